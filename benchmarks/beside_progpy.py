@@ -95,9 +95,8 @@ def truth() -> np.ndarray:
 
 
 def ours() -> tuple[np.ndarray, float]:
-    from leg_wear_monitor.monitor.config.forecast import Forecasting
-    from leg_wear_monitor.monitor.forecast.forecast import JointCondition, forecast
-    from leg_wear_monitor.monitor.forecast.growth_law import GrowthLaw
+    from leg_wear_monitor.monitor.config.sections import Forecasting
+    from leg_wear_monitor.monitor.forecast.forecast import GrowthLaw, JointCondition, forecast
     from leg_wear_monitor.monitor.forecast.wear_coefficients import estimate_coefficient
 
     law = GrowthLaw(np.array([[POWER]]), np.array([FRESH]), np.array([1.0]), np.zeros(1))

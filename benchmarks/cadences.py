@@ -24,20 +24,18 @@ import attrs
 import numpy as np
 from diagnosis import LEGS, NEW, kept, truth
 
-from leg_wear_monitor import MonitorConfig, WearMonitor, load_mechanism
-from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.run.drive import quintic
-from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, new_run_statistics
+from leg_wear_monitor import MonitorConfig, WearMonitor, load_mechanism, twin
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.run import TORQUE, new_run_statistics, quintic
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.estimate.cause import Cause, Change
 from leg_wear_monitor.gait.config import PaceConfig
-from leg_wear_monitor.gait.pace import Pace
+from leg_wear_monitor.gait.leg import Pace
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.inputs import Cadence
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState
+from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.reports import CycleReport
 from leg_wear_monitor.monitor.verdict.verdict import Verdict
-from leg_wear_monitor.twin import kinds
 from leg_wear_monitor.twin.sample import gait_samples
 
 NOISE_RAD, NOISE_NM = 1.0e-3, 0.5
@@ -125,8 +123,8 @@ def samples_of(walk: Walk, random: np.random.Generator) -> np.ndarray:
     stamps = 10**9 + (walk.first + np.arange(count) + 1) * PERIOD_NS
     angle = walk.angle + NOISE_RAD * random.standard_normal(count)
     torque = walk.torque + NOISE_NM * random.standard_normal(count)
-    crank = gait_samples(stamps, kinds.CRANK, crank_angle_rad=angle)
-    return np.stack([crank, gait_samples(stamps, kinds.TORQUE, torque_nm=torque)], axis=1).ravel()
+    crank = gait_samples(stamps, twin.CRANK, crank_angle_rad=angle)
+    return np.stack([crank, gait_samples(stamps, twin.TORQUE, torque_nm=torque)], axis=1).ravel()
 
 
 class Look(NamedTuple):

@@ -10,10 +10,8 @@ import numpy as np
 from watch import Watch
 
 from leg_wear_monitor.dynamics.clearance.stepper import INTERVALS, ClearanceStepper
-from leg_wear_monitor.dynamics.run.drive import steady_drive
-from leg_wear_monitor.dynamics.run.protocol import Setup
-from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
-from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.dynamics.run import Setup, new_run_statistics, steady_drive
+from leg_wear_monitor.mechanism.position import TURN
 
 CALLS = 100_000
 TURNS = 5  # cycles

@@ -6,32 +6,30 @@ The chain is 0, which the compiler does not know.
 
 import math
 
-from leg_wear_monitor.contact.friction import friction_force
-from leg_wear_monitor.contact.normal.laws import normal_force
+from leg_wear_monitor.compiled.kernel import entry
+from leg_wear_monitor.contact.arrays import friction_force
+from leg_wear_monitor.contact.normal import normal_force
+from leg_wear_monitor.dynamics.clearance.advance import drive_torque, reactions, toe_deviation
 from leg_wear_monitor.dynamics.clearance.contact import (
     A0,
     E0,
-    K1E,
-    K1V,
-    V0,
-    accelerate_clearances,
-)
-from leg_wear_monitor.dynamics.clearance.joint_laws import (
     FRESH_COEFFICIENT,
     FRICTION_COEFFICIENT,
     FRICTION_LAW,
     HYSTERESIS_FACTOR,
+    K1E,
+    K1V,
     NORMAL_FORM,
     RAMP_0,
     RAMP_1,
+    V0,
+    accelerate_clearances,
 )
+from leg_wear_monitor.dynamics.clearance.film_system import factorise_contacts, solve_contacts
 from leg_wear_monitor.dynamics.clearance.model import hold_eccentricities, take_tables
-from leg_wear_monitor.dynamics.clearance.outputs import drive_torque, reactions, toe_deviation
-from leg_wear_monitor.dynamics.clearance.rosenbrock import factorise_contacts, solve_contacts
 from leg_wear_monitor.dynamics.clearance.step import integrate_joints, shift_start, try_step
-from leg_wear_monitor.dynamics.joint.contact_event import DELTA, first_contact_event, update_contacts
-from leg_wear_monitor.kernel import entry
-from leg_wear_monitor.wear.surfaces import deposit_wear
+from leg_wear_monitor.dynamics.joint import DELTA, first_contact_event, update_contacts
+from leg_wear_monitor.wear import deposit_wear
 
 STEP = 1.0e-5  # s
 

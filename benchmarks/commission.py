@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from leg_wear_monitor.bags.mcap.writer import McapWriter
+from leg_wear_monitor.bags.mcap_writer import McapWriter
 from leg_wear_monitor.commissioning.commission import commission
-from leg_wear_monitor.commissioning.result.commissioning_result import CommissioningItem, CommissioningResult
+from leg_wear_monitor.commissioning.result import CommissioningItem, CommissioningResult
 from leg_wear_monitor.gait.config import GaitConfig, LoadConfig, PaceConfig
 from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.mechanism.arrays import Floats

@@ -20,18 +20,16 @@ from diagnosis import explained, kept, measured, named, new, referred, simulated
 from disturbed import MASSES, NEW, NOISE_NM, walked
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.estimate.change_detector import ChangeDetector
-from leg_wear_monitor.estimate.drive_compliance import leg_behind_coupling
-from leg_wear_monitor.estimate.identification import UNLIKE_FILE, identified_leg, misfit
+from leg_wear_monitor.estimate.channel import leg_behind_coupling
+from leg_wear_monitor.estimate.leg_model import UNLIKE_FILE, ChangeDetector, identified_leg, misfit
 from leg_wear_monitor.estimate.signature import TorqueSensor
-from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
 from leg_wear_monitor.mechanism.spec import Mechanism, Track, TrackDrive
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.monitor.diagnosis.references import ROUNDS
-from leg_wear_monitor.twin.follower.load import torque_size
-from leg_wear_monitor.twin.reference.leg_parameters import COUPLING_DAMPING, LegParameters
-from leg_wear_monitor.twin.reference.torque_reference import TorqueReference, TorqueReferenceRun
+from leg_wear_monitor.twin.load import torque_size
+from leg_wear_monitor.twin.reference import COUPLING_DAMPING, LegParameters
+from leg_wear_monitor.twin.torque_reference import TorqueReference, TorqueReferenceRun
 
 STIFFNESS_NM_PER_RAD = (1000.0, 200.0)
 OPENINGS = (("G", 0.6), ("J", 1.0), ("B", 0.45), ("A", 0.45), ("I", 0.6))

@@ -16,16 +16,14 @@ import attrs
 import numpy as np
 from diagnosis import BODIES, LEGS, NEW, kept, truth
 
-from leg_wear_monitor import MonitorConfig, WearMonitor, load_mechanism
-from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.result.statistics import percentile
-from leg_wear_monitor.dynamics.run.drive import quintic
-from leg_wear_monitor.dynamics.run.run_statistics import FORCE, TORQUE, new_run_statistics
+from leg_wear_monitor import MonitorConfig, WearMonitor, load_mechanism, twin
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.run import FORCE, TORQUE, new_run_statistics, quintic
 from leg_wear_monitor.dynamics.simulation import prepare
+from leg_wear_monitor.dynamics.statistics import percentile
 from leg_wear_monitor.gait.config import PaceConfig
-from leg_wear_monitor.gait.pace import Pace
+from leg_wear_monitor.gait.leg import Pace
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.twin import kinds
 from leg_wear_monitor.twin.sample import gait_samples
 
 SAMPLES, NOISE_RAD, NOISE_NM = 200, 1.0e-3, 0.5  # of a gait cycle, which takes a second
@@ -93,8 +91,8 @@ def samples_of(walk: Walk, first: int, random: np.random.Generator) -> np.ndarra
     stamps = 10**9 + (first * SAMPLES + np.arange(count) + 1) * PERIOD_NS
     angle = walk.angle + NOISE_RAD * random.standard_normal(count)
     torque = walk.torque + NOISE_NM * random.standard_normal(count)
-    crank = gait_samples(stamps, kinds.CRANK, crank_angle_rad=angle)
-    return np.stack([crank, gait_samples(stamps, kinds.TORQUE, torque_nm=torque)], axis=1).ravel()
+    crank = gait_samples(stamps, twin.CRANK, crank_angle_rad=angle)
+    return np.stack([crank, gait_samples(stamps, twin.TORQUE, torque_nm=torque)], axis=1).ravel()
 
 
 def reported(monitor: WearMonitor, samples: np.ndarray) -> dict[int, np.ndarray]:

@@ -12,15 +12,14 @@ import numpy as np
 from commission import START_NS, TURN, WALK_S, walk_of, walked
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.estimate.torque_fit.torque_model import TorqueModel, torque_model
+from leg_wear_monitor.estimate.torque_model import TorqueModel, torque_model
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.config.parameters import config_from
-from leg_wear_monitor.monitor.crank_zero.crank_zero import CrankZero
-from leg_wear_monitor.monitor.crank_zero.phase import Zero
-from leg_wear_monitor.monitor.evaluation.evaluation_period import A_CYCLE, EvaluationPeriods
-from leg_wear_monitor.twin.kinds import CRANK, TORQUE
-from leg_wear_monitor.twin.sample import Samples, gait_samples
-from leg_wear_monitor.twin.settings import TrackerSettings
+from leg_wear_monitor.monitor.crank_walk import Zero
+from leg_wear_monitor.monitor.crank_zero import CrankZero
+from leg_wear_monitor.monitor.evaluation import A_CYCLE, EvaluationPeriods
+from leg_wear_monitor.twin import CRANK, TORQUE
+from leg_wear_monitor.twin.sample import Samples, TrackerSettings, gait_samples
 
 BOOTS = 4  # of each cadence and sampling
 NOISE_RAD, NOISE_NM = 1.0e-3, 0.3

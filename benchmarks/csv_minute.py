@@ -19,12 +19,11 @@ import numpy as np
 from diagnosis import LEGS, NEW, truth
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.run.drive import quintic
-from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, new_run_statistics
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.run import TORQUE, new_run_statistics, quintic
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.gait.config import PaceConfig
-from leg_wear_monitor.gait.pace import Pace
+from leg_wear_monitor.gait.leg import Pace
 
 RPM, RATE_HZ, NOISE_RAD, NOISE_NM = 57.0, 199.58, 1.0e-3, 0.5
 OFFSET_RAD, BEGIN_MS = 0.7956, 1772352000000

@@ -20,20 +20,17 @@ import numpy as np
 from diagnosis import NEW, kept
 
 from leg_wear_monitor import MonitorConfig, load_mechanism
-from leg_wear_monitor.commissioning.evidence.detection import SOON, WIDER, joint_detections
-from leg_wear_monitor.commissioning.evidence.walk import Walk
+from leg_wear_monitor.commissioning.detection import OPENED, SOON, Walk, joint_detections
 from leg_wear_monitor.estimate.cause import Cause
-from leg_wear_monitor.estimate.change_detector import ChangeDetector
-from leg_wear_monitor.estimate.leg_model import change_of, explainer_of
+from leg_wear_monitor.estimate.leg_model import ChangeDetector, change_of, explainer_of
 from leg_wear_monitor.estimate.signature import TorqueSensor
-from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.position import TURN, build_linkage
 from leg_wear_monitor.monitor.config.fitting import fitted
-from leg_wear_monitor.monitor.diagnosis.leg_models import COMMISSIONING_CYCLES, LegModels
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
+from leg_wear_monitor.monitor.diagnosis.references import COMMISSIONING_CYCLES, LegModels
 from leg_wear_monitor.monitor.diagnosis.state import SignedCycle
-from leg_wear_monitor.twin.follower.load import torque_size
-from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
+from leg_wear_monitor.twin.load import torque_size
+from leg_wear_monitor.twin.reference import LegParameters
 
 SENSORS = (
     (200.0, 0.5, 0.0),
@@ -103,7 +100,7 @@ def main() -> None:
         explainer = explainer_of(leg, reference, own, walk.baseline)
         detector = ChangeDetector(explainer, NEW, 3600.0 * MonitorConfig().diagnosis.false_alarm_hours)
         for joint, one in found.items():
-            for i, factor in enumerate(WIDER):
+            for i, factor in enumerate(OPENED):
                 rows = rows_of(joint, 0.3 * factor, sensor, hz, 6)
                 begins = [np.concatenate([rows[j:], rows]) for j in range(0, len(rows) - 2, EVERY)]
                 waits = [detected(detector, part) for part in begins]

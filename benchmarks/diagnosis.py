@@ -23,42 +23,44 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.run.drive import quintic
-from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, new_run_statistics
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.run import TORQUE, new_run_statistics, quintic
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.estimate.cause import Cause
-from leg_wear_monitor.estimate.change_detector import ChangeDetector
-from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
 from leg_wear_monitor.estimate.explanations import Explainer
-from leg_wear_monitor.estimate.identification import (
+from leg_wear_monitor.estimate.leg_model import (
     FAR_FROM_FILE,
     UNLIKE_FILE,
+    ChangeDetector,
+    best_fit,
+    explainer_of,
     identified_leg,
     leg_of_ideal_torque,
     misfit,
 )
-from leg_wear_monitor.estimate.leg_model import best_fit, explainer_of
-from leg_wear_monitor.estimate.signature import TorqueSensor, averaged, signatures
-from leg_wear_monitor.estimate.signature_model import with_noise_of
+from leg_wear_monitor.estimate.signature import (
+    CommissionedTorque,
+    TorqueSensor,
+    averaged,
+    signatures,
+    with_noise_of,
+)
 from leg_wear_monitor.gait.config import PaceConfig
-from leg_wear_monitor.gait.pace import Pace
-from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.gait.leg import Pace
+from leg_wear_monitor.mechanism.position import TURN, build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState
-from leg_wear_monitor.monitor.diagnosis.leg_models import LegModels
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
-from leg_wear_monitor.twin.follower.load import torque_size
-from leg_wear_monitor.twin.kinds import CRANK
-from leg_wear_monitor.twin.kinds import TORQUE as TORQUE_SAMPLE
-from leg_wear_monitor.twin.reference.crank_profile import CrankProfile, cycle_profile, mean_profile
-from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
-from leg_wear_monitor.twin.reference.leg_simulation import LegSimulation
-from leg_wear_monitor.twin.reference.torque_reference import TorqueReference, TorqueReferenceRun
+from leg_wear_monitor.monitor.diagnosis.references import LegModels
+from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
+from leg_wear_monitor.twin import CRANK
+from leg_wear_monitor.twin import TORQUE as TORQUE_SAMPLE
+from leg_wear_monitor.twin.leg_simulation import LegSimulation
+from leg_wear_monitor.twin.load import torque_size
+from leg_wear_monitor.twin.reference import CrankProfile, LegParameters, cycle_profile, mean_profile
 from leg_wear_monitor.twin.sample import gait_samples
-from leg_wear_monitor.wear.surfaces import SECTORS
+from leg_wear_monitor.twin.torque_reference import TorqueReference, TorqueReferenceRun
+from leg_wear_monitor.wear import SECTORS
 
 RATE = 1000  # steps of a gait cycle at which a walk is kept
 COMMISSIONING, AFTER, HEALTHY = 60, 60, 160

@@ -35,16 +35,14 @@ from diagnosis import (
 )
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.estimate.change_detector import ChangeDetector
 from leg_wear_monitor.estimate.explanations import Explainer
-from leg_wear_monitor.estimate.identification import UNLIKE_FILE, misfit
+from leg_wear_monitor.estimate.leg_model import UNLIKE_FILE, ChangeDetector, misfit
 from leg_wear_monitor.estimate.signature import TorqueSensor
-from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle, point_motion
 from leg_wear_monitor.mechanism.spec import Mechanism, PhaseLoad
 from leg_wear_monitor.monitor.diagnosis.references import ROUNDS
-from leg_wear_monitor.twin.follower.load import torque_size
-from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
+from leg_wear_monitor.twin.load import torque_size
+from leg_wear_monitor.twin.reference import LegParameters
 
 SIZES, CYCLES = (3.6e-4, 1.0e-3), 40
 RATES, NOISES_NM, INSTANTS = (50.0, 100.0, 200.0, 500.0, 1000.0), (0.05, 0.5, 2.0), (200.0, 1000.0)

@@ -18,14 +18,11 @@ from diagnosis_conditions import known_reference
 from numba import njit
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.estimate.change_detector import ChangeDetector, DetectorState
-from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
-from leg_wear_monitor.estimate.leg_model import explainer_of
-from leg_wear_monitor.estimate.signature import TorqueSensor
-from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.mechanism.position import build_linkage
-from leg_wear_monitor.monitor.diagnosis.leg_models import LegModels
-from leg_wear_monitor.twin.follower.load import load_signature, torque_size
+from leg_wear_monitor.estimate.leg_model import ChangeDetector, DetectorState, explainer_of
+from leg_wear_monitor.estimate.signature import CommissionedTorque, TorqueSensor
+from leg_wear_monitor.mechanism.position import TURN, build_linkage
+from leg_wear_monitor.monitor.diagnosis.references import LegModels
+from leg_wear_monitor.twin.load import load_signature, torque_size
 
 NOISE_NM, BLOCK, STRETCH = 0.5, 10, 1000  # N m; gait cycles
 FAR = 1.0e6  # a sum from which no gait cycle leads below zero

@@ -21,20 +21,19 @@ import numpy as np
 from diagnosis import BODIES, CLOCK, NEW, RATE, UNWORN, kept, measured
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.run.drive import quintic
-from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, new_run_statistics
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.run import TORQUE, new_run_statistics, quintic
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.estimate.signature import TorqueSensor, signatures
-from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle, point_motion
 from leg_wear_monitor.mechanism.spec import Mechanism, PhaseLoad
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.diagnosis import leg_models, observer, references
+from leg_wear_monitor.monitor.diagnosis import observer, references
+from leg_wear_monitor.monitor.diagnosis import references as leg_models
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.monitor.diagnosis.state import SignedCycle
-from leg_wear_monitor.twin.follower.load import torque_size
-from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
+from leg_wear_monitor.twin.load import torque_size
+from leg_wear_monitor.twin.reference import LegParameters
 
 MASSES = dict(zip(BODIES, (1.04, 0.96, 1.04, 0.96, 1.04, 0.96, 1.04), strict=True))
 # force over its peak in stance, sum of sines of half turns: two overground stances (ground_reaction.json)

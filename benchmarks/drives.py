@@ -25,11 +25,11 @@ from disturbed import COMMISSIONED, HEALTHY, MASSES, WORN, drawn, signed, walked
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.estimate.signature import TorqueSensor
-from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.mechanism.position import build_linkage
-from leg_wear_monitor.monitor.diagnosis import leg_models, references
-from leg_wear_monitor.twin.follower.load import torque_size
-from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
+from leg_wear_monitor.mechanism.position import TURN, build_linkage
+from leg_wear_monitor.monitor.diagnosis import references
+from leg_wear_monitor.monitor.diagnosis import references as leg_models
+from leg_wear_monitor.twin.load import torque_size
+from leg_wear_monitor.twin.reference import LegParameters
 
 OPENINGS = (  # and the walk, whose start is another one
     *((joint, 0.45, 0) for joint in "ABGI"), *(("J", 0.45, walk) for walk in range(3)),

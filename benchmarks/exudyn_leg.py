@@ -19,9 +19,9 @@ import attrs
 import numpy as np
 from watch import Watch
 
-from leg_wear_monitor.dynamics.run.protocol import Setup
+from leg_wear_monitor.dynamics.run import Setup
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ideal import ideal_motion
+from leg_wear_monitor.mechanism.position import ideal_motion
 
 sys.exudynFast = True  # type: ignore[attr-defined]
 import exudyn  # noqa: E402

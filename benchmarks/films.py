@@ -15,10 +15,10 @@ import attrs
 from watch import Watch
 
 from leg_wear_monitor import Mechanism, load_mechanism
-from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
-from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
+from leg_wear_monitor.dynamics.clearance.stepper import ClearanceRun
+from leg_wear_monitor.dynamics.run import new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.mechanism.clearance import Film
+from leg_wear_monitor.mechanism.spec import Film
 
 FIVE = ("A", "B", "G", "I", "J")
 VISCOSITIES = (0.0, 0.01, 0.03, 0.1, 0.3, 1.0)  # Pa s

@@ -19,13 +19,13 @@ from pathlib import Path
 
 import numpy as np
 
-from leg_wear_monitor.bags.mcap.writer import McapWriter
-from leg_wear_monitor.fleet.overview.read import load_overview
+from leg_wear_monitor.bags.mcap_writer import McapWriter
+from leg_wear_monitor.fleet.overview import load_overview
 from leg_wear_monitor.gait.config import EncoderConfig, GaitConfig, PaceConfig, TorqueSensorConfig
 from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.sensors import readings
 from leg_wear_monitor.messages import encode
-from leg_wear_monitor.twin.kinds import TORQUE
+from leg_wear_monitor.twin import TORQUE
 
 RATE_HZ, WALK_S, BEGIN_NS = 200, 12, 1_790_000_000 * 10**9
 DAY_S, NEW_M, WORN_M = 86_400, 3.0e-4, 1.0e-3

@@ -15,10 +15,8 @@ from statistics import NormalDist
 
 import numpy as np
 
-from leg_wear_monitor.fleet.learning.learn import learn
-from leg_wear_monitor.fleet.learning.levels import LOT, PAIR, PART
-from leg_wear_monitor.fleet.learning.part import Part
-from leg_wear_monitor.monitor.forecast.coefficient_prior import CoefficientPrior
+from leg_wear_monitor.fleet.learning import LOT, PAIR, PART, Part, learn
+from leg_wear_monitor.monitor.forecast.wear_coefficients import CoefficientPrior
 
 SIGMA, ERROR_M, Z90 = 0.7, 7.0e-6, NormalDist().inv_cdf(0.9)  # 5 µm of the new part, 5 µm of the measurement
 LEGS, ASKED = 20, (1, 5, 20)

@@ -14,8 +14,8 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1] / "test"))
 from made_up_fleet import NOW_NS, random_fleet
 
-from leg_wear_monitor.report.fleet.page import fleet_page
-from leg_wear_monitor.report.fleet.standing import Day
+from leg_wear_monitor.report.fleet_page import fleet_page
+from leg_wear_monitor.report.fleet_standing import Day
 from leg_wear_monitor.report.page import page_html
 
 # The time until the layout is up to date: the browser then only has to paint.

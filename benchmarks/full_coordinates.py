@@ -16,13 +16,12 @@ import numba
 import numpy as np
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics.full.model import FullModel, accelerate, add_contacts, full_scratch
-from leg_wear_monitor.dynamics.full.run import TOLERANCE_M, FullRun
-from leg_wear_monitor.dynamics.run.run_statistics import FORCE, JOINT_RATES, new_run_statistics
+from leg_wear_monitor.compiled.kernel import entry
+from leg_wear_monitor.dynamics.full_model import FullModel, accelerate, add_contacts, full_scratch
+from leg_wear_monitor.dynamics.full_run import TOLERANCE_M, FullRun
+from leg_wear_monitor.dynamics.run import FORCE, JOINT_RATES, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.kernel import entry
-from leg_wear_monitor.mechanism.constraints import closures, rotations
-from leg_wear_monitor.mechanism.forces import applied_forces
+from leg_wear_monitor.mechanism.constraints import applied_forces, closures, rotations
 
 LEG = load_mechanism("bionic_leg")
 FIVE = ("A", "B", "G", "I", "J")

@@ -23,25 +23,22 @@ from disturbed import MASSES, drawn, watched
 from drives import Drive, cycles_of, summary, when
 
 from leg_wear_monitor import MonitorConfig, load_mechanism
-from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.run.drive import quintic
-from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, TORQUE, new_run_statistics
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.run import ARCHARD, TORQUE, new_run_statistics, quintic
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.estimate.signature import TorqueSensor
 from leg_wear_monitor.gait.config import GaitConfig, LoadConfig
-from leg_wear_monitor.gait.ground import POINTS, Ground
-from leg_wear_monitor.mechanism.ground_reaction import with_toe_force
-from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.gait.leg import POINTS, Ground
+from leg_wear_monitor.mechanism.person import with_toe_force
+from leg_wear_monitor.mechanism.position import TURN, build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.inputs import Load
+from leg_wear_monitor.twin import CRANK
+from leg_wear_monitor.twin import TORQUE as TORQUE_KIND
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
-from leg_wear_monitor.twin.follower.load import torque_size
-from leg_wear_monitor.twin.kinds import CRANK
-from leg_wear_monitor.twin.kinds import TORQUE as TORQUE_KIND
-from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
-from leg_wear_monitor.twin.sample import gait_samples
-from leg_wear_monitor.twin.settings import GROUND, STANCE, TwinSettings
+from leg_wear_monitor.twin.load import torque_size
+from leg_wear_monitor.twin.reference import LegParameters
+from leg_wear_monitor.twin.sample import GROUND, STANCE, TwinSettings, gait_samples
 
 PEAKS_N = (100.0, 300.0, 600.0)
 BEFORE, HEALTHY, WORN, COUNTED = 140, 260, 40, 60

@@ -14,7 +14,7 @@ import numpy as np
 
 from leg_wear_monitor import Mechanism, load_mechanism, simulate
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ground_reaction import (
+from leg_wear_monitor.mechanism.person import (
     FORE_AFT,
     PHASES,
     Stance,

@@ -21,16 +21,14 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.run.drive import quintic
-from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, new_run_statistics
+from leg_wear_monitor import twin as kinds
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.run import TORQUE, new_run_statistics, quintic
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.gait.config import PaceConfig
-from leg_wear_monitor.gait.pace import Pace
+from leg_wear_monitor.gait.leg import Pace
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, growth_rate
-from leg_wear_monitor.monitor.forecast.model_error import ModelError, model_error
-from leg_wear_monitor.twin import kinds
+from leg_wear_monitor.monitor.forecast.measurement import GrowthWindow, ModelError, growth_rate, model_error
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import gait_samples
 

@@ -13,20 +13,21 @@ import numpy as np
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
-from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.run.drive import steady_drive
-from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.run import new_run_statistics, steady_drive
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.arrays import body_names
 from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.angle_regression import (
+    ClearanceObservation,
+    ClearanceRegression,
+    clearance_estimates,
+    rms,
+)
 from leg_wear_monitor.monitor.config.inputs import Encoders
-from leg_wear_monitor.monitor.encoders.angle_regression import rms
-from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObservation, clearance_estimates
-from leg_wear_monitor.monitor.encoders.clearance_regression import ClearanceRegression
-from leg_wear_monitor.monitor.encoders.commissioning import commissioned, errors_of, known_with
-from leg_wear_monitor.twin.reference.joint_angles import angle_model
-from leg_wear_monitor.twin.reference.reference import ReferenceRun
-from leg_wear_monitor.wear.surfaces import SECTORS
+from leg_wear_monitor.monitor.encoders import commissioned, errors_of, known_with
+from leg_wear_monitor.twin.reference import ReferenceRun, angle_model
+from leg_wear_monitor.wear import SECTORS
 
 SENSORS = {"B": "hip", "G": "knee", "I": "ankle"}
 FRESH, WORN = 3.0e-4, 4.5e-4

@@ -16,7 +16,7 @@ import numpy as np
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.life.life import LifeRun, LifeSettings
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.config.forecast import Forecasting
+from leg_wear_monitor.monitor.config.sections import Forecasting
 
 LIMIT_M = 6.0e-4
 MOST_JUMPS = 400

@@ -14,21 +14,18 @@ from diagnosis import NEW, profile_of, truth
 from hidden import OFFSET, SCALE, SENSORS, UNKNOWN, UNKNOWN_M
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.run.drive import quintic
-from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, new_run_statistics
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.run import TORQUE, new_run_statistics, quintic
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.gait.config import PaceConfig
-from leg_wear_monitor.gait.pace import Pace
+from leg_wear_monitor.gait.leg import Pace
 from leg_wear_monitor.mechanism.arrays import body_names
-from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.encoders.clearance_regression import ClearanceRegression
-from leg_wear_monitor.monitor.encoders.commissioning import EncoderErrors, commissioned, known_with
-from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
-from leg_wear_monitor.twin.reference.joint_angles import AngleModel, angle_model
-from leg_wear_monitor.twin.reference.reference import Reference, ReferenceRun
-from leg_wear_monitor.wear.surfaces import SECTORS
+from leg_wear_monitor.monitor.angle_regression import ClearanceRegression
+from leg_wear_monitor.monitor.encoders import EncoderErrors, commissioned, known_with
+from leg_wear_monitor.twin.reference import AngleModel, CrankProfile, Reference, ReferenceRun, angle_model
+from leg_wear_monitor.wear import SECTORS
 
 RATE = 1000  # steps of a gait cycle at which a walk is kept; encoders give each fifth
 RIPPLE, NOISE_RAD = 0.03, 1.0e-4

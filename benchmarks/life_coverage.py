@@ -15,10 +15,9 @@ import numpy as np
 from hidden_lives import LIMIT_M, HiddenLife, read
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.monitor.config.forecast import Forecasting
-from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointCondition, forecast
-from leg_wear_monitor.monitor.forecast.growth_law import GrowthLaw
-from leg_wear_monitor.monitor.forecast.life_file import law_of
+from leg_wear_monitor.monitor.config.sections import Forecasting
+from leg_wear_monitor.monitor.forecast.forecast import Forecast, GrowthLaw, JointCondition, forecast
+from leg_wear_monitor.monitor.forecast.forecaster import law_of
 from leg_wear_monitor.monitor.forecast.wear_coefficients import MeasuredClearance, estimate_coefficient
 
 FRESH_M, MEASURED_M, GROWTH_NOISE = 3.0e-4, 5.0e-6, 0.03

@@ -44,11 +44,10 @@ from leg_wear_monitor.gait.config import (
 )
 from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.sensors import readings
-from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
-from leg_wear_monitor.ros.gait_publisher.sensor_messages import sensor_message
+from leg_wear_monitor.ros.gait_publisher import PublisherConfig, sensor_message
 from leg_wear_monitor.ros.running import spin
-from leg_wear_monitor.twin.kinds import CRANK, LOAD, TORQUE
-from leg_wear_monitor.twin.settings import TrackerSettings
+from leg_wear_monitor.twin import CRANK, LOAD, TORQUE
+from leg_wear_monitor.twin.sample import TrackerSettings
 
 LOOP_CYCLES = 8  # that are sent again and again, with an angle that wraps
 STAMP = slice(4, 12)  # of a header in CDR

@@ -11,10 +11,9 @@ import numpy as np
 from exudyn_leg import ExudynLeg, Scheme
 from scipy_leg import METHODS, ScipyLeg
 
-from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
-from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.run.protocol import Setup
-from leg_wear_monitor.dynamics.run.run_statistics import FORCE, RunStatistics, new_run_statistics
+from leg_wear_monitor.dynamics.clearance.stepper import ClearanceRun
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.run import FORCE, RunStatistics, Setup, new_run_statistics
 
 ALLOWED = 0.02
 IMPLICIT = tuple(Scheme(1.0e-6 * us) for us in (1280.0, 640.0, 320.0, 160.0, 80.0, 20.0))

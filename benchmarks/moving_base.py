@@ -11,10 +11,8 @@ import numpy as np
 
 from leg_wear_monitor import Mechanism, load_mechanism, simulate
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ground_reaction import PHASES, nominal_stance, on_the_ground
-from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
-from leg_wear_monitor.mechanism.person import with_person
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.person import PHASES, nominal_stance, on_the_ground, with_person
+from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
 from leg_wear_monitor.mechanism.spec import PhaseLoad
 
 LEGS = ((0.0, 0.0), (300.0, 0.0), (600.0, 0.0), (600.0, 80.0))  # vertical peak [N], person [kg]

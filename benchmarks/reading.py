@@ -15,9 +15,9 @@ from watch import Watch
 
 from leg_wear_monitor.bags.reader import Recording
 from leg_wear_monitor.messages import encode
-from leg_wear_monitor.messages.definitions import definition
+from leg_wear_monitor.messages.streams import definition
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.twin.kinds import CRANK
+from leg_wear_monitor.twin import CRANK
 
 NAMES = ["hip", "knee", "ankle", "crank", "toe", "pelvis", "spare"]
 TOPICS = {"/joint_states": encode.JOINT_STATE, "/drive_torque": encode.WRENCH_STAMPED}

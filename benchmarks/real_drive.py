@@ -36,15 +36,15 @@ from real_robot import FOLDER as ROBOT
 from real_robot import print_tables
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.position import TURN, build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.diagnosis import leg_models, references
+from leg_wear_monitor.monitor.diagnosis import references
+from leg_wear_monitor.monitor.diagnosis import references as leg_models
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver, TorqueObserverSnapshot
-from leg_wear_monitor.twin.follower.load import torque_size
-from leg_wear_monitor.twin.kinds import CRANK, TORQUE
-from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
+from leg_wear_monitor.twin import CRANK, TORQUE
+from leg_wear_monitor.twin.load import torque_size
+from leg_wear_monitor.twin.reference import LegParameters
 from leg_wear_monitor.twin.sample import gait_samples
 
 NOISE_RAD = 1.0e-3

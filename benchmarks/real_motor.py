@@ -7,11 +7,10 @@ import attrs
 import numpy as np
 from diagnosis import RATE
 
-from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.run.drive import CrankMotion, quintic
-from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, new_run_statistics
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.run import TORQUE, CrankMotion, new_run_statistics, quintic
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 
 FILE = Path("laas_anti_cogging/codes/Testing/speed_data/speed_test.txt")

@@ -32,14 +32,18 @@ import one_core  # noqa: F401, before numpy
 import numpy as np
 
 from leg_wear_monitor.estimate.cause import Cause, Change
-from leg_wear_monitor.estimate.change_detector import threshold
-from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
 from leg_wear_monitor.estimate.explanations import Explainer, Nuisance
-from leg_wear_monitor.estimate.leg_model import change_of
-from leg_wear_monitor.estimate.nuisances import commissioned_baseline, with_scatter_of
-from leg_wear_monitor.estimate.signature import PhaseMeans, TorqueSensor, averaged, signatures
-from leg_wear_monitor.estimate.signature_model import SignatureModel
-from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.estimate.ground_load import commissioned_baseline, with_scatter_of
+from leg_wear_monitor.estimate.leg_model import change_of, threshold
+from leg_wear_monitor.estimate.signature import (
+    CommissionedTorque,
+    PhaseMeans,
+    SignatureModel,
+    TorqueSensor,
+    averaged,
+    signatures,
+)
+from leg_wear_monitor.mechanism.position import TURN
 
 FOLDER = Path("dynamic_calibration/dataset_ur10e")
 JOINTS, STEP_S, PERIOD_S = 6, 0.01, 10.0
@@ -58,7 +62,7 @@ ALPHA = (np.pi / 2, 0.0, 0.0, np.pi / 2, -np.pi / 2, 0.0)
 GRAVITY = 9.81
 ROUNDED = 1.0e-6  # [N m/kg], the lever of the flange about the last joint's axis
 
-# usual changes of a drive that is all right, as in estimate/nuisances.py
+# usual changes of a drive that is all right, as in estimate/ground_load.py
 FRICTION, SCALE, OFFSET_RAD = 0.1, 0.02, 0.01
 
 

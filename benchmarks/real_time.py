@@ -44,10 +44,9 @@ from scipy_leg import ScipyLeg, impact_speeds
 from watch import Watch
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
-from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.run.protocol import Setup
-from leg_wear_monitor.dynamics.run.run_statistics import RunStatistics, new_run_statistics
+from leg_wear_monitor.dynamics.clearance.stepper import ClearanceRun
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.run import RunStatistics, Setup, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 
 LEG = load_mechanism("bionic_leg")

@@ -15,7 +15,7 @@ import zstandard
 from mcap.reader import make_reader
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.bags.mcap.writer import McapWriter
+from leg_wear_monitor.bags.mcap_writer import McapWriter
 
 ROOT = Path(__file__).parents[1]
 DOMAIN = "77"

@@ -20,9 +20,8 @@ import attrs
 import numpy as np
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
-from leg_wear_monitor.mechanism.position import build_linkage
-from leg_wear_monitor.twin.follower.load import load_signature
+from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
+from leg_wear_monitor.twin.load import load_signature
 
 RATE_HZ = 200.0
 CADENCES_RPM, LOADS_N = (52.0, 56.0, 60.0, 64.0, 68.0), (0.0, 15.0, 30.0)

@@ -19,9 +19,9 @@ import one_core  # before numpy
 from watch import Watch
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics.batch.batch import Leg, simulate_batch
-from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
-from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
+from leg_wear_monitor.dynamics.batch import Leg, simulate_batch
+from leg_wear_monitor.dynamics.clearance.stepper import ClearanceRun
+from leg_wear_monitor.dynamics.run import new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 
 LEG = load_mechanism("bionic_leg")

@@ -14,10 +14,9 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from watch import Watch
 
-from leg_wear_monitor.dynamics.full.model import FullScratch, accelerate, full_scratch
-from leg_wear_monitor.dynamics.full.run import TOLERANCE_RATE, FullRun
-from leg_wear_monitor.dynamics.run.protocol import Setup
-from leg_wear_monitor.dynamics.run.run_statistics import DRIVE_RATES, FORCE, JOINT_RATES, SPEED, RunStatistics
+from leg_wear_monitor.dynamics.full_model import FullScratch, accelerate, full_scratch
+from leg_wear_monitor.dynamics.full_run import TOLERANCE_RATE, FullRun
+from leg_wear_monitor.dynamics.run import DRIVE_RATES, FORCE, JOINT_RATES, SPEED, RunStatistics, Setup
 from leg_wear_monitor.mechanism.arrays import Floats
 
 METHODS = ("LSODA", "Radau", "DOP853", "RK45")

@@ -11,12 +11,12 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
-from leg_wear_monitor.dynamics.result.statistics import energy_balance, joint_statistics
-from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, new_run_statistics
+from leg_wear_monitor.dynamics.clearance.stepper import ClearanceRun
+from leg_wear_monitor.dynamics.run import ARCHARD, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
+from leg_wear_monitor.dynamics.statistics import energy_balance, joint_statistics
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.wear.surfaces import worn_volume
+from leg_wear_monitor.wear import worn_volume
 
 JOINTS = ("A", "B", "G", "I", "J")
 

@@ -24,12 +24,10 @@ os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM
 from watch import Watch
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.studies.execution.run import run_study
-from leg_wear_monitor.studies.plan.settings import STUDIES, load_settings, parse_settings
-from leg_wear_monitor.studies.plan.study import Study
-from leg_wear_monitor.studies.point import code_digest
+from leg_wear_monitor.studies.execution import STUDIES, load_settings, parse_settings, run_study
+from leg_wear_monitor.studies.leg_tasks import compute
+from leg_wear_monitor.studies.plan import Study, code_digest
 from leg_wear_monitor.studies.results import load_results
-from leg_wear_monitor.studies.tasks.compute import compute
 
 CORES, LEGS = 100, 1000
 

@@ -13,85 +13,76 @@ if TYPE_CHECKING:
     from typing import Any
 
     from leg_wear_monitor.commissioning.commission import commission
-    from leg_wear_monitor.commissioning.result.commissioning_result import (
-        CommissioningItem,
-        CommissioningResult,
-    )
-    from leg_wear_monitor.commissioning.result.joint_detection import JointDetection
-    from leg_wear_monitor.dynamics.result.parts import (
+    from leg_wear_monitor.commissioning.result import CommissioningItem, CommissioningResult, JointDetection
+    from leg_wear_monitor.dynamics.result import (
         EnergyBalance,
         Impact,
         JointResult,
+        SimulationResult,
         ToeResult,
         TorqueResult,
         Trace,
     )
-    from leg_wear_monitor.dynamics.result.simulation_result import SimulationResult
     from leg_wear_monitor.dynamics.simulation import simulate
-    from leg_wear_monitor.fleet.fleet import Fleet
-    from leg_wear_monitor.fleet.overview.parts import FleetOverview, LegOverview
-    from leg_wear_monitor.life.duty import Duty
+    from leg_wear_monitor.files import share_directory
+    from leg_wear_monitor.fleet.overview import FleetOverview, LegOverview
+    from leg_wear_monitor.fleet.update import Fleet
     from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
-    from leg_wear_monitor.life.result import Life
-    from leg_wear_monitor.mechanism.drives.drive import Drive
-    from leg_wear_monitor.mechanism.drives.loader import drives, load_drive
-    from leg_wear_monitor.mechanism.ground_reaction import on_the_ground
+    from leg_wear_monitor.life.result import Duty, Life
     from leg_wear_monitor.mechanism.loader import load_mechanism
-    from leg_wear_monitor.mechanism.materials.loader import load_material, materials
-    from leg_wear_monitor.mechanism.materials.material import Material
-    from leg_wear_monitor.mechanism.person import with_person
+    from leg_wear_monitor.mechanism.materials import Material, load_material, materials
+    from leg_wear_monitor.mechanism.person import on_the_ground, with_person
+    from leg_wear_monitor.mechanism.sourced import Drive, drives, load_drive
     from leg_wear_monitor.mechanism.spec import Mechanism
-    from leg_wear_monitor.monitor.config.parameter_file import load_config
+    from leg_wear_monitor.monitor.config.parameters import load_config
     from leg_wear_monitor.monitor.config.settings import MonitorConfig
     from leg_wear_monitor.monitor.ledger.ledger import open_ledger
     from leg_wear_monitor.monitor.wear_monitor import WearMonitor
     from leg_wear_monitor.playback.replay import replay
-    from leg_wear_monitor.playback.result.parts import ReplayJoint
-    from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
+    from leg_wear_monitor.playback.result import ReplayJoint, ReplaySummary
     from leg_wear_monitor.playback.summary import ReplayResult
     from leg_wear_monitor.report.plot import plot
-    from leg_wear_monitor.share import share_directory
     from leg_wear_monitor.twin.sample import gait_samples
 
 _HOME = {
-    "CommissioningItem": "commissioning.result.commissioning_result",
-    "CommissioningResult": "commissioning.result.commissioning_result",
-    "Drive": "mechanism.drives.drive",
-    "Duty": "life.duty",
-    "EnergyBalance": "dynamics.result.parts",
-    "Fleet": "fleet.fleet",
-    "FleetOverview": "fleet.overview.parts",
-    "Impact": "dynamics.result.parts",
-    "JointDetection": "commissioning.result.joint_detection",
-    "JointResult": "dynamics.result.parts",
-    "LegOverview": "fleet.overview.parts",
+    "CommissioningItem": "commissioning.result",
+    "CommissioningResult": "commissioning.result",
+    "Drive": "mechanism.sourced",
+    "Duty": "life.result",
+    "EnergyBalance": "dynamics.result",
+    "Fleet": "fleet.update",
+    "FleetOverview": "fleet.overview",
+    "Impact": "dynamics.result",
+    "JointDetection": "commissioning.result",
+    "JointResult": "dynamics.result",
+    "LegOverview": "fleet.overview",
     "Life": "life.result",
     "LifeRun": "life.life",
     "LifeSettings": "life.life",
-    "Material": "mechanism.materials.material",
+    "Material": "mechanism.materials",
     "Mechanism": "mechanism.spec",
     "MonitorConfig": "monitor.config.settings",
-    "ReplayJoint": "playback.result.parts",
+    "ReplayJoint": "playback.result",
     "ReplayResult": "playback.summary",
-    "ReplaySummary": "playback.result.replay_summary",
-    "SimulationResult": "dynamics.result.simulation_result",
-    "ToeResult": "dynamics.result.parts",
-    "TorqueResult": "dynamics.result.parts",
-    "Trace": "dynamics.result.parts",
+    "ReplaySummary": "playback.result",
+    "SimulationResult": "dynamics.result",
+    "ToeResult": "dynamics.result",
+    "TorqueResult": "dynamics.result",
+    "Trace": "dynamics.result",
     "WearMonitor": "monitor.wear_monitor",
     "commission": "commissioning.commission",
-    "drives": "mechanism.drives.loader",
+    "drives": "mechanism.sourced",
     "gait_samples": "twin.sample",
-    "load_config": "monitor.config.parameter_file",
-    "load_drive": "mechanism.drives.loader",
-    "load_material": "mechanism.materials.loader",
+    "load_config": "monitor.config.parameters",
+    "load_drive": "mechanism.sourced",
+    "load_material": "mechanism.materials",
     "load_mechanism": "mechanism.loader",
-    "materials": "mechanism.materials.loader",
-    "on_the_ground": "mechanism.ground_reaction",
+    "materials": "mechanism.materials",
+    "on_the_ground": "mechanism.person",
     "open_ledger": "monitor.ledger.ledger",
     "plot": "report.plot",
     "replay": "playback.replay",
-    "share_directory": "share",
+    "share_directory": "files",
     "simulate": "dynamics.simulation",
     "simulate_life": "life.life",
     "with_person": "mechanism.person",

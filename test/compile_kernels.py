@@ -9,7 +9,7 @@ from concurrent.futures import ProcessPoolExecutor
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.bags.reader import Recording
-from leg_wear_monitor.share import share_directory
+from leg_wear_monitor.files import share_directory
 
 
 def simulation() -> None:

@@ -15,8 +15,8 @@ from ruamel.yaml import YAML
 from ruamel.yaml.parser import Parser
 
 from leg_wear_monitor import Mechanism, load_mechanism
+from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.mechanism.position import Linkage, build_linkage
-from leg_wear_monitor.share import share_directory
 
 if os.environ.get("MOVED_STARTS"):  # as `make test-machines` sets it
     from moved_starts import move_starts

@@ -2,7 +2,7 @@
 
 from made_up_summary import made_up_summary
 
-from leg_wear_monitor.fleet.overview.parts import (
+from leg_wear_monitor.fleet.overview import (
     BadRecording,
     FleetOverview,
     LegChange,

@@ -3,17 +3,18 @@
 import attrs
 import numpy as np
 
-from leg_wear_monitor.fleet.overview.make import counts_of, first_of
-from leg_wear_monitor.fleet.overview.parts import (
+from leg_wear_monitor.fleet.overview import (
     BadRecording,
     FleetOverview,
     LegChange,
     LegOverview,
     RecordingHealth,
+    counts_of,
+    first_of,
 )
-from leg_wear_monitor.monitor.alarms.words import ADVICE
+from leg_wear_monitor.monitor.alarms import ADVICE
 from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure, State, Verdict
-from leg_wear_monitor.playback.result.condition import JointClearance, LifeHours
+from leg_wear_monitor.playback.result import JointClearance, LifeHours
 
 NOW_NS = 1_795_000_000 * 10**9
 DAY_NS = 86_400 * 10**9

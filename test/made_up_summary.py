@@ -6,37 +6,37 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.bags.findings import Severity
-from leg_wear_monitor.mechanism.materials.load import BushingLoad
-from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.mechanism.materials import BushingLoad
+from leg_wear_monitor.monitor.alarms import Level
+from leg_wear_monitor.monitor.angle_regression import ClearanceObservation
 from leg_wear_monitor.monitor.config.settings import Limits
-from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObservation
-from leg_wear_monitor.monitor.forecast.coefficient_prior import CoefficientPrior
 from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, Quantiles
+from leg_wear_monitor.monitor.forecast.wear_coefficients import CoefficientPrior
 from leg_wear_monitor.monitor.ledger.entry import Measurement, WalkedLoad
 from leg_wear_monitor.monitor.reports import Lost
 from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure, State, Verdict
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS
-from leg_wear_monitor.playback.result.condition import JointClearance, LifeHours
-from leg_wear_monitor.playback.result.leg import LegJoint, ReplayLeg
-from leg_wear_monitor.playback.result.parts import (
+from leg_wear_monitor.playback.result import (
     AlarmChange,
     ClearanceChange,
+    JointClearance,
+    LegJoint,
     LegLife,
+    LifeHours,
     ReplayAlarm,
     ReplayAlarms,
+    ReplayFinding,
+    ReplayGait,
+    ReplayHistory,
     ReplayJoint,
+    ReplayLeg,
+    ReplayMonitor,
+    ReplayRecording,
     ReplayStatus,
+    ReplaySummary,
     SeenClearance,
     WornDepth,
 )
-from leg_wear_monitor.playback.result.recording import (
-    ReplayFinding,
-    ReplayGait,
-    ReplayMonitor,
-    ReplayRecording,
-)
-from leg_wear_monitor.playback.result.replay_history import ReplayHistory
-from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
 
 LIFE = Quantiles(1.0, 2.0, 3.0)
 

@@ -7,11 +7,11 @@ them must hold for every draw. ``MOVED_STARTS=SEED`` moves all starts of a run o
 
 import numpy as np
 
+from leg_wear_monitor.dynamics import full_run
 from leg_wear_monitor.dynamics.clearance import stepper
 from leg_wear_monitor.dynamics.clearance.model import clearance_state
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
-from leg_wear_monitor.dynamics.full import run
-from leg_wear_monitor.dynamics.full.advance import full_state
+from leg_wear_monitor.dynamics.full_run import full_state
 
 _PART = 1.0e-12
 _CLEARANCE_M = 3.0e-4  # journals start centred: moved by the part of a usual clearance
@@ -41,5 +41,5 @@ def move_starts(seed: int) -> None:
     def moved_full_state(q, v, clearance_joints, t=0.0):
         return full_state(factor * q, factor * v, clearance_joints, t)
 
-    stepper.clearance_state, run.full_state = moved_clearance_state, moved_full_state
+    stepper.clearance_state, full_run.full_state = moved_clearance_state, moved_full_state
     ClearanceStepper.set_eccentricities = lambda self, e: _set_eccentricities(self, moved(e))

@@ -10,9 +10,8 @@ import pytest
 
 from leg_wear_monitor.bags.reader import Recording
 from leg_wear_monitor.messages import encode
-from leg_wear_monitor.messages.decode import Decoder
-from leg_wear_monitor.messages.definitions import definition
-from leg_wear_monitor.messages.streams import JOINT_STATE, STREAMS, WRENCH_STAMPED
+from leg_wear_monitor.messages.cdr import Decoder
+from leg_wear_monitor.messages.streams import JOINT_STATE, STREAMS, WRENCH_STAMPED, definition
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE
 

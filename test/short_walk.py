@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.bags.mcap.writer import McapWriter
+from leg_wear_monitor.bags.mcap_writer import McapWriter
 from leg_wear_monitor.messages import encode
 
 RATE_HZ, BEGIN_S = 200, 1_700_000_000

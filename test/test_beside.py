@@ -12,17 +12,14 @@ from pathlib import Path
 
 import pytest
 
-from leg_wear_monitor import beside
-from leg_wear_monitor.beside import compiled_beside, python_command
+from leg_wear_monitor import workers
 from leg_wear_monitor.cli.start import main
-from leg_wear_monitor.code_cache import one_process_at_a_time
-from leg_wear_monitor.errors import ConfigWarning
-from leg_wear_monitor.interrupt import put_in_order
-from leg_wear_monitor.workers.job import Job
-from leg_wear_monitor.workers.processes import run_in_processes
+from leg_wear_monitor.compiled.cache import one_process_at_a_time
+from leg_wear_monitor.errors import ConfigWarning, put_in_order
+from leg_wear_monitor.workers import Job, compiled_beside, python_command, run_in_processes
 
 MODULE = """
-from leg_wear_monitor.kernel import compile_for, entry
+from leg_wear_monitor.compiled.kernel import compile_for, entry
 @entry
 def line(x):
     return 2.0 * x
@@ -36,7 +33,7 @@ SCRIPT = """
 import time
 from shapes import compile_curve, curve, line
 from leg_wear_monitor import beside
-from leg_wear_monitor.kernel import is_stored
+from leg_wear_monitor.compiled.kernel import is_stored
 beside._processors = lambda: 2
 with beside.compiled_beside(compile_curve, curve):
     here = line(3.0)
@@ -50,16 +47,16 @@ print(here, curve(3.0), len(line.stats.cache_hits), len(curve.stats.cache_hits))
 def started(monkeypatch, tmp_path):
     """The second processes that were started; nothing is stored, and there are two processors."""
     processes: list[subprocess.Popen[bytes]] = []
-    start = beside._started
+    start = workers._started
 
     def noting(*arguments):
         processes.append(start(*arguments))
         return processes[-1]
 
-    monkeypatch.setattr(beside, "_started", noting)
-    monkeypatch.setattr(beside, "_processors", lambda: 2)
-    monkeypatch.setattr(beside, "is_stored", lambda _entry: False)
-    monkeypatch.setattr(beside, "cache_directory", lambda: tmp_path)
+    monkeypatch.setattr(workers, "_started", noting)
+    monkeypatch.setattr(workers, "_processors", lambda: 2)
+    monkeypatch.setattr(workers, "is_stored", lambda _entry: False)
+    monkeypatch.setattr(workers, "cache_directory", lambda: tmp_path)
     return processes
 
 
@@ -98,12 +95,12 @@ def test_a_process_imports_nothing_from_the_current_directory():
 @pytest.mark.plain
 def test_processes_are_started_in_three_places():
     """Each of which keeps the current directory out."""
-    home = Path(beside.__file__).parent
+    home = Path(workers.__file__).parent
     start = re.compile(
         r"sys\.executable|ProcessPoolExecutor\(|get_context\(|\bPopen\(|subprocess\.run\(|os\.system"
     )
     found = {str(path.relative_to(home)) for path in home.rglob("*.py") if start.search(path.read_text())}
-    assert found == {"beside.py", "cli/verbs/demo.py", "workers/processes.py"}
+    assert found == {"beside.py", "cli/verbs/nodes.py", "workers.py"}
 
 
 @pytest.mark.plain
@@ -138,7 +135,7 @@ def test_it_ends_where_an_exception_would_be_lost(started):
     [("_processors", lambda: 1), ("is_stored", lambda _entry: True), ("cache_directory", lambda: None)],
 )
 def test_there_is_none_where_it_is_of_no_use(monkeypatch, started, name, value):
-    monkeypatch.setattr(beside, name, value)
+    monkeypatch.setattr(workers, name, value)
     with compiled_beside(signal.pause, entry):
         pass
     assert not started

@@ -8,16 +8,16 @@ from pathlib import Path
 
 import pytest
 
-from leg_wear_monitor import code_cache
-from leg_wear_monitor.code_cache import code_directory, fault_of, make_private
+from leg_wear_monitor.compiled import cache
+from leg_wear_monitor.compiled.cache import code_directory, fault_of, make_private
 from leg_wear_monitor.errors import ConfigWarning
 
 NOBODY = 65534
-WHERE = "from leg_wear_monitor.code_cache import code_directory; print(code_directory('leaf'))"
+WHERE = "from leg_wear_monitor.compiled.cache import code_directory; print(code_directory('leaf'))"
 TWICE = (
     f"import subprocess, sys; {WHERE}; sys.stdout.flush(); subprocess.run([sys.executable, '-c', {WHERE!r}])"
 )
-KERNELS = "from leg_wear_monitor.kernel import cache_directory; print(cache_directory())"
+KERNELS = "from leg_wear_monitor.compiled.kernel import cache_directory; print(cache_directory())"
 
 as_root = pytest.mark.skipif(os.geteuid() != 0, reason="needs root, to be two users")
 
@@ -145,7 +145,7 @@ def test_a_directory_laid_in_advance_by_another_user_is_not_used(shared, tmp_pat
 def test_two_users_have_two_places(shared, tmp_path):
     """The second user cannot enter the first one's, nor is it led there."""
     program = (
-        "import os; from leg_wear_monitor.code_cache import code_directory\n"
+        "import os; from leg_wear_monitor.compiled.cache import code_directory\n"
         f"os.setgroups([]); os.setgid({NOBODY}); os.setuid({NOBODY})\n"
         "print(code_directory('leaf'))"
     )
@@ -189,11 +189,11 @@ def test_where_no_place_is_safe_nothing_is_kept(shared):
 @pytest.mark.plain
 def test_the_usual_place_is_taken_without_a_word(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    code_cache._home.cache_clear()
+    cache._home.cache_clear()
     with warnings.catch_warnings():
         warnings.simplefilter("error", ConfigWarning)
         assert code_directory("a leaf of this test") == tmp_path / "leg_wear_monitor" / "a leaf of this test"
-    code_cache._home.cache_clear()
+    cache._home.cache_clear()
 
 
 @pytest.fixture
@@ -201,7 +201,7 @@ def place(tmp_path, monkeypatch):
     """An empty cache, in a process that has not looked for one."""
 
     def forget():
-        code_cache._home.cache_clear()
+        cache._home.cache_clear()
         code_directory.cache_clear()
 
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))

@@ -5,7 +5,7 @@ import sys
 import pytest
 
 from leg_wear_monitor import LegWearError
-from leg_wear_monitor.data_frame import data_frame
+from leg_wear_monitor.files import data_frame
 
 pytestmark = pytest.mark.plain
 

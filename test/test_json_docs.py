@@ -18,10 +18,10 @@ from json_fields import Row, descriptions, is_of, leaves, rows_of, unit_of
 from made_up_summary import made_up_summary
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.commissioning.result.joint_detection import JointDetection
-from leg_wear_monitor.life.many_lives import lives_document
+from leg_wear_monitor.commissioning.result import JointDetection
+from leg_wear_monitor.life.life import lives_document
 from leg_wear_monitor.life.result import Life
-from leg_wear_monitor.play.result import Clearances, JointClearance, Play, PlayMeasurement
+from leg_wear_monitor.play.fit import Clearances, JointClearance, Play, PlayMeasurement
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "reference" / "json.md"

@@ -17,15 +17,22 @@ from numba.core.registry import cpu_target
 from numba.core.targetconfig import TargetConfig
 
 import leg_wear_monitor
-from leg_wear_monitor import whole_program
-from leg_wear_monitor.kernel import ByAddress, kernel
+from leg_wear_monitor.compiled import kernel as whole_program
+from leg_wear_monitor.compiled.kernel import ByAddress, kernel
 
-LEAF = "from leg_wear_monitor.kernel import kernel\n@kernel\ndef slope(x):\n    return {factor} * x\n"
-ROOT = "from leg_wear_monitor.kernel import entry\n{line}\n@entry\ndef line(x):\n    return slope(x) + 1.0\n"
+LEAF = (
+    "from leg_wear_monitor.compiled.kernel import kernel\n@kernel\ndef slope(x):\n    return {factor} * x\n"
+)
+ROOT = """from leg_wear_monitor.compiled.kernel import entry
+{line}
+@entry
+def line(x):
+    return slope(x) + 1.0
+"""
 DIRECT = "from leg_wear_monitor.leaf import slope"
 SCRIPT = """
 import importlib, sys
-from leg_wear_monitor.kernel import at_compilation, cache_directory
+from leg_wear_monitor.compiled.kernel import at_compilation, cache_directory
 at_compilation.append(lambda: print("compiling", end=" ", file=sys.stderr))
 for root in {roots}:
     line = importlib.import_module(f"leg_wear_monitor.{{root}}").line

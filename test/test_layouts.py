@@ -9,8 +9,8 @@ from typing import Any
 import layouts
 import pytest
 
+from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.messages.leg_markers import MARKERS
-from leg_wear_monitor.share import share_directory
 
 pytestmark = pytest.mark.plain
 

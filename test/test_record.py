@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from leg_wear_monitor.kernel import entry
-from leg_wear_monitor.record import new_records, record_of, values_of
+from leg_wear_monitor.compiled.kernel import entry, new_records, record_of, values_of
 
 pytestmark = pytest.mark.plain
 

@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from leg_wear_monitor.kernel import entry, kernel
-from leg_wear_monitor.vectors import (
+from leg_wear_monitor.compiled import vector_kinds
+from leg_wear_monitor.compiled.kernel import entry, kernel
+from leg_wear_monitor.compiled.vectors import (
     WIDTH,
     any_of,
     bits_of,
@@ -19,7 +20,6 @@ from leg_wear_monitor.vectors import (
     only,
     padded,
     part_at,
-    plain,
     put_part,
     put_vector,
     root,
@@ -142,8 +142,8 @@ def test_padded(count, room):
 
 def test_without_a_compiler():
     x = np.arange(8.0).reshape(2, 4)
-    plain.stored(x, (0, 2), plain.loaded(x, (1, 0)) + 2.0 * plain.loaded(x, (1, 2)))
+    vector_kinds.stored(x, (0, 2), vector_kinds.loaded(x, (1, 0)) + 2.0 * vector_kinds.loaded(x, (1, 2)))
     np.testing.assert_array_equal(x[0], [0.0, 1.0, 16.0, 19.0])
-    assert plain.folded(plain.loaded(x, (0, 2)), np.add) == 35.0
-    assert plain.chosen(True, 1.0, 2.0) == 1.0
-    assert plain.root_of(4.0) == 2.0
+    assert vector_kinds.folded(vector_kinds.loaded(x, (0, 2)), np.add) == 35.0
+    assert vector_kinds.chosen(True, 1.0, 2.0) == 1.0
+    assert vector_kinds.root_of(4.0) == 2.0

@@ -9,14 +9,14 @@ import sys
 import pytest
 
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.whole_file import unfinished, write_whole
+from leg_wear_monitor.files import unfinished, write_whole
 
 pytestmark = pytest.mark.plain
 
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from leg_wear_monitor.whole_file import write_whole
+from leg_wear_monitor.files import write_whole
 os.fsync = lambda _: os.kill(os.getpid(), signal.SIGKILL)
 write_whole(Path(sys.argv[1]), b"new")
 """
@@ -25,7 +25,7 @@ write_whole(Path(sys.argv[1]), b"new")
 TOGETHER = """
 import sys
 from pathlib import Path
-from leg_wear_monitor.whole_file import write_whole
+from leg_wear_monitor.files import write_whole
 for _ in range(200):
     write_whole(Path(sys.argv[1]), sys.argv[2].encode() * 20_000)
 """

@@ -5,20 +5,13 @@ import argparse
 import numpy as np
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics.full.model import BAUMGARTE
-from leg_wear_monitor.dynamics.full.run import TOLERANCE_M, FullRun
-from leg_wear_monitor.dynamics.result.statistics import energy_balance
-from leg_wear_monitor.dynamics.run.run_statistics import (
-    ARCHARD,
-    CONTACT,
-    FORCE,
-    new_run_statistics,
-    percentile,
-)
+from leg_wear_monitor.dynamics.full_model import BAUMGARTE
+from leg_wear_monitor.dynamics.full_run import TOLERANCE_M, FullRun
+from leg_wear_monitor.dynamics.run import ARCHARD, CONTACT, FORCE, new_run_statistics, percentile
 from leg_wear_monitor.dynamics.simulation import prepare
+from leg_wear_monitor.dynamics.statistics import energy_balance
 from leg_wear_monitor.mechanism.constraints import closures_at
-from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
-from leg_wear_monitor.mechanism.position import build_linkage, dense_jacobian
+from leg_wear_monitor.mechanism.position import TURN, build_linkage, dense_jacobian, one_cycle
 
 LEG = load_mechanism("bionic_leg")
 APART = 1.0e-9  # m: what the clearances of two runs differ by, enough to make them two samples of the chaos

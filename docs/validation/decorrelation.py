@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
-from leg_wear_monitor.dynamics.run.protocol import Run
-from leg_wear_monitor.dynamics.run.run_statistics import BEGIN, new_run_statistics
+from leg_wear_monitor.dynamics.clearance.stepper import ClearanceRun
+from leg_wear_monitor.dynamics.run import BEGIN, Run, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import MODELS, prepare
-from leg_wear_monitor.mechanism.ideal import rotated
-from leg_wear_monitor.report.figures import figure as drawing
+from leg_wear_monitor.mechanism.position import rotated
+from leg_wear_monitor.report import figure as drawing
 
 LEGS, SETS = ("bionic_leg", "jansen_leg"), ("AB", "G", "IJ", "ABGIJ")
 CLEARANCE, APART = 3.0e-4, 1.0e-9  # m: of all joints, and by what two runs in full coordinates differ

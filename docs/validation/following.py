@@ -10,11 +10,10 @@ from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.gait.config import GaitConfig, LoadConfig
 from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
-from leg_wear_monitor.twin.sample import Samples, gait_samples
-from leg_wear_monitor.twin.settings import TwinSettings
+from leg_wear_monitor.twin.sample import Samples, TwinSettings, gait_samples
 
 START_NS, CYCLES, RATE_HZ = 1_700_000_000_000_000_000, 40, 1000
 # noise of the encoder [rad], rate [Hz], fraction of samples lost

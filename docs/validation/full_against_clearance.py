@@ -14,9 +14,8 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor import Mechanism, SimulationResult, load_mechanism, simulate
-from leg_wear_monitor.dynamics.batch.batch import simulate_batch
-from leg_wear_monitor.dynamics.batch.leg import Leg
-from leg_wear_monitor.mechanism.ground_reaction import on_the_ground
+from leg_wear_monitor.dynamics.batch import Leg, simulate_batch
+from leg_wear_monitor.mechanism.person import on_the_ground
 
 LEGS = ("bionic_leg", "jansen_leg")
 SPEEDS_RPM = (30.0, 60.0, 90.0)

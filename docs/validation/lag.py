@@ -8,19 +8,17 @@ import numpy as np
 from tracking import NOISE_RAD, RIPPLE, START_NS, crank, seen
 
 from leg_wear_monitor import load_mechanism
+from leg_wear_monitor.compiled.kernel import new_records
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
-from leg_wear_monitor.dynamics.run.protocol import DONE
-from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, TORQUE, new_run_statistics
+from leg_wear_monitor.dynamics.run import ARCHARD, DONE, TORQUE, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.record import new_records
+from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.twin import TORQUE as TORQUE_KIND
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
-from leg_wear_monitor.twin.kinds import TORQUE as TORQUE_KIND
-from leg_wear_monitor.twin.sample import gait_samples
-from leg_wear_monitor.twin.settings import TrackerSettings, TwinSettings
-from leg_wear_monitor.twin.steps import MOVE, SPLINE_NODE, join_smoothly
-from leg_wear_monitor.twin.tracker.tracker import CrankTracker
+from leg_wear_monitor.twin.sample import TrackerSettings, TwinSettings, gait_samples
+from leg_wear_monitor.twin.statistics import MOVE, SPLINE_NODE, join_smoothly
+from leg_wear_monitor.twin.tracker import CrankTracker
 
 LAGS_S = (
     (0.1, 0.025), (0.1, 0.01), (0.1, 0.005), (0.06, 0.025), (0.06, 0.01), (0.04, 0.025), (0.04, 0.01),

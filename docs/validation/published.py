@@ -14,14 +14,11 @@ import numpy as np
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.contact.arrays import compile_contacts
-from leg_wear_monitor.contact.normal.hertz import HERTZ
-from leg_wear_monitor.contact.normal.hysteresis import delivered_restitution
-from leg_wear_monitor.contact.normal.laws import LAWS
-from leg_wear_monitor.dynamics.full.run import TOLERANCE_M, FullRun
-from leg_wear_monitor.dynamics.run.run_statistics import POWER, new_run_statistics
+from leg_wear_monitor.contact.normal import HERTZ, LAWS, delivered_restitution
+from leg_wear_monitor.dynamics.full_run import TOLERANCE_M, FullRun
+from leg_wear_monitor.dynamics.run import POWER, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle, point_motion
 
 TEST = Path(__file__).parents[2] / "test"
 

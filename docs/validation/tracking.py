@@ -6,18 +6,16 @@ The crank turns at 60 rpm with a ripple of 3 % twice a turn; an encoder of 1e-3 
 import numpy as np
 
 from leg_wear_monitor import load_mechanism
+from leg_wear_monitor.compiled.kernel import new_records
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
-from leg_wear_monitor.dynamics.run.protocol import DONE
-from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, new_run_statistics
+from leg_wear_monitor.dynamics.run import ARCHARD, DONE, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ideal import TURN, ideal_motion
-from leg_wear_monitor.record import new_records
+from leg_wear_monitor.mechanism.position import TURN, ideal_motion
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
-from leg_wear_monitor.twin.sample import Samples, gait_samples
-from leg_wear_monitor.twin.settings import TrackerSettings, TwinSettings
-from leg_wear_monitor.twin.steps import MOVE, SPLINE_NODE, join_smoothly
-from leg_wear_monitor.twin.tracker.tracker import CrankTracker
+from leg_wear_monitor.twin.sample import Samples, TrackerSettings, TwinSettings, gait_samples
+from leg_wear_monitor.twin.statistics import MOVE, SPLINE_NODE, join_smoothly
+from leg_wear_monitor.twin.tracker import CrankTracker
 
 BANDWIDTHS_HZ, RATES_HZ = (3.0, 5.0, 8.0, 12.0, 20.0), (50.0, 200.0, 1000.0)
 NOISE_RAD, RIPPLE, WAVES = 1.0e-3, 0.03, 2

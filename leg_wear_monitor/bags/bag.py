@@ -1,18 +1,113 @@
-"""Resolve what a user names to an ordered list of recordings: bags (plain, split, compressed) and tables."""
+"""Recordings on disk: files, metadata, topics, and the source that reads each."""
 
 import os
 import re
 import stat
-from collections.abc import Iterable, Mapping
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol, TypeAlias, cast
 
 import attrs
+import numpy as np
 from numpy.typing import ArrayLike
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+from ruamel.yaml.events import AliasEvent
 
-from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError, Severity
-from leg_wear_monitor.bags.metadata import METADATA, read_metadata
-from leg_wear_monitor.bags.regular_file import kind_of
+from leg_wear_monitor.bags.findings import (
+    Budget,
+    DamageError,
+    Finding,
+    RecordingError,
+    Severity,
+    kind_of,
+    open_regular,
+)
+from leg_wear_monitor.bags.mcap_file import Due, McapFile, Piece
+from leg_wear_monitor.bags.mcap_layout import ZSTD_MAGIC, Channel, expand_message, expanded
+from leg_wear_monitor.bags.table_file import TableFile
+from leg_wear_monitor.configuration.strict import events_with_depth
+from leg_wear_monitor.errors import printable
+from leg_wear_monitor.messages.streams import Stream, streams_read
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+
+# Reader of a bag directory's metadata.yaml (files, topics, compression), with limits on size and nesting.
+
+
+METADATA = "metadata.yaml"
+_LARGEST = 2**20  # bytes; a bag of 200 topics and 1000 files has some 250 kB
+_DEEPEST = 20
+
+
+@attrs.frozen
+class Metadata:
+    """Contents of metadata.yaml.
+
+    Attributes
+    ----------
+    files : list of str
+        File names in order, without duplicates.
+    by_message : bool
+        Whether each message is compressed on its own.
+    types : dict
+        Message type by topic name.
+    """
+
+    files: list[str]
+    by_message: bool
+    types: dict[str, str]
+
+
+def read_metadata(path: Path) -> Metadata:
+    """Read metadata.yaml.
+
+    Raises
+    ------
+    DamageError
+        If the file is unreliable; the text is a predicate that follows the file name.
+    """
+    try:
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise DamageError("is not a file")
+        if path.stat().st_size > _LARGEST:
+            raise DamageError(f"has {path.stat().st_size} bytes, expected at most {_LARGEST}")
+        with open_regular(path) as file:
+            text = file.read(_LARGEST).decode("utf-8")
+        _check_simple(text)
+        return _structured(YAML(typ="safe", pure=True).load(text)["rosbag2_bagfile_information"])
+    except (OSError, YAMLError, KeyError, TypeError, AttributeError, ValueError) as error:
+        raise DamageError("cannot be read") from error
+
+
+def _check_simple(text: str) -> None:
+    """Refuse YAML that can grow without limit from a few lines: aliases and deep nesting."""
+    for event, depth in events_with_depth(text):
+        if isinstance(event, AliasEvent):
+            raise DamageError("contains aliases, which no bag's metadata has")
+        if depth > _DEEPEST:
+            raise DamageError(f"is nested more than {_DEEPEST} deep")
+
+
+def _structured(information: Any) -> Metadata:
+    names = [Path(name).name for name in information["relative_file_paths"]]
+    topics = [topic["topic_metadata"] for topic in information.get("topics_with_message_count", [])]
+    mode = information.get("compression_mode", "")
+    return Metadata(
+        files=list(dict.fromkeys(names)),
+        by_message=isinstance(mode, str) and mode.lower() == "message",
+        types={topic["name"]: topic["type"] for topic in topics if _is_text(topic["name"], topic["type"])},
+    )
+
+
+def _is_text(*values: object) -> bool:
+    return all(isinstance(value, str) for value in values)
+
+
+# Resolve what a user names to an ordered list of recordings: bags (plain, split, compressed) and tables.
+
 
 MCAP, CSV, PARQUET, IN_MEMORY = ".mcap", ".csv", ".parquet", ""
 TABLES = (CSV, PARQUET, IN_MEMORY)
@@ -191,3 +286,261 @@ def _by_number(path: Path) -> tuple[list[tuple[int, str]], str]:
     """Sort key that orders run_2.mcap before run_10.mcap."""
     parts = re.findall(r"\d+|\D+", path.name)
     return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts], path.name
+
+
+# Selection of the crank and torque topics of a recording, and check of their types.
+
+
+@attrs.frozen
+class Role:
+    """Input required from a recording: its stream, and its topic if the user named one."""
+
+    stream: Stream
+    topic: str | None = None
+
+    @property
+    def name(self) -> str:
+        """Relative topic name, as in the node."""
+        return self.stream.topic
+
+
+def roles(config: MonitorConfig, given: Mapping[str, str | None]) -> list[Role]:
+    """Inputs that a monitor needs; `given` holds the user's topics."""
+    read = streams_read(config.drive_torque.source, config.foot_load.source)
+    return [Role(stream, given.get(stream.topic)) for stream in read]
+
+
+def find_topic(role: Role, topics: Iterable[str], where: str) -> str | None:
+    """Topic of a role: the given one, else the name in the root, else the name in its only namespace.
+
+    Returns
+    -------
+    str or None
+        None if no topic was given and none was found.
+
+    Raises
+    ------
+    RecordingError
+        If the given topic does not exist, or several namespaces contain the name.
+    """
+    recorded = sorted(set(topics))
+    if role.topic is not None:
+        topic = "/" + role.topic.lstrip("/")
+        if topic not in recorded:
+            raise RecordingError(where, topic, f"is not a topic of the recording, it has {listed(recorded)}")
+        return topic
+    if f"/{role.name}" in recorded:
+        return f"/{role.name}"
+    near = [topic for topic in recorded if topic.endswith(f"/{role.name}")]
+    if len(near) > 1:
+        option = f"--{role.name}".replace("_", "-")
+        raise RecordingError(where, role.name, f"could be {listed(near)}, select one with {option}")
+    return near[0] if near else None
+
+
+def check_channel(role: Role, channel: Channel, known_type: str, where: str) -> int:
+    """Stream code of a channel, after a check that its messages can be decoded.
+
+    Parameters
+    ----------
+    role : Role
+    channel : Channel
+    known_type : str
+        Type of the topic from metadata.yaml; empty if unknown.
+    where : str
+        File name in errors.
+
+    Raises
+    ------
+    RecordingError
+        If they cannot; the message names the file, the topic and the expected type.
+    """
+    stream = role.stream
+    kind = channel.type or known_type or stream.type
+    if kind != stream.type:
+        raise RecordingError(where, channel.topic, f"is of type {kind}, expected {stream.type}")
+    if channel.encoding != "cdr":
+        raise RecordingError(where, channel.topic, f"is encoded as {channel.encoding!r}, expected 'cdr'")
+    if channel.definition_encoding == "ros2msg" and channel.definition:
+        fields = _fields(channel.definition)
+        if fields != stream.fields:
+            text = f"defines {kind} by {'; '.join(fields)}, expected {'; '.join(stream.fields)}"
+            raise RecordingError(where, channel.topic, text)
+    return stream.code
+
+
+def _fields(definition: str) -> tuple[str, ...]:
+    """Type and name of each field in a definition's main part, without constants and comments."""
+    fields = []
+    for line in definition.splitlines():
+        if line.startswith("====="):
+            break
+        words = line.split("#")[0].split()
+        if len(words) == 2 and "=" not in words[1]:
+            fields.append(f"{words[0].split('/')[-1]} {words[1]}")
+    return tuple(fields)
+
+
+def listed(names: Iterable[str]) -> str:
+    """Sorted names as text, shortened if there are many."""
+    names = sorted(set(names))
+    more = f" and {len(names) - 20} more" if len(names) > 20 else ""
+    return (", ".join(printable(name, 100) for name in names[:20]) or "none") + more
+
+
+# Uniform access to the files of a recording, and selection of the channels to read.
+
+
+class OpenFile(Protocol):
+    """Common interface of MCAP files, .db3 files and tables."""
+
+    path: Path
+    size: int
+    findings: list[Finding]
+
+    @property
+    def channels(self) -> dict[int, Channel]:
+        """Channels of the file by channel number."""
+
+    def pieces(self, types: dict[int, int]) -> Iterator[Due]:
+        """Pieces of the channels in `types` (stream code by channel number)."""
+
+
+@attrs.define(eq=False)
+class Source:
+    """An open file of a recording, and the channels to read with their stream codes."""
+
+    bag_file: BagFile
+    file: OpenFile
+    budget: Budget
+    types: dict[int, int] = attrs.Factory(dict)
+
+    def pieces(self) -> Iterator[Due]:
+        """Pieces of the selected channels, in order of log time."""
+        for due in self.file.pieces(self.types):
+            yield attrs.evolve(due, load=partial(self._expanded, due)) if self.bag_file.by_message else due
+
+    def _expanded(self, due: Due) -> Piece | None:
+        """Load a piece and decompress each of its messages."""
+        piece = due.load()
+        return None if piece is None else _expanded(piece, self.budget.at_once // 2)
+
+
+def open_sources(
+    bag_files: Iterable[BagFile], config: MonitorConfig, budget: Budget, stack: ExitStack
+) -> tuple[list[Source], list[Finding]]:
+    """Open the files of a recording; an unreadable file becomes a finding if another one can be opened.
+
+    Parameters
+    ----------
+    bag_files : iterable of BagFile
+    config : MonitorConfig
+        Columns and units of tables.
+    budget : Budget
+    stack : contextlib.ExitStack
+        Closes the files.
+
+    Raises
+    ------
+    RecordingError
+        If no file can be opened.
+    """
+    sources: list[Source] = []
+    failed: list[RecordingError] = []
+    for bag_file in bag_files:
+        try:
+            sources.append(Source(bag_file, _open(bag_file, config, budget, stack), budget))
+        except RecordingError as error:
+            failed.append(error)
+    if not sources:
+        raise failed[0]
+    return sources, [Finding(Path(error.source), f"{error.fault}: it is lost") for error in failed]
+
+
+def assign(sources: list[Source], wanted: Iterable[Role]) -> tuple[dict[str, str], list[Finding]]:
+    """Find the topics of roles, and select the channels to read from each source.
+
+    Returns
+    -------
+    topics : dict
+        Topic by role name, for each role that was found.
+    findings : list of Finding
+
+    Raises
+    ------
+    RecordingError
+        If the crank's topic is missing, or the type of a topic cannot be read.
+    """
+    recorded = [channel.topic for source in sources for channel in source.file.channels.values()]
+    first = sources[0].bag_file.path
+    topics: dict[str, str] = {}
+    findings: list[Finding] = []
+    for role in wanted:
+        topic = find_topic(role, recorded, str(first))
+        if topic is not None:
+            topics[role.name] = topic
+            for source in sources:
+                source.types |= _types(source, role, topic)
+            continue
+        text = f"is not a topic of the recording, it has {listed(recorded)}"
+        if role.stream.is_needed:
+            raise RecordingError(str(first), role.name, text)
+        findings.append(Finding(first, f"{role.name}: {text}", Severity.NOTE))
+    return topics, findings
+
+
+def _types(source: Source, role: Role, topic: str) -> dict[int, int]:
+    known = source.bag_file.types.get(topic, "")
+    return {
+        number: check_channel(role, channel, known, str(source.bag_file.path))
+        for number, channel in source.file.channels.items()
+        if channel.topic == topic
+    }
+
+
+def _open(bag_file: BagFile, config: MonitorConfig, budget: Budget, stack: ExitStack) -> OpenFile:
+    path = bag_file.path
+    try:
+        if bag_file.storage == IN_MEMORY:
+            return TableFile(path, bag_file.table, bag_file.storage, config, budget)
+        if bag_file.compressed:
+            path = _expanded_file(bag_file, budget, stack)
+        if bag_file.storage in TABLES:
+            content = stack.enter_context(open_regular(path))
+            return TableFile(bag_file.path, content, bag_file.storage, config, budget)
+        if bag_file.storage == MCAP:
+            return McapFile(bag_file.path, stack.enter_context(open_regular(path)), budget)
+    except DamageError as error:
+        raise RecordingError(str(bag_file.path), "", str(error)) from error
+    except OSError as error:
+        raise RecordingError(str(bag_file.path), "", f"cannot be read: {error.strerror}") from error
+    from leg_wear_monitor.bags.sqlite import SqliteFile
+
+    return SqliteFile(bag_file.path, path, budget, stack)
+
+
+def _expanded_file(bag_file: BagFile, budget: Budget, stack: ExitStack) -> Path:
+    """Decompress a file to a temporary file; its size counts as memory."""
+    path = Path(stack.enter_context(tempfile.TemporaryDirectory())) / f"content{bag_file.storage}"
+    with open_regular(bag_file.path) as file, path.open("wb") as content:
+        if file.read(len(ZSTD_MAGIC)) != ZSTD_MAGIC:
+            raise DamageError("is not a zstd file, although its name says so")
+        file.seek(0)
+        for part in expanded(file):
+            budget.take(len(part))
+            content.write(part)
+        if not content.tell():
+            raise DamageError("contains nothing that can be decompressed")
+    return path
+
+
+def _expanded(piece: Piece, most: int) -> Piece:
+    """Decompress each message of a piece, up to `most` bytes in total."""
+    contents = []
+    for begin, end in zip(piece.messages["begin"].tolist(), piece.messages["end"].tolist(), strict=True):
+        contents.append(expand_message(piece.data[begin:end].tobytes(), most))
+        most -= len(contents[-1])
+    messages = piece.messages.copy()
+    messages["end"] = np.cumsum([len(content) for content in contents])
+    messages["begin"] = messages["end"] - [len(content) for content in contents]
+    return attrs.evolve(piece, data=np.frombuffer(b"".join(contents), np.uint8), messages=messages)

@@ -1,11 +1,16 @@
-"""Findings: faults of a recording, reported while the remainder of the recording is read."""
+"""Findings and errors of recordings, and the budgets that bound what a file may cost."""
 
+import os
+import stat
 from enum import Enum
 from pathlib import Path
+from typing import IO
 
 import attrs
 
 from leg_wear_monitor.errors import ConfigError, printable
+
+# Findings: faults of a recording, reported while the remainder of the recording is read.
 
 
 class RecordingError(ConfigError):
@@ -54,3 +59,103 @@ class Finding:
 
 class DamageError(Exception):
     """A part of a file is unusable; the reader records a finding and continues."""
+
+
+# Memory limit for reading a recording, independent of the sizes it declares; includes temporary files.
+
+
+DEFAULT_MB = 512.0
+_LEAST_MB = 16.0
+_MB = 1_000_000
+
+
+@attrs.define
+class Budget:
+    """Memory limit of a reader, and the bytes reserved until the recording is closed.
+
+    Parameters
+    ----------
+    megabytes : float
+        Memory limit [10⁶ bytes]; at least 16.
+
+    Raises
+    ------
+    ConfigError
+        If the limit is below 16 MB.
+    """
+
+    megabytes: float = DEFAULT_MB
+    taken: int = attrs.field(init=False, default=0)
+
+    def __attrs_post_init__(self) -> None:
+        if not self.megabytes >= _LEAST_MB:
+            text = f"{self.megabytes:g} MB is too little, expected at least {_LEAST_MB:g} MB"
+            raise ConfigError("--memory-mb", "", text)
+
+    @property
+    def left(self) -> int:
+        """Bytes that are not reserved."""
+        return max(0, int(min(self.megabytes, 1.0e12) * _MB) - self.taken)
+
+    @property
+    def at_once(self) -> int:
+        """Bytes that one part of a file may use while it is read; queued samples use the rest."""
+        return self.left // 2
+
+    def check(self, needed: int) -> None:
+        """Check that a part of a file fits into memory.
+
+        Raises
+        ------
+        DamageError
+            If it needs too much memory; the text is a predicate that follows the name of the part.
+        """
+        if needed > self.at_once:
+            raise DamageError(
+                f"needs {needed / _MB:.0f} MB to be read, more than the {self.at_once / _MB:.0f} MB that "
+                f"--memory-mb {self.megabytes:g} leaves for it"
+            )
+
+    def take(self, needed: int) -> None:
+        """Reserve bytes until the recording is closed, for example for a temporary file.
+
+        Raises
+        ------
+        DamageError
+        """
+        if needed > self.left:
+            raise DamageError(f"needs larger temporary files than --memory-mb {self.megabytes:g} allows")
+        self.taken += needed
+
+
+# Opening of untrusted paths: accepts regular files only, and never blocks on a pipe.
+
+
+_KINDS = {
+    stat.S_IFDIR: "a directory",
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+}
+
+
+def kind_of(mode: int) -> str:
+    """File kind of an `os.stat` mode, with its article; empty for a regular file."""
+    return "" if stat.S_ISREG(mode) else _KINDS.get(stat.S_IFMT(mode), "no file")
+
+
+def open_regular(path: Path) -> IO[bytes]:
+    """Open a regular file for reading.
+
+    Raises
+    ------
+    OSError
+        If it cannot be opened or is not a regular file (it may have been replaced since an earlier check).
+    """
+    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
+    what = kind_of(os.fstat(descriptor).st_mode)
+    if what:
+        os.close(descriptor)
+        raise OSError(0, f"is {what}, expected a file", str(path))
+    return os.fdopen(descriptor, "rb")

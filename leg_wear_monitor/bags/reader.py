@@ -1,7 +1,9 @@
 """Reads recordings, damaged ones too, as blocks of gait samples in log-time order, in bounded memory."""
 
 import heapq
-from collections.abc import Iterable, Iterator
+import math
+import struct
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from itertools import repeat
 from pathlib import Path
@@ -10,19 +12,310 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.bags.bag import TABLES, BagFile, Recordable, find_files
-from leg_wear_monitor.bags.budget import DEFAULT_MB, Budget
-from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
-from leg_wear_monitor.bags.joint_names import JointNames
-from leg_wear_monitor.bags.mcap.file import Piece
-from leg_wear_monitor.bags.one_leg import OneLeg, check_topics
-from leg_wear_monitor.bags.pauses import Block, Pauses
-from leg_wear_monitor.bags.sources import assign, open_sources
-from leg_wear_monitor.bags.topics import roles
-from leg_wear_monitor.messages.clocks import Clocks
-from leg_wear_monitor.messages.decode import Decoder, mark_zero_stamps
+from leg_wear_monitor.bags.bag import (
+    TABLES,
+    BagFile,
+    Recordable,
+    Source,
+    assign,
+    find_files,
+    listed,
+    open_sources,
+    roles,
+)
+from leg_wear_monitor.bags.findings import DEFAULT_MB, Budget, Finding, RecordingError, Severity
+from leg_wear_monitor.bags.mcap_file import Piece
+from leg_wear_monitor.bags.table_file import TableFile
+from leg_wear_monitor.bags.table_layout import (
+    CRANK_SPEED,
+    DRIVE_TORQUE,
+    FOOT_LOAD,
+    FOOT_LOAD_ALONG,
+    STAMP,
+    Column,
+    columns_of,
+)
+from leg_wear_monitor.errors import printable
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.messages.cdr import ENCAPSULATION, Clocks, Decoder, mark_zero_stamps
+from leg_wear_monitor.messages.streams import JOINT_STATE
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.twin.sample import GAIT_SAMPLE, NO_FAULT, ZERO_STAMP, Samples
+from leg_wear_monitor.twin import CRANK
+from leg_wear_monitor.twin.sample import GAIT_SAMPLE, MISSING_JOINT, NO_FAULT, NOT_FINITE, ZERO_STAMP, Samples
+
+# Check that several files record one leg: same topics, and equal crank angles at equal times.
+
+
+_KEPT = 8192  # samples per file that are kept for comparison with other files
+_ENOUGH = 20  # smallest number of common samples for a conclusion
+_APART_RAD = 0.1  # exceeds the effect of clock offset and noise in two recordings of one crank
+_LONGEST_NS = 100_000_000  # longest gap between two samples for interpolation
+_ADVICE = "are these two legs? Give one leg at a time, or select its topic with --joint-states"
+
+
+def check_topics(
+    sources: Iterable[Source], topics: dict[str, str], joint_states: str | None
+) -> list[Finding]:
+    """Check that each file has the crank's topic, or has no other topic that could be a crank's.
+
+    Parameters
+    ----------
+    sources : iterable of Source
+    topics : dict
+        Topic by role.
+    joint_states : str, optional
+        The topic, if the user named it.
+
+    Raises
+    ------
+    RecordingError
+        If a file has a crank's topic in another namespace and the user named no topic.
+    """
+    topic, findings = topics["joint_states"], []
+    for source in sources:
+        recorded = {channel.topic for channel in source.file.channels.values()}
+        if topic in recorded:
+            continue
+        others = [other for other in recorded if other.endswith("/joint_states")]
+        if others and joint_states is None:
+            text = f"has {listed(others)}, where other files have {listed([topic])}: {_ADVICE}"
+            raise RecordingError(str(source.bag_file.path), "joint_states", text)
+        text = f"has no topic {topic}: no crank is read from it"
+        findings.append(Finding(source.bag_file.path, text, Severity.NOTE))
+    return findings
+
+
+@attrs.frozen(eq=False)
+class _Motion:
+    """Crank angles in order of their stamps."""
+
+    stamp_ns: NDArray[np.int64]
+    angle_rad: Floats
+
+    def apart(self, other: "_Motion") -> Floats:
+        """Differences [rad] to the angles of `other`, where this motion can be interpolated."""
+        after = np.searchsorted(self.stamp_ns, other.stamp_ns)
+        inside = (after > 0) & (after < len(self.stamp_ns))
+        after, stamps = after[inside], other.stamp_ns[inside]
+        step = self.stamp_ns[after] - self.stamp_ns[after - 1]
+        close = (step > 0) & (step <= _LONGEST_NS)
+        after, step = after[close], step[close]
+        begin = self.angle_rad[after - 1]
+        part = (stamps[close] - self.stamp_ns[after - 1]) / step
+        expected = begin + part * _wrapped(self.angle_rad[after] - begin)
+        return np.abs(_wrapped(other.angle_rad[inside][close] - expected))
+
+
+class OneLeg:
+    """Compares the crank angles of files that overlap in time."""
+
+    def __init__(self) -> None:
+        self._files: dict[Path, _Motion] = {}
+
+    def add_samples(self, path: Path, samples: Samples) -> None:
+        """Compare samples of a file with those of other files; stamps are those of the headers.
+
+        Raises
+        ------
+        RecordingError
+            If another file has different angles at the same times.
+        """
+        new = _motion(samples)
+        if not len(new.stamp_ns):
+            return
+        for other, motion in self._files.items():
+            if other != path:
+                apart = motion.apart(new)
+                if len(apart) >= _ENOUGH and np.median(apart) > _APART_RAD:
+                    text = f"has other crank angles than {other.name} at the same times: {_ADVICE}"
+                    raise RecordingError(str(path), "joint_states", text)
+        kept = self._files.get(path, new)
+        if kept is not new:
+            new = _Motion(
+                np.concatenate([kept.stamp_ns, new.stamp_ns]), np.concatenate([kept.angle_rad, new.angle_rad])
+            )
+        order = np.argsort(new.stamp_ns, kind="stable")[-_KEPT:]
+        self._files[path] = _Motion(new.stamp_ns[order], new.angle_rad[order])
+
+
+def _motion(samples: Samples) -> _Motion:
+    chosen = samples[(samples["kind"] == CRANK) & (samples["fault"] == NO_FAULT)]
+    return _Motion(chosen["stamp_ns"].astype(np.int64), chosen["crank_angle_rad"].astype(float))
+
+
+def _wrapped(angle: Floats) -> Floats:
+    """Angle wrapped to half a turn around 0 [rad]."""
+    return np.asarray((angle + math.pi) % TURN - math.pi)
+
+
+# Check that a recording's messages contain the crank joint; otherwise report the joints they contain.
+
+
+_MOST = 1000
+_NAMED = (NO_FAULT, NOT_FINITE, ZERO_STAMP)
+
+
+@attrs.define
+class _Counts:
+    """Numbers of a file's messages with and without the crank; joint names of those without it."""
+
+    found: int = 0
+    missing: int = 0
+    names: set[str] = attrs.Factory(set)
+
+
+class JointNames:
+    """Searches the messages of each file for the crank joint.
+
+    Parameters
+    ----------
+    crank_joint : str
+    """
+
+    def __init__(self, crank_joint: str) -> None:
+        self._crank = crank_joint
+        self._files: dict[Path, _Counts] = {}
+
+    def add_samples(
+        self, path: Path, data: NDArray[np.uint8], messages: NDArray[np.void], samples: Samples
+    ) -> None:
+        """Count messages of a file, using the samples decoded from them."""
+        counts = self._files.setdefault(path, _Counts())
+        cranks = messages["type"] == JOINT_STATE
+        counts.found += int(np.count_nonzero(cranks & np.isin(samples["fault"], _NAMED)))
+        missing = np.flatnonzero(samples["fault"] == MISSING_JOINT)
+        counts.missing += len(missing)
+        if len(missing) and len(counts.names) < _MOST:
+            message = messages[missing[0]]
+            counts.names |= set(names_in(data[message["begin"] : message["end"]].tobytes())[:_MOST])
+
+    def findings(self) -> list[Finding]:
+        """Findings after all messages have been read.
+
+        Raises
+        ------
+        RecordingError
+            If messages contain joints but never the crank, or if one file lacks the crank and another has it.
+        """
+        found = sum(counts.found for counts in self._files.values())
+        findings = []
+        for path, counts in self._files.items():
+            if not counts.missing:
+                continue
+            text = f"is not among the joints of {counts.missing} messages, they have {listed(counts.names)}"
+            if not counts.found:
+                remedy = "set the crank with --crank-joint (crank_joint in the parameters)"
+                if found:
+                    remedy = "the other files have it: give the recordings of one leg at a time"
+                raise RecordingError(str(path), self._crank, f"{text}; {remedy}")
+            text = f"joint {self._crank} {text}; {counts.found} have it"
+            findings.append(Finding(path, text, Severity.NOTE))
+        return findings
+
+
+def names_in(raw: bytes) -> list[str]:
+    """Joint names in a sensor_msgs/JointState message that has been decoded successfully."""
+    order = "<" if raw[1] else ">"
+    body, names = raw[ENCAPSULATION:], []
+    _, at = _text(body, 8, order)
+    count, at = _count(body, at, order)
+    for _ in range(count):
+        text, at = _text(body, at, order)
+        names.append(text.rstrip(b"\0").decode("utf-8", "replace"))
+    return names
+
+
+def _count(body: bytes, at: int, order: str) -> tuple[int, int]:
+    at += -at % 4
+    return struct.unpack_from(f"{order}I", body, at)[0], at + 4
+
+
+def _text(body: bytes, at: int, order: str) -> tuple[bytes, int]:
+    size, at = _count(body, at, order)
+    return body[at : at + size], at + size
+
+
+# Pauses between recordings that are replayed together: time without recording, not an input fault.
+
+
+@attrs.frozen(eq=False)
+class Block:
+    """Samples in order of log time.
+
+    Attributes
+    ----------
+    samples : (n,) array of GAIT_SAMPLE
+    log_time_ns : (n,) array of int
+    fraction : float
+        Fraction of the recording's bytes read so far, 0 to 1.
+    source : (n,) array of int
+        File index of each sample.
+    pause_ns : int
+        Duration of the pause before this block, in log time [ns]; 0 if there was no pause.
+    """
+
+    samples: Samples
+    log_time_ns: NDArray[np.int64]
+    fraction: float
+    source: NDArray[np.int64]
+    pause_ns: int = 0
+
+    def part(self, which: slice, pause_ns: int = 0) -> "Block":
+        """Block of a subset of the samples."""
+        return Block(
+            self.samples[which], self.log_time_ns[which], self.fraction, self.source[which], pause_ns
+        )
+
+
+class Pauses:
+    """Splits blocks where one recording has ended and the next one begins later.
+
+    Parameters
+    ----------
+    files : sequence of pathlib.Path
+        File by source index.
+    recordings : sequence of int
+        Recording index of each file; files of one bag have no pauses between them.
+    shortest_ns : int
+        Shortest gap that counts as a pause [ns].
+
+    Attributes
+    ----------
+    findings : list of Finding
+    """
+
+    def __init__(self, files: Sequence[Path], recordings: Sequence[int], shortest_ns: int) -> None:
+        self._files, self._shortest_ns = files, shortest_ns
+        self._recordings = np.array(recordings, np.int64)
+        self._known: set[int] = set()
+        self._last_ns = 0
+        self.findings: list[Finding] = []
+
+    def cut(self, block: Block) -> Iterator[Block]:
+        """Split a block at its pauses."""
+        times = np.concatenate([[self._last_ns], block.log_time_ns])
+        begin, pause_ns = 0, 0
+        for at in np.flatnonzero(np.diff(times) > self._shortest_ns).tolist():
+            recordings = self._recordings[block.source]
+            self._known.update(recordings[:at].tolist())
+            if self._known and recordings[at] not in self._known:
+                if at > begin:
+                    yield block.part(slice(begin, at), pause_ns)
+                begin, pause_ns = at, int(times[at + 1] - times[at])
+                self._report(block.source[at], pause_ns)
+        self._known.update(self._recordings[block.source].tolist())
+        self._last_ns = int(times[-1])
+        if begin < len(block.samples):
+            yield block.part(slice(begin, None), pause_ns)
+
+    def _report(self, source: int, pause_ns: int) -> None:
+        text = (
+            f"begins {pause_ns * 1.0e-9:.4g} s after the recording before it ended; the leg was not "
+            "monitored during this pause, which is not a fault of the input"
+        )
+        self.findings.append(Finding(self._files[source], text, Severity.NOTE))
+
 
 TIMES = ("header", "log", "publish")
 _TOGETHER = 4096  # smallest intended number of samples in a block
@@ -192,3 +485,63 @@ def _merged(block: Block, new: Block) -> Block:
         order = np.argsort(times, kind="stable")
         times, samples, source = times[order], samples[order], source[order]
     return Block(samples, times, new.fraction, source)
+
+
+# What is understood of a table: its rows, its time, its columns with their ranges in SI units.
+
+
+_SI = {CRANK_SPEED: "rad/s", DRIVE_TORQUE: "N m", FOOT_LOAD: "N", FOOT_LOAD_ALONG: "N"}
+
+
+def understood(path: Path, config: MonitorConfig) -> tuple[list[str], list[Finding]]:
+    """Read a table as a whole: what was understood, a line each, and the findings.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        CSV or Parquet file.
+    config : MonitorConfig
+        Names the columns and their units.
+
+    Raises
+    ------
+    RecordingError
+        If the table cannot be read.
+    """
+    files, findings = find_files([path])
+    with ExitStack() as stack:
+        (source,), _ = open_sources(files, config, Budget(), stack)
+        table = source.file
+        if not isinstance(table, TableFile):
+            raise TypeError(f"{path} is no table")
+        for due in table.pieces({}):
+            due.load()
+        columns = columns_of(config)
+        lines = [_time(table, columns), *(_column(table, one) for one in columns if one.key != STAMP)]
+        return [*lines, *_others(table, columns)], findings + table.findings
+
+
+def _time(table: TableFile, columns: tuple[Column, ...]) -> str:
+    counts = table.counts
+    seconds = ((counts.last_ns or 0) - (counts.first_ns or 0)) * 1.0e-9
+    rate = f", {(counts.rows - 1) / seconds:.4g} rows a second" if seconds > 0.0 else ""
+    of = next((f"time {_named(one)}" for one in columns if one.key == STAMP), "no column of the time")
+    return f"table of {counts.rows} rows over {seconds:.6g} s{rate}; {of}"
+
+
+def _column(table: TableFile, column: Column) -> str:
+    counts, unit = table.counts, _SI.get(column.key, "rad")
+    found = f"{counts.measured.get(column.key, 0)} values"
+    if column.key in counts.least:
+        found += f", {counts.least[column.key]:.4g} to {counts.most[column.key]:.4g} {unit}"
+    return f"{column.key} {_named(column)}: {found}"
+
+
+def _others(table: TableFile, columns: tuple[Column, ...]) -> list[str]:
+    read = {column.name for column in columns}
+    others = [printable(name, 100) for name in table.names if name not in read]
+    return [f"not read: {', '.join(others)}"] if others else []
+
+
+def _named(column: Column) -> str:
+    return f"from {column.name!r} in {column.unit}"

@@ -10,22 +10,23 @@ from xml.etree import ElementTree
 
 import click
 
-from leg_wear_monitor.configuration.nearest import did_you_mean
-from leg_wear_monitor.errors import ConfigWarning, LegWearError, printable
-from leg_wear_monitor.interrupt import INTERRUPTED
-from leg_wear_monitor.share import share_directory
+from leg_wear_monitor.errors import INTERRUPTED, ConfigWarning, LegWearError, did_you_mean, printable
+from leg_wear_monitor.files import share_directory
 
 COULD_NOT = 2
 
-_VERBS = (
-    "acknowledge", "cache", "check", "commission", "dashboard", "demo", "draw", "drives", "fleet",
-    "gait-publisher", "life", "materials", "measure", "monitor", "play", "reference", "replay", "report",
-    "reset", "simulate", "study",
-)  # fmt: skip
+_VERBS = {
+    "acknowledge": "upkeep", "cache": "check", "check": "check", "commission": "commission",
+    "dashboard": "nodes", "demo": "nodes", "draw": "study", "drives": "check", "fleet": "fleet",
+    "gait-publisher": "nodes", "life": "life", "materials": "check", "measure": "upkeep",
+    "monitor": "nodes", "play": "commission", "reference": "commission", "replay": "replay",
+    "report": "replay", "reset": "upkeep", "simulate": "study", "study": "study",
+}  # fmt: skip
+"""Verbs, and the file in `verbs` of each."""
 
 
 class Verbs(click.Group):
-    """A group whose verbs stand in one module each, and whose faults end in one line and an exit code."""
+    """A group: its verbs are imported when they are called, their faults end in one line and an exit code."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names of the verbs."""
@@ -33,11 +34,12 @@ class Verbs(click.Group):
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import a verb's module and give its command."""
-        if cmd_name.replace("_", "-") not in _VERBS:
+        file = _VERBS.get(cmd_name.replace("_", "-"))
+        if file is None:
             fault = f"{cmd_name!r} is not a verb, expected one of {', '.join(_VERBS)}"
             raise click.UsageError(fault + did_you_mean(cmd_name, _VERBS), ctx)
         name = cmd_name.replace("-", "_")
-        verb: click.Command = getattr(import_module(f"leg_wear_monitor.cli.verbs.{name}"), name)
+        verb: click.Command = getattr(import_module(f"leg_wear_monitor.cli.verbs.{file}"), name)
         return verb
 
     def invoke(self, ctx: click.Context) -> Any:

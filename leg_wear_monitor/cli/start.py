@@ -9,7 +9,7 @@ import os
 import signal
 import sys
 
-from leg_wear_monitor.interrupt import interrupt, leave
+from leg_wear_monitor.errors import interrupt, leave
 
 _NODES = ("monitor", "gait-publisher", "gait_publisher")
 

@@ -1,9 +1,12 @@
-"""Strict conversion with cattrs: no conversion between numbers and texts, unknown keys are errors."""
+"""YAML files within bounds, strict conversion to classes, renamed keys, libraries of files."""
 
 import math
 import reprlib
-from collections.abc import Callable
+import stat
+from collections.abc import Callable, Collection, Iterator
 from enum import Enum, IntEnum
+from functools import cache
+from pathlib import Path
 from typing import Any, get_args, get_origin
 
 import attrs
@@ -11,10 +14,60 @@ import cattrs
 import numpy as np
 from cattrs.errors import ClassValidationError, ForbiddenExtraKeysError
 from cattrs.gen import make_dict_structure_fn
+from ruamel.yaml import YAML
+from ruamel.yaml.constructor import DuplicateKeyError
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.events import CollectionEndEvent, CollectionStartEvent, Event, NodeEvent
 
-from leg_wear_monitor.configuration.quantity import FieldError
-from leg_wear_monitor.configuration.renamed import unknown_fault
-from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.configuration import FieldError
+from leg_wear_monitor.errors import ConfigError, did_you_mean, nearest
+from leg_wear_monitor.files import share_directory
+
+# Unknown keys of configurations, among them renamed ones (CHANGELOG.rst).
+
+
+RENAMED = {
+    "drop_share": "drop_fraction",
+    "duplicate_share": "duplicate_fraction",
+    "fault_share": "fault_fraction",
+    "late_share": "late_fraction",
+    "bad_sample_share": "bad_sample_fraction",
+    "loose_joints": "clearance_joints",
+    "lost_time_share": "lost_time_fraction",
+    "perturb_share": "perturb_fraction",
+    "stuck_torque_share": "stuck_torque_fraction",
+    "warn_share": "warn_fraction",
+}
+
+
+def new_name(name: str) -> str | None:
+    """Present name of a renamed key, including its sections; None for a key that was not renamed."""
+    section, dot, key = name.rpartition(".")
+    return f"{section}{dot}{RENAMED[key]}" if key in RENAMED else None
+
+
+def unknown_fault(what: str, name: str, known: Collection[str], listed: str) -> str:
+    """Error message for an unknown name.
+
+    Parameters
+    ----------
+    what : str
+        Kind of the name, such as ``key`` or ``parameter``.
+    name : str
+    known : collection of str
+        Known names, to find a renamed or similar one.
+    listed : str
+        End of the message if there is none: where the known names are listed.
+    """
+    renamed = new_name(name)
+    if renamed in known:
+        return f"is now called {renamed}"
+    near = nearest(name, known)
+    return f"unknown {what}, {f'did you mean {near}?' if near else listed}"
+
+
+# Strict conversion with cattrs: no conversion between numbers and texts, unknown keys are errors.
+
 
 MOST = 1.0e30  # in SI units: squares, and ratios to the smallest, stay finite
 
@@ -222,3 +275,185 @@ _converter.register_structure_hook_factory(attrs.has, _strict_class)
 _converter.register_structure_hook_factory(_generic(dict), _strict_mapping)
 _converter.register_structure_hook_factory(_generic(tuple), _strict_tuple)
 _converter.register_structure_hook_factory(_generic(np.ndarray), _array)
+
+
+# Reads a YAML file within bounds of its size, its depth and its expanded aliases.
+
+
+MOST_BYTES = 1_000_000  # the largest file of the package has 3000
+MOST_VALUES, DEEPEST = 100_000, 50  # values that aliases add; depth with all of them expanded
+
+
+def read_document(path: Path, source: str) -> Any:
+    """Read a YAML 1.2 file as plain values.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+    source : str
+        Its name in messages.
+
+    Raises
+    ------
+    FileNotFoundError
+    ConfigError
+        Naming the line at fault, or the exceeded bound.
+    """
+    try:
+        text = _read_text(path, source)
+        written = _values(text, source)
+        document = YAML(typ="safe", pure=True).load(text)
+    except UnicodeDecodeError as error:
+        raise ConfigError(source, "", f"is not UTF-8 text: byte {error.start}") from error
+    # an invalid date or number; a tag that does not fit its value; recursion
+    except (YAMLError, ValueError, TypeError, AttributeError, LookupError, RecursionError) as error:
+        raise ConfigError(source, "", f"is not YAML: {_fault(error)}") from error
+    _check_size(document, written, source)
+    return document
+
+
+def _read_text(path: Path, source: str) -> str:
+    """The file's text; devices are not read, since they may have no end."""
+    try:
+        kind = path.stat().st_mode
+        if stat.S_ISCHR(kind) or stat.S_ISBLK(kind) or stat.S_ISSOCK(kind):
+            raise ConfigError(source, "", "is a device, expected a file")
+        with path.open("rb") as file:
+            content = file.read(MOST_BYTES + 1)
+    except FileNotFoundError:
+        raise
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise ConfigError(source, "", f"cannot be read: {reason}") from error
+    if len(content) > MOST_BYTES:
+        raise ConfigError(source, "", f"has more than {MOST_BYTES} bytes, it is not a configuration")
+    return content.decode("utf-8")
+
+
+def _values(text: str, source: str) -> int:
+    """Number of values and keys as they are written; aliases count once.
+
+    Stops at the first place that is too deep: to compose thousands of levels takes seconds.
+    """
+    number = 0
+    try:
+        for event, depth in events_with_depth(text):
+            if depth > DEEPEST:
+                raise ConfigError(source, "", f"is nested more than {DEEPEST} deep")
+            number += isinstance(event, NodeEvent)
+    except YAMLError:
+        return number  # reported when the document is composed, after earlier faults
+    return number
+
+
+def events_with_depth(text: str) -> Iterator[tuple[Event, int]]:
+    """Events of a YAML text during parsing, each with the number of open collections."""
+    depth = 0
+    for event in YAML(typ="safe", pure=True).parse(text):
+        depth += isinstance(event, CollectionStartEvent) - isinstance(event, CollectionEndEvent)
+        yield event, depth
+
+
+def _check_size(document: Any, written: int, source: str) -> None:
+    """Check the size of a document with its aliases expanded, visiting each part only once."""
+    values, levels = _extent(document, {}, frozenset())
+    if levels > DEEPEST:
+        raise ConfigError(source, "", f"is nested more than {DEEPEST} deep, or contains itself")
+    if values > written + MOST_VALUES:
+        raise ConfigError(source, "", f"its aliases expand to more than {MOST_VALUES} values")
+
+
+def _extent(value: Any, known: dict[int, tuple[int, int]], above: frozenset[int]) -> tuple[int, int]:
+    """Number of values in a value, including itself, and their depth; a recursive value has too many."""
+    if not isinstance(value, dict | list | tuple | set):
+        return 1, 0
+    if id(value) in above or len(above) > DEEPEST:
+        return 1, DEEPEST + 1
+    if id(value) not in known:
+        parts = [*value.keys(), *value.values()] if isinstance(value, dict) else list(value)
+        extents = [_extent(part, known, above | {id(value)}) for part in parts]
+        values, levels = 1 + sum(each[0] for each in extents), 1 + max((e[1] for e in extents), default=0)
+        known[id(value)] = values, levels
+    return known[id(value)]
+
+
+def _fault(error: Exception) -> str:
+    """The fault and its line, without the excerpt that ruamel.yaml prints below."""
+    mark = error.problem_mark if isinstance(error, MarkedYAMLError) else None
+    text = error.problem if isinstance(error, MarkedYAMLError) and error.problem else str(error)
+    text = next(iter(text.splitlines()), type(error).__name__)
+    if isinstance(error, DuplicateKeyError):
+        text = text.split(" with value ")[0].replace("found ", "")
+    return f"line {mark.line + 1}: {text}" if mark else text
+
+
+# Files of one kind that come with the package, and a user's own ones beside them.
+
+
+@attrs.frozen
+class Library:
+    """Files of a folder of ``config/``, called by name.
+
+    Attributes
+    ----------
+    folder : str
+    what : str
+        One of them, in a word, for messages.
+    kind : type
+        Class that a file is structured as.
+    """
+
+    folder: str
+    what: str
+    kind: type
+
+    def files(self) -> dict[str, Path]:
+        """Files that come with the package, by name."""
+        return dict(_files(share_directory() / "config" / self.folder))
+
+    def unknown(self, name_or_path: str | Path) -> str:
+        """Fault of a name that none of the files has; empty for a path, or a name that one has."""
+        name, known = Path(name_or_path), self.files()
+        if _is_path(name) or str(name) in known:
+            return ""
+        hint = did_you_mean(str(name), known)
+        return f"no {self.what} of this name, leg-wear-monitor {self.folder} lists them{hint}"
+
+    def load(self, name_or_path: str | Path) -> Any:
+        """Read a file: by name, or by a path, which is anything with a suffix or a directory.
+
+        Raises
+        ------
+        ConfigError
+            Names file, key, value and what was expected.
+        """
+        path = Path(name_or_path)
+        if _is_path(path):
+            return _read(path, str(path), self.kind)
+        fault = self.unknown(path)
+        if fault:
+            raise ConfigError(str(name_or_path), "", fault)
+        return _shipped(self.files()[path.name], self.kind)
+
+
+def _is_path(path: Path) -> bool:
+    return bool(path.suffix) or path.parent != Path()
+
+
+@cache
+def _files(directory: Path) -> dict[str, Path]:
+    return {path.stem: path for path in sorted(directory.glob("*.yaml"))}
+
+
+@cache
+def _shipped(path: Path, kind: type) -> Any:
+    """A file of the package, which each joint of a leg asks for."""
+    return _read(path, path.name, kind)
+
+
+def _read(path: Path, source: str, kind: type) -> Any:
+    try:
+        document = read_document(path, source)
+    except FileNotFoundError as error:
+        raise ConfigError(source, "", f"cannot be read: {error.strerror}") from error
+    return structure(document, kind, source, "")

@@ -3,18 +3,21 @@
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from leg_wear_monitor.dashboard import regions as region
-from leg_wear_monitor.dashboard.leg_view import NO_VERDICT, Known, leg_setup, view_of
+from leg_wear_monitor.dashboard import source as region
+from leg_wear_monitor.dashboard.received import Row, Trends
 from leg_wear_monitor.dashboard.source import (
+    NO_VERDICT,
     Content,
     Freshness,
+    Known,
     LegPage,
     Stamps,
+    leg_setup,
     stamps_of,
     unreadable,
+    view_of,
     words_of,
 )
-from leg_wear_monitor.dashboard.trends import Row, Trends
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -22,14 +25,16 @@ from leg_wear_monitor.monitor.forecast.measurement import last_measured
 from leg_wear_monitor.monitor.ledger.entry import ClearancePoint, JointWear, binding_of, walked_words
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import LedgerContent, read_ledger
-from leg_wear_monitor.monitor.verdict.belief import believed
-from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance
+from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance, believed
 from leg_wear_monitor.monitor.verdict.verdict import Figure
-from leg_wear_monitor.playback.condition import believed_fields, ledger_verdict
-from leg_wear_monitor.playback.result.condition import JointClearance, LifeHours
-from leg_wear_monitor.playback.result.parts import ClearanceChange, ReplayJoint
-from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
-from leg_wear_monitor.playback.summary import replay_alarm
+from leg_wear_monitor.playback.result import (
+    ClearanceChange,
+    JointClearance,
+    LifeHours,
+    ReplayJoint,
+    ReplaySummary,
+)
+from leg_wear_monitor.playback.summary import believed_fields, ledger_verdict, replay_alarm
 
 OLD_AFTER_S = 60.0  # a monitor of a walking leg writes more often
 

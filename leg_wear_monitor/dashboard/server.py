@@ -1,9 +1,14 @@
 """The web server: one page and its events, for reading only."""
 
 import asyncio
+import ipaddress
+import json
+import re
 import resource
 import socket
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from http import HTTPStatus
 from typing import Any
 
@@ -12,11 +17,200 @@ from tornado.httpserver import HTTPServer
 from tornado.iostream import IOStream, StreamClosedError
 from tornado.web import Application, HTTPError, RequestHandler
 
-from leg_wear_monitor.dashboard.hosts import is_allowed, own_names
-from leg_wear_monitor.dashboard.hub import Hub
+from leg_wear_monitor.dashboard.source import Content, Source
 from leg_wear_monitor.errors import LegWearError, printable
-from leg_wear_monitor.monitor.alarms.guides import CODES_OF_GUIDES, FOLDER
-from leg_wear_monitor.share import share_directory
+from leg_wear_monitor.files import share_directory
+from leg_wear_monitor.monitor.alarms import CODES_OF_GUIDES, FOLDER
+
+# Keeps the content of a source, renews it while somebody looks, and hands each viewer what has changed.
+
+
+MOST_VIEWERS = 100
+
+_TICK_S = 0.5  # a human does not see more; each tick is one rendering, however many look
+_TICKS_A_WORD = 2  # a word every second, also if nothing has changed: so a viewer knows that it is connected
+
+
+@attrs.define(eq=False)
+class Viewer:
+    """Somebody who looks: what he was given last, by region, and the bell that wakes him."""
+
+    given: dict[str, int] = attrs.Factory(dict)
+    bell: asyncio.Event = attrs.Factory(asyncio.Event)
+
+
+class Hub:
+    """One content for all viewers.
+
+    Parameters
+    ----------
+    source : Source
+    """
+
+    def __init__(self, source: Source) -> None:
+        self._source = source
+        self._content: Content | None = None
+        self._numbers: dict[str, int] = {}  # of each region: counts up when it changes
+        self._lock = asyncio.Lock()
+        self._worker = ThreadPoolExecutor(1, thread_name_prefix="dashboard")
+        self._viewers: set[Viewer] = set()
+        self._sent: dict[tuple[tuple[str, int], ...], str] = {}  # messages of this tick, by what is given
+        self.is_closing = False
+
+    @property
+    def viewers(self) -> int:
+        """How many look."""
+        return len(self._viewers)
+
+    def join(self) -> Viewer | None:
+        """A viewer more; None if there are too many."""
+        if len(self._viewers) >= MOST_VIEWERS or self.is_closing:
+            return None
+        viewer = Viewer()
+        viewer.bell.set()
+        self._viewers.add(viewer)
+        return viewer
+
+    def leave(self, viewer: Viewer) -> None:
+        """A viewer less."""
+        self._viewers.discard(viewer)
+
+    async def run(self) -> None:
+        """Renew the content while somebody looks, until `close`."""
+        ticks = 0
+        while not self.is_closing:
+            await asyncio.sleep(_TICK_S)
+            ticks += 1
+            if not self._viewers:
+                continue
+            has_changed = await self._renew()
+            if has_changed or ticks % _TICKS_A_WORD == 0:
+                self._sent.clear()
+                self._ring()
+
+    def close(self) -> None:
+        """Send the viewers away; `run` ends after its tick."""
+        self.is_closing = True
+        self._ring()
+
+    def finish(self) -> None:
+        """End the worker, when nobody asks any more."""
+        self._worker.shutdown(wait=False)
+
+    def _ring(self) -> None:
+        for viewer in self._viewers:
+            viewer.bell.set()
+
+    async def content(self) -> Content:
+        """The present content.
+
+        Raises
+        ------
+        LegWearError
+            If it cannot be shown.
+        """
+        await self._renew()
+        if self._content is None:
+            raise RuntimeError("a source without content")
+        return self._content
+
+    async def leg_page(self, name: str) -> str | None:
+        """The page of a leg of a fleet; None if there is none."""
+        page: str | None = await self._work(partial(self._source.leg_page, name))
+        return page
+
+    async def message(self, viewer: Viewer) -> str:
+        """What a viewer does not have yet, as one server-sent event."""
+        if self._content is None:
+            await self._renew()
+        key = tuple(sorted(viewer.given.items()))
+        if key not in self._sent:
+            self._sent[key] = self._event(viewer.given)
+        viewer.given = dict(self._numbers)
+        return self._sent[key]
+
+    def _event(self, given: Mapping[str, int]) -> str:
+        content, freshness = self._content, self._source.freshness()
+        regions = content.regions if content else {}
+        changed = {name: text for name, text in regions.items() if given.get(name) != self._numbers[name]}
+        state = {
+            **attrs.asdict(freshness),
+            "page": content.page if content else "",
+            "words": attrs.asdict(content.words) if content else {},
+            "regions": changed,
+        }
+        return f"event: state\ndata: {json.dumps(state, allow_nan=False)}\n\n"
+
+    async def _renew(self) -> bool:
+        """Whether the content is another one."""
+        async with self._lock:
+            if not await self._work(self._source.renew) and self._content is not None:
+                return False
+            before, self._content = self._content, await self._work(self._source.content)
+        regions = before.regions if before else {}
+        for name, markup in self._content.regions.items():
+            if regions.get(name) != markup:
+                self._numbers[name] = self._numbers.get(name, 0) + 1
+        self._sent.clear()
+        return True
+
+    async def _work(self, work: Any) -> Any:
+        return await asyncio.get_running_loop().run_in_executor(self._worker, work)
+
+
+# Which names a request may call this server by: a page of another site must not reach it under its own name.
+#
+# Another site can let its name point to this machine (DNS rebinding), and its page then reads what this
+# server sends. An address cannot be turned around like this, nor can this machine's own names.
+
+
+_HOST = re.compile(r"\[(?P<six>[0-9a-fA-F:.]+)\](:\d{1,5})?|(?P<name>[A-Za-z0-9._-]{1,253}?)\.?(:\d{1,5})?")
+
+
+def is_local(host: str) -> bool:
+    """Whether a server bound to a host can be reached from this machine only."""
+    return host == "localhost" or _is_loopback(host)
+
+
+def own_names(host: str) -> frozenset[str]:
+    """Names that may be asked for, beside addresses, if a server is bound to a host."""
+    if is_local(host):
+        return frozenset({"localhost"})
+    own = {"localhost", host.lower(), socket.gethostname().lower(), f"{socket.gethostname().lower()}.local"}
+    return frozenset(own)
+
+
+def is_allowed(header: str, host: str, names: frozenset[str]) -> bool:
+    """Whether the Host header of a request names this server.
+
+    Parameters
+    ----------
+    header : str
+    host : str
+        What the server is bound to.
+    names : frozenset of str
+        As `own_names` returned them.
+    """
+    found = _HOST.fullmatch(header)
+    if found is None:
+        return False
+    asked = (found["six"] or found["name"]).lower()
+    if asked in names:
+        return True
+    return _is_loopback(asked) if is_local(host) else _is_address(asked)
+
+
+def _is_address(text: str) -> bool:
+    try:
+        ipaddress.ip_address(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _is_loopback(text: str) -> bool:
+    return _is_address(text) and ipaddress.ip_address(text).is_loopback
+
 
 MOST_CONNECTIONS = 300  # of the viewers of a hub, and what their browsers keep open beside
 

@@ -2,17 +2,319 @@
 
 import hashlib
 import json
-from collections.abc import Mapping
-from pathlib import Path
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path, PurePosixPath
 from typing import Protocol
 
 import attrs
+import numpy as np
 
-from leg_wear_monitor.dashboard.regions import TITLES
-from leg_wear_monitor.errors import printable
-from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
-from leg_wear_monitor.report.page import Page, render, template_text
-from leg_wear_monitor.report.replay.banner import LOOKS
+from leg_wear_monitor.errors import ConfigError, LegWearError, printable
+from leg_wear_monitor.fleet.description import fleet_directory, load_fleet
+from leg_wear_monitor.fleet.overview import FILE, FleetOverview, described, load_overview
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.alarms import ADVICE, Level
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.evaluation import AlarmBoard
+from leg_wear_monitor.monitor.ledger.entry import Measurement, WalkedLoad
+from leg_wear_monitor.monitor.reports import Lost
+from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, Evidence, Figure, State, Verdict, amount
+from leg_wear_monitor.playback.result import (
+    JointClearance,
+    LegLife,
+    LifeHours,
+    ReplayAlarm,
+    ReplayAlarms,
+    ReplayGait,
+    ReplayHistory,
+    ReplayJoint,
+    ReplayLeg,
+    ReplayMonitor,
+    ReplayRecording,
+    ReplayStatus,
+    ReplaySummary,
+    summary_of,
+)
+from leg_wear_monitor.playback.summary import leg_shape, settings_of
+from leg_wear_monitor.report.fleet_page import fleet_page
+from leg_wear_monitor.report.fleet_standing import Day
+from leg_wear_monitor.report.page import (
+    STATE_LOOKS,
+    Banner,
+    Chart,
+    Page,
+    Part,
+    Table,
+    Text,
+    alarm_line,
+    not_valid,
+    page_html,
+    render,
+    template_text,
+    verdict_banner,
+)
+from leg_wear_monitor.report.replay.charts import (
+    estimates_chart,
+    force_chart,
+    has_estimates,
+    health_chart,
+    openings_chart,
+)
+from leg_wear_monitor.report.replay.joint_rows import joint_rows, joint_views
+from leg_wear_monitor.report.replay.page import belief, leg_drawing, replay_page
+
+# What is known of a leg at one instant, in the shape of a replay's summary: so the page has its words.
+
+
+# nothing was recorded: times are times of the day, not those since a recording's begin
+_NOT_RECORDED = ReplayRecording(
+    files=(), topics={}, time="header", is_partial=False, findings=(), crank_samples=0, torque_samples=0,
+    begin_ns=0, end_ns=0, duration_s=0.0,
+)  # fmt: skip
+
+_NOTHING_LOST = Lost(
+    unmonitored_s=0.0, already_counted=0, faulty={}, conflicting=0, implausible=0, duplicates=0, late=0,
+    stray_stamps=0, outliers=0, gaps_bridged=0, gaps_lost=0, backward_jumps=0, failures=0,
+)  # fmt: skip
+
+NO_VERDICT = Verdict(
+    state=State.NOT_MONITORED,
+    joints=(),
+    why="there is no verdict on the leg yet",
+    since_ns=0,
+    do="let the leg walk with the monitor running",
+    evidence=(),
+    not_valid=(),
+    fault_code=NO_GAIT_CYCLE,
+)
+
+
+@attrs.frozen(eq=False)
+class LegSetup:
+    """The leg and the monitor's settings.
+
+    Attributes
+    ----------
+    monitor : ReplayMonitor
+    shape : ReplayLeg
+    limits_m, new_m : dict of str to float
+        Limit of each joint's mean clearance, and its clearance when new.
+    report_s : float
+        Time between two reports of the monitor on itself.
+    """
+
+    monitor: ReplayMonitor
+    shape: ReplayLeg
+    limits_m: dict[str, float]
+    new_m: dict[str, float]
+    report_s: float = 1.0
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The clearance joints."""
+        return self.monitor.clearance_joints
+
+
+def leg_setup(config: MonitorConfig, mechanism: Mechanism) -> LegSetup:
+    """The leg of a configuration, for a mechanism that `fitted` returned."""
+    joints = mechanism.clearance_joints
+    limits = AlarmBoard(config, joints).clearance_limits_m
+    return LegSetup(
+        monitor=settings_of(config, mechanism),
+        shape=leg_shape(mechanism),
+        limits_m=dict(zip(joints, limits, strict=True)),
+        new_m={joint: float(mechanism.clearances[joint].radial_clearance) for joint in joints},
+        report_s=config.diagnostics.period_s,
+    )
+
+
+def unknown_leg() -> LegSetup:
+    """A leg without joints and shape, until its parameters are known."""
+    default = MonitorConfig()
+    monitor = ReplayMonitor(
+        mechanism="",
+        hardware_id="",
+        clearance_joints=(),
+        commanded_rpm=default.cadence.commanded_rpm,
+        wear_acceleration=1.0,
+        bushing_radius_m={},
+        limits=default.limits,
+        duty_hours_per_day=default.forecast.duty_hours_per_day,
+    )
+    return LegSetup(monitor, ReplayLeg(), {}, {})
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Known:
+    """What a source knows of a leg; empty where it knows nothing.
+
+    Attributes
+    ----------
+    verdict : Verdict
+    history : ReplayHistory
+    cycles : int
+        Gait cycles over the leg's life.
+    joints, clearances, life, forecast, alarms, status, measurements, walked
+        As in `ReplaySummary`; `alarms` are those of now.
+    missing : str
+        Why there is no gait cycle; empty if there is.
+    """
+
+    verdict: Verdict
+    history: ReplayHistory
+    cycles: int = 0
+    joints: Mapping[str, ReplayJoint] = attrs.Factory(dict)
+    clearances: Mapping[str, JointClearance] = attrs.Factory(dict)
+    life: Mapping[str, LifeHours | None] = attrs.Factory(dict)
+    forecast: LegLife | None = None
+    alarms: Sequence[ReplayAlarm] = ()
+    status: Sequence[ReplayStatus] = ()
+    measurements: Sequence[Measurement] = ()
+    walked: Sequence[WalkedLoad] = ()
+    missing: str = ""
+
+
+def view_of(setup: LegSetup, known: Known) -> ReplaySummary:
+    """What is known, as a summary; without lives that the verdict does not believe."""
+    is_valid = Figure.FORECAST not in known.verdict.not_valid
+    return ReplaySummary(
+        verdict=known.verdict,
+        recording=_NOT_RECORDED,
+        monitor=setup.monitor,
+        leg=setup.shape,
+        cycles=known.cycles,
+        gait=ReplayGait(
+            believable_cycles=known.cycles, doubtful_cycles=0, missing=known.missing, is_counted=False
+        ),
+        joints=dict(known.joints),
+        clearances=dict(known.clearances),
+        life=dict(known.life) if is_valid else dict.fromkeys(known.life),
+        forecast=known.forecast if is_valid else None,
+        measurements=tuple(known.measurements),
+        walked=tuple(known.walked),
+        alarms=ReplayAlarms(now=tuple(known.alarms), changes=()),
+        status=tuple(known.status),
+        lost=_NOTHING_LOST,
+        history=known.history,
+        wear_depth_m={},
+        advice=ADVICE,
+    )
+
+
+def over_time(view: ReplaySummary) -> ReplaySummary:
+    """The same, its times since the first row of its history."""
+    stamps = view.history.stamp_ns
+    if not len(stamps):
+        return view
+    begin, end = int(stamps[0]), int(stamps[-1])
+    times = attrs.evolve(_NOT_RECORDED, begin_ns=begin, end_ns=end, duration_s=1.0e-9 * (end - begin))
+    return attrs.evolve(view, recording=times)
+
+
+# Regions of the page: markup of what is known of a leg, each replaced by itself when it changes.
+
+
+VERDICT, JOINTS, ALARMS, BELIEF, TRENDS, STATUS = "verdict", "joints", "alarms", "belief", "trends", "status"
+
+TITLES = {
+    JOINTS: "Joints",
+    ALARMS: "Alarms",
+    BELIEF: "Are these values valid?",
+    TRENDS: "Trends",
+    STATUS: "Status of the monitor",
+}
+"""By region, in the order of the page; the verdict is above all."""
+
+_MOST_EVIDENCE = 6
+
+
+def verdict_region(view: ReplaySummary) -> str:
+    """State, reason, action, evidence and what is not valid; its guide is one of the server's pages."""
+    banner = verdict_banner(view, f"/guides/{PurePosixPath(view.verdict.guide).name}")
+    return banner_markup(with_evidence(banner, view.verdict.evidence))
+
+
+def banner_markup(banner: Banner) -> str:
+    """A banner as it stands in the head of a page."""
+    return render("dashboard/banner.html", banner=banner)
+
+
+def with_evidence(banner: Banner, evidence: Sequence[Evidence]) -> Banner:
+    """A banner with the values that the verdict rests on, the first ones, below what to do."""
+    known = [each for each in evidence if each.value is not None]
+    if not known:
+        return banner
+    words = "; ".join(map(evidence_words, known[:_MOST_EVIDENCE]))
+    more = len(known) - _MOST_EVIDENCE
+    words += f"; {more} more" if more > 0 else ""
+    first, *others = banner.notes
+    return attrs.evolve(banner, notes=[first, ("Evidence", words), *others])
+
+
+def evidence_words(evidence: Evidence) -> str:
+    """A value and its limit, such as ``clearance G 0.62 mm (limit 0.6 mm)``."""
+    name = evidence.name.replace("_", " ").removesuffix(f" {evidence.unit}")
+    value = "unknown" if evidence.value is None else amount(evidence.value, evidence.unit)
+    limit = "" if evidence.limit is None else f" (limit {amount(evidence.limit, evidence.unit)})"
+    return f"{name} {value}{limit}"
+
+
+def joints_region(view: ReplaySummary, instead: str = "") -> str:
+    """The leg with its joints; a sentence instead of them, where they are not known."""
+    if instead:
+        return _parts([Text(instead, is_not_valid=True)])
+    views = joint_views(view)
+    drawing, rows = leg_drawing(view, views), joint_rows(view, views)
+    return render("replay/joints_and_leg.html", drawing=drawing.markup, rows=rows.markup)
+
+
+def alarms_region(view: ReplaySummary) -> str:
+    """Every alarm that is raised."""
+    raised = [alarm_line(view, alarm) for alarm in view.alarms.now if alarm.level is not Level.OK]
+    return render("replay/alarms.html", alarms=raised, advice=view.advice, otherwise="No alarm is raised.")
+
+
+def belief_region(view: ReplaySummary) -> str:
+    """Whether input, torque, cadence and model can be believed."""
+    return belief(view).markup
+
+
+def status_region(view: ReplaySummary) -> str:
+    """All statuses in words."""
+    rows = [(status.name, status.level.name, status.message) for status in view.status]
+    return _parts([Table(caption="Statuses", head=("", "level", "message"), rows=rows, is_text=True)])
+
+
+def trends_region(view: ReplaySummary, caption: str) -> str:
+    """Charts of what is known over time; of what the verdict does not believe, why not."""
+    timed = over_time(view)
+    if len(timed.history.stamp_ns) < 2:
+        return _parts([Text("There is nothing to draw yet.")])
+    parts: list[Part] = [Text(caption)]
+    if np.isfinite(timed.history.cadence_rpm).any():
+        parts.append(health_chart(timed))
+    if has_estimates(timed):
+        parts.append(estimates_chart(timed))
+    if _is_known(timed.history.clearance_m):
+        parts += _unless_doubted(timed, Figure.CLEARANCES, "Counted clearances", openings_chart(timed))
+    if _is_known(timed.history.peak_force_n):
+        parts += _unless_doubted(timed, Figure.IMPACT_FORCES, "Impact forces", force_chart(timed))
+    return _parts(parts)
+
+
+def _is_known(columns: Mapping[str, Floats]) -> bool:
+    return any(np.isfinite(values).any() for values in columns.values())
+
+
+def _unless_doubted(view: ReplaySummary, figure: Figure, name: str, chart: Chart) -> list[Part]:
+    doubt = not_valid(view.verdict, figure)
+    return [Text(f"{name}: {doubt}", is_not_valid=True)] if doubt else [chart]
+
+
+def _parts(parts: Sequence[Part]) -> str:
+    return render("dashboard/parts.html", parts=parts)
+
 
 SCRIPT = "dashboard/dashboard.js"
 
@@ -175,7 +477,7 @@ def words_of(view: ReplaySummary, name: str, heading: str, summary: str) -> Word
     verdict = view.verdict
     joints = ", ".join(map(view.leg.joint_words, verdict.joints))
     state = f"{verdict.state.words} joint {joints}" if joints else verdict.state.words
-    title = f"{LOOKS[verdict.state][0]} {state} – {name}"
+    title = f"{STATE_LOOKS[verdict.state][0]} {state} – {name}"
     return Words(title=title, state=f"{name}: {state}", heading=heading, summary=summary)
 
 
@@ -183,3 +485,97 @@ def _identity(page: Page) -> str:
     """The same for pages with the same scripts and styles."""
     parts = (page.style, *page.scripts)
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
+
+
+# A fleet as its last update left it: the page of the fleet, and those of its legs.
+
+
+FRESH_DAYS = 7.0
+OLD_AFTER_S = FRESH_DAYS * 86_400.0
+
+_SUMMARY = "summary.json"
+_AGAIN_S = 3600.0  # the page says which legs are outdated, and that changes by itself
+
+
+class FleetSource:
+    """A source that reads the overview of a fleet again when it has changed.
+
+    Parameters
+    ----------
+    description : pathlib.Path
+    clock : callable
+        Seconds since 1970.
+    versions : mapping of str to str
+        Versions of the software, by name.
+
+    Raises
+    ------
+    ConfigError
+        If the description or the overview is unusable.
+    """
+
+    def __init__(self, description: Path, clock: Callable[[], float], versions: Mapping[str, str]) -> None:
+        self._description, self._clock, self._versions = description, clock, versions
+        self._home = fleet_directory(description)
+        self._fault = ""
+        self._overview = self._read()
+        self._stamps, self._made_s = self._stamps_now(), -_AGAIN_S
+
+    def _read(self) -> FleetOverview:
+        return described(load_overview(self._home), load_fleet(self._description))
+
+    def _stamps_now(self) -> Stamps:
+        return stamps_of(self._description, self._home / FILE)
+
+    def renew(self) -> bool:
+        """Read description and overview again if one of them has changed."""
+        stamps = self._stamps_now()
+        if stamps != self._stamps:
+            self._stamps = stamps
+            try:
+                self._overview, self._fault = self._read(), ""
+            except LegWearError as error:  # the page of before stays, and says so
+                self._fault = str(error)
+                return False
+            return True
+        return self._clock() - self._made_s >= _AGAIN_S
+
+    def content(self) -> Content:
+        """The page of the fleet."""
+        self._made_s = self._clock()
+        day = Day(now_ns=round(1.0e9 * self._made_s), fresh_days=FRESH_DAYS)
+        pages = {leg.id for leg in self._overview.legs if self._summary_of(leg.id).is_file()}
+        page = fleet_page(self._overview, day, pages, self._versions)
+        page = attrs.evolve(
+            page,
+            libraries=[*page.libraries, template_text(SCRIPT)],
+            styles=[*page.styles, template_text("dashboard/dashboard.css")],
+        )
+        state = page.banner.word.lower() if page.banner else ""
+        words = Words(title=f"{state} – fleet", state=state, heading=page.title, summary=page.summary)
+        identity = hashlib.sha256(page_html(page).encode()).hexdigest()[:16]
+        live = live_settings(identity, words, self.freshness(), "Updated ")
+        page = attrs.evolve(page, live=live)
+        return Content(page=identity, html=page_html(page), regions={}, words=words, policy=page.policy)
+
+    def freshness(self) -> Freshness:
+        """Since when the fleet was not updated."""
+        if self._fault:
+            return unreadable(self._fault, OLD_AFTER_S)
+        _, (written_ns, _) = self._stamps
+        age_s = max(0.0, self._clock() - 1.0e-9 * written_ns)
+        return Freshness(age_s, "the fleet was not updated; run leg-wear-monitor fleet update", OLD_AFTER_S)
+
+    def leg_page(self, name: str) -> str | None:
+        """The page of a leg of the description, by its exact id; no other name leads to a file."""
+        if name not in {leg.id for leg in self._overview.legs}:
+            return None
+        source = self._summary_of(name)
+        try:
+            record = json.loads(source.read_bytes())
+            return page_html(replay_page(summary_of(record, str(source))))
+        except (OSError, ValueError, ConfigError):  # of an earlier version, or damaged: as if there was none
+            return None
+
+    def _summary_of(self, leg: str) -> Path:
+        return self._home / "legs" / leg / _SUMMARY

@@ -2,16 +2,19 @@
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from numbers import Integral, Real
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from leg_wear_monitor.configuration.strict import shown
 from leg_wear_monitor.contact.arrays import clearance_settings, compile_contacts, compile_films
-from leg_wear_monitor.dynamics.arguments import check_kinds, given_joints, given_mechanism
-from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
-from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.ideal_result import ideal_result
-from leg_wear_monitor.dynamics.result.simulation_result import SimulationResult
-from leg_wear_monitor.dynamics.result.statistics import (
+from leg_wear_monitor.dynamics.clearance.stepper import ClearanceRun
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.result import JointResult, SimulationResult, ToeResult, TorqueResult, Trace
+from leg_wear_monitor.dynamics.run import Setup, Traceable, Tracer, new_run_statistics
+from leg_wear_monitor.dynamics.statistics import (
     CycleScatter,
     drive_torque,
     energy_balance,
@@ -20,15 +23,153 @@ from leg_wear_monitor.dynamics.result.statistics import (
     toe_errors,
     trace_of,
 )
-from leg_wear_monitor.dynamics.run.protocol import Setup
-from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
-from leg_wear_monitor.dynamics.run.tracer import Traceable, Tracer
-from leg_wear_monitor.errors import AssemblyError, ConfigError, SimulationError
-from leg_wear_monitor.mechanism.ideal import TURN, check_cycle
+from leg_wear_monitor.errors import AssemblyError, ConfigError, SimulationError, did_you_mean
+from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.mechanism.plausible import suspects
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.position import (
+    TURN,
+    IdealMotion,
+    build_linkage,
+    check_cycle,
+    one_cycle,
+    point_motion,
+)
 from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive, TorqueDrive
-from leg_wear_monitor.wear.surfaces import fresh_surfaces
+from leg_wear_monitor.wear import fresh_surfaces
+
+# Checks of the arguments of library functions; an invalid one raises an error of one line.
+
+
+_KINDS: dict[str, tuple[Any, str]] = {
+    "trace": (Integral, "a whole number"),
+    "intervals": (Integral, "a whole number"),
+    "wear": (bool, "true or false"),
+}
+
+
+def given_mechanism(mechanism: Mechanism | str | Path) -> Mechanism:
+    """The given mechanism, or the one of a name or a file.
+
+    Raises
+    ------
+    ConfigError
+        If the argument is of another type, or the file is invalid.
+    """
+    if isinstance(mechanism, Mechanism):
+        return mechanism
+    if isinstance(mechanism, str | Path):
+        return load_mechanism(mechanism)
+    raise ConfigError("mechanism", "", f"{shown(mechanism)} is not a Mechanism, a name or a file")
+
+
+def given_joints(names: Sequence[str], mechanism: Mechanism) -> tuple[str, ...]:
+    """Names of the clearance joints as a tuple, checked.
+
+    Raises
+    ------
+    ConfigError
+        If a name is unknown or occurs twice, or for a text in place of a list: ``"AB"`` would be two joints.
+    """
+    if isinstance(names, str):
+        raise ConfigError("clearances", "", f"{shown(names)} is a text, expected a list of names")
+    try:
+        clearance_joints = tuple(names)
+    except TypeError as error:
+        raise ConfigError("clearances", "", f"{shown(names)} is not a list of names") from error
+    for name in clearance_joints:
+        if not isinstance(name, str):
+            raise ConfigError("clearances", "", f"{shown(name)} is not the name of a joint")
+        if name not in mechanism.clearances:
+            ready = ", ".join(mechanism.clearances) or "none"
+            raise ConfigError(
+                "clearances",
+                "",
+                f"{name!r} has no clearance settings in {mechanism.source}, expected some of: {ready}"
+                + did_you_mean(name, mechanism.clearances),
+            )
+    if len(set(clearance_joints)) < len(clearance_joints):
+        raise ConfigError("clearances", "", f"{','.join(clearance_joints)!r} names a joint twice")
+    return clearance_joints
+
+
+def check_kinds(**values: object) -> None:
+    """Check the types: ``trace`` and ``intervals`` are integers, ``wear`` is a bool, all others are numbers.
+
+    None is allowed except for ``cycles``; it selects the default.
+
+    Raises
+    ------
+    ConfigError
+        Names the argument as the command line does.
+    """
+    for name, value in values.items():
+        kinds, what = _KINDS.get(name, (Real, "a number"))
+        is_flag = isinstance(value, bool | np.bool_)
+        if value is None and name != "cycles":
+            continue
+        if not (is_flag if name == "wear" else isinstance(value, kinds) and not is_flag):
+            option = name.removesuffix("_s").replace("_", "-")
+            raise ConfigError(option, "", f"{shown(value)} is not {what}")
+
+
+# Simulation result of an ideal linkage.
+
+
+_POINTS = 1440
+
+
+def ideal_result(setup: Setup, cycles: float, trace: int) -> SimulationResult:
+    """Result of the ideal motion, from the statistics of one cycle: all cycles are equal."""
+    mechanism = setup.linkage.mechanism
+    motion = one_cycle(setup.linkage, _POINTS, setup.speed)
+    torque = motion.drive_torque
+    force = np.linalg.norm(motion.joint_force, axis=2)
+    return SimulationResult(
+        mechanism=mechanism.name,
+        model="ideal",
+        speed_rpm=setup.speed * 60.0 / TURN,
+        cycles=cycles,
+        simulated_s=cycles * TURN / abs(setup.speed),
+        drive_torque_nm=TorqueResult(
+            mean=float(torque.mean()),
+            rms=float(np.sqrt(np.mean(torque**2))),
+            min=float(torque.min()),
+            max=float(torque.max()),
+            p99=float(np.percentile(torque, 99.0)),
+            max_abs=float(np.abs(torque).max()),
+            max_error=0.0,
+        ),
+        energy_j=None,
+        toe=None if mechanism.toe is None else ToeResult(0.0, 0.0, 0.0),
+        joints={
+            name: JointResult(
+                mean_force_n=float(force[:, i].mean()),
+                rms_force_n=float(np.sqrt(np.mean(force[:, i] ** 2))),
+                p99_force_n=float(np.percentile(force[:, i], 99.0)),
+                max_force_n=float(force[:, i].max()),
+            )
+            for i, name in enumerate(mechanism.joints)
+        },
+        trace=_trace(setup, one_cycle(setup.linkage, trace, setup.speed), cycles) if trace else None,
+    )
+
+
+def _trace(setup: Setup, motion: IdealMotion, cycles: float) -> Trace:
+    """Trace of all cycles, from the samples of one cycle in the crank's direction of rotation."""
+    mechanism = setup.linkage.mechanism
+    points = len(motion.crank_angle)
+    turns = np.arange(round(cycles * points))
+    pick = (turns if setup.speed > 0.0 else -turns) % points
+    force = np.linalg.norm(motion.joint_force, axis=2)[pick]
+    toe = None if mechanism.toe is None else point_motion(motion, setup.linkage, *mechanism.toe)[0][pick]
+    return Trace(
+        crank_angle_rad=np.sign(setup.speed) * turns * (TURN / points),
+        toe_x_m=None if toe is None else toe[:, 0],
+        toe_y_m=None if toe is None else toe[:, 1],
+        drive_torque_nm=motion.drive_torque[pick],
+        force_n={name: force[:, i] for i, name in enumerate(mechanism.joints)},
+    )
+
 
 MODELS: dict[str, Callable[[Setup], Traceable]] = {"clearance": ClearanceRun, "full": FullRun}
 

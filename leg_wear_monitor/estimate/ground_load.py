@@ -17,17 +17,30 @@ import numpy as np
 
 from leg_wear_monitor.dynamics.clearance.tables import POINTS
 from leg_wear_monitor.estimate.cause import Cause
-from leg_wear_monitor.estimate.drive_figures import UNDECLARED, DriveFigures
-from leg_wear_monitor.estimate.explanations import Nuisance
-from leg_wear_monitor.estimate.ideal_signature import signature_of_torque
-from leg_wear_monitor.estimate.least_squares import Point, gauss_newton
-from leg_wear_monitor.estimate.signature import TorqueSensor
+from leg_wear_monitor.estimate.explanations import (
+    Baseline,
+    LeftOut,
+    Nuisance,
+    OtherChannel,
+    Point,
+    body_torques,
+    gauss_newton,
+)
+from leg_wear_monitor.estimate.signature import (
+    UNDECLARED,
+    CommissionedTorque,
+    DriveFigures,
+    TorqueSensor,
+    signature_of_torque,
+    simulated_signatures,
+)
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ground_reaction import FORE_AFT, PHASES, Stance, nominal_stance
-from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
-from leg_wear_monitor.mechanism.position import Linkage
-from leg_wear_monitor.twin.follower.load import at_points
-from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
+from leg_wear_monitor.mechanism.person import FORE_AFT, PHASES, Stance, nominal_stance
+from leg_wear_monitor.mechanism.position import TURN, Linkage, build_linkage, one_cycle, point_motion
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.twin.load import at_points, load_shape, load_signature
+from leg_wear_monitor.twin.reference import MASS_TOLERANCE
+from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 _HARMONICS = 12  # sin(k pi s) over stance, in each component
 
@@ -210,3 +223,180 @@ def ground_load(
         square=best.point.square / phases,
         without=without / phases,
     )
+
+
+# What changes a torque's signature beside clearances: friction, scale, lag, load, bodies.
+
+
+# usual changes of a leg that is all right: friction warms up, sensors drift, the ground differs
+_FRICTION_CHANGE = 0.1  # of the torque's size
+_SCALE = 0.02
+_OFFSET_RAD = 0.01  # a lag of 1.6 ms at 60 rpm, or a crank offset: at one speed the two look alike
+_LOAD_N = 5.0
+_LOAD_FRICTION = 0.03  # a gear that warms up
+# of the ground's peak: its mean over some steps, and the harmonics of its vertical and fore-aft shape
+_LOAD_FRACTION, _VERTICAL, _FORE_AFT_CHANGE, _LOAD_HARMONICS = 0.05, 0.01, 0.005, 8
+
+# of a leg that was never commissioned: tolerances of bodies, and what else the model may have wrong
+_TOLERANCES = {Cause.MASS: MASS_TOLERANCE, Cause.LENGTH: 0.005}
+_MEAN_ERROR = 0.05  # of the torque's size, in each phase
+_ROUGHNESS_ERROR = 0.15
+_SENSOR_TOLERANCE = 5.0  # times the usual changes of friction, scale and lag
+
+_SCALE_STEP, _OFFSET_STEP_RAD, _LOAD_FRICTION_STEP = 0.1, 0.03, 0.05
+
+_LATER_S = 0.0025 * np.array([*range(-8, 0), *range(1, 13)])
+_SLOWER_S = tuple(1.0 / (TURN * hz) for hz in (70.0, 35.0, 20.0, 10.0))
+_CHANNEL_CYCLES = 20
+
+# gait cycles that the expected covariance counts as: a tenth to 0.45 of the weight is that of 50 measured
+# cycles where the others are most probable by it, in the air and on the ground (2026-11-25)
+_EXPECTED_CYCLES = 120
+_PARTS = 5  # of the commissioned cycles, each of which is seen by the others
+_LEAST_PARTED = 4  # gait cycles: each part leaves a mean and a scatter
+
+
+def nuisances(mechanism: Mechanism, reference: TorqueReference, sensor: TorqueSensor) -> list[Nuisance]:
+    """Nuisances of a leg that walks as a reference does."""
+    phases, speed = sensor.phases, reference.profile.speed
+    constant = np.concatenate([np.full(phases, np.sign(speed)), np.zeros(phases)])
+    scaled = _difference(reference, sensor, scale_step=_SCALE_STEP)
+    shifted = _difference(reference, sensor, offset_step_rad=_OFFSET_STEP_RAD)
+    rubbing = _difference(reference, sensor, load_friction_step=_LOAD_FRICTION_STEP)
+    found = [
+        Nuisance(Cause.FRICTION, "", constant, _FRICTION_CHANGE * sensor.size_nm),
+        Nuisance(Cause.SCALE, "", scaled, _SCALE),
+        # the samples' angle is too large where the torque comes late, and too small where the crank is ahead
+        Nuisance(Cause.TIMING, "", -shifted, _OFFSET_RAD),
+        Nuisance(Cause.LOAD_FRICTION, "", rubbing, _LOAD_FRICTION),
+    ]
+    if mechanism.toe is not None:
+        found += _loads(build_linkage(reference.parameters.in_air.applied(mechanism)), reference, sensor)
+    for name, mass, length in zip(mechanism.bodies, *body_torques(mechanism).at(speed), strict=True):
+        found.append(Nuisance(Cause.MASS, name, signature_of_torque(mass, phases), 0.0))
+        found.append(Nuisance(Cause.LENGTH, name, signature_of_torque(length, phases), 0.0))
+    return found
+
+
+def _loads(linkage: Linkage, reference: TorqueReference, sensor: TorqueSensor) -> list[Nuisance]:
+    """The ground's force: its size, and for a leg that walks under one its shape, too."""
+    known, usual = reference.parameters.load, [(load_shape(linkage), _LOAD_N)]
+    if known.size:
+        stance = nominal_stance(linkage)
+        peak_n = float((known @ stance.up).max())
+        s, order = stance.fractions(), np.arange(1, _LOAD_HARMONICS + 1)
+        waves = np.where(s <= 1.0, np.sin(0.5 * TURN * np.outer(order, s)), 0.0)
+        usual = [(known / peak_n, _LOAD_FRACTION * peak_n)]
+        usual += [(np.outer(one, stance.up), _VERTICAL * peak_n) for one in waves]
+        usual += [(np.outer(one, stance.back), _FORE_AFT_CHANGE * peak_n) for one in waves]
+    speed, found = reference.profile.speed, []
+    channel = attrs.evolve(sensor.channel, load_friction=0.0)
+    for force, spread in usual:
+        torque = load_signature(linkage, force)[:-1]
+        received = channel.received(torque, TURN / abs(speed) / len(torque), float(np.sign(speed)))
+        found.append(Nuisance(Cause.LOAD, "", signature_of_torque(received, sensor.phases), spread))
+    return found
+
+
+def other_channels(reference: TorqueReference, sensor: TorqueSensor) -> list[OtherChannel]:
+    """Channels that a torque sensor may have instead of its own: earlier, later, filtered."""
+    own = simulated_signatures(reference, 0, sensor, cycles=_CHANNEL_CYCLES).mean(axis=0)
+    present = sensor.channel
+    slower = [one for one in _SLOWER_S if one > present.time_constant_s]
+    tried = [(late, present.time_constant_s) for late in _LATER_S] + [
+        (late, time_constant_s)
+        for time_constant_s in slower
+        for late in (0.0, *_LATER_S[_LATER_S > 0.0][::2])
+    ]
+    found = []
+    for later_s, time_constant_s in tried:
+        other = attrs.evolve(present, delay_s=present.delay_s + later_s, time_constant_s=time_constant_s)
+        behind = attrs.evolve(sensor, channel=other)
+        column = simulated_signatures(reference, 0, behind, cycles=_CHANNEL_CYCLES).mean(axis=0) - own
+        found.append(OtherChannel(float(other.lateness_s - present.lateness_s), column))
+    return found
+
+
+def with_scatter_of(covariance: Floats, signatures: Floats) -> Floats:
+    """Covariance (F, F) of a gait cycle in a leg that scatters as some commissioned cycles do.
+
+    The sample covariance is shrunk to the expected one, whose variances are at least the measured ones.
+
+    Parameters
+    ----------
+    covariance : (F, F) array
+        Expected one.
+    signatures : (n, F) array
+        Measured gait cycles.
+    """
+    if len(signatures) < 2:
+        return covariance
+    measured = np.cov(signatures.T)
+    more = np.maximum(0.0, np.diagonal(measured) - np.diagonal(covariance))
+    weight = len(signatures) / (len(signatures) + _EXPECTED_CYCLES)
+    return np.asarray(weight * measured + (1.0 - weight) * (covariance + np.diag(more)))
+
+
+def parts_left_out(covariance: Floats, signatures: Floats) -> tuple[LeftOut, ...]:
+    """Parts of some commissioned gait cycles, signatures (n, F), each seen by the others.
+
+    Within the cycles that a covariance was made of, any test scatters less than in later ones.
+
+    Parameters
+    ----------
+    covariance : (F, F) array
+        Expected one, as of `with_scatter_of`.
+    signatures : (n, F) array
+    """
+    if len(signatures) < _LEAST_PARTED:
+        return ()
+    found = []
+    for part in np.array_split(np.arange(len(signatures)), min(_PARTS, len(signatures) // 2)):
+        others = np.delete(signatures, part, axis=0)
+        departures = signatures[part] - others.mean(axis=0)
+        found.append(LeftOut(with_scatter_of(covariance, others), departures, len(others)))
+    return tuple(found)
+
+
+def commissioned_baseline(
+    commissioned: CommissionedTorque,
+    expected: Floats,
+    covariance: Floats,
+    left_out: tuple[LeftOut, ...] = (),
+) -> Baseline:
+    """Baseline of a commissioned leg; the signature (F,) that is expected, covariance (F, F) of a cycle.
+
+    What the reference of the expected leg is off is in that difference, and cancels.
+    """
+    mean = commissioned.mean
+    return Baseline(mean - expected, covariance / commissioned.cycles, left_out)
+
+
+def unknown_baseline(found: list[Nuisance], sensor: TorqueSensor) -> Baseline:
+    """Baseline of a leg that was never commissioned, with its tolerances."""
+    phases = sensor.phases
+    covariance = np.diag(np.repeat([_MEAN_ERROR * sensor.size_nm, _ROUGHNESS_ERROR], phases) ** 2)
+    for one in found:
+        spread = _TOLERANCES.get(one.cause, _SENSOR_TOLERANCE * one.spread)
+        covariance += spread**2 * np.outer(one.column, one.column)
+    return Baseline(np.zeros(2 * phases), covariance)
+
+
+def _difference(
+    reference: TorqueReference,
+    sensor: TorqueSensor,
+    scale_step: float = 0.0,
+    offset_step_rad: float = 0.0,
+    load_friction_step: float = 0.0,
+) -> Floats:
+    """Derivative of the expected leg's signature: by a factor on the torque, the crank's offset, friction."""
+
+    def stepped(sign: float) -> Floats:
+        own = sensor.channel
+        channel = attrs.evolve(own, load_friction=own.load_friction + sign * load_friction_step)
+        behind = attrs.evolve(sensor, channel=channel)
+        scale, offset_rad = 1.0 + sign * scale_step, sign * offset_step_rad
+        return np.asarray(simulated_signatures(reference, 0, behind, scale, offset_rad).mean(axis=0))
+
+    step = scale_step or offset_step_rad or load_friction_step
+    return np.asarray((stepped(1.0) - stepped(-1.0)) / (2.0 * step))

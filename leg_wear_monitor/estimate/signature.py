@@ -6,7 +6,10 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
-from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.twin.leg_simulation import POINTS
+from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 SAMPLES = 200  # a gait cycle: what comes faster is averaged, since clearances show at these times already
 
@@ -184,3 +187,317 @@ def quiet_phases(signature: Floats) -> Floats:
     phases = len(signature) // 2
     limit = np.sort(signature[phases:])[math.ceil(phases / 3) - 1]
     return np.concatenate([np.zeros(phases, bool), signature[phases:] <= limit])
+
+
+# The drive torque of the leg with ideal joints, and what it makes of a signature.
+
+
+_POINTS = 240  # of a gait cycle: three in each of 80 phases
+
+
+def ideal_torque(mechanism: Mechanism, speed: float) -> Floats:
+    """Drive torque (n,) [N m] with ideal joints at equal steps of the crank angle, at a crank speed [rad/s].
+
+    Raises
+    ------
+    AssemblyError
+        If the linkage does not close or has a dead point.
+    """
+    return one_cycle(build_linkage(mechanism), _POINTS, speed).drive_torque
+
+
+def signature_of_torque(torque: Floats, phases: int) -> Floats:
+    """Signature's change by a torque that is added at equal steps of the crank angle, without roughness."""
+    angle: Floats = np.linspace(0.0, TURN, len(torque), endpoint=False)
+    first = np.zeros(len(torque), np.int64)
+    return np.concatenate([PhaseMeans(first, angle, (1, phases)).of(torque)[0], np.zeros(phases)])
+
+
+# A torque sensor on simulated legs: its samples, and their signatures.
+
+
+# of the noise that is added to simulated torques: the same at each start, and another one for each leg, or
+# their covariance would be that of a single leg's cycles
+_SEED = 20261122
+_PART_OF_SAMPLE = 0.618  # by which samples move in each simulated gait cycle
+
+
+class SimulatedSensor:
+    """A sensor on legs of a reference that were simulated for as many gait cycles as each other.
+
+    Its samples fall at the same times on each of these legs.
+
+    Parameters
+    ----------
+    reference : TorqueReference
+    cycles : int
+        Simulated gait cycles of a leg.
+    sensor : TorqueSensor
+    offset_rad : float
+        Added to the crank angle.
+    """
+
+    def __init__(
+        self, reference: TorqueReference, cycles: int, sensor: TorqueSensor, offset_rad: float = 0.0
+    ) -> None:
+        self._reference, self._sensor = reference, sensor
+        period = TURN / abs(reference.profile.speed)
+        # another part of a sample each gait cycle: samples of a real leg fall anywhere, too
+        between = period / (period / sensor.period_s + _PART_OF_SAMPLE)
+        place = np.arange(between, period * cycles, between) * (POINTS / period)
+        self._cycles, self._step_s = cycles, period / POINTS
+        self._samples, self._between = len(place), between * (POINTS / period)
+        self._at = np.minimum(place.astype(np.int64), cycles * POINTS - 1)
+        # of averaged samples
+        self._ends = place[sensor.together - 1 :: sensor.together]
+        cycle = np.minimum((self._ends / POINTS).astype(np.int64), cycles - 1)
+        angle = np.interp(self._ends % POINTS, np.arange(POINTS + 1.0), reference.angle) + offset_rad
+        shape = cycles, sensor.phases
+        self._phases = PhaseMeans(cycle, angle, shape), PhaseMeans(cycle[1:], angle[1:], shape)
+
+    def signatures(self, leg: int, scale: float = 1.0) -> Floats:
+        """Signatures (cycles, F) of a leg, with the sensor's noise and a factor on the torque."""
+        torque = scale * self.torque(leg)
+        return self.signatures_of(torque + self._sensor.noise_nm * self.noise(leg))
+
+    def signatures_of(self, torque: Floats) -> Floats:
+        """Signatures (cycles, F) of averaged samples (n,) [N m]."""
+        return signatures_by_phase(*self._phases, torque, np.diff(torque), self._sensor)
+
+    def torque(self, leg: int) -> Floats:
+        """Averaged samples (n,) of a leg [N m], without noise."""
+        simulated = self._reference.torque_nm[leg][: self._cycles].astype(float).ravel()
+        direction = float(np.sign(self._reference.profile.speed))
+        torque = self._sensor.channel.received(simulated, self._step_s, direction)
+        if self._sensor.is_instant:
+            return averaged(torque[self._at], self._sensor.together)
+        at = np.minimum(self._ends.astype(np.int64), len(torque) - 1)
+        impulse = np.cumsum(torque)[at] + (self._ends - at - 1.0) * torque[at]
+        return np.asarray(np.diff(impulse, prepend=0.0) / (self._sensor.together * self._between))
+
+    def noise(self, leg: int) -> Floats:
+        """Noise (n,) of averaged samples of a leg, in standard deviations of a single sample."""
+        noise = np.random.default_rng([_SEED, leg]).standard_normal(self._samples)
+        return averaged(noise, self._sensor.together)
+
+
+# Expected signatures over clearances, for a torque sensor, from simulated torque references.
+
+
+_WEAKEST_NOISE, _STRONGEST_NOISE = 1.0e-4, 1.0  # of the torque's size
+_HALVINGS = 12  # of that range: the noise is found to 0.2 %
+
+
+@attrs.frozen(eq=False)
+class SignatureModel:
+    """Expected signatures (F,) of a leg, as a function of its k clearances.
+
+    What several clearances change is the sum of what each of them changes alone.
+
+    Attributes
+    ----------
+    sensor : TorqueSensor
+    grid_m : (k, s) array
+        Increasing clearances of each joint.
+    mean : (F,) array
+        Signature of the expected leg.
+    change : (k, s, F) array
+        What each joint changes, at each clearance of the grid.
+    covariance : (F, F) array
+        Of the signature of one gait cycle.
+    cycles : int
+        Simulated gait cycles of each leg.
+    """
+
+    sensor: TorqueSensor
+    grid_m: Floats
+    mean: Floats
+    change: Floats
+    covariance: Floats
+    cycles: int
+    _log_grid: Floats = attrs.field(init=False)
+    _slopes: Floats = attrs.field(init=False)
+
+    def at(self, clearance_m: Floats) -> tuple[Floats, Floats]:
+        """Signature (F,) at clearances (k,) [m], and its derivatives (F, k) by their logarithms.
+
+        Linear in the logarithms of the clearances between points of the grid, and beyond its ends.
+        """
+        x, joints = np.log(clearance_m), np.arange(len(self.grid_m))
+        grid = self._log_grid
+        i = (grid[:, 1:-1] < x[:, None]).sum(axis=1)
+        slopes, beyond = self._slopes[joints, i], x - grid[joints, i]
+        return self.mean + self.change[joints, i].sum(axis=0) + beyond @ slopes, slopes.T
+
+    @_log_grid.default
+    def _logarithms(self) -> Floats:
+        return np.asarray(np.log(self.grid_m))
+
+    @_slopes.default
+    def _derivatives(self) -> Floats:
+        """Derivatives (k, s - 1, F) by the logarithm of a clearance between points of the grid."""
+        with np.errstate(invalid="ignore", divide="ignore"):  # where a clearance can be no wider
+            return np.asarray(np.diff(self.change, axis=1) / np.diff(self._log_grid, axis=1)[:, :, None])
+
+
+def signature_model(reference: TorqueReference, sensor: TorqueSensor) -> SignatureModel:
+    """Model for a sensor, whose noise is added to the simulated torques."""
+    cycles = [len(torque) for torque in reference.torque_nm]
+    sensors = {n: SimulatedSensor(reference, n, sensor) for n in set(cycles)}
+    legs = [sensors[n].signatures(leg) for leg, n in enumerate(cycles)]
+    means = np.array([leg.mean(axis=0) for leg in legs])
+    scatter = np.concatenate([leg - mean for leg, mean in zip(legs, means, strict=True)])
+    covariance = scatter.T @ scatter / (len(scatter) - len(legs))
+    joints = reference.clearance_m.shape[1]
+    order = np.arange(1, len(legs)).reshape(joints, -1)
+    grid = np.array([reference.clearance_m[[0, *order[k]], k] for k in range(joints)])
+    change = np.array([means[[0, *order[k]]] - means[0] for k in range(joints)])
+    place = np.argsort(grid, axis=1, kind="stable")
+    grid, change = np.take_along_axis(grid, place, 1), np.take_along_axis(change, place[:, :, None], 1)
+    return SignatureModel(sensor, grid, means[0], change, covariance, cycles[1])
+
+
+def simulated_signatures(
+    reference: TorqueReference,
+    leg: int,
+    sensor: TorqueSensor,
+    scale: float = 1.0,
+    offset_rad: float = 0.0,
+    cycles: int | None = None,
+) -> Floats:
+    """Signatures (cycles, F) of a leg of a reference.
+
+    Parameters
+    ----------
+    reference : TorqueReference
+    leg : int
+    sensor : TorqueSensor
+    scale : float
+        Factor on the torque.
+    offset_rad : float
+        Added to the crank angle.
+    cycles : int, optional
+        The first ones; all by default.
+    """
+    simulated = SimulatedSensor(reference, cycles or len(reference.torque_nm[leg]), sensor, offset_rad)
+    return simulated.signatures(leg, scale)
+
+
+def with_noise_of(reference: TorqueReference, sensor: TorqueSensor, measured: Floats) -> TorqueSensor:
+    """The sensor with the noise that makes simulated torques as rough as measured ones in quiet phases.
+
+    Parameters
+    ----------
+    reference : TorqueReference
+    sensor : TorqueSensor
+    measured : (F,) array
+        Mean of measured signatures.
+    """
+    simulated = SimulatedSensor(reference, len(reference.torque_nm[0]), sensor)
+    torque, noise = simulated.torque(0), simulated.noise(0)
+    quiet = quiet_phases(simulated.signatures_of(torque + sensor.noise_nm * noise).mean(axis=0))
+    low, high = (np.log(fraction * sensor.size_nm) for fraction in (_WEAKEST_NOISE, _STRONGEST_NOISE))
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        rough = simulated.signatures_of(torque + np.exp(middle) * noise).mean(axis=0)
+        low, high = (middle, high) if (rough - measured)[quiet].mean() < 0.0 else (low, middle)
+    return attrs.evolve(sensor, noise_nm=float(np.exp(0.5 * (low + high))))
+
+
+# The baseline of a leg: its drive torque when it was commissioned.
+
+
+@attrs.frozen(eq=False)
+class CommissionedTorque:
+    """Signatures of the drive torque of a leg whose k clearances were known.
+
+    Attributes
+    ----------
+    stamp_ns : int
+        End of its last gait cycle.
+    clearance_m : (k,) array
+        Counted clearances then.
+    signatures : (cycles, F) array
+        Of each gait cycle, as in `estimate.signature`.
+    sigma_m : (k,) array
+        Standard deviations of the clearances: above 0 where a correction made them.
+    channel : Channel
+        Of the drive, by these signatures.
+    speed : float
+        Mean speed of the crank [rad/s]; 0 where it is not known.
+    """
+
+    stamp_ns: int
+    clearance_m: Floats
+    signatures: Floats
+    sigma_m: Floats = attrs.field()
+    channel: Channel = DIRECT
+    speed: float = 0.0
+
+    @sigma_m.default
+    def _as_counted(self) -> Floats:
+        return np.zeros(len(self.clearance_m))
+
+    @property
+    def is_as_counted(self) -> bool:
+        """Whether the clearances were the counted ones, not corrected."""
+        return not self.sigma_m.any()
+
+    @property
+    def cycles(self) -> int:
+        """Number of gait cycles."""
+        return len(self.signatures)
+
+    @property
+    def mean(self) -> Floats:
+        """Mean signature (F,)."""
+        return np.asarray(self.signatures.mean(axis=0))
+
+
+# What is declared of a drive, before anything was measured: prior knowledge of an estimate.
+
+
+@attrs.frozen(kw_only=True)
+class DriveFigures:
+    """Declared figures of a drive, at the crank's shaft; NaN where nothing is declared.
+
+    A motor's or a gear's own figures are converted to the crank before: the torque by its turns per turn of
+    the crank, friction by speed and stiffness by their square.
+
+    Attributes
+    ----------
+    lag_s : float
+        Time by which the measured torque is late.
+    bandwidth_hz : float
+        Corner frequency of the first-order low-pass between the torque on the crank and the measured one.
+    load_friction : float
+        Fraction eta of the friction eta |torque| sign(speed).
+    coulomb_nm : float
+        Constant friction.
+    viscous_nms : float
+        Friction by speed [N m s/rad].
+    stiffness_nm_per_rad : float
+        Stiffness between the measured angle and the crank.
+    """
+
+    lag_s: float = math.nan
+    bandwidth_hz: float = math.nan
+    load_friction: float = math.nan
+    coulomb_nm: float = math.nan
+    viscous_nms: float = math.nan
+    stiffness_nm_per_rad: float = math.nan
+
+    @property
+    def declared(self) -> dict[str, float]:
+        """The figures that are declared, by name."""
+        return {name: value for name, value in attrs.asdict(self).items() if not math.isnan(value)}
+
+    @property
+    def lateness_s(self) -> float:
+        """Declared time by which slow changes of the torque are late: by the lag and by the low-pass."""
+        parts = (self.lag_s, 1.0 / (2.0 * math.pi * self.bandwidth_hz))
+        return sum(one for one in parts if not math.isnan(one))
+
+
+UNDECLARED = DriveFigures()
+"""Nothing is known."""

@@ -1,23 +1,35 @@
 """Brings the ledgers of a fleet up to date with recordings that are not counted yet."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 
-from leg_wear_monitor.fleet.chain.queue import Chain
-from leg_wear_monitor.fleet.chain.words import words_of
-from leg_wear_monitor.fleet.description.fleet_description import FleetDescription
-from leg_wear_monitor.fleet.directory.lock import locked
-from leg_wear_monitor.fleet.learning.files import learned_from
-from leg_wear_monitor.fleet.learning.of_fleet import learn_fleet, measured_in
-from leg_wear_monitor.fleet.learning.renew import is_renewal_due, renew
-from leg_wear_monitor.fleet.overview.make import write_overview
-from leg_wear_monitor.fleet.tables.parquet import arrow
-from leg_wear_monitor.workers.cluster import run_on_cluster
-from leg_wear_monitor.workers.job import Job
-from leg_wear_monitor.workers.processes import run_here, run_in_processes
+from leg_wear_monitor.bags.bag import METADATA, PARQUET, find_files
+from leg_wear_monitor.bags.findings import RecordingError
+from leg_wear_monitor.bags.mcap_layout import MAGIC
+from leg_wear_monitor.files import data_frame
+from leg_wear_monitor.fleet.chain import Chain, begin_of, state_of, words_of
+from leg_wear_monitor.fleet.description import FleetDescription, FleetLeg, fleet_directory
+from leg_wear_monitor.fleet.directory import (
+    LegDirectory,
+    arrow,
+    lives_table,
+    locked,
+    make_directory,
+    read_tables,
+    recordings_table,
+    verdicts_table,
+    write_table,
+)
+from leg_wear_monitor.fleet.overview import FleetOverview, load_overview, write_overview
+from leg_wear_monitor.fleet.renew import is_renewal_due, learn_fleet, learned_from, measured_in, renew
+from leg_wear_monitor.workers import Job, run_here, run_in_processes, run_on_cluster
+
+if TYPE_CHECKING:
+    import pandas as pd
+
 
 _NOT_COUNTED = ("no_gait", "already_counted")
 
@@ -229,3 +241,210 @@ def _refuse_shared(chains: Sequence[Chain]) -> None:
             for chain in sharing:
                 others = ", ".join(other.leg.id for other in sharing if other is not chain)
                 chain.refuse(key, f"the leg {others} has a recording with the same content; not counted")
+
+
+# Which recordings are complete, while others are being recorded.
+
+
+PATIENCE = 6
+"""Looks during which a recording without an end must not change: its recorder may have been killed."""
+
+_ENDS = {".mcap": MAGIC, PARQUET: b"PAR1"}
+
+
+class Followed:
+    """Looks again and again at the recordings of a fleet."""
+
+    def __init__(self) -> None:
+        self._seen: dict[Path, tuple[tuple[int, int], int]] = {}
+
+    def complete(self, fleet: FleetDescription) -> FleetDescription:
+        """The fleet with the recordings that are complete: unchanged since the last look, and with their end.
+
+        Parameters
+        ----------
+        fleet : FleetDescription
+            As it is now.
+        """
+        return attrs.evolve(
+            fleet,
+            legs=tuple(
+                attrs.evolve(leg, recordings=tuple(filter(self._is_complete, leg.recordings)))
+                for leg in fleet.legs
+            ),
+        )
+
+    def _is_complete(self, path: Path) -> bool:
+        state = state_of(path)
+        before, looks = self._seen.get(path, (None, 0))
+        looks = looks + 1 if before == state else 0
+        self._seen[path] = state, looks
+        return looks >= (1 if has_end(path) else PATIENCE)
+
+
+def has_end(path: Path) -> bool:
+    """Whether a recording has what its recorder writes last."""
+    if path.is_dir():
+        return (path / METADATA).is_file()
+    try:
+        (file,) = find_files([path])[0]
+        end = _ENDS.get(file.storage, b"")
+        if file.compressed or not end:
+            return False
+        with path.open("rb") as content:
+            content.seek(-min(len(end), path.stat().st_size), 2)
+            return content.read() == end
+    except (RecordingError, OSError):
+        return False
+
+
+# A fleet that was updated, for Python.
+
+
+TABLES = ("verdicts", "cycles", "recordings", "lives")
+
+
+class Fleet:
+    """A fleet that ``leg-wear-monitor fleet update`` keeps; the tables require pandas.
+
+    Parameters
+    ----------
+    path : str or pathlib.Path
+        Directory of the fleet, or its description ``fleet.yaml``.
+
+    Attributes
+    ----------
+    path : pathlib.Path
+        Directory of the fleet.
+    overview : FleetOverview
+        The fleet at a glance, as in ``fleet.json``.
+
+    Raises
+    ------
+    ConfigError
+        If no fleet is there.
+
+    Examples
+    --------
+    >>> import leg_wear_monitor as lw
+    >>> fleet = lw.Fleet("fleet/")  # doctest: +SKIP
+    >>> fleet.overview.counts["stop"]  # doctest: +SKIP
+    1
+    >>> worst = fleet.lives().groupby("leg").used_fraction.max()  # doctest: +SKIP
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = fleet_directory(path)
+        self.overview: FleetOverview = load_overview(self.path)
+        self._legs = [(leg.id, leg.lot, LegDirectory(self.path, leg.id)) for leg in self.overview.legs]
+
+    def table(self, name: str) -> Any:
+        """A table of pyarrow.
+
+        Parameters
+        ----------
+        name : str
+            ``verdicts``, ``cycles``, ``recordings`` or ``lives``.
+
+        Raises
+        ------
+        LegWearError
+            If pyarrow is not installed.
+        """
+        if name == "cycles":
+            return read_tables((leg, file) for leg, _, files in self._legs for file in files.tables())
+        makers = {"verdicts": verdicts_table, "recordings": recordings_table, "lives": lives_table}
+        return makers[name](self._legs)
+
+    def cycles(self) -> "pd.DataFrame":
+        """Table with a row for each minute, or each gait cycle, of each leg, in the order of time.
+
+        A joint's column has its name after a dot: ``clearance_m.A``.
+        """
+        return _frame(self.table("cycles"))
+
+    def verdicts(self) -> "pd.DataFrame":
+        """Table with a row for each counted recording: the verdict at its end."""
+        return _frame(self.table("verdicts"))
+
+    def recordings(self) -> "pd.DataFrame":
+        """Table with a row for each recording: what became of it."""
+        return _frame(self.table("recordings"))
+
+    def lives(self) -> "pd.DataFrame":
+        """Table with a row for each counted recording and joint, and for the ``leg``: clearance and life."""
+        return _frame(self.table("lives"))
+
+    def export(self, out: str | Path) -> list[Path]:
+        """Write all tables as CSV and Parquet files; the files.
+
+        Parameters
+        ----------
+        out : str or pathlib.Path
+            Directory, made if it does not exist.
+        """
+        make_directory(Path(out))
+        files = []
+        for name in TABLES:
+            table = self.table(name)
+            for ending in ("csv", "parquet"):
+                files.append(Path(out) / f"{name}.{ending}")
+                write_table(files[-1], table)
+        return files
+
+
+def _frame(table: Any) -> "pd.DataFrame":
+    data_frame({})  # one line if pandas is not installed
+    frame: pd.DataFrame = table.to_pandas()
+    return frame
+
+
+# What is understood of the description of a fleet: its legs, their parameters, and their recordings.
+
+
+_DAY_NS = 86_400 * 10**9
+
+
+def understood(
+    fleet: FleetDescription, progress: Callable[[float], None] | None = None
+) -> Iterator[tuple[str, str]]:
+    """What is understood, and what is wrong: pairs of a line and a fault, one of which is empty.
+
+    Of each leg the first and the last recording by name are opened, so that a column or a topic that is
+    missing shows before an update; damage within a recording does not.
+
+    Parameters
+    ----------
+    fleet : FleetDescription
+    progress : callable, optional
+        Called with the completed fraction, 0 to 1.
+    """
+    number = sum(len(leg.recordings) for leg in fleet.legs)
+    yield f"fleet of {_many(len(fleet.legs), 'leg')}, {_many(number, 'recording')}, kept in {fleet.out}", ""
+    for done, leg in enumerate(fleet.legs, 1):
+        ends = [
+            (each, *begin_of(each, leg)) for each in dict.fromkeys(leg.recordings[:1] + leg.recordings[-1:])
+        ]
+        yield _line(leg, [begin_ns for _, begin_ns, _ in ends if begin_ns]), ""
+        for path, _, fault in ends:
+            if fault:
+                yield "", f"{leg.id}: {leg.shown(path)}: {fault}"
+        if progress:
+            progress(done / len(fleet.legs))
+
+
+def _line(leg: FleetLeg, begins_ns: list[int]) -> str:
+    megabytes = sum(state_of(path)[0] for path in leg.recordings) / 1.0e6
+    parts = [f"{_many(len(leg.recordings), 'recording')}, {megabytes:.3g} MB"]
+    parts.append(f"parameters {leg.config_file.name if leg.config_file else 'of the package'}")
+    if leg.config.hardware != leg.id:
+        parts.append(f"hardware {leg.config.hardware}")
+    if leg.lot:
+        parts.append(f"lot {leg.lot}")
+    if begins_ns and max(begins_ns) < _DAY_NS:
+        parts.append("stamps without a date")
+    return f"{leg.id}: {'; '.join(parts)}"
+
+
+def _many(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"

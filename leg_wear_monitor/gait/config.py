@@ -4,8 +4,8 @@ from itertools import pairwise
 
 import attrs
 
-from leg_wear_monitor.configuration.quantity import FieldError, choice, described, quantity
-from leg_wear_monitor.mechanism.ground_reaction import FORE_AFT
+from leg_wear_monitor.configuration import FieldError, choice, described, quantity
+from leg_wear_monitor.mechanism.person import FORE_AFT
 
 MOST_ENCODERS = 4
 WRENCH, EFFORT, FLOAT64 = TORQUE_SOURCES = ("wrench", "effort", "float64")

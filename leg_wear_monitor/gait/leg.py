@@ -1,28 +1,187 @@
 """Ground truth of the synthetic leg: full coordinates, with its own clearances and wear."""
 
 import math
+from bisect import bisect_right
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import attrs
 import numpy as np
 
-from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.run.drive import CrankMotion, quintic
-from leg_wear_monitor.dynamics.run.protocol import Setup
-from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, RunStatistics, new_run_statistics
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.run import (
+    TORQUE,
+    CrankMotion,
+    RunStatistics,
+    Setup,
+    new_run_statistics,
+    quintic,
+)
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.gait.config import GaitConfig, KnockConfig
-from leg_wear_monitor.gait.ground import Ground
-from leg_wear_monitor.gait.pace import Pace
+from leg_wear_monitor.gait.config import TEMPLATE, GaitConfig, KnockConfig, LoadConfig, PaceConfig
 from leg_wear_monitor.mechanism.arrays import Floats, body_names
-from leg_wear_monitor.mechanism.ground_reaction import GROUND, with_toe_force
-from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
 from leg_wear_monitor.mechanism.loader import load_mechanism
-from leg_wear_monitor.mechanism.person import with_person
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.person import (
+    GROUND_LOAD,
+    Stance,
+    nominal_stance,
+    stance_template,
+    with_person,
+    with_toe_force,
+)
+from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle, point_motion
 from leg_wear_monitor.mechanism.spec import Mechanism, RevoluteJoint, SpeedDrive
+
+# The ground under the synthetic leg: a force on its toe that differs from step to step.
+
+
+POINTS = 512  # entries of the force's table: 2 ms at 60 rpm, a tenth of the transient
+
+_TRANSIENT_S = 0.02
+_FURTHEST = 3.0  # standard deviations: further steps are drawn in, so that stance never meets the next one
+
+# Walking on a treadmill, mean of three stances (opensim-models, Rajagopal, grf_walk.mot): coefficients of
+# sin(k pi s) of the vertical and of the fore-aft force, over their peaks
+_TREADMILL = (
+    (0.9697, -0.0111, 0.2704, 0.0111, -0.0928, 0.0058, -0.0567, 0.0148),
+    (0.0543, 0.7599, -0.0784, 0.1612, -0.1057, -0.0958, -0.0441, -0.1037),
+)
+
+
+class Ground:
+    """Draws the ground's force on the toe, step by step.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    config : GaitConfig
+
+    Attributes
+    ----------
+    swing : float
+        Crank angle in the middle of swing, as a fraction of a turn: there, a step begins.
+
+    Raises
+    ------
+    ConfigError
+        For a mechanism without a toe that moves to and fro, or a stance that leaves no swing.
+    """
+
+    def __init__(self, mechanism: Mechanism, config: GaitConfig) -> None:
+        self._load, self._random = config.load, np.random.default_rng([config.seed, 6])
+        self._stance = stance = _stance(mechanism, config)
+        self._whole = (stance.turned * (stance.toe_off - stance.heel_strike)) % 1.0
+        half = 0.5 * (1.0 - self._whole)
+        if half < _FURTHEST * self._load.timing_scatter + 0.01:
+            fault = f"{self._load.timing_scatter!r} leaves no swing beside {self._whole:.2f} turns of stance"
+            raise ConfigError("gait", "load.timing_scatter", fault)
+        self.swing = stance.toe_off + stance.turned * half
+
+    def step(self, speed: float) -> Floats:
+        """Force (POINTS, 2) [N] of the next step at equal steps of the crank angle from 0.
+
+        Parameters
+        ----------
+        speed : float
+            Of the crank [rad/s], for the duration of the transient.
+        """
+        load, stance = self._load, self._stance
+        size, late = np.clip(self._random.standard_normal(2), -_FURTHEST, _FURTHEST)
+        strike = stance.heel_strike + stance.turned * load.timing_scatter * late
+        since = (stance.turned * (np.arange(POINTS) / POINTS - strike)) % 1.0
+        vertical, along = _shape(load, since / self._whole)
+        risen = since / max(_TRANSIENT_S * abs(speed) / TURN, 1.0 / POINTS)
+        vertical += load.heel_strike_transient * np.sin(0.5 * TURN * np.minimum(risen, 1.0)) ** 2
+        peak_n = load.ground_n * (1.0 + load.amplitude_scatter * size)
+        return np.asarray(
+            peak_n * (np.outer(vertical, stance.up) + load.fore_aft * np.outer(along, stance.back))
+        )
+
+
+def _stance(mechanism: Mechanism, config: GaitConfig) -> Stance:
+    """Stance of a leg that walks as the crank first turns."""
+    load, nominal = config.load, nominal_stance(build_linkage(mechanism))
+    if nominal.turned * next((rpm for rpm in config.pace.speeds_rpm if rpm), nominal.turned) < 0.0:
+        ends = nominal.toe_off, nominal.heel_strike
+        nominal = Stance(*ends, -nominal.turned, nominal.up, -nominal.back)
+    return attrs.evolve(
+        nominal,
+        heel_strike=nominal.heel_strike + nominal.turned * load.heel_strike_shift,
+        toe_off=nominal.toe_off + nominal.turned * load.toe_off_shift,
+    )
+
+
+def _shape(load: LoadConfig, s: Floats) -> tuple[Floats, Floats]:
+    """Vertical and fore-aft force (n,) over their peaks, at fractions (n,) of stance; 0 beyond 1."""
+    known = stance_template(s) if load.shape == TEMPLATE else [_waves(one, s) for one in _TREADMILL]
+    vertical, along = (
+        _waves(own, s) if own else one
+        for own, one in zip((load.vertical_waves, load.fore_aft_waves), known, strict=True)
+    )
+    return vertical, along
+
+
+def _waves(coefficients: tuple[float, ...], s: Floats) -> Floats:
+    waves = np.sin(0.5 * TURN * np.outer(s, np.arange(1, len(coefficients) + 1)))
+    return np.where(s <= 1.0, waves @ np.array(coefficients), 0.0)
+
+
+# Crank motion: a sequence of speeds joined by smooth ramps, with a phase-dependent ripple.
+
+
+class _Stretch(NamedTuple):
+    """Speed transition: start time [s], ripple-free start angle [rad], start and end speed [rad/s]."""
+
+    since: float
+    angle: float
+    before: float
+    after: float
+
+
+class Pace:
+    """Motion of the crank over time, from angle 0.
+
+    The ramps define the ripple-free angle phi. The crank angle is theta = phi + r / h sin(h phi): the ripple
+    amplitude is the fraction r of any speed, and the ripple stops with the crank.
+    """
+
+    def __init__(self, config: PaceConfig) -> None:
+        self._ramp = config.ramp_s
+        self._ripple, self._waves = config.ripple, config.ripple_per_turn
+        speeds = [rpm * TURN / 60.0 for rpm in config.speeds_rpm]
+        self._stretches, self._since = [_Stretch(0.0, 0.0, speeds[0], speeds[0])], [0.0]
+        for (_, end), (before, after) in zip(pairwise(config.times_s), pairwise(speeds), strict=True):
+            self._stretches.append(_Stretch(end, self._even(end).angle, before, after))
+            self._since.append(end)
+
+    def at(self, t: float) -> CrankMotion:
+        """Crank motion at a time [s]."""
+        angle, speed, acceleration = self._even(t)
+        r, h = self._ripple, self._waves
+        sine, factor = math.sin(h * angle), 1.0 + r * math.cos(h * angle)
+        return CrankMotion(
+            angle + r / h * sine, speed * factor, acceleration * factor - speed * speed * r * h * sine
+        )
+
+    def _even(self, t: float) -> CrankMotion:
+        """Ripple-free motion: a smooth speed step 10 u^3 - 15 u^4 + 6 u^5, then constant speed."""
+        last = self._stretches[bisect_right(self._since, t) - 1]
+        tau, step = t - last.since, last.after - last.before
+        if tau >= self._ramp:
+            angle = (
+                last.angle + 0.5 * (last.before + last.after) * self._ramp + last.after * (tau - self._ramp)
+            )
+            return CrankMotion(angle, last.after, 0.0)
+        u = tau / self._ramp
+        risen = u * u * u * (10.0 + u * (6.0 * u - 15.0))
+        area = u**4 * (2.5 + u * (u - 3.0)) * self._ramp
+        slope = 30.0 * u * u * (1.0 + u * (u - 2.0)) / self._ramp
+        return CrankMotion(
+            last.angle + last.before * tau + step * area, last.before + step * risen, step * slope
+        )
+
 
 _LONGEST_PIECE_S = 2.0e-3  # longest drive polynomial: follows a ripple of 50 Hz to 1e-9 rad
 _PUSH, _PUSH_PHASES = "toe_force_n", 72  # name of a load, and entries of its table
@@ -72,7 +231,7 @@ class SyntheticLeg:
             leg = with_toe_force(leg, self._ground.step(speed))
         setup = _setup(leg, config, speed)
         self.clearance_joints = setup.clearance_joints
-        self._foot_loads = [i for i, name in enumerate(leg.loads) if name in (GROUND, _PUSH)]
+        self._foot_loads = [i for i, name in enumerate(leg.loads) if name in (GROUND_LOAD, _PUSH)]
         self._setup, self._run = setup, FullRun(setup)
         self._knock, self._friction = _checked(config.knock, setup), config.load.friction_nm
         self._sides = _sides(mechanism, config.joint_encoders.joints)
@@ -153,7 +312,7 @@ class SyntheticLeg:
 
     def _load(self, force: Floats) -> None:
         """Let a force (n, 2) [N] act on the toe from now on, closed periodically as in `compile_arrays`."""
-        k = list(self._setup.linkage.mechanism.loads).index(GROUND)
+        k = list(self._setup.linkage.mechanism.loads).index(GROUND_LOAD)
         table = self._run.model.arrays.load_force[k]
         table[: len(force) + 1] = force[-1], *force
         table[len(force) + 1 :] = force[0]

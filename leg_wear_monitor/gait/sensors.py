@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from leg_wear_monitor.dynamics.run.drive import CrankMotion
+from leg_wear_monitor.dynamics.run import CrankMotion
 from leg_wear_monitor.gait.config import (
     CONTACT,
     EFFORT,
@@ -23,14 +23,9 @@ from leg_wear_monitor.gait.config import (
     TransportConfig,
 )
 from leg_wear_monitor.gait.leg import SyntheticLeg
-from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.twin.kinds import CRANK, LOAD, TORQUE
-from leg_wear_monitor.twin.sample import (
-    FAULTS,
-    NO_FAULT,
-    OUT_OF_RANGE,
-    WRONG_TYPE,
-)
+from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.twin import CRANK, LOAD, TORQUE
+from leg_wear_monitor.twin.sample import FAULTS, NO_FAULT, OUT_OF_RANGE, WRONG_TYPE
 
 _CONTACT_N = 20.0  # force from which a switch closes
 

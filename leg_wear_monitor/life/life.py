@@ -11,30 +11,34 @@ If all wear coefficients are larger by one factor, the life is the same but shor
 depends on coefficient times cycles only. See `monitor.forecast` for different coefficients.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from itertools import islice
 from typing import Any, NamedTuple
 
 import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from leg_wear_monitor.configuration.quantity import described, quantity
-from leg_wear_monitor.dynamics.batch.batch import advance_batch
-from leg_wear_monitor.dynamics.batch.leg import Leg, prepare_legs, share_tables
+from leg_wear_monitor.configuration import described, quantity
+from leg_wear_monitor.dynamics.batch import Leg, advance_batch, prepare_legs, share_tables
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
-from leg_wear_monitor.dynamics.run.drive import steady_drive
-from leg_wear_monitor.dynamics.run.protocol import DONE, Setup, stop
-from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, RunStatistics, new_run_statistics
+from leg_wear_monitor.dynamics.run import (
+    ARCHARD,
+    DONE,
+    RunStatistics,
+    Setup,
+    new_run_statistics,
+    steady_drive,
+    stop,
+)
 from leg_wear_monitor.errors import ConfigError, SimulationError
-from leg_wear_monitor.life.duty import Duty
-from leg_wear_monitor.life.limits import MOST_JUMPS, check_life
-from leg_wear_monitor.life.result import Life, LifePoint, life_of
+from leg_wear_monitor.life.result import Duty, Life, LifePoint, life_of
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.mechanism.materials.of_joints import check_wear_is_known
-from leg_wear_monitor.mechanism.plausible import suspects
+from leg_wear_monitor.mechanism.materials import check_wear_is_known
+from leg_wear_monitor.mechanism.plausible import limit_fault, suspects
+from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.wear.cycle_jump import (
+from leg_wear_monitor.wear import (
     JumpControl,
     WearRate,
     jump_error,
@@ -44,6 +48,44 @@ from leg_wear_monitor.wear.cycle_jump import (
     wear_rate,
     weighted,
 )
+
+# Checks that a life by cycle jumps ends.
+
+
+MOST_JUMPS = 10_000  # per life; with the default length of a jump, a life takes some 15
+
+
+def check_life(
+    clearance_joints: Sequence[str], fresh_m: Floats, radius_m: Floats, limit_m: ArrayLike, jump: JumpControl
+) -> None:
+    """Check that a life can end.
+
+    Parameters
+    ----------
+    clearance_joints : sequence of str
+    fresh_m, radius_m : (k,) arrays
+        Clearances when new, and radii of the bushings.
+    limit_m : float or (k,) array
+    jump : JumpControl
+
+    Raises
+    ------
+    ConfigError
+        For limits and jumps that `simulate_life` refuses.
+    """
+    limits = np.broadcast_to(np.asarray(limit_m, dtype=float), len(clearance_joints))
+    for joint, fresh, radius, limit in zip(clearance_joints, fresh_m, radius_m, limits, strict=True):
+        fault = limit_fault(joint, float(fresh), float(radius), float(limit))
+        if fault:
+            raise ConfigError("limit-m", "", fault)
+    jumps = float((limits - fresh_m).min() / jump.opens_m)
+    if jumps > MOST_JUMPS:
+        raise ConfigError(
+            "opens-m",
+            "",
+            f"{jump.opens_m:g} m a jump takes {jumps:.2g} jumps to the limit, expected at most {MOST_JUMPS}",
+        )
+
 
 _TRIALS = 4  # of a jump with too large an error, before it is accepted and reported
 
@@ -341,3 +383,130 @@ def _setups(legs: Sequence[Leg], wear_factor: ArrayLike) -> list[Setup]:
         coefficient = setup.contacts.wear_coefficient * factor[:, None]
         setups.append(attrs.evolve(setup, contacts=setup.contacts._replace(wear_coefficient=coefficient)))
     return setups
+
+
+# Lives with different wear coefficients, which together show the effect of joints on each other.
+
+
+LEAST_FRACTION = 0.05  # least fraction of the growth to its limit that a joint reaches in every life
+LEAST_OPENING = 1.0e-3  # of the first joint's opening: bounds the factor of a joint that hardly wears
+_DIGITS = 6
+
+
+def simulate_lives(
+    mechanism: Mechanism,
+    settings: LifeSettings,
+    number: int,
+    *,
+    limit_m: float,
+    horizon_cycles: float,
+    wear_factor: float = 1.0,
+    speed_rpm: float | None = None,
+    duty: Duty | None = None,
+    progress: Callable[[float], None] = lambda _fraction: None,
+) -> Iterator[tuple[Floats, Life]]:
+    """Simulate lives, each with factors (k,) on its wear coefficients: the nominal life first, then others.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    settings : LifeSettings
+    number : int
+        Number of lives.
+    limit_m, horizon_cycles : float
+        As in `simulate_life`.
+    wear_factor : float
+        Factor on all wear coefficients.
+    speed_rpm : float, optional
+    duty : Duty, optional
+    progress : callable
+        Called with the completed fraction of all lives.
+
+    Raises
+    ------
+    ConfigError, SimulationError
+    """
+
+    def life(index: int, factor: Floats) -> tuple[Floats, Life]:
+        own = attrs.evolve(settings, seed=settings.seed + index * settings.legs)
+        run = LifeRun(mechanism, own, speed_rpm=speed_rpm, wear_factor=factor, duty=duty)
+        done = simulate_life(
+            run,
+            limit_m=limit_m,
+            horizon_cycles=horizon_cycles,
+            progress=lambda fraction: progress((index + fraction) / number),
+        )
+        return factor, done
+
+    first = life(0, np.full(len(mechanism.clearance_joints), wear_factor))
+    yield first
+    for index, factor in enumerate(islice(spread_factors(first[1]), number - 1), start=1):
+        yield life(index, wear_factor * factor)
+
+
+def spread_factors(nominal: Life) -> Iterator[Floats]:
+    """Factors (k,) on the wear coefficients, life by life, as an endless sequence.
+
+    The clearances at the ends of the lives should be evenly distributed. In each life the first joint reaches
+    its full growth, and the others reach fractions from an evenly distributed sequence (Roberts's additive
+    recurrence), if they grow as in the nominal life.
+
+    Parameters
+    ----------
+    nominal : Life
+        The life with factors of 1.
+    """
+    opened = nominal.clearance_m[-1] - nominal.clearance_m[0]
+    opened = np.maximum(opened, LEAST_OPENING * opened.max())
+    step = _root(len(opened)) ** -np.arange(1.0, len(opened) + 1.0)
+    number = 0
+    while True:
+        number += 1
+        fraction = LEAST_FRACTION + (1.0 - LEAST_FRACTION) * ((0.5 + number * step) % 1.0)
+        yield np.asarray(fraction / fraction.max() * opened.max() / opened)
+
+
+def lives_document(lives: list[tuple[Floats, Life]], limit_m: float) -> dict[str, Any]:
+    """Plain object for JSON: the nominal life, and the data of the others that the forecast needs.
+
+    With a duty, also when each joint of the nominal life reaches the limit.
+    """
+    (factor, nominal), *further = lives
+    duty = (
+        {"duty": {**nominal.duty.to_dict(), "limit_m": limit_m, "end": nominal.end(limit_m)}}
+        if nominal.duty
+        else {}
+    )
+    return {
+        **nominal.to_dict(),
+        **duty,
+        "wear_factor": _by_joint(nominal, factor),
+        "further": [_short(factor, life) for factor, life in further],
+    }
+
+
+def _short(factor: Floats, life: Life) -> dict[str, Any]:
+    names = ("clearance_m", "growth_m_per_cycle")
+    columns = {name: _by_joint(life, getattr(life, name).T) for name in names}
+    joints = {joint: {name: columns[name][joint] for name in names} for joint in life.clearance_joints}
+    return {
+        "wear_factor": _by_joint(life, factor),
+        "cycles": _rounded(life.cycles),
+        "joints": joints,
+    }
+
+
+def _by_joint(life: Life, values: Floats) -> dict[str, Any]:
+    return dict(zip(life.clearance_joints, map(_rounded, values), strict=True))
+
+
+def _rounded(values: Floats) -> Any:
+    return np.vectorize(lambda value: float(f"{value:.{_DIGITS}g}"))(values).tolist()
+
+
+def _root(dimension: int) -> float:
+    """The root x > 1 of x^(dimension + 1) = x + 1."""
+    x = 1.5
+    for _ in range(60):
+        x = (1.0 + x) ** (1.0 / (dimension + 1))
+    return x

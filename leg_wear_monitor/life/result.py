@@ -1,20 +1,120 @@
 """Result of a life: states of wear over gait cycles, and when a clearance reaches its limit."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
 
-from leg_wear_monitor.data_frame import data_frame
-from leg_wear_monitor.json_text import json_text
-from leg_wear_monitor.life.duty import Duty
+from leg_wear_monitor.contact.arrays import contact_doubt, half_angle_of
+from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.files import data_frame, json_text
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.materials import (
+    bushing_of,
+    lacks_wear,
+    load_material,
+    rating_life_hours,
+    regime_of,
+)
+from leg_wear_monitor.mechanism.person import on_the_ground
+from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
 from leg_wear_monitor.shown import Drawable
-from leg_wear_monitor.wear.cycle_jump import WearRate, opening
+from leg_wear_monitor.wear import WearRate, opening
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+# Duty of a leg: hours a day that it walks under each load of the ground.
+
+
+_MOST_N = 10_000.0  # of a peak: ten times a person's weight
+_HOURS_OF_A_DAY = 24.0
+
+
+def _check(_duty: object, _field: object, hours_by_peak: Mapping[float, float]) -> None:
+    if not hours_by_peak:
+        raise ConfigError("duty", "", "has no load, expected such as 0:2,300:5,600:1 (N:hours a day)")
+    for peak, hours in hours_by_peak.items():
+        if not 0.0 <= peak <= _MOST_N:
+            raise ConfigError("duty", "", f"{peak:g} N is not a peak from 0 to {_MOST_N:g} N")
+        if not (math.isfinite(hours) and hours > 0.0):
+            raise ConfigError("duty", "", f"{hours:g} h at {peak:g} N is not a time above 0 h")
+    whole = sum(hours_by_peak.values())
+    if whole > _HOURS_OF_A_DAY:
+        raise ConfigError("duty", "", f"{whole:g} h a day together are more than {_HOURS_OF_A_DAY:g} h")
+
+
+@attrs.frozen
+class Duty:
+    """Hours a day that a leg walks under each load; only their shares matter for its wear in an hour.
+
+    Attributes
+    ----------
+    hours_by_peak : mapping of float to float
+        Hours a day, by the largest vertical force [N] of the ground on the foot; 0 is the leg in the air.
+
+    Raises
+    ------
+    ConfigError
+        For forces and times that cannot be.
+
+    Examples
+    --------
+    >>> import leg_wear_monitor as lw
+    >>> duty = lw.Duty({0.0: 2.0, 300.0: 5.0, 600.0: 1.0})
+    >>> duty == lw.Duty.parse("0:2,300:5,600:1"), duty.hours_per_day
+    (True, 8.0)
+    """
+
+    hours_by_peak: Mapping[float, float] = attrs.field(validator=_check)
+
+    @classmethod
+    def parse(cls, text: str) -> "Duty":
+        """Duty of a text such as ``0:2,300:5,600:1``: peak [N] and hours a day of each part.
+
+        Raises
+        ------
+        ConfigError
+        """
+        found: dict[float, float] = {}
+        for part in text.split(","):
+            try:
+                peak, hours = (float(value) for value in part.split(":"))
+            except ValueError:
+                fault = f"{part!r} is not N:hours a day, expected such as 0:2,300:5,600:1"
+                raise ConfigError("duty", "", fault) from None
+            if peak in found:
+                raise ConfigError("duty", "", f"{peak:g} N is there twice")
+            found[peak] = hours
+        return cls(found)
+
+    @property
+    def hours_per_day(self) -> float:
+        """Hours a day under all loads."""
+        return sum(self.hours_by_peak.values())
+
+    @property
+    def shares(self) -> Floats:
+        """Fraction (parts,) of the gait cycles under each load."""
+        return np.array(list(self.hours_by_peak.values())) / self.hours_per_day
+
+    def to_dict(self) -> dict[str, list[float]]:
+        """Plain object for JSON: peaks and hours of the parts."""
+        return {"peak_n": list(self.hours_by_peak), "hours_per_day": list(self.hours_by_peak.values())}
+
+    def mechanisms(self, mechanism: Mechanism) -> list[Mechanism]:
+        """The mechanism under each load, which takes the place of a load named *ground* that it has.
+
+        Raises
+        ------
+        ConfigError
+            For a mechanism without a toe that moves to and fro.
+        """
+        return [on_the_ground(mechanism, peak) for peak in self.hours_by_peak]
+
 
 SCHEMA_VERSION = 1
 """Of the JSON; counts up when a field is renamed, removed or means something else."""
@@ -226,3 +326,60 @@ def life_of(
         duty=duty,
         part_growth_m_per_cycle=np.array([point.part_growth_m for point in points]),
     )
+
+
+# Load of the bushings of a leg that wears, for the limits and formulas of their makers.
+
+
+def pressure_speed(mechanism: Mechanism, life: Life) -> dict[str, float]:
+    """Mean pressure times sliding speed [Pa m/s] of each joint when new, whether it wears or not.
+
+    It is W / (2 R w) over the period, with W the integral of F_N |v_t| dt over a gait cycle.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    life : Life
+    """
+    found = {}
+    for k, joint in enumerate(life.clearance_joints):
+        settings = mechanism.clearances[joint]
+        area_m2 = 2.0 * settings.bushing_radius * settings.width
+        found[joint] = float(life.rubbing_j_per_cycle[0, k]) / (area_m2 * life.period_s)
+    return found
+
+
+def contact_doubts(mechanism: Mechanism, life: Life) -> dict[str, str]:
+    """Joints whose normal law does not hold at their largest peak force when new, and why."""
+    found = {}
+    for k, joint in enumerate(life.clearance_joints):
+        settings, force_n = mechanism.clearances[joint], float(life.peak_force_n[0, k])
+        psi = half_angle_of(settings, force_n)
+        doubt = contact_doubt(psi, force_n, settings.bushing_radius, settings.normal_law == "winkler")
+        if doubt:
+            found[joint] = doubt
+    return found
+
+
+def rating_hours(settings: Clearance, load: float) -> float | None:
+    """Life by the formula of the pair's maker [h], all factors 1; NaN beyond its range, None without one."""
+    constants = load_material(settings.material).rating_life if settings.material else None
+    return None if constants is None else rating_life_hours(load, constants)
+
+
+def validity(mechanism: Mechanism, life: Life) -> dict[str, Any]:
+    """What each joint's life holds for, as ``life --json`` has it; parameters as of `pressure_speed`."""
+    loads, contacts = pressure_speed(mechanism, life), contact_doubts(mechanism, life)
+    found = {}
+    for joint in life.clearance_joints:
+        settings, load = mechanism.clearances[joint], loads[joint]
+        hours = rating_hours(settings, load)
+        found[joint] = {
+            "holds_for": regime_of(settings),
+            "is_counted": not lacks_wear(settings),
+            "mean_pressure_speed_pa_mps": load,
+            "outside_limits": bushing_of(mechanism, joint).loaded(0.0, 0.0, 0.0, load).outside_limits,
+            "rating_life_h": None if hours is None or math.isnan(hours) else hours,
+            "outside_contact_law": contacts.get(joint),
+        }
+    return found

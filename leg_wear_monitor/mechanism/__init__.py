@@ -1,1 +1,7 @@
-"""The mechanism: its description, its arrays for the kernels, its ideal motion."""
+"""The mechanism: its description, its arrays, its ideal motion; names of the contact laws.
+
+What is imported here imports neither numpy nor numba.
+"""
+
+NORMAL_LAWS = ("hertz", "hunt-crossley", "lankarani-nikravesh", "gonthier", "flores", "hu-guo", "winkler")
+FRICTION_LAWS = ("ambrosio", "threlfall", "none")

@@ -1,20 +1,236 @@
 """Reading of mechanism files: YAML into checked types."""
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import attrs
+import numpy as np
 
-from leg_wear_monitor.configuration.nearest import did_you_mean
-from leg_wear_monitor.configuration.quantity import FieldError
-from leg_wear_monitor.configuration.strict import choose, mapping, shown, structure
-from leg_wear_monitor.configuration.yaml_file import read_document
-from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.configuration import FieldError
+from leg_wear_monitor.configuration.strict import choose, mapping, read_document, shown, structure
+from leg_wear_monitor.errors import ConfigError, did_you_mean
+from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.mechanism import spec
-from leg_wear_monitor.mechanism.clearance import ClearanceSection
-from leg_wear_monitor.mechanism.clearance_joints import clearance_joints
-from leg_wear_monitor.mechanism.references import check_references
-from leg_wear_monitor.share import share_directory
+from leg_wear_monitor.mechanism.materials import load_material, regimes, settings_of
+from leg_wear_monitor.mechanism.plausible import largest_link
+from leg_wear_monitor.mechanism.position import TURN, Linkage, one_cycle, point_motion
+from leg_wear_monitor.mechanism.spec import (
+    GROUND,
+    Clearance,
+    ClearanceSection,
+    Mechanism,
+    Pair,
+    PrismaticJoint,
+    RevoluteJoint,
+    SpeedDrive,
+    TorqueDrive,
+)
+
+# Check that every body and point to which a mechanism refers exists.
+
+
+def check_references(mechanism: Mechanism) -> None:
+    """Check every body and point that joints, drive, springs, loads and assembly name.
+
+    Raises
+    ------
+    ConfigError
+        Names the key of the missing body or point, and the existing ones.
+    """
+    if GROUND in mechanism.bodies:
+        raise ConfigError(
+            mechanism.source, "bodies.ground", "is not a moving body, give its points under the key ground"
+        )
+    _check_joints(mechanism)
+    _need_moving(mechanism, mechanism.drive.body, "drive.body")
+    for name, spring in mechanism.springs.items():
+        for body, point in zip(spring.bodies, spring.points, strict=True):
+            _need_point(mechanism, body, point, f"springs.{name}.bodies", f"springs.{name}.points")
+    for name, load in mechanism.loads.items():
+        _need_point(mechanism, load.body, load.point, f"loads.{name}.body", f"loads.{name}.point")
+    for body in mechanism.assembly.poses:
+        _need_moving(mechanism, body, f"assembly.{body}")
+    for body in mechanism.bodies:
+        if body not in mechanism.assembly.poses:
+            raise ConfigError(
+                mechanism.source,
+                f"assembly.{body}",
+                "is missing, expected: the body's origin and angle, [x, y, angle] [m, m, rad]",
+            )
+
+
+def _check_joints(mechanism: Mechanism) -> None:
+    for name, joint in mechanism.joints.items():
+        roles = ("bushing", "journal") if isinstance(joint, RevoluteJoint) else ("guide", "slider")
+        sides = mechanism.sides(name)
+        for role, body in zip(roles, sides, strict=True):
+            key = f"joints.{name}.{role}"
+            _need_point(mechanism, body, name, key, key)
+        if sides[0] == sides[1]:
+            raise ConfigError(
+                mechanism.source, f"joints.{name}", f"joins {sides[0]!r} to itself, expected two bodies"
+            )
+
+
+def _need_point(mechanism: Mechanism, body: str, point: str, body_key: str, point_key: str) -> None:
+    if body != GROUND and body not in mechanism.bodies:
+        bodies = ", ".join([GROUND, *mechanism.bodies])
+        raise ConfigError(mechanism.source, body_key, f"{body!r} is not a body, expected one of {bodies}")
+    if point not in mechanism.points_of(body):
+        points = ", ".join(mechanism.points_of(body)) or "none"
+        raise ConfigError(
+            mechanism.source, point_key, f"body {body!r} has no point {point!r}, its points are: {points}"
+        )
+
+
+def _need_moving(mechanism: Mechanism, body: str, key: str) -> None:
+    if body not in mechanism.bodies:
+        bodies = ", ".join(mechanism.bodies)
+        raise ConfigError(mechanism.source, key, f"{body!r} is not a moving body, expected one of {bodies}")
+
+
+# Summary of a mechanism in everyday units, in which a wrong unit is obvious.
+
+
+_POINTS = 180  # crank steps per turn: enough for a stride with an error of 0.1 %
+
+
+def understood(linkage: Linkage) -> tuple[str, ...]:
+    """Statements on the size, mass, drive, stride and clearances of a mechanism, with units."""
+    return tuple(_statements(linkage))
+
+
+def _statements(linkage: Linkage) -> Iterator[str]:
+    mechanism = linkage.mechanism
+    link, length = largest_link(mechanism)
+    yield f"largest link {length:.4g} m ({link})"
+    body = max(mechanism.bodies, key=lambda name: mechanism.bodies[name].mass)
+    yield f"heaviest mass {mechanism.bodies[body].mass:.4g} kg ({body})"
+    yield _drive(mechanism)
+    if mechanism.toe is not None:
+        x, y = point_motion(one_cycle(linkage, _POINTS, 1.0), linkage, *mechanism.toe)[0].T
+        yield f"toe's stride {np.ptp(x):.4g} m, lift {np.ptp(y):.4g} m"
+    yield from _clearances(mechanism)
+
+
+def _drive(mechanism: Mechanism) -> str:
+    drive = mechanism.drive
+    if isinstance(drive, TorqueDrive):
+        return f"crank driven by {drive.torque:.4g} N m"
+    speed = drive.speed if isinstance(drive, SpeedDrive) else drive.track.speed_radps
+    sense = "counter-clockwise" if speed > 0.0 else "clockwise"
+    return f"crank {60.0 * abs(speed) / TURN:.4g} rpm {sense}"
+
+
+def _clearances(mechanism: Mechanism) -> Iterator[str]:
+    """Young's moduli and clearances of the clearance joints, each value once."""
+    clearance_joints = [mechanism.clearances[joint] for joint in mechanism.clearance_joints]
+    moduli = sorted({modulus for c in clearance_joints for modulus in c.youngs_modulus})
+    if moduli:
+        yield "E " + " and ".join(f"{1.0e-9 * modulus:.4g}" for modulus in moduli) + " GPa"
+    yield from _pairs(mechanism)
+    for fresh, radius in sorted({(c.radial_clearance, c.bushing_radius) for c in clearance_joints}):
+        ratio = 100.0 * fresh / radius
+        yield f"clearance {1.0e3 * fresh:.4g} mm in a radius of {1.0e3 * radius:.4g} mm ({ratio:.2g} %)"
+
+
+def _pairs(mechanism: Mechanism) -> Iterator[str]:
+    """Material pairs of the clearance joints, with regime and wear coefficients."""
+    for what, names in regimes(mechanism, mechanism.clearance_joints).items():
+        yield f"material of {', '.join(names)}: {what}"
+
+
+# Settings of the clearance joints of a mechanism file: defaults merged with each joint's own settings.
+
+
+_REQUIRED = {field.name for field in attrs.fields(Clearance) if field.default is attrs.NOTHING}
+
+
+def clearance_joints(
+    section: ClearanceSection, joints: Mapping[str, RevoluteJoint | PrismaticJoint], source: str
+) -> tuple[dict[str, Clearance], tuple[str, ...]]:
+    """Settings of the revolute joints, and the names of the clearance joints.
+
+    Returns
+    -------
+    settings : dict of str to Clearance
+        For every revolute joint with a complete set of settings.
+    names : tuple of str
+        The clearance joints.
+
+    Raises
+    ------
+    ConfigError
+        Names the invalid key, among the joint's own settings or among the defaults.
+    """
+    own = section.joints if isinstance(section.joints, dict) else {name: {} for name in section.joints}
+    revolute = [name for name, joint in joints.items() if isinstance(joint, RevoluteJoint)]
+    for name in own:
+        if name not in revolute:
+            what = "is a prismatic joint" if name in joints else "is not a joint"
+            raise ConfigError(
+                source,
+                f"clearances.joints.{name}",
+                f"{what}, only a revolute joint can have clearance: {', '.join(revolute)}",
+            )
+    # complete defaults also apply to joints that only the command line names
+    named = revolute if set(section.defaults) >= _REQUIRED or (section.defaults and not own) else own
+    settings = {
+        name: _settings(section.defaults, own.get(name, {}), source, name)
+        for name in revolute
+        if name in named
+    }
+    return settings, tuple(own)
+
+
+def _settings(defaults: dict[str, Any], own: Any, source: str, name: str) -> Clearance:
+    """Settings of one joint; an error names the place of the key in the file."""
+    place = f"clearances.joints.{name}"
+    own = structure({} if own is None else own, dict[str, Any], source, place)
+    merged: dict[str, Any] = {}
+    # a pair named in the defaults, then their values; a pair of the joint's own, then its values
+    for given, where in ((defaults, "clearances.defaults"), (own, place)):
+        merged = _over(_over(merged, _of_pair(given, source, where)), given)
+    try:
+        settings: Clearance = structure(merged, Clearance, source, "")
+    except ConfigError as error:
+        key = error.key.split(".")[0]
+        if key in defaults and key not in own:
+            place = "clearances.defaults"
+        raise ConfigError(source, f"{place}.{error.key}", error.fault) from error
+    return settings
+
+
+def _of_pair(given: dict[str, Any], source: str, place: str) -> dict[str, Any]:
+    """Settings that come from the material pair named here, as the file would have them; none without."""
+    if "material" not in given:
+        return {}
+    name = structure(given["material"], str, source, f"{place}.material")
+    try:
+        return settings_of(load_material(name))
+    except ConfigError as error:
+        raise ConfigError(source, f"{place}.material", str(error)) from error
+
+
+def _over(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
+    """Settings with others over them, key by key, also inside ``friction``."""
+    merged = below | above
+    if isinstance(below.get("friction"), dict) and isinstance(above.get("friction"), dict):
+        merged["friction"] = below["friction"] | above["friction"]
+    return merged
+
+
+def _list_or_mapping(value: Any) -> tuple[Any, Any]:
+    if isinstance(value, list) and any(value.count(name) > 1 for name in value):
+        raise FieldError("", f"{shown(value)} names a joint twice")
+    if not isinstance(value, list | dict):
+        raise FieldError("", f"{shown(value)} is not a list of names, nor a mapping of names to settings")
+    return (tuple[str, ...] if isinstance(value, list) else dict[str, Any]), value
+
+
+choose(tuple[str, ...] | dict[str, Any], _list_or_mapping)
+choose(Pair, lambda value: (tuple[float, float], value if isinstance(value, list) else [value, value]))
 
 
 def _key(field: "attrs.Attribute[Any]") -> Any:

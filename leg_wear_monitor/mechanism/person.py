@@ -1,9 +1,4 @@
-"""A person's leg that hangs on a linkage: segments added to its thigh, shank and foot (physics.md section 9).
-
-Segments by Winter, *Biomechanics and Motor Control of Human Movement*: mass over that of the body; over the
-length of the segment, the distance of the centre of mass from the proximal joint and the radius of gyration
-about the centre of mass.
-"""
+"""A person on the leg: the weight of a leg by Winter, and the reaction of the ground on the foot."""
 
 import math
 from itertools import pairwise
@@ -14,9 +9,15 @@ import numpy as np
 
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ideal import one_cycle
-from leg_wear_monitor.mechanism.position import build_linkage
-from leg_wear_monitor.mechanism.spec import GROUND, Body, Mechanism, Vector
+from leg_wear_monitor.mechanism.position import TURN, Linkage, build_linkage, one_cycle, point_motion
+from leg_wear_monitor.mechanism.spec import GROUND, Body, Mechanism, PhaseLoad, Vector
+
+# A person's leg that hangs on a linkage: segments added to its thigh, shank and foot (physics.md section 9).
+#
+# Segments by Winter, *Biomechanics and Motor Control of Human Movement*: mass over that of the body; over the
+# length of the segment, the distance of the centre of mass from the proximal joint and the radius of gyration
+# about the centre of mass.
+
 
 PERSON_TOLERANCE = 0.2  # of the mass of a person, who eats, dresses and carries
 
@@ -100,3 +101,156 @@ def _with(body: Body, segment: _Segment, person_kg: float, upper: Vector, lower:
     inertia = body.inertia + mass * (segment.gyration * length) ** 2
     inertia += body.mass * mass / whole * math.dist(body.com, centre) ** 2
     return attrs.evolve(body, mass=whole, inertia=inertia, com=(x, y))
+
+
+# Force of the ground on the toe: a template of human stance over the gait cycle (physics.md section 9).
+#
+# The vertical force is the mean of two measured overground stances (opensim-models, Gait2354_Simbody,
+# subject01_walk1_grf.mot); the fore-aft force brakes in the first half of stance and pushes in the second
+# one.
+
+
+PHASES = 128  # entries of a load's table; a divisor of the number of points of the leg's tables
+FORE_AFT = 0.145  # mean of the peaks of braking and of pushing, over the peak of the vertical force
+
+_VERTICAL = (1.143, -0.042, 0.337, 0.0, -0.0125, -0.016, -0.0655, 0.0105)  # of sin(k pi s), s over stance
+_STANCE = 0.8  # middle part of the toe's way backwards that is stance
+_POINTS = 1024
+
+GROUND_LOAD = "ground"  # name of the load in a mechanism
+
+
+@attrs.frozen
+class Stance:
+    """When and where the foot stands.
+
+    Attributes
+    ----------
+    heel_strike, toe_off : float
+        Crank angle at its begin and at its end, as a fraction of a turn.
+    turned : float
+        1 where the crank angle increases in time, -1 otherwise.
+    up, back : (2,) arrays
+        Unit vectors: upwards, and horizontally as the toe moves in stance.
+    """
+
+    heel_strike: float
+    toe_off: float
+    turned: float
+    up: Floats
+    back: Floats
+
+    def force(self, fore_aft: float = FORE_AFT, points: int = PHASES) -> Floats:
+        """Force (points, 2) at equal steps of the crank angle from 0, per newton of the vertical peak.
+
+        Parameters
+        ----------
+        fore_aft : float, optional
+            Largest fore-aft force, over the largest vertical one.
+        points : int, optional
+        """
+        vertical, along = stance_template(self.fractions(points))
+        return np.outer(vertical, self.up) + fore_aft * np.outer(along, self.back)
+
+    def fractions(self, points: int = PHASES) -> Floats:
+        """Fractions (points,) of stance at equal steps of the crank angle from 0; above 1 it is over."""
+        whole = (self.turned * (self.toe_off - self.heel_strike)) % 1.0
+        since = (self.turned * (np.arange(points) / points - self.heel_strike)) % 1.0
+        return np.asarray(since / whole)
+
+
+def stance_template(s: Floats) -> tuple[Floats, Floats]:
+    """Vertical and fore-aft force (n,) over their peaks, at fractions (n,) of stance; 0 beyond 1.
+
+    The fore-aft force is positive where it points as the toe moves: it brakes.
+    """
+    vertical, stands = _vertical(s), s <= 1.0
+    return np.where(stands, vertical / _PEAK, 0.0), np.where(stands, np.sin(TURN * s), 0.0)
+
+
+def nominal_stance(linkage: Linkage) -> Stance:
+    """Stance by the toe's motion: the middle part of its way backwards, on which its lowest point is.
+
+    Raises
+    ------
+    ConfigError
+        For a mechanism without a toe, or with one that does not move to and fro.
+    """
+    mechanism = linkage.mechanism
+    if mechanism.toe is None:
+        raise ConfigError(mechanism.source, "bodies", "has no point called toe for the ground to push")
+    up = upwards(mechanism)
+    across = np.array([up[1], -up[0]])
+    position, velocity, _ = point_motion(one_cycle(linkage, _POINTS, 1.0), linkage, *mechanism.toe)
+    lowest = int((position @ up).argmin())
+    along = np.roll(velocity @ across, -lowest)
+    back = np.sign(along[0])
+    forth = np.flatnonzero(back * along <= 0.0)
+    if not forth.size:
+        raise ConfigError(mechanism.source, "bodies", "has a toe that does not move to and fro")
+    end, begin = int(forth[0]), int(forth[-1]) - _POINTS
+    middle, half = lowest + 0.5 * (begin + end), 0.5 * _STANCE * (end - begin)
+    ends = [float(at / _POINTS % 1.0) for at in (middle - half, middle + half)]
+    turned = float(np.sign(getattr(mechanism.drive, "speed", 1.0)) or 1.0)
+    heel_strike, toe_off = ends if turned > 0.0 else reversed(ends)
+    return Stance(heel_strike, toe_off, turned, up, turned * back * across)
+
+
+def upwards(mechanism: Mechanism) -> Floats:
+    """Unit vector (2,) opposite to gravity; the y axis without gravity."""
+    gravity = np.array(mechanism.gravity)
+    size = float(np.hypot(*gravity))
+    return -gravity / size if size > 0.0 else np.array([0.0, 1.0])
+
+
+def with_toe_force(mechanism: Mechanism, force: Floats, name: str = GROUND_LOAD) -> Mechanism:
+    """The mechanism with a force (n, 2) [N] on its toe, at equal steps of the crank angle from 0.
+
+    A load of the same name that it had is replaced.
+
+    Raises
+    ------
+    ConfigError
+        For a mechanism without a toe.
+    """
+    if mechanism.toe is None:
+        raise ConfigError(mechanism.source, "bodies", "has no point called toe for the ground to push")
+    body, point = mechanism.toe
+    phases = tuple((np.arange(len(force)) / len(force)).tolist())
+    load = PhaseLoad(
+        body=body, point=point, phase=phases, force=tuple((float(x), float(y)) for x, y in force)
+    )
+    return attrs.evolve(mechanism, loads={**mechanism.loads, name: load})
+
+
+def on_the_ground(mechanism: Mechanism, peak_n: float) -> Mechanism:
+    """The mechanism under the force of the ground on its toe, in the stance of a person.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        A load named *ground* that it has is replaced.
+    peak_n : float
+        Largest vertical force [N].
+
+    Raises
+    ------
+    ConfigError
+        For a mechanism without a toe that moves to and fro.
+
+    Examples
+    --------
+    >>> import leg_wear_monitor as lw
+    >>> leg = lw.on_the_ground(lw.load_mechanism("bionic_leg"), 300.0)
+    >>> round(max(up for _, up in leg.loads["ground"].force))
+    300
+    """
+    return with_toe_force(mechanism, peak_n * nominal_stance(build_linkage(mechanism)).force())
+
+
+def _vertical(s: Floats) -> Floats:
+    order = np.arange(1, len(_VERTICAL) + 1)
+    return np.asarray(np.sin(0.5 * TURN * np.multiply.outer(s, order)) @ np.array(_VERTICAL))
+
+
+_PEAK = float(_vertical(np.linspace(0.0, 1.0, 2001)).max())

@@ -1,13 +1,36 @@
-"""Position analysis: assembly at one crank angle (physics.md section 1)."""
+"""Position analysis of the linkage, its continuation over the crank angle, and the ideal motion."""
 
+import functools
+import math
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
+import attrs
 import numpy as np
+from numpy.typing import ArrayLike
 
 from leg_wear_monitor.errors import AssemblyError
-from leg_wear_monitor.mechanism.arrays import Floats, MechanismArrays, com_poses, compile_arrays
-from leg_wear_monitor.mechanism.constraints import DRIVE, Rows, closures_at, jacobians_at, select_rows
-from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.mechanism.arrays import (
+    Floats,
+    MechanismArrays,
+    body_names,
+    com_poses,
+    compile_arrays,
+    point_from_com,
+)
+from leg_wear_monitor.mechanism.constraints import (
+    DRIVE,
+    Rows,
+    applied_forces_at,
+    closures_at,
+    jacobians_at,
+    select_rows,
+)
+from leg_wear_monitor.mechanism.spec import GROUND, Mechanism, PrismaticJoint
+
+# Position analysis: assembly at one crank angle (physics.md section 1).
+
 
 _TOLERANCE = 1.0e-12  # residual of a closed joint [m, rad], near rounding for links of a metre
 _FAR = 0.5  # rad or link lengths: an assembly further from the initial guess is a different one
@@ -232,3 +255,302 @@ def _size(mechanism: Mechanism) -> float:
         for b in body.points.values()
     ]
     return float(max(spans, default=0.0)) or 1.0
+
+
+# Continuation of a position along the crank angle, on one branch (physics.md section 1).
+
+
+_LONGEST_STEP = np.deg2rad(2.0)  # crank step that keeps the continuation on its branch
+_SHORTEST_STEP = np.deg2rad(1.0e-4)  # crank step below which a dead point is reported
+
+
+def positions(linkage: Linkage, crank_angles: Floats) -> Floats:
+    """Coordinates q (p, n, 3) at p crank angles [rad], visited in this order; see `follow`."""
+    q, angle = assemble(linkage), linkage.mechanism.assembly.crank_angle
+    found = np.empty((len(crank_angles), *q.shape))
+    for i, target in enumerate(crank_angles):
+        q, angle = follow(linkage, q, angle, target), target
+        found[i] = q
+    return found
+
+
+def follow(linkage: Linkage, q: Floats, angle: float, target: float) -> Floats:
+    """Coordinates (n, 3) at the crank angle ``target``, continued on one branch from q at ``angle`` [rad].
+
+    Raises
+    ------
+    AssemblyError
+        If there is a dead point between the angles, naming its crank angle.
+    """
+    angle, q = furthest(linkage, q, angle, target)
+    if angle != target:
+        raise AssemblyError(
+            f"{linkage.mechanism.source}: drive.body: "
+            f"dead point at crank angle {np.rad2deg(angle) % 360.0:.2f} deg: "
+            "the crank cannot turn through a full cycle"
+        )
+    return q
+
+
+def furthest(linkage: Linkage, q: Floats, angle: float, target: float) -> tuple[float, Floats]:
+    """Last crank angle [rad] and coordinates (n, 3) of `walk`: the target's, or those before a dead point."""
+    last = deque(walk(linkage, q, angle, target), maxlen=1)
+    return last[0] if last else (angle, q)
+
+
+def walk(linkage: Linkage, q: Floats, angle: float, target: float) -> Iterator[tuple[float, Floats]]:
+    """Crank angles [rad] and coordinates (n, 3) from q at ``angle`` to ``target``, continued on one branch.
+
+    Before a dead point, they end early.
+    """
+    longest = _LONGEST_STEP  # shorter after a step that failed: near a dead point, the next would fail, too
+    while angle != target:
+        step = float(np.clip(target - angle, -longest, longest))
+        while (near := _step(linkage, q, angle, step)) is None:
+            step *= 0.5
+            if abs(step) < _SHORTEST_STEP:
+                return
+            longest = abs(step)
+        longest = min(2.0 * longest, _LONGEST_STEP)
+        q, angle = near, target if step == target - angle else angle + step
+        yield angle, q
+
+
+def _step(linkage: Linkage, q: Floats, angle: float, step: float) -> Floats | None:
+    """One continuation step [rad] along the tangent; None if it fails or passes a singular position."""
+    here = evaluate(linkage, q, np.zeros_like(q), (angle, 0.0, 0.0)).jacobian
+    sign = np.linalg.slogdet(here)[0]
+    if sign == 0.0:
+        return None
+    guess = q.copy()
+    guess[1:] += (np.linalg.solve(here, drive_column(linkage)) * step).reshape(-1, 3)
+    near = newton(linkage, guess, angle + step)
+    if near is None or np.abs(near - guess).max() > abs(step):
+        return None
+    ahead = evaluate(linkage, near, np.zeros_like(q), (angle + step, 0.0, 0.0)).jacobian
+    return near if np.linalg.slogdet(ahead)[0] == sign else None
+
+
+# Ideal motion: all joints without clearance, over crank angles (physics.md sections 1 and 2).
+
+
+TURN = 2.0 * math.pi
+
+
+@attrs.frozen(eq=False)
+class IdealMotion:
+    """Motion of the ideal linkage at N crank angles.
+
+    Attributes
+    ----------
+    crank_angle : (N,) array, rad
+    q, v, a : (N, n, 3) arrays
+        Centre of mass [m] and angle [rad] of every body, ground first; their velocities and accelerations.
+    joint_force : (N, j, 2) array, N
+        Force on the journal's (or slider's) body in each joint.
+    drive_torque : (N,) array, N m
+    """
+
+    crank_angle: Floats
+    q: Floats
+    v: Floats
+    a: Floats
+    joint_force: Floats
+    drive_torque: Floats
+
+
+def ideal_motion(
+    linkage: Linkage, crank_angles: Iterable[float], speed: float, acceleration: float = 0.0
+) -> IdealMotion:
+    """Motion of the ideal linkage at the given crank angles.
+
+    Parameters
+    ----------
+    linkage : Linkage
+    crank_angles : iterable of float, rad
+        Visited in this order; neighbours may be any distance apart.
+    speed, acceleration : float
+        Speed [rad/s] and acceleration [rad/s^2] of the crank, the same at every angle.
+
+    Returns
+    -------
+    IdealMotion
+
+    Raises
+    ------
+    AssemblyError
+        If the linkage does not close at the assembly's angle, or has a dead point between the angles.
+    """
+    angles = np.array(list(crank_angles), dtype=float)
+    return _motion(linkage, angles, positions(linkage, angles), speed, acceleration)
+
+
+def one_cycle(linkage: Linkage, points: int, speed: float, acceleration: float = 0.0) -> IdealMotion:
+    """Ideal motion at ``points`` equal steps of one crank turn from angle 0.
+
+    The speed [rad/s] and the acceleration [rad/s^2] are the same at every step.
+    """
+    return _motion(linkage, _even_angles(points), _one_cycle_positions(linkage, points), speed, acceleration)
+
+
+def check_cycle(linkage: Linkage) -> None:
+    """Check that the crank can turn through a full cycle.
+
+    Raises
+    ------
+    AssemblyError
+        If there is a dead point; the message contains its crank angle.
+    """
+    start = linkage.mechanism.assembly.crank_angle
+    follow(linkage, assemble(linkage), start, start + TURN)
+
+
+@attrs.frozen
+class _Geometry:
+    """A linkage as a cache key: equal for linkages that differ in masses, springs and loads only."""
+
+    linkage: Linkage = attrs.field(eq=False)
+    key: bytes
+
+
+def _one_cycle_positions(linkage: Linkage, points: int) -> Floats:
+    """Coordinates q (points, n, 3) over one turn, cached by the linkage's geometry."""
+    arrays = linkage.arrays
+    shape = (
+        arrays.joint_kind,
+        arrays.joint_body,
+        arrays.joint_point,
+        arrays.joint_normal,
+        arrays.joint_angle,
+    )
+    start = np.append(
+        com_poses(linkage.mechanism), [linkage.mechanism.assembly.crank_angle, arrays.drive_body]
+    )
+    key = b"".join(array.tobytes() for array in (*shape, start))
+    return _solved_positions(_Geometry(linkage, key), points).copy()
+
+
+# a twin, studies and tests need the positions of one linkage several times, with other loads and speeds
+@functools.lru_cache(maxsize=16)
+def _solved_positions(geometry: _Geometry, points: int) -> Floats:
+    return positions(geometry.linkage, _even_angles(points))
+
+
+def _even_angles(points: int) -> Floats:
+    return np.asarray(np.arange(points) * (TURN / points), dtype=np.float64)
+
+
+def _motion(linkage: Linkage, angles: Floats, q: Floats, speed: float, acceleration: float) -> IdealMotion:
+    """Velocities, accelerations and reactions at positions q (N, n, 3)."""
+    v, a, jacobian = np.zeros_like(q), np.zeros_like(q), jacobians(linkage, q)
+    column = drive_column(linkage) * speed
+    v[:, 1:] = _solve(jacobian, np.broadcast_to(column, jacobian.shape[:2])).reshape(len(q), -1, 3)
+    a[:, 1:] = _solve(jacobian, gammas(linkage, q, v, acceleration)).reshape(len(q), -1, 3)
+    force = np.empty_like(q)
+    applied_forces_at(linkage.arrays, q, v, np.empty((q.shape[1], 2)), force)
+    # M a + phi_q^T lambda = Q; the force that a row exerts is -phi_q^T lambda
+    inertial: Floats = force - linkage.arrays.mass * a
+    lam = _solve(jacobian.transpose(0, 2, 1), inertial[:, 1:].reshape(len(q), -1))
+    return IdealMotion(angles, q, v, a, reactions(linkage, q, lam), -lam[:, linkage.rows.drive_row])
+
+
+def _solve(matrices: Floats, columns: Floats) -> Floats:
+    """Solutions (N, m) of N linear systems, matrices (N, m, m) and right-hand sides (N, m)."""
+    return np.asarray(np.linalg.solve(matrices, columns[..., None]), dtype=np.float64)[..., 0]
+
+
+def reactions(linkage: Linkage, q: Floats, lam: Floats) -> Floats:
+    """Force (N, j, 2) [N] on the journal's or slider's body in every joint, from the multipliers (N, m)."""
+    arrays, force = linkage.arrays, np.zeros((len(q), len(linkage.mechanism.joints), 2))
+    for closure, row in zip(linkage.rows.closure, linkage.rows.row, strict=True):
+        if closure == DRIVE:
+            continue
+        if arrays.joint_kind[closure] == 0:
+            force[:, closure] = -lam[:, row : row + 2]
+        else:
+            angle = q[:, arrays.joint_body[closure, 0], 2]
+            force[:, closure] = -lam[:, row, None] * rotated(arrays.joint_normal[closure], angle)
+    return force
+
+
+def point_motion(
+    motion: IdealMotion, linkage: Linkage, body: str, point: str
+) -> tuple[Floats, Floats, Floats]:
+    """Position [m], velocity [m/s] and acceleration [m/s^2] of a point of a body, (N, 2) each."""
+    i = body_names(linkage.mechanism).index(body)
+    q, v, a = motion.q[:, i], motion.v[:, i], motion.a[:, i]
+    lever = rotated(point_from_com(linkage.mechanism, body, point), q[:, 2])
+    across = np.stack([-lever[:, 1], lever[:, 0]], axis=1)
+    w, alpha = v[:, 2:], a[:, 2:]
+    return q[:, :2] + lever, v[:, :2] + w * across, a[:, :2] + alpha * across - w * w * lever
+
+
+def point_path(mechanism: Mechanism, q: Floats, body: str, point: str) -> Floats:
+    """Position (N, 2) [m] of a point of a body at coordinates q (N, n, 3)."""
+    i = body_names(mechanism).index(body)
+    return q[:, i, :2] + rotated(point_from_com(mechanism, body, point), q[:, i, 2])
+
+
+def rotated(vector: ArrayLike, angle: ArrayLike) -> Floats:
+    """A vector (2,) rotated by an angle [rad], or by N angles: (N, 2)."""
+    x, y = np.asarray(vector, dtype=float)
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([c * x - s * y, s * x + c * y], axis=-1)
+
+
+# The ideal mechanism at crank angle 0 as places in its plane, for pictures.
+
+
+@attrs.frozen(eq=False)
+class Outline:
+    """Shapes and places [m].
+
+    Attributes
+    ----------
+    bodies : dict of str to (n, 2) array
+        Corners of each moving body.
+    joints : dict of str to (2,) array
+    """
+
+    bodies: dict[str, Floats]
+    joints: dict[str, Floats]
+
+
+def outline_of(mechanism: Mechanism) -> Outline:
+    """Outline of a mechanism.
+
+    Raises
+    ------
+    AssemblyError
+        If it does not close.
+    """
+    linkage = build_linkage(mechanism)
+    motion = ideal_motion(linkage, [0.0], 1.0)
+
+    def place(body: str, point: str) -> Floats:
+        return np.asarray(point_motion(motion, linkage, body, point)[0][0], np.float64)
+
+    bodies = {
+        body: corners({point: place(body, point) for point in mechanism.points_of(body)})
+        for body in mechanism.bodies
+    }
+    return Outline(bodies, {joint: place(mechanism.sides(joint)[1], joint) for joint in mechanism.joints})
+
+
+def is_on_ground(mechanism: Mechanism, joint: str) -> bool:
+    """Whether a joint joins a body to the ground."""
+    return GROUND in mechanism.sides(joint)
+
+
+def carriers(mechanism: Mechanism, joint: str) -> tuple[str, str]:
+    """The two bodies of a joint, last the one at whose point it is drawn: the ground, or the journal."""
+    bushing, journal = mechanism.sides(joint)
+    is_fixed = bushing == GROUND and not isinstance(mechanism.joints[joint], PrismaticJoint)
+    return (journal, bushing) if is_fixed else (bushing, journal)
+
+
+def corners(points: Mapping[str, Floats]) -> Floats:
+    """Corners (n, 2) of a body's shape: its distinct points [m], ordered by angle around their mean."""
+    distinct = np.unique(np.array(list(points.values())).round(9), axis=0)
+    around = distinct - distinct.mean(axis=0)
+    return np.asarray(distinct[np.argsort(np.arctan2(around[:, 1], around[:, 0]))])

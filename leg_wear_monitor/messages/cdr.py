@@ -8,18 +8,32 @@ A message is four bytes of encapsulation and a body; members are aligned relativ
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
-from leg_wear_monitor.kernel import entry, kernel
+from leg_wear_monitor.compiled.kernel import entry, kernel
+from leg_wear_monitor.messages.streams import CONTACT as CONTACT_SWITCH
 from leg_wear_monitor.messages.streams import (
-    CONTACT,
     FLOAT64,
     JOINT_STATE,
     LOAD_FLOAT64,
     LOAD_WRENCH,
     STREAMS,
     WRENCH_STAMPED,
+    Stream,
 )
-from leg_wear_monitor.twin.sample import EMPTY, MISSING_JOINT, NO_FAULT, NOT_FINITE, UNDECODABLE, WRONG_LENGTH
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.twin.sample import (
+    CONTACT,
+    EMPTY,
+    GAIT_SAMPLE,
+    MISSING_JOINT,
+    NO_FAULT,
+    NOT_FINITE,
+    UNDECODABLE,
+    WRONG_LENGTH,
+    ZERO_STAMP,
+    Samples,
+)
 
 MESSAGE = np.dtype(
     [
@@ -286,7 +300,7 @@ def decode(data, messages, crank, encoders, ends_at, axis, use_effort, out, out_
             elif kind == LOAD_FLOAT64:
                 fault, force[1] = float64_message(data, begin, end, big)
                 force[0], stamp = 0.0, messages[i]["log_time_ns"]
-            elif kind == CONTACT:
+            elif kind == CONTACT_SWITCH:
                 fault, force[1] = bool_message(data, begin, end)
                 force[0], stamp = 0.0, messages[i]["log_time_ns"]
         out[i]["stamp_ns"] = stamp
@@ -302,3 +316,145 @@ def decode(data, messages, crank, encoders, ends_at, axis, use_effort, out, out_
                 wanted = encoders[first : ends_at[j]]
                 out_angles[i, j] = joint_angle(data, begin, end, data[begin + 1] == 0, wanted)
             first = ends_at[j]
+
+
+# Decoding of messages to gait samples: selects crank, torque and foot load, and applies signs and scales.
+
+
+_AXES = {"x": 0, "y": 1, "z": 2}
+
+
+class Decoder:
+    """Decodes messages to samples, singly or in bulk, with identical results; used live and in replay.
+
+    Parameters
+    ----------
+    config : MonitorConfig
+        The decoder uses `crank_joint`, `crank`, `encoders`, `drive_torque` and `foot_load`.
+    """
+
+    def __init__(self, config: MonitorConfig) -> None:
+        crank, torque = config.crank, config.drive_torque
+        self._crank = np.frombuffer(config.crank_joint.encode(), np.uint8)
+        self._crank_scale = crank.sign / crank.gear_ratio
+        self._offset_rad = crank.offset_rad
+        self._torque_scale = torque.sign * torque.scale * torque.gear_ratio
+        self._axis = _AXES[torque.axis]
+        self._effort = torque.source == "effort"
+        load = config.foot_load
+        self._force_scale = 1.0 if load.source == CONTACT else load.sign * load.scale
+        names = [name.encode() for name in config.encoders.names]
+        self._encoders = np.frombuffer(b"".join(names), np.uint8)
+        self._ends = np.cumsum([len(name) for name in names], dtype=np.int64)
+        self._signs = np.array(config.encoders.signs or (1.0,) * len(names))
+
+    def many(self, data: NDArray[np.uint8], messages: NDArray[np.void]) -> Samples:
+        """Decode messages in order; an unusable message becomes a sample with a fault.
+
+        Parameters
+        ----------
+        data : (bytes,) array of uint8
+        messages : (n,) array of MESSAGE
+
+        Returns
+        -------
+        (n,) array of GAIT_SAMPLE
+        """
+        samples = np.empty(len(messages), GAIT_SAMPLE)
+        angles = np.empty((len(messages), len(self._ends)))
+        force = np.empty((len(messages), 2))
+        out = samples, angles, force
+        decode(data, messages, self._crank, self._encoders, self._ends, self._axis, self._effort, *out)
+        samples["foot_force_n"] = force * self._force_scale
+        samples["encoder_rad"] = np.nan
+        samples["encoder_rad"][:, : len(self._ends)] = angles * self._signs
+        samples["crank_angle_rad"] *= self._crank_scale
+        samples["crank_angle_rad"] += self._offset_rad
+        samples["crank_velocity_radps"] *= self._crank_scale
+        samples["torque_nm"] *= self._torque_scale
+        return mark_zero_stamps(samples)
+
+    def one(self, raw: bytes, kind: int, log_time_ns: int = 0) -> Samples:
+        """Decode one serialized message.
+
+        Parameters
+        ----------
+        raw : bytes
+        kind : int
+            Code of the message's stream.
+        log_time_ns : int
+            Time of arrival [ns]; stamps messages without a header.
+
+        Returns
+        -------
+        (1,) array of GAIT_SAMPLE
+        """
+        message = np.zeros(1, MESSAGE)
+        message[0] = (0, len(raw), log_time_ns, log_time_ns, kind)
+        return self.many(np.frombuffer(raw, np.uint8), message)
+
+
+def mark_zero_stamps(samples: Samples) -> Samples:
+    """Mark, in place, otherwise valid samples with a stamp of zero: their clock had not started."""
+    zero = (samples["stamp_ns"] == 0) & (samples["fault"] == NO_FAULT)
+    if zero.any():
+        samples["fault"][zero] = ZERO_STAMP
+    return samples
+
+
+# Check that the clocks of a recording agree: header stamps against log times.
+
+
+_FRACTION, _LEAST_NS = 0.05, 1_000_000_000
+
+
+class Clocks:
+    """First and last stamps and log times of each message type."""
+
+    def __init__(self) -> None:
+        self._ends: dict[int, tuple[int, int, int, int]] = {}
+
+    def compare(self, samples: Samples, messages: NDArray[np.void]) -> None:
+        """Update the times from messages and the samples decoded from them.
+
+        Parameters
+        ----------
+        samples : (n,) array of GAIT_SAMPLE
+            Stamped by their headers.
+        messages : (n,) array of MESSAGE
+        """
+        good = samples["fault"] == NO_FAULT
+        for kind in np.unique(messages["type"][good]).tolist():
+            chosen = np.flatnonzero(good & (messages["type"] == kind))
+            stamps, times = samples["stamp_ns"][chosen], messages["log_time_ns"][chosen]
+            first = self._ends.get(kind, (int(stamps[0]), int(times[0])))[:2]
+            self._ends[kind] = (*first, int(stamps[-1]), int(times[-1]))
+
+    def notes(self) -> list[str]:
+        """Disagreements of the clocks, one line each."""
+        stamped = (self._rate(each.code, each.topic) for each in STREAMS if each.has_stamp)
+        unstamped = (self._apart(each) for each in STREAMS if not each.has_stamp)
+        return [note for note in (*stamped, *unstamped) if note]
+
+    def _apart(self, stream: Stream) -> str | None:
+        """Remark if the log times that stamp a stream are far from the crank's stamps; otherwise None."""
+        crank = self._ends.get(JOINT_STATE)
+        if stream.code not in self._ends or crank is None or abs(crank[1] - crank[0]) <= _LEAST_NS:
+            return None
+        apart = (crank[1] - crank[0]) / 1e9
+        return (
+            f"{stream.topic} has no header, so its stamps are log times; they are {apart:.6g} s after the "
+            "header stamps of joint_states; try --time log"
+        )
+
+    def _rate(self, kind: int, name: str) -> str | None:
+        if kind not in self._ends:
+            return None
+        first, first_log, last, last_log = self._ends[kind]
+        span, span_log = last - first, last_log - first_log
+        if abs(span - span_log) <= max(_LEAST_NS, _FRACTION * abs(span_log)):
+            return None
+        return (
+            f"{name}: header stamps span {span / 1e9:.6g} s, log times {span_log / 1e9:.6g} s; header stamps "
+            "are used, unless --time selects others"
+        )

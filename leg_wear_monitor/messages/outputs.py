@@ -1,25 +1,22 @@
 """Conversion of reports to serialized output messages, byte-identical live and in replay."""
 
-from collections.abc import Iterable, Iterator, Sequence
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from types import MappingProxyType
 
 import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.json_text import or_nan
+from leg_wear_monitor.files import or_nan
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.messages import encode
 from leg_wear_monitor.messages.leg_markers import MARKERS
-from leg_wear_monitor.messages.output import Outgoing, Output, single
-from leg_wear_monitor.messages.qos import LATCHED, SENSOR_DATA
-from leg_wear_monitor.messages.scalars import Scalars
-from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
-from leg_wear_monitor.monitor.alarms.fault_codes import code_of
-from leg_wear_monitor.monitor.alarms.words import state_of
-from leg_wear_monitor.monitor.config.parameter_file import NODE
+from leg_wear_monitor.messages.streams import LATCHED, SENSOR_DATA, Outgoing, Output, single
+from leg_wear_monitor.monitor.alarms import Alarm, Level, code_of, state_of
+from leg_wear_monitor.monitor.config.parameters import NODE
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.forecast.forecast import LegForecast
-from leg_wear_monitor.monitor.forecast.words import answer_words, lifetime_values
+from leg_wear_monitor.monitor.forecast.forecast import LegForecast, answer_words, lifetime_values
 from leg_wear_monitor.monitor.reports import (
     AlarmList,
     CycleReport,
@@ -30,8 +27,57 @@ from leg_wear_monitor.monitor.reports import (
     VerdictReport,
 )
 from leg_wear_monitor.monitor.status import verdict_status
-from leg_wear_monitor.monitor.verdict.words import with_unit
-from leg_wear_monitor.twin.kinds import CRANK
+from leg_wear_monitor.monitor.verdict.verdict import with_unit
+from leg_wear_monitor.twin import CRANK
+
+# Values of each clearance joint as numbers of their own, because tools plot arrays by index only.
+
+
+def _remaining_p50_h(joint: JointReport) -> float | None:
+    hours = joint.forecast.hours if joint.forecast else None
+    return hours.p50 if hours else None
+
+
+SCALARS: Mapping[str, Callable[[JointReport], float | None]] = MappingProxyType(
+    {
+        "clearance_m": lambda joint: joint.clearance_m,
+        "seen_m": lambda joint: joint.seen_m,
+        "remaining_p50_h": _remaining_p50_h,
+        "peak_force_n": lambda joint: joint.peak_force_n,
+    }
+)
+"""Values of a joint by the last part of their topics' names; None or not finite if not known."""
+
+
+class Scalars:
+    """Messages of std_msgs/Float64 after each gait cycle; a value that is not known has no message.
+
+    Parameters
+    ----------
+    clearance_joints : sequence of str
+        The clearance joints, in the order of the reports.
+
+    Attributes
+    ----------
+    outputs : tuple of Output
+        One for each joint and value, such as ``~/joints/A/clearance_m``.
+    """
+
+    def __init__(self, clearance_joints: Sequence[str]) -> None:
+        self._by_joint = {
+            joint: {name: Output(f"~/joints/{joint}/{name}", encode.FLOAT64) for name in SCALARS}
+            for joint in clearance_joints
+        }
+        self.outputs = tuple(output for outputs in self._by_joint.values() for output in outputs.values())
+
+    def of(self, cycle: CycleReport) -> Iterator[Outgoing]:
+        """Messages of all known values of a gait cycle."""
+        for joint in cycle.joints:
+            for name, output in self._by_joint[joint.joint].items():
+                value = SCALARS[name](joint)
+                if value is not None and math.isfinite(value):
+                    yield single(output, cycle.stamp_ns, encode.float64s(value)[0].tobytes())
+
 
 CLEARANCES = Output("~/clearance_states", encode.JOINT_STATE)
 IMPACTS = Output("~/impact_forces", encode.JOINT_STATE, SENSOR_DATA)

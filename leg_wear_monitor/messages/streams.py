@@ -3,9 +3,18 @@
 `cdr` parses the messages of a stream; `twin.kinds` defines the use of its samples.
 """
 
-import attrs
+from collections.abc import Iterator
+from functools import cache
 
-from leg_wear_monitor.twin.kinds import CRANK, LOAD, TORQUE
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys.store import Typestore
+
+from leg_wear_monitor.monitor.forecast.forecast import Answer
+from leg_wear_monitor.monitor.reports import CycleReport, Reports
+from leg_wear_monitor.twin import CRANK, LOAD, TORQUE
 
 JOINT_STATE, WRENCH_STAMPED, FLOAT64, LOAD_WRENCH, LOAD_FLOAT64, CONTACT = range(1, 7)
 
@@ -111,3 +120,153 @@ def streams_read(torque_source: str, load_source: str = "none") -> tuple[Stream,
     """Streams that are read with values of `drive_torque.source` and `foot_load.source`."""
     sources = (("", ""), (torque_source, ""), ("", load_source))
     return tuple(stream for stream in STREAMS if (stream.torque_source, stream.load_source) in sources)
+
+
+# Quality of service in the format of rosbag2 (metadata version 9), so that playback uses the original.
+
+
+_FOREVER = {"sec": 9223372036, "nsec": 854775807}
+
+
+@attrs.frozen
+class Qos:
+    """Quality of service offered by a publisher."""
+
+    reliability: str = "reliable"
+    durability: str = "volatile"
+    depth: int = 10
+
+    def profile(self) -> dict[str, object]:
+        """Mapping as in metadata.yaml."""
+        return {
+            "history": "keep_last",
+            "depth": self.depth,
+            "reliability": self.reliability,
+            "durability": self.durability,
+            "deadline": dict(_FOREVER),
+            "lifespan": dict(_FOREVER),
+            "liveliness": "automatic",
+            "liveliness_lease_duration": dict(_FOREVER),
+            "avoid_ros_namespace_conventions": False,
+        }
+
+    def text(self) -> str:
+        """YAML text for a channel's metadata."""
+        lines = []
+        for key, value in self.profile().items():
+            if isinstance(value, dict):
+                lines += [f"{key}:", *(f"  {part}: {number}" for part, number in value.items())]
+            else:
+                lines.append(f"{key}: {str(value).lower()}")
+        return "- " + "\n  ".join(lines)
+
+
+RELIABLE = Qos()
+SENSOR_DATA = Qos(reliability="best_effort", depth=200)
+LATCHED = Qos(durability="transient_local", depth=1)
+
+
+# An output topic of the monitor, and messages for it.
+
+
+@attrs.frozen
+class Output:
+    """An output topic of the monitor: name relative to the node, type and offered quality of service."""
+
+    name: str
+    type: str
+    qos: Qos = RELIABLE
+
+
+@attrs.frozen(eq=False)
+class Outgoing:
+    """Messages for one topic.
+
+    Attributes
+    ----------
+    output : Output
+    stamp_ns : (n,) array of int
+    messages : (n, bytes) array of uint8
+        One message per row.
+    """
+
+    output: Output
+    stamp_ns: NDArray[np.int64]
+    messages: NDArray[np.uint8]
+
+
+def single(output: Output, stamp_ns: int, raw: bytes) -> Outgoing:
+    """One message for a topic."""
+    return Outgoing(output, np.array([stamp_ns], np.int64), np.frombuffer(raw, np.uint8)[None, :])
+
+
+def topic_of(output: Output, node: str) -> str:
+    """Full name of a topic, for a node such as ``/robot/leg_wear_monitor``."""
+    return node + output.name[1:] if output.name.startswith("~") else output.name
+
+
+# Message definitions and type hashes, which a recording needs so that other tools can read it.
+
+
+@attrs.frozen
+class Definition:
+    """A message type.
+
+    Attributes
+    ----------
+    name : str
+        Such as ``sensor_msgs/msg/JointState``.
+    text : str
+        Definition in ros2msg format, including those of all nested types.
+    digest : str
+        Type hash of REP-2011, ``RIHS01_...``.
+    """
+
+    name: str
+    text: str
+    digest: str
+
+
+@cache
+def types() -> Typestore:
+    """Types of ROS 2 Jazzy."""
+    return get_typestore(Stores.ROS2_JAZZY)
+
+
+@cache
+def definition(name: str) -> Definition:
+    """Definition of a message type of ROS 2's common interfaces."""
+    text, _ = types().generate_msgdef(name, ros_version=2)
+    return Definition(name, text, types().hash_rihs01(name))
+
+
+# Times of forecast messages: a minute after the last one, after an alarm change, on a new answer.
+
+
+_MINUTE_NS = 60 * 10**9
+
+
+class ForecastTimes:
+    """Selects gait cycles by their stamps only, independent of how reports are grouped."""
+
+    def __init__(self) -> None:
+        self._published_ns: int | None = None
+        self._changes_ns: list[int] = []
+        self._answers: list[Answer] = []
+
+    def due(self, reports: Reports) -> Iterator[CycleReport]:
+        """Gait cycles after which a forecast is due."""
+        self._changes_ns += [change.stamp_ns for change in reports.alarms]
+        for cycle in reports.cycles:
+            changes = [stamp for stamp in self._changes_ns if stamp <= cycle.stamp_ns]
+            forecasts = [joint.forecast for joint in cycle.joints] + [cycle.forecast]
+            answers = [each.answer for each in forecasts if each is not None]
+            if changes or answers != self._answers or self._is_minute(cycle.stamp_ns):
+                self._answers = answers
+                self._changes_ns = [stamp for stamp in self._changes_ns if stamp > cycle.stamp_ns]
+                self._published_ns = cycle.stamp_ns
+                yield cycle
+
+    def _is_minute(self, stamp_ns: int) -> bool:
+        """Whether no forecast was published yet, or the last is a minute old or of another time base."""
+        return self._published_ns is None or not 0 <= stamp_ns - self._published_ns < _MINUTE_NS

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
-from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.alarms import Alarm, Level
 from leg_wear_monitor.monitor.config.settings import LedgerFile
-from leg_wear_monitor.monitor.evaluation.torque_record import FRICTION_KEY, SIGMA_KEY
-from leg_wear_monitor.monitor.inputs.pauses import Pauses
+from leg_wear_monitor.monitor.gait_evidence import FRICTION_KEY, SIGMA_KEY
+from leg_wear_monitor.monitor.inputs import Pauses
 from leg_wear_monitor.monitor.ledger.entry import (
     AlarmEvent,
     ClearancePoint,
@@ -28,11 +28,36 @@ from leg_wear_monitor.monitor.ledger.entry import (
 )
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, VerdictReport
-from leg_wear_monitor.monitor.spans import NEIGHBOURS_NS, Spans, is_within, with_span
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics, SampleStatistics
-from leg_wear_monitor.wear.surfaces import BUSHING
+from leg_wear_monitor.wear import BUSHING
+
+# Stretches of time whose wear is counted, so that none is counted twice.
+
+
+Spans = tuple[tuple[int, int], ...]
+
+NEIGHBOURS_NS = 10_000_000_000  # stretches nearer than this are taken as one
+
+
+def with_span(spans: Spans, begin_ns: int, end_ns: int) -> Spans:
+    """Disjoint spans in order of time with one more, joined with those that it meets or nearly meets."""
+    apart = []
+    for begin, end in spans:
+        if begin_ns - NEIGHBOURS_NS <= end and begin <= end_ns + NEIGHBOURS_NS:
+            begin_ns, end_ns = min(begin, begin_ns), max(end, end_ns)
+        else:
+            apart.append((begin, end))
+    return tuple(sorted([*apart, (begin_ns, end_ns)]))
+
+
+def is_within(stamp_ns: Ints, spans: Ints) -> NDArray[np.bool_]:
+    """Which stamps (n,) lie in one of the spans (m, 2), in order of their begin; ends are within."""
+    latest = np.maximum.accumulate(spans[:, 1])
+    at = np.searchsorted(spans[:, 0], stamp_ns, side="right") - 1
+    return np.asarray((at >= 0) & (stamp_ns <= latest[np.maximum(at, 0)]))
+
 
 POINT_S = 600.0  # of walking, between two points of the clearances' history
 # of all walking so far, likewise if it is more: a year of 8 h a day then has some 1100 points, not 17 500

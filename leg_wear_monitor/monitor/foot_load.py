@@ -11,25 +11,15 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ground_reaction import nominal_stance
-from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.person import nominal_stance
+from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle, point_motion
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.alarms.fault_codes import (
-    EXCHANGED,
-    FOOT_LOAD_LIMITS,
-    GAPS,
-    SCALE,
-    SIGN,
-    STUCK,
-    ZERO,
-)
+from leg_wear_monitor.monitor.alarms import EXCHANGED, FOOT_LOAD_LIMITS, GAPS, SCALE, SIGN, STUCK, ZERO
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.reports import FootLoad
-from leg_wear_monitor.twin.follower.state import FINE_PHASES
-from leg_wear_monitor.twin.kinds import KINDS, LOAD
-from leg_wear_monitor.twin.sample import NO_FAULT, Samples
-from leg_wear_monitor.twin.settings import CONTACT, MEASURED
+from leg_wear_monitor.twin import KINDS, LOAD
+from leg_wear_monitor.twin.follower_state import FINE_PHASES
+from leg_wear_monitor.twin.sample import CONTACT, MEASURED, NO_FAULT, Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics, LoadProfile, TorqueProfile
 
 _CYCLES = 10  # over which the load is averaged

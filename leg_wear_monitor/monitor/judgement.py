@@ -5,24 +5,35 @@ from collections.abc import Callable, Sequence
 
 import attrs
 
+from leg_wear_monitor.compiled.kernel import Records
 from leg_wear_monitor.estimate.cause import TorqueExplanation
-from leg_wear_monitor.monitor.accounting import Accounting
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis
-from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate, ClearanceObservation
-from leg_wear_monitor.monitor.encoders.observer import EncoderObserver
-from leg_wear_monitor.monitor.encoders.state import faults
-from leg_wear_monitor.monitor.evaluation import specs
-from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluation
-from leg_wear_monitor.monitor.evaluation.gait_evidence import doubts
-from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
-from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.monitor import alarm_specs
+from leg_wear_monitor.monitor.accounting import Accounting, AccountingState
+from leg_wear_monitor.monitor.alarms import Alarm
+from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate, ClearanceObservation
+from leg_wear_monitor.monitor.crank_zero import CrankZeroSnapshot
+from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserverSnapshot
+from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
+from leg_wear_monitor.monitor.encoders import EncoderObserver, EncoderSnapshot, faults
+from leg_wear_monitor.monitor.evaluation import AlarmEvaluation, AlarmEvaluationState
+from leg_wear_monitor.monitor.foot_load import FootLoadState
+from leg_wear_monitor.monitor.forecast.forecaster import RENEWED_NS, Forecaster, ForecastState
+from leg_wear_monitor.monitor.forecast.measurement import GrowthWindow
+from leg_wear_monitor.monitor.forecast.wear_coefficients import MeasuredClearance
+from leg_wear_monitor.monitor.gait_evidence import NO_MISMATCH, MismatchWindow, TorqueRecord, doubts
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.reports import CycleReport, JointReport, VerdictReport
-from leg_wear_monitor.monitor.state import MonitorState
-from leg_wear_monitor.monitor.verdict.belief import BelievedClearance, at_limit_by_estimate, believed
 from leg_wear_monitor.monitor.verdict.rules import findings
-from leg_wear_monitor.monitor.verdict.sampled import with_sampling
-from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance, Situation
+from leg_wear_monitor.monitor.verdict.situation import (
+    BelievedClearance,
+    JointSituation,
+    SeenClearance,
+    Situation,
+    at_limit_by_estimate,
+    believed,
+    with_sampling,
+)
 from leg_wear_monitor.monitor.verdict.verdict import (
     NO_GAIT_CYCLE,
     Figure,
@@ -32,8 +43,87 @@ from leg_wear_monitor.monitor.verdict.verdict import (
     has_changed,
     verdict_of,
 )
-from leg_wear_monitor.twin.digital_twin import DigitalTwin
-from leg_wear_monitor.twin.statistics import Tracking
+from leg_wear_monitor.twin.digital_twin import DigitalTwin, TwinSnapshot
+from leg_wear_monitor.twin.statistics import CycleStatistics, Event, Tracking
+
+# Update of the forecast with clearance estimates from encoders: each minute of stamps, or on a finding.
+
+
+def update_forecast(
+    observer: EncoderObserver,
+    forecaster: Forecaster,
+    statistics: CycleStatistics,
+    worn_m: Floats,
+    replaced_ns: Sequence[int],
+) -> tuple[ClearanceEstimate, ...]:
+    """Clearance estimates after a gait cycle, and whether the forecast uses them.
+
+    Parameters
+    ----------
+    watch : EncoderObserver
+    forecaster : Forecaster
+        Updated if that is due.
+    statistics : CycleStatistics
+    worn_m : (k,) array
+        Wear counted by the twin for each part.
+    replaced_ns : sequence of int
+        When each part was replaced, 0 if it never was.
+    """
+    state, estimates = observer.state, observer.estimates(statistics.clearance_mean_m)
+    other = tuple(one.is_other for one in estimates)
+    is_due = other != state.other or not 0 <= statistics.stamp_ns - state.updated_ns < RENEWED_NS
+    if is_due and any(one.observation is ClearanceObservation.SEEN for one in estimates):
+        state.updated_ns, state.other = statistics.stamp_ns, other
+        state.believed = tuple(
+            one.observation is ClearanceObservation.SEEN
+            and forecaster.use_estimate(k, _measured(one, float(worn_m[k])), replaced_ns[k])
+            for k, one in enumerate(estimates)
+        )
+    believed = state.believed or (False,) * len(estimates)
+    return tuple(
+        attrs.evolve(one, believed=yes and one.observation is ClearanceObservation.SEEN)
+        for one, yes in zip(estimates, believed, strict=True)
+    )
+
+
+def _measured(estimate: ClearanceEstimate, wear_m: float) -> MeasuredClearance:
+    return MeasuredClearance(estimate.clearance_m, estimate.sigma_m, wear_m)
+
+
+# The changing state of a monitor, without its ledger.
+
+
+@attrs.define
+class MonitorState:
+    """State beside twin, alarms and accounting; every value is immutable.
+
+    ``findings`` are those of the last evaluation period; empty before the first.
+    """
+
+    growth: tuple[GrowthWindow, ...]
+    torque: TorqueRecord
+    last: CycleReport | None = None
+    happened: tuple[Event, ...] = ()
+    findings: tuple[Finding, ...] = ()
+    mismatch: MismatchWindow = NO_MISMATCH
+
+
+@attrs.frozen(eq=False)
+class MonitorSnapshot:
+    """Snapshot of a monitor without its ledger."""
+
+    twin: TwinSnapshot
+    state: MonitorState
+    accounting: AccountingState
+    evaluation: AlarmEvaluationState
+    forecast: ForecastState
+    alarms: dict[str, Alarm]
+    evaluation_periods: Records
+    guard: Records
+    encoders: EncoderSnapshot | None = None
+    torque: TorqueObserverSnapshot | None = None
+    crank_zero: CrankZeroSnapshot | None = None
+    foot_load: FootLoadState | None = None
 
 
 class Judge:
@@ -99,7 +189,7 @@ class Judge:
     def shown(self, state: MonitorState, joint: str) -> SeenClearance | None:
         """What encoders or the drive torque show of a joint best, or showed when its alarm was raised."""
         own = next(each for each in self.joints(state) if each.joint == joint)
-        alarm = self._evaluation.board.alarms[specs.CLEARANCE.name(joint)]
+        alarm = self._evaluation.board.alarms[alarm_specs.CLEARANCE.name(joint)]
         best = min(own.seen, key=lambda one: one.sigma_m, default=None)
         return at_limit_by_estimate(own, alarm) or best
 
@@ -107,7 +197,7 @@ class Judge:
         """The believed clearance of each joint, in the words of a verdict of this state."""
         alarms, is_counted_leg = self._evaluation.board.alarms, Figure.CLEARANCES not in verdict.not_valid
         return {
-            each.joint: believed(each, alarms[specs.CLEARANCE.name(each.joint)], is_counted_leg)
+            each.joint: believed(each, alarms[alarm_specs.CLEARANCE.name(each.joint)], is_counted_leg)
             for each in self.joints(state)
         }
 
@@ -174,7 +264,7 @@ def situation_of(
     return Situation(
         joints=joint_situations(twin, evaluation, last, diagnosis, measured, parts),
         alarms=tuple(alarms.values()),
-        quantities=specs.QUANTITIES,
+        quantities=alarm_specs.QUANTITIES,
         has_cycle=last is not None,
         is_all_counted=is_all_counted,
         has_torque=last is not None and last.torque_samples > 0,
@@ -191,7 +281,7 @@ def situation_of(
         doubts=_doubts(last, evaluation, explained),
         encoder_faults=tuple(faults(config.encoders.names, encoders.state)) if encoders else (),
         diagnosis=diagnosis,
-        explained=explained if evaluation.board.level(specs.MISMATCH.name()) else None,
+        explained=explained if evaluation.board.level(alarm_specs.MISMATCH.name()) else None,
         crank=config.crank,
         drive_torque=config.drive_torque,
     )

@@ -5,35 +5,31 @@ from pathlib import Path
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate.torque_fit.torque_model import torque_model
-from leg_wear_monitor.mechanism.materials.load import bushing_of
+from leg_wear_monitor.estimate.torque_model import torque_model
+from leg_wear_monitor.mechanism.materials import bushing_of
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.accounting import Accounting
 from leg_wear_monitor.monitor.config.fitting import fitted, twin_settings
 from leg_wear_monitor.monitor.config.inputs import AT_START
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.crank_zero.crank_zero import CrankZero
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Body, Diagnosis, DiagnosisState
+from leg_wear_monitor.monitor.crank_zero import CrankZero
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.reference_file import read_references
-from leg_wear_monitor.monitor.encoders.observer import EncoderObserver
-from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluation
-from leg_wear_monitor.monitor.evaluation.evaluation_period import A_CYCLE, EvaluationPeriods
-from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
+from leg_wear_monitor.monitor.diagnosis.state import Body, Diagnosis, DiagnosisState
+from leg_wear_monitor.monitor.encoders import EncoderObserver
+from leg_wear_monitor.monitor.evaluation import A_CYCLE, AlarmEvaluation, EvaluationPeriods
 from leg_wear_monitor.monitor.foot_load import FootLoadCheck
 from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
-from leg_wear_monitor.monitor.forecast.growth import GrowthWindow
-from leg_wear_monitor.monitor.forecast.model_error import model_error
-from leg_wear_monitor.monitor.inputs.guard import InputGuard
-from leg_wear_monitor.monitor.judgement import Judge
+from leg_wear_monitor.monitor.forecast.measurement import GrowthWindow, model_error
+from leg_wear_monitor.monitor.gait_evidence import TorqueRecord
+from leg_wear_monitor.monitor.inputs import InputGuard
+from leg_wear_monitor.monitor.judgement import Judge, MonitorSnapshot, MonitorState
 from leg_wear_monitor.monitor.ledger.entry import Measurement, SimulatedReference
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
-from leg_wear_monitor.monitor.state import MonitorSnapshot, MonitorState
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
-from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
-from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
-from leg_wear_monitor.twin.sampling.settings import SamplingSettings
-from leg_wear_monitor.twin.settings import NO_LOAD
+from leg_wear_monitor.twin.reference import LegParameters
+from leg_wear_monitor.twin.sample import NO_LOAD, SamplingSettings
+from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 WRONG_TORQUE = "the received drive torque is wrong; see the status `torque`"
 ACCELERATED = "wear is accelerated: clearances grow within the gait cycles that are compared"

@@ -5,29 +5,25 @@ import numpy as np
 
 from leg_wear_monitor.estimate.mismatch import explanation
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.monitor.alarms.alarm import Level
-from leg_wear_monitor.monitor.cycle_report import cycle_report, latest
-from leg_wear_monitor.monitor.diagnosis.corrections import Correction
+from leg_wear_monitor.monitor.alarm_specs import CLEARANCE, MISMATCH
+from leg_wear_monitor.monitor.alarms import Level
+from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate
+from leg_wear_monitor.monitor.diagnosis.observer import Correction
 from leg_wear_monitor.monitor.diagnosis.state import TorqueState
-from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
-from leg_wear_monitor.monitor.evaluation.specs import CLEARANCE, MISMATCH
-from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, extended
-from leg_wear_monitor.monitor.forecast_update import update_forecast
-from leg_wear_monitor.monitor.ledger.entry import (
-    Audit,
-    CorrectedClearance,
-    IdentifiedLeg,
-    SimulatedReference,
-)
+from leg_wear_monitor.monitor.forecast.measurement import GrowthWindow, extended
+from leg_wear_monitor.monitor.judgement import update_forecast
+from leg_wear_monitor.monitor.ledger.entry import Audit, CorrectedClearance, IdentifiedLeg, SimulatedReference
 from leg_wear_monitor.monitor.parts import Parts
 from leg_wear_monitor.monitor.reports import (
     AlarmList,
     CycleReport,
     SampleReports,
     VerdictReport,
+    cycle_report,
+    latest,
 )
-from leg_wear_monitor.monitor.verdict.belief import COUNTED, alarm_value, is_surely_below
-from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
+from leg_wear_monitor.monitor.verdict.situation import COUNTED, alarm_value, is_surely_below
+from leg_wear_monitor.twin.reference import LegParameters
 from leg_wear_monitor.twin.sample import Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics
 

@@ -11,11 +11,11 @@ import attrs
 
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor import alarm_specs
 from leg_wear_monitor.monitor.accounting import verdict_event
-from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level, acknowledged
+from leg_wear_monitor.monitor.alarms import Alarm, Level, acknowledged
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.evaluation import specs
-from leg_wear_monitor.monitor.evaluation.board import AlarmBoard
+from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.forecast.measurement import last_measured
 from leg_wear_monitor.monitor.ledger.entry import (
     AlarmEvent,
@@ -28,10 +28,16 @@ from leg_wear_monitor.monitor.ledger.entry import (
 )
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.reports import VerdictReport
-from leg_wear_monitor.monitor.verdict.alarm_rules import OF_A_JOINT
-from leg_wear_monitor.monitor.verdict.belief import COUNTED, SEEN, is_surely_below
 from leg_wear_monitor.monitor.verdict.rules import findings
-from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance, Situation
+from leg_wear_monitor.monitor.verdict.situation import (
+    COUNTED,
+    OF_A_JOINT,
+    SEEN,
+    JointSituation,
+    SeenClearance,
+    Situation,
+    is_surely_below,
+)
 from leg_wear_monitor.monitor.verdict.verdict import Finding, dated
 
 
@@ -85,8 +91,8 @@ def rested_on(alarms: Iterable[Alarm], joint: str, named: Iterable[str] = ()) ->
     """
     raised = [alarm for alarm in alarms if alarm.level is not Level.OK]
     own = [alarm for alarm in raised if alarm.kind in OF_A_JOINT and alarm.subject == joint]
-    explains = joint in named or any(alarm.kind == specs.CLEARANCE.kind for alarm in own)
-    mismatch = [alarm for alarm in raised if explains and alarm.kind == specs.MISMATCH.kind]
+    explains = joint in named or any(alarm.kind == alarm_specs.CLEARANCE.kind for alarm in own)
+    mismatch = [alarm for alarm in raised if explains and alarm.kind == alarm_specs.MISMATCH.kind]
     return tuple(alarm.name for alarm in (*own, *mismatch))
 
 
@@ -171,7 +177,7 @@ def acknowledge_in(ledger: Ledger, leg: Mechanism, config: MonitorConfig, stamp_
 
 def shown_in(ledger: Ledger, joint: str) -> SeenClearance | None:
     """What encoders or the drive torque showed of a joint when the alarm in a ledger was raised."""
-    name = specs.CLEARANCE.name(joint)
+    name = alarm_specs.CLEARANCE.name(joint)
     alarms = ledger.entry.alarms if ledger.entry else ()
     own = next((alarm for alarm in alarms if alarm.name == name and alarm.cause in SEEN), None)
     return SeenClearance(own.cause, own.worst, own.sigma) if own else None
@@ -197,7 +203,7 @@ def overrule_in(ledger: Ledger, leg: Mechanism, config: MonitorConfig, found: Me
     entry, limits_m = ledger.entry, clearance_limits(leg, config)
     if entry is None or not is_surely_below(limits_m[found.joint], found.clearance_m, found.sigma_m):
         return None
-    name = specs.CLEARANCE.name(found.joint)
+    name = alarm_specs.CLEARANCE.name(found.joint)
     own = next((alarm for alarm in entry.alarms if alarm.name == name), None)
     if own is None or own.cause in ("", COUNTED):
         return None
@@ -248,7 +254,7 @@ def note_verdict_of(
             )
         )
     situation = Situation(
-        joints=tuple(joints), alarms=entry.alarms, quantities=specs.QUANTITIES, mismatch=math.nan
+        joints=tuple(joints), alarms=entry.alarms, quantities=alarm_specs.QUANTITIES, mismatch=math.nan
     )
     ledger.note(verdict_event(VerdictReport(stamp_ns, dated(findings(situation), (), stamp_ns))))
 

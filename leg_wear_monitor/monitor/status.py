@@ -6,46 +6,74 @@ from collections.abc import Iterable, Mapping, Sequence
 import attrs
 
 from leg_wear_monitor.estimate.cause import TorqueExplanation
-from leg_wear_monitor.json_text import or_nan
-from leg_wear_monitor.mechanism.materials.load import BushingLoad
+from leg_wear_monitor.files import or_nan
+from leg_wear_monitor.mechanism.materials import BushingLoad
+from leg_wear_monitor.monitor import alarm_specs
 from leg_wear_monitor.monitor.accounting import Accounting
-from leg_wear_monitor.monitor.alarms.alarm import Level
-from leg_wear_monitor.monitor.alarms.fault_codes import (
+from leg_wear_monitor.monitor.alarms import (
+    ADVICE,
     CRANK_ZERO,
     ENCODERS,
     FOOT_LOAD_WORDS,
     LEDGER_INTERRUPTED,
     LEDGER_NOT_WRITTEN,
     NOT_FOLLOWED,
+    Level,
     code_of,
     worst_code,
 )
-from leg_wear_monitor.monitor.alarms.words import ADVICE
-from leg_wear_monitor.monitor.crank_zero.crank_zero import CrankZero
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis
-from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObservation
-from leg_wear_monitor.monitor.encoders.observer import EncoderObserver
-from leg_wear_monitor.monitor.encoders.state import faults
-from leg_wear_monitor.monitor.evaluation import specs
-from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluation
-from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
+from leg_wear_monitor.monitor.angle_regression import ClearanceObservation
+from leg_wear_monitor.monitor.crank_walk import LEAST_TURNS
+from leg_wear_monitor.monitor.crank_zero import CrankZero
+from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
+from leg_wear_monitor.monitor.encoders import EncoderObserver, faults
+from leg_wear_monitor.monitor.evaluation import AlarmEvaluation
 from leg_wear_monitor.monitor.foot_load import FootLoadCheck
-from leg_wear_monitor.monitor.forecast.words import UNKNOWN, answer_words, lifetime_values
-from leg_wear_monitor.monitor.inputs.health import InputHealth
+from leg_wear_monitor.monitor.forecast.forecast import UNKNOWN, answer_words, lifetime_values
+from leg_wear_monitor.monitor.gait_evidence import TorqueRecord
+from leg_wear_monitor.monitor.inputs import InputHealth
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.reports import CycleReport, Status
 from leg_wear_monitor.monitor.torque_status import diagnosis_status, torque_status
-from leg_wear_monitor.monitor.verdict.belief import BelievedClearance, believed_words
-from leg_wear_monitor.monitor.verdict.sampled import sampled_words
-from leg_wear_monitor.monitor.verdict.verdict import Finding, State, Verdict, verdict_of
-from leg_wear_monitor.monitor.verdict.words import amount, estimate, with_unit
-from leg_wear_monitor.monitor.zero_status import zero_status
+from leg_wear_monitor.monitor.verdict.situation import BelievedClearance, believed_words, sampled_words
+from leg_wear_monitor.monitor.verdict.verdict import (
+    Finding,
+    State,
+    Verdict,
+    amount,
+    estimate,
+    verdict_of,
+    with_unit,
+)
+from leg_wear_monitor.twin import KINDS, LOAD
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
-from leg_wear_monitor.twin.kinds import KINDS, LOAD
 from leg_wear_monitor.twin.statistics import Event, Sampling, Tracking
 
+# Status of the crank's zero.
+
+
+def zero_status(crank_zero: CrankZero) -> Status:
+    """The zero of the crank's encoder and its runner-up, or why it is not known."""
+    state, zero = crank_zero.state, crank_zero.state.zero
+    values = {
+        "offset_rad": zero.offset_rad if zero else math.nan,
+        "sigma_rad": zero.sigma_rad if zero else math.nan,
+        "mismatch": zero.mismatch if zero else math.nan,
+        "other_rad": zero.other_rad if zero else math.nan,
+        "other_mismatch": zero.other_mismatch if zero else math.nan,
+        "turns": float(zero.turns if zero else state.turns),
+        "least_turns": float(LEAST_TURNS),
+        "times_found": float(state.times_found),
+        "not_monitored_s": crank_zero.unmonitored_s,
+    }
+    if zero is None:
+        return Status("crank zero", Level.WARN, crank_zero.cause, values, CRANK_ZERO)
+    found = estimate(zero.offset_rad, zero.sigma_rad, "rad")
+    return Status("crank zero", Level.OK, f"crank angle at joint position 0: {found}", values)
+
+
 _NOTHING_BELIEVED: Mapping[str, BelievedClearance | None] = {}
-_INPUT = tuple(spec.name() for spec in specs.OF_INPUT)
+_INPUT = tuple(spec.name() for spec in alarm_specs.OF_INPUT)
 
 
 def statuses(
@@ -123,7 +151,7 @@ def _gait(
     without_zero: str,
 ) -> Status:
     tracking = twin.tracking
-    cadence = evaluation.board.alarms[specs.CADENCE.name()]
+    cadence = evaluation.board.alarms[alarm_specs.CADENCE.name()]
     message, level, code = tracking.name.lower().replace("_", " "), cadence.level, code_of(cadence)
     if evaluation.guard.cause:
         message, level, code = "not monitored: see input", Level.ERROR, NOT_FOLLOWED
@@ -176,7 +204,7 @@ def _health_values(health: InputHealth) -> dict[str, float]:
 def _joint(
     k: int, name: str, twin: DigitalTwin, evaluation: AlarmEvaluation, last: CycleReport | None
 ) -> Status:
-    names = [spec.name(name) for spec in specs.JOINT]
+    names = [spec.name(name) for spec in alarm_specs.JOINT]
     level, code = evaluation.board.level(*names), _code(evaluation, names)
     values = {
         "clearance_m": float(twin.clearance_mean_m[k]),
@@ -243,7 +271,7 @@ def _load_values(load: BushingLoad) -> dict[str, float]:
 def _encoders(encoders: EncoderObserver, evaluation: AlarmEvaluation, last: CycleReport | None) -> Status:
     """Further encoders: their faults, their errors, and the clearances estimated from them."""
     settings, state = evaluation.config.encoders, encoders.state
-    kinds = {spec.kind for spec in specs.ENCODERS}
+    kinds = {spec.kind for spec in alarm_specs.ENCODERS}
     departures = [alarm for alarm in evaluation.board.alarms.values() if alarm.kind in kinds]
     level, code = max(alarm.level for alarm in departures), worst_code(departures)
     values = {"cycles": float(encoders.cycles)}
@@ -271,7 +299,9 @@ def _encoders(encoders: EncoderObserver, evaluation: AlarmEvaluation, last: Cycl
 def _foot_load(check: FootLoadCheck, evaluation: AlarmEvaluation) -> Status:
     """The measured foot load, and faults of its sensor."""
     load, alarms = check.load, evaluation.board.alarms
-    raised = [alarms[spec.name()] for spec in specs.OF_FOOT_LOAD if alarms[spec.name()].level is not Level.OK]
+    raised = [
+        alarms[spec.name()] for spec in alarm_specs.OF_FOOT_LOAD if alarms[spec.name()].level is not Level.OK
+    ]
     level = max((alarm.level for alarm in raised), default=Level.OK)
     values = {name: or_nan(value) for name, value in attrs.asdict(load).items() if not isinstance(value, str)}
     messages = [FOOT_LOAD_WORDS.get(alarm.kind, f"see: {alarm.name}") for alarm in raised]

@@ -5,20 +5,17 @@ from collections.abc import Sequence
 
 from leg_wear_monitor.estimate.cause import TorqueExplanation
 from leg_wear_monitor.estimate.signature import DIRECT
-from leg_wear_monitor.monitor.alarms.alarm import Level
-from leg_wear_monitor.monitor.alarms.fault_codes import CAUSES_OF_ALARMS, DIAGNOSIS, worst_code
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState, NotUsed
-from leg_wear_monitor.monitor.evaluation import specs
-from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluation
-from leg_wear_monitor.monitor.evaluation.torque_checks import offset_error_rad
-from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
+from leg_wear_monitor.monitor import alarm_specs
+from leg_wear_monitor.monitor.alarms import CAUSES_OF_ALARMS, DIAGNOSIS, Level, worst_code
+from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState, NotUsed
+from leg_wear_monitor.monitor.evaluation import AlarmEvaluation
+from leg_wear_monitor.monitor.gait_evidence import TorqueRecord
 from leg_wear_monitor.monitor.reports import CycleReport, Status
-from leg_wear_monitor.monitor.verdict.cause_words import EVIDENCE, CauseWords
-from leg_wear_monitor.monitor.verdict.diagnosis_words import diagnosis_words
-from leg_wear_monitor.monitor.verdict.words import with_unit
+from leg_wear_monitor.monitor.torque_checks import offset_error_rad
+from leg_wear_monitor.monitor.verdict.verdict import EVIDENCE, CauseWords, diagnosis_words, with_unit
 from leg_wear_monitor.twin.statistics import NotCompared
 
-_TORQUE = tuple(spec.name() for spec in specs.TORQUE)
+_TORQUE = tuple(spec.name() for spec in alarm_specs.TORQUE)
 _CODES = {name.upper(): cause.fault_code for name, cause in CAUSES_OF_ALARMS.items()}
 
 
@@ -58,7 +55,7 @@ def torque_status(
     config, messages = evaluation.config, []
     speed = explained.speed_radps if explained else last.cadence_rpm * math.pi / 30.0
     words = CauseWords(config.crank, config.drive_torque, speed)
-    if specs.MISMATCH.name() in raised:
+    if alarm_specs.MISMATCH.name() in raised:
         causes = f": {words.explanation(explained)}" if explained else ""
         messages = [f"the measured torque differs from the predicted one{causes}"]
         values |= _explained_values(explained) if explained else {}
@@ -67,7 +64,7 @@ def torque_status(
         present = evaluation.present_causes(last, record)
         messages += map(words.cause, present.values())
         past = [name for name in CAUSES_OF_ALARMS if name in raised and name not in present]
-        messages += [f"the {specs.QUANTITIES[name]} was beyond its limit" for name in past]
+        messages += [f"the {alarm_specs.QUANTITIES[name]} was beyond its limit" for name in past]
     if not messages and math.isnan(last.torque_mismatch):
         messages = ["not enough gait cycles yet for a comparison"]
     return Status("torque", level, "; ".join(messages or ["measured as predicted"]), values, code)

@@ -6,22 +6,22 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.errors import LegWearError, closed_at_the_end
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.alarm_specs import MISMATCH
+from leg_wear_monitor.monitor.alarms import Alarm, Level
 from leg_wear_monitor.monitor.config.fitting import check_limits
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.cycle_report import with_forecast
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis
-from leg_wear_monitor.monitor.evaluation.evaluation_period import EvaluationPeriods
-from leg_wear_monitor.monitor.evaluation.mismatch_window import NO_MISMATCH
-from leg_wear_monitor.monitor.evaluation.specs import MISMATCH
+from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
+from leg_wear_monitor.monitor.evaluation import EvaluationPeriods
 from leg_wear_monitor.monitor.forecast.forecast import ForecastBasis
 from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult
+from leg_wear_monitor.monitor.gait_evidence import NO_MISMATCH
+from leg_wear_monitor.monitor.judgement import MonitorSnapshot
 from leg_wear_monitor.monitor.ledger.entry import AlarmEvent, Audit, JointWear, Measurement, WalkedLoad
 from leg_wear_monitor.monitor.ledger.file import LedgerError
-from leg_wear_monitor.monitor.ledger.ledger import Ledger
+from leg_wear_monitor.monitor.ledger.ledger import Ledger, open_ledger
 from leg_wear_monitor.monitor.parts import Parts
 from leg_wear_monitor.monitor.processing import Processing
 from leg_wear_monitor.monitor.reports import (
@@ -34,13 +34,12 @@ from leg_wear_monitor.monitor.reports import (
     Status,
     VerdictReport,
     lost,
+    with_forecast,
 )
 from leg_wear_monitor.monitor.resets import Acknowledged, last_reset, named_for_clearance, rested_on
-from leg_wear_monitor.monitor.state import MonitorSnapshot
 from leg_wear_monitor.monitor.status import statuses
-from leg_wear_monitor.monitor.verdict.belief import SOURCES, BelievedClearance, is_held_by_estimate
-from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples
-from leg_wear_monitor.twin.sampling.settings import SamplingSettings
+from leg_wear_monitor.monitor.verdict.situation import SOURCES, BelievedClearance, is_held_by_estimate
+from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples, SamplingSettings
 from leg_wear_monitor.twin.statistics import Sampling, joined
 
 
@@ -519,3 +518,42 @@ class WearMonitor:
     def already_counted_s(self) -> float:
         """Time of the samples that the ledger already contained the wear of [s]."""
         return self._accounting.state.skipped_s
+
+
+# A monitor with the ledger that its parameters name, from the one to the other without a gap.
+
+
+def open_monitor(
+    mechanism: Mechanism,
+    config: MonitorConfig,
+    at_end: bool = False,
+    sampling: SamplingSettings | None = None,
+) -> WearMonitor:
+    """Open the ledger and build the monitor that continues it.
+
+    Building takes seconds, and a minute where kernels are compiled: if it is cut short, the ledger must not
+    look as if a run that monitored something had been.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    config : MonitorConfig
+    at_end : bool
+        Whether the ledger is written at the end of the run alone, see `open_ledger`.
+    sampling : SamplingSettings, optional
+        Follow blocks of gait cycles only.
+
+    Raises
+    ------
+    ConfigError, LedgerError
+        For parameters or a ledger that cannot be used.
+    """
+    ledger = open_ledger(mechanism, config, at_end)
+    if ledger is None:
+        return WearMonitor(mechanism, config, sampling=sampling)
+    with closed_at_the_end(ledger.abandon):
+        try:
+            return WearMonitor(mechanism, config, ledger, sampling)
+        except BaseException:
+            ledger.abandon()
+            raise

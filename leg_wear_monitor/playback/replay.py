@@ -8,23 +8,18 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.bags.bag import Recordable, listed_recordings
-from leg_wear_monitor.bags.budget import DEFAULT_MB
-from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
-from leg_wear_monitor.bags.pauses import Block
-from leg_wear_monitor.bags.reader import Recording
+from leg_wear_monitor.bags.findings import DEFAULT_MB, Finding, RecordingError, Severity
+from leg_wear_monitor.bags.reader import Block, Recording
 from leg_wear_monitor.errors import printable
+from leg_wear_monitor.files import unfinished
 from leg_wear_monitor.mechanism.loader import load_mechanism
-from leg_wear_monitor.monitor.config.parameter_file import NODE, load_config
+from leg_wear_monitor.monitor.config.parameters import NODE, load_config
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.evaluation.gait_evidence import GaitEvidence
-from leg_wear_monitor.monitor.opening import open_monitor
-from leg_wear_monitor.monitor.wear_monitor import WearMonitor
-from leg_wear_monitor.playback.history import History
-from leg_wear_monitor.playback.sink import Sink
+from leg_wear_monitor.monitor.gait_evidence import GaitEvidence
+from leg_wear_monitor.monitor.wear_monitor import WearMonitor, open_monitor
+from leg_wear_monitor.playback.history import History, Sink
 from leg_wear_monitor.playback.summary import ReplayResult
-from leg_wear_monitor.twin.sample import Samples
-from leg_wear_monitor.twin.sampling.settings import SamplingSettings
-from leg_wear_monitor.whole_file import unfinished
+from leg_wear_monitor.twin.sample import Samples, SamplingSettings
 
 REPORTS_FILE = "reports.mcap"
 

@@ -1,5 +1,10 @@
-"""The summary of a replay, from which its files and its page are made."""
+"""The result of a replay and its summary, from which its files and its page are made.
 
+What the verdict does not believe has no remaining life.
+"""
+
+import json
+import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -10,52 +15,138 @@ import numpy as np
 from leg_wear_monitor.bags.findings import Finding
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.outline import is_on_ground, outline_of
+from leg_wear_monitor.mechanism.position import is_on_ground, outline_of
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.alarms.alarm import Alarm
-from leg_wear_monitor.monitor.alarms.words import ADVICE, state_of
+from leg_wear_monitor.monitor.alarms import ADVICE, Alarm, state_of
+from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate, ClearanceObservation
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
-from leg_wear_monitor.monitor.evaluation.gait_evidence import GaitEvidence
-from leg_wear_monitor.monitor.forecast.forecast import LegForecast
+from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
+from leg_wear_monitor.monitor.gait_evidence import GaitEvidence
+from leg_wear_monitor.monitor.ledger.entry import VerdictEvent
 from leg_wear_monitor.monitor.reports import JointReport, Status
-from leg_wear_monitor.monitor.verdict.belief import BelievedClearance
-from leg_wear_monitor.monitor.verdict.verdict import Verdict
+from leg_wear_monitor.monitor.verdict.situation import BelievedClearance
+from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure, State, Verdict
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
-from leg_wear_monitor.playback.condition import (
-    believed_fields,
-    clearances,
-    joint_forecast,
-    leg_forecast,
-    life,
-)
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS, History
-from leg_wear_monitor.playback.result.leg import LegJoint, Place, ReplayLeg
-from leg_wear_monitor.playback.result.parts import (
+from leg_wear_monitor.playback.result import (
     AlarmChange,
     ClearanceChange,
+    JointClearance,
+    LegJoint,
     LegLife,
+    LifeHours,
+    Place,
     ReplayAlarm,
     ReplayAlarms,
-    ReplayJoint,
-    ReplayStatus,
-    SeenClearance,
-    WornDepth,
-)
-from leg_wear_monitor.playback.result.recording import (
     ReplayFinding,
     ReplayGait,
+    ReplayHistory,
+    ReplayJoint,
+    ReplayLeg,
     ReplayMonitor,
     ReplayRecording,
     ReplaySampling,
+    ReplayStatus,
+    ReplaySummary,
+    SeenClearance,
+    WornDepth,
+    life_hours,
 )
-from leg_wear_monitor.playback.result.replay_history import ReplayHistory
-from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
 from leg_wear_monitor.shown import Drawable
-from leg_wear_monitor.twin.kinds import CRANK, TORQUE
+from leg_wear_monitor.twin import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import Samples, brings
 from leg_wear_monitor.twin.statistics import Sampling
-from leg_wear_monitor.wear.surfaces import BUSHING, JOURNAL
+from leg_wear_monitor.wear import BUSHING, JOURNAL
+
+# Condition of the leg at the end of a replay; what the verdict does not believe has no remaining life.
+
+
+def joint_forecast(told: JointForecast | None, verdict: Verdict) -> JointForecast | None:
+    """A joint's forecast; without its remaining life if the verdict does not believe that."""
+    if told is None or Figure.FORECAST not in verdict.not_valid:
+        return told
+    return attrs.evolve(told, cycles=None, hours=None, days=None)
+
+
+def leg_forecast(told: LegForecast | None, verdict: Verdict) -> LegForecast | None:
+    """The leg's forecast; without its remaining life if the verdict does not believe that."""
+    if told is None or Figure.FORECAST not in verdict.not_valid:
+        return told
+    return attrs.evolve(told, cycles=None, hours=None, days=None, first_probability={})
+
+
+def clearances(result: "ReplayResult") -> dict[str, JointClearance]:
+    """Clearance of each joint, as counted and as encoders or the drive torque show it best."""
+    monitor, last = result.monitor, result.history.last
+    limits = dict(zip(monitor.clearance_joints, monitor.clearance_limits_m, strict=True))
+    diagnosis, found, believed = monitor.diagnosis, {}, monitor.believed_clearances
+    for k, joint in enumerate(last.joints if last else ()):
+        seen = []
+        if joint.seen and joint.seen.observation is ClearanceObservation.SEEN:
+            seen.append((joint.seen.sigma_m, joint.seen.clearance_m, "encoders"))
+        if diagnosis.clearance_m and math.isfinite(diagnosis.clearance_m[k]):
+            seen.append((diagnosis.sigma_m[k], diagnosis.clearance_m[k], "torque"))
+        sigma_m, clearance_m, by = min(seen) if seen else (None, None, None)
+        one = believed[joint.joint]
+        found[joint.joint] = JointClearance(
+            counted_m=joint.clearance_m,
+            seen_m=clearance_m,
+            seen_sigma_m=sigma_m,
+            seen_by=(by,) if by else (),
+            new_m=monitor.mechanism.clearances[joint.joint].radial_clearance,
+            limit_m=limits[joint.joint],
+            measured_m=joint.measured.clearance_m if joint.measured else None,
+            measured_sigma_m=joint.measured.sigma_m if joint.measured else None,
+            **(believed_fields(one) if one else {}),
+        )
+    return found
+
+
+def believed_fields(one: BelievedClearance) -> dict[str, Any]:
+    """A believed clearance as the fields of a `JointClearance` or a `ReplayJoint`."""
+    sigma_m = None if math.isnan(one.sigma_m) else one.sigma_m
+    return {"believed_m": one.clearance_m, "believed_sigma_m": sigma_m, "believed_by": one.by}
+
+
+def life(result: "ReplayResult", verdict: Verdict) -> dict[str, LifeHours | None]:
+    """Remaining life of each joint and of the leg; None where it is not known or not believed."""
+    last = result.history.last
+    if last is None:
+        return {}
+    return life_of({joint.joint: joint.forecast for joint in last.joints}, last.forecast, verdict)
+
+
+def life_of(
+    joints: Mapping[str, JointForecast | None], leg: LegForecast | None, verdict: Verdict
+) -> dict[str, LifeHours | None]:
+    """Remaining life of each joint and of the ``leg`` by their forecasts, as far as it is believed."""
+    told: dict[str, JointForecast | LegForecast | None] = {
+        name: joint_forecast(each, verdict) for name, each in joints.items()
+    }
+    told["leg"] = leg_forecast(leg, verdict)
+    return {name: life_hours(each.hours) if each else None for name, each in told.items()}
+
+
+def ledger_verdict(event: VerdictEvent) -> Verdict:
+    """A verdict of a ledger."""
+    return Verdict(
+        state=State(event.state),
+        joints=tuple(json.loads(event.joints)),
+        why=event.why,
+        since_ns=event.since_ns,
+        do=event.to_do,
+        evidence=tuple(_evidence(each) for each in json.loads(event.evidence)),
+        not_valid=tuple(map(Figure, json.loads(event.not_valid))),
+        fault_code=event.fault_code,
+    )
+
+
+def _evidence(record: dict[str, Any]) -> Evidence:
+    return Evidence(**{field.name: record[field.name] for field in attrs.fields(Evidence)})
+
+
+# The summary of a replay, from which its files and its page are made.
+
 
 POINTS = 1000
 """Points that a history is thinned to; peaks of forces are kept, and the range of what has no peaks."""

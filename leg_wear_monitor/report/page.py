@@ -1,20 +1,288 @@
-"""A self-contained HTML page: sections of parts, with the configuration and versions.
-
-A page needs no network and no other file: it embeds pictures, scripts and style, and its content security
-policy forbids everything else. It prints, fits a phone screen, and has an alternative text for every picture.
-"""
+"""Pages: one file each, with their parts, charts, words and banners."""
 
 import base64
+import csv
 import hashlib
+import io
 import re
 from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
+from urllib.parse import quote
 
 import attrs
 import jinja2
+import numpy as np
 
-from leg_wear_monitor.report.parts import Live, Part
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.monitor.alarms import Level, raised_words, time_words
+from leg_wear_monitor.monitor.verdict.situation import COUNTED, OF_A_JOINT
+from leg_wear_monitor.monitor.verdict.verdict import Figure, State, Verdict
+from leg_wear_monitor.playback.result import ReplayAlarm, ReplaySummary
+
+# A chart as data: its series are a CSV file inside the page, which the page's script draws with uPlot.
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Series:
+    """A column of values.
+
+    Attributes
+    ----------
+    name, unit : str
+        Title of its column; no unit if empty.
+    values : (n,) array
+        NaN where it is not known.
+    colour : str
+        CSS variable of the page.
+    style : str
+        ``line``, ``dashed``, ``points`` or ``steps``.
+    width : float
+        Of a line [CSS pixels].
+    """
+
+    name: str
+    unit: str
+    values: Floats
+    colour: str = "--series-0"
+    style: str = "line"
+    width: float = 1.5
+
+    @property
+    def head(self) -> str:
+        """Title of the column with its unit."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Panel:
+    """Axes with series over the chart's x axis.
+
+    Attributes
+    ----------
+    title : str
+    series : sequence of Series
+    low, high : float or None
+        Ends of the y axis; those of the values if None.
+    height : int
+        [CSS pixels].
+    lanes : sequence of str
+        Words for the values 0, 1, … of each series, which is then drawn in a lane of its own.
+    """
+
+    title: str
+    series: Sequence[Series]
+    low: float | None = None
+    high: float | None = None
+    height: int = 170
+    lanes: Sequence[str] = ()
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Chart:
+    """Panels above each other, over one x axis.
+
+    Attributes
+    ----------
+    name : str
+        Stem of the name of its CSV file.
+    alt, caption : str
+    x : Series
+    panels : sequence of Panel
+    group : str
+        Charts of one group share cursor and zoom.
+    ends : tuple of float or None
+        Of the x axis; the first and the last value if None.
+    """
+
+    name: str
+    alt: str
+    caption: str
+    x: Series
+    ends: tuple[float, float] | None = None
+    panels: Sequence[Panel]
+    group: str
+    kind: str = attrs.field(default="chart", init=False)
+
+    @property
+    def columns(self) -> tuple[Series, ...]:
+        """The x axis, and the series of all panels."""
+        return (self.x, *(series for panel in self.panels for series in panel.series))
+
+    @property
+    def csv(self) -> str:
+        """All columns as CSV, with units in the titles; an empty cell for what is not known."""
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(series.head for series in self.columns)
+        for row in zip(*(series.values.tolist() for series in self.columns), strict=True):
+            writer.writerow("" if np.isnan(value) else f"{value:.9g}" for value in row)
+        return text.getvalue()
+
+    @property
+    def address(self) -> str:
+        """The CSV file as a ``data:`` URL."""
+        return "data:text/csv;charset=utf-8," + quote(self.csv, safe=",.-+()/: ")
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What the script needs beside the values, as plain data."""
+        panels = list(map(_settings, self.panels))
+        return {"group": self.group, "x": self.x.head, "ends": self.ends, "panels": panels}
+
+
+def _settings(panel: Panel) -> dict[str, Any]:
+    series = [
+        {
+            "name": each.name,
+            "unit": each.unit,
+            "colour": each.colour,
+            "style": each.style,
+            "width": each.width,
+        }
+        for each in panel.series
+    ]
+    ends = {"low": panel.low, "high": panel.high, "height": panel.height, "lanes": list(panel.lanes)}
+    return {"title": panel.title, "series": series, **ends}
+
+
+# Parts of a page: text, pictures, tables, listings, and markup that a template has made.
+
+
+@attrs.frozen(kw_only=True)
+class Picture:
+    """One picture.
+
+    Attributes
+    ----------
+    image : bytes
+        PNG or SVG.
+    alt : str
+        Alternative text: describes the picture to readers who cannot see it.
+    caption : str
+        Caption below the picture; no caption if empty.
+    wide : bool
+        Whether it needs the width of the page: on a phone it then scrolls sideways instead of being shrunk.
+    """
+
+    image: bytes = attrs.field(repr=False)
+    alt: str
+    caption: str = ""
+    wide: bool = False
+    kind: str = attrs.field(default="picture", init=False)
+
+    @property
+    def address(self) -> str:
+        """The picture as a ``data:`` URL."""
+        media = "png" if self.image.startswith(b"\x89PNG") else "svg+xml"
+        return f"data:image/{media};base64,{base64.b64encode(self.image).decode()}"
+
+
+@attrs.frozen(kw_only=True)
+class Gallery:
+    """Pictures of one kind side by side, as many in a row as fit, with a common caption."""
+
+    pictures: Sequence[Picture]
+    caption: str = ""
+    kind: str = attrs.field(default="gallery", init=False)
+
+
+@attrs.frozen(kw_only=True)
+class Table:
+    """A table; the first column contains the row names.
+
+    Attributes
+    ----------
+    caption : str
+    head : sequence of str
+        Column titles with units.
+    rows : sequence of sequences of str
+        Cells, as many per row as `head` has.
+    note : str
+        Note below the table; no note if empty.
+    is_text : bool
+        Whether its cells are texts, which wrap, and not numbers.
+
+    Raises
+    ------
+    ValueError
+        If a row has another number of cells than `head`.
+    """
+
+    caption: str
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    note: str = ""
+    is_text: bool = False
+    kind: str = attrs.field(default="table", init=False)
+
+    def __attrs_post_init__(self) -> None:
+        if any(len(row) != len(self.head) for row in self.rows):
+            raise ValueError(f"a row of the table {self.caption!r} has not {len(self.head)} cells")
+
+
+@attrs.frozen
+class Text:
+    """A paragraph; greyed if it says that something is not valid."""
+
+    text: str
+    is_not_valid: bool = False
+    kind: str = attrs.field(default="text", init=False)
+
+
+@attrs.frozen
+class Sentences:
+    """A list of sentences, for instance conclusions."""
+
+    sentences: Sequence[str]
+    kind: str = attrs.field(default="sentences", init=False)
+
+
+@attrs.frozen(kw_only=True)
+class Listing:
+    """Preformatted text, for instance the contents of a file."""
+
+    text: str
+    kind: str = attrs.field(default="listing", init=False)
+
+
+@attrs.frozen(kw_only=True)
+class Live:
+    """An interactive element: markup with its data, and a script.
+
+    Attributes
+    ----------
+    markup : str
+        Trusted HTML, inserted without escaping; the script finds it by its id.
+    script : str
+        JavaScript that uses neither modules nor the network.
+    caption : str
+        Caption below the element; no caption if empty.
+    """
+
+    markup: str = attrs.field(repr=False)
+    script: str = attrs.field(repr=False)
+    caption: str = ""
+    kind: str = attrs.field(default="live", init=False)
+
+
+@attrs.frozen
+class Fragment:
+    """Markup of a template of this package: trusted HTML, inserted without escaping."""
+
+    markup: str = attrs.field(repr=False)
+    kind: str = attrs.field(default="fragment", init=False)
+
+
+Part = Text | Sentences | Picture | Gallery | Table | Listing | Live | Fragment | Chart
+
+
+# A self-contained HTML page: sections of parts, with the configuration and versions.
+#
+# A page needs no network and no other file: it embeds pictures, scripts and style, and its content security
+# policy forbids everything else. It prints, fits a phone screen, and has an alternative text for every
+# picture.
+
 
 _SPACES = re.compile(r"[^a-z0-9]+")
 
@@ -172,3 +440,157 @@ def template_text(name: str) -> str:
     loader = jinja2.PackageLoader("leg_wear_monitor.report")
     text: str = loader.get_source(jinja2.Environment(autoescape=True), name)[0]
     return text
+
+
+# Words that the parts of the page share: what is not valid and why, joints, times, values.
+
+
+NOT_VALID = "not valid"
+
+
+def not_valid(verdict: Verdict, *figures: Figure) -> str:
+    """Why one of some figures does not hold, without a number; empty if all hold."""
+    if not set(figures) & set(verdict.not_valid):
+        return ""
+    return f"{NOT_VALID}: {reason(verdict)}"
+
+
+def reason(verdict: Verdict) -> str:
+    """Why the values of a verdict's list are not valid, in general words."""
+    if Figure.CLEARANCES in verdict.not_valid:
+        return "leg differs from its model"
+    return "leg not monitored" if verdict.state is State.NOT_MONITORED else "see the verdict"
+
+
+def joints_words(summary: ReplaySummary) -> str:
+    """The joints of the verdict with their labels, such as ``joint G (knee)``; empty without any."""
+    joints = ", ".join(map(summary.leg.joint_words, summary.verdict.joints))
+    return f"joint {joints}" if joints else ""
+
+
+def since_words(summary: ReplaySummary, stamp_ns: int) -> str:
+    """A stamp, and when in the recording that was."""
+    begin, end = summary.recording.begin_ns, summary.recording.end_ns
+    if not begin <= stamp_ns <= end:
+        return time_words(stamp_ns)
+    return f"{time_words(stamp_ns)}, {duration((stamp_ns - begin) / 1.0e9)} after the recording's begin"
+
+
+def duration(seconds: float) -> str:
+    """A time in a unit that suits it."""
+    if seconds < 120.0:
+        return f"{seconds:.3g} s"
+    return f"{seconds / 60.0:.3g} min" if seconds < 7200.0 else f"{seconds / 3600.0:.3g} h"
+
+
+def value(factor: float, number: float | None) -> str:
+    """A number times a factor in four digits; a dash if it is not known."""
+    return "-" if number is None else f"{float(f'{factor * number:.4g}'):g}"
+
+
+# The verdict as the banner of a page.
+
+
+STATE_LOOKS = {
+    State.HEALTHY: ("✓", "fine"),
+    State.WATCH: ("◆", "careful"),
+    State.NOT_MONITORED: ("?", "careful"),
+    State.INSPECT: ("▲", "bad"),
+    State.STOP: ("■", "bad"),
+}
+
+
+def verdict_banner(summary: ReplaySummary, guide: str) -> Banner:
+    """State as symbol and word, joints, reason, action, code, begin, and the values that are not valid.
+
+    Parameters
+    ----------
+    summary : ReplaySummary
+    guide : str
+        Address of the verdict's guide.
+    """
+    verdict = summary.verdict
+    symbol, severity = STATE_LOOKS[verdict.state]
+    notes = [("Do", verdict.do), ("Code", verdict.fault_code)]
+    if verdict.since_ns:
+        notes.append(("Since", since_words(summary, verdict.since_ns)))
+    if verdict.not_valid:
+        figures = ", ".join(figure.words for figure in verdict.not_valid)
+        notes.append(("Not valid", f"{figures}: {reason(verdict)}"))
+    return Banner(
+        symbol=symbol,
+        word=verdict.state.words.upper(),
+        subject=joints_words(summary),
+        text=verdict.why,
+        notes=notes,
+        severity=severity,
+        guide=guide,
+    )
+
+
+# Alarms in words, without values that the verdict does not believe.
+
+
+LEVEL_LOOKS = {Level.OK: ("✓", "fine"), Level.WARN: ("▲", "careful"), Level.ERROR: ("■", "bad")}
+
+_FIGURES = {
+    "impact_force": Figure.IMPACT_FORCES,
+    "clearance": Figure.CLEARANCES,
+    "growth": Figure.GROWTH,
+    "remaining_life": Figure.FORECAST,
+}
+
+
+@attrs.frozen(kw_only=True)
+class AlarmLine:
+    """A raised alarm.
+
+    Attributes
+    ----------
+    symbol, look, level, name : str
+        Symbol and class of its level, the level, and the name with the joint's label.
+    short : str
+        Level and kind, for the row of its joint.
+    words : str
+        State, worst value and limit.
+    doubt : str
+        Why its value does not hold; empty if it does.
+    since : str
+    """
+
+    symbol: str
+    look: str
+    level: str
+    name: str
+    short: str
+    words: str
+    doubt: str
+    since: str
+
+
+def alarm_line(summary: ReplaySummary, alarm: ReplayAlarm) -> AlarmLine:
+    """A raised alarm in words."""
+    symbol, look = LEVEL_LOOKS[alarm.level]
+    kind, _, subject = alarm.name.partition(" ")
+    name = f"{kind} {summary.leg.joint_words(subject)}" if kind in OF_A_JOINT else alarm.name
+    doubt = alarm_doubt(summary, alarm)
+    words = raised_words(alarm.state, alarm.worst, alarm.limit, alarm.unit, alarm.raised_ns)
+    return AlarmLine(
+        symbol=symbol,
+        look=look,
+        level=alarm.level.name,
+        name=name,
+        short=f"{alarm.level.name} {kind}",
+        words=alarm.state if doubt else words.rpartition(", since ")[0],
+        doubt=doubt,
+        since=f"since {since_words(summary, alarm.raised_ns)}",
+    )
+
+
+def alarm_doubt(summary: ReplaySummary, alarm: ReplayAlarm) -> str:
+    """Why the value of an alarm does not hold; empty if it does: that of an estimate does."""
+    kind, _, subject = alarm.name.partition(" ")
+    figure, clearance = _FIGURES.get(kind), summary.clearances.get(subject)
+    if figure is Figure.CLEARANCES and clearance and clearance.believed_by not in (None, COUNTED):
+        return ""
+    return not_valid(summary.verdict, figure) if figure else ""

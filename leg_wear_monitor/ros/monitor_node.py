@@ -4,45 +4,172 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import attrs
+import numpy as np
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from std_srvs.srv import Trigger
 
-from leg_wear_monitor.dynamics.clearance.beforehand import advance_beside
-from leg_wear_monitor.errors import LegWearError
-from leg_wear_monitor.interrupt import closed_at_the_end
+from leg_wear_monitor.dynamics.clearance.stepper import advance_beside
+from leg_wear_monitor.errors import LegWearError, closed_at_the_end
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.messages import outputs
-from leg_wear_monitor.messages.decode import Decoder
-from leg_wear_monitor.messages.forecast_times import ForecastTimes
+from leg_wear_monitor.messages.cdr import Decoder
 from leg_wear_monitor.messages.outputs import Messages
-from leg_wear_monitor.messages.qos import SENSOR_DATA
-from leg_wear_monitor.messages.streams import STREAMS
-from leg_wear_monitor.monitor.alarms.alarm import Alarm
-from leg_wear_monitor.monitor.alarms.words import ADVICE
-from leg_wear_monitor.monitor.config.fitting import check_limits
-from leg_wear_monitor.monitor.config.plausible import acceleration_doubts
+from leg_wear_monitor.messages.streams import SENSOR_DATA, STREAMS, ForecastTimes
+from leg_wear_monitor.monitor.alarms import ADVICE, ALREADY_COUNTED, Alarm, Level
+from leg_wear_monitor.monitor.config.fitting import acceleration_doubts, check_limits
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.opening import open_monitor
-from leg_wear_monitor.monitor.reports import Reports
-from leg_wear_monitor.monitor.wear_monitor import WearMonitor
-from leg_wear_monitor.ros.epochs import Epochs, boot_id
-from leg_wear_monitor.ros.health.node_health import Load, load_status, recording_status
-from leg_wear_monitor.ros.health.supervision import Supervision
-from leg_wear_monitor.ros.inputs.due import Due
-from leg_wear_monitor.ros.inputs.inbox import Inbox
-from leg_wear_monitor.ros.inputs.inputs import InputTopic, subscribe
-from leg_wear_monitor.ros.measure_service import MeasureRequest, measured, offer_measure
-from leg_wear_monitor.ros.outputs.black_box import BlackBox
-from leg_wear_monitor.ros.outputs.markers import MarkerTopic
-from leg_wear_monitor.ros.outputs.outlets import Outlets
-from leg_wear_monitor.ros.parameters.parameters import Parameters
-from leg_wear_monitor.ros.running import ClosingNode, run, spin
-from leg_wear_monitor.ros.services import Confirmation, asked_once, audit_time, undone
-from leg_wear_monitor.ros.waiting import repeated
+from leg_wear_monitor.monitor.ledger.entry import JointWear
+from leg_wear_monitor.monitor.reports import Reports, Status
+from leg_wear_monitor.monitor.resets import wear_words
+from leg_wear_monitor.monitor.wear_monitor import WearMonitor, open_monitor
+from leg_wear_monitor.ros.health import Load, load_status, recording_status
+from leg_wear_monitor.ros.inputs import Due, Inbox, InputTopic, subscribe
+from leg_wear_monitor.ros.measure import MeasureRequest, measured, offer_measure
+from leg_wear_monitor.ros.outputs import BlackBox, MarkerTopic, Outlets
+from leg_wear_monitor.ros.running import ClosingNode, Parameters, repeated, run, spin
+from leg_wear_monitor.ros.supervision import Supervision
+from leg_wear_monitor.twin.sample import NO_FAULT, Samples
+
+# Samples whose time is already in the ledger: the clock was reset, or a recording is played back.
+#
+# A live leg cannot walk through the same time twice. If stamps agree with the node's own clock, the samples
+# are live and the clock was reset: simulation time restarted, the board has no hardware clock, or the clock
+# was set back. After a reboot, the same holds for stamps that are not calendar dates. Any other samples may
+# come from playback of a recording whose wear is already counted; this case is undecidable here.
+
+
+NOW_NS = 10 * 10**9  # live samples are within this time of the node's clock; the inbox holds no more
+NO_DATE_NS = 10**17  # stamps below are of 1970 to 1973: they count from the start of something
+
+UNDECIDED = (
+    "the ledger contains the time of these samples already, so they are skipped and nothing is monitored. "
+    "If they are simulated, set use_sim_time: true; "
+    "if their clock restarts with each start, set ledger.skip_counted: false; "
+    "if they are from a recording, use replay, or no ledger"
+)
+BEGUN = "the clock of the samples has restarted: they are counted as a new epoch"
+
+_BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
+
+
+def boot_id() -> str:
+    """Identifier of the computer's current boot; empty if unknown."""
+    try:
+        return _BOOT_ID.read_text(encoding="ascii").strip()
+    except (OSError, UnicodeDecodeError):
+        return ""
+
+
+class Epochs:
+    """Detects clock resets, and reports samples for which a reset is undecidable.
+
+    Parameters
+    ----------
+    monitor : WearMonitor
+    boot : str
+        See `boot_id`.
+    now_ns : callable
+        The node's clock [ns].
+    report : callable
+        Called with whether it is an error, and a line: at each clock reset, and at the first undecidable one.
+    """
+
+    def __init__(
+        self, monitor: WearMonitor, boot: str, now_ns: Callable[[], int], report: Callable[[bool, str], None]
+    ) -> None:
+        self._monitor, self._now_ns, self._report = monitor, now_ns, report
+        self._is_other_boot = monitor.begin_run(boot)
+        self._begun, self._left_out, self._reported = 0, 0, 0
+
+    def check(self, samples: Samples) -> None:
+        """Check samples before they are passed to the monitor."""
+        known = self._monitor.counted(samples) & (samples["fault"] == NO_FAULT)
+        if not known.any():
+            return
+        stamp_ns = int(samples["stamp_ns"][known][-1])
+        is_now = abs(self._now_ns() - stamp_ns) <= NOW_NS
+        if is_now or (self._is_other_boot and stamp_ns < NO_DATE_NS):
+            self._monitor.begin_epoch(stamp_ns, "clock")
+            self._begun += 1
+            self._report(False, BEGUN)
+            return
+        if not self._left_out:
+            self._report(True, UNDECIDED)
+        self._left_out += int(np.count_nonzero(known))
+
+    def status(self) -> Status:
+        """Clock status: an error if samples were left out since the last call."""
+        values = {"left_out_samples": float(self._left_out), "epochs_begun": float(self._begun)}
+        is_undecided, self._reported = self._left_out > self._reported, self._left_out
+        if is_undecided:
+            return Status("clock", Level.ERROR, UNDECIDED, values, ALREADY_COUNTED)
+        return Status("clock", Level.OK, BEGUN if self._begun else "continues", values)
+
+
+# Helpers of the operator services: confirmation, audit time, reply texts.
+
+
+CONFIRM_S = 30.0
+
+
+class Confirmation:
+    """Two-step confirmation of a wear reset: any node in the domain can call a service once by mistake.
+
+    Parameters
+    ----------
+    now_s : callable
+        Returns the time of a monotonic clock [s].
+    """
+
+    def __init__(self, now_s: Callable[[], float] = time.monotonic) -> None:
+        self._now_s = now_s
+        self._asked_s: dict[str, float] = {}
+
+    def is_confirmed(self, what: str) -> bool:
+        """Whether the same request came less than `CONFIRM_S` ago; if not, register it as the first."""
+        now_s = self._now_s()
+        asked_s = self._asked_s.pop(what, None)
+        if asked_s is not None and now_s - asked_s <= CONFIRM_S:
+            return True
+        self._asked_s[what] = now_s
+        return False
+
+
+def audit_time(now_ns: int) -> int:
+    """Time for permanent audit records [ns].
+
+    Raises
+    ------
+    LegWearError
+        If no valid time is available.
+    """
+    if now_ns <= 0:
+        raise LegWearError(
+            "there is no time for the ledger: use_sim_time is set and no message came on /clock; "
+            "publish /clock or start the node without use_sim_time"
+        )
+    return now_ns
+
+
+def asked_once(joint: str, wear: JointWear) -> str:
+    """Reply to a first reset request: the wear that a reset would delete, and how to confirm."""
+    return (
+        f"joint {joint}: not reset yet; this would set {wear_words(wear)} to 0; "
+        f"call again within {CONFIRM_S:g} s if the part was replaced"
+    )
+
+
+def undone(joint: str, wear: JointWear) -> str:
+    """Reply to an undone reset: the joint's wear, including the wear since the reset."""
+    return (
+        f"joint {joint}: the reset is undone, {wear_words(wear)} are counted, including those since the reset"
+    )
+
 
 NO_COMMANDS = "It publishes no commands and must not be part of a safety function."
 

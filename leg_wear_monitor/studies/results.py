@@ -1,22 +1,308 @@
 """What a study found: its settings, and the result of each point, for pages and for Python users."""
 
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import attrs
+import numpy as np
 
-from leg_wear_monitor.data_frame import data_frame
+from leg_wear_monitor.files import data_frame
+from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.loader import parse_mechanism, read_yaml
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.studies.claims.evaluation import LegClaims, evaluate
-from leg_wear_monitor.studies.plan.settings import parse_settings
-from leg_wear_monitor.studies.plan.study import Study
-from leg_wear_monitor.studies.point import Arrays, Point
-from leg_wear_monitor.studies.storage.store import MANIFEST, MECHANISM, StudyDirectory, read_manifest
-from leg_wear_monitor.studies.tables import joint_columns, point_columns
+from leg_wear_monitor.studies.execution import (
+    MANIFEST,
+    MECHANISM,
+    StudyDirectory,
+    parse_settings,
+    read_manifest,
+)
+from leg_wear_monitor.studies.paper import CLAIMS, Claim, Effect
+from leg_wear_monitor.studies.plan import (
+    RANGES,
+    Arrays,
+    Point,
+    Spread,
+    Study,
+    clearance_joints_of,
+    depth_per_cycle,
+    joint_force,
+    largest_error,
+    of_clearance_joints,
+    peak_force,
+    spread,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+# In what fraction of the drawn legs each claim holds, and which lengths and masses decide it.
+
+
+SCHEMA_VERSION = 1
+CONFIDENCE = 0.95  # of a decision in one leg, of a fraction's interval, and of all correlations together
+HOLDS, FAILS, UNDECIDED = "holds", "fails", "undecided"
+MOST_INFLUENCES = 3  # named for a claim
+
+
+@attrs.frozen
+class Influence:
+    """A length or mass that decides a claim: Spearman's correlation with its effect, and the corrected p."""
+
+    factor: str
+    rank_correlation: float
+    p: float
+
+
+@attrs.frozen(kw_only=True)
+class ClaimResult:
+    """What became of a claim.
+
+    Attributes
+    ----------
+    claim : Claim
+    effects : tuple of Effect
+        Of every drawn leg, in the order of `LegClaims.factors`.
+    states : tuple of str
+        `HOLDS`, `FAILS` or `UNDECIDED`, of every drawn leg.
+    file_leg : Effect or None
+        Of the leg of the file.
+    file_state : str
+        Its state; empty without that leg.
+    interval : tuple of float
+        Interval of the fraction (Wilson); 0 to 1 if no leg is decided.
+    influences : tuple of Influence
+        Significant ones, the strongest first, at most `MOST_INFLUENCES`.
+    """
+
+    claim: Claim
+    effects: tuple[Effect, ...]
+    states: tuple[str, ...]
+    file_leg: Effect | None
+    file_state: str
+    interval: tuple[float, float]
+    influences: tuple[Influence, ...]
+
+    def count(self, state: str) -> int:
+        """Number of legs in a state."""
+        return self.states.count(state)
+
+    @property
+    def fraction(self) -> float | None:
+        """Fraction of the decided legs in which the claim holds; None if none is decided."""
+        decided = self.count(HOLDS) + self.count(FAILS)
+        return self.count(HOLDS) / decided if decided else None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return {
+            "claim": self.claim.key,
+            "place": self.claim.place,
+            "text": self.claim.text,
+            **{state: self.count(state) for state in (HOLDS, FAILS, UNDECIDED)},
+            "fraction": self.fraction,
+            "fraction_interval": list(self.interval),
+            "median_effect": float(np.median(_values(self.effects))) if self.effects else None,
+            "file_leg": None
+            if self.file_leg is None
+            else {**attrs.asdict(self.file_leg), "state": self.file_state},
+            "decided_by": [attrs.asdict(influence) for influence in self.influences],
+        }
+
+
+@attrs.frozen(kw_only=True)
+class LegClaims:
+    """The claims against the drawn legs.
+
+    Attributes
+    ----------
+    rejected : dict of str to int
+        Number of drawn legs that do not walk, by reason.
+    factors : dict of str to (legs,) array
+        Factors on lengths and masses of the legs that walk.
+    claims : tuple of ClaimResult
+    """
+
+    rejected: dict[str, int]
+    factors: dict[str, Floats] = attrs.field(eq=False)
+    claims: tuple[ClaimResult, ...]
+
+    @property
+    def legs(self) -> int:
+        """Number of drawn legs that walk."""
+        return len(next(iter(self.factors.values()), ()))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return {
+            "schema_version": SCHEMA_VERSION,
+            "confidence": CONFIDENCE,
+            "legs": self.legs,
+            "rejected": self.rejected,
+            "claims": [result.to_dict() for result in self.claims],
+        }
+
+
+def evaluate(found: Sequence[tuple[Point, Arrays]]) -> LegClaims:
+    """Evaluate the claims on the results of a study ``legs``; requires scipy."""
+    rejected = Counter(str(arrays["rejected"]) for _, arrays in found if str(arrays["rejected"]))
+    walking = [(point, arrays) for point, arrays in found if not str(arrays["rejected"])]
+    drawn = [arrays for point, arrays in walking if point.settings["leg"]]
+    of_file = next((arrays for point, arrays in walking if not point.settings["leg"]), None)
+    factors = _factors(drawn)
+    effects = [tuple(claim.measure(leg) for leg in drawn) for claim in CLAIMS]
+    influences = _influences(factors, effects)
+    runs = min((point.settings["runs"] for point, _ in walking), default=2)
+    results = []
+    for claim, each, decided_by in zip(CLAIMS, effects, influences, strict=True):
+        states = tuple(decide(effect, runs) for effect in each)
+        own = None if of_file is None else claim.measure(of_file)
+        results.append(ClaimResult(
+            claim=claim, effects=each, states=states, influences=decided_by, interval=_interval(states),
+            file_leg=own, file_state="" if own is None else decide(own, runs),
+        ))  # fmt: skip
+    return LegClaims(rejected=dict(sorted(rejected.items())), factors=factors, claims=tuple(results))
+
+
+def decide(effect: Effect, runs: int) -> str:
+    """Whether a claim holds, or fails, or is within the scatter of its runs (Student's t, both sides)."""
+    from scipy.stats import t
+
+    if abs(effect.score) < t.ppf(0.5 + 0.5 * CONFIDENCE, runs - 1):
+        return UNDECIDED
+    return HOLDS if effect.value > 0.0 else FAILS
+
+
+def _interval(states: Sequence[str]) -> tuple[float, float]:
+    from scipy.stats import binomtest
+
+    holds, fails = states.count(HOLDS), states.count(FAILS)
+    if not holds + fails:
+        return 0.0, 1.0
+    interval = binomtest(holds, holds + fails).proportion_ci(CONFIDENCE, method="wilson")
+    return float(interval.low), float(interval.high)
+
+
+def _factors(drawn: Sequence[Arrays]) -> dict[str, Floats]:
+    """Factors of the legs, by what they multiply."""
+    if not drawn:
+        return {}
+    bodies = [str(name) for name in drawn[0]["bodies"]]
+    length = np.array([leg["length_factor"] for leg in drawn])
+    mass = np.array([leg["mass_factor"] for leg in drawn])
+    return {f"length of {name}": length[:, i] for i, name in enumerate(bodies)} | {
+        f"mass of {name}": mass[:, i] for i, name in enumerate(bodies[1:])
+    }
+
+
+def _influences(
+    factors: dict[str, Floats], effects: Sequence[tuple[Effect, ...]]
+) -> list[tuple[Influence, ...]]:
+    """For every claim the factors whose rank correlation with its effect is significant among all of them."""
+    from scipy.stats import spearmanr
+
+    pairs = [[_rank(spearmanr, factor, each) for factor in factors.values()] for each in effects]
+    p = holm(np.array([[pair[1] for pair in row] for row in pairs]))
+    chosen = []
+    for row, adjusted in zip(pairs, p, strict=True):
+        known = [
+            Influence(name, rho, float(q))
+            for name, (rho, _), q in zip(factors, row, adjusted, strict=True)
+            if q < 1.0 - CONFIDENCE
+        ]
+        chosen.append(tuple(sorted(known, key=lambda one: -abs(one.rank_correlation))[:MOST_INFLUENCES]))
+    return chosen
+
+
+def _rank(spearmanr: Any, factor: Floats, effects: tuple[Effect, ...]) -> tuple[float, float]:
+    """Correlation and p; 0 and 1 where one of them does not vary, or there are less than three legs."""
+    values = _values(effects)
+    if len(values) < 3 or np.ptp(values) == 0.0 or np.ptp(factor) == 0.0:
+        return 0.0, 1.0
+    found = spearmanr(factor, values)
+    return float(found.statistic), float(found.pvalue)
+
+
+def holm(p: Floats) -> Floats:
+    """Probabilities corrected for their number (Holm 1979), of the same shape."""
+    flat = p.ravel()
+    order = np.argsort(flat, kind="stable")
+    steps = (len(flat) - np.arange(len(flat))) * flat[order]
+    adjusted = np.empty_like(flat)
+    adjusted[order] = np.minimum(np.maximum.accumulate(steps), 1.0) if len(flat) else steps
+    return adjusted.reshape(p.shape)
+
+
+def _values(effects: Sequence[Effect]) -> Floats:
+    return np.array([effect.value for effect in effects])
+
+
+# Responses of a study's points as columns of tables; mean and deviation of a statistic after a dot.
+
+
+Columns = dict[str, list[Any]]
+_Found = Sequence[tuple[Point, Arrays]]
+
+_FORCES = ("mean_force_n", "rms_force_n", "p99_force_n")
+_OF_CONTACT = (
+    "impacts",
+    "impact_speed_mps",
+    "contact_fraction",
+    "friction_work_j_per_cycle",
+    "archard_integral_j_per_cycle",
+)
+
+
+def point_columns(found: _Found) -> Columns:
+    """One row a point: largest errors of toe and drive in a cycle against the ideal leg, and the torque.
+
+    None for the errors of a toe that the leg does not have.
+    """
+    columns: Columns = {
+        "point": [point.label for point, _ in found],
+        "clearance_joints": [", ".join(clearance_joints_of(arrays)) for _, arrays in found],
+        "clearance_m": [point.clearance_m for point, _ in found],
+        "speed_rpm": [point.speed_rpm for point, _ in found],
+    }
+    for name, ideal in RANGES.items():
+        errors = [largest_error(arrays, name) if ideal in arrays else None for _, arrays in found]
+        columns |= _means(name, errors)
+    return columns | _means("rms_torque_nm", [spread(arrays["rms_torque_nm"]) for _, arrays in found])
+
+
+def joint_columns(found: _Found) -> Columns:
+    """One row a point and clearance joint: forces, impacts, contact, and wear of the bushing."""
+    rows = [(point, arrays, joint) for point, arrays in found for joint in clearance_joints_of(arrays)]
+    columns: Columns = {
+        "point": [point.label for point, _, _ in rows],
+        "joint": [joint for _, _, joint in rows],
+        "clearance_m": [point.clearance_m for point, _, _ in rows],
+        "speed_rpm": [point.speed_rpm for point, _, _ in rows],
+    }
+    statistics = [dict(_statistics(arrays, joint)) for _, arrays, joint in rows]
+    names = ("peak_force_n", *_FORCES, *_OF_CONTACT, "wear_depth_m_per_cycle")
+    for name in names:
+        columns |= _means(name, [each[name] for each in statistics])
+    return columns
+
+
+def _statistics(arrays: Arrays, joint: str) -> Iterator[tuple[str, Spread]]:
+    yield "peak_force_n", peak_force(arrays, joint)
+    for name in _FORCES:
+        yield name, joint_force(arrays, name, joint)
+    for name in _OF_CONTACT:
+        yield name, of_clearance_joints(arrays, name, joint)
+    yield "wear_depth_m_per_cycle", depth_per_cycle(arrays, joint)
+
+
+def _means(name: str, values: Sequence[Spread | None]) -> Columns:
+    return {
+        f"{name}.mean": [None if value is None else value.mean for value in values],
+        f"{name}.deviation": [None if value is None else value.deviation for value in values],
+    }
 
 
 @attrs.frozen(kw_only=True, eq=False)

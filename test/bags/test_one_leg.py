@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
-from leg_wear_monitor.bags.mcap.writer import McapWriter
+from leg_wear_monitor.bags.mcap_writer import McapWriter
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.messages import encode
 

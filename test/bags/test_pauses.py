@@ -9,9 +9,9 @@ import pytest
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.bags.findings import Severity
-from leg_wear_monitor.bags.mcap.writer import McapWriter
+from leg_wear_monitor.bags.mcap_writer import McapWriter
 from leg_wear_monitor.messages import encode
-from leg_wear_monitor.monitor.inputs.pauses import Pauses
+from leg_wear_monitor.monitor.inputs import Pauses
 
 START_NS, RATE_HZ, SECONDS = 1_700_000_000 * 10**9, 200, 5
 PAUSE_S = 3600.0

@@ -12,7 +12,7 @@ from leg_wear_monitor.bags.findings import RecordingError, Severity
 from leg_wear_monitor.messages import encode
 from leg_wear_monitor.monitor.config.inputs import DriveTorque
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.twin.kinds import TORQUE
+from leg_wear_monitor.twin import TORQUE
 from leg_wear_monitor.twin.sample import NO_FAULT
 
 Read = Callable[..., Any]

@@ -12,7 +12,7 @@ from rosbags.rosbag2 import Writer as Rosbag2Writer
 
 from leg_wear_monitor.bags.reader import Recording
 from leg_wear_monitor.messages import encode
-from leg_wear_monitor.messages.definitions import definition, types
+from leg_wear_monitor.messages.streams import definition, types
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples
 

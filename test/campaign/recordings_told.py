@@ -24,7 +24,7 @@ def walk() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Stamps [ns], crank angles [rad] and torques [N m] of a healthy leg."""
     from leg_wear_monitor.bags.reader import Recording
     from leg_wear_monitor.monitor.config.settings import MonitorConfig
-    from leg_wear_monitor.twin.kinds import CRANK, TORQUE
+    from leg_wear_monitor.twin import CRANK, TORQUE
 
     with Recording([_BAG], MonitorConfig()) as recording:
         samples = np.concatenate([block.samples for block in recording.blocks()])

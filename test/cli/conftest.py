@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from leg_wear_monitor.cli import waiting
+from leg_wear_monitor.cli import common
 from leg_wear_monitor.cli.main import cli
-from leg_wear_monitor.share import share_directory
+from leg_wear_monitor.files import share_directory
 
 Run = Callable[..., Result]
 
@@ -18,7 +18,7 @@ Run = Callable[..., Result]
 def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
     """Call the command line in an empty directory; a bug's exception is raised, not swallowed."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(waiting, "is_compiled", lambda _kernels: True)  # nor is it said that they compile
+    monkeypatch.setattr(common, "is_compiled", lambda _kernels: True)  # nor is it said that they compile
     # Before click 8.2, stderr was mixed into stdout unless one asked.
     old = "mix_stderr" in inspect.signature(CliRunner).parameters
     runner = CliRunner(mix_stderr=False) if old else CliRunner()

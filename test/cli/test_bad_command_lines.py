@@ -2,7 +2,7 @@
 
 import pytest
 
-from leg_wear_monitor.cli import waiting
+from leg_wear_monitor.cli import common
 from leg_wear_monitor.dynamics import simulation
 
 # arguments, and what the line must say
@@ -89,8 +89,8 @@ def test_a_target_that_cannot_be_written_is_found_before_the_run(
 @pytest.mark.plain
 def test_bad_input_is_one_line_where_kernels_are_still_to_be_compiled(run, monkeypatch, tmp_path):
     """A pipe's reader takes the first line on stderr for the fault."""
-    monkeypatch.setattr(waiting, "is_compiled", lambda _kernels: False)
-    monkeypatch.setattr(waiting, "_mark", lambda _kernels: tmp_path / "mark")
+    monkeypatch.setattr(common, "is_compiled", lambda _kernels: False)
+    monkeypatch.setattr(common, "_mark", lambda _kernels: tmp_path / "mark")
     result = run("simulate", "--speed-rpm", "0")
     assert result.exit_code == 2
     (line,) = result.stderr.splitlines()

@@ -2,8 +2,8 @@
 
 import pytest
 
-from leg_wear_monitor import code_cache, kernel
-from leg_wear_monitor.cli.waiting import compilation
+from leg_wear_monitor.cli.common import compilation
+from leg_wear_monitor.compiled import cache, kernel
 
 pytestmark = pytest.mark.plain
 
@@ -13,7 +13,7 @@ def place(tmp_path, monkeypatch):
     """An empty cache of its own, as a new process would find it."""
 
     def forget():
-        for cached in (code_cache._home, code_cache.code_directory, kernel.cache_directory):
+        for cached in (cache._home, cache.code_directory, kernel.cache_directory):
             cached.cache_clear()
 
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))

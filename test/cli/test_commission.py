@@ -3,10 +3,10 @@
 import json
 from pathlib import Path
 
-from leg_wear_monitor.commissioning import detections
-from leg_wear_monitor.monitor.config.parameter_file import load_config
+from leg_wear_monitor.commissioning import detection
+from leg_wear_monitor.files import share_directory
+from leg_wear_monitor.monitor.config.parameters import load_config
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
-from leg_wear_monitor.share import share_directory
 
 HEALTHY = share_directory() / "bags" / "healthy.mcap"
 
@@ -47,7 +47,7 @@ def test_a_reference_is_written_beside_the_parameters(run, tmp_path: Path, monke
     def simulated(mechanism, _profiles, _progress):
         return shipped_references(mechanism)
 
-    monkeypatch.setattr(detections, "simulated_under", simulated)
+    monkeypatch.setattr(detection, "simulated_under", simulated)
     result = run("commission", str(HEALTHY), "--out", "monitor.yaml", "--reference", "leg.npz")
     assert "written: leg.npz" in result.stdout
     assert load_config(tmp_path / "monitor.yaml").diagnosis.reference == "leg.npz"

@@ -9,7 +9,7 @@ import urllib.request
 
 import pytest
 
-from leg_wear_monitor.cli.verbs import dashboard
+from leg_wear_monitor.cli.verbs import nodes
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.config.fitting import fitted
@@ -63,7 +63,7 @@ def test_without_ros_a_node_is_one_line(run, complaints, monkeypatch):
     def without():
         raise LegWearError("rclpy: no module")
 
-    monkeypatch.setattr(dashboard, "need_rclpy", without)
+    monkeypatch.setattr(nodes, "need_rclpy", without)
     result = run("dashboard", "--node", "/left/leg_wear_monitor")
     assert (result.exit_code, complaints(result)) == (2, ["error: rclpy: no module"])
 

@@ -6,7 +6,7 @@ import pytest
 from made_up_fleet import made_up_fleet, made_up_leg
 from made_up_summary import made_up_summary
 
-from leg_wear_monitor.cli import fleet_pages
+from leg_wear_monitor.cli import pages as fleet_pages
 
 
 @pytest.fixture

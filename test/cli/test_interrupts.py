@@ -10,8 +10,8 @@ import sys
 
 import pytest
 
-from leg_wear_monitor.interrupt import closed_at_the_end, put_in_order, would_be_lost
-from leg_wear_monitor.share import share_directory
+from leg_wear_monitor.errors import closed_at_the_end, put_in_order, would_be_lost
+from leg_wear_monitor.files import share_directory
 
 RUN = """
 import os, signal, sys
@@ -91,7 +91,7 @@ def test_an_exception_is_lost_in_an_import_but_not_in_a_call(tmp_path, monkeypat
     assert not would_be_lost(sys._getframe())
     assert not would_be_lost(None)
     (tmp_path / "asks_at_import.py").write_text(
-        "import sys\nfrom leg_wear_monitor.interrupt import would_be_lost\n"
+        "import sys\nfrom leg_wear_monitor.errors import would_be_lost\n"
         "lost = would_be_lost(sys._getframe())\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
@@ -104,7 +104,7 @@ def test_an_exception_is_lost_in_an_import_but_not_in_a_call(tmp_path, monkeypat
 def test_the_second_interrupt_ends_what_takes_too_long():
     code = (
         "import os, signal\n"
-        "from leg_wear_monitor.interrupt import interrupt\n"
+        "from leg_wear_monitor.errors import interrupt\n"
         "signal.signal(signal.SIGINT, interrupt)\n"
         "try:\n    os.kill(os.getpid(), signal.SIGINT)\n"
         "finally:\n    os.kill(os.getpid(), signal.SIGINT)\n"

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.life import many_lives
-from leg_wear_monitor.monitor.forecast.life_file import read_lives
+from leg_wear_monitor.life import life as many_lives
+from leg_wear_monitor.monitor.forecast.forecaster import read_lives
 from leg_wear_monitor.monitor.ledger.entry import fingerprint
 
 ONE = ("life", "--mechanism", "four_bar", "--legs", "1", "--cycles", "2", "--opens-m", "2e-5")

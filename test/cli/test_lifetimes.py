@@ -6,12 +6,12 @@ import re
 import numpy as np
 import pytest
 
-from leg_wear_monitor.monitor.forecast.words import clearance_mm, three_digits
+from leg_wear_monitor.monitor.forecast.forecast import clearance_mm, three_digits
 
 pytest.importorskip("mcap")
 pytest.importorskip("rosbags")
 
-from leg_wear_monitor.bags.mcap.writer import McapWriter
+from leg_wear_monitor.bags.mcap_writer import McapWriter
 from leg_wear_monitor.messages import encode
 
 SECONDS, RATE_HZ = 14, 200

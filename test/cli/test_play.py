@@ -10,10 +10,10 @@ import pytest
 from play.rocks import COUNTS_PER_TURN, SIGNALS, Rocks, rocks, servo
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.bags.mcap.writer import McapWriter
+from leg_wear_monitor.bags.mcap_writer import McapWriter
 from leg_wear_monitor.messages import encode
-from leg_wear_monitor.play.clearances import effects
-from leg_wear_monitor.twin.reference.joint_angles import angle_model
+from leg_wear_monitor.play.fit import effects
+from leg_wear_monitor.twin.reference import angle_model
 
 START_NS = 1_772_352_000 * 10**9
 

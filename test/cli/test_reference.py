@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from leg_wear_monitor.monitor.diagnosis import reference_file
-from leg_wear_monitor.twin.reference import torque_reference
+from leg_wear_monitor.twin import torque_reference
 
 
 def test_references_of_two_cadences_are_written_and_named(run, tmp_path: Path, monkeypatch) -> None:

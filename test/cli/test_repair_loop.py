@@ -7,7 +7,7 @@ from contextlib import closing
 
 import pytest
 
-from leg_wear_monitor.share import share_directory
+from leg_wear_monitor.files import share_directory
 
 BAGS = share_directory() / "bags"
 

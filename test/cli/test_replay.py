@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.cli.verbs import replay as verb
-from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.verdict.verdict import State
 
 pytest.importorskip("mcap")
 pytest.importorskip("rosbags")
 
-from leg_wear_monitor.bags.mcap.writer import McapWriter
+from leg_wear_monitor.bags.mcap_writer import McapWriter
 from leg_wear_monitor.bags.reader import TIMES
 from leg_wear_monitor.messages import encode
 

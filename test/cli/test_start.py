@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.cli.verbs import simulate as verb
+from leg_wear_monitor.cli.verbs import study as verb
 from leg_wear_monitor.dynamics.simulation import MODELS, default_model
 
 HEAVY = {"numba", "numpy", "matplotlib", "rich", "cattrs", "ruamel.yaml"}

@@ -11,21 +11,13 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import LegWearError, Mechanism, MonitorConfig, simulate
-from leg_wear_monitor.bags.series.signals import (
-    EFFORT,
-    FLOAT64,
-    WRENCH,
-    JointName,
-    Signals,
-    TorqueSource,
-)
+from leg_wear_monitor.bags.series import EFFORT, FLOAT64, WRENCH, JointName, Signals, TorqueSource
 from leg_wear_monitor.commissioning.commission import commission, propose
-from leg_wear_monitor.commissioning.result.commissioning_result import CommissioningResult
-from leg_wear_monitor.estimate.torque_fit.series import Series
-from leg_wear_monitor.estimate.torque_fit.torque_model import TorqueModel
-from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.commissioning.result import CommissioningResult
+from leg_wear_monitor.estimate.torque_model import Series, TorqueModel
+from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.fitting import fitted
-from leg_wear_monitor.monitor.config.parameter_file import load_config
+from leg_wear_monitor.monitor.config.parameters import load_config
 
 from .conftest import Robot, Walk, columns_of
 

@@ -9,23 +9,23 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import Mechanism, MonitorConfig
-from leg_wear_monitor.commissioning import detections
-from leg_wear_monitor.commissioning.detections import with_detections
-from leg_wear_monitor.commissioning.evidence.detection import joint_detections
-from leg_wear_monitor.commissioning.evidence.walk import LEAST_CYCLES, Walk
-from leg_wear_monitor.commissioning.result.commissioning_result import CommissioningItem, CommissioningResult
-from leg_wear_monitor.commissioning.result.joint_detection import JointDetection, judgement
+from leg_wear_monitor.commissioning import detection
+from leg_wear_monitor.commissioning.detection import LEAST_CYCLES, Walk, joint_detections, with_detections
+from leg_wear_monitor.commissioning.result import (
+    CommissioningItem,
+    CommissioningResult,
+    JointDetection,
+    judgement,
+)
 from leg_wear_monitor.errors import LegWearError
-from leg_wear_monitor.estimate.signature import TorqueSensor
-from leg_wear_monitor.estimate.signature_model import simulated_signatures
-from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.estimate.signature import TorqueSensor, simulated_signatures
+from leg_wear_monitor.mechanism.position import TURN, build_linkage
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.monitor.diagnosis.state import SignedCycle
-from leg_wear_monitor.twin.follower.load import torque_size
-from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
-from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
+from leg_wear_monitor.twin.load import torque_size
+from leg_wear_monitor.twin.reference import CrankProfile
+from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 RESULT = CommissioningResult(
     items=(CommissioningItem(name="crank.sign", value=1),),
@@ -139,7 +139,7 @@ def test_a_reference_that_is_asked_for_is_simulated_and_named(
         asked.profiles = profiles
         return (reference,)
 
-    monkeypatch.setattr(detections, "simulated_under", simulated)
+    monkeypatch.setattr(detection, "simulated_under", simulated)
     result = with_detections(RESULT, walked(), Path("leg.npz"))
     assert [one.cadence_rpm for one in asked.profiles] == [pytest.approx(60.0)]
     assert result.reference is reference

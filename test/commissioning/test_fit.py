@@ -6,16 +6,13 @@ import pytest
 
 from leg_wear_monitor import Mechanism
 from leg_wear_monitor.estimate.signature import Channel
-from leg_wear_monitor.estimate.torque_fit.fit import Fit, fit
-from leg_wear_monitor.estimate.torque_fit.pairing import Pair
-from leg_wear_monitor.estimate.torque_fit.regression import Terms
-from leg_wear_monitor.estimate.torque_fit.start import Start
-from leg_wear_monitor.estimate.torque_fit.torque_model import TorqueModel, with_clearances
+from leg_wear_monitor.estimate.torque_fit import Fit, Terms, fit
+from leg_wear_monitor.estimate.torque_model import Pair, Start, TorqueModel, with_clearances
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.twin.reference.crank_profile import HARMONICS, CrankProfile
-from leg_wear_monitor.twin.reference.torque_reference import TorqueReference, TorqueReferenceRun
-from leg_wear_monitor.wear.surfaces import SECTORS
+from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.twin.reference import HARMONICS, CrankProfile
+from leg_wear_monitor.twin.torque_reference import TorqueReference, TorqueReferenceRun
+from leg_wear_monitor.wear import SECTORS
 
 from .conftest import Walk
 

@@ -5,15 +5,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from leg_wear_monitor.commissioning.evidence.sampling import Sampling, added_up, sampling_of
-from leg_wear_monitor.estimate.torque_fit.fit import fit
-from leg_wear_monitor.estimate.torque_fit.motion import motion_of
-from leg_wear_monitor.estimate.torque_fit.pairing import paired
-from leg_wear_monitor.estimate.torque_fit.series import Series
-from leg_wear_monitor.estimate.torque_fit.start import Start
-from leg_wear_monitor.estimate.torque_fit.torque_model import TorqueModel
+from leg_wear_monitor.commissioning.evidence import Sampling, added_up, sampling_of
+from leg_wear_monitor.estimate.torque_fit import fit
+from leg_wear_monitor.estimate.torque_model import Series, Start, TorqueModel, motion_of, paired
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.position import TURN
 
 from .conftest import Robot, Walk, columns_of
 

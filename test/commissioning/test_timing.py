@@ -5,7 +5,7 @@ import math
 import attrs
 import pytest
 
-from leg_wear_monitor.commissioning.evidence.timing import Timing
+from leg_wear_monitor.commissioning.evidence import Timing
 
 pytestmark = pytest.mark.plain
 

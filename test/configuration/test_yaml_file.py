@@ -5,8 +5,8 @@ from contextlib import nullcontext
 import pytest
 
 from leg_wear_monitor import ConfigError, load_config, load_mechanism
-from leg_wear_monitor.configuration import yaml_file
-from leg_wear_monitor.configuration.yaml_file import MOST_BYTES
+from leg_wear_monitor.configuration import strict
+from leg_wear_monitor.configuration.strict import MOST_BYTES
 
 pytestmark = pytest.mark.plain
 
@@ -53,10 +53,10 @@ def test_hostile_yaml_is_one_line(tmp_path, what):
     ],
 )
 def test_only_what_aliases_add_is_bounded(tmp_path, monkeypatch, text, is_refused):
-    monkeypatch.setattr(yaml_file, "MOST_VALUES", 10)
+    monkeypatch.setattr(strict, "MOST_VALUES", 10)
     (tmp_path / "x.yaml").write_text(text)
     with pytest.raises(ConfigError, match="aliases expand to") if is_refused else nullcontext():
-        yaml_file.read_document(tmp_path / "x.yaml", "x.yaml")
+        strict.read_document(tmp_path / "x.yaml", "x.yaml")
 
 
 @pytest.mark.parametrize(

@@ -8,16 +8,15 @@ import numpy as np
 import pytest
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.contact.conformity import (
+from leg_wear_monitor.contact.arrays import (
     NARROW_RAD,
     WIDEST_RAD,
     conformity_doubts,
     contact_doubt,
-    contact_half_angle,
     half_angle_of,
+    half_angle_under_load,
 )
-from leg_wear_monitor.mechanism.ideal import one_cycle
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.position import build_linkage, one_cycle
 
 pytestmark = pytest.mark.plain
 
@@ -46,14 +45,14 @@ def soft(clearance_m: float, **more: object) -> lw.Mechanism:
 def test_half_angles_in_closed_form(degrees, load):
     """2 psi / sin 2 psi - 1 at 45 and 60 degrees, times (3 pi / 8) E* w c."""
     force = 3.0 * math.pi / 8.0 * E_STAR * WIDTH * CLEARANCE * load
-    assert math.degrees(contact_half_angle(force, MODULUS, WIDTH, CLEARANCE)) == pytest.approx(degrees)
+    assert math.degrees(half_angle_under_load(force, MODULUS, WIDTH, CLEARANCE)) == pytest.approx(degrees)
 
 
 @pytest.mark.parametrize("force", [1.0, 100.0, 1.0e4])
 def test_a_narrow_contact_has_the_width_of_hertz_s_line(force):
     """a^2 = 4 F R_eq / (pi w E*), R_eq = R^2 / c (Johnson, Contact Mechanics, 1985, section 4.2)."""
     a = math.sqrt(4.0 * force * RADIUS**2 / CLEARANCE / (math.pi * WIDTH * E_STAR))
-    psi = contact_half_angle(force, MODULUS, WIDTH, CLEARANCE)
+    psi = half_angle_under_load(force, MODULUS, WIDTH, CLEARANCE)
     assert psi < math.radians(9.0)
     assert psi * RADIUS == pytest.approx(a, rel=0.7 * psi**2 + 1e-9)
 
@@ -67,12 +66,12 @@ def test_half_angles_against_the_exact_load_of_a_pin_in_a_plate(degrees, error):
     b2 = math.tan(math.radians(0.5 * degrees)) ** 2
     one_body = 2.07e11 / (1.0 - 0.29**2)
     per_width = one_body * CLEARANCE * math.pi * (b2 + 1.0) * b2 / (2.0 - math.log(b2 + 1.0) - 2.0 * b2**2)
-    found = math.degrees(contact_half_angle(per_width * WIDTH, MODULUS, WIDTH, CLEARANCE))
+    found = math.degrees(half_angle_under_load(per_width * WIDTH, MODULUS, WIDTH, CLEARANCE))
     assert found == pytest.approx(degrees, abs=error)
 
 
 def test_the_arc_widens_with_force_and_softness_and_as_the_clearance_falls():
-    angles = [contact_half_angle(force, MODULUS, WIDTH, CLEARANCE) for force in (0.0, 1.0, 1e3, 1e9, 1e30)]
+    angles = [half_angle_under_load(force, MODULUS, WIDTH, CLEARANCE) for force in (0.0, 1.0, 1e3, 1e9, 1e30)]
     assert angles == sorted(angles)
     assert angles[0] == pytest.approx(0.0, abs=1e-7)  # 2 psi = sin 2 psi to rounding
     assert angles[-1] <= 0.5 * math.pi

@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from reynolds import film_numbers
 
-from leg_wear_monitor.contact.film import (
+from leg_wear_monitor.contact.arrays import (
     attitude_angle,
     film_damping,
     film_force,
@@ -18,7 +18,7 @@ from leg_wear_monitor.contact.film import (
     rotation_number,
     squeeze_number,
 )
-from leg_wear_monitor.mechanism.clearance import FILM_WIDTHS
+from leg_wear_monitor.mechanism.spec import FILM_WIDTHS
 
 pytestmark = pytest.mark.plain
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.contact.friction import (
+from leg_wear_monitor.contact.arrays import (
     AMBROSIO,
     FRICTION_CODES,
     NONE,
@@ -15,7 +15,7 @@ from leg_wear_monitor.contact.friction import (
     friction_force,
     threlfall_ramp,
 )
-from leg_wear_monitor.mechanism.law_names import FRICTION_LAWS
+from leg_wear_monitor.mechanism import FRICTION_LAWS
 
 pytestmark = pytest.mark.plain
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.contact.geometry import contact_modulus, journal_contact
+from leg_wear_monitor.contact.arrays import contact_modulus, journal_contact
 
 pytestmark = pytest.mark.plain
 

@@ -9,8 +9,8 @@ from contextlib import contextmanager
 import pytest
 from heard_leg import NODE, Clock, walk
 
-from leg_wear_monitor.dashboard.leg_view import leg_setup
 from leg_wear_monitor.dashboard.live_leg import LiveLeg
+from leg_wear_monitor.dashboard.source import leg_setup
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -80,8 +80,7 @@ def states_of(answer):
 def served():
     """Serve a source in a thread; all are ended with the test."""
     pytest.importorskip("tornado")
-    from leg_wear_monitor.dashboard.hub import Hub
-    from leg_wear_monitor.dashboard.server import listen, serve
+    from leg_wear_monitor.dashboard.server import Hub, listen, serve
 
     running = []
 

@@ -11,7 +11,7 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from leg_wear_monitor.dashboard.live_leg import OLD_AFTER_S, LiveLeg
-from leg_wear_monitor.dashboard.trends import MOST_ROWS, Row, Trends
+from leg_wear_monitor.dashboard.received import MOST_ROWS, Row, Trends
 
 pytestmark = pytest.mark.plain
 

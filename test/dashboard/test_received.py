@@ -9,12 +9,11 @@ from hypothesis import strategies as st
 
 from leg_wear_monitor.dashboard.received import MOST, alarm_of, own_statuses, received_status, verdict_of
 from leg_wear_monitor.messages.outputs import Messages
-from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor import alarm_specs
+from leg_wear_monitor.monitor.alarms import Alarm, Level
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.evaluation import specs
 from leg_wear_monitor.monitor.reports import AlarmList, VerdictReport
-from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure, Finding, State
-from leg_wear_monitor.monitor.verdict.words import unit_of, with_unit
+from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure, Finding, State, unit_of, with_unit
 
 pytestmark = pytest.mark.plain
 
@@ -90,7 +89,7 @@ def test_an_alarm_is_understood_as_it_was_said(messages, heard, kind, unit, leve
 
 
 def test_every_unit_of_an_alarm_is_understood():
-    found = [getattr(one, "unit", None) for one in vars(specs).values()]
+    found = [getattr(one, "unit", None) for one in vars(alarm_specs).values()]
     units = {unit for unit in found if isinstance(unit, str)}
     assert len(units) > 4
     for unit in units | set(UNITS):

@@ -8,17 +8,11 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import Mechanism
-from leg_wear_monitor.dynamics.full.run import TOLERANCE_M, FullRun
-from leg_wear_monitor.dynamics.result.parts import EnergyBalance
-from leg_wear_monitor.dynamics.result.statistics import energy_balance
-from leg_wear_monitor.dynamics.run.run_statistics import (
-    ARCHARD,
-    CONTACT,
-    FORCE,
-    RunStatistics,
-    new_run_statistics,
-)
+from leg_wear_monitor.dynamics.full_run import TOLERANCE_M, FullRun
+from leg_wear_monitor.dynamics.result import EnergyBalance
+from leg_wear_monitor.dynamics.run import ARCHARD, CONTACT, FORCE, RunStatistics, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
+from leg_wear_monitor.dynamics.statistics import energy_balance
 
 
 @attrs.frozen(eq=False)

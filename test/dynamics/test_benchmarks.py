@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.run.run_statistics import POWER, new_run_statistics
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.run import POWER, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.mechanism.ideal import one_cycle
+from leg_wear_monitor.mechanism.position import one_cycle
 
 # IVP Test Set, problem "andrews", at t = 0.03 s: beta, Theta, gamma, phi, delta, Omega, epsilon [rad]
 ANDREWS_ANGLES = [

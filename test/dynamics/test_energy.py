@@ -4,13 +4,13 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
-from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.result.statistics import energy_balance
-from leg_wear_monitor.dynamics.run.run_statistics import DISSIPATION, FRICTION, POWER, new_run_statistics
+from leg_wear_monitor.dynamics.clearance.stepper import ClearanceRun
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.run import DISSIPATION, FRICTION, POWER, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
+from leg_wear_monitor.dynamics.statistics import energy_balance
 from leg_wear_monitor.mechanism.loader import parse_mechanism
+from leg_wear_monitor.mechanism.position import TURN, one_cycle
 from leg_wear_monitor.mechanism.spec import ConstantLoad, PhaseLoad
 
 

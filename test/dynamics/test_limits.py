@@ -4,14 +4,13 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.dynamics.full.model import BAUMGARTE
-from leg_wear_monitor.dynamics.full.run import TOLERANCE_M, FullRun
-from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
+from leg_wear_monitor.dynamics.full_model import BAUMGARTE
+from leg_wear_monitor.dynamics.full_run import TOLERANCE_M, FullRun
+from leg_wear_monitor.dynamics.run import new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.constraints import closures_at
-from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
-from leg_wear_monitor.mechanism.position import dense_jacobian
-from leg_wear_monitor.wear.surfaces import SECTORS
+from leg_wear_monitor.mechanism.position import TURN, dense_jacobian, one_cycle
+from leg_wear_monitor.wear import SECTORS
 
 
 @pytest.mark.chaotic

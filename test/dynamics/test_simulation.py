@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import ConfigError, load_mechanism, simulate
-from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
-from leg_wear_monitor.share import share_directory
+from leg_wear_monitor.files import share_directory
+from leg_wear_monitor.mechanism.position import TURN, one_cycle
 
 FULL = {"model": "full"}
 

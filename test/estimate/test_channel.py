@@ -7,14 +7,17 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.estimate.channel import channel_of
-from leg_wear_monitor.estimate.drive_figures import DriveFigures
-from leg_wear_monitor.estimate.nuisances import nuisances
-from leg_wear_monitor.estimate.signature import DIRECT, Channel, TorqueSensor
-from leg_wear_monitor.estimate.signature_model import simulated_signatures
-from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.estimate.ground_load import nuisances
+from leg_wear_monitor.estimate.signature import (
+    DIRECT,
+    Channel,
+    DriveFigures,
+    TorqueSensor,
+    simulated_signatures,
+)
+from leg_wear_monitor.mechanism.position import TURN, build_linkage
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
-from leg_wear_monitor.twin.follower.load import torque_size
+from leg_wear_monitor.twin.load import torque_size
 
 HZ = 35.0
 DRIVE = Channel(delay_s=0.0075, time_constant_s=1.0 / (TURN * HZ), load_friction=0.2)

@@ -4,16 +4,14 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.estimate.drive_compliance import compliance_of, leg_behind_coupling
-from leg_wear_monitor.estimate.signature import Channel, TorqueSensor
-from leg_wear_monitor.estimate.signature_model import simulated_signatures
-from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.estimate.channel import compliance_of, leg_behind_coupling
+from leg_wear_monitor.estimate.signature import Channel, TorqueSensor, simulated_signatures
+from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
-from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
-from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
-from leg_wear_monitor.twin.reference.leg_simulation import LegSimulation
-from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
-from leg_wear_monitor.wear.surfaces import SECTORS
+from leg_wear_monitor.twin.leg_simulation import LegSimulation
+from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
+from leg_wear_monitor.twin.torque_reference import TorqueReference
+from leg_wear_monitor.wear import SECTORS
 
 SENSOR = TorqueSensor(period_s=0.005, cycle_s=1.0, size_nm=9.2, noise_nm=0.5)
 MASS = (1.04, 0.96, 1.04, 0.96, 1.04, 0.96, 1.04)

@@ -5,18 +5,10 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.estimate.cause import Cause
-from leg_wear_monitor.estimate.clearance_fit import fit_clearances
-from leg_wear_monitor.estimate.explanations import (
-    Baseline,
-    Explainer,
-    Misfits,
-    Nuisance,
-    OtherChannel,
-)
-from leg_wear_monitor.estimate.leg_model import change_of
-from leg_wear_monitor.estimate.nuisances import with_scatter_of
-from leg_wear_monitor.estimate.signature import TorqueSensor
-from leg_wear_monitor.estimate.signature_model import SignatureModel
+from leg_wear_monitor.estimate.explanations import Baseline, Explainer, Misfits, Nuisance, OtherChannel
+from leg_wear_monitor.estimate.ground_load import with_scatter_of
+from leg_wear_monitor.estimate.leg_model import change_of, fit_clearances
+from leg_wear_monitor.estimate.signature import SignatureModel, TorqueSensor
 
 JOINTS = ("A", "B", "G")
 NEW = np.full(3, 3.0e-4)

@@ -4,17 +4,14 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.estimate.ground_load import ground_load
-from leg_wear_monitor.estimate.nuisances import nuisances
-from leg_wear_monitor.estimate.signature import Channel, TorqueSensor
-from leg_wear_monitor.estimate.signature_model import signature_model, simulated_signatures
-from leg_wear_monitor.mechanism.ground_reaction import PHASES, nominal_stance
-from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.estimate.ground_load import ground_load, nuisances
+from leg_wear_monitor.estimate.signature import Channel, TorqueSensor, signature_model, simulated_signatures
 from leg_wear_monitor.mechanism.loader import load_mechanism
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.person import PHASES, nominal_stance
+from leg_wear_monitor.mechanism.position import TURN, build_linkage
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
-from leg_wear_monitor.twin.follower.load import at_points, load_signature, torque_size
-from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
+from leg_wear_monitor.twin.load import at_points, load_signature, torque_size
+from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 PEAK_N = 300.0
 

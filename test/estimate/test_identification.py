@@ -6,22 +6,19 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
-from leg_wear_monitor.estimate.identification import (
-    FAR_FROM_FILE,
-    identified_leg,
-    leg_of_ideal_torque,
-    misfit,
+from leg_wear_monitor.estimate.ground_load import nuisances
+from leg_wear_monitor.estimate.leg_model import FAR_FROM_FILE, identified_leg, leg_of_ideal_torque, misfit
+from leg_wear_monitor.estimate.signature import (
+    CommissionedTorque,
+    TorqueSensor,
+    signature_model,
+    simulated_signatures,
 )
-from leg_wear_monitor.estimate.nuisances import nuisances
-from leg_wear_monitor.estimate.signature import TorqueSensor
-from leg_wear_monitor.estimate.signature_model import signature_model, simulated_signatures
-from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
-from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
-from leg_wear_monitor.twin.reference.leg_simulation import POINTS
-from leg_wear_monitor.twin.reference.torque_reference import HEAVIER, LONGER, ROUGHER
+from leg_wear_monitor.twin.leg_simulation import POINTS
+from leg_wear_monitor.twin.reference import LegParameters
+from leg_wear_monitor.twin.torque_reference import HEAVIER, LONGER, ROUGHER
 
 SENSOR = TorqueSensor(period_s=0.005, cycle_s=1.0, size_nm=9.2, noise_nm=0.3)
 

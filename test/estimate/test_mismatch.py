@@ -11,11 +11,10 @@ import pytest
 
 from leg_wear_monitor.estimate.cause import Cause, TorqueExplanation
 from leg_wear_monitor.estimate.mismatch import Allowed, explanation
-from leg_wear_monitor.mechanism.ideal import one_cycle
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.position import build_linkage, one_cycle
 from leg_wear_monitor.monitor.config.parameters import config_from
-from leg_wear_monitor.monitor.verdict.cause_words import CauseWords
-from leg_wear_monitor.twin.follower.load import load_signature
+from leg_wear_monitor.monitor.verdict.verdict import CauseWords
+from leg_wear_monitor.twin.load import load_signature
 from leg_wear_monitor.twin.statistics import TorqueProfile
 
 pytestmark = pytest.mark.plain

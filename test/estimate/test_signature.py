@@ -5,13 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.estimate.signature import (
-    PhaseMeans,
-    TorqueSensor,
-    averaged,
-    quiet_phases,
-    signatures,
-)
+from leg_wear_monitor.estimate.signature import PhaseMeans, TorqueSensor, averaged, quiet_phases, signatures
 
 SENSOR = TorqueSensor(period_s=0.005, cycle_s=1.0, size_nm=10.0)
 ANGLE = 2.0 * np.pi * (np.arange(200) + 0.5) / 200

@@ -9,7 +9,7 @@ import pytest
 from short_walk import torque_of_a_cycle, write_walk
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.fleet.description.loader import load_fleet
+from leg_wear_monitor.fleet.description import load_fleet
 from leg_wear_monitor.fleet.update import FleetUpdate, update_fleet
 
 

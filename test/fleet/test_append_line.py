@@ -2,7 +2,7 @@
 
 import pytest
 
-from leg_wear_monitor.fleet.directory.atomic import append_line
+from leg_wear_monitor.fleet.directory import append_line
 
 pytestmark = pytest.mark.plain
 

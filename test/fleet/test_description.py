@@ -3,7 +3,7 @@
 import pytest
 
 from leg_wear_monitor.errors import ConfigError, ConfigWarning
-from leg_wear_monitor.fleet.description.loader import fleet_directory, load_fleet
+from leg_wear_monitor.fleet.description import fleet_directory, load_fleet
 
 pytestmark = pytest.mark.plain
 

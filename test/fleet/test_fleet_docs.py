@@ -7,7 +7,7 @@ from typing import Any
 import attrs
 import pytest
 
-from leg_wear_monitor.fleet.description import spec
+from leg_wear_monitor.fleet import description
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "fleet_file.md"
 TABLE = re.compile(r"(<!-- keys of (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -22,7 +22,7 @@ def default(field: "attrs.Attribute[Any]") -> str:
 def table(name: str) -> str:
     rows = [
         f"| `{field.name}` | {default(field)} | {field.metadata['doc']} |"
-        for field in attrs.fields(getattr(spec, name))
+        for field in attrs.fields(getattr(description, name))
     ]
     return "\n".join(["| key | default | what it is |", "|---|---|---|", *rows, ""])
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from leg_wear_monitor.bags.mcap.layout import MAGIC
-from leg_wear_monitor.fleet.description.loader import load_fleet
-from leg_wear_monitor.fleet.follow import PATIENCE, Followed, has_end
+from leg_wear_monitor.bags.mcap_layout import MAGIC
+from leg_wear_monitor.fleet.description import load_fleet
+from leg_wear_monitor.fleet.update import PATIENCE, Followed, has_end
 
 pytestmark = pytest.mark.plain
 

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.cli.main import cli
-from leg_wear_monitor.fleet.fleet import TABLES
+from leg_wear_monitor.fleet.update import TABLES
 
 parquet = pytest.importorskip("pyarrow.parquet", reason="the extra 'fleet' is not installed")
 

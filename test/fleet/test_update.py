@@ -12,14 +12,12 @@ from click.testing import CliRunner
 import leg_wear_monitor as lw
 from leg_wear_monitor.cli.main import cli
 from leg_wear_monitor.errors import ConfigError, LegWearError
-from leg_wear_monitor.fleet.chain.count import _counted, count_or_fault
-from leg_wear_monitor.fleet.chain.scan import Found, scan
-from leg_wear_monitor.fleet.description.loader import load_fleet
-from leg_wear_monitor.fleet.directory.leg_directory import LegDirectory
-from leg_wear_monitor.fleet.directory.lock import locked
-from leg_wear_monitor.fleet.fleet import Fleet
-from leg_wear_monitor.fleet.overview.read import load_overview
-from leg_wear_monitor.workers.code import package_digest
+from leg_wear_monitor.fleet.chain import Found, _counted, count_or_fault, scan
+from leg_wear_monitor.fleet.description import load_fleet
+from leg_wear_monitor.fleet.directory import LegDirectory, locked
+from leg_wear_monitor.fleet.overview import load_overview
+from leg_wear_monitor.fleet.update import Fleet
+from leg_wear_monitor.workers import package_digest
 
 pytest.importorskip("pyarrow", reason="the extra 'fleet' is not installed")
 

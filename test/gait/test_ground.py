@@ -7,14 +7,12 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import ConfigError, load_mechanism
-from leg_wear_monitor.dynamics.run.run_statistics import DISSIPATION, FRICTION, POWER
+from leg_wear_monitor.dynamics.run import DISSIPATION, FRICTION, POWER
 from leg_wear_monitor.gait.config import GaitConfig, LoadConfig, PaceConfig
-from leg_wear_monitor.gait.ground import POINTS, Ground
-from leg_wear_monitor.gait.leg import SyntheticLeg
+from leg_wear_monitor.gait.leg import POINTS, Ground, SyntheticLeg
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ground_reaction import FORE_AFT, nominal_stance
-from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.person import FORE_AFT, nominal_stance
+from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle, point_motion
 
 LEG = load_mechanism("bionic_leg")
 SPEED = TURN  # rad/s

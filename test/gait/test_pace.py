@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.configuration.quantity import FieldError
-from leg_wear_monitor.dynamics.run.drive import CrankMotion, quintic
+from leg_wear_monitor.configuration import FieldError
+from leg_wear_monitor.dynamics.run import CrankMotion, quintic
 from leg_wear_monitor.gait.config import PaceConfig
-from leg_wear_monitor.gait.pace import Pace
+from leg_wear_monitor.gait.leg import Pace
 
 pytestmark = pytest.mark.plain
 

@@ -10,11 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from readings_as_samples import samples
 
-from leg_wear_monitor.dynamics.run.drive import CrankMotion
+from leg_wear_monitor.dynamics.run import CrankMotion
 from leg_wear_monitor.gait.config import EncoderConfig, GaitConfig, TorqueSensorConfig, TransportConfig
 from leg_wear_monitor.gait.leg import Instant
 from leg_wear_monitor.gait.sensors import Reading, readings
-from leg_wear_monitor.twin.kinds import CRANK, TORQUE
+from leg_wear_monitor.twin import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import NO_FAULT
 
 pytestmark = pytest.mark.plain

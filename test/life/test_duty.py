@@ -5,7 +5,7 @@ import pytest
 
 import leg_wear_monitor as lw
 from leg_wear_monitor import ConfigError
-from leg_wear_monitor.mechanism.ground_reaction import nominal_stance, with_toe_force
+from leg_wear_monitor.mechanism.person import nominal_stance, with_toe_force
 from leg_wear_monitor.mechanism.position import build_linkage
 
 FEW = lw.LifeSettings(legs=2, cycles=3)

@@ -9,17 +9,14 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import ConfigError, SimulationError
-from leg_wear_monitor.dynamics.batch.leg import Leg
+from leg_wear_monitor.dynamics.batch import Leg
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
-from leg_wear_monitor.dynamics.run.drive import steady_drive
-from leg_wear_monitor.dynamics.run.protocol import DONE
-from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
+from leg_wear_monitor.dynamics.run import DONE, new_run_statistics, steady_drive
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.life import life as life_module
-from leg_wear_monitor.life.bushing_load import pressure_speed
 from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
-from leg_wear_monitor.wear.cycle_jump import JumpControl
-from leg_wear_monitor.wear.surfaces import Surfaces, worn_volume
+from leg_wear_monitor.life.result import pressure_speed
+from leg_wear_monitor.wear import JumpControl, Surfaces, worn_volume
 
 SHORT = LifeSettings(legs=2, cycles=3, settle_cycles=1)
 

@@ -6,8 +6,7 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from leg_wear_monitor.life.life import LifeRun, LifeSettings
-from leg_wear_monitor.life.many_lives import LEAST_FRACTION, spread_factors
+from leg_wear_monitor.life.life import LEAST_FRACTION, LifeRun, LifeSettings, spread_factors
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ import pytest
 from ruamel.yaml import YAML
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.mechanism.materials.units import UNITS
+from leg_wear_monitor.mechanism.sourced import UNITS
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "drives.md"
 TABLE = re.compile(r"(<!-- (drives|units|keys of Drive) -->\n).*?(<!-- end -->)", re.DOTALL)

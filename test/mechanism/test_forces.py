@@ -7,8 +7,13 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from leg_wear_monitor.mechanism.arrays import compile_arrays
-from leg_wear_monitor.mechanism.constraints import rotations
-from leg_wear_monitor.mechanism.forces import applied_forces, external_power, load_force, stored_energy
+from leg_wear_monitor.mechanism.constraints import (
+    applied_forces,
+    external_power,
+    load_force,
+    rotations,
+    stored_energy,
+)
 from leg_wear_monitor.mechanism.loader import parse_mechanism
 
 pytestmark = pytest.mark.plain

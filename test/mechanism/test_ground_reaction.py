@@ -5,16 +5,15 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.mechanism.ground_reaction import (
+from leg_wear_monitor.mechanism.loader import load_mechanism
+from leg_wear_monitor.mechanism.person import (
     FORE_AFT,
     nominal_stance,
     stance_template,
     upwards,
     with_toe_force,
 )
-from leg_wear_monitor.mechanism.ideal import one_cycle, point_motion
-from leg_wear_monitor.mechanism.loader import load_mechanism
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.position import build_linkage, one_cycle, point_motion
 
 POINTS = 1024
 

@@ -6,8 +6,7 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.mechanism.ideal import TURN, ideal_motion, one_cycle, point_motion
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.position import TURN, build_linkage, ideal_motion, one_cycle, point_motion
 
 pytestmark = pytest.mark.plain
 

@@ -9,9 +9,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor import ConfigError, Mechanism, load_mechanism
-from leg_wear_monitor.mechanism.clearance import Clearance, Friction
 from leg_wear_monitor.mechanism.loader import parse_mechanism, shipped_mechanisms
-from leg_wear_monitor.mechanism.spec import ConstantLoad, PhaseLoad, PrismaticJoint, TorqueDrive
+from leg_wear_monitor.mechanism.spec import (
+    Clearance,
+    ConstantLoad,
+    Friction,
+    PhaseLoad,
+    PrismaticJoint,
+    TorqueDrive,
+)
 
 pytestmark = pytest.mark.plain
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.mechanism.loader import load_mechanism, shipped_mechanisms
-from leg_wear_monitor.mechanism.outline import is_on_ground, outline_of
+from leg_wear_monitor.mechanism.position import is_on_ground, outline_of
 
 pytestmark = pytest.mark.plain
 

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import ConfigError, load_mechanism
-from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
 from leg_wear_monitor.mechanism.person import heavier_person, with_person
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
 
 pytestmark = pytest.mark.plain
 

@@ -5,13 +5,10 @@ import pytest
 
 from leg_wear_monitor import AssemblyError
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.mechanism.loader import load_mechanism, parse_mechanism, shipped_mechanisms
+from leg_wear_monitor.mechanism.loader import load_mechanism, parse_mechanism, shipped_mechanisms, understood
 from leg_wear_monitor.mechanism.plausible import doubts, suspects
-from leg_wear_monitor.mechanism.understood import understood
-from leg_wear_monitor.monitor.config.fitting import fitted
-from leg_wear_monitor.monitor.config.parameter_file import load_config
-from leg_wear_monitor.monitor.config.parameters import config_from
-from leg_wear_monitor.monitor.config.plausible import parameter_doubts
+from leg_wear_monitor.monitor.config.fitting import fitted, parameter_doubts
+from leg_wear_monitor.monitor.config.parameters import config_from, load_config
 
 pytestmark = pytest.mark.plain
 

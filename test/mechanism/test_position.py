@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.errors import AssemblyError
-from leg_wear_monitor.mechanism.ideal import TURN, check_cycle, one_cycle
 from leg_wear_monitor.mechanism.loader import parse_mechanism
-from leg_wear_monitor.mechanism.position import assemble, build_linkage
+from leg_wear_monitor.mechanism.position import TURN, assemble, build_linkage, check_cycle, one_cycle
 
 pytestmark = pytest.mark.plain
 

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from leg_wear_monitor.mechanism.ideal import TURN, point_path
 from leg_wear_monitor.mechanism.loader import load_mechanism, parse_mechanism, shipped_mechanisms
-from leg_wear_monitor.mechanism.reach.reach import reach_of
-from leg_wear_monitor.mechanism.reach.words import findings, headline, loop_of
+from leg_wear_monitor.mechanism.position import TURN, point_path
+from leg_wear_monitor.mechanism.reach import findings, headline, loop_of, reach_of
 
 pytestmark = pytest.mark.plain
 

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.messages.cdr import MESSAGE
-from leg_wear_monitor.messages.decode import Decoder
+from leg_wear_monitor.messages.cdr import MESSAGE, Decoder
 from leg_wear_monitor.messages.streams import (
     CONTACT,
     FLOAT64,
@@ -22,7 +21,7 @@ from leg_wear_monitor.messages.streams import (
 )
 from leg_wear_monitor.monitor.config.inputs import Crank, DriveTorque, Encoders, FootLoad
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.twin.kinds import CRANK, LOAD, TORQUE
+from leg_wear_monitor.twin import CRANK, LOAD, TORQUE
 from leg_wear_monitor.twin.sample import (
     EMPTY,
     FAULTS,

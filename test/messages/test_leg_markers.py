@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.messages.leg_drawing import LegDrawing
+from leg_wear_monitor.messages.encode import CYLINDER, LINE_LIST, LINE_STRIP, SPHERE, TEXT, LegDrawing
 from leg_wear_monitor.messages.leg_markers import LegMarkers
-from leg_wear_monitor.messages.marker_array import CYLINDER, LINE_LIST, LINE_STRIP, SPHERE, TEXT
-from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.alarms import Alarm, Level
 from leg_wear_monitor.monitor.reports import AlarmList, Lost, Reports, SampleReports
-from leg_wear_monitor.twin.kinds import CRANK
+from leg_wear_monitor.twin import CRANK
 
 pytestmark = pytest.mark.plain
 

@@ -9,8 +9,6 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.messages.forecast_times import ForecastTimes
-from leg_wear_monitor.messages.output import topic_of
 from leg_wear_monitor.messages.outputs import (
     ALARMS,
     CLEARANCES,
@@ -23,10 +21,11 @@ from leg_wear_monitor.messages.outputs import (
     Messages,
     plain,
 )
-from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.messages.streams import ForecastTimes, topic_of
+from leg_wear_monitor.monitor.alarms import Alarm, Level
+from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate, ClearanceObservation
 from leg_wear_monitor.monitor.config.inputs import DriveTorque
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate, ClearanceObservation
 from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, LegForecast, Quantiles
 from leg_wear_monitor.monitor.reports import (
     AlarmList,
@@ -39,8 +38,8 @@ from leg_wear_monitor.monitor.reports import (
 )
 from leg_wear_monitor.monitor.verdict.situation import SeenClearance
 from leg_wear_monitor.playback.replay import node_beside
-from leg_wear_monitor.twin.kinds import CRANK
-from leg_wear_monitor.twin.kinds import TORQUE as TORQUE_SAMPLE
+from leg_wear_monitor.twin import CRANK
+from leg_wear_monitor.twin import TORQUE as TORQUE_SAMPLE
 
 pytestmark = pytest.mark.plain
 

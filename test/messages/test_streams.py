@@ -3,14 +3,12 @@
 import numpy as np
 import pytest
 
-from leg_wear_monitor.messages.decode import Decoder
-from leg_wear_monitor.messages.definitions import types
-from leg_wear_monitor.messages.streams import STREAMS, streams_read
+from leg_wear_monitor.messages.cdr import Decoder
+from leg_wear_monitor.messages.streams import STREAMS, streams_read, types
 from leg_wear_monitor.monitor.config.inputs import TORQUE_SOURCES, FootLoad
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.twin.kinds import KINDS
-from leg_wear_monitor.twin.sample import GAIT_SAMPLE, brings, gait_samples
-from leg_wear_monitor.twin.settings import LOAD_SOURCES
+from leg_wear_monitor.twin import KINDS
+from leg_wear_monitor.twin.sample import GAIT_SAMPLE, LOAD_SOURCES, brings, gait_samples
 
 pytestmark = pytest.mark.plain
 

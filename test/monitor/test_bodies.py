@@ -7,8 +7,8 @@ import pytest
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
-from leg_wear_monitor.monitor.opening import open_monitor
-from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
+from leg_wear_monitor.monitor.wear_monitor import open_monitor
+from leg_wear_monitor.twin.reference import LegParameters
 
 
 @pytest.fixture

@@ -6,23 +6,22 @@ from pathlib import Path
 
 import pytest
 
-from leg_wear_monitor.monitor.alarms.fault_codes import FAULT_CODES
-from leg_wear_monitor.monitor.alarms.guides import CODES_OF_GUIDES, FOLDER, guide_of
-from leg_wear_monitor.monitor.evaluation import specs
+from leg_wear_monitor.monitor import alarm_specs
+from leg_wear_monitor.monitor.alarms import CODES_OF_GUIDES, FAULT_CODES, FOLDER, guide_of
 from leg_wear_monitor.monitor.verdict.rules import RULES
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "reference" / "codes.md"
 PART = re.compile(r"(<!-- codes -->\n).*?(<!-- end -->)", re.DOTALL)
-OF_A_JOINT = {*specs.JOINT, *specs.ENCODERS}
+OF_A_JOINT = {*alarm_specs.JOINT, *alarm_specs.ENCODERS}
 ALARMS = (
-    *specs.JOINT,
-    *specs.ENCODERS,
-    *specs.TORQUE,
-    *specs.GAIT,
-    *specs.INPUT,
-    specs.SOURCES,
-    *specs.OF_FOOT_LOAD,
+    *alarm_specs.JOINT,
+    *alarm_specs.ENCODERS,
+    *alarm_specs.TORQUE,
+    *alarm_specs.GAIT,
+    *alarm_specs.INPUT,
+    alarm_specs.SOURCES,
+    *alarm_specs.OF_FOOT_LOAD,
 )
 
 pytestmark = pytest.mark.plain

@@ -11,12 +11,11 @@ from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.gait.config import FootLoadSensorConfig, GaitConfig, LoadConfig
 from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.sensors import readings
-from leg_wear_monitor.mechanism.ground_reaction import nominal_stance
+from leg_wear_monitor.mechanism.person import nominal_stance
 from leg_wear_monitor.mechanism.position import build_linkage
-from leg_wear_monitor.monitor.alarms.alarm import Level
-from leg_wear_monitor.monitor.alarms.fault_codes import FOOT_LOAD_WORDS
+from leg_wear_monitor.monitor.alarms import FOOT_LOAD_WORDS, Level
 from leg_wear_monitor.monitor.config.parameters import config_from
-from leg_wear_monitor.twin.kinds import LOAD
+from leg_wear_monitor.twin import LOAD
 from leg_wear_monitor.twin.sample import Samples
 
 S, START = 1_000_000_000, 10**18

@@ -9,7 +9,7 @@ from ruamel.yaml import YAML
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.mechanism.loader import shipped_mechanisms
-from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.forecast.forecast import Answer
 from leg_wear_monitor.monitor.verdict.verdict import Figure
 

@@ -3,7 +3,7 @@
 import pytest
 
 from leg_wear_monitor import WearMonitor, open_ledger
-from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.monitor.evaluation.evaluation_period import IDLE_LIMIT, EvaluationPeriods
-from leg_wear_monitor.monitor.inputs.health import TorqueRange, with_torques
-from leg_wear_monitor.monitor.spans import NEIGHBOURS_NS, is_within, with_span
-from leg_wear_monitor.twin.kinds import TORQUE
+from leg_wear_monitor.monitor.accounting import NEIGHBOURS_NS, is_within, with_span
+from leg_wear_monitor.monitor.evaluation import IDLE_LIMIT, EvaluationPeriods
+from leg_wear_monitor.monitor.inputs import TorqueRange, with_torques
+from leg_wear_monitor.twin import TORQUE
 from leg_wear_monitor.twin.sample import EMPTY, GAIT_SAMPLE, gait_samples
 
 pytestmark = pytest.mark.plain

@@ -6,7 +6,7 @@ import pytest
 
 from leg_wear_monitor import WearMonitor, open_ledger
 from leg_wear_monitor.monitor.config.parameters import config_from
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState
+from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.parts import Parts
 
 START_NS = 1_700_000_000_123_456_789

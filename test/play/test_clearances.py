@@ -6,10 +6,9 @@ import pytest
 
 from leg_wear_monitor import LegWearError, Mechanism, load_mechanism
 from leg_wear_monitor.mechanism.arrays import body_names
-from leg_wear_monitor.mechanism.ideal import ideal_motion
-from leg_wear_monitor.mechanism.position import build_linkage
-from leg_wear_monitor.play.clearances import clearances_of, effects, solved
-from leg_wear_monitor.twin.reference.joint_angles import angle_model
+from leg_wear_monitor.mechanism.position import build_linkage, ideal_motion
+from leg_wear_monitor.play.fit import clearances_of, effects, solved
+from leg_wear_monitor.twin.reference import angle_model
 
 POSTURES = np.array([0.3, 1.5, 2.9, 4.4, 5.6])
 SHIFT_M = 1.0e-5

@@ -8,8 +8,8 @@ from play.coverage import coverage
 from play.rocks import rocks
 
 from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.play.fit import PlayMeasurement
 from leg_wear_monitor.play.measurement import measure_play
-from leg_wear_monitor.play.result import PlayMeasurement
 
 pytestmark = pytest.mark.plain
 

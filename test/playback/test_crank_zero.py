@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.bags.mcap.writer import McapWriter
-from leg_wear_monitor.estimate.torque_fit.torque_model import TorqueModel, torque_model
+from leg_wear_monitor.bags.mcap_writer import McapWriter
+from leg_wear_monitor.estimate.torque_model import TorqueModel, torque_model
 from leg_wear_monitor.messages import encode
-from leg_wear_monitor.messages.decode import Decoder
+from leg_wear_monitor.messages.cdr import Decoder
 from leg_wear_monitor.messages.streams import JOINT_STATE, WRENCH_STAMPED
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.config.settings import MonitorConfig

@@ -13,21 +13,19 @@ import pytest
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.bags.findings import RecordingError
-from leg_wear_monitor.bags.mcap.writer import McapWriter
+from leg_wear_monitor.bags.mcap_writer import McapWriter
 from leg_wear_monitor.messages import encode
-from leg_wear_monitor.messages.decode import Decoder
-from leg_wear_monitor.messages.forecast_times import ForecastTimes
-from leg_wear_monitor.messages.leg_drawing import LegDrawing
+from leg_wear_monitor.messages.cdr import Decoder
+from leg_wear_monitor.messages.encode import LegDrawing
 from leg_wear_monitor.messages.leg_markers import LegMarkers
-from leg_wear_monitor.messages.output import topic_of
 from leg_wear_monitor.messages.outputs import Messages
-from leg_wear_monitor.messages.streams import JOINT_STATE, WRENCH_STAMPED
+from leg_wear_monitor.messages.streams import JOINT_STATE, WRENCH_STAMPED, ForecastTimes, topic_of
 from leg_wear_monitor.monitor.config.inputs import Cadence
 from leg_wear_monitor.monitor.config.settings import LedgerFile
 from leg_wear_monitor.monitor.forecast.forecast import Answer, Quantiles
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.ledger.ledger import open_ledger
-from leg_wear_monitor.playback.result.replay_summary import summary_of
+from leg_wear_monitor.playback.result import summary_of
 
 SECONDS, RATE_HZ = 8, 200
 CYCLES = SECONDS - 2  # the first and the last are not whole

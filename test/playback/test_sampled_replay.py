@@ -12,7 +12,7 @@ from leg_wear_monitor.cli.main import cli
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.ledger.ledger import open_ledger
-from leg_wear_monitor.playback.result.replay_summary import summary_of
+from leg_wear_monitor.playback.result import summary_of
 from leg_wear_monitor.playback.summary import ReplayResult
 from leg_wear_monitor.report.page import page_html
 from leg_wear_monitor.report.replay.page import replay_page

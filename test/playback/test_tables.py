@@ -8,14 +8,14 @@ import pytest
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.bags.findings import RecordingError
-from leg_wear_monitor.bags.mcap.writer import McapWriter
+from leg_wear_monitor.bags.mcap_writer import McapWriter
 from leg_wear_monitor.bags.reader import Recording
-from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.files import share_directory
+from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.messages import encode
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.playback.replay import REPORTS_FILE
-from leg_wear_monitor.share import share_directory
-from leg_wear_monitor.twin.kinds import CRANK, LOAD
+from leg_wear_monitor.twin import CRANK, LOAD
 
 Columns = dict[str, np.ndarray]
 NS = {"input.units.stamp": "ns"}

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.bags.mcap.writer import McapWriter
+from leg_wear_monitor.bags.mcap_writer import McapWriter
 from leg_wear_monitor.bags.reader import Recording
+from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.messages import encode
-from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.config.inputs import TORQUE_SOURCES, DriveTorque
-from leg_wear_monitor.share import share_directory
-from leg_wear_monitor.twin.kinds import CRANK
+from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin.sample import Samples
 
 HEALTHY = share_directory() / "bags" / "healthy.mcap"

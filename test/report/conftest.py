@@ -8,8 +8,7 @@ import pytest
 
 from leg_wear_monitor.report.page import Page
 from leg_wear_monitor.report.study.page import study_page
-from leg_wear_monitor.studies.execution.run import run_study
-from leg_wear_monitor.studies.plan.settings import parse_settings
+from leg_wear_monitor.studies.execution import parse_settings, run_study
 from leg_wear_monitor.studies.results import StudyResults, load_results
 
 ENSEMBLE = {"runs": 2, "cycles": 2, "skip_cycles": 1, "traced_cycles": 1}

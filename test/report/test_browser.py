@@ -11,11 +11,10 @@ from browser import NEEDS_CHROMIUM, WIDTHS, browse, printed
 from made_up_summary import made_up_summary
 
 from leg_wear_monitor.mechanism.loader import load_mechanism, parse_mechanism
-from leg_wear_monitor.report.drawing.drawing import drawing_of
-from leg_wear_monitor.report.drawing.page import drawing_html
+from leg_wear_monitor.report.drawing import drawing_html, drawing_of
 from leg_wear_monitor.report.page import page_html
 from leg_wear_monitor.report.replay.page import replay_page
-from leg_wear_monitor.studies.plan.settings import STUDIES
+from leg_wear_monitor.studies.execution import STUDIES
 
 pytestmark = NEEDS_CHROMIUM
 

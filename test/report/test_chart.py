@@ -11,8 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from leg_wear_monitor.report.chart import Chart, Panel, Series
-from leg_wear_monitor.report.page import Page, Section, page_html
+from leg_wear_monitor.report.page import Chart, Page, Panel, Section, Series, page_html
 
 pytestmark = pytest.mark.plain
 

@@ -8,9 +8,19 @@ from html_reader import read
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.report.figures.figure import new_figure, png, svg
-from leg_wear_monitor.report.page import Page, Section, page_html
-from leg_wear_monitor.report.parts import Gallery, Listing, Live, Picture, Sentences, Table, Text
+from leg_wear_monitor.report.figure import new_figure, png, svg
+from leg_wear_monitor.report.page import (
+    Gallery,
+    Listing,
+    Live,
+    Page,
+    Picture,
+    Section,
+    Sentences,
+    Table,
+    Text,
+    page_html,
+)
 
 pytestmark = pytest.mark.plain
 

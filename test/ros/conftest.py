@@ -34,9 +34,8 @@ if find_spec("rclpy"):
     from leg_wear_monitor.gait.leg import SyntheticLeg
     from leg_wear_monitor.gait.sensors import readings
     from leg_wear_monitor.messages.streams import streams_read
-    from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
-    from leg_wear_monitor.ros.gait_publisher.sensor_messages import sensor_message
-    from leg_wear_monitor.ros.inputs.message_class import message_class
+    from leg_wear_monitor.ros.gait_publisher import PublisherConfig, sensor_message
+    from leg_wear_monitor.ros.inputs import message_class
     from leg_wear_monitor.ros.monitor_node import MonitorNode
     from leg_wear_monitor.ros.running import spin
 

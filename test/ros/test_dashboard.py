@@ -16,7 +16,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from live_browser import LivePage, wait_for
 
 from leg_wear_monitor.gait.config import KnockConfig
-from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
+from leg_wear_monitor.ros.gait_publisher import PublisherConfig
 
 PARAMETERS = {
     "cadence__tolerance_rpm": 30.0,

@@ -9,10 +9,9 @@ from xml.etree import ElementTree
 import pytest
 from ruamel.yaml import YAML
 
-from leg_wear_monitor.monitor.config.parameter_file import parse_config
-from leg_wear_monitor.monitor.config.parameters import Parameter, parameters_of, structured
-from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
-from leg_wear_monitor.share import share_directory
+from leg_wear_monitor.files import share_directory
+from leg_wear_monitor.monitor.config.parameters import Parameter, parameters_of, parse_config, structured
+from leg_wear_monitor.ros.gait_publisher import PublisherConfig
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "ros.md"
 TABLE = re.compile(r"(<!-- parameters -->\n).*?(<!-- end -->)", re.DOTALL)

@@ -8,7 +8,7 @@ from leg_wear_monitor.messages.streams import FLOAT64, STREAMS, WRENCH_STAMPED, 
 
 pytest.importorskip("rclpy")
 
-from leg_wear_monitor.ros.inputs.due import Due, stamp_of
+from leg_wear_monitor.ros.inputs import Due, stamp_of
 
 BY_CODE = {stream.code: stream for stream in STREAMS}
 TORQUE, BARE = BY_CODE[WRENCH_STAMPED], BY_CODE[FLOAT64]

@@ -18,9 +18,8 @@ from std_msgs.msg import Float64
 from leg_wear_monitor.gait.config import EncoderConfig, TorqueSensorConfig
 from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.sensors import readings
-from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
-from leg_wear_monitor.ros.gait_publisher.node import GaitPublisher
-from leg_wear_monitor.twin.kinds import CRANK
+from leg_wear_monitor.ros.gait_publisher import GaitPublisher, PublisherConfig
+from leg_wear_monitor.twin import CRANK
 
 
 @pytest.mark.parametrize("precompute", [True, False])

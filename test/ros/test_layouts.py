@@ -14,9 +14,9 @@ from mcap_ros2.decoder import DecoderFactory
 from rclpy.utilities import try_shutdown
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.messages.output import topic_of
 from leg_wear_monitor.messages.outputs import Messages
-from leg_wear_monitor.ros.inputs.message_class import message_class
+from leg_wear_monitor.messages.streams import topic_of
+from leg_wear_monitor.ros.inputs import message_class
 from leg_wear_monitor.ros.monitor_node import MonitorNode
 
 ME = "/leg_wear_monitor"

@@ -19,6 +19,7 @@ from visualization_msgs.msg import MarkerArray
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.bags.reader import Recording
+from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.gait.config import (
     EncoderConfig,
     FootLoadSensorConfig,
@@ -27,14 +28,13 @@ from leg_wear_monitor.gait.config import (
     PaceConfig,
     TransportConfig,
 )
-from leg_wear_monitor.messages.leg_drawing import LegDrawing
+from leg_wear_monitor.messages.encode import LegDrawing
 from leg_wear_monitor.messages.leg_markers import LegMarkers
 from leg_wear_monitor.messages.outputs import Messages
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
-from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
-from leg_wear_monitor.share import share_directory
+from leg_wear_monitor.ros.gait_publisher import PublisherConfig
 
 ME = "/leg_wear_monitor"
 FAST = {"wear_acceleration": 1.0e5}

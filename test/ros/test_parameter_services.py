@@ -23,12 +23,10 @@ from rclpy.parameter import Parameter, parameter_dict_from_yaml_file, parameter_
 from rclpy.utilities import try_shutdown
 from rosgraph_msgs.msg import Clock
 
-from leg_wear_monitor.monitor.config.parameter_file import load_config
-from leg_wear_monitor.monitor.config.parameters import PARAMETERS
+from leg_wear_monitor.monitor.config.parameters import PARAMETERS, load_config
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.ros.monitor_node import MonitorNode
-from leg_wear_monitor.ros.parameters.parameters import Parameters
-from leg_wear_monitor.ros.running import ClosingNode
+from leg_wear_monitor.ros.running import ClosingNode, Parameters
 
 ME = "/leg_wear_monitor"
 

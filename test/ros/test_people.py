@@ -14,7 +14,7 @@ from std_srvs.srv import Trigger
 
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.monitor.config.parameters import PARAMETERS
-from leg_wear_monitor.ros.gait_publisher.node import GaitPublisher
+from leg_wear_monitor.ros.gait_publisher import GaitPublisher
 from leg_wear_monitor.ros.monitor_node import MonitorNode
 
 ME = "/leg_wear_monitor"

@@ -14,19 +14,15 @@ from mcap.reader import make_reader
 from rclpy.serialization import serialize_message
 
 from leg_wear_monitor.gait.sensors import Reading
-from leg_wear_monitor.messages.decode import Decoder
-from leg_wear_monitor.messages.qos import SENSOR_DATA
-from leg_wear_monitor.messages.streams import JOINT_STATE, STREAMS, WRENCH_STAMPED
-from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.messages.cdr import Decoder
+from leg_wear_monitor.messages.streams import JOINT_STATE, SENSOR_DATA, STREAMS, WRENCH_STAMPED
+from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
-from leg_wear_monitor.ros.gait_publisher.sensor_messages import sensor_message
-from leg_wear_monitor.ros.health.node_health import Load, load_status, recording_status, topics_status
-from leg_wear_monitor.ros.inputs.inbox import Inbox
-from leg_wear_monitor.ros.inputs.inputs import InputTopic
-from leg_wear_monitor.ros.inputs.publishers import Publishers
-from leg_wear_monitor.ros.outputs.black_box import BlackBox
-from leg_wear_monitor.twin.kinds import CRANK, TORQUE
+from leg_wear_monitor.ros.gait_publisher import PublisherConfig, sensor_message
+from leg_wear_monitor.ros.health import Load, load_status, recording_status, topics_status
+from leg_wear_monitor.ros.inputs import Inbox, InputTopic, Publishers
+from leg_wear_monitor.ros.outputs import BlackBox
+from leg_wear_monitor.twin import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import FAULTS, NO_FAULT, OUT_OF_RANGE, WRONG_TYPE
 
 START_NS = 1_700_000_000_000_000_000

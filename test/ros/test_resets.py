@@ -9,8 +9,7 @@ from rclpy.parameter import Parameter
 from rclpy.utilities import try_shutdown
 
 from leg_wear_monitor.errors import LegWearError
-from leg_wear_monitor.ros.monitor_node import MonitorNode
-from leg_wear_monitor.ros.services import CONFIRM_S, Confirmation
+from leg_wear_monitor.ros.monitor_node import CONFIRM_S, Confirmation, MonitorNode
 
 
 @pytest.mark.plain

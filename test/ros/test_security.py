@@ -15,9 +15,9 @@ import rclpy
 from rclpy.parameter import Parameter
 from rclpy.utilities import try_shutdown
 
-from leg_wear_monitor.ros.gait_publisher.node import GaitPublisher
+from leg_wear_monitor.files import share_directory
+from leg_wear_monitor.ros.gait_publisher import GaitPublisher
 from leg_wear_monitor.ros.monitor_node import MonitorNode
-from leg_wear_monitor.share import share_directory
 
 PATIENCE_S = 60.0
 

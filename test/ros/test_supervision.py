@@ -19,18 +19,15 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from visualization_msgs.msg import MarkerArray
 
-from leg_wear_monitor.messages.decode import Decoder
+from leg_wear_monitor.messages.cdr import Decoder
 from leg_wear_monitor.messages.streams import JOINT_STATE
-from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.alarms import Alarm, Level
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.reports import AlarmList, Status
-from leg_wear_monitor.ros.health.clock_monitor import ClockMonitor, both_clocks
-from leg_wear_monitor.ros.health.node_alarms import NodeAlarms
-from leg_wear_monitor.ros.health.node_log import AlarmLog, StatusLog
-from leg_wear_monitor.ros.health.silence import Silence
-from leg_wear_monitor.ros.inputs.crank_names import CrankNames
-from leg_wear_monitor.ros.inputs.inbox import Inbox
-from leg_wear_monitor.twin.kinds import KINDS
+from leg_wear_monitor.ros.health import ClockMonitor, NodeAlarms, Silence, both_clocks
+from leg_wear_monitor.ros.inputs import CrankNames, Inbox
+from leg_wear_monitor.ros.supervision import AlarmLog, StatusLog
+from leg_wear_monitor.twin import KINDS
 
 ME = "/leg_wear_monitor"
 SECOND = 10**9

@@ -11,12 +11,12 @@ pytest.importorskip("rclpy")
 from diagnostic_msgs.msg import DiagnosticArray
 
 from leg_wear_monitor.bags.reader import Recording
+from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.gait.config import EFFORT, FLOAT64, TORQUE_SOURCES, TorqueSensorConfig
 from leg_wear_monitor.gait.sensors import Reading
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
-from leg_wear_monitor.share import share_directory
-from leg_wear_monitor.twin.kinds import CRANK, TORQUE
+from leg_wear_monitor.ros.gait_publisher import PublisherConfig
+from leg_wear_monitor.twin import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import NO_FAULT
 
 ME = "/leg_wear_monitor"

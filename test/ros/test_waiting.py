@@ -2,7 +2,7 @@
 
 import threading
 
-from leg_wear_monitor.ros.waiting import repeated
+from leg_wear_monitor.ros.running import repeated
 
 
 def test_the_time_that_passes_is_said_again_and_again_and_no_more_afterwards():

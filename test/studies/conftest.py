@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from leg_wear_monitor.studies.plan.settings import parse_settings
-from leg_wear_monitor.studies.plan.study import Study
+from leg_wear_monitor.studies.execution import parse_settings
+from leg_wear_monitor.studies.plan import Study
 
 ENSEMBLE = {"runs": 2, "cycles": 2, "skip_cycles": 1, "traced_cycles": 1}
 

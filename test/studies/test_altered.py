@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.errors import ConfigError, ConfigWarning, LegWearError
-from leg_wear_monitor.studies.execution import run
-from leg_wear_monitor.studies.execution.run import run_study
+from leg_wear_monitor.studies import execution
+from leg_wear_monitor.studies.execution import canonical, run_study, text_checksum
 from leg_wear_monitor.studies.results import load_results
-from leg_wear_monitor.studies.storage import archive
-from leg_wear_monitor.studies.storage.checksum import canonical, text_checksum
 
 pytestmark = pytest.mark.plain
 
@@ -36,7 +34,7 @@ def computed(sweep, tmp_path_factory):
     """A study's directory, its results made up."""
     out = tmp_path_factory.mktemp("computed")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run, "compute", result)
+        patch.setattr(execution, "compute", result)
         assert run_study("size", sweep, out) == 3
     return out
 
@@ -44,7 +42,7 @@ def computed(sweep, tmp_path_factory):
 @pytest.fixture
 def study(computed, tmp_path, monkeypatch):
     """A copy of it that may be spoilt."""
-    monkeypatch.setattr(run, "compute", result)
+    monkeypatch.setattr(execution, "compute", result)
     shutil.copytree(computed, tmp_path / "study")
     return tmp_path / "study"
 
@@ -116,7 +114,7 @@ def test_points_that_are_not_what_was_computed_are_computed_again(study, sweep):
 
 
 def test_a_bomb_is_not_unpacked(study, monkeypatch):
-    monkeypatch.setattr(archive, "_MOST_BYTES", 100)
+    monkeypatch.setattr(execution, "_MOST_BYTES", 100)
     with pytest.raises(ConfigError, match="unpacks to more than"):
         load_results(study)
 

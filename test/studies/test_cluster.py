@@ -6,7 +6,7 @@ import signal
 import pytest
 from dask_cluster import cluster
 
-from leg_wear_monitor.studies.execution.run import run_study
+from leg_wear_monitor.studies.execution import run_study
 from leg_wear_monitor.studies.results import load_results
 
 pytest.importorskip("distributed", reason="the extra 'dask' is not installed")

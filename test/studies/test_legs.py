@@ -9,28 +9,30 @@ import pytest
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.cli.verbs.study import write_study_page
 from leg_wear_monitor.errors import AssemblyError, ConfigError
-from leg_wear_monitor.mechanism.ideal import one_cycle
-from leg_wear_monitor.mechanism.position import build_linkage
-from leg_wear_monitor.report.study.legs_page import claim_table, influence_gallery
-from leg_wear_monitor.studies.claims.effect import Effect, difference, greatest, least, log_ratio
-from leg_wear_monitor.studies.claims.evaluation import FAILS, HOLDS, UNDECIDED, decide, evaluate, holm
-from leg_wear_monitor.studies.claims.paper import CLAIMS
-from leg_wear_monitor.studies.execution.run import run_study
-from leg_wear_monitor.studies.plan.kinds import legs
-from leg_wear_monitor.studies.plan.kinds.legs import ALL, FOOT, HIP, PLACES, SETS
-from leg_wear_monitor.studies.point import Point
-from leg_wear_monitor.studies.results import load_results
-from leg_wear_monitor.studies.summary import clearance_joints_of, depth_per_cycle, largest_error, peak_force
-from leg_wear_monitor.studies.tasks.drawn_leg import (
+from leg_wear_monitor.mechanism.position import build_linkage, one_cycle
+from leg_wear_monitor.report.study.wear_page import claim_table, influence_gallery
+from leg_wear_monitor.studies import kinds
+from leg_wear_monitor.studies.execution import run_study
+from leg_wear_monitor.studies.kinds import ALL, FOOT, HIP, PLACES, SETS
+from leg_wear_monitor.studies.leg_tasks import (
     DEAD_POINT,
+    ERRORS,
     OPEN,
     STEP,
     TRANSMISSION,
     draw_leg,
+    drawn_leg_response,
     rejection,
 )
-from leg_wear_monitor.studies.tasks.leg import drawn_leg_response
-from leg_wear_monitor.studies.tasks.response import ERRORS
+from leg_wear_monitor.studies.paper import CLAIMS, Effect, difference, greatest, least, log_ratio
+from leg_wear_monitor.studies.plan import (
+    Point,
+    clearance_joints_of,
+    depth_per_cycle,
+    largest_error,
+    peak_force,
+)
+from leg_wear_monitor.studies.results import FAILS, HOLDS, UNDECIDED, decide, evaluate, holm, load_results
 
 
 @pytest.fixture(scope="module")
@@ -272,7 +274,7 @@ def test_the_file_s_leg_wears_deeper_at_a_than_at_b(results):
 
 @pytest.mark.plain
 def test_without_scipy_the_study_does_not_begin(settings, tmp_path, monkeypatch):
-    monkeypatch.setattr(legs, "find_spec", lambda _name: None)
+    monkeypatch.setattr(kinds, "find_spec", lambda _name: None)
     with pytest.raises(ConfigError, match="needs scipy, the extra 'studies'"):
         run_study("legs", settings, tmp_path / "out")
     assert not (tmp_path / "out").exists()

@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.errors import SimulationError
 from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
-from leg_wear_monitor.studies.tasks.life import STATES, between, wear_life
-from leg_wear_monitor.wear.cycle_jump import JumpControl
-from leg_wear_monitor.wear.surfaces import BUSHING
+from leg_wear_monitor.studies.life_tasks import STATES, between, wear_life
+from leg_wear_monitor.wear import BUSHING, JumpControl
 
 SETTINGS = {
     "clearance_joints": ["I", "J"], "clearance_m": 3.0e-4, "speed_rpm": 60.0, "perturb_fraction": 0.3,

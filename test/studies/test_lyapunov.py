@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.studies.tasks.exponent import lyapunov_exponent
-from leg_wear_monitor.studies.tasks.lyapunov import exponent, stretches
+from leg_wear_monitor.studies.life_tasks import exponent, lyapunov_exponent, stretches
 
 PLAIN = pytest.mark.plain
 

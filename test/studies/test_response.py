@@ -5,16 +5,14 @@ import pytest
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
-from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.run.drive import steady_drive
-from leg_wear_monitor.dynamics.run.run_statistics import TORQUE_ERROR, new_run_statistics
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.run import TORQUE_ERROR, new_run_statistics, steady_drive
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.studies.summary import RANGES, fraction_of_range
-from leg_wear_monitor.studies.tasks.ensemble import ensemble, observed_legs, start_angles
-from leg_wear_monitor.studies.tasks.grid import SAMPLES
-from leg_wear_monitor.studies.tasks.response import ERRORS, run_ensemble
-from leg_wear_monitor.wear.surfaces import BUSHING
+from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.studies.leg_tasks import ERRORS, run_ensemble
+from leg_wear_monitor.studies.life_tasks import SAMPLES, ensemble, observed_legs, start_angles
+from leg_wear_monitor.studies.plan import RANGES, fraction_of_range
+from leg_wear_monitor.wear import BUSHING
 
 PLACE = {
     "clearance_joints": ["G"],

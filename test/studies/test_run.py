@@ -13,14 +13,13 @@ import loky
 import numpy as np
 import pytest
 
+from leg_wear_monitor import workers
 from leg_wear_monitor.errors import ConfigError, LegWearError
-from leg_wear_monitor.studies.execution import run
-from leg_wear_monitor.studies.execution.run import run_study
+from leg_wear_monitor.studies import execution
+from leg_wear_monitor.studies import leg_tasks as tasks
+from leg_wear_monitor.studies.execution import StudyDirectory, run_study
 from leg_wear_monitor.studies.results import load_results
-from leg_wear_monitor.studies.storage.store import StudyDirectory
-from leg_wear_monitor.studies.tasks import compute as tasks
-from leg_wear_monitor.workers import processes
-from leg_wear_monitor.workers.job import Job
+from leg_wear_monitor.workers import Job
 
 
 def files(directory):
@@ -52,7 +51,7 @@ def test_finished_points_are_kept_and_others_computed(sweep, uninterrupted, tmp_
             raise KeyboardInterrupt
         return compute(task, mechanism, settings, code)
 
-    monkeypatch.setattr(run, "compute", counted)
+    monkeypatch.setattr(execution, "compute", counted)
     with pytest.raises(KeyboardInterrupt):
         run_study("size", sweep, tmp_path)
     assert load_results(tmp_path).missing == ["0.3 mm", "0.4 mm"]
@@ -159,7 +158,7 @@ def test_processes_give_the_same_results_to_the_bit_though_one_dies(
 def test_where_there_is_no_pool_a_study_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "loky", None)
     with pytest.raises(ConfigError, match=r"--workers: 2: needs loky \(pip install loky\), expected 1"):
-        processes.run_in_processes([], 2, lambda *_: None)
+        workers.run_in_processes([], 2, lambda *_: None)
 
 
 @pytest.mark.plain
@@ -177,7 +176,7 @@ def test_workers_that_keep_dying_end_the_study(monkeypatch):
     monkeypatch.setattr(loky, "ProcessPoolExecutor", Broken)
     job = Job("k", print, ())
     with pytest.raises(LegWearError, match="worker processes died 3 times; finished results are kept"):
-        processes.run_in_processes([job], 2, lambda *_: None)
+        workers.run_in_processes([job], 2, lambda *_: None)
 
 
 @pytest.mark.skipif("MOVED_STARTS" in os.environ, reason="the starts of other processes are not moved")

@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.studies.tasks.grid import SAMPLES
-from leg_wear_monitor.studies.tasks.section import period_of, poincare_section
+from leg_wear_monitor.studies.life_tasks import SAMPLES, period_of, poincare_section
 
 SETTINGS = {
     "clearance_joints": ["G"], "clearance_m": 3.0e-4, "perturb_fraction": 0.3, "seed": 1, "skip_cycles": 4,

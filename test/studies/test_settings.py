@@ -6,9 +6,9 @@ import pytest
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.cli.verbs.study import NAMES
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.studies.plan.settings import STUDIES, load_settings, parse_settings
-from leg_wear_monitor.studies.tasks.compute import TASKS
-from leg_wear_monitor.studies.tasks.ensemble import check_points, ensemble
+from leg_wear_monitor.studies.execution import STUDIES, load_settings, parse_settings
+from leg_wear_monitor.studies.leg_tasks import TASKS
+from leg_wear_monitor.studies.life_tasks import check_points, ensemble
 
 pytestmark = pytest.mark.plain
 

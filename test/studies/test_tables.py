@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.mechanism.loader import load_mechanism
-from leg_wear_monitor.studies.point import Point
-from leg_wear_monitor.studies.results import StudyResults
-from leg_wear_monitor.studies.tables import joint_columns, point_columns
+from leg_wear_monitor.studies.plan import Point
+from leg_wear_monitor.studies.results import StudyResults, joint_columns, point_columns
 
 pytestmark = pytest.mark.plain
 

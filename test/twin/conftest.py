@@ -7,7 +7,7 @@ import pytest
 
 from leg_wear_monitor import Mechanism
 from leg_wear_monitor.errors import LegWearError
-from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.twin.digital_twin import DigitalTwin, TwinSnapshot
 from leg_wear_monitor.twin.sample import Samples, gait_samples
 

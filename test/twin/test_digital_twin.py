@@ -10,12 +10,11 @@ from hypothesis import strategies as st
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.errors import ConfigError, LegWearError
-from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.twin import TORQUE
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
-from leg_wear_monitor.twin.kinds import TORQUE
-from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
-from leg_wear_monitor.twin.sample import Samples, gait_samples
-from leg_wear_monitor.twin.settings import TrackerSettings, TwinSettings
+from leg_wear_monitor.twin.reference import LegParameters
+from leg_wear_monitor.twin.sample import Samples, TrackerSettings, TwinSettings, gait_samples
 from leg_wear_monitor.twin.statistics import (
     CycleStatistics,
     SampleStatistics,

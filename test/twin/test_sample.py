@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.errors import LegWearError
-from leg_wear_monitor.twin.kinds import TORQUE
+from leg_wear_monitor.twin import TORQUE
 from leg_wear_monitor.twin.sample import FAULTS, GAIT_SAMPLE, gait_samples
 
 

@@ -4,9 +4,9 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.twin.digital_twin import DigitalTwin, TwinSnapshot
-from leg_wear_monitor.twin.sampling.settings import SamplingSettings
+from leg_wear_monitor.twin.sample import SamplingSettings
 from leg_wear_monitor.twin.statistics import CycleStatistics, TwinUpdate
 
 SETTINGS = SamplingSettings(fraction=0.3, block_cycles=8, settle_cycles=1)

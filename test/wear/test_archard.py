@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from leg_wear_monitor.wear.surfaces import BUSHING, JOURNAL, SECTORS, deposit_wear, fresh_surfaces, profile_at
+from leg_wear_monitor.wear import BUSHING, JOURNAL, SECTORS, deposit_wear, fresh_surfaces, profile_at
 
 pytestmark = pytest.mark.plain
 

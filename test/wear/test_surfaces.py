@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.wear.surfaces import (
+from leg_wear_monitor.wear import (
     BUSHING,
     JOURNAL,
     SECTORS,

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from leg_wear_monitor.wear.surfaces import wear_zone
+from leg_wear_monitor.wear import wear_zone
 
 pytestmark = pytest.mark.plain
 

@@ -1,8 +1,10 @@
-"""``leg-wear-monitor check``: what is wrong with a configuration or an installation."""
+"""Verbs that look: ``check``, ``drives``, ``materials``, ``cache``."""
 
 import platform
+import shutil
 import warnings
 from collections.abc import Callable, Mapping
+from datetime import datetime
 from functools import partial
 from importlib import metadata
 from pathlib import Path
@@ -10,16 +12,30 @@ from typing import TYPE_CHECKING
 
 import click
 
-from leg_wear_monitor.cli.doubts import warn_of
+from leg_wear_monitor.cli.common import (
+    STDOUT,
+    check_directory,
+    check_outputs,
+    compilation,
+    is_compiled,
+    json_option,
+    sourced_lines,
+    warn_of,
+    write_json,
+)
 from leg_wear_monitor.cli.main import version
-from leg_wear_monitor.cli.output import check_directory
-from leg_wear_monitor.cli.verbs.simulate import DEFAULT_MODEL
-from leg_wear_monitor.cli.waiting import compilation, is_compiled
+from leg_wear_monitor.cli.verbs.study import DEFAULT_MODEL
 from leg_wear_monitor.errors import ConfigWarning, LegWearError
-from leg_wear_monitor.share import share_directory
+from leg_wear_monitor.files import json_text, share_directory
 
 if TYPE_CHECKING:
-    from leg_wear_monitor.monitor.config.drive import DriveParameters
+    from leg_wear_monitor.mechanism.materials import Material
+    from leg_wear_monitor.mechanism.sourced import Drive
+    from leg_wear_monitor.monitor.config.sections import DriveParameters
+
+
+# ``leg-wear-monitor check``: what is wrong with a configuration or an installation.
+
 
 DOUBTED = 1
 
@@ -61,7 +77,7 @@ def _installation() -> bool:
     if not _all_well({"kernels": _kernels, "share": lambda: str(share_directory())}):
         return False
     from leg_wear_monitor.mechanism.loader import shipped_mechanisms
-    from leg_wear_monitor.monitor.config.parameter_file import shipped_config
+    from leg_wear_monitor.monitor.config.parameters import shipped_config
 
     shipped = {"monitor.yaml": partial(_parameters, str(shipped_config()))}
     return _all_well({name: partial(_first_line, name) for name in shipped_mechanisms()} | shipped)
@@ -90,7 +106,7 @@ def _library(name: str) -> Callable[[], str]:
 
 
 def _kernels() -> str:
-    from leg_wear_monitor.kernel import cache_directory
+    from leg_wear_monitor.compiled.kernel import cache_directory
 
     place = cache_directory()
     if place is None:
@@ -116,10 +132,10 @@ def _table(name: str, parameters: str | None) -> str:
     """Read a table, and say what was understood of it."""
     try:
         from leg_wear_monitor.bags.findings import Severity
-        from leg_wear_monitor.bags.table_check import understood
+        from leg_wear_monitor.bags.reader import understood
     except ModuleNotFoundError as error:
         raise LegWearError(f"{error.name} is not installed; pip install 'leg_wear_monitor[bags]'") from error
-    from leg_wear_monitor.monitor.config.parameter_file import load_config
+    from leg_wear_monitor.monitor.config.parameters import load_config
 
     lines, findings = understood(Path(name), load_config(parameters))
     for finding in findings:
@@ -133,21 +149,21 @@ def _table(name: str, parameters: str | None) -> str:
 def _file(name: str) -> str:
     """Check a file as what it is."""
     from leg_wear_monitor.mechanism.loader import is_file_name, read_yaml
-    from leg_wear_monitor.monitor.config.parameter_file import is_parameter_file
+    from leg_wear_monitor.monitor.config.parameters import is_parameter_file
 
     document = read_yaml(Path(name), name) if is_file_name(name) else None
     if is_parameter_file(document):
         return _parameters(name)
-    from leg_wear_monitor.fleet.description.loader import is_fleet_file
+    from leg_wear_monitor.fleet.description import is_fleet_file
 
     return _fleet(name) if is_fleet_file(document) else _mechanism(name)
 
 
 def _fleet(path: str) -> str:
     """Read the description of a fleet and the begins of its recordings, and say what was understood."""
-    from leg_wear_monitor.cli.waiting import progress_bar
-    from leg_wear_monitor.fleet.description.loader import load_fleet
-    from leg_wear_monitor.fleet.understood import understood
+    from leg_wear_monitor.cli.common import progress_bar
+    from leg_wear_monitor.fleet.description import load_fleet
+    from leg_wear_monitor.fleet.update import understood
 
     fleet = load_fleet(path)
     for file in dict.fromkeys(leg.config_file for leg in fleet.legs if leg.config_file):
@@ -162,9 +178,8 @@ def _fleet(path: str) -> str:
 def _parameters(path: str) -> str:
     """Read the monitor's parameters, and say what they are set to."""
     from leg_wear_monitor.mechanism.loader import load_mechanism
-    from leg_wear_monitor.monitor.config.fitting import fitted, twin_settings
-    from leg_wear_monitor.monitor.config.parameter_file import load_config
-    from leg_wear_monitor.monitor.config.plausible import parameter_doubts
+    from leg_wear_monitor.monitor.config.fitting import fitted, parameter_doubts, twin_settings
+    from leg_wear_monitor.monitor.config.parameters import load_config
 
     config = load_config(path)
     leg = fitted(load_mechanism(config.mechanism), config, path)
@@ -184,8 +199,8 @@ def _parameters(path: str) -> str:
 
 def _drive(parameters: "DriveParameters", path: str) -> str:
     """What is declared of the drive, in a line of its own; empty if nothing is."""
-    from leg_wear_monitor.monitor.config.drive import drive_figures
     from leg_wear_monitor.monitor.config.parameters import PARAMETERS
+    from leg_wear_monitor.monitor.config.sections import drive_figures
 
     declared = drive_figures(parameters, path).declared
     if not (declared or parameters.type):
@@ -204,13 +219,12 @@ def _first_line(name: str) -> str:
 
 def _mechanism(name: str) -> str:
     """Load, assemble and turn a mechanism, and say what it is."""
-    from leg_wear_monitor.mechanism.loader import load_mechanism
+    from leg_wear_monitor.mechanism.loader import load_mechanism, understood
     from leg_wear_monitor.mechanism.plausible import doubts
-    from leg_wear_monitor.mechanism.understood import understood
 
     leg = load_mechanism(name)
     with compilation("mechanism", how_long="a few seconds"):
-        from leg_wear_monitor.contact.conformity import conformity_doubts
+        from leg_wear_monitor.contact.arrays import conformity_doubts
         from leg_wear_monitor.dynamics.simulation import prepare
 
         linkage = prepare(leg).linkage
@@ -225,3 +239,146 @@ def _mechanism(name: str) -> str:
         "closes, and the crank turns through"
     )
     return "\n".join([what, *(f"{'':13} {statement}" for statement in understood(linkage))])
+
+
+# ``leg-wear-monitor drives``: drives by name, with the sources of their figures.
+
+
+@click.command(short_help="List drives by name, with the sources of their figures.")
+@click.argument("name", required=False)
+@json_option("the drives")
+def drives(name: str | None, json_file: Path | None) -> None:
+    """List the drives that the parameter drive.type can name, or print one of them with all its sources.
+
+    NAME is a drive of the list, or a file such as ./my_drive.yaml.
+    """
+    from leg_wear_monitor.mechanism import sourced
+
+    check_outputs(json_file, None)
+    known = [sourced.load_drive(each) for each in ([name] if name is not None else sourced.drives())]
+    document = {"schema_version": 1, "drives": [drive.to_dict() for drive in known]}
+    written = write_json(json_file, json_text(document))
+    if json_file != STDOUT:
+        for drive in known:
+            for line in _drive_listed(drive) if name is None else _drive_in_full(drive):
+                click.echo(line)
+        for path in written:
+            click.echo(f"written: {path}")
+
+
+def _drive_listed(drive: "Drive") -> list[str]:
+    """A drive in two lines: what it is, and what is known of it."""
+    known = ", ".join(f"{key.replace('_', ' ')} {value.text}" for key, value in drive.values())
+    return [drive.name, f"    {drive.title}: {known}"]
+
+
+def _drive_in_full(drive: "Drive") -> list[str]:
+    """A drive with every number, its conditions and its source."""
+    head = [f"{drive.name}: {drive.title}", f"torques and speeds are those of the {drive.shaft} shaft"]
+    return [*head, *sourced_lines(drive.values()), *([f"note: {drive.notes}"] if drive.notes else [])]
+
+
+# ``leg-wear-monitor materials``: material pairs of joints, with their sources.
+
+
+@click.command(short_help="List the material pairs of joints, with their sources.")
+@click.argument("name", required=False)
+@json_option("the pairs")
+def materials(name: str | None, json_file: Path | None) -> None:
+    """List the material pairs that a joint can name, or print one of them with all its sources.
+
+    NAME is a pair of the list, or a file such as ./my_pair.yaml.
+    """
+    from leg_wear_monitor.mechanism import materials as loader
+
+    check_outputs(json_file, None)
+    names = [name] if name is not None else loader.materials()
+    pairs = [loader.load_material(each) for each in names]
+    document = {"schema_version": 1, "materials": [pair.to_dict() for pair in pairs]}
+    written = write_json(json_file, json_text(document))
+    if json_file != STDOUT:
+        for pair in pairs:
+            for line in _listed(pair) if name is None else _in_full(pair):
+                click.echo(line)
+        for path in written:
+            click.echo(f"written: {path}")
+
+
+def _listed(pair: "Material") -> list[str]:
+    """A pair in two lines: what it is, and what is known of it."""
+    known = pair.wear_coefficients
+    wear = "no wear coefficient" if known is None else " and ".join(f"{k:.3g}" for k in known) + " 1/Pa"
+    limits = (pair.limits.dynamic_pressure or pair.limits.static_pressure, pair.limits.pressure_speed)
+    parts = [
+        f"{label} up to {value.text}" for label, value in zip(("p", "p v"), limits, strict=True) if value
+    ]
+    return [pair.name, f"    {pair.title}: {', '.join([wear, *parts])}"]
+
+
+def _in_full(pair: "Material") -> list[str]:
+    """A pair with every number, its conditions and its source."""
+    lines = [
+        f"{pair.name}: {pair.title}",
+        f"bushing: {pair.bushing.material}; journal: {pair.journal.material}; lubricant: {pair.lubricant}",
+        f"regime: {pair.regime}",
+        *sourced_lines(pair.values()),
+    ]
+    if pair.wear_coefficients is None:
+        lines.append(
+            "wear coefficient of the pair: not known; a life needs a wear_coefficient beside the material"
+        )
+    else:
+        bushing, journal = pair.wear_coefficients
+        lines.append(f"wear coefficient of the pair: {bushing:.3g} (bushing), {journal:.3g} (journal) 1/Pa")
+    return [*lines, *([f"note: {pair.notes}"] if pair.notes else [])]
+
+
+# ``leg-wear-monitor cache``: compiled code on this machine.
+
+
+_MOST = 20  # directories that are listed: one version has about ten
+
+
+@click.command(short_help="List or remove the compiled code on this machine.")
+@click.option("--clear", is_flag=True, help="Remove it; the next start compiles again.")
+def cache(clear: bool) -> None:
+    """Print the place and the size of the compiled code, by version; or remove it.
+
+    Each change of the source makes a new version. The two versions that were used last are kept, and all
+    versions that were used within a day.
+    """
+    from leg_wear_monitor.compiled.cache import kept_directories
+    from leg_wear_monitor.compiled.kernel import cache_directory
+
+    here = cache_directory()
+    if here is None:
+        raise LegWearError("no directory is safe for compiled code, so it is not stored")
+    kept = kept_directories(here.parent)
+    click.echo(f"place: {here.parent}")
+    if clear:
+        size = sum(map(_size, kept))
+        for directory in kept:
+            shutil.rmtree(directory, ignore_errors=True)
+        left = [each for each in kept if each.exists()]
+        if left:
+            raise LegWearError(f"{left[0]} could not be removed, nor {len(left) - 1} more")
+        click.echo(f"removed: {_in_mb(size)} in {len(kept)} directories")
+        return
+    click.echo(f"total: {_in_mb(sum(map(_size, kept)))} in {len(kept)} directories")
+    for directory in sorted(kept, key=_used, reverse=True)[:_MOST]:
+        used = datetime.fromtimestamp(_used(directory)).strftime("%Y-%m-%d %H:%M")
+        click.echo(f"  {_in_mb(_size(directory)):>9}  used {used}  {directory.name}")
+    if len(kept) > _MOST:
+        click.echo(f"  and {len(kept) - _MOST} that are older")
+
+
+def _used(directory: Path) -> float:
+    return directory.stat().st_mtime
+
+
+def _size(directory: Path) -> int:
+    return sum(file.stat().st_size for file in directory.rglob("*") if file.is_file())
+
+
+def _in_mb(size: int) -> str:
+    return f"{size / 1e6:.1f} MB"

@@ -6,14 +6,20 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from leg_wear_monitor.cli.options import out_option, sample_option, workers_option
-from leg_wear_monitor.cli.output import check_directory
-from leg_wear_monitor.cli.waiting import compilation, progress_bar
+from leg_wear_monitor.cli.common import (
+    check_directory,
+    compilation,
+    out_option,
+    progress_bar,
+    sample_option,
+    workers_option,
+)
 
 if TYPE_CHECKING:
-    from leg_wear_monitor.fleet.chain.queue import Chain
-    from leg_wear_monitor.fleet.description.fleet_description import FleetDescription
+    from leg_wear_monitor.fleet.chain import Chain
+    from leg_wear_monitor.fleet.description import FleetDescription
     from leg_wear_monitor.fleet.update import FleetUpdate
+
 
 WITH_FINDINGS = 1
 _MOST_LINES = 20
@@ -57,7 +63,7 @@ def update(
     of a recording are lost, if no gait cycle in it fits its leg, if all of its time is counted already, or if
     a leg could not be updated.
     """
-    from leg_wear_monitor.fleet.description.loader import load_fleet
+    from leg_wear_monitor.fleet.description import load_fleet
 
     legs = load_fleet(description)
     out = out or legs.out
@@ -79,7 +85,7 @@ def update(
 @out_option("Directory of the tables.  [default: tables in the directory of the fleet]")
 def export(path: Path, out: Path | None) -> None:
     """Write verdicts, cycles, recordings and lives, each as a CSV and a Parquet file."""
-    from leg_wear_monitor.fleet.fleet import Fleet
+    from leg_wear_monitor.fleet.update import Fleet
 
     found = Fleet(path)
     out = out or found.path / "tables"
@@ -114,9 +120,9 @@ def _follow(description: Path, count: "Callable[[FleetDescription], FleetUpdate]
     import warnings
 
     from leg_wear_monitor.errors import ConfigWarning
-    from leg_wear_monitor.fleet.chain.words import words_of
-    from leg_wear_monitor.fleet.description.loader import load_fleet
-    from leg_wear_monitor.fleet.follow import Followed
+    from leg_wear_monitor.fleet.chain import words_of
+    from leg_wear_monitor.fleet.description import load_fleet
+    from leg_wear_monitor.fleet.update import Followed
 
     signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
     followed, code, told = Followed(), 0, set[tuple[str, str]]()
@@ -149,13 +155,13 @@ def _print_findings(done: "FleetUpdate", out: Path) -> None:
 
 def _compile(chains: Sequence["Chain"]) -> None:
     """Compile all that the monitors of these legs need: once, and not in every worker at the same time."""
-    from leg_wear_monitor.cli.waiting import is_compiled
+    from leg_wear_monitor.cli.common import is_compiled
 
     if is_compiled("monitor"):
         return
-    from leg_wear_monitor.dynamics.clearance.beforehand import advance_beside
+    from leg_wear_monitor.dynamics.clearance.stepper import advance_beside
     from leg_wear_monitor.mechanism.loader import load_mechanism
-    from leg_wear_monitor.monitor.opening import open_monitor
+    from leg_wear_monitor.monitor.wear_monitor import open_monitor
 
     with compilation("monitor", how_long="about a minute"), advance_beside():
         config: Any = chains[0].leg.config
@@ -163,7 +169,7 @@ def _compile(chains: Sequence["Chain"]) -> None:
 
 
 def _print_counts(done: "FleetUpdate", out: Path) -> None:
-    from leg_wear_monitor.fleet.overview.read import FILE, load_overview
+    from leg_wear_monitor.fleet.overview import FILE, load_overview
 
     if done.is_up_to_date:
         click.echo("everything is in the ledger already")
@@ -203,8 +209,8 @@ def report(description: Path, out: Path | None, fresh_days: float, workers: int 
     """
     import os
 
-    from leg_wear_monitor.cli.fleet_pages import write_pages
-    from leg_wear_monitor.fleet.description.loader import fleet_directory
+    from leg_wear_monitor.cli.pages import write_pages
+    from leg_wear_monitor.fleet.description import fleet_directory
 
     out = out or fleet_directory(description)
     check_directory("--out", out)

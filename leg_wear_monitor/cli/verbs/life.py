@@ -7,23 +7,28 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from leg_wear_monitor.cli.doubts import warn_of
-from leg_wear_monitor.cli.number import bounded, options_named
-from leg_wear_monitor.cli.options import (
+from leg_wear_monitor.cli.common import (
+    STDOUT,
+    bounded,
+    check_outputs,
     clearances_option,
+    compilation,
     json_option,
     mechanism_option,
+    options_named,
     out_option,
+    progress_bar,
     speed_option,
+    warn_of,
+    write_directory,
+    write_json,
 )
-from leg_wear_monitor.cli.output import STDOUT, check_outputs, write_directory, write_json
-from leg_wear_monitor.cli.waiting import compilation, progress_bar
-from leg_wear_monitor.json_text import json_text
+from leg_wear_monitor.files import json_text
 
 if TYPE_CHECKING:
     from leg_wear_monitor.life.result import Life
     from leg_wear_monitor.mechanism.arrays import Floats
-    from leg_wear_monitor.mechanism.materials.material import RatingLife
+    from leg_wear_monitor.mechanism.materials import RatingLife
     from leg_wear_monitor.mechanism.spec import Mechanism
 
     Lives = list[tuple[Floats, Life]]  # with the factors on their wear coefficients
@@ -114,7 +119,7 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
     text = json_text(_document(leg, lives, options["limit_m"]))
     written = write_json(json_file, text)
     if out is not None:
-        from leg_wear_monitor.report.figures.life_picture import life_picture
+        from leg_wear_monitor.report.figure import life_picture
 
         files = {"life.json": text.encode(), "life.png": life_picture(result)}
         written += write_directory(out, files)
@@ -139,12 +144,10 @@ def _lives(leg: "Mechanism", lives: int, opens_m: float | None, duty: str | None
     import numpy as np
 
     from leg_wear_monitor.contact.arrays import clearance_settings
-    from leg_wear_monitor.life.duty import Duty
-    from leg_wear_monitor.life.life import LifeSettings
-    from leg_wear_monitor.life.limits import check_life
-    from leg_wear_monitor.life.many_lives import simulate_lives
-    from leg_wear_monitor.mechanism.materials.of_joints import check_wear_is_known
-    from leg_wear_monitor.wear.cycle_jump import JumpControl
+    from leg_wear_monitor.life.life import LifeSettings, check_life, simulate_lives
+    from leg_wear_monitor.life.result import Duty
+    from leg_wear_monitor.mechanism.materials import check_wear_is_known
+    from leg_wear_monitor.wear import JumpControl
 
     given = {name: value for name in ("legs", "cycles") if (value := options.pop(name)) is not None}
     settings = LifeSettings(**given)
@@ -161,8 +164,8 @@ def _lives(leg: "Mechanism", lives: int, opens_m: float | None, duty: str | None
 
 def _document(leg: "Mechanism", lives: "Lives", limit_m: float) -> dict[str, Any]:
     """Lives, bound to the leg that they are of."""
-    from leg_wear_monitor.life.bushing_load import validity
-    from leg_wear_monitor.life.many_lives import lives_document
+    from leg_wear_monitor.life.life import lives_document
+    from leg_wear_monitor.life.result import validity
     from leg_wear_monitor.monitor.ledger.entry import fingerprint
 
     return {
@@ -175,7 +178,7 @@ def _document(leg: "Mechanism", lives: "Lives", limit_m: float) -> dict[str, Any
 
 def _validity(leg: "Mechanism", result: "Life") -> list[str]:
     """What the life holds for: the regime of each joint's wear."""
-    from leg_wear_monitor.mechanism.materials.of_joints import regimes
+    from leg_wear_monitor.mechanism.materials import regimes
 
     found = regimes(leg, result.clearance_joints).items()
     return [f"holds for {', '.join(joints)}: {what}" for what, joints in found]
@@ -183,16 +186,15 @@ def _validity(leg: "Mechanism", result: "Life") -> list[str]:
 
 def _not_counted(leg: "Mechanism") -> list[str]:
     """Joints whose pair gives no wear coefficient."""
-    from leg_wear_monitor.mechanism.materials.of_joints import lacks_wear
+    from leg_wear_monitor.mechanism.materials import lacks_wear
 
     return [joint for joint in leg.clearance_joints if lacks_wear(leg.clearances[joint])]
 
 
 def _loads(leg: "Mechanism", result: "Life") -> list[str]:
     """What p v of the new leg is beyond, the makers' own life of their bushings, and contacts too wide."""
-    from leg_wear_monitor.life.bushing_load import contact_doubts, pressure_speed, rating_hours
-    from leg_wear_monitor.mechanism.materials.load import bushing_of
-    from leg_wear_monitor.mechanism.materials.loader import load_material
+    from leg_wear_monitor.life.result import contact_doubts, pressure_speed, rating_hours
+    from leg_wear_monitor.mechanism.materials import bushing_of, load_material
 
     told = []
     for joint, load in pressure_speed(leg, result).items():

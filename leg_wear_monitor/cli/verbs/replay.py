@@ -1,33 +1,44 @@
-"""``leg-wear-monitor replay``: a recording through the same monitor that runs live."""
+"""``leg-wear-monitor replay`` and ``report``."""
 
+import json
 import time
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from leg_wear_monitor.cli.doubts import warn_of
-from leg_wear_monitor.cli.main import version
-from leg_wear_monitor.cli.options import config_option, json_option, out_option, sample_option
-from leg_wear_monitor.cli.output import (
+from leg_wear_monitor.cli.common import (
     PAGE,
     STDOUT,
     SUMMARY,
     check_outputs,
+    compilation,
+    config_option,
+    json_option,
+    out_option,
     page_of,
+    progress_bar,
+    sample_option,
+    warn_of,
     write_directory,
     write_json,
 )
-from leg_wear_monitor.cli.waiting import compilation, progress_bar
-from leg_wear_monitor.errors import LegWearError
-from leg_wear_monitor.interrupt import closed_at_the_end
-from leg_wear_monitor.monitor.evaluation.specs import INPUT_KINDS, KINDS
+from leg_wear_monitor.cli.main import version
+from leg_wear_monitor.errors import ConfigError, LegWearError, closed_at_the_end
+from leg_wear_monitor.monitor.alarm_specs import INPUT_KINDS, KINDS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from leg_wear_monitor.monitor.config.settings import MonitorConfig
     from leg_wear_monitor.playback.summary import ReplayResult
+
+
+# ``leg-wear-monitor replay``: a recording through the same monitor that runs live.
+
 
 WITH_FINDINGS = 1
 
@@ -114,7 +125,7 @@ def replay(
         missing = result.evidence.missing()
         click.echo(f"warning: no gait cycle fits this leg, so no forces are given: {missing}", err=True)
     if json_file != STDOUT:
-        from leg_wear_monitor.cli.replay_tables import print_replay
+        from leg_wear_monitor.cli.tables import print_replay
 
         print_replay(result, wall_s)
         for path in written:
@@ -139,7 +150,7 @@ def _run(
 ) -> tuple["ReplayResult", float]:
     """The result, and the time [s] it took once all was compiled."""
     try:
-        from leg_wear_monitor.dynamics.clearance.beforehand import advance_beside
+        from leg_wear_monitor.dynamics.clearance.stepper import advance_beside
         from leg_wear_monitor.playback.replay import replay as run
     except ModuleNotFoundError as error:
         raise LegWearError(f"{error.name} is not installed; pip install 'leg_wear_monitor[bags]'") from error
@@ -172,8 +183,8 @@ def _run(
 def _config(path: Path | None, crank_joint: str | None, node: str | None) -> "MonitorConfig":
     import attrs
 
-    from leg_wear_monitor.monitor.config.parameter_file import load_config
-    from leg_wear_monitor.monitor.config.plausible import acceleration_doubts
+    from leg_wear_monitor.monitor.config.fitting import acceleration_doubts
+    from leg_wear_monitor.monitor.config.parameters import load_config
 
     config = load_config(path, node)
     warn_of(str(path or "parameters"), acceleration_doubts(config))
@@ -189,7 +200,7 @@ def asks_to_act(result: "ReplayResult") -> bool:
 
 def is_raised(result: "ReplayResult", fail_on: tuple[str, ...]) -> bool:
     """Whether an alarm asked for was raised at any time."""
-    from leg_wear_monitor.monitor.alarms.alarm import Level
+    from leg_wear_monitor.monitor.alarms import Level
 
     worst = result.history.worst
     highest = max(worst.values(), default=Level.OK)
@@ -212,3 +223,58 @@ def _write(result: "ReplayResult", wall_s: float, out: Path | None, json_file: P
         files = {SUMMARY: text.encode(), PAGE: page_of(summary)}
         written = [out / REPORTS_FILE, *write_directory(out, files)]
     return written + write_json(json_file, text)
+
+
+# ``leg-wear-monitor report``: the page of a run again, from its data.
+
+
+_MISMADE = (
+    ArithmeticError, AttributeError, LookupError, MemoryError, OSError, RuntimeError, RuntimeWarning,
+    TypeError, ValueError,
+)  # fmt: skip
+
+
+@click.command(short_help="Write the HTML page of a run again, from its data.")
+@click.argument("directory", type=click.Path(path_type=Path), metavar="DIR")
+def report(directory: Path) -> int:
+    """Draw the page of a study or a replay again from the data in DIR; nothing is computed."""
+    if (directory / SUMMARY).is_file():
+        return _replay(directory)
+    if not (directory / "study.json").is_file():
+        raise ConfigError(
+            str(directory),
+            "",
+            "contains no study.json, expected the --out of a study or of a replay",
+        )
+    from leg_wear_monitor.cli.verbs.study import write_study_page
+
+    with _as_one_line(directory / "study.json", "study"):
+        return write_study_page(directory)
+
+
+def _replay(directory: Path) -> int:
+    from leg_wear_monitor.playback.result import summary_of
+
+    source = directory / SUMMARY
+    with _as_one_line(source, "replay"):
+        record = json.loads(source.read_text(encoding="utf-8"), parse_constant=_refuse)
+        page = page_of(summary_of(record, str(source)))
+    for path in write_directory(directory, {PAGE: page}):
+        click.echo(f"written: {path}")
+    return 0
+
+
+def _refuse(name: str) -> None:
+    raise ValueError(f"{name} is not JSON")
+
+
+@contextmanager
+def _as_one_line(source: Path, what: str) -> Iterator[None]:
+    """Data that a page cannot be made of is the file's fault: the run itself made one of what it wrote."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", RuntimeWarning)  # numpy would print it and go on
+            yield
+    except _MISMADE as error:
+        fault = f"is not what a {what} of this version writes ({type(error).__name__}: {error})"
+        raise ConfigError(str(source), "", fault) from error

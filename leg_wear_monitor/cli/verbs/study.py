@@ -1,16 +1,45 @@
-"""``leg-wear-monitor study``: the paper's parameter studies, each with a page of its own."""
+"""Verbs that compute and draw: ``simulate``, ``study``, ``draw``."""
 
+import math
+import time
+from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from leg_wear_monitor.cli.options import workers_option
-from leg_wear_monitor.cli.output import check_directory
-from leg_wear_monitor.cli.waiting import compilation, progress_bar
+from leg_wear_monitor.cli.common import (
+    STDOUT,
+    bounded,
+    check_directory,
+    check_file,
+    check_outputs,
+    clearances_option,
+    compilation,
+    json_option,
+    mechanism_option,
+    options_named,
+    out_option,
+    progress_bar,
+    speed_option,
+    warn_of,
+    workers_option,
+    write_directory,
+    write_file,
+    write_json,
+)
+from leg_wear_monitor.errors import ConfigError, LegWearError, printable
+from leg_wear_monitor.mechanism import NORMAL_LAWS
 
 if TYPE_CHECKING:
-    from leg_wear_monitor.studies.plan.study import Study
+    from leg_wear_monitor.dynamics.result import SimulationResult
+    from leg_wear_monitor.mechanism.spec import Mechanism
+    from leg_wear_monitor.report.drawing import Drawing
+    from leg_wear_monitor.studies.plan import Study
+
+
+# ``leg-wear-monitor study``: the paper's parameter studies, each with a page of its own.
+
 
 # spelled out, for --help shall not wait for numpy; the tests compare it with the library's
 NAMES = ("size", "speed", "location", "wear", "multi", "chaos", "laws", "lubrication", "load", "legs")
@@ -53,7 +82,7 @@ def study(
     """
     import attrs
 
-    from leg_wear_monitor.studies.plan.settings import load_settings
+    from leg_wear_monitor.studies.execution import load_settings
 
     settings = load_settings(name, config)
     if mechanism is not None:
@@ -69,10 +98,10 @@ def _compute(
 ) -> tuple[int, int]:
     import os
 
-    from leg_wear_monitor.dynamics.clearance.beforehand import motion_beside
+    from leg_wear_monitor.dynamics.clearance.stepper import motion_beside
     from leg_wear_monitor.dynamics.simulation import simulate
     from leg_wear_monitor.mechanism.loader import load_mechanism
-    from leg_wear_monitor.studies.execution.run import run_study
+    from leg_wear_monitor.studies.execution import run_study
 
     leg = load_mechanism(settings.mechanism)
     with compilation("clearance"), motion_beside():  # once, and not in every worker at the same time
@@ -92,8 +121,8 @@ def _compute(
 
 def write_study_page(path: Path) -> int:
     """Draw the page of a study from the data in its directory; 1 if something is missing there."""
-    from leg_wear_monitor.cli.output import write_directory
-    from leg_wear_monitor.json_text import json_text
+    from leg_wear_monitor.cli.common import write_directory
+    from leg_wear_monitor.files import json_text
     from leg_wear_monitor.report.page import page_html
     from leg_wear_monitor.report.study.page import study_page
     from leg_wear_monitor.studies.results import load_results
@@ -109,3 +138,291 @@ def write_study_page(path: Path) -> int:
     for label in results.missing:
         click.echo(f"warning: point {label}: is not computed yet", err=True)
     return FAULTS_FOUND if results.faults or results.missing else 0
+
+
+# ``leg-wear-monitor draw``: a picture of a mechanism, working or not.
+
+
+WITH_FINDINGS = 1
+
+_SUFFIXES = (".html", ".svg")
+_OURS = b"leg-wear-monitor draw"  # near the begin of what this verb writes
+_POLL_S = 0.2
+
+_Stamp = tuple[int, int, int]
+
+
+@click.command(short_help="Draw a mechanism, working or not.")
+@click.argument("mechanism", metavar="MECHANISM")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="A file .html or .svg.  [default: MECHANISM.html in this directory]",
+)
+@click.option("--forces", is_flag=True, help="Draw the forces in the joints, without clearance (.html).")
+@click.option(
+    "--crank-angle",
+    type=float,
+    callback=bounded("deg"),
+    metavar="DEG",
+    help="Position to draw, or to show first.  [default: 0, or the one that shows what is wrong]",
+)
+@click.option("--watch", is_flag=True, help="Draw again whenever the mechanism file is saved, until Ctrl-C.")
+def draw(mechanism: str, out: Path | None, forces: bool, crank_angle: float | None, watch: bool) -> int:
+    """Draw a mechanism file, or a mechanism that comes with the package.
+
+    The HTML page moves the mechanism through its cycle; it is one file and needs no network. Where the
+    mechanism does not close, its bodies are drawn apart at the open joint, with the distance; where its crank
+    does not turn through, the page shows the range and the bodies in line at its ends. The exit code is then
+    1. Replaces a drawing of an earlier run, and no other file.
+    """
+    target = Path(f"{Path(mechanism).stem}.html") if out is None else out
+    _check_target(target)
+    if forces and target.suffix.lower() == ".svg":
+        raise ConfigError("--forces", "", f"{target} is a still picture, expected an --out FILE.html")
+    if watch:
+        return _watch(mechanism, target, forces, crank_angle)
+    return _draw(mechanism, target, forces, crank_angle)
+
+
+def _check_target(path: Path) -> None:
+    """Make sure that a drawing can be written, and that it replaces none but a drawing."""
+    if path.suffix.lower() not in _SUFFIXES:
+        raise ConfigError("--out", str(path), f"expected a file that ends in {' or '.join(_SUFFIXES)}")
+    check_file("--out", path)
+    if path.is_file():
+        with path.open("rb") as file:
+            is_ours = _OURS in file.read(4096)
+        if not is_ours:
+            raise ConfigError(
+                "--out", str(path), "exists and is no drawing of this command, expected another --out FILE"
+            )
+
+
+def _draw(mechanism: str, target: Path, forces: bool, crank_angle: float | None, watch: bool = False) -> int:
+    """Draw once, and say what was drawn and what is wrong."""
+    from leg_wear_monitor.mechanism.loader import load_mechanism
+
+    leg = load_mechanism(mechanism)
+    angle = None if crank_angle is None else math.radians(crank_angle)
+    with compilation("mechanism", how_long="a few seconds"):
+        from leg_wear_monitor.report.drawing import drawing_of
+
+        drawing = drawing_of(leg, angle, forces)
+        content = _content(drawing, target, watch)
+    was_there = target.exists()
+    write_file(target, content)
+    how = "replaced" if was_there else "written"
+    click.echo(f"{how}: {target}: {printable(leg.name)}: {printable(drawing.headline)}")
+    for finding in drawing.findings:
+        click.echo(f"warning: {leg.source}: {printable(finding)}", err=True)
+    return WITH_FINDINGS if drawing.findings else 0
+
+
+def _content(drawing: "Drawing", target: Path, watch: bool) -> bytes:
+    if target.suffix.lower() == ".svg":
+        from leg_wear_monitor.report.drawing import drawing_svg
+
+        return drawing_svg(drawing)
+    from leg_wear_monitor.report.drawing import drawing_html
+
+    return drawing_html(drawing, is_watched=watch).encode()
+
+
+def _watch(mechanism: str, target: Path, forces: bool, crank_angle: float | None) -> int:
+    """Draw whenever the file has changed, until Ctrl-C; a fault in it is one line, until the next save."""
+    source = _source(mechanism)
+    drawn: _Stamp | None = None
+    try:
+        while True:
+            stamp = _stamp(source)
+            if stamp is not None and stamp != drawn:
+                drawn = stamp
+                try:
+                    _draw(mechanism, target, forces, crank_angle, watch=True)
+                except LegWearError as error:
+                    click.echo(f"error: {printable(str(error))}", err=True)
+            time.sleep(_POLL_S)
+    except KeyboardInterrupt:
+        _finish(mechanism, target, forces, crank_angle)
+        return 0
+
+
+def _finish(mechanism: str, target: Path, forces: bool, crank_angle: float | None) -> None:
+    """Write the page for the last time, without the script that loads it again."""
+    try:
+        _draw(mechanism, target, forces, crank_angle)
+    except LegWearError:
+        click.echo(f"kept: {target} is of an earlier state of the file", err=True)
+
+
+def _source(mechanism: str) -> Path:
+    """The file to watch.
+
+    Raises
+    ------
+    ConfigError
+        If there is none.
+    """
+    from leg_wear_monitor.mechanism.loader import is_file_name, shipped_mechanisms
+
+    source = Path(mechanism) if is_file_name(mechanism) else shipped_mechanisms().get(mechanism)
+    if source is None or not source.is_file():
+        raise ConfigError(mechanism, "", "there is no such file to watch")
+    return source
+
+
+def _stamp(source: Path) -> _Stamp | None:
+    """What changes when a file is saved; None while an editor replaces it."""
+    try:
+        stat = source.stat()
+    except OSError:
+        return None
+    return stat.st_mtime_ns, stat.st_size, stat.st_ino
+
+
+# ``leg-wear-monitor simulate``: the leg offline, ideal or with clearances.
+
+
+# Spelled out, for --help shall not wait for numba; the tests compare them with the library's.
+MODELS, DEFAULT_MODEL = ("clearance", "full"), "clearance"
+
+# a motion too short to take time, but through all of the code
+_WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
+
+
+@click.command(short_help="Simulate the leg offline, ideal or with clearances.")
+@mechanism_option
+@clearances_option("A,B|none")
+@click.option(
+    "--clearance-m",
+    type=float,
+    callback=bounded("m", above=0.0),
+    metavar="M",
+    help="Radial clearance in metres.  [default: the mechanism's own]",
+)
+@speed_option
+@click.option(
+    "--cycles",
+    type=float,
+    callback=bounded(above=0.0),
+    metavar="N",
+    help="Gait cycles to count.  [default: 5]",
+)
+@click.option(
+    "--duration",
+    type=float,
+    callback=bounded("s", above=0.0),
+    metavar="S",
+    help="Time to count, in seconds, instead of cycles.",
+)
+@click.option(
+    "--skip-cycles",
+    type=float,
+    callback=bounded(at_least=0.0),
+    metavar="N",
+    help="Gait cycles before counting.  [default: 1; 0 with --duration]",
+)
+@click.option(
+    "--model", type=click.Choice(MODELS), help=f"Formulation of the motion.  [default: {DEFAULT_MODEL}]"
+)
+@click.option(
+    "--wear",
+    type=click.Choice(("on", "off")),
+    default="off",
+    show_default=True,
+    help="Whether wear opens the clearances during the run; it is counted either way.",
+)
+@click.option(
+    "--normal-law",
+    type=click.Choice(NORMAL_LAWS),
+    metavar="NAME",
+    help=f"Normal contact law of all clearance joints: {', '.join(NORMAL_LAWS)}.",
+)
+@click.option(
+    "--trace",
+    type=click.IntRange(min=0),
+    metavar="N",
+    default=0,
+    help="Keep N samples per cycle, for --json and for the pictures of --out; from some hundred on, samples "
+    "take longer than the simulation.",
+)
+@click.option(
+    "--intervals",
+    type=int,
+    metavar="N",
+    help="Resolution of model clearance: intervals of time per gait cycle.  [default: 2048]",
+)
+@json_option("the result")
+@out_option("Write result.json and pictures of the leg and its worn bushings.")
+def simulate(mechanism: str, json_file: Path | None, out: Path | None, **options: Any) -> None:
+    """Simulate the motion of the leg, ideal or with clearances, and report forces and wear."""
+    if options["cycles"] is not None and options["duration"] is not None:
+        raise click.UsageError("--cycles and --duration cannot be combined")
+    from leg_wear_monitor.mechanism.loader import load_mechanism
+    from leg_wear_monitor.mechanism.plausible import doubts
+
+    leg = load_mechanism(mechanism)
+    check_outputs(json_file, out)
+    with options_named():
+        result, wall_s = _run(leg, _keywords(**options))
+    warn_of(leg.source, doubts(leg))  # what fails names them itself, in its one line
+    written = _write(leg, result, wall_s, json_file, out)
+    if json_file != STDOUT:
+        from leg_wear_monitor.cli.tables import print_result
+
+        print_result(result, wall_s)
+        for path in written:
+            click.echo(f"written: {path}")
+
+
+def _keywords(clearances: str | None, wear: str, duration: float | None, **options: Any) -> dict[str, Any]:
+    """Arguments of the library's simulate; what was not asked for is left to the library."""
+    keywords = {"wear": wear == "on", "duration_s": duration, **options}
+    if clearances is not None:
+        names = [] if clearances.strip() == "none" else clearances.split(",")
+        keywords["clearances"] = [name.strip() for name in names]
+    return {name: value for name, value in keywords.items() if value is not None}
+
+
+def _run(leg: "Mechanism", keywords: dict[str, Any]) -> tuple["SimulationResult", float]:
+    """The result, and the time [s] it took once all was compiled."""
+    from leg_wear_monitor.dynamics.clearance.stepper import motion_beside
+    from leg_wear_monitor.dynamics.simulation import default_model, simulate
+    from leg_wear_monitor.mechanism.spec import SpeedDrive
+
+    span = ("cycles", "duration_s", "skip_cycles", "trace")
+    short = {name: value for name, value in keywords.items() if name not in span}
+    if isinstance(leg.drive, SpeedDrive):
+        short |= {"cycles": _WARM_UP_CYCLES, "skip_cycles": 0.0}
+    else:
+        short["duration_s"] = _WARM_UP_S
+    clearance_joints = keywords.get("clearances", leg.clearance_joints)
+    model = keywords.get("model") or default_model(leg)
+    kernels = model if clearance_joints else "ideal"
+    with compilation(kernels), motion_beside() if kernels == "clearance" else nullcontext():
+        simulate(leg, **short)
+    with progress_bar("simulating") as progress:
+        began = time.perf_counter()
+        result = simulate(leg, **keywords, progress=progress)
+        return result, time.perf_counter() - began
+
+
+def _write(
+    leg: "Mechanism",
+    result: "SimulationResult",
+    wall_s: float,
+    json_file: Path | None,
+    out: Path | None,
+) -> list[Path]:
+    """Write what was asked for, and give the files."""
+    if json_file is None and out is None:
+        return []
+    written: list[Path] = []
+    text = result.to_json(wall_s)
+    if out is not None:
+        from leg_wear_monitor.report.leg_picture import pictures
+
+        written += write_directory(out, {**pictures(leg, result), "result.json": text.encode()})
+    return written + write_json(json_file, text)

@@ -1,33 +1,58 @@
 """Stepper of the leg in clearance coordinates: advance, observe, snapshot (physics.md section 7)."""
 
-from typing import NamedTuple
+import math
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
+from copy import copy
+from typing import Any, NamedTuple
 
+import attrs
 import numpy as np
 
+from leg_wear_monitor.compiled.kernel import compile_for
+from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.dynamics.clearance.advance import ADVANCE, advance_clearances, observe
-from leg_wear_monitor.dynamics.clearance.basis import is_damped
-from leg_wear_monitor.dynamics.clearance.contact import A0, E0, F_T, NX, NY, V0
-from leg_wear_monitor.dynamics.clearance.coupling import rigid_coupling
-from leg_wear_monitor.dynamics.clearance.film import FILM_X, FILM_Y
+from leg_wear_monitor.dynamics.clearance.basis import is_damped, motion_shapes, stored_shapes, views
+from leg_wear_monitor.dynamics.clearance.contact import (
+    A0,
+    E0,
+    F_T,
+    FILM_X,
+    FILM_Y,
+    NX,
+    NY,
+    V0,
+    contact_laws,
+    have_usual_laws,
+)
 from leg_wear_monitor.dynamics.clearance.film_system import film_model
-from leg_wear_monitor.dynamics.clearance.joint_laws import contact_laws, have_usual_laws
 from leg_wear_monitor.dynamics.clearance.model import (
     ANGLE,
     SPEED,
     ClearanceModel,
     ClearanceState,
+    ClearanceWork,
     clearance_state,
     clearance_work,
+    rigid_coupling,
     state_shapes,
 )
-from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, build_tables
-from leg_wear_monitor.dynamics.joint.contact_event import F_N
-from leg_wear_monitor.dynamics.run.protocol import Setup
-from leg_wear_monitor.dynamics.run.run_statistics import RunStatistics
+from leg_wear_monitor.dynamics.clearance.tables import COARSER, ClearanceTables, build_tables
+from leg_wear_monitor.dynamics.joint import F_N
+from leg_wear_monitor.dynamics.run import (
+    DONE,
+    RunStatistics,
+    Sample,
+    Setup,
+    new_run_statistics,
+    steady_drive,
+    stop,
+)
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.mechanism.arrays import Flags, Floats
-from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive, TorqueDrive
+from leg_wear_monitor.mechanism.arrays import Flags, Floats, Ints, Singles
+from leg_wear_monitor.mechanism.position import TURN, Linkage, build_linkage
+from leg_wear_monitor.mechanism.spec import ConstantLoad, Mechanism, SpeedDrive, TorqueDrive
+from leg_wear_monitor.workers import compiled_beside
 
 INTERVALS = 2048  # intervals per turn at the setup's speed
 TOLERANCE_M = 5.0e-9  # local error of a step in the eccentricities [m]; a smaller one does not change means
@@ -241,3 +266,246 @@ def _toe_deviations(toe: Floats, speed: float, e: Floats, v: Floats, a: Floats) 
     by, turning = toe[:, 1 : 1 + d], speed * toe[:, 1 + d :]
     # as in the run statistics, without the second derivative by the crank angle, whose part is 1e-3
     return np.stack([by @ e, by @ v + turning @ e, by @ a + 2.0 * (turning @ v)])
+
+
+# The clearance formulation as a `Run`.
+
+
+_ROUNDING = 1.0e-6  # tolerance for rounding of times at whole intervals, as a fraction of an interval
+
+
+class ClearanceRun:
+    """A leg in clearance coordinates with constant crank speed.
+
+    Parameters
+    ----------
+    setup : Setup
+    intervals : int
+        Number of intervals per turn, see `INTERVALS`.
+
+    Raises
+    ------
+    ConfigError
+        For a mechanism that is not driven by speed.
+    """
+
+    def __init__(self, setup: Setup, intervals: int = INTERVALS) -> None:
+        if not isinstance(setup.linkage.mechanism.drive, SpeedDrive):
+            raise needs_speed(setup.linkage.mechanism)
+        self.stepper = ClearanceStepper(setup, TURN / abs(setup.speed) / intervals)
+        self._setup = setup
+        self._polynomial = steady_drive(0.0, setup.speed)
+        self._ahead: tuple[ClearanceRun, RunStatistics] | None = None
+
+    @property
+    def time(self) -> float:
+        """Time reached [s]."""
+        return self.stepper.time
+
+    @property
+    def stored_energy(self) -> float:
+        """Kinetic plus potential energy of gravity, springs and contacts [J], to the order of e / L."""
+        state, tables = self.stepper.state, self.stepper.model.tables
+        angle, speed, _ = state.drive
+        u = angle / TURN % 1.0 * (len(tables.stored) - 1)
+        i = min(int(u), len(tables.stored) - 2)
+        row = tables.stored[i] + (u - i) * (tables.stored[i + 1] - tables.stored[i])
+        at, e, v = views(row, stored_shapes(len(state.approach))), state.e, state.v
+        moving = 0.5 * v @ at["a"] @ v + speed * v @ (at["b"] + at["b_e"] @ e)
+        moving += 0.5 * speed**2 * (at["c"][0] + at["c_e"] @ e + 0.5 * e @ at["c_ee"] @ e)
+        resting = at["potential"][0] - at["push"] @ e - 0.5 * e @ at["push_e"] @ e
+        return float(moving + resting) + self.stepper.observe().elastic_energy
+
+    def advance(self, t_end: float, statistics: RunStatistics) -> None:
+        """Advance to the last whole interval before a time [s] and add to run statistics.
+
+        Raises
+        ------
+        SimulationError
+            If the motion diverges; names the joint, the time and what to try.
+        """
+        status, k = self.stepper.advance(self._polynomial, t_end, statistics)
+        if status != DONE:
+            raise stop(self._setup, status, k, self.time)
+
+    def sample(self) -> Sample:
+        """The present state of the leg."""
+        moment, tables, contacts = self.stepper.observe(), self.stepper.model.tables, self._setup.contacts
+        force = np.zeros(len(self._setup.linkage.mechanism.joints))
+        force[contacts.joint] = self.stepper.last_force
+        np.add.at(force, tables.reaction_joint[1:], moment.reaction[1:] ** 2)
+        ideal = tables.reaction_joint[1::2]
+        force[ideal] = np.sqrt(force[ideal])
+        toe = moment.toe if self._setup.linkage.mechanism.toe else None
+        return Sample(self.stepper.crank_angle, toe, moment.torque, force)
+
+    def branch(self) -> "ClearanceRun":
+        """An independent copy of the run in its present state."""
+        surfaces = self._setup.surfaces._replace(depth=self.stepper.state.depth.copy())
+        run, model = copy(self), self.stepper.model
+        run._ahead = None
+        run._setup = attrs.evolve(self._setup, surfaces=surfaces)
+        run.stepper = ClearanceStepper(run._setup, model.interval, tables=model.tables)
+        run.stepper.restore(self.stepper.snapshot())
+        return run
+
+    def sample_at(self, t: float) -> Sample:
+        """The leg at a time [s] less than one interval ahead, reached by one shorter interval."""
+        stepper, rest = self.stepper, t - self.time
+        if rest <= _ROUNDING * stepper.model.interval:
+            return self.sample()
+        if self._ahead is None:  # kept for the next sample: to build a stepper takes longer than the interval
+            joints = len(self._setup.linkage.mechanism.joints)
+            self._ahead = self.branch(), new_run_statistics(joints)
+        ahead, statistics = self._ahead
+        ahead.stepper.restore(stepper.snapshot())
+        ahead.stepper.model = stepper.model._replace(interval=rest)
+        ahead.stepper.state.intervals[0] = 0.0
+        angle, speed, _ = stepper.state.drive
+        ahead._polynomial = steady_drive(angle, speed)
+        ahead.advance(rest, statistics)
+        return ahead.sample()
+
+
+# Compilation of the motion before any leg is there: types of arguments do not depend on the mechanism.
+
+
+def _contacts() -> ContactArrays:
+    """Settings of one clearance joint, all 0."""
+    whole, line, pair = np.zeros(1, np.int64), np.zeros(1), np.zeros((1, 2))
+    return ContactArrays(
+        joint=whole, bushing_radius=line, clearance=line, width=line, modulus=line, normal_form=whole,
+        stiffness=line, hysteresis=line, speed_floor=line, friction_law=whole, friction=np.zeros((1, 3)),
+        wear_coefficient=pair,
+    )  # fmt: skip
+
+
+def _tables() -> ClearanceTables:
+    """Tables of one clearance joint, all 0 and as small as can be."""
+    width = sum(math.prod(shape) for shape in motion_shapes(1, damped=False).values())
+    return ClearanceTables(
+        motion=np.zeros((1, width)),
+        reaction=np.zeros((1, 1, 1)),
+        reaction_joint=np.zeros(1, np.int64),
+        stored=np.zeros((1, 1)),
+        parts=np.zeros(1, np.int64),
+        by_e=np.zeros((1, 1, 1, 1), np.float32),
+        bend=np.zeros((1, 1, 1, 1), np.float32),
+        spin=np.zeros((1, 1, 1, 1), np.float32),
+        spin_reaction=np.zeros((1, 1, 1), np.float32),
+    )
+
+
+def _leg() -> tuple[ClearanceModel, ClearanceState, ClearanceWork]:
+    """A leg that has the types of all legs, and nothing else."""
+    contacts, line = _contacts(), np.zeros(2)
+    film = film_model(contacts, np.zeros((1, 2)))
+    model = ClearanceModel(
+        contacts,
+        _tables(),
+        1.0,
+        tolerance=line,
+        law=contact_laws(contacts),
+        usual=1,
+        film=film,
+        damped=0,
+        coupling=rigid_coupling(),
+    )
+    state = clearance_state(np.zeros((1, 2, 1)), 0.0, 1.0)
+    return model, state, clearance_work(model, state)
+
+
+def advance_arguments() -> tuple[Any, ...]:
+    """Arguments of the types that `advance_clearances` is called with."""
+    model, state, work = _leg()
+    return model, 0, state, np.zeros(7), 0.0, new_run_statistics(1), work
+
+
+def observe_arguments() -> tuple[Any, ...]:
+    """Arguments of the types that `observe` is called with."""
+    model, state, work = _leg()
+    return model, 0, state, work
+
+
+def compile_advance() -> None:
+    """Compile `advance_clearances`, or load it."""
+    compile_for(advance_clearances, *advance_arguments())
+
+
+def advance_beside() -> AbstractContextManager[None]:
+    """Have a second process compile `advance_clearances` while the work inside compiles all else."""
+    return compiled_beside(compile_advance, advance_clearances)
+
+
+@contextmanager
+def motion_beside() -> Iterator[None]:
+    """Have two processes compile the motion: `advance_clearances` the second, `observe` this one."""
+    with advance_beside():
+        compile_for(observe, *observe_arguments())
+        yield
+
+
+# A force on the toe, at each point of the leg's tables (physics.md section 9).
+#
+# The tables are linear in the force, point by point.
+
+
+_TRIAL_N = 100.0
+
+
+class LoadedTable(NamedTuple):
+    """A table that the force changes: its rows (n, w), columns (c,), parts (3, n, c): bare, per x, per y."""
+
+    rows: Floats | Singles
+    columns: Ints
+    parts: Floats
+
+
+class LoadedTables(NamedTuple):
+    """Those of `ClearanceTables`."""
+
+    motion: LoadedTable
+    reaction: LoadedTable
+    stored: LoadedTable
+    by_e: LoadedTable
+
+
+def loaded_tables(linkage: Linkage, contacts: ContactArrays, tables: ClearanceTables) -> LoadedTables:
+    """What a force on the toe changes.
+
+    Parameters
+    ----------
+    linkage : Linkage
+        One without a toe has nothing to push.
+    contacts : ContactArrays
+    tables : ClearanceTables
+        Of this linkage; `put_force` changes them.
+    """
+    mechanism = linkage.mechanism
+    others = []
+    for push in ((_TRIAL_N, 0.0), (0.0, _TRIAL_N)):
+        if mechanism.toe is None:
+            break
+        trial = ConstantLoad(body=mechanism.toe[0], point=mechanism.toe[1], force=push)
+        pushed = attrs.evolve(mechanism, loads={**mechanism.loads, "trial of a toe force": trial})
+        others.append(build_tables(build_linkage(pushed), contacts))
+    return LoadedTables(*(_loaded(name, tables, others) for name in LoadedTables._fields))
+
+
+def put_force(loaded: LoadedTables, force: Floats) -> None:
+    """Set the tables to a force (N, 2) [N] along the axes of the mechanism, at their points of a turn."""
+    fine = np.concatenate([force, force[:1]])
+    for table, step in zip(loaded, (1, 1, 1, COARSER), strict=True):
+        fx, fy = fine[::step].T[:, :, None]
+        table.rows[:, table.columns] = table.parts[0] + fx * table.parts[1] + fy * table.parts[2]
+
+
+def _loaded(name: str, tables: ClearanceTables, others: list[ClearanceTables]) -> LoadedTable:
+    table = getattr(tables, name)
+    rows = table.reshape(len(table), -1)  # a view
+    if not others:
+        return LoadedTable(rows, np.zeros(0, np.int64), np.zeros((3, len(rows), 0)))
+    slopes = [(getattr(other, name).reshape(rows.shape).astype(float) - rows) / _TRIAL_N for other in others]
+    columns = np.flatnonzero(np.any(slopes, axis=(0, 1)))
+    parts = np.stack([rows.astype(float), *slopes])[:, :, columns]
+    return LoadedTable(rows, columns.astype(np.int64), np.ascontiguousarray(parts))

@@ -19,14 +19,19 @@ from typing import NamedTuple
 
 import numpy as np
 
+from leg_wear_monitor.compiled.vectors import WIDTH, padded
 from leg_wear_monitor.contact.arrays import ContactArrays
-from leg_wear_monitor.dynamics.clearance.basis import Basis, derivative, project
-from leg_wear_monitor.dynamics.clearance.layout import changing_shapes, motion_shapes, views
+from leg_wear_monitor.dynamics.clearance.basis import (
+    Basis,
+    changing_shapes,
+    derivative,
+    motion_shapes,
+    project,
+    views,
+)
 from leg_wear_monitor.mechanism.arrays import Floats, Ints, Singles, body_names, point_from_com
 from leg_wear_monitor.mechanism.constraints import DRIVE
-from leg_wear_monitor.mechanism.ideal import TURN, IdealMotion, one_cycle, rotated
-from leg_wear_monitor.mechanism.position import Linkage
-from leg_wear_monitor.vectors import WIDTH, padded
+from leg_wear_monitor.mechanism.position import TURN, IdealMotion, Linkage, one_cycle, rotated
 
 POINTS = 1024  # table points per turn, with linear interpolation
 COARSER = 2  # ratio of the step of the tables of first order in e to that of the others

@@ -5,10 +5,10 @@ from typing import Any
 
 import attrs
 
-from leg_wear_monitor.configuration.quantity import FieldError, choice, described, quantity
-from leg_wear_monitor.twin.sample import ENCODERS
-from leg_wear_monitor.twin.settings import (
+from leg_wear_monitor.configuration import FieldError, choice, described, quantity
+from leg_wear_monitor.twin.sample import (
     AVERAGE,
+    ENCODERS,
     FOOT_FRAME,
     GROUND_FRAME,
     LOAD_FRAMES,

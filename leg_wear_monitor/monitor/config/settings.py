@@ -6,9 +6,7 @@ from these classes. A section is a class, so `limits.clearance_m` is the paramet
 
 import attrs
 
-from leg_wear_monitor.configuration.quantity import described, quantity
-from leg_wear_monitor.monitor.config.drive import DriveParameters
-from leg_wear_monitor.monitor.config.forecast import Forecasting
+from leg_wear_monitor.configuration import described, quantity
 from leg_wear_monitor.monitor.config.inputs import (
     LIVE,
     Cadence,
@@ -19,6 +17,7 @@ from leg_wear_monitor.monitor.config.inputs import (
     Load,
     Tracker,
 )
+from leg_wear_monitor.monitor.config.sections import DriveParameters, Forecasting
 from leg_wear_monitor.monitor.config.tables import TableInput
 
 

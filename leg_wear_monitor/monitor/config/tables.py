@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 
 import attrs
 
-from leg_wear_monitor.configuration.quantity import FieldError, choice, described, quantity
+from leg_wear_monitor.configuration import FieldError, choice, described, quantity
 
 DATE = "date"
 STAMPS: Mapping[str, int] = {"s": 9, "ms": 6, "us": 3, "ns": 0}

@@ -11,29 +11,129 @@ from typing import NamedTuple
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate.cause import Cause
-from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
-from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
-from leg_wear_monitor.estimate.drive_compliance import compliance_of
-from leg_wear_monitor.estimate.signature import DIRECT
+from leg_wear_monitor.estimate.cause import Cause, Change
+from leg_wear_monitor.estimate.channel import compliance_of
+from leg_wear_monitor.estimate.leg_model import ClearanceFit
+from leg_wear_monitor.estimate.signature import DIRECT, CommissionedTorque, TorqueSensor, signatures
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.config.drive import drive_figures
+from leg_wear_monitor.monitor.config.sections import drive_figures
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.diagnosis.corrections import Correction, correction_of, settle
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState, NotUsed
-from leg_wear_monitor.monitor.diagnosis.evidence import Evidence
-from leg_wear_monitor.monitor.diagnosis.leg_models import COMMISSIONING_CYCLES, LegModels
-from leg_wear_monitor.monitor.diagnosis.reasons import doubt, missing, next_step
-from leg_wear_monitor.monitor.diagnosis.references import LOAD_ROUNDS, References
-from leg_wear_monitor.monitor.diagnosis.signed_cycle import find_sensor, signed_cycle
-from leg_wear_monitor.monitor.diagnosis.state import UNUSED_CYCLES, WINDOW_CYCLES, TorqueState
-from leg_wear_monitor.monitor.diagnosis.torque_samples import NO_TORQUE_SAMPLES
-from leg_wear_monitor.monitor.kept_samples import KeepsSamples
-from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
-from leg_wear_monitor.twin.reference.torque_reference import TorqueReference, TorqueReferenceSnapshot
-from leg_wear_monitor.twin.settings import GROUND, MEASURED
+from leg_wear_monitor.monitor.diagnosis.evidence import SETTLING_CYCLES, Evidence, doubt, missing, next_step
+from leg_wear_monitor.monitor.diagnosis.references import (
+    COMMISSIONING_CYCLES,
+    LOAD_ROUNDS,
+    LegModels,
+    References,
+)
+from leg_wear_monitor.monitor.diagnosis.state import (
+    NO_TORQUE_SAMPLES,
+    UNUSED_CYCLES,
+    WINDOW_CYCLES,
+    Diagnosis,
+    DiagnosisState,
+    NotUsed,
+    SignedCycle,
+    TorqueState,
+    cycle_torque,
+    sensor_period_s,
+)
+from leg_wear_monitor.twin.reference import LegParameters
+from leg_wear_monitor.twin.sample import GROUND, INSTANT, MEASURED, KeepsSamples
 from leg_wear_monitor.twin.statistics import CycleStatistics
+from leg_wear_monitor.twin.torque_reference import TorqueReference, TorqueReferenceSnapshot
+
+# Counted clearances that are surely wrong, and what becomes of the evidence when they are corrected.
+
+
+# of the counted clearance: smaller openings are named wrongly where masses are 5 % off (diagnosis.md)
+CORRECTED_FROM = 1.3
+
+
+class Correction(NamedTuple):
+    """A counted clearance that is surely wrong: joint index, its clearance [m], and the change behind it."""
+
+    joint: int
+    clearance_m: float
+    change: Change
+
+
+def correction_of(state: TorqueState, joints: Sequence[str]) -> Correction | None:
+    """A settled change of one clearance, seen at the present cadence."""
+    if not state.changes or state.fit_cycles < SETTLING_CYCLES or not state.is_compared:
+        return None
+    change = state.changes[-1]
+    if sum(cycle.begin_ns >= change.since_ns for cycle in state.cycles) < SETTLING_CYCLES:
+        return None
+    is_wide = change.value >= CORRECTED_FROM * change.counted
+    if change.subject not in joints or not change.is_sure or not is_wide:
+        return None
+    return Correction(joints.index(change.subject), change.value, change)
+
+
+def settle(state: TorqueState, correction: Correction, counted_m: Floats) -> None:
+    """Make the gait cycles since a change those of the commissioned leg, with clearances (k,) [m].
+
+    What the correction is off does then not look like a further change; it stays in the standard deviation.
+    """
+    joint, _, change = correction
+    state.cycles = tuple(cycle for cycle in state.cycles if cycle.begin_ns >= change.since_ns)
+    signatures, before = state.signatures, state.commissioned
+    sigma_m = before.sigma_m.copy() if before else np.zeros(len(counted_m))
+    sigma_m[joint] = change.sigma
+    state.forget_baselines()
+    state.commissioned = CommissionedTorque(
+        state.cycles[-1].end_ns,
+        counted_m,
+        signatures,
+        sigma_m,
+        before.channel if before else DIRECT,
+        state.profile.speed,
+    )
+    state.settled = (*state.settled, attrs.evolve(change, is_corrected=True))
+
+
+# Gait cycles with the signature of their torque, from the samples that an observer keeps.
+
+
+# of the sensor's period: steps between samples at times that are more irregular say nothing of its roughness
+_JITTER = 0.15
+
+
+def find_sensor(
+    state: TorqueState, begin_ns: int, end_ns: int, config: MonitorConfig, size_nm: float
+) -> None:
+    """Find the sensor's period in the first gait cycle with torques."""
+    if state.sensor is not None:
+        return
+    period_s = sensor_period_s(state.samples, begin_ns, end_ns)
+    if math.isnan(period_s):
+        return
+    # as commanded: a reference, and all of its signatures, are for one cadence
+    cycle_s = 60.0 / abs(config.cadence.commanded_rpm)
+    is_instant = config.drive_torque.sampling == INSTANT
+    state.sensor = TorqueSensor(float(f"{period_s:.2g}"), cycle_s, size_nm, is_instant)
+    # those of a sensor with another rate do not count: the leg is commissioned anew
+    size = 2 * state.sensor.phases
+    state.baselines = tuple(one for one in state.baselines if one.signatures.shape[1] == size)
+
+
+def signed_cycle(state: TorqueState, begin_ns: int, end_ns: int) -> SignedCycle | NotUsed:
+    """A gait cycle between two stamps, or why it has no signature."""
+    sensor = state.sensor
+    if sensor is None or not sensor.phases:
+        return NotUsed.GAP
+    torque = cycle_torque(state.samples, begin_ns, end_ns, sensor)
+    if torque is None:
+        return NotUsed.GAP
+    if torque.jitter > _JITTER:
+        return NotUsed.JITTER
+    first = np.zeros(len(torque.angle), np.int64)
+    signature = signatures(first, torque.angle, torque.torque, torque.step, sensor)[0]
+    if not np.isfinite(signature).all():
+        return NotUsed.GAP
+    return SignedCycle(begin_ns, end_ns, signature, torque.profile, torque.late)
+
 
 _ESTIMATED_M, _ESTIMATED = 1.0e-4, 0.2  # largest standard deviation of an observable clearance; of it
 

@@ -9,15 +9,14 @@ from typing import IO, Any
 import numpy as np
 
 from leg_wear_monitor.errors import ConfigError, LegWearError, printable
-from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.files import share_directory
+from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.ledger.entry import fingerprint
-from leg_wear_monitor.share import share_directory
-from leg_wear_monitor.twin.reference.crank_profile import HARMONICS, CrankProfile
-from leg_wear_monitor.twin.reference.leg_parameters import COUPLING_DAMPING, LegParameters
-from leg_wear_monitor.twin.reference.leg_simulation import POINTS
-from leg_wear_monitor.twin.reference.torque_reference import TorqueReference, TorqueReferenceRun
-from leg_wear_monitor.wear.surfaces import SECTORS
+from leg_wear_monitor.twin.leg_simulation import POINTS
+from leg_wear_monitor.twin.reference import COUPLING_DAMPING, HARMONICS, CrankProfile, LegParameters
+from leg_wear_monitor.twin.torque_reference import TorqueReference, TorqueReferenceRun
+from leg_wear_monitor.wear import SECTORS
 
 FORMAT = 2  # 1, without a number, had one reference of a leg as its file is
 

@@ -1,23 +1,201 @@
 """State of the torque observer; every value is immutable, so a shallow copy is a snapshot."""
 
 import math
+from collections.abc import Mapping
+from enum import Enum
 from typing import NamedTuple
 
 import attrs
 import numpy as np
 
 from leg_wear_monitor.estimate.cause import Change
-from leg_wear_monitor.estimate.change_detector import DetectorState
-from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
-from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
 from leg_wear_monitor.estimate.ground_load import GroundLoad
-from leg_wear_monitor.estimate.signature import TorqueSensor
-from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.monitor.diagnosis.diagnosis import NotUsed
-from leg_wear_monitor.monitor.diagnosis.torque_samples import NO_TORQUE_SAMPLES, TorqueSamples
-from leg_wear_monitor.twin.reference.crank_profile import CrankProfile, mean_profile
-from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
-from leg_wear_monitor.twin.reference.torque_reference import CADENCES, TorqueReference
+from leg_wear_monitor.estimate.leg_model import ClearanceFit, DetectorState
+from leg_wear_monitor.estimate.signature import DIRECT, Channel, CommissionedTorque, TorqueSensor, averaged
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
+from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.twin import TORQUE
+from leg_wear_monitor.twin.reference import CrankProfile, LegParameters, cycle_profile, mean_profile
+from leg_wear_monitor.twin.sample import Samples, brings, indices_within, is_valid, newest, of_crank
+from leg_wear_monitor.twin.torque_reference import CADENCES, TorqueReference
+
+# Samples of the crank and of the drive torque, kept until their gait cycle ends.
+
+
+_LOST = 1.5  # periods of the sensor: in a longer time between two samples, some were lost
+_LEAST_CRANK_SAMPLES = 40  # in a gait cycle, for its profile
+
+
+@attrs.frozen(eq=False)
+class TorqueSamples:
+    """Stamps [ns] and crank angles [rad], stamps [ns] and drive torques [N m], in the order of arrival."""
+
+    crank_ns: Ints
+    crank_rad: Floats
+    torque_ns: Ints
+    torque_nm: Floats
+
+    def extended(self, piece: Samples) -> "TorqueSamples":
+        """With the valid ones of a piece."""
+        crank = of_crank(piece)
+        torque = piece[is_valid(piece) & brings(piece, TORQUE) & np.isfinite(piece["torque_nm"])]
+        return TorqueSamples(
+            np.concatenate([self.crank_ns, crank["stamp_ns"]]),
+            np.concatenate([self.crank_rad, crank["crank_angle_rad"]]),
+            np.concatenate([self.torque_ns, torque["stamp_ns"]]),
+            np.concatenate([self.torque_nm, torque["torque_nm"]]),
+        )
+
+    def after(self, stamp_ns: int) -> "TorqueSamples":
+        """Those from a stamp on."""
+        crank, torque = newest(self.crank_ns, stamp_ns), newest(self.torque_ns, stamp_ns)
+        return TorqueSamples(
+            self.crank_ns[crank], self.crank_rad[crank], self.torque_ns[torque], self.torque_nm[torque]
+        )
+
+
+NO_TORQUE_SAMPLES = TorqueSamples(np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64), np.zeros(0))
+
+
+class CycleTorque(NamedTuple):
+    """Drive torque over a gait cycle.
+
+    ``angle`` (n,) crank angle [rad], ``torque`` (n,) [N m], ``step`` (n,) torque less that of the sample
+    before [N m], NaN where that was lost; ``profile`` how the crank turned; ``period_s`` of the sensor;
+    ``late`` from the begin to the first sample, in periods of the sensor; ``jitter`` median departure of the
+    times between samples from that period, as a fraction of it.
+    """
+
+    angle: Floats
+    torque: Floats
+    step: Floats
+    profile: CrankProfile
+    period_s: float
+    late: float
+    jitter: float
+
+
+def sensor_period_s(kept: TorqueSamples, begin_ns: int, end_ns: int) -> float:
+    """Median time between the torque samples of a gait cycle; NaN where there are fewer than three."""
+    stamps, _ = _between(kept.torque_ns, kept.torque_nm, begin_ns, end_ns)
+    return float(np.median(np.diff(stamps))) * 1.0e-9 if len(stamps) > 2 else float("nan")
+
+
+def cycle_torque(kept: TorqueSamples, begin_ns: int, end_ns: int, sensor: TorqueSensor) -> CycleTorque | None:
+    """Drive torque between two passages of the crank's zero; None where samples are too few.
+
+    Samples that come faster than signatures need are averaged.
+    """
+    crank_ns, crank = _between(kept.crank_ns, kept.crank_rad, begin_ns, end_ns)
+    torque_ns, torque = _between(kept.torque_ns, kept.torque_nm, begin_ns, end_ns)
+    if len(crank_ns) < _LEAST_CRANK_SAMPLES or len(torque_ns) < 2 * sensor.together:
+        return None
+    turned: Floats = np.asarray(np.unwrap(crank, period=TURN), dtype=np.float64)
+    since_s = np.asarray(1.0e-9 * (crank_ns - begin_ns), dtype=np.float64)
+    profile = cycle_profile(since_s, turned, 1.0e-9 * (end_ns - begin_ns))
+    gap = np.diff(torque_ns, prepend=torque_ns[0]) > _LOST * 1.0e9 * sensor.period_s
+    angle = np.interp(torque_ns, crank_ns, turned)
+    if sensor.together > 1:
+        angle = angle[sensor.together - 1 :: sensor.together]
+        torque = averaged(torque, sensor.together)
+        gap = averaged(gap.astype(float), sensor.together) > 0.0
+        angle = angle[: len(torque)]
+    step = np.diff(torque, prepend=np.nan)
+    step[gap] = np.nan
+    late = 1.0e-9 * float(torque_ns[0] - begin_ns) / sensor.period_s
+    period_ns = 1.0e9 * sensor.period_s
+    jitter = float(np.median(np.abs(np.diff(torque_ns) - period_ns))) / period_ns
+    return CycleTorque(angle, torque, step, profile, sensor.period_s, late, jitter)
+
+
+def _between(stamps: Ints, values: Floats, begin_ns: int, end_ns: int) -> tuple[Ints, Floats]:
+    """Stamps and values of a time, in order."""
+    which = indices_within(stamps, begin_ns, end_ns)
+    return stamps[which], values[which]
+
+
+# What the measured drive torque shows of the clearances, compared with those that the monitor counts.
+
+
+class DiagnosisState(Enum):
+    """What the diagnosis can report; the value is the word that files contain."""
+
+    OFF = "off"
+    WAITING = "waiting"
+    AS_COUNTED = "as_counted"
+    CHANGED = "changed"
+
+
+class NotUsed(Enum):
+    """Why a gait cycle says nothing of the clearances; the value is the word that files contain."""
+
+    CADENCE = "cadence"
+    STANDSTILL = "standstill"
+    GAP = "gap"
+    JITTER = "jitter"
+    TORQUE_CAUSE = "torque_cause"
+    UNLIKE = "unlike"
+
+
+@attrs.frozen
+class Body:
+    """Identified mass and length of a body, as factors on those of the mechanism file."""
+
+    name: str
+    mass: float
+    length: float
+
+
+@attrs.frozen(kw_only=True)
+class Diagnosis:
+    """Clearances estimated from the drive torque, and what has changed.
+
+    Attributes
+    ----------
+    state : DiagnosisState
+    reason : str
+        Why there is no estimate yet, or why it is not to be believed now; empty otherwise.
+    next_step : str
+        What is known next, and after how many gait cycles; empty where walking adds nothing.
+    cycles : int
+        Gait cycles in the estimate.
+    cycles_not_used : mapping of str to int
+        Gait cycles of this run that were not used, by reason: another cadence; a stop and a start in it; a
+        bridged gap, or too few torque samples; irregular stamps; a torque that is wrong as received; a crank
+        that turns otherwise.
+    clearance_m, sigma_m : tuple of float
+        Estimated clearance of each clearance joint and its standard deviation; NaN where it is not
+        observable.
+    changes : tuple of Change
+        Significant departures, the oldest first: those by which counted clearances were corrected, and, where
+        the state is CHANGED, the one that is not settled yet.
+    channel : Channel
+        Delay, low-pass and load friction of the drive by the commissioned gait cycles; of a drive that adds
+        nothing before.
+    bodies : tuple of Body
+        Identified masses and lengths that the wear is counted with; empty while it is counted as in the file.
+    friction : float
+        Factor on the friction in the joints that the wear is counted with.
+    load : GroundLoad or None
+        Force of the ground by the commissioned gait cycles, if the foot surely carries one.
+    compliance : float
+        Between the measured crank angle and the crank [rad/(N m)], that the wear is counted with; 0 if rigid.
+    """
+
+    state: DiagnosisState = DiagnosisState.OFF
+    reason: str = ""
+    next_step: str = ""
+    cycles: int = 0
+    cycles_not_used: Mapping[str, int] = attrs.field(factory=dict)
+    clearance_m: tuple[float, ...] = ()
+    sigma_m: tuple[float, ...] = ()
+    changes: tuple[Change, ...] = ()
+    channel: Channel = DIRECT
+    bodies: tuple[Body, ...] = ()
+    friction: float = 1.0
+    load: GroundLoad | None = None
+    compliance: float = 0.0
+
 
 WINDOW_CYCLES = 60  # that are kept at a cadence, and that clearances are estimated from
 UNUSED_CYCLES = 20  # in a row, after which a result is not one of the leg as it walks now

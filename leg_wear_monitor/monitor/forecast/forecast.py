@@ -5,18 +5,220 @@ own scatter and the load to come. In each of them all joints grow together by th
 has reached its limit (`growth_law.py`).
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from enum import Enum
+from functools import cache
+from statistics import NormalDist
 
 import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.monitor.config.forecast import Forecasting
-from leg_wear_monitor.monitor.forecast.coefficient_prior import CoefficientPrior
-from leg_wear_monitor.monitor.forecast.even_draws import MEMBERS, even_fractions, even_normals
-from leg_wear_monitor.monitor.forecast.growth_law import GrowthLaw, cycles_to
-from leg_wear_monitor.monitor.forecast.wear_coefficients import CoefficientEstimate, MeasuredClearance
+from leg_wear_monitor.monitor.config.sections import Forecasting
+from leg_wear_monitor.monitor.forecast.wear_coefficients import (
+    CoefficientEstimate,
+    CoefficientPrior,
+    MeasuredClearance,
+)
+
+# Draws of an ensemble: fixed, the same at every call, and spread evenly instead of at random.
+
+
+MEMBERS = 1021
+_MULTIPLIER = 333
+_TURN = 631  # shifts each dimension by another amount, so that no member lies in a corner of all of them
+
+
+@cache
+def even_fractions(dimensions: int) -> Floats:
+    """Numbers in (0, 1), shape (dimensions, MEMBERS): a lattice of Korobov's.
+
+    Each dimension has the same evenly spaced numbers, in another order. By this multiplier every two of 17
+    dimensions, which five joints need, are filled like a good lattice of two: lines that hold all members
+    are at most 1/15 apart, where 1/34 is the least that could be; of 32 dimensions 1/6 (see the test).
+    """
+    member = np.arange(MEMBERS)
+    rows = [(member * pow(_MULTIPLIER, axis, MEMBERS) + axis * _TURN) % MEMBERS for axis in range(dimensions)]
+    fractions = (np.array(rows) + 0.5) / MEMBERS
+    fractions.flags.writeable = False
+    return fractions
+
+
+@cache
+def even_normals(dimensions: int) -> Floats:
+    """The same as standard normal numbers."""
+    inverse = np.array([NormalDist().inv_cdf((i + 0.5) / MEMBERS) for i in range(MEMBERS)])
+    normals = inverse[np.floor(even_fractions(dimensions) * MEMBERS).astype(int)]
+    normals.flags.writeable = False
+    return np.asarray(normals)
+
+
+# How the growth of each joint's clearance depends on all joints' clearances, fitted to simulated lives.
+#
+#     ln(growth_k / x_k) = a_k + sum over j of B_kj ln(c_j / c_j0)
+#
+# with x_k the factor on joint k's wear coefficient, c_j the mean clearances and c_j0 those when new: a power
+# law. What the lives are off a law that does not know them is its sigma.
+
+
+PRIOR_SIGMA = 1.0  # of B beforehand: growth may double or halve where a clearance doubles
+_SCATTER = 0.1  # of ln growth, by which the prior is weighed against the lives
+LEAST_LIVES = 4  # with coefficients that differ, for the law to be judged
+_STEPS = 12  # from new to the limit
+
+
+@attrs.frozen(eq=False)
+class SimulatedLife:
+    """A life as the law needs it; p points, k joints.
+
+    Attributes
+    ----------
+    factor : (k,) array
+        On the joints' wear coefficients.
+    cycles : (p,) array
+    clearance_m, growth_m_per_cycle : (p, k) arrays
+    """
+
+    factor: Floats
+    cycles: Floats
+    clearance_m: Floats
+    growth_m_per_cycle: Floats
+
+
+@attrs.frozen(eq=False)
+class GrowthLaw:
+    """Growth over all clearances, relative to that of the same leg at others.
+
+    Attributes
+    ----------
+    coupling : (k, k) array
+        B: of ln growth of the row's joint over ln clearance of the column's.
+    fresh_m, widest_m : (k,) arrays
+        Clearances when new, and the largest that lives have seen: beyond both, growth stays as it is there.
+    sigma : (k,) array
+        Standard deviation of what ln growth is off.
+    lives : int
+        It was fitted to.
+    """
+
+    coupling: Floats
+    fresh_m: Floats
+    widest_m: Floats
+    sigma: Floats
+    lives: int = 0
+
+    def log_growth(self, clearance_m: Floats) -> Floats:
+        """Logarithm of growth (k, n) at clearances (k, n), but for a_k."""
+        in_range = np.clip(clearance_m, self.fresh_m[:, None], self.widest_m[:, None])
+        return np.asarray(self.coupling @ np.log(in_range / self.fresh_m[:, None]))
+
+
+def no_law(fresh_m: Floats, sigma: float) -> GrowthLaw:
+    """Growth that stays as it is, off by a standard deviation of its logarithm."""
+    k = len(fresh_m)
+    return GrowthLaw(np.zeros((k, k)), fresh_m, np.full(k, np.inf), np.full(k, sigma))
+
+
+def fitted_law(lives: Sequence[SimulatedLife], sigma: float) -> GrowthLaw:
+    """The law of simulated lives that all begin with the same clearances.
+
+    Parameters
+    ----------
+    lives : sequence of SimulatedLife
+    sigma : float
+        Standard deviation of ln growth where there are too few lives to tell it.
+    """
+    fresh = lives[0].clearance_m[0]
+    coupling, _ = _coefficients(lives, fresh)
+    widest = np.max([life.clearance_m.max(axis=0) for life in lives], axis=0)
+    return GrowthLaw(coupling, fresh, widest, _sigma(lives, sigma), len(lives))
+
+
+def _sigma(lives: Sequence[SimulatedLife], unknown: float) -> Floats:
+    """What lives are off, of each joint; where they are too few, or it does not open, what is given."""
+    if len(lives) < LEAST_LIVES:
+        return np.full(len(lives[0].factor), unknown)
+    off = left_over(lives)
+    is_known = np.isfinite(off)
+    square = np.square(off, where=is_known, out=np.zeros_like(off)).sum(axis=0)
+    return np.where(is_known.any(axis=0), np.sqrt(square / np.maximum(is_known.sum(axis=0), 1)), unknown)
+
+
+def left_over(lives: Sequence[SimulatedLife]) -> Floats:
+    """Logarithm (n, k) of the cycles each life took to its end, over those by the law of all the others.
+
+    NaN where a joint has not opened.
+    """
+    fresh, off = lives[0].clearance_m[0], []
+    for i, life in enumerate(lives):
+        coupling, level = _coefficients([*lives[:i], *lives[i + 1 :]], fresh)
+        law = GrowthLaw(coupling, fresh, np.full(len(fresh), np.inf), np.zeros(len(fresh)))
+        base = life.factor * np.exp(level)
+        expected = cycles_to(law, fresh[:, None], base[:, None], life.clearance_m[-1])
+        opened = np.isfinite(expected[:, 0]) & (expected[:, 0] > 0.0)
+        off.append(np.log(np.where(opened, life.cycles[-1] / np.where(opened, expected[:, 0], 1.0), np.nan)))
+    return np.array(off)
+
+
+def _coefficients(lives: Sequence[SimulatedLife], fresh_m: Floats) -> tuple[Floats, Floats]:
+    """B (k, k) and a (k,), of ridge regression."""
+    x = np.log(np.concatenate([life.clearance_m for life in lives]) / fresh_m)
+    growth = np.concatenate([life.growth_m_per_cycle / life.factor for life in lives])
+    prior = (_SCATTER / PRIOR_SIGMA) ** 2 * np.eye(x.shape[1])
+    coupling, level = np.zeros((x.shape[1],) * 2), np.zeros(x.shape[1])
+    for k in range(x.shape[1]):
+        grows = growth[:, k] > 0.0
+        if not grows.any():
+            level[k] = -np.inf
+            continue
+        y, own = np.log(growth[grows, k]), x[grows]
+        centred = own - own.mean(axis=0)
+        coupling[k] = np.linalg.solve(centred.T @ centred + prior, centred.T @ (y - y.mean()))
+        level[k] = y.mean() - own.mean(axis=0) @ coupling[k]
+    return coupling, level
+
+
+def cycles_to(law: GrowthLaw, clearance_m: Floats, base_m: Floats, limit_m: Floats) -> Floats:
+    """Gait cycles until each joint reaches its limit, all joints growing together.
+
+    A joint that is at its limit stays there: its part is replaced before it opens further.
+
+    Parameters
+    ----------
+    law : GrowthLaw
+    clearance_m : (k, n) array
+        Of n legs.
+    base_m : (k, n) array
+        exp(a) x: growth a cycle when all is new.
+    limit_m : (k,) array
+
+    Returns
+    -------
+    (k, n) array
+        Infinite where a clearance does not grow; 0 where it is at its limit.
+    """
+    limit = limit_m[:, None]
+    step = np.maximum(limit - law.fresh_m[:, None], 1.0e-3 * limit) / _STEPS
+    clearance = np.minimum(clearance_m, limit)
+    ends = np.where(clearance_m >= limit, 0.0, np.inf)
+    going, spent = (clearance_m < limit) & (base_m > 0.0), np.zeros(clearance_m.shape[1])
+    base = np.where(going, base_m, 0.0)
+    while going.any():
+        # Heun's method; the joint that goes fastest says how far
+        first = base * np.exp(law.log_growth(clearance))
+        fastest = (first / step).max(axis=0)
+        cycles = np.divide(1.0, fastest, out=np.zeros_like(fastest), where=fastest > 0.0)
+        ahead = np.minimum(clearance + cycles * first, limit)
+        growth = 0.5 * (first + base * np.exp(law.log_growth(ahead)))
+        opened = clearance + cycles * growth
+        reached = going & (opened >= limit)
+        within = np.divide(limit - clearance, growth, out=np.zeros_like(growth), where=reached)
+        ends = np.where(reached, spent + within, ends)
+        clearance, spent = np.minimum(opened, limit), spent + cycles
+        going &= ~reached
+        base = np.where(going, base, 0.0)
+    return ends
 
 
 class Answer(Enum):
@@ -317,3 +519,68 @@ def _leg_answer(joints: Sequence[Answer]) -> Answer:
 def quantiles(values: Floats) -> Quantiles:
     """Quantiles of equally likely values."""
     return Quantiles(*np.quantile(values, (0.1, 0.5, 0.9)).tolist())
+
+
+# How long something lasts, and how large a clearance is, in as many digits as are known.
+
+
+UNKNOWN = {
+    f"{fraction}_{key}": math.nan for key in ("cycles", "hours", "days") for fraction in ("p10", "p50", "p90")
+}
+"""What `lifetime_values` gives, not known."""
+
+_SIGMAS_APART = 2.5631  # p10 and p90 of a normal distribution
+
+
+def lifetime_values(forecast: JointForecast | LegForecast) -> dict[str, float]:
+    """Quantiles of cycles, hours and days of duty by keys such as ``p50_hours``; none if not known."""
+    values: dict[str, float] = {}
+    for key in ("cycles", "hours", "days"):
+        quantiles = getattr(forecast, key)
+        if quantiles is not None:
+            values |= {f"{fraction}_{key}": value for fraction, value in attrs.asdict(quantiles).items()}
+    return values
+
+
+def answer_words(forecast: JointForecast) -> str:
+    """What can be said of a joint's life, and what it holds for."""
+    held = "" if forecast.prior is None else f"; {_basis(forecast.prior)}"
+    return f"{forecast.answer.value}{held}"
+
+
+def bases(forecasts: Mapping[str, JointForecast]) -> list[str]:
+    """What the lives of some joints hold for, a sentence for all joints alike."""
+    found: dict[str, list[str]] = {}
+    for joint, forecast in forecasts.items():
+        if forecast.prior is not None:
+            found.setdefault(_basis(forecast.prior), []).append(joint)
+    return [f"{', '.join(joints)}: {basis}" for basis, joints in found.items()]
+
+
+def _basis(prior: CoefficientPrior) -> str:
+    factor = f"{math.exp(prior.sigma):.2g}"
+    return f"holds for {prior.holds_for}, its wear coefficient known to a factor of {factor} ({prior.basis})"
+
+
+def three_digits(value: float) -> str:
+    """A number rounded to three digits, without an exponent as far as that is readable."""
+    if value == 0.0 or not math.isfinite(value):
+        return f"{value:.3g}"
+    if not 1.0e-4 <= abs(value) < 1.0e9:
+        return f"{value:.2e}"
+    rounded = float(f"{value:.2e}")
+    return f"{rounded:.{max(0, 2 - math.floor(math.log10(abs(rounded))))}f}"
+
+
+def clearance_mm(value_m: float, p10_m: float, p90_m: float) -> str:
+    """A counted clearance [mm] in the digits that it deserves: the last is that of its standard deviation.
+
+    Parameters
+    ----------
+    value_m : float
+    p10_m, p90_m : float
+        Quantiles of what it may be.
+    """
+    sigma_mm = 1.0e3 * (p90_m - p10_m) / _SIGMAS_APART
+    digits = -math.floor(math.log10(sigma_mm)) if sigma_mm > 0.0 else 6
+    return f"{1.0e3 * value_m:.{min(max(digits, 2), 6)}f}"

@@ -7,18 +7,64 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.mechanism.clearance import Clearance
-from leg_wear_monitor.mechanism.clearance_range import measured_fault, sigma_fault
-from leg_wear_monitor.monitor.config.forecast import Forecasting
-from leg_wear_monitor.monitor.forecast.coefficient_prior import CoefficientPrior
-from leg_wear_monitor.monitor.forecast.known_clearance import corrections_of
-from leg_wear_monitor.monitor.forecast.validity import validity
+from leg_wear_monitor.mechanism.arrays import Floats, body_names
+from leg_wear_monitor.mechanism.person import heavier_person
+from leg_wear_monitor.mechanism.plausible import measured_fault, sigma_fault
+from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
+from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
+from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     CoefficientEstimate,
+    CoefficientPrior,
     MeasuredClearance,
+    corrections_of,
     estimate_coefficient,
 )
 from leg_wear_monitor.monitor.ledger.entry import CorrectedClearance, JointWear, Measurement
+from leg_wear_monitor.twin.reference import MASS_TOLERANCE
+
+# How past forecasts did: a measured clearance is later reality, and the ledger says what was expected.
+
+
+LEAST = 5  # measurements, below which fractions have no meaning
+
+
+@attrs.frozen
+class Validity:
+    """Predicted against measured.
+
+    Attributes
+    ----------
+    measurements : int
+    within : int
+        Of them between p10 and p90 of what was expected: 80 % in the long run.
+    bias : float
+        Mean probability with which less was expected, less one half: above 0, joints wear faster than
+        forecast; from -0.5 to 0.5.
+    """
+
+    measurements: int
+    within: int
+    bias: float
+
+    @property
+    def words(self) -> str:
+        """In a line, for operators."""
+        text = f"{self.within} of {self.measurements} measured clearances were between expected p10 and p90"
+        if self.measurements < LEAST:
+            return f"{text}; too few to evaluate the forecast"
+        # a mean of n even numbers from 0 to 1 has a standard deviation of 1 / sqrt(12 n)
+        if abs(self.bias) * np.sqrt(12.0 * self.measurements) < 2.0:
+            return f"{text}; no bias found"
+        return f"{text}; joints wear {'faster' if self.bias > 0.0 else 'slower'} than forecast"
+
+
+def validity(measurements: Sequence[Measurement]) -> Validity:
+    """What measurements say of the forecasts before each of them; contradictions too, not withdrawn ones."""
+    below = np.array([m.expected_below for m in measurements if not m.is_withdrawn])
+    within = int(np.count_nonzero((below >= 0.1) & (below <= 0.9)))
+    return Validity(len(below), within, float(below.mean() - 0.5) if len(below) else 0.0)
+
 
 CONTRADICTS = 0.00135  # probability of a tail: three standard deviations of a normal one
 
@@ -278,3 +324,172 @@ def _change(before: CoefficientEstimate, after: CoefficientEstimate) -> str:
         f"the wear coefficient is {middle:.3g} times the nominal one, {low:.3g} to {high:.3g} (p10 to p90); "
         f"its uncertainty is {before.sigma / after.sigma:.3g} times smaller than before"
     )
+
+
+# How far the growth of a real leg may be from that of the leg on paper, because of its masses.
+#
+# Wear grows with force times sliding. What the ideal motion makes of it follows from its reactions, and so
+# does its sensitivity to each body's mass: without a simulation, a fraction of a second for any mechanism.
+# The rest is made by impacts.
+
+
+# squared sensitivity of what impacts make: by regression over the joints of sixteen legs as built
+# (`benchmarks/growth_coverage.py --quick --legs 16`)
+_OF_IMPACTS = 1.6
+_POINTS = 160  # of a gait cycle
+_MASS_STEP = 0.01
+
+
+@attrs.frozen(eq=False)
+class ModelError:
+    """What the counted growth of each clearance joint may be off.
+
+    Attributes
+    ----------
+    ideal_m : (k,) array
+        Growth a gait cycle that the ideal motion makes.
+    sensitivity : (k,) array
+        Of its logarithm to those of all masses, root sum of squares; the person's is known less well.
+    """
+
+    ideal_m: Floats
+    sensitivity: Floats
+
+    def relative(self, k: int, growth_m: float) -> float:
+        """Standard deviation of a joint's growth a gait cycle, as a fraction of it.
+
+        Impacts depend on masses, lengths and ripple in a rugged way, not by sensitivities: their fraction of
+        the growth adds to the variance in proportion.
+        """
+        impacts = min(1.0, abs(1.0 - self.ideal_m[k] / growth_m)) if growth_m > 0.0 else 0.0
+        return MASS_TOLERANCE * math.sqrt(self.sensitivity[k] ** 2 + _OF_IMPACTS * impacts)
+
+
+def model_error(mechanism: Mechanism, speed_radps: float, wear_acceleration: float = 1.0) -> ModelError:
+    """Model error of a leg on paper.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The masses of its bodies are independent of each other, and inertias follow them.
+    speed_radps : float
+        Of its crank.
+    wear_acceleration : float
+        Factor on all wear.
+    """
+    sliding = _force_times_sliding(mechanism, speed_radps)
+    square = np.zeros_like(sliding)
+    for name, body in mechanism.bodies.items():
+        factor = 1.0 + _MASS_STEP
+        heavier = attrs.evolve(body, mass=factor * body.mass, inertia=factor * body.inertia)
+        changed = attrs.evolve(mechanism, bodies={**mechanism.bodies, name: heavier})
+        square += np.square((_force_times_sliding(changed, speed_radps) - sliding) / _MASS_STEP)
+    if mechanism.person_kg:
+        more = _force_times_sliding(heavier_person(mechanism), speed_radps) - sliding
+        square += np.square(more / MASS_TOLERANCE)
+    # a joint that carries nothing on paper: all of its growth is made by impacts
+    sensitivity = np.divide(np.sqrt(square), sliding, out=np.zeros_like(sliding), where=sliding > 0.0)
+    parts = [mechanism.clearances[joint] for joint in mechanism.clearance_joints]
+    # Archard's law, spread over the contact's area: both surfaces open the clearance (wear.py)
+    per_joule = [sum(part.wear_coefficient) / (TURN * part.bushing_radius * part.width) for part in parts]
+    return ModelError(wear_acceleration * np.array(per_joule) * sliding, sensitivity)
+
+
+def _force_times_sliding(mechanism: Mechanism, speed_radps: float) -> Floats:
+    """Force times sliding distance [J] over a gait cycle in each clearance joint, all joints ideal (k,)."""
+    motion = one_cycle(build_linkage(mechanism), _POINTS, speed_radps)
+    names, joints, found = body_names(mechanism), list(mechanism.joints), []
+    for name in mechanism.clearance_joints:
+        bushing, journal = (names.index(body) for body in mechanism.sides(name))
+        turning = np.abs(motion.v[:, journal, 2] - motion.v[:, bushing, 2])
+        force = np.linalg.norm(motion.joint_force[:, joints.index(name)], axis=1)
+        radius = mechanism.clearances[name].bushing_radius
+        found.append(radius * (force * turning).mean() * TURN / abs(speed_radps))
+    return np.array(found)
+
+
+# How fast clearances grow: averaged over gait cycles, since single cycles of a chaotic motion scatter.
+
+
+LEAST_CYCLES = 10
+LARGEST_ERROR = 0.5  # of the mean: beyond it the scatter says more than the mean
+
+_BATCHES = 5  # of six cycles each in a window of thirty: longer than neighbours hang together
+# five means leave four degrees of freedom: Student's t, not a normal distribution. So wide is the normal one
+# whose interval from p10 to p90 is that of t: 1.533 standard errors, not 1.282
+_WIDER = 1.533 / 1.282
+
+
+@attrs.frozen(eq=False)
+class GrowthWindow:
+    """The last gait cycles of one joint.
+
+    Attributes
+    ----------
+    growth_m : (n,) array
+        Of the mean clearance in each cycle.
+    moving_s : (n,) array
+        Time in motion of each.
+    """
+
+    growth_m: Floats = attrs.field(factory=lambda: np.zeros(0))
+    moving_s: Floats = attrs.field(factory=lambda: np.zeros(0))
+
+
+@attrs.frozen
+class GrowthRate:
+    """Mean growth over a window.
+
+    Attributes
+    ----------
+    per_cycle_m, sampling_m : float
+        A gait cycle, and the uncertainty of this mean because single cycles scatter.
+    per_second_m : float
+        A second of walking.
+    """
+
+    per_cycle_m: float
+    sampling_m: float
+    per_second_m: float
+
+    def error_m(self, model_error: float) -> float:
+        """Uncertainty of a gait cycle's growth in this leg: of the mean, and of the model.
+
+        As of a normal distribution: 80 % lie within 1.28 of it either way.
+
+        Parameters
+        ----------
+        model_error : float
+            Standard deviation of the relative growth (`ModelError`).
+        """
+        return math.hypot(self.sampling_m, model_error * self.per_cycle_m)
+
+
+def extended(window: GrowthWindow, growth_m: float, moving_s: float, cycles: int) -> GrowthWindow:
+    """Window of at most so many cycles with one more."""
+    keep = max(0, len(window.growth_m) + 1 - cycles)
+    return GrowthWindow(
+        np.append(window.growth_m[keep:], growth_m), np.append(window.moving_s[keep:], moving_s)
+    )
+
+
+def growth_rate(window: GrowthWindow) -> GrowthRate | None:
+    """Mean growth, None while there is not enough data to know it.
+
+    A mean is used and not a median: wear comes in bursts, and the mean is what adds up. Neighbouring cycles
+    of a chaotic motion hang together, so the scatter is that of the means of batches.
+    """
+    n = len(window.growth_m)
+    if n < LEAST_CYCLES:
+        return None
+    mean = float(window.growth_m.mean())
+    sampling = _WIDER * _standard_error(window.growth_m)
+    if not sampling <= LARGEST_ERROR * abs(mean):
+        return None
+    return GrowthRate(mean, sampling, float(window.growth_m.sum() / window.moving_s.sum()))
+
+
+def _standard_error(values: Floats) -> float:
+    size = len(values) // _BATCHES
+    means = values[len(values) - _BATCHES * size :].reshape(_BATCHES, size).mean(axis=1)
+    return float(means.std(ddof=1) / math.sqrt(_BATCHES))

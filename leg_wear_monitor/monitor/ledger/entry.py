@@ -9,14 +9,14 @@ from typing import Any
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
+from leg_wear_monitor.estimate.signature import CommissionedTorque
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.alarms.alarm import Alarm
+from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.twin.reference.leg_parameters import COUPLING_DAMPING
-from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
-from leg_wear_monitor.wear.surfaces import SECTORS
+from leg_wear_monitor.twin.reference import COUPLING_DAMPING
+from leg_wear_monitor.twin.torque_reference import TorqueReference
+from leg_wear_monitor.wear import SECTORS
 
 _CLASS_N = 100  # foot loads are told apart to this
 

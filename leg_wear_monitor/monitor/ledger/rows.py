@@ -6,11 +6,10 @@ from typing import Any, TypeVar
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
-from leg_wear_monitor.estimate.signature import Channel
-from leg_wear_monitor.json_text import finite_or_none, or_nan
+from leg_wear_monitor.estimate.signature import Channel, CommissionedTorque
+from leg_wear_monitor.files import finite_or_none, or_nan
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.alarms import Alarm, Level
 from leg_wear_monitor.monitor.ledger.entry import (
     AlarmEvent,
     Audit,
@@ -31,10 +30,9 @@ from leg_wear_monitor.monitor.ledger.entry import (
     together,
 )
 from leg_wear_monitor.monitor.ledger.schema import add, replace, sealed
-from leg_wear_monitor.twin.reference.crank_profile import UNLIKE, CrankProfile
-from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
-from leg_wear_monitor.twin.reference.leg_simulation import POINTS
-from leg_wear_monitor.twin.reference.torque_reference import CADENCES, CYCLES, TorqueReference
+from leg_wear_monitor.twin.leg_simulation import POINTS
+from leg_wear_monitor.twin.reference import UNLIKE, CrankProfile, LegParameters
+from leg_wear_monitor.twin.torque_reference import CADENCES, CYCLES, TorqueReference
 
 _Row = TypeVar("_Row", Measurement, CorrectedClearance, ForecastPoint, VerdictEvent, ClearancePoint)
 

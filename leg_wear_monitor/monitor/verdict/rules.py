@@ -3,8 +3,8 @@
 docs/reference/monitor.md lists them; a test compares the two.
 """
 
-from leg_wear_monitor.monitor.alarms.alarm import Level
-from leg_wear_monitor.monitor.alarms.fault_codes import (
+from leg_wear_monitor.monitor.alarms import (
+    ADVICE,
     ALREADY_COUNTED,
     CRANK_ZERO,
     EXCHANGED,
@@ -13,12 +13,19 @@ from leg_wear_monitor.monitor.alarms.fault_codes import (
     SIGN,
     STUCK,
     ZERO,
+    Level,
 )
-from leg_wear_monitor.monitor.alarms.words import ADVICE
-from leg_wear_monitor.monitor.verdict import cause_rules, clearance_rules, input_rules, material_rules
-from leg_wear_monitor.monitor.verdict.alarm_rules import blinding, of_foot_load, raised
-from leg_wear_monitor.monitor.verdict.rule import EVERYTHING, OF_THE_GAIT, OF_THE_MODEL, Rule
-from leg_wear_monitor.monitor.verdict.situation import Situation
+from leg_wear_monitor.monitor.verdict import subject_rules
+from leg_wear_monitor.monitor.verdict.situation import (
+    EVERYTHING,
+    OF_THE_GAIT,
+    OF_THE_MODEL,
+    Rule,
+    Situation,
+    blinding,
+    of_foot_load,
+    raised,
+)
 from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, NONE, Figure, Finding, State
 
 _ACKNOWLEDGE = "then acknowledge the alarms: leg-wear-monitor acknowledge --ledger FILE, or --node NAME"
@@ -42,7 +49,7 @@ def _cause(code: str, meaning: str, state: State = State.INSPECT, not_valid: tup
     return Rule(
         code=code,
         state=state,
-        hits=cause_rules.found(code),
+        hits=subject_rules.found(code),
         why=f"the drive torque differs from the prediction: {meaning}{{causes}}",
         do=f"{{remedy}}; {_ACKNOWLEDGE}",
         not_valid=not_valid,
@@ -74,14 +81,14 @@ RULES = (
     Rule(
         code="CLEARANCE",
         state=State.STOP,
-        hits=clearance_rules.counted_at_limit,
+        hits=subject_rules.counted_at_limit,
         why="the {known} clearance of joint {joint} is {value} (limit {limit}){past}",
         do=_REPLACE,
     ),
     Rule(
         code="CLEARANCE_SEEN",
         state=State.STOP,
-        hits=clearance_rules.seen_at_limit,
+        hits=subject_rules.seen_at_limit,
         why="according to {by}, the clearance of joint {joint} is {value} (limit {limit}){past}{doubt}",
         do=_REPLACE,
         not_valid=EVERYTHING,
@@ -89,7 +96,7 @@ RULES = (
     Rule(
         code="CLEARANCE_BELIEVED",
         state=State.STOP,
-        hits=clearance_rules.believed_at_limit,
+        hits=subject_rules.believed_at_limit,
         why="counting and measurements together give a clearance of {value} in joint {joint} (limit {limit})",
         do=_REPLACE,
     ),
@@ -99,7 +106,7 @@ RULES = (
     Rule(
         code="CLEARANCE_CHANGED",
         state=State.INSPECT,
-        hits=clearance_rules.diagnosed,
+        hits=subject_rules.diagnosed,
         why="the drive torque shows a {change}",
         do=_ROCK,
         not_valid=EVERYTHING,
@@ -107,14 +114,14 @@ RULES = (
     Rule(
         code="CLEARANCE_CORRECTED",
         state=State.INSPECT,
-        hits=clearance_rules.corrected,
+        hits=subject_rules.corrected,
         why="the drive torque showed a {change}; the counted clearance is corrected",
         do=_ROCK,
     ),
     Rule(
         code="CLEARANCE_DEPARTURE",
         state=State.INSPECT,
-        hits=clearance_rules.departing,
+        hits=subject_rules.departing,
         why="the encoders show a clearance of joint {joint} that differs from the counted one by {value} "
         "(limit {limit}){past}",
         do=f"{_ROCK}; {_ACKNOWLEDGE}",
@@ -126,7 +133,7 @@ RULES = (
     Rule(
         code="TORQUE_MISMATCH",
         state=State.INSPECT,
-        hits=cause_rules.mismatch,
+        hits=subject_rules.mismatch,
         why="the drive torque does not fit the counted leg, so the forecast is not valid: {value} of the "
         "predicted RMS is not explained (limit {limit}){past}{causes}",
         do="stop when it is safe, block the drive and rock each joint; measure the joint with play and enter "
@@ -160,7 +167,7 @@ RULES = (
     Rule(
         code=ALREADY_COUNTED,
         state=State.NOT_MONITORED,
-        hits=input_rules.all_counted,
+        hits=subject_rules.all_counted,
         why="everything that was received is in the ledger already: nothing was counted",
         do="nothing, if a recording was replayed again; for its report, replay it without a ledger; "
         "on a live leg, check the clock of the samples",
@@ -169,7 +176,7 @@ RULES = (
     Rule(
         code=CRANK_ZERO,
         state=State.NOT_MONITORED,
-        hits=input_rules.without_zero,
+        hits=subject_rules.without_zero,
         why="{cause}",
         do="let the leg walk steadily at the commanded cadence; if the zero is still not found, check the "
         "drive torque and its parameters, or set crank.zero to known and crank.offset_rad",
@@ -178,7 +185,7 @@ RULES = (
     Rule(
         code="NOT_FOLLOWED",
         state=State.NOT_MONITORED,
-        hits=input_rules.unfollowed,
+        hits=subject_rules.unfollowed,
         why="{cause}",
         do=f"repair the input of the crank; {_COUNTED}",
         not_valid=OF_THE_GAIT,
@@ -194,7 +201,7 @@ RULES = (
     Rule(
         code="NOT_THIS_LEG",
         state=State.NOT_MONITORED,
-        hits=input_rules.doubtful,
+        hits=subject_rules.doubtful,
         why="the gait does not fit this leg: {cause}",
         do="compare the parameters with the leg: mechanism, cadence, crank and drive_torque",
         not_valid=EVERYTHING,
@@ -202,7 +209,7 @@ RULES = (
     Rule(
         code=NO_GAIT_CYCLE,
         state=State.NOT_MONITORED,
-        hits=input_rules.no_cycle,
+        hits=subject_rules.no_cycle,
         why="the monitor has not received a whole gait cycle yet",
         do=f"let the leg walk; if it walks already: {_COUNTED}",
     ),
@@ -218,7 +225,7 @@ RULES = (
     Rule(
         code="MATERIAL_LIMIT",
         state=State.WATCH,
-        hits=material_rules.outside_limits,
+        hits=subject_rules.outside_limits,
         why="joint {joint}: {outside}; its wear coefficient does not hold",
         do="compare the material of the mechanism file with the part, and load and cadence with its limits; "
         f"until then, measure the clearance of joint {{joints}} regularly; {_ACKNOWLEDGE}",
@@ -227,35 +234,35 @@ RULES = (
     Rule(
         code="PART_REPLACED",
         state=State.WATCH,
-        hits=clearance_rules.replaced,
+        hits=subject_rules.replaced,
         why="joint {joint} was replaced on {when}, {cycles} gait cycles ago",
         do="confirm by walking: let the leg walk on at the commanded cadence, and see the verdict then",
     ),
     Rule(
         code="NO_DRIVE_TORQUE",
         state=State.WATCH,
-        hits=input_rules.no_torque,
+        hits=subject_rules.no_torque,
         why="joints {joints} cannot be observed: {cause}",
         do="provide the drive torque (drive_torque.source); until then, rock the joints by hand regularly",
     ),
     Rule(
         code="TORQUE_NOT_COMPARED",
         state=State.WATCH,
-        hits=input_rules.not_compared,
+        hits=subject_rules.not_compared,
         why="the comparison of the drive torque needs more gait cycles",
         do="let the leg walk on",
     ),
     Rule(
         code="NOT_OBSERVED",
         state=State.WATCH,
-        hits=input_rules.not_observed,
+        hits=subject_rules.not_observed,
         why="the drive torque does not show the clearances of joints {joints} yet{causes}",
         do="let the leg walk on at a steady cadence{next}; until then, rock these joints by hand regularly",
     ),
     Rule(
         code="CADENCE",
         state=State.WATCH,
-        hits=input_rules.other_cadence,
+        hits=subject_rules.other_cadence,
         why="the leg {walks}; the commanded cadence is {commanded} ± {tolerance}",
         do=f"walk at the commanded cadence, or set cadence.commanded_rpm; {_ACKNOWLEDGE}",
         not_valid=(Figure.FORECAST,),
@@ -263,7 +270,7 @@ RULES = (
     Rule(
         code="ENCODER",
         state=State.WATCH,
-        hits=input_rules.encoder_faults,
+        hits=subject_rules.encoder_faults,
         why="encoder {cause}",
         do="repair the encoder, or remove it from encoders.names",
     ),
@@ -277,7 +284,7 @@ RULES = (
     Rule(
         code=NONE,
         state=State.HEALTHY,
-        hits=input_rules.nothing_found,
+        hits=subject_rules.nothing_found,
         why="no alarm is raised, and {observed}",
         do=f"nothing now. {ADVICE}",
     ),

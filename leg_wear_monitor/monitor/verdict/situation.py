@@ -1,15 +1,20 @@
-"""What a verdict depends on, and nothing else; the defaults are those of a leg without a fault."""
+"""What rules judge: the situation of leg and joints, the believed clearance, and the form of a rule."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import attrs
 
 from leg_wear_monitor.estimate.cause import NamedCause, TorqueExplanation
-from leg_wear_monitor.mechanism.materials.load import BushingLoad
-from leg_wear_monitor.monitor.alarms.alarm import Alarm
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.materials import BushingLoad
+from leg_wear_monitor.monitor.alarms import Alarm, Level, time_words
 from leg_wear_monitor.monitor.config.inputs import Crank, DriveTorque
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis
+from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
+from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure, Finding, State, amount, estimate
+from leg_wear_monitor.twin.statistics import Sampling
+
+# What a verdict depends on, and nothing else; the defaults are those of a leg without a fault.
 
 
 @attrs.frozen
@@ -154,3 +159,343 @@ class Situation:
         return tuple(
             joint.joint for joint in self.joints if not any(seen.by == "encoders" for seen in joint.seen)
         )
+
+
+# Which clearance of a joint is believed, and by whom: all views and the clearance alarm draw from here.
+
+
+COUNTED, MEASURED, BOTH = "counted", "measured", "both"
+SEEN = ("torque", "encoders")
+SURE_SIGMAS = 2.0  # by which an estimated or measured clearance must be beyond its limit, or below it
+SOURCES = {
+    COUNTED: "counting",
+    MEASURED: "a measurement",
+    BOTH: "counting and measurements together",
+    "torque": "the drive torque",
+    "encoders": "the joint encoders",
+}
+
+
+@attrs.frozen
+class BelievedClearance:
+    """The one clearance of a joint.
+
+    Attributes
+    ----------
+    clearance_m, sigma_m : float
+        Mean radial clearance and its standard deviation; NaN if that is not known.
+    by : str
+        ``counted``, ``torque``, ``encoders``, ``measured``, or ``both`` for what counting and measurements
+        give together.
+    """
+
+    clearance_m: float
+    sigma_m: float
+    by: str
+
+
+def believed_words(one: BelievedClearance) -> str:
+    """A believed clearance, such as ``2.05 mm ± 0.65 mm according to the drive torque``."""
+    value = amount(one.clearance_m, "m")
+    if not math.isnan(one.sigma_m):
+        value = estimate(one.clearance_m, one.sigma_m, "m")
+    return f"{value} according to {SOURCES[one.by]}"
+
+
+def judged(joint: JointSituation) -> BelievedClearance:
+    """The counted clearance, or a larger one by measurement: what somebody found on the leg counts."""
+    found = [BelievedClearance(joint.counted_m, math.nan, COUNTED)]
+    if joint.measured is not None:
+        found.append(BelievedClearance(joint.measured.clearance_m, joint.measured.sigma_m, MEASURED))
+    rests_on_it = joint.measured is not None and joint.is_measurement_used
+    if rests_on_it or joint.believed_m >= joint.limit_m:  # never with NaN
+        found.append(BelievedClearance(joint.believed_m, math.nan, BOTH))
+    return max((one for one in found if not math.isnan(one.clearance_m)), key=lambda one: one.clearance_m)
+
+
+def surely_at(limit_m: float, seen: Sequence[SeenClearance]) -> SeenClearance | None:
+    """The surest of the estimates that are beyond a limit by `SURE_SIGMAS`; None without one."""
+    found = [one for one in seen if one.clearance_m - SURE_SIGMAS * one.sigma_m >= limit_m]
+    return min(found, key=lambda one: one.sigma_m, default=None)
+
+
+def is_surely_below(limit_m: float, clearance_m: float, sigma_m: float) -> bool:
+    """Whether a measured clearance contradicts that a joint is at its limit."""
+    return clearance_m + SURE_SIGMAS * sigma_m < limit_m
+
+
+def is_overruled(joint: JointSituation, alarm: Alarm | None) -> bool:
+    """Whether a measurement contradicts the estimate that an alarm of the clearance rests on.
+
+    The counted clearance is below the limit, too: a measurement does not end what counting says.
+    It was acknowledged with the measurement, and rises again, not acknowledged, if the estimate returns
+    below the limit and then passes it again.
+    """
+    if alarm is None or joint.measured is None or not alarm.acknowledged or alarm.cause not in SEEN:
+        return False
+    is_counted_below = not judged(joint).clearance_m >= joint.limit_m
+    return is_counted_below and is_surely_below(
+        joint.limit_m, joint.measured.clearance_m, joint.measured.sigma_m
+    )
+
+
+def at_limit_by_estimate(joint: JointSituation, alarm: Alarm | None) -> SeenClearance | None:
+    """What encoders or the drive torque surely show at the limit, now or as the latched alarm keeps it."""
+    if is_overruled(joint, alarm):
+        return None
+    now = surely_at(joint.limit_m, joint.seen)
+    if now is None and alarm is not None and alarm.level is Level.ERROR and alarm.cause in SEEN:
+        return SeenClearance(alarm.cause, alarm.worst, alarm.sigma)
+    return now
+
+
+def believed(joint: JointSituation, alarm: Alarm | None, is_counted_leg: bool) -> BelievedClearance | None:
+    """The clearance that the verdict rests on; None where nothing known of the joint is valid.
+
+    Parameters
+    ----------
+    joint : JointSituation
+    alarm : Alarm or None
+        That of the joint's clearance.
+    is_counted_leg : bool
+        Whether the verdict does not list the counted clearances as not valid.
+    """
+    known, estimate = judged(joint), at_limit_by_estimate(joint, alarm)
+    if estimate is not None and estimate.clearance_m > known.clearance_m:
+        return BelievedClearance(estimate.clearance_m, estimate.sigma_m, estimate.by)
+    if is_counted_leg or known.clearance_m >= joint.limit_m:
+        return known
+    if joint.measured is not None:
+        return BelievedClearance(joint.measured.clearance_m, joint.measured.sigma_m, MEASURED)
+    if not joint.seen:
+        return None
+    best = min(joint.seen, key=lambda one: one.sigma_m)
+    return BelievedClearance(best.clearance_m, best.sigma_m, best.by)
+
+
+def alarm_value(joint: JointSituation, alarm: Alarm) -> BelievedClearance | None:
+    """The clearance that its alarm is evaluated with at the end of a period; None to leave it as it is.
+
+    A counted clearance is evaluated once a gait cycle instead, unless an estimate had raised the alarm.
+    """
+    known, sure = judged(joint), surely_at(joint.limit_m, joint.seen)
+    if sure is not None and sure.clearance_m > known.clearance_m:
+        return BelievedClearance(sure.clearance_m, sure.sigma_m, sure.by)
+    if is_held_by_estimate(alarm):
+        # what the torque said, only the torque takes back: a new run shows nothing for a while
+        return None if is_overruled(joint, alarm) and not joint.seen else known
+    return None if known.by == COUNTED else known
+
+
+def is_held_by_estimate(alarm: Alarm) -> bool:
+    """Whether an alarm of the clearance is present because of what encoders or the drive torque showed."""
+    return alarm.present is not Level.OK and alarm.cause in SEEN
+
+
+# What a sampled replay adds to a verdict: how much of the gait was followed, and the standard errors.
+
+
+def sampled_words(sampling: Sampling) -> str:
+    """Words on a sampled replay."""
+    cycles = sampling.followed_cycles + sampling.estimated_cycles
+    return (
+        f"sampled: {sampling.followed_cycles} of {cycles:.0f} gait cycles were followed, "
+        "wear of the others is estimated, their impacts are not seen"
+    )
+
+
+def with_sampling(
+    findings: Sequence[Finding], sampling: Sampling, joints: Sequence[str], sigma_m: Floats
+) -> tuple[Finding, ...]:
+    """Findings that tell of a sampled replay.
+
+    Parameters
+    ----------
+    findings : sequence of Finding
+    sampling : Sampling
+    joints : sequence of str
+        The clearance joints.
+    sigma_m : (k,) array
+        Standard errors of their clearances.
+    """
+    evidence = [Evidence("sampled fraction", sampling.fraction, None, "")]
+    evidence += [
+        Evidence(f"standard error {joint}", sigma, None, "m")
+        for joint, sigma in zip(joints, sigma_m.tolist(), strict=True)
+    ]
+    words = sampled_words(sampling)
+    return tuple(
+        attrs.evolve(one, why=f"{one.why}; {words}", evidence=(*one.evidence, *evidence)) for one in findings
+    )
+
+
+# A rule of the verdict: condition, state and texts in one entry.
+
+
+EVERYTHING = tuple(Figure)
+OF_THE_GAIT = (Figure.GROWTH, Figure.IMPACT_FORCES)
+OF_THE_MODEL = (Figure.GROWTH, Figure.IMPACT_FORCES, Figure.FORECAST)
+
+
+@attrs.frozen(kw_only=True)
+class Hit:
+    """One case for which the condition of a rule holds.
+
+    Attributes
+    ----------
+    words : mapping of str to str
+        Words for the braces of the rule's texts.
+    joint : str
+        The joint concerned, empty if it is none.
+    since_ns : int
+        Stamp since which it holds, 0 if it is not known.
+    evidence : tuple of Evidence
+    not_valid : tuple of Figure
+        In addition to the rule's.
+    state : State
+        Where it is more severe than the rule's.
+    """
+
+    words: Mapping[str, str] = attrs.field(factory=dict)
+    joint: str = ""
+    since_ns: int = 0
+    evidence: tuple[Evidence, ...] = ()
+    not_valid: tuple[Figure, ...] = ()
+    state: State = State.HEALTHY
+
+
+@attrs.frozen(kw_only=True)
+class Rule:
+    """A rule.
+
+    Attributes
+    ----------
+    code : str
+        Stable name.
+    state : State
+    hits : callable
+        Its condition: the cases in a situation for which it holds.
+    why, do : str
+        Texts, with the words of a hit in braces; in ``do``, ``{joints}`` names all joints
+        of the hits with their labels, and ``{joint}`` is the first one as commands take it.
+    not_valid : tuple of Figure
+        Kinds of values that are not valid while the rule applies.
+    """
+
+    code: str
+    state: State
+    hits: Callable[[Situation], Sequence[Hit]]
+    why: str
+    do: str
+    not_valid: tuple[Figure, ...] = ()
+
+    def found(self, situation: Situation) -> Finding | None:
+        """The finding if the rule holds, with all of its cases."""
+        hits = self.hits(situation)
+        if not hits:
+            return None
+        joints = tuple(dict.fromkeys(hit.joint for hit in hits if hit.joint))
+        since = [hit.since_ns for hit in hits if hit.since_ns]
+        not_valid = {*self.not_valid, *(figure for hit in hits for figure in hit.not_valid)}
+        words = {"joints": ", ".join(map(situation.joint_words, joints)), **hits[0].words}
+        return Finding(
+            code=self.code,
+            state=max((self.state, *(hit.state for hit in hits)), key=lambda state: state.severity),
+            joints=joints,
+            why="; ".join(dict.fromkeys(self.why.format(**hit.words) for hit in hits)),
+            do=self.do.format(**(words | {"joint": hits[0].joint})),
+            since_ns=min(since, default=0),
+            evidence=tuple(each for hit in hits for each in hit.evidence),
+            not_valid=tuple(figure for figure in Figure if figure in not_valid),
+        )
+
+
+# Conditions on alarms. A latched alarm counts like a present one until somebody acknowledges it.
+
+
+Condition = Callable[[Situation], Sequence[Hit]]
+
+OF_A_JOINT = (
+    "impact_force",
+    "clearance",
+    "growth",
+    "remaining_life",
+    "material_limit",
+    "clearance_departure",
+)
+
+
+def raised(*kinds: str, least: Level = Level.WARN) -> Condition:
+    """Alarms of some kinds (all if none is given) at a level or above it."""
+
+    def hits(situation: Situation) -> Sequence[Hit]:
+        return [
+            hit_of(alarm, situation)
+            for alarm in situation.alarms
+            if alarm.level >= least and (not kinds or alarm.kind in kinds)
+        ]
+
+    return hits
+
+
+def blinding(situation: Situation) -> Sequence[Hit]:
+    """Present faults of the input of the crank; those of torque and foot load stop no counting."""
+    kinds = ("input_sources", "input_rate", "input_samples", "input_gaps", "input_silence")
+    causes = f": {situation.input_causes[0]}" if situation.input_causes else ""  # the most frequent
+    return [
+        hit_of(alarm, situation, causes=causes)
+        for alarm in situation.alarms
+        if alarm.kind in kinds
+        and alarm.subject not in ("torque", "foot_load")
+        and alarm.present is Level.ERROR
+    ]
+
+
+def of_foot_load(situation: Situation) -> Sequence[Hit]:
+    """Present lack of samples of the foot load."""
+    return [
+        hit_of(alarm, situation)
+        for alarm in situation.alarms
+        if alarm.subject == "foot_load" and alarm.present is Level.ERROR
+    ]
+
+
+def hit_of(alarm: Alarm, situation: Situation, **words: str) -> Hit:
+    """An alarm as a case of a rule: its worst value if it is known, else its last one."""
+    is_present = alarm.present is alarm.level  # a level that has fallen has a value within the limit
+    is_last = math.isnan(alarm.worst) or (is_present and not math.isnan(alarm.value))
+    value = alarm.value if is_last else alarm.worst
+    is_of_a_joint = alarm.kind in OF_A_JOINT
+    joint, noun = situation.joint_words(alarm.subject), situation.quantity(alarm)
+    told = {
+        "quantity": f"{noun} of joint {joint}" if is_of_a_joint else noun,
+        "joint": joint,
+        "value": amount(value, alarm.unit),
+        "limit": amount(alarm.limit, alarm.unit),
+        "past": "" if is_present else f" (since {time_words(alarm.raised_ns)}; now within its limit)",
+        "known": "counted",
+    }
+    evidence: tuple[Evidence, ...] = ()
+    each = _measured(alarm, value, situation)
+    if each is not None and each.measured is not None:
+        told["known"] = "measured" if value <= each.measured.clearance_m else "estimated"
+        told["past"] += (
+            f"; {estimate(each.measured.clearance_m, each.measured.sigma_m, 'm')} was measured, "
+            f"{amount(each.counted_m, 'm')} is counted"
+        )
+        evidence = (
+            Evidence(f"measured clearance {each.joint}", each.measured.clearance_m, each.limit_m, "m"),
+            Evidence(f"counted clearance {each.joint}", each.counted_m, each.limit_m, "m"),
+        )
+    return Hit(
+        words=told | words,
+        joint=alarm.subject if is_of_a_joint else "",
+        since_ns=alarm.raised_ns,
+        evidence=(Evidence(alarm.name, value, alarm.limit, alarm.unit), *evidence),
+    )
+
+
+def _measured(alarm: Alarm, value: float, situation: Situation) -> JointSituation | None:
+    """The joint of an alarm of the clearance, if its value is known by measurement and not by counting."""
+    own = (each for each in situation.joints if alarm.kind == "clearance" and each.joint == alarm.subject)
+    return next((each for each in own if each.measured is not None and value > each.counted_m), None)

@@ -1,15 +1,20 @@
-"""A verdict and the findings it is made of; everything here is immutable."""
+"""The verdict: state, joints, reason, what to do; and the words for each cause of a torque."""
 
+import math
 from collections.abc import Iterable, Sequence
 from enum import Enum
 from typing import Any
 
 import attrs
 
-from leg_wear_monitor.json_text import finite_or_none
-from leg_wear_monitor.monitor.alarms.alarm import Level
-from leg_wear_monitor.monitor.alarms.guides import guide_of
+from leg_wear_monitor.estimate.cause import Cause, NamedCause, TorqueExplanation
+from leg_wear_monitor.files import finite_or_none
+from leg_wear_monitor.monitor.alarms import Level, guide_of
+from leg_wear_monitor.monitor.config.inputs import AT_START, Crank, DriveTorque
+from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
 from leg_wear_monitor.shown import Shown
+
+# A verdict and the findings it is made of; everything here is immutable.
 
 
 class _Word(Enum):
@@ -220,3 +225,240 @@ def has_changed(before: Verdict | None, after: Verdict) -> bool:
 
 def _identity(verdict: Verdict) -> tuple[object, ...]:
     return (verdict.state, verdict.fault_code, verdict.not_valid)
+
+
+# Values in the verdict's sentences: units that operators read, in three digits.
+
+
+_KEYS = {"m/h": "m_per_hour", "N m": "nm"}
+_UNITS = {key: unit for unit, key in _KEYS.items()} | {"n": "N", "hz": "Hz", "pa": "Pa"}
+_SHOWN = {"m": (1.0e3, "mm"), "m/h": (1.0e6, "um/h"), "s": (1.0e3, "ms"), "rad": (1.0e3, "mrad")}
+
+
+def with_unit(name: str, unit: str) -> str:
+    """Key of a value in a status: a name that ends in the value's unit."""
+    key = _KEYS.get(unit, unit.lower())
+    return f"{name}_{key}" if key and not name.endswith(f"_{key}") else name
+
+
+def unit_of(key: str, name: str) -> str:
+    """Unit of a value by its key, for which `with_unit` was given a name; empty if the key is not of it."""
+    if not key.startswith(f"{name}_"):
+        return ""
+    found = key.removeprefix(f"{name}_")
+    return _UNITS.get(found, found)
+
+
+def amount(value: float, unit: str) -> str:
+    """A value [SI] with its unit, such as ``0.62 mm``; a fraction has none."""
+    factor, shown = _SHOWN.get(unit, (1.0, unit))
+    if unit == "s" and abs(value) >= 1.0:
+        factor, shown = 1.0, unit
+    return f"{_digits(factor * value)} {shown}".rstrip()
+
+
+def estimate(value: float, sigma: float, unit: str) -> str:
+    """A value [SI] and its standard deviation, such as ``0.62 mm ± 0.03 mm``."""
+    return f"{amount(value, unit)} ± {amount(sigma, unit)}"
+
+
+def _digits(value: float) -> str:
+    if math.isnan(value):
+        return "unknown"
+    return f"{value:.0f}" if 999.5 <= abs(value) < 1.0e6 else f"{value:.3g}"
+
+
+# What explains a drive torque, in words: causes with values, and what a person does about them.
+#
+# One sentence a cause, whether a torque mismatch, an alarm of the torque or the diagnosis shows it.
+
+
+_SURE = 3.0  # standard deviations
+_MOST = 3  # alternatives in words
+_NEAR = 0.03  # by which a factor may differ from that of a known mistake
+
+EVIDENCE = {
+    Cause.SIGN: ("torque_factor", ""),
+    Cause.SCALE: ("torque_factor_size", ""),
+    Cause.TIMING: ("crank_angle_ahead", "rad"),
+    Cause.CRANK_OFFSET: ("crank_angle_ahead", "rad"),
+    Cause.LAG: ("torque_late", "s"),
+    Cause.BIAS: ("impossible_friction", "N m"),
+    Cause.FRICTION: ("friction", "N m"),
+    Cause.LOAD_FRICTION: ("load_friction", ""),
+    Cause.LOAD: ("foot_load", "N"),
+    Cause.MASS: ("mass_fraction", ""),
+    Cause.LENGTH: ("length_fraction", ""),
+    Cause.UNKNOWN: ("unknown_change", ""),
+}
+"""Name and unit of each cause's value; that of a clearance has the name of its joint."""
+
+_DELAY, _ZERO = "look for a delay of the torque", "check the zero of the torque sensor"
+_COMPARED = {Cause.MASS: ("lighter", "heavier"), Cause.LENGTH: ("shorter", "longer")}
+
+
+@attrs.frozen
+class CauseWords:
+    """Words for causes, of a monitor whose crank and drive torque have some parameters.
+
+    Attributes
+    ----------
+    crank, torque : Crank, DriveTorque
+    speed_radps : float
+        Mean speed of the crank; NaN if it is not known.
+    """
+
+    crank: Crank
+    torque: DriveTorque
+    speed_radps: float = math.nan
+
+    def explanation(self, explained: TorqueExplanation) -> str:
+        """All alternatives with their values, and what stays unexplained."""
+        left = estimate(explained.after, explained.after_sigma, "")
+        rest = f"{left} of the predicted RMS stays unexplained"
+        other = "the mechanism is another one, or a clearance has changed"
+        if not explained.alternatives:
+            return (
+                "no reversed sign, factor, crank angle, lag, load at the foot or mass of a body explains "
+                f"half of it: {rest}; {other}"
+            )
+        told = [" and ".join(map(self.cause, causes)) for causes in explained.alternatives]
+        words = ", or ".join([*told[:_MOST], *(["others"] if len(told) > _MOST else [])])
+        if len(told) > 1:
+            words += " (these explain the torque equally well and cannot be distinguished)"
+        if abs(explained.bias.value) > _SURE * explained.bias.sigma:
+            words += f"; {self.cause(explained.bias)}"
+        return words if explained.is_whole else f"{words}; {rest}: {other}"
+
+    def cause(self, one: NamedCause) -> str:
+        """A cause other than a clearance, with its value; the drive torque is *it*."""
+        size = estimate(abs(one.value), one.sigma, EVIDENCE[one.cause][1])
+        match one.cause:
+            case Cause.SIGN:
+                return f"it is {estimate(one.value, one.sigma, '')} times the predicted one"
+            case Cause.SCALE:
+                return f"its size is {size} times the predicted one{self._known_factor(one)[0]}"
+            case Cause.TIMING:
+                return self._timing(one)
+            case Cause.CRANK_OFFSET:
+                return f"the crank is {size} {'ahead of' if one.value > 0.0 else 'behind'} its measured angle"
+            case Cause.LAG:
+                return f"the torque is {size} {'late' if one.value > 0.0 else 'early'}"
+            case Cause.BIAS if one.value < 0.0:
+                return f"a constant torque of {size} drives the crank; friction cannot drive"
+            case Cause.BIAS:
+                return f"a constant torque exceeds the largest friction of the drive by {size}"
+            case Cause.FRICTION:
+                return f"the constant torque has {_way(one)} by {size} since this leg was commissioned"
+            case Cause.LOAD_FRICTION:
+                return f"the part of the torque that is friction has {_way(one)} by {size}, of 1"
+            case Cause.LOAD:
+                return f"a load of {size} {'lifts' if one.value > 0.0 else 'pulls down'} the foot"
+            case Cause.MASS | Cause.LENGTH:
+                percent = estimate(100.0 * abs(one.value), 100.0 * one.sigma, "%")
+                return f"body {one.subject} is {percent} {_COMPARED[one.cause][one.value > 0.0]}"
+        return "no single cause explains the change"
+
+    def remedy(self, one: NamedCause) -> str:
+        """What a person does about a cause."""
+        match one.cause:
+            case Cause.SIGN:
+                return f"set drive_torque.sign to {-self.torque.sign}"
+            case Cause.SCALE:
+                return self._known_factor(one)[1]
+            case Cause.TIMING:
+                shift = f"{self._shift(one.value)} if its angle is wrong, else {_DELAY}"
+                return f"turn the crank to a known angle and compare: {shift}"
+            case Cause.CRANK_OFFSET:
+                return self._shift(one.value)
+            case Cause.LAG:
+                return _DELAY
+            case Cause.BIAS:
+                more = ", and the friction of the drive" if one.value > 0.0 else ""
+                return f"{_ZERO}, drive_torque.sign, scale and gear_ratio{more}"
+            case Cause.FRICTION | Cause.LOAD_FRICTION:
+                return f"{_ZERO}, the lubrication and the temperature of the drive"
+            case Cause.LOAD:
+                return "check the load and the ground at the foot"
+            case Cause.MASS:
+                return (
+                    f"check for loose or added parts, and the mass of {one.subject} in the mechanism's file"
+                )
+        return "look for loose, bent or added parts, and rock each joint"
+
+    def _known_factor(self, one: NamedCause) -> tuple[str, str]:
+        """What a factor looks like, and the remedy."""
+        torque, gear = self.torque, self.crank.gear_ratio
+        scale = f"set drive_torque.scale to {torque.scale / one.value:.4g}"
+        if _is_near(one, 1000.0):
+            return ": it is in N mm", scale
+        if gear != 1.0 and _is_near(one, 1.0 / gear):
+            return (
+                f": it is the torque on the joint's shaft; crank.gear_ratio is {amount(gear, '')}",
+                f"set drive_torque.gear_ratio to {torque.gear_ratio * gear:.4g}",
+            )
+        if torque.gear_ratio != 1.0 and _is_near(one, torque.gear_ratio):
+            return (
+                ": it is already the torque on the crank; drive_torque.gear_ratio is "
+                f"{amount(torque.gear_ratio, '')}",
+                "set drive_torque.gear_ratio to 1",
+            )
+        return "", f"{scale}, or correct drive_torque.gear_ratio"
+
+    def _timing(self, one: NamedCause) -> str:
+        """An angle that an offset of the crank explains as well as a lag does."""
+        speed = self.speed_radps
+        offset = self.cause(NamedCause(Cause.CRANK_OFFSET, one.value, one.sigma))
+        if not abs(speed) > 0.0:
+            return f"{offset}, or the torque is {'early' if one.value > 0.0 else 'late'}"
+        lag = self.cause(NamedCause(Cause.LAG, -one.value / speed, one.sigma / abs(speed)))
+        return f"{offset}, or {lag}: at one speed the two cannot be distinguished"
+
+    def _shift(self, angle_rad: float) -> str:
+        if self.crank.zero == AT_START:
+            return "restart the monitor while the leg walks steadily, so that the crank's zero is found again"
+        right = f"set crank.offset_rad to {self.crank.offset_rad + angle_rad:.4g}"
+        return right if angle_rad else "correct crank.offset_rad"
+
+
+def _way(one: NamedCause) -> str:
+    return "risen" if one.value > 0.0 else "fallen"
+
+
+def _is_near(one: NamedCause, factor: float) -> bool:
+    return abs(one.value - factor) <= max(_SURE * one.sigma, _NEAR * factor)
+
+
+# State of the diagnosis in words, without the values that change in each gait cycle.
+
+
+_STATES = {
+    DiagnosisState.OFF: "off",
+    DiagnosisState.WAITING: "waiting",
+    DiagnosisState.AS_COUNTED: "the drive torque shows the counted clearances",
+    DiagnosisState.CHANGED: "the drive torque shows a change",
+}
+
+
+def diagnosis_words(diagnosis: Diagnosis, joints: Sequence[str]) -> str:
+    """State, reason, and the joints (k,) that the drive torque does not show."""
+    told = [_STATES[diagnosis.state]]
+    if diagnosis.reason:
+        told.append(diagnosis.reason)
+    if diagnosis.next_step:
+        told.append(diagnosis.next_step)
+    hidden = unseen(diagnosis, joints)
+    if diagnosis.clearance_m and hidden:
+        told.append(f"not observable: {', '.join(hidden)}")
+    if diagnosis.bodies:
+        told.append("wear is counted with the masses, lengths and friction that the drive torque shows")
+    return "; ".join(told)
+
+
+def unseen(diagnosis: Diagnosis, joints: Sequence[str]) -> tuple[str, ...]:
+    """Joints whose clearance the drive torque does not show."""
+    if not diagnosis.clearance_m:
+        return tuple(joints)
+    return tuple(
+        joint for joint, value in zip(joints, diagnosis.clearance_m, strict=True) if math.isnan(value)
+    )

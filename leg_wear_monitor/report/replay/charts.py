@@ -7,11 +7,23 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.playback.result.parts import AlarmChange
-from leg_wear_monitor.playback.result.replay_history import ReplayHistory
-from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
-from leg_wear_monitor.report.chart import Chart, Panel, Series
-from leg_wear_monitor.report.figures.replay_series import opened, time_of
+from leg_wear_monitor.mechanism.materials import BushingLoad
+from leg_wear_monitor.monitor.verdict.verdict import Figure
+from leg_wear_monitor.playback.result import AlarmChange, ReplayHistory, ReplaySummary
+from leg_wear_monitor.report.figure import opened, time_of
+from leg_wear_monitor.report.page import (
+    NOT_VALID,
+    Chart,
+    Panel,
+    Part,
+    Section,
+    Series,
+    Table,
+    Text,
+    not_valid,
+    value,
+)
+from leg_wear_monitor.report.replay.joint_rows import counted_mm
 
 SERIES_COLOURS = 7  # of the style sheet
 _GROUP = "time"
@@ -229,3 +241,146 @@ def _greatest(values: Floats, otherwise: float = 0.0) -> float:
 
 def _least(values: Floats) -> float:
     return -_greatest(-values, -math.inf)
+
+
+# Clearances over time and at the end, as counted and as further encoders show them.
+
+
+_TITLE = "Clearance over time"
+
+
+def clearance_section(summary: ReplaySummary) -> Section:
+    """Clearances by estimate, and the counted ones where they are valid."""
+    doubt = not_valid(summary.verdict, Figure.CLEARANCES)
+    seen = [estimates_chart(summary)] if has_estimates(summary) else []
+    if doubt:
+        text = Text(f"Counted clearances: {doubt}.", is_not_valid=True)
+        return Section(_TITLE, [*seen, text], is_folded=True)
+    return Section(_TITLE, [openings_chart(summary), *seen, _table(summary)], is_folded=True)
+
+
+def _table(summary: ReplaySummary) -> Table:
+    has_growth = Figure.GROWTH not in summary.verdict.not_valid
+    is_sampled = any(joint.sampling_sigma_m for joint in summary.joints.values())
+    rows = []
+    for name, joint in summary.joints.items():
+        clearance = joint.clearance_m
+        growth = (
+            value(1.0e12, joint.growth_m_per_cycle),
+            value(1.0e12, joint.growth_error_m_per_cycle),
+        )
+        rows.append(
+            (
+                summary.leg.joint_words(name),
+                counted_mm(summary, name),
+                value(1.0e9, clearance.last - clearance.first),
+                *((value(1.0e9, joint.sampling_sigma_m),) if is_sampled else ()),
+                *(growth if has_growth else (NOT_VALID, NOT_VALID)),
+            )
+        )
+    return Table(
+        caption="Clearances at the end",
+        head=(
+            *("joint", "counted clearance [mm]", "opened [nm]"),
+            *(("standard error of sampling [nm]",) if is_sampled else ()),
+            *("growth [pm/cycle]", "± [pm/cycle]"),
+        ),
+        rows=rows,
+        note="Counted: the clearance when new plus the wear counted by the model since, in its "
+        "significant digits. ± is one standard deviation of the growth: gait cycles of a chaotic "
+        "motion scatter, and the leg may be built with other masses than its file has.",
+    )
+
+
+def clearance_sentences(summary: ReplaySummary) -> list[str]:
+    """Joints that surely are not as counted, a sentence each."""
+    sentences = []
+    for name, joint in summary.joints.items():
+        off = joint.seen.departure_m if joint.seen and joint.seen.is_other else None
+        if off is not None:
+            sentences.append(
+                f"Encoders show that {summary.leg.joint_words(name)} is {1.0e6 * abs(off):.0f} µm "
+                f"{'wider' if off > 0.0 else 'narrower'} than counted."
+            )
+    return sentences
+
+
+def encoder_sections(summary: ReplaySummary) -> list[Section]:
+    """Clearances as further encoders show them, if there are such."""
+    is_counted_leg = Figure.CLEARANCES not in summary.verdict.not_valid
+    rows = [
+        (
+            summary.leg.joint_words(name),
+            _millimetres(joint.clearance_m.last) if is_counted_leg else NOT_VALID,
+            _millimetres(joint.seen.clearance_m),
+            _millimetres(joint.seen.sigma_m),
+            "other than counted" if joint.seen.is_other else joint.seen.observation.value,
+        )
+        for name, joint in summary.joints.items()
+        if joint.seen
+    ]
+    if not rows:
+        return []
+    title = "Clearances estimated from encoders"
+    table = Table(
+        caption=title,
+        head=("joint", "counted [mm]", "estimated [mm]", "± [mm]", ""),
+        rows=rows,
+        note="Counted: by the law of wear with the nominal coefficient. Estimated: from the angles of "
+        "further encoders over the last gait cycles; the standard deviation includes the model error.",
+    )
+    return [Section(title, [table], is_folded=True)]
+
+
+def _millimetres(metres: float | None) -> str:
+    return "-" if metres is None else f"{1.0e3 * metres:.4f}"
+
+
+# Contact forces of each joint over time.
+
+
+def force_section(summary: ReplaySummary) -> Section:
+    """Chart and table."""
+    doubt = not_valid(summary.verdict, Figure.IMPACT_FORCES)
+    if doubt:
+        return Section("Impact forces", [Text(doubt, is_not_valid=True)], is_folded=True)
+    rows = [
+        (
+            summary.leg.joint_words(name),
+            value(1.0, joint.peak_force_n),
+            value(1.0, joint.mean_force_n),
+            str(joint.impacts),
+        )
+        for name, joint in summary.joints.items()
+    ]
+    table = Table(caption="Contact forces", head=("joint", "peak [N]", "mean [N]", "impacts"), rows=rows)
+    return Section("Impact forces", [force_chart(summary), table, *_loads(summary)], is_folded=True)
+
+
+def _loads(summary: ReplaySummary) -> list[Part]:
+    """Pressure, sliding speed and p v of each joint in the last gait cycle, against its material's limits."""
+    loads = {summary.leg.joint_words(name): joint.load for name, joint in summary.joints.items()}
+    rows = [(name, *_load_cells(load)) for name, load in loads.items() if load is not None]
+    if not rows:
+        return []
+    table = Table(
+        caption="Pressure and sliding speed in the last gait cycle, and the limits of the materials",
+        head=("joint", "p mean [MPa]", "p p99 [MPa]", "limit", "v [m/s]", "limit", "p v [MPa m/s]", "limit"),
+        rows=rows,
+        note="p: force over diameter times width. v: mean sliding speed under load. A dash: the material has "
+        "no such limit. Beyond a limit, the wear coefficient does not hold.",
+    )
+    told = [f"{name}: {load.outside_limits}." for name, load in loads.items() if load and load.outside_limits]
+    return [table, *(Text(text, is_not_valid=True) for text in told)]
+
+
+def _load_cells(load: BushingLoad) -> tuple[str, ...]:
+    return (
+        value(1.0e-6, load.mean_pressure_pa),
+        value(1.0e-6, load.p99_pressure_pa),
+        value(1.0e-6, load.pressure_limit_pa),
+        value(1.0, load.mean_sliding_speed_mps),
+        value(1.0, load.sliding_speed_limit_mps),
+        value(1.0e-6, load.mean_pressure_speed_pa_mps),
+        value(1.0e-6, load.pressure_speed_limit_pa_mps),
+    )

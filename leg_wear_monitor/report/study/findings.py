@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from leg_wear_monitor.mechanism.law_names import NORMAL_LAWS
+from leg_wear_monitor.mechanism import NORMAL_LAWS
 from leg_wear_monitor.report.study.text import (
     PICO,
     QUANTITIES,
@@ -16,8 +16,8 @@ from leg_wear_monitor.report.study.text import (
     with_spread,
     zone_text,
 )
-from leg_wear_monitor.studies.point import Arrays
-from leg_wear_monitor.studies.summary import (
+from leg_wear_monitor.studies.plan import (
+    Arrays,
     Spread,
     clearance_joints_of,
     depth_per_cycle,

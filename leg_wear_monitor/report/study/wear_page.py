@@ -1,29 +1,45 @@
 """HTML page of the wear study: wear of new joints, and its development over a life."""
 
+import textwrap
 from collections.abc import Sequence
 
 import numpy as np
 
-from leg_wear_monitor.report.figures.figure import INK, SMALL, new_figure, png, tidy
-from leg_wear_monitor.report.page import Section
-from leg_wear_monitor.report.parts import Gallery, Picture, Table
+from leg_wear_monitor.report.figure import BLUE, GREEN, INK, PAPER, SMALL, VERMILION, new_figure, png, tidy
+from leg_wear_monitor.report.page import Gallery, Picture, Section, Table
 from leg_wear_monitor.report.study import findings
-from leg_wear_monitor.report.study.sections import Sections, asked, conclude, cycle, wear
+from leg_wear_monitor.report.study.sections import Sections, asked, conclude, cycle, wear, wear_gallery
 from leg_wear_monitor.report.study.text import (
+    MARKS,
     PICO,
     Labelled,
+    joined,
     joint_table,
     number,
+    percent,
     wear_table,
     with_spread,
     zone_text,
 )
-from leg_wear_monitor.report.study.trends import MARKS
-from leg_wear_monitor.report.study.wear_pictures import wear_gallery
-from leg_wear_monitor.studies.point import Arrays
-from leg_wear_monitor.studies.results import StudyResults
-from leg_wear_monitor.studies.summary import clearance_joints_of, spread
-from leg_wear_monitor.wear.surfaces import BUSHING, wear_zone
+from leg_wear_monitor.studies.leg_tasks import DEAD_POINT, OPEN, STEP, TRANSMISSION
+from leg_wear_monitor.studies.plan import (
+    Arrays,
+    clearance_joints_of,
+    depth_per_cycle,
+    joint_force,
+    of_clearance_joints,
+    spread,
+)
+from leg_wear_monitor.studies.results import (
+    CONFIDENCE,
+    FAILS,
+    HOLDS,
+    UNDECIDED,
+    ClaimResult,
+    LegClaims,
+    StudyResults,
+)
+from leg_wear_monitor.wear import BUSHING, wear_zone
 
 _NEW, _END = 0, 1  # indices of states: rates when new and at the end (depths: halfway and at the end)
 _MILLION = 1.0e-6
@@ -154,4 +170,189 @@ def life_table(lives: Labelled, head: str) -> Table:
         rows=rows,
         note="Mean and standard deviation over runs; the life ends where the joint that wears fastest has "
         "opened as far as the configuration says.",
+    )
+
+
+# HTML page of the study of other lengths and masses: claims against fractions of legs.
+
+
+_ALWAYS, _NEVER = 0.9, 0.1  # a fraction whose interval is beyond these hardly depends on the leg
+_REASONS = {
+    OPEN: "no assembly near that of the file",
+    DEAD_POINT: "dead point",
+    TRANSMISSION: "transmission near a dead point",
+    STEP: "step of another size",
+}
+_LOOKS = ((HOLDS, BLUE, "o"), (FAILS, VERMILION, "s"), (UNDECIDED, GREEN, "^"))
+_WIDE = 52  # characters in a line of a picture's title
+
+
+def legs(results: StudyResults, _labelled: Labelled) -> Sections:
+    """Sections of the page."""
+    found = results.claims()
+    sections = [asked(results), conclude(_sentences(found)), Section("Claims", [claim_table(found)])]
+    gallery = influence_gallery(found)
+    if gallery.pictures:
+        sections.append(Section("What decides", [gallery]))
+    return sections
+
+
+def _sentences(found: LegClaims) -> list[str]:
+    rejected = [f"{_REASONS[reason]} {count}" for reason, count in found.rejected.items()]
+    drawn = found.legs + sum(found.rejected.values())
+    sentences = [f"Of {drawn} drawn legs {found.legs} walk" + _tail(rejected) + "."]
+    known = [result for result in found.claims if result.fraction is not None]
+    groups = (
+        ("Hold in more than 90 % of legs", [one for one in known if one.interval[0] > _ALWAYS]),
+        ("Hold in less than 10 % of legs", [one for one in known if one.interval[1] < _NEVER]),
+    )
+    for head, group in groups:
+        if group:
+            sentences.append(f"{head}: {'; '.join(one.claim.text for one in group)}.")
+    between = [one for one in known if one.interval[0] <= _ALWAYS and one.interval[1] >= _NEVER]
+    if between:
+        texts = [f"{one.claim.text} ({_fraction(one)})" for one in between]
+        sentences.append(f"Depend on lengths and masses, or are not sure: {'; '.join(texts)}.")
+    open_ones = sum(result.count(UNDECIDED) for result in found.claims)
+    if found.legs:
+        part = percent(open_ones / (found.legs * len(found.claims)))
+        sentences.append(f"Within the scatter over runs, and so undecided: {part} of all claims in all legs.")
+    return sentences
+
+
+def _tail(rejected: Sequence[str]) -> str:
+    return f"; rejected: {', '.join(rejected)}" if rejected else ""
+
+
+def claim_table(found: LegClaims) -> Table:
+    """Table of the claims against the fractions of legs, and what decides."""
+    rows = [
+        [
+            result.claim.place,
+            result.claim.text,
+            *(str(result.count(state)) for state in (HOLDS, FAILS, UNDECIDED)),
+            _fraction(result),
+            result.file_state or "–",
+            ", ".join(f"{one.factor} ({one.rank_correlation:+.2f})" for one in result.influences) or "–",
+        ]
+        for result in found.claims
+    ]
+    return Table(
+        caption="The paper's claims in legs of other lengths and masses",
+        head=[
+            "clearance in",
+            "claim",
+            "holds",
+            "fails",
+            "undecided",
+            "fraction of the decided [%]",
+            "leg of the file",
+            "decided by (rank correlation)",
+        ],
+        rows=rows,
+        note=f"Undecided: within the scatter over runs (Student's t, {percent(CONFIDENCE)}). Fraction: with "
+        f"Wilson's interval of {percent(CONFIDENCE)}. Decided by: factors whose rank correlation with the "
+        "measure of the claim is significant after Holm's correction for all claims and factors; positive "
+        "where a longer or heavier body favours the claim.",
+        is_text=True,
+    )
+
+
+def _fraction(result: ClaimResult) -> str:
+    if result.fraction is None:
+        return "–"
+    low, high = result.interval
+    return f"{100.0 * result.fraction:.0f} ({100.0 * low:.0f} to {100.0 * high:.0f})"
+
+
+def influence_gallery(found: LegClaims) -> Gallery:
+    """For every claim that a factor decides, its measure in all legs over the strongest factor."""
+    pictures = []
+    for result in (one for one in found.claims if one.influences):
+        first = result.influences[0]
+        factor, values = found.factors[first.factor], [effect.value for effect in result.effects]
+        figure = new_figure(4.6, 3.1)
+        axes = figure.subplots()
+        for state, colour, mark in _LOOKS:
+            chosen = [i for i, each in enumerate(result.states) if each == state]
+            axes.plot(
+                factor[chosen], [values[i] for i in chosen], mark, color=colour, markersize=4.5,
+                markeredgewidth=0.0, label=f"{state} ({len(chosen)})",
+            )  # fmt: skip
+        axes.axhline(0.0, color=INK, linewidth=0.8)
+        if result.file_leg is not None:
+            axes.plot(1.0, result.file_leg.value, "*", color=INK, markersize=13.0, markeredgecolor=PAPER)
+        axes.margins(y=0.2)  # room for the legend
+        tidy(axes)
+        axes.set_xlabel(f"factor on the {first.factor}", fontsize=SMALL)
+        axes.set_ylabel("measure of the claim", fontsize=SMALL)
+        axes.set_title(textwrap.fill(result.claim.text, _WIDE), fontsize=SMALL, color=INK, fontweight="bold")
+        axes.legend(fontsize=SMALL, frameon=False, ncols=3, handletextpad=0.1)
+        alt = f"{result.claim.text}: over the {first.factor}, rank correlation {first.rank_correlation:+.2f}"
+        pictures.append(Picture(image=png(figure), alt=alt))
+    caption = (
+        "A point for each leg; star: the leg of the file. The measure is the logarithm of the ratio that the "
+        "claim says is above 1, or the difference of the fractions (of variance that repeats, of a turn); "
+        "above 0 the claim holds."
+    )
+    return Gallery(pictures=pictures, caption=caption)
+
+
+# Conclusions of the study of oil and grease, from its data.
+
+
+_OPENS_M = 1.0e-4  # depth of the bushing at which a life is compared
+
+
+def lubrication(labelled: Labelled) -> list[str]:
+    """Order of the joints by wear, life of the first, forces and contact, dry and with each viscosity."""
+    (_, dry), *greased = labelled
+    sentences = [f"{_capital(label)}: {_order(arrays)}" for label, arrays in labelled]
+    for joint in clearance_joints_of(dry):
+        loads = [
+            f"{label} {with_spread(joint_force(arrays, 'p99_force_n', joint))}" for label, arrays in labelled
+        ]
+        sentences.append(
+            f"Joint {joint}: force of contact and film, 99 % of the time below [N]: {'; '.join(loads)}."
+        )
+    for label, arrays in greased:
+        sentences.append(f"With {label} {_against(arrays, dry)}.")
+    return sentences
+
+
+def _capital(label: str) -> str:
+    return label[:1].upper() + label[1:]
+
+
+def _order(arrays: Arrays) -> str:
+    """The joints by wear of the bushing, most first, and the life of the first."""
+    depths = {joint: depth_per_cycle(arrays, joint) for joint in clearance_joints_of(arrays)}
+    worn = sorted((joint for joint in depths if depths[joint].mean > 0.0), key=lambda j: -depths[j].mean)
+    if not worn:
+        return "the films carry everything, and no joint wears."
+    texts = [f"{joint} {with_spread(depths[joint], 1.0e12)}" for joint in worn]
+    first = depths[worn[0]]
+    cycles = _OPENS_M / first.mean
+    scatter = cycles * first.deviation / first.mean
+    rest = [joint for joint in depths if joint not in worn]
+    idle = f"; {joined(rest)} {'does' if len(rest) == 1 else 'do'} not wear" if rest else ""
+    return (
+        f"greatest depth of the bushings [pm a cycle]: {', '.join(texts)}{idle}. At this rate {worn[0]} is "
+        f"{1.0e3 * _OPENS_M:g} mm deep after {number(_MILLION * cycles)} ± {number(_MILLION * scatter)} "
+        "million cycles."
+    )
+
+
+def _against(arrays: Arrays, dry: Arrays) -> str:
+    """Wear and time in contact against those of the dry joints."""
+    wear, touch = [], []
+    for joint in clearance_joints_of(dry):
+        before, after = (
+            of_clearance_joints(each, "archard_integral_j_per_cycle", joint).mean for each in (dry, arrays)
+        )
+        wear.append(f"{joint} {percent(after / before)}" if before > 0.0 else f"{joint} –")
+        touch.append(f"{joint} {percent(of_clearance_joints(arrays, 'contact_fraction', joint).mean)}")
+    return (
+        f"the wear, ∫ F |v| dt of the contact's share, is of the dry one: {', '.join(wear)}; surfaces touch "
+        f"for: {', '.join(touch)} of the time"
     )

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.bags.mcap.records import COUNTS, IGNORED, walk
+from leg_wear_monitor.bags.mcap_layout import COUNTS, IGNORED, walk
 from leg_wear_monitor.messages.cdr import MESSAGE
 from leg_wear_monitor.messages.streams import JOINT_STATE, WRENCH_STAMPED
 

@@ -74,12 +74,13 @@ def _used(kind: str, path: Path, must_be_refused: bool) -> tuple[Outcome, str]:
 
 def _parameters(path: Path) -> str:
     from leg_wear_monitor.mechanism.loader import load_mechanism
-    from leg_wear_monitor.monitor.config.fitting import fitted, twin_settings
-    from leg_wear_monitor.monitor.config.parameter_file import load_config
-    from leg_wear_monitor.monitor.config.parameters import PARAMETERS, values_of
-    from leg_wear_monitor.monitor.config.plausible import parameter_doubts
-    from leg_wear_monitor.monitor.forecast.coefficient_prior import usual_prior
-    from leg_wear_monitor.monitor.forecast.wear_coefficients import MeasuredClearance, estimate_coefficient
+    from leg_wear_monitor.monitor.config.fitting import fitted, parameter_doubts, twin_settings
+    from leg_wear_monitor.monitor.config.parameters import PARAMETERS, load_config, values_of
+    from leg_wear_monitor.monitor.forecast.wear_coefficients import (
+        MeasuredClearance,
+        estimate_coefficient,
+        usual_prior,
+    )
 
     config = load_config(path)
     leg = fitted(load_mechanism(config.mechanism), config)
@@ -130,7 +131,7 @@ def _mechanism(path: Path) -> str:
 
 
 def _study(path: Path) -> str:
-    from leg_wear_monitor.studies.plan.settings import load_settings
+    from leg_wear_monitor.studies.execution import load_settings
 
     points = load_settings("wear", path).points()
     wrong = [point.label for point in points if not (math.isfinite(point.cost) and point.cost > 0.0)]
@@ -139,7 +140,7 @@ def _study(path: Path) -> str:
 
 def _life(path: Path) -> str:
     from leg_wear_monitor.mechanism.loader import load_mechanism
-    from leg_wear_monitor.monitor.forecast.life_file import law_of
+    from leg_wear_monitor.monitor.forecast.forecaster import law_of
 
     law = law_of(load_mechanism("four_bar"), str(path), 0.4)
     known = bool(np.isfinite(law.coupling).all() and np.isfinite(law.sigma).all())

@@ -19,9 +19,9 @@ from campaign.case import Case, Outcome
 from campaign.warm_twin import keep_twin
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.cli.main import cli
-from leg_wear_monitor.fleet.description.loader import load_fleet
-from leg_wear_monitor.fleet.directory.leg_directory import LegDirectory
-from leg_wear_monitor.fleet.overview.read import load_overview
+from leg_wear_monitor.fleet.description import load_fleet
+from leg_wear_monitor.fleet.directory import LegDirectory
+from leg_wear_monitor.fleet.overview import load_overview
 from leg_wear_monitor.fleet.update import update_fleet
 
 KILLS = 3  # in each case of kills

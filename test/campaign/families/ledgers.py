@@ -137,7 +137,7 @@ def _walk(path: Path, run: int, closed: bool) -> None:
 
 
 def _entry(run: int, step: int):  # type: ignore[no-untyped-def]
-    from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+    from leg_wear_monitor.monitor.alarms import Alarm, Level
     from leg_wear_monitor.monitor.ledger.entry import Entry, JointWear
 
     n = 9 * run + step + 1

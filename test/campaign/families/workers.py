@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from campaign.case import Case, Outcome
-from leg_wear_monitor.workers.job import Job
-from leg_wear_monitor.workers.processes import run_in_processes
+from leg_wear_monitor.workers import Job, run_in_processes
 
 SHORT, LONG = 4, 60
 

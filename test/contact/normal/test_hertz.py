@@ -4,9 +4,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.contact.geometry import contact_modulus
-from leg_wear_monitor.contact.normal.hertz import HERTZ, contact_stiffness, elastic_force
-from leg_wear_monitor.contact.normal.laws import LAWS, elastic_energy, law_coefficient, softening
+from leg_wear_monitor.contact.arrays import contact_modulus
+from leg_wear_monitor.contact.normal import (
+    HERTZ,
+    LAWS,
+    contact_stiffness,
+    elastic_energy,
+    elastic_force,
+    law_coefficient,
+    softening,
+)
 
 pytestmark = pytest.mark.plain
 

@@ -12,8 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from leg_wear_monitor.contact.normal.hysteresis import delivered_restitution
-from leg_wear_monitor.contact.normal.laws import LAWS, normal_force
+from leg_wear_monitor.contact.normal import LAWS, delivered_restitution, normal_force
 
 pytestmark = pytest.mark.plain
 

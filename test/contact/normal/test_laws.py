@@ -7,15 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.contact.geometry import contact_modulus
-from leg_wear_monitor.contact.normal.laws import (
-    LAWS,
-    elastic_energy,
-    law_coefficient,
-    normal_force,
-    softening,
-)
-from leg_wear_monitor.mechanism.law_names import NORMAL_LAWS
+from leg_wear_monitor.contact.arrays import contact_modulus
+from leg_wear_monitor.contact.normal import LAWS, elastic_energy, law_coefficient, normal_force, softening
+from leg_wear_monitor.mechanism import NORMAL_LAWS
 
 pytestmark = pytest.mark.plain
 

@@ -9,19 +9,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
 
-from leg_wear_monitor.contact.geometry import contact_modulus
-from leg_wear_monitor.contact.normal.hysteresis import delivered_restitution
-from leg_wear_monitor.contact.normal.laws import LAWS, elastic_energy, law_coefficient, normal_force
-from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
-from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.result.statistics import energy_balance
-from leg_wear_monitor.dynamics.run.run_statistics import (
-    ARCHARD,
-    CONTACT,
-    FORCE,
-    new_run_statistics,
+from leg_wear_monitor.contact.arrays import contact_modulus
+from leg_wear_monitor.contact.normal import (
+    LAWS,
+    delivered_restitution,
+    elastic_energy,
+    law_coefficient,
+    normal_force,
 )
+from leg_wear_monitor.dynamics.clearance.stepper import ClearanceRun
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.run import ARCHARD, CONTACT, FORCE, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
+from leg_wear_monitor.dynamics.statistics import energy_balance
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.loader import load_mechanism
 

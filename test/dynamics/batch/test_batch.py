@@ -7,16 +7,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from leg_wear_monitor import AssemblyError, ConfigError, SimulationError, load_mechanism, simulate
-from leg_wear_monitor.dynamics.batch import leg as batch_leg
-from leg_wear_monitor.dynamics.batch.batch import advance_batch, simulate_batch
-from leg_wear_monitor.dynamics.batch.leg import Leg
+from leg_wear_monitor.dynamics import batch as batch_leg
+from leg_wear_monitor.dynamics.batch import Leg, advance_batch, simulate_batch
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
 from leg_wear_monitor.dynamics.clearance.tables import build_basis, build_tables
-from leg_wear_monitor.dynamics.run.drive import steady_drive
-from leg_wear_monitor.dynamics.run.protocol import DONE, INVALID_DRIVE
-from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
+from leg_wear_monitor.dynamics.run import DONE, INVALID_DRIVE, new_run_statistics, steady_drive
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.position import TURN
 
 SHORT = {"cycles": 0.2, "skip_cycles": 0.1}
 

@@ -6,11 +6,10 @@ import pytest
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.dynamics.clearance.advance import ADVANCE
-from leg_wear_monitor.dynamics.clearance.beforehand import advance_arguments, observe_arguments
-from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
-from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
+from leg_wear_monitor.dynamics.clearance.stepper import ClearanceRun, advance_arguments, observe_arguments
+from leg_wear_monitor.dynamics.run import new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.mechanism.clearance import Film
+from leg_wear_monitor.mechanism.spec import Film
 
 
 def types_of(arguments):

@@ -4,13 +4,13 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.dynamics.clearance.coupling import DAMPING, PARTS, coupling_of
-from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
-from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.result.statistics import energy_balance
-from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, new_run_statistics
+from leg_wear_monitor.dynamics.clearance.model import DAMPING, PARTS, coupling_of
+from leg_wear_monitor.dynamics.clearance.stepper import ClearanceRun
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.run import TORQUE, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.dynamics.statistics import energy_balance
+from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism, Track, TrackDrive
 
 PHASES = 32

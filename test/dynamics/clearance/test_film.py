@@ -7,34 +7,45 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from leg_wear_monitor import Mechanism
-from leg_wear_monitor.dynamics.clearance.contact import CAM, DAMPING, NX, NY, SAMPLE_ROWS, STIFFNESS, VECTORS
-from leg_wear_monitor.dynamics.clearance.film import FILM_X, FILM_Y, MOMENT_B, MOMENT_J
-from leg_wear_monitor.dynamics.clearance.film_system import factorise_films, solve_films
-from leg_wear_monitor.dynamics.clearance.rosenbrock import (
+from leg_wear_monitor.compiled.vectors import padded
+from leg_wear_monitor.dynamics.clearance.contact import (
+    CAM,
+    DAMPING,
+    FILM_X,
+    FILM_Y,
+    MOMENT_B,
+    MOMENT_J,
+    NX,
+    NY,
+    SAMPLE_ROWS,
+    STIFFNESS,
+    VECTORS,
+)
+from leg_wear_monitor.dynamics.clearance.film_system import (
     GAMMA,
     contact_system,
     factorise_contacts,
+    factorise_films,
     solve_contacts,
+    solve_films,
 )
-from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
-from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
+from leg_wear_monitor.dynamics.clearance.stepper import ClearanceRun, ClearanceStepper
 from leg_wear_monitor.dynamics.clearance.tables import COARSER, build_tables
-from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.joint.contact_event import DELTA, EX, EY, F_N
-from leg_wear_monitor.dynamics.result.statistics import energy_balance
-from leg_wear_monitor.dynamics.run.drive import steady_drive
-from leg_wear_monitor.dynamics.run.run_statistics import (
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.joint import DELTA, EX, EY, F_N
+from leg_wear_monitor.dynamics.run import (
     ARCHARD,
     CONTACT,
     DISSIPATION,
     FORCE,
     FRICTION,
     new_run_statistics,
+    steady_drive,
 )
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.mechanism.clearance import Film
-from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
-from leg_wear_monitor.vectors import padded
+from leg_wear_monitor.dynamics.statistics import energy_balance
+from leg_wear_monitor.mechanism.position import TURN, one_cycle
+from leg_wear_monitor.mechanism.spec import Film
 
 FIVE = tuple("ABGIJ")
 POINTS = 256

@@ -5,14 +5,12 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.contact.arrays import ContactArrays
-from leg_wear_monitor.dynamics.clearance.basis import Basis
-from leg_wear_monitor.dynamics.clearance.layout import changing_shapes, motion_shapes, views
+from leg_wear_monitor.dynamics.clearance.basis import Basis, changing_shapes, motion_shapes, views
 from leg_wear_monitor.dynamics.clearance.tables import COARSER, ClearanceTables, build_tables
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.mechanism.forces import applied_forces_at, external_power
-from leg_wear_monitor.mechanism.ideal import TURN, ideal_motion, one_cycle
+from leg_wear_monitor.mechanism.constraints import applied_forces_at, external_power
 from leg_wear_monitor.mechanism.loader import load_mechanism, parse_mechanism
-from leg_wear_monitor.mechanism.position import Linkage, evaluate
+from leg_wear_monitor.mechanism.position import TURN, Linkage, evaluate, ideal_motion, one_cycle
 from leg_wear_monitor.mechanism.spec import ConstantLoad
 
 pytestmark = pytest.mark.plain

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import load_mechanism, simulate
-from leg_wear_monitor.mechanism.ground_reaction import on_the_ground
+from leg_wear_monitor.mechanism.person import on_the_ground
 
 # of the difference of two runs of four cycles, from 10 starts moved by 1e-12 in each model, 2026-11-25
 SIGMA_FORCE = [0.0010, 0.0012, 0.0005, 0.0005, 0.0006]

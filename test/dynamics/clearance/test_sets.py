@@ -13,11 +13,9 @@ import pytest
 
 from leg_wear_monitor.dynamics.clearance.stepper import TOLERANCE_M, ClearanceStepper
 from leg_wear_monitor.dynamics.clearance.tables import build_tables
-from leg_wear_monitor.dynamics.run.drive import steady_drive
-from leg_wear_monitor.dynamics.run.protocol import DONE
-from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, CONTACT, FORCE, new_run_statistics
+from leg_wear_monitor.dynamics.run import ARCHARD, CONTACT, DONE, FORCE, new_run_statistics, steady_drive
 from leg_wear_monitor.dynamics.simulation import prepare, simulate
-from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.position import TURN
 
 pytestmark = pytest.mark.chaotic
 

@@ -12,21 +12,22 @@ from hypothesis import strategies as st
 from leg_wear_monitor import Mechanism, load_mechanism
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
 from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, build_tables
-from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.run.drive import steady_drive
-from leg_wear_monitor.dynamics.run.protocol import DONE, INVALID_DRIVE
-from leg_wear_monitor.dynamics.run.run_statistics import (
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.run import (
     ARCHARD,
     BEGIN,
+    DONE,
     FORCE,
+    INVALID_DRIVE,
     PEAK,
     SPEED,
     RunStatistics,
     new_run_statistics,
+    steady_drive,
 )
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.mechanism.ideal import TURN, ideal_motion
-from leg_wear_monitor.wear.surfaces import SECTORS, Surfaces, worn_volume
+from leg_wear_monitor.mechanism.position import TURN, ideal_motion
+from leg_wear_monitor.wear import SECTORS, Surfaces, worn_volume
 
 FAST_WEAR = 1.0e-11  # 1/Pa: a cycle opens clearances by what steel does in ten thousand
 SHORT = 0.3  # s

@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 
-from leg_wear_monitor.dynamics.clearance.joint_laws import FRESH_COEFFICIENT
+from leg_wear_monitor.compiled.kernel import entry
+from leg_wear_monitor.compiled.vectors import WIDTH, padded, put_vector, vector_at
+from leg_wear_monitor.dynamics.clearance.contact import FRESH_COEFFICIENT, take_directions, touch_worn_walls
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
-from leg_wear_monitor.dynamics.clearance.worn_walls import take_directions, touch_worn_walls
-from leg_wear_monitor.dynamics.joint.joint_contact import coefficient_at, penetration
+from leg_wear_monitor.dynamics.joint import coefficient_at, penetration
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.kernel import entry
-from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.vectors import WIDTH, padded, put_vector, vector_at
+from leg_wear_monitor.mechanism.position import TURN
 
 pytestmark = pytest.mark.plain
 

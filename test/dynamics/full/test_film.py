@@ -4,13 +4,13 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.result.statistics import energy_balance
-from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, CONTACT, FORCE, new_run_statistics
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.run import ARCHARD, CONTACT, FORCE, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare, simulate
+from leg_wear_monitor.dynamics.statistics import energy_balance
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.mechanism.clearance import Film
 from leg_wear_monitor.mechanism.loader import load_mechanism, parse_mechanism
+from leg_wear_monitor.mechanism.spec import Film
 
 CYCLE = 60.0 / 5000.0  # s
 

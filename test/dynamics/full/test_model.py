@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from leg_wear_monitor.contact.arrays import clearance_settings, compile_contacts
-from leg_wear_monitor.dynamics.full.model import (
+from leg_wear_monitor.dynamics.full_model import (
     BAUMGARTE,
     accelerate,
     add_contacts,
@@ -17,13 +17,11 @@ from leg_wear_monitor.dynamics.full.model import (
     full_model,
     full_scratch,
 )
-from leg_wear_monitor.dynamics.joint.joint_contact import joint_force, penetration
-from leg_wear_monitor.dynamics.run.drive import steady_drive
-from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, DISSIPATION, FRICTION, JOINT_RATES
+from leg_wear_monitor.dynamics.joint import joint_force, penetration
+from leg_wear_monitor.dynamics.run import ARCHARD, DISSIPATION, FRICTION, JOINT_RATES, steady_drive
 from leg_wear_monitor.mechanism.constraints import closures, rotations
-from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
-from leg_wear_monitor.mechanism.position import dense_jacobian
-from leg_wear_monitor.wear.surfaces import SECTORS, Surfaces
+from leg_wear_monitor.mechanism.position import TURN, dense_jacobian, one_cycle
+from leg_wear_monitor.wear import SECTORS, Surfaces
 
 pytestmark = [pytest.mark.plain, pytest.mark.uncompiled]
 

@@ -5,18 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.run.run_statistics import (
-    DISSIPATION,
-    FRICTION,
-    POWER,
-    TORQUE,
-    new_run_statistics,
-)
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.run import DISSIPATION, FRICTION, POWER, TORQUE, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare, simulate
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
 from leg_wear_monitor.mechanism.loader import parse_mechanism
+from leg_wear_monitor.mechanism.position import TURN, one_cycle
 
 SPEED = 5.0  # rad/s
 INERTIA = 0.02  # kg m^2

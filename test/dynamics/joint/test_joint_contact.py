@@ -8,9 +8,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from leg_wear_monitor.contact.arrays import ContactArrays, clearance_settings, compile_contacts
-from leg_wear_monitor.contact.normal.laws import LAWS
-from leg_wear_monitor.dynamics.joint.joint_contact import contact_energy, joint_force, penetration
-from leg_wear_monitor.wear.surfaces import SECTORS, Surfaces, local_surfaces
+from leg_wear_monitor.contact.normal import LAWS
+from leg_wear_monitor.dynamics.joint import contact_energy, joint_force, penetration
+from leg_wear_monitor.wear import SECTORS, Surfaces, local_surfaces
 
 pytestmark = pytest.mark.plain
 

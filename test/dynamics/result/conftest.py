@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import Impact, JointResult, SimulationResult, TorqueResult, Trace
-from leg_wear_monitor.dynamics.result.parts import ClearanceResult, WearDepth
+from leg_wear_monitor.dynamics.result import ClearanceResult, WearDepth
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from leg_wear_monitor.dynamics.result.tables import impact_columns, joint_columns, trace_columns
+from leg_wear_monitor.dynamics.result import impact_columns, joint_columns, trace_columns
 
 pytestmark = pytest.mark.plain
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.dynamics.run.cholesky import factorise, substitute
+from leg_wear_monitor.dynamics.full_model import factorise, substitute
 
 pytestmark = pytest.mark.plain
 

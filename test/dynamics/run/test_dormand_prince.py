@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from leg_wear_monitor.dynamics.run.dormand_prince import (
+from leg_wear_monitor.dynamics.run import (
     ERROR,
     NODES,
     STAGES,

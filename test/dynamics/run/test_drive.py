@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from leg_wear_monitor.dynamics.run.drive import DEGREE, drive_at, steady_drive
+from leg_wear_monitor.dynamics.run import DEGREE, drive_at, steady_drive
 
 pytestmark = pytest.mark.plain
 

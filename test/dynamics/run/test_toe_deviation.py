@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from leg_wear_monitor.dynamics.run.toe_deviation import NO_TOE, ideal_toe, interpolate
-from leg_wear_monitor.mechanism.ideal import TURN, ideal_motion, point_motion
+from leg_wear_monitor.dynamics.full_model import NO_TOE, ideal_toe, interpolate
+from leg_wear_monitor.mechanism.position import TURN, ideal_motion, point_motion
 
 pytestmark = pytest.mark.plain
 

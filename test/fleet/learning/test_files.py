@@ -7,12 +7,15 @@ import attrs
 import pytest
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.fleet.learning.files import priors_of, write_learning
-from leg_wear_monitor.fleet.learning.learn import learn
-from leg_wear_monitor.fleet.learning.part import pair_of, parts_of
-from leg_wear_monitor.monitor.config.forecast import Forecasting
-from leg_wear_monitor.monitor.forecast.coefficient_prior import prior_source, usual_prior
-from leg_wear_monitor.monitor.forecast.wear_coefficients import MeasuredClearance, estimate_coefficient
+from leg_wear_monitor.fleet.learning import learn, pair_of, parts_of
+from leg_wear_monitor.fleet.renew import priors_of, write_learning
+from leg_wear_monitor.monitor.config.sections import Forecasting
+from leg_wear_monitor.monitor.forecast.wear_coefficients import (
+    MeasuredClearance,
+    estimate_coefficient,
+    prior_source,
+    usual_prior,
+)
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 
 pytestmark = pytest.mark.plain

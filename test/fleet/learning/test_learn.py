@@ -8,10 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from leg_wear_monitor.fleet.learning.learn import learn
-from leg_wear_monitor.fleet.learning.levels import LOT, PAIR, PART, variances
-from leg_wear_monitor.fleet.learning.part import Part
-from leg_wear_monitor.monitor.forecast.coefficient_prior import CoefficientPrior
+from leg_wear_monitor.fleet.learning import LOT, PAIR, PART, Part, learn, variances
+from leg_wear_monitor.monitor.forecast.wear_coefficients import CoefficientPrior
 
 pytestmark = pytest.mark.plain
 

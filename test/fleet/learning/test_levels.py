@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from leg_wear_monitor.fleet.learning.levels import Evidence, Variances, predict, variances
+from leg_wear_monitor.fleet.learning import Evidence, Variances, predict, variances
 
 pytestmark = pytest.mark.plain
 

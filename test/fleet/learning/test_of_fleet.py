@@ -7,13 +7,13 @@ import attrs
 import pytest
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.fleet.description.fleet_description import FleetLeg
-from leg_wear_monitor.fleet.directory.leg_directory import LegDirectory
-from leg_wear_monitor.fleet.learning import of_fleet
-from leg_wear_monitor.fleet.learning.of_fleet import learn_fleet
+from leg_wear_monitor.fleet import renew
+from leg_wear_monitor.fleet.description import FleetLeg
+from leg_wear_monitor.fleet.directory import LegDirectory
+from leg_wear_monitor.fleet.renew import learn_fleet
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.forecast.coefficient_prior import read_priors
+from leg_wear_monitor.monitor.forecast.wear_coefficients import read_priors
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.ledger.ledger import open_ledger
 
@@ -95,7 +95,7 @@ def test_where_nobody_ever_measured_no_ledger_is_copied(tmp_path, monkeypatch):
         path.parent.mkdir(parents=True)
         settings = attrs.evolve(one.config, ledger=attrs.evolve(one.config.ledger, path=str(path)))
         open_ledger(fitted(load_mechanism(settings.mechanism), settings), settings).close()
-    monkeypatch.setattr(of_fleet, "copy_of", lambda path: pytest.fail(f"{path} is copied"))
+    monkeypatch.setattr(renew, "copy_of", lambda path: pytest.fail(f"{path} is copied"))
     found = learn_fleet(legs, tmp_path)
     assert (dict(found.pairs), dict(found.priors), found.findings) == ({}, {}, ())
     assert json.loads((tmp_path / "learning.json").read_text())["pairs"] == {}

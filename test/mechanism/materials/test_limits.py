@@ -4,7 +4,7 @@ import attrs
 import pytest
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.mechanism.materials.load import Bushing, BushingLoad
+from leg_wear_monitor.mechanism.materials import Bushing, BushingLoad
 
 pytestmark = pytest.mark.plain
 

@@ -8,9 +8,8 @@ import pytest
 from ruamel.yaml import YAML
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.mechanism.materials.material import Material
-from leg_wear_monitor.mechanism.materials.sourced import SourcedValue, WearCoefficient
-from leg_wear_monitor.mechanism.materials.units import UNITS
+from leg_wear_monitor.mechanism.materials import Material
+from leg_wear_monitor.mechanism.sourced import UNITS, SourcedValue, WearCoefficient
 
 pytestmark = pytest.mark.plain
 

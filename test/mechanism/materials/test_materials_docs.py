@@ -7,10 +7,10 @@ from typing import Any
 import attrs
 import pytest
 
-from leg_wear_monitor.mechanism.drives.drive import Drive
-from leg_wear_monitor.mechanism.materials import material, sourced
-from leg_wear_monitor.mechanism.materials.loader import load_material, materials
-from leg_wear_monitor.mechanism.materials.units import UNITS
+from leg_wear_monitor.mechanism import materials as material
+from leg_wear_monitor.mechanism import sourced
+from leg_wear_monitor.mechanism.materials import load_material, materials
+from leg_wear_monitor.mechanism.sourced import UNITS, Drive
 
 PAGE = Path(__file__).parents[3] / "docs" / "reference" / "materials.md"
 TABLE = re.compile(r"(<!-- (pairs|units|keys of (\w+)) -->\n).*?(<!-- end -->)", re.DOTALL)

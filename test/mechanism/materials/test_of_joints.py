@@ -10,8 +10,7 @@ from ruamel.yaml import YAML
 import leg_wear_monitor as lw
 from leg_wear_monitor.life.life import LifeRun
 from leg_wear_monitor.mechanism.loader import parse_mechanism, shipped_mechanisms
-from leg_wear_monitor.mechanism.materials.load import bushing_of
-from leg_wear_monitor.mechanism.materials.of_joints import regimes
+from leg_wear_monitor.mechanism.materials import bushing_of, regimes
 from leg_wear_monitor.mechanism.plausible import doubts
 from leg_wear_monitor.monitor.ledger.entry import fingerprint
 

@@ -5,7 +5,7 @@ import math
 import pytest
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.mechanism.materials.rating_life import rating_life_hours
+from leg_wear_monitor.mechanism.materials import rating_life_hours
 
 pytestmark = pytest.mark.plain
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level, Limit, acknowledged, evaluated, has_changed
+from leg_wear_monitor.monitor.alarms import Alarm, Level, Limit, acknowledged, evaluated, has_changed
 
 pytestmark = pytest.mark.plain
 

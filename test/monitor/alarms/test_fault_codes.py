@@ -6,8 +6,7 @@ from pathlib import Path
 import attrs
 import pytest
 
-from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
-from leg_wear_monitor.monitor.alarms.fault_codes import FAULT_CODES, NO_FAULT, code_of, worst_code
+from leg_wear_monitor.monitor.alarms import FAULT_CODES, NO_FAULT, Alarm, Level, code_of, worst_code
 
 pytestmark = pytest.mark.plain
 

@@ -5,8 +5,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level, Limit, acknowledged, evaluated
-from leg_wear_monitor.monitor.alarms.words import raised_words, state_of
+from leg_wear_monitor.monitor.alarms import (
+    Alarm,
+    Level,
+    Limit,
+    acknowledged,
+    evaluated,
+    raised_words,
+    state_of,
+)
 
 pytestmark = pytest.mark.plain
 

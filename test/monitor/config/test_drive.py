@@ -6,11 +6,11 @@ import attrs
 import pytest
 
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.estimate.drive_figures import DriveFigures
+from leg_wear_monitor.estimate.signature import DriveFigures
 from leg_wear_monitor.mechanism.loader import load_mechanism
-from leg_wear_monitor.monitor.config.drive import DriveParameters, drive_figures
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.parameters import config_from
+from leg_wear_monitor.monitor.config.sections import DriveParameters, drive_figures
 
 pytestmark = pytest.mark.plain
 

@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 from ruamel.yaml import YAML
 
-from leg_wear_monitor.monitor.config.parameter_file import load_config, shipped_config
-from leg_wear_monitor.monitor.config.parameters import PARAMETERS, Parameter
+from leg_wear_monitor.monitor.config.parameters import PARAMETERS, Parameter, load_config, shipped_config
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 
 PAGE = Path(__file__).parents[3] / "docs" / "reference" / "parameters.md"

@@ -7,10 +7,15 @@ from ruamel.yaml import YAML
 
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.loader import load_mechanism
-from leg_wear_monitor.monitor.config.drive import NOT_DECLARED
 from leg_wear_monitor.monitor.config.fitting import fitted
-from leg_wear_monitor.monitor.config.parameter_file import parse_config
-from leg_wear_monitor.monitor.config.parameters import PARAMETERS, changed, config_from, values_of
+from leg_wear_monitor.monitor.config.parameters import (
+    PARAMETERS,
+    changed,
+    config_from,
+    parse_config,
+    values_of,
+)
+from leg_wear_monitor.monitor.config.sections import NOT_DECLARED
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 
 pytestmark = pytest.mark.plain

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import Mechanism
-from leg_wear_monitor.estimate.torque_fit.torque_model import TorqueModel, torque_model
+from leg_wear_monitor.estimate.torque_model import TorqueModel, torque_model
 from leg_wear_monitor.monitor.config.parameters import config_from
-from leg_wear_monitor.monitor.crank_zero.crank_zero import CrankZero
-from leg_wear_monitor.monitor.evaluation.evaluation_period import A_CYCLE, EvaluationPeriods
-from leg_wear_monitor.twin.kinds import CRANK, TORQUE
-from leg_wear_monitor.twin.sample import Samples, gait_samples
-from leg_wear_monitor.twin.settings import TrackerSettings
+from leg_wear_monitor.monitor.crank_zero import CrankZero
+from leg_wear_monitor.monitor.evaluation import A_CYCLE, EvaluationPeriods
+from leg_wear_monitor.twin import CRANK, TORQUE
+from leg_wear_monitor.twin.sample import Samples, TrackerSettings, gait_samples
 
 START_NS = 1_700_000_000_000_000_000
 TURN = 2.0 * math.pi

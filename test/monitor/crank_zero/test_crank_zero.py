@@ -6,10 +6,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from leg_wear_monitor.monitor.crank_zero.crank_zero import CrankZero
-from leg_wear_monitor.monitor.crank_zero.phase import LEAST_TURNS
-from leg_wear_monitor.monitor.evaluation.evaluation_period import A_CYCLE, EvaluationPeriods
-from leg_wear_monitor.twin.kinds import CRANK
+from leg_wear_monitor.monitor.crank_walk import LEAST_TURNS
+from leg_wear_monitor.monitor.crank_zero import CrankZero
+from leg_wear_monitor.monitor.evaluation import A_CYCLE, EvaluationPeriods
+from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin.sample import Samples
 
 Walk = Callable[..., Samples]

@@ -9,7 +9,7 @@ import pytest
 
 from leg_wear_monitor import Mechanism, WearMonitor
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.reports import CycleReport, Status
 from leg_wear_monitor.monitor.verdict.verdict import State

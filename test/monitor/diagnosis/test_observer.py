@@ -6,30 +6,27 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.estimate.body_torques import body_torques
 from leg_wear_monitor.estimate.cause import Cause
-from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
-from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.estimate.explanations import body_torques
+from leg_wear_monitor.estimate.signature import CommissionedTorque
+from leg_wear_monitor.mechanism.position import TURN, build_linkage
 from leg_wear_monitor.monitor.config.inputs import Load
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.diagnosis import leg_models, references
 from leg_wear_monitor.monitor.diagnosis import observer as observer_module
-from leg_wear_monitor.monitor.diagnosis.diagnosis import DiagnosisState
-from leg_wear_monitor.monitor.diagnosis.leg_models import COMMISSIONING_CYCLES
+from leg_wear_monitor.monitor.diagnosis import references
+from leg_wear_monitor.monitor.diagnosis import references as leg_models
+from leg_wear_monitor.monitor.diagnosis.evidence import LOCKED_SAMPLES
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
-from leg_wear_monitor.monitor.diagnosis.reasons import LOCKED_SAMPLES
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
-from leg_wear_monitor.monitor.diagnosis.state import UNUSED_CYCLES
-from leg_wear_monitor.twin.follower.load import load_shape, load_signature
-from leg_wear_monitor.twin.kinds import CRANK, TORQUE
-from leg_wear_monitor.twin.reference import torque_reference
-from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
-from leg_wear_monitor.twin.reference.leg_simulation import POINTS, LegSimulation
-from leg_wear_monitor.twin.reference.torque_reference import WIDER
-from leg_wear_monitor.twin.sample import gait_samples
-from leg_wear_monitor.twin.settings import GROUND
-from leg_wear_monitor.wear.surfaces import SECTORS
+from leg_wear_monitor.monitor.diagnosis.references import COMMISSIONING_CYCLES
+from leg_wear_monitor.monitor.diagnosis.state import UNUSED_CYCLES, DiagnosisState
+from leg_wear_monitor.twin import CRANK, TORQUE, torque_reference
+from leg_wear_monitor.twin.leg_simulation import POINTS, LegSimulation
+from leg_wear_monitor.twin.load import load_shape, load_signature
+from leg_wear_monitor.twin.reference import CrankProfile
+from leg_wear_monitor.twin.sample import GROUND, gait_samples
+from leg_wear_monitor.twin.torque_reference import WIDER
+from leg_wear_monitor.wear import SECTORS
 
 NEW = np.full(5, 3.0e-4)
 SIZE_NM = 9.2

@@ -6,17 +6,22 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
-from leg_wear_monitor.estimate.signature import TorqueSensor
-from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.estimate.signature import CommissionedTorque, TorqueSensor
+from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.inputs import Cadence
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState, NotUsed
-from leg_wear_monitor.monitor.diagnosis.reasons import doubt, missing, next_step
-from leg_wear_monitor.monitor.diagnosis.state import AtCadence, SignedCycle, TorqueState
-from leg_wear_monitor.monitor.verdict.input_rules import nothing_found
+from leg_wear_monitor.monitor.diagnosis.evidence import doubt, missing, next_step
+from leg_wear_monitor.monitor.diagnosis.state import (
+    AtCadence,
+    Diagnosis,
+    DiagnosisState,
+    NotUsed,
+    SignedCycle,
+    TorqueState,
+)
 from leg_wear_monitor.monitor.verdict.situation import Situation
-from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
+from leg_wear_monitor.monitor.verdict.subject_rules import nothing_found
+from leg_wear_monitor.twin.reference import CrankProfile
 
 NEW = np.full(5, 3.0e-4)
 SENSOR = TorqueSensor(0.005, 1.0, 9.2)

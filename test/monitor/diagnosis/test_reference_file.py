@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import ConfigError, WearMonitor, load_mechanism
-from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.settings import MonitorConfig, TorqueDiagnosis
 from leg_wear_monitor.monitor.diagnosis import reference_file
 from leg_wear_monitor.monitor.diagnosis.reference_file import (
@@ -16,11 +16,10 @@ from leg_wear_monitor.monitor.diagnosis.reference_file import (
     shipped_references,
     write_references,
 )
-from leg_wear_monitor.twin.reference import torque_reference
-from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
-from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
-from leg_wear_monitor.twin.reference.torque_reference import TorqueReferenceRun
-from leg_wear_monitor.wear.surfaces import SECTORS
+from leg_wear_monitor.twin import torque_reference
+from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
+from leg_wear_monitor.twin.torque_reference import TorqueReferenceRun
+from leg_wear_monitor.wear import SECTORS
 
 
 @pytest.fixture(scope="module")

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.diagnosis.state import WINDOW_CYCLES, SignedCycle, TorqueState
-from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
+from leg_wear_monitor.twin.reference import CrankProfile
 
 pytestmark = pytest.mark.plain
 STEADY = CrankProfile.steady(TURN)

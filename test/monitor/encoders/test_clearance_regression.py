@@ -5,18 +5,28 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import ConfigError
-from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.run import new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.arrays import body_names
-from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.monitor.angle_regression import (
+    ClearanceObservation,
+    ClearanceRegression,
+    clearance_estimates,
+)
 from leg_wear_monitor.monitor.config.inputs import Encoders
-from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObservation, clearance_estimates
-from leg_wear_monitor.monitor.encoders.clearance_regression import ClearanceRegression
-from leg_wear_monitor.monitor.encoders.commissioning import commissioned, errors_of, known_with
-from leg_wear_monitor.twin.reference.crank_profile import HARMONICS, CrankProfile
-from leg_wear_monitor.twin.reference.joint_angles import PHASES, angle_model, design
-from leg_wear_monitor.twin.reference.reference import Reference, ReferenceRun, worn_to
+from leg_wear_monitor.monitor.encoders import commissioned, errors_of, known_with
+from leg_wear_monitor.twin.reference import (
+    HARMONICS,
+    PHASES,
+    CrankProfile,
+    Reference,
+    ReferenceRun,
+    angle_model,
+    design,
+    worn_to,
+)
 
 SENSORS = ("B", "G", "I")  # hip, knee, ankle
 FRESH = np.full(5, 3e-4)

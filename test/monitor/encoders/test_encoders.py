@@ -10,15 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from leg_wear_monitor import ConfigError, WearMonitor, open_ledger
-from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.monitor.alarms import Level
+from leg_wear_monitor.monitor.angle_regression import ClearanceObservation
 from leg_wear_monitor.monitor.config.parameters import config_from
-from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObservation
-from leg_wear_monitor.monitor.encoders.commissioning import errors_of
+from leg_wear_monitor.monitor.encoders import errors_of
 from leg_wear_monitor.monitor.ledger.ledger import LedgerError
 from leg_wear_monitor.monitor.ledger.rows import read_commissioned
-from leg_wear_monitor.twin.reference.joint_angles import PHASES, angle_model
-from leg_wear_monitor.twin.reference.reference import ReferenceRun
+from leg_wear_monitor.twin.reference import PHASES, ReferenceRun, angle_model
 from leg_wear_monitor.twin.sample import EMPTY
 
 NAMES, JOINTS = ("hip", "knee", "ankle"), ("B", "G", "I")
@@ -206,7 +205,7 @@ def test_an_encoder_that_says_nothing_is_told_and_the_others_go_on(new_watch, re
 def test_a_leg_that_cannot_be_simulated_is_told_and_the_crank_goes_on(new_watch, read, monkeypatch):
     monitor = new_watch()
     # whatever the stepper says, it failed
-    monkeypatch.setattr("leg_wear_monitor.twin.reference.reference.DONE", -1)
+    monkeypatch.setattr("leg_wear_monitor.twin.reference.DONE", -1)
     reports = monitor.update(read(3.5))
     assert "could not be simulated" in status(monitor).message
     assert status(monitor).level is Level.WARN

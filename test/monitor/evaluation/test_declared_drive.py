@@ -3,8 +3,8 @@
 import attrs
 import pytest
 
-from leg_wear_monitor.monitor.config.drive import DriveParameters
 from leg_wear_monitor.monitor.config.fitting import largest_lag_s
+from leg_wear_monitor.monitor.config.sections import DriveParameters
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 
 pytestmark = pytest.mark.plain

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.evaluation.gait_evidence import GaitEvidence, doubts
+from leg_wear_monitor.monitor.gait_evidence import GaitEvidence, doubts
 from leg_wear_monitor.twin.sample import EMPTY, NO_FAULT, gait_samples
 
 pytestmark = pytest.mark.plain

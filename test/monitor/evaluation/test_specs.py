@@ -6,11 +6,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor import alarm_specs
+from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.evaluation import specs
-from leg_wear_monitor.monitor.evaluation.board import AlarmBoard, limits_of
+from leg_wear_monitor.monitor.evaluation import AlarmBoard, limits_of
 from leg_wear_monitor.monitor.forecast.forecast import Quantiles
 
 pytestmark = pytest.mark.plain
@@ -24,15 +24,15 @@ FOOT_LOAD = {"foot_load.source": "contact"}
 def renewed(page):
     rows = ["| alarm | value | limit |", "|---|---|---|"]
     for group in (
-        specs.JOINT,
-        specs.ENCODERS,
-        specs.TORQUE,
-        specs.GAIT,
-        specs.INPUT,
-        (specs.SOURCES,),
-        specs.OF_FOOT_LOAD,
+        alarm_specs.JOINT,
+        alarm_specs.ENCODERS,
+        alarm_specs.TORQUE,
+        alarm_specs.GAIT,
+        alarm_specs.INPUT,
+        (alarm_specs.SOURCES,),
+        alarm_specs.OF_FOOT_LOAD,
     ):
-        joint = "<joint>" if group in (specs.JOINT, specs.ENCODERS) else ""
+        joint = "<joint>" if group in (alarm_specs.JOINT, alarm_specs.ENCODERS) else ""
         rows += [f"| `{spec.name(joint)}` | {spec.meaning} | {spec.limit_words} |" for spec in group]
     table = "\n".join([*rows, ""])
     return TABLE.sub(lambda found: found[1] + table + found[2], page)
@@ -46,9 +46,9 @@ def test_the_page_lists_every_alarm_as_it_is_declared():
 
 def test_kinds_are_those_of_the_board():
     board = AlarmBoard(config_from(ENCODERS | FOOT_LOAD), ("A", "B"))
-    assert set(specs.KINDS) == {alarm.kind for alarm in board.alarms.values()}
-    assert len(set(specs.KINDS)) == len(specs.KINDS)
-    assert set(specs.INPUT_KINDS) == {kind for kind in specs.KINDS if kind.startswith("input_")}
+    assert set(alarm_specs.KINDS) == {alarm.kind for alarm in board.alarms.values()}
+    assert len(set(alarm_specs.KINDS)) == len(alarm_specs.KINDS)
+    assert set(alarm_specs.INPUT_KINDS) == {kind for kind in alarm_specs.KINDS if kind.startswith("input_")}
 
 
 def test_names_and_their_order_are_a_contract():
@@ -106,7 +106,7 @@ def test_the_limits_of_impact_forces_are_those_of_the_cadence() -> None:
 def test_a_life_that_may_be_short_raises_its_alarm_and_one_that_is_not_known_does_not(hours, level):
     config = config_from({"limits.remaining_life_h": 50.0})
     forecast = SimpleNamespace(hours=None if hours is None else Quantiles(*hours))
-    value = specs.LIFE.value(SimpleNamespace(forecast=forecast))
+    value = alarm_specs.LIFE.value(SimpleNamespace(forecast=forecast))
     board = AlarmBoard(config, ("A",))
     for cycle in range(config.alarms.on_delay_cycles):
         board.evaluate({"remaining_life A": value}, 10**9 * (1 + cycle))

@@ -9,10 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor.estimate.cause import Cause, NamedCause
-from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.evaluation.board import AlarmBoard
-from leg_wear_monitor.monitor.evaluation.torque_checks import (
+from leg_wear_monitor.monitor.evaluation import AlarmBoard
+from leg_wear_monitor.monitor.gait_evidence import COMMISSIONING_CYCLES, TorqueRecord
+from leg_wear_monitor.monitor.torque_checks import (
     BIAS,
     DRIFT,
     LAG,
@@ -21,7 +22,6 @@ from leg_wear_monitor.monitor.evaluation.torque_checks import (
     torque_causes,
     torque_values,
 )
-from leg_wear_monitor.monitor.evaluation.torque_record import COMMISSIONING_CYCLES, TorqueRecord
 
 pytestmark = pytest.mark.plain
 

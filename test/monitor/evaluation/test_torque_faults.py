@@ -8,15 +8,14 @@ import pytest
 pytest.importorskip("mcap")
 
 from leg_wear_monitor.bags.reader import Recording
-from leg_wear_monitor.monitor.alarms.alarm import Level
-from leg_wear_monitor.monitor.alarms.fault_codes import FAULT_CODES
+from leg_wear_monitor.files import share_directory
+from leg_wear_monitor.monitor import alarm_specs
+from leg_wear_monitor.monitor.alarms import FAULT_CODES, Level
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.evaluation import specs
 from leg_wear_monitor.monitor.verdict.rules import RULES
-from leg_wear_monitor.share import share_directory
+from leg_wear_monitor.twin.cycle import LEAST_CYCLES
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
-from leg_wear_monitor.twin.follower.repeating import LEAST_CYCLES
-from leg_wear_monitor.twin.settings import TwinSettings
+from leg_wear_monitor.twin.sample import TwinSettings
 
 SECONDS = 8
 WARN = 0.08  # of the mismatch, by default
@@ -149,7 +148,11 @@ def test_every_status_of_the_monitor_has_a_fault_code_that_the_pages_list(monito
             assert (status.fault_code == "NONE") == (status.level is Level.OK), status
             codes.add(status.fault_code)
         monitor.restore(new)
-    known = {*FAULT_CODES, *(rule.code for rule in RULES), *(spec.name().upper() for spec in specs.TORQUE)}
+    known = {
+        *FAULT_CODES,
+        *(rule.code for rule in RULES),
+        *(spec.name().upper() for spec in alarm_specs.TORQUE),
+    }
     assert {"NONE", "TORQUE_SIGN", "TORQUE_MISMATCH"} <= codes <= known
 
 

@@ -10,15 +10,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor import ConfigError, load_mechanism
-from leg_wear_monitor.monitor.config.forecast import Forecasting
-from leg_wear_monitor.monitor.forecast.coefficient_prior import (
+from leg_wear_monitor.monitor.config.sections import Forecasting
+from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
+from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     CoefficientPrior,
+    MeasuredClearance,
+    estimate_coefficient,
     nominal_per_pa,
     prior_source,
     usual_prior,
 )
-from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
-from leg_wear_monitor.monitor.forecast.wear_coefficients import MeasuredClearance, estimate_coefficient
 
 pytestmark = pytest.mark.plain
 

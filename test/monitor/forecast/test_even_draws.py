@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from leg_wear_monitor.monitor.forecast.even_draws import MEMBERS, even_fractions, even_normals
+from leg_wear_monitor.monitor.forecast.forecast import MEMBERS, even_fractions, even_normals
 
 pytestmark = pytest.mark.plain
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import LegWearError, WearMonitor
-from leg_wear_monitor.monitor.config.forecast import Forecasting
+from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.forecast.forecast import Answer
 from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
 from leg_wear_monitor.monitor.forecast.wear_coefficients import MeasuredClearance

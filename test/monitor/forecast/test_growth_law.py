@@ -6,13 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.monitor.forecast.growth_law import (
-    GrowthLaw,
-    SimulatedLife,
-    cycles_to,
-    fitted_law,
-    no_law,
-)
+from leg_wear_monitor.monitor.forecast.forecast import GrowthLaw, SimulatedLife, cycles_to, fitted_law, no_law
 
 pytestmark = pytest.mark.plain
 

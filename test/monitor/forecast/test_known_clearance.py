@@ -11,12 +11,11 @@ from hypothesis import strategies as st
 
 from leg_wear_monitor import WearMonitor, open_ledger
 from leg_wear_monitor.estimate.cause import Cause, Change
-from leg_wear_monitor.fleet.learning.part import parts_of
-from leg_wear_monitor.monitor.config.forecast import Forecasting
+from leg_wear_monitor.fleet.learning import parts_of
 from leg_wear_monitor.monitor.config.parameters import config_from
-from leg_wear_monitor.monitor.diagnosis.corrections import Correction
-from leg_wear_monitor.monitor.forecast.forecast import JointCondition, forecast
-from leg_wear_monitor.monitor.forecast.growth_law import no_law
+from leg_wear_monitor.monitor.config.sections import Forecasting
+from leg_wear_monitor.monitor.diagnosis.observer import Correction
+from leg_wear_monitor.monitor.forecast.forecast import JointCondition, forecast, no_law
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     MeasuredClearance,
     estimate_coefficient,

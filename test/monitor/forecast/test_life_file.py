@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import ConfigError
+from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.life.life import LifeRun, LifeSettings
-from leg_wear_monitor.monitor.forecast.life_file import law_of, read_lives
+from leg_wear_monitor.monitor.forecast.forecaster import law_of, read_lives
 from leg_wear_monitor.monitor.ledger.entry import fingerprint
-from leg_wear_monitor.share import share_directory
 
 SHIPPED = share_directory() / "config" / "lives" / "bionic_leg.json"
 

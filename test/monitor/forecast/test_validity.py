@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from leg_wear_monitor.monitor.forecast.validity import validity
+from leg_wear_monitor.monitor.forecast.measurement import validity
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 
 pytestmark = pytest.mark.plain

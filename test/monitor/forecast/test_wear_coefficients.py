@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from leg_wear_monitor import ConfigError, load_mechanism
-from leg_wear_monitor.monitor.config.forecast import Forecasting
+from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.forecast.measurement import measure
 from leg_wear_monitor.monitor.forecast.wear_coefficients import MeasuredClearance, estimate_coefficient
 from leg_wear_monitor.monitor.ledger.entry import JointWear

@@ -5,10 +5,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from leg_wear_monitor.monitor.alarms.alarm import Level
-from leg_wear_monitor.monitor.inputs.guard import InputGuard
-from leg_wear_monitor.twin.sample import EMPTY, MISSING_JOINT, NO_FAULT, ZERO_STAMP, gait_samples
-from leg_wear_monitor.twin.settings import TrackerSettings
+from leg_wear_monitor.monitor.alarms import Level
+from leg_wear_monitor.monitor.inputs import InputGuard
+from leg_wear_monitor.twin.sample import (
+    EMPTY,
+    MISSING_JOINT,
+    NO_FAULT,
+    ZERO_STAMP,
+    TrackerSettings,
+    gait_samples,
+)
 
 TURN = 2.0 * np.pi
 DEGREES = 180.0 / np.pi

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.mechanism.clearance import Film
+from leg_wear_monitor.files import share_directory
+from leg_wear_monitor.mechanism.spec import Film
 from leg_wear_monitor.monitor.ledger.entry import fingerprint
-from leg_wear_monitor.share import share_directory
 
 pytestmark = pytest.mark.plain
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from ledger_contents import contents
 
-from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
+from leg_wear_monitor.estimate.signature import CommissionedTorque
 from leg_wear_monitor.mechanism.loader import load_mechanism
-from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.alarms import Alarm, Level
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.ledger.entry import (
@@ -29,10 +29,9 @@ from leg_wear_monitor.monitor.ledger.entry import (
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.ledger.schema import FORMAT, UNRELEASED_ID
-from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
-from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
-from leg_wear_monitor.twin.reference.leg_simulation import POINTS
-from leg_wear_monitor.twin.reference.torque_reference import CYCLES, TorqueReference
+from leg_wear_monitor.twin.leg_simulation import POINTS
+from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
+from leg_wear_monitor.twin.torque_reference import CYCLES, TorqueReference
 
 pytestmark = pytest.mark.plain
 

@@ -7,10 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level, Limit, acknowledged, evaluated
-from leg_wear_monitor.monitor.verdict.belief import alarm_value, at_limit_by_estimate, believed
+from leg_wear_monitor.monitor.alarms import Alarm, Level, Limit, acknowledged, evaluated
 from leg_wear_monitor.monitor.verdict.rules import findings
-from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance, Situation
+from leg_wear_monitor.monitor.verdict.situation import (
+    JointSituation,
+    SeenClearance,
+    Situation,
+    alarm_value,
+    at_limit_by_estimate,
+    believed,
+)
 from leg_wear_monitor.monitor.verdict.verdict import Figure, State, verdict_of
 
 LIMIT_M = 6.0e-4

@@ -11,21 +11,33 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor.estimate.cause import Cause, Change, NamedCause, TorqueExplanation
-from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
-from leg_wear_monitor.monitor.alarms.fault_codes import EXCHANGED, SCALE, SIGN, STUCK, ZERO
-from leg_wear_monitor.monitor.alarms.guides import guide_of
-from leg_wear_monitor.monitor.alarms.words import ADVICE
+from leg_wear_monitor.monitor import alarm_specs
+from leg_wear_monitor.monitor.alarms import (
+    ADVICE,
+    EXCHANGED,
+    SCALE,
+    SIGN,
+    STUCK,
+    ZERO,
+    Alarm,
+    Level,
+    guide_of,
+)
 from leg_wear_monitor.monitor.config.inputs import Crank, DriveTorque
 from leg_wear_monitor.monitor.config.parameters import config_from
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState
-from leg_wear_monitor.monitor.evaluation import specs
-from leg_wear_monitor.monitor.evaluation.board import AlarmBoard
-from leg_wear_monitor.monitor.verdict.alarm_rules import OF_A_JOINT
-from leg_wear_monitor.monitor.verdict.cause_words import CauseWords
-from leg_wear_monitor.monitor.verdict.rule import OF_THE_GAIT, OF_THE_MODEL
+from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
+from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.verdict.rules import RULES, findings
-from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance, Situation
+from leg_wear_monitor.monitor.verdict.situation import (
+    OF_A_JOINT,
+    OF_THE_GAIT,
+    OF_THE_MODEL,
+    JointSituation,
+    SeenClearance,
+    Situation,
+)
 from leg_wear_monitor.monitor.verdict.verdict import (
+    CauseWords,
     Figure,
     Finding,
     State,
@@ -39,7 +51,7 @@ pytestmark = pytest.mark.plain
 
 JOINTS = ("A", "G")
 NEW = tuple(JointSituation(joint=joint, counted_m=3.0e-4, limit_m=6.0e-4) for joint in JOINTS)
-HEALTHY = Situation(joints=NEW, quantities=specs.QUANTITIES, mismatch=0.031, mismatch_limit=0.1)
+HEALTHY = Situation(joints=NEW, quantities=alarm_specs.QUANTITIES, mismatch=0.031, mismatch_limit=0.1)
 BOARD = AlarmBoard(
     config_from({"encoders.names": ["knee"], "encoders.joints": ["G"], "foot_load.source": "wrench"}),
     JOINTS,
@@ -449,7 +461,7 @@ def test_every_alarm_of_a_board_has_a_verdict_and_its_kind_is_known() -> None:
         verdict = judged(alarms=(alarm(name, Level.WARN),))
         assert verdict.state is not State.HEALTHY, name
         assert {one.subject} & set(JOINTS) == set(verdict.joints), name
-    assert {spec.kind for spec in (*specs.JOINT, *specs.ENCODERS)} == set(OF_A_JOINT)
+    assert {spec.kind for spec in (*alarm_specs.JOINT, *alarm_specs.ENCODERS)} == set(OF_A_JOINT)
     for level in (Level.WARN, Level.ERROR):
         raised = {judged(alarms=(alarm(name, level),)).fault_code for name in BOARD.alarms}
         assert "NONE" not in raised

@@ -8,8 +8,7 @@ from made_up_summary import made_up_summary
 
 from leg_wear_monitor import ConfigError
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS
-from leg_wear_monitor.playback.result.replay_summary import summary_of
-from leg_wear_monitor.playback.result.tables import joint_columns
+from leg_wear_monitor.playback.result import joint_columns, summary_of
 
 pytestmark = pytest.mark.plain
 

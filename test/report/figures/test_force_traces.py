@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import Trace
-from leg_wear_monitor.report.figures.force_traces import force_traces
+from leg_wear_monitor.report.figure import force_traces
 
 pytestmark = pytest.mark.plain
 

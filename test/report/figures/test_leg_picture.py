@@ -8,10 +8,9 @@ import pytest
 from matplotlib.patches import Polygon
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.mechanism.ideal import ideal_motion, point_motion
-from leg_wear_monitor.mechanism.position import build_linkage
-from leg_wear_monitor.report.figures.figure import VERMILION, png
-from leg_wear_monitor.report.figures.leg_picture import leg_picture
+from leg_wear_monitor.mechanism.position import build_linkage, ideal_motion, point_motion
+from leg_wear_monitor.report.figure import VERMILION, png
+from leg_wear_monitor.report.leg_picture import leg_picture
 
 pytestmark = pytest.mark.plain
 
@@ -77,7 +76,7 @@ def test_the_same_picture_gives_the_same_bytes():
 
 def test_no_picture_needs_pyplot():
     code = (
-        "import sys; import leg_wear_monitor.report.figures.simulation; "
+        "import sys; import leg_wear_monitor.report.leg_picture; "
         "print([name for name in ('matplotlib.pyplot', 'tkinter') if name in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -5,8 +5,8 @@ import re
 import numpy as np
 import pytest
 
-from leg_wear_monitor.report.figures.worn_bushings import worn_bushings
-from leg_wear_monitor.wear.surfaces import BUSHING, JOURNAL, Surfaces
+from leg_wear_monitor.report.figure import worn_bushings
+from leg_wear_monitor.wear import BUSHING, JOURNAL, Surfaces
 
 pytestmark = pytest.mark.plain
 

@@ -7,8 +7,8 @@ import pytest
 from browser import NEEDS_CHROMIUM, WIDTHS, browse
 from made_up_fleet import NOW_NS, made_up_fleet, random_fleet
 
-from leg_wear_monitor.report.fleet.page import counts, fleet_page
-from leg_wear_monitor.report.fleet.standing import Day, Standing
+from leg_wear_monitor.report.fleet_page import counts, fleet_page
+from leg_wear_monitor.report.fleet_standing import Day, Standing
 from leg_wear_monitor.report.page import page_html
 
 pytestmark = NEEDS_CHROMIUM

@@ -6,12 +6,12 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.report.parts import Sentences, Table
+from leg_wear_monitor.report.page import Sentences, Table
 from leg_wear_monitor.report.study import findings
 from leg_wear_monitor.report.study.page import study_page
 from leg_wear_monitor.report.study.text import number, with_spread, zone_text
-from leg_wear_monitor.studies.plan.settings import STUDIES
-from leg_wear_monitor.studies.summary import Spread, power_law, spread
+from leg_wear_monitor.studies.execution import STUDIES
+from leg_wear_monitor.studies.plan import Spread, power_law, spread
 
 
 def parts(page, kind):

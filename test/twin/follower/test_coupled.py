@@ -6,16 +6,15 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, TORQUE, new_run_statistics
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.run import ARCHARD, TORQUE, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Track, TrackDrive
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
-from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
-from leg_wear_monitor.twin.sample import gait_samples
-from leg_wear_monitor.twin.settings import TwinSettings
+from leg_wear_monitor.twin.reference import LegParameters
+from leg_wear_monitor.twin.sample import TwinSettings, gait_samples
 
 START_NS, RATE, CYCLES, SETTLING = 1_700_000_000_000_000_000, 200, 12, 4
 STIFFNESS, DAMPING = 1000.0, 1.75  # N m/rad, N m s/rad: 0.05 of the critical damping

@@ -5,14 +5,13 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import Mechanism
-from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
-from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
+from leg_wear_monitor.dynamics.clearance.stepper import ClearanceRun
+from leg_wear_monitor.dynamics.run import new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.twin.cycle import INSTANT_CYCLES
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
-from leg_wear_monitor.twin.follower.repeating import INSTANT_CYCLES
-from leg_wear_monitor.twin.sample import Samples, gait_samples
-from leg_wear_monitor.twin.settings import INSTANT, TwinSettings
+from leg_wear_monitor.twin.sample import INSTANT, Samples, TwinSettings, gait_samples
 
 START_NS, RATE, SECONDS = 1_700_000_000_000_000_000, 200, 13
 ERROR = 0.1  # of the alarm, by default

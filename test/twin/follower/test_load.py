@@ -7,29 +7,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor import Mechanism
-from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
+from leg_wear_monitor.compiled.kernel import Record, new_records, record_of
+from leg_wear_monitor.dynamics.clearance.stepper import ClearanceRun
 from leg_wear_monitor.dynamics.clearance.tables import build_tables
-from leg_wear_monitor.dynamics.run.run_statistics import FORCE, TORQUE, new_run_statistics
+from leg_wear_monitor.dynamics.run import FORCE, TORQUE, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.mechanism.ground_reaction import on_the_ground
-from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
-from leg_wear_monitor.mechanism.person import with_person
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.person import on_the_ground, with_person
+from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle, point_motion
 from leg_wear_monitor.mechanism.spec import ConstantLoad
-from leg_wear_monitor.record import Record, new_records, record_of
+from leg_wear_monitor.twin.cycle import LoadEstimate, find
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
-from leg_wear_monitor.twin.follower.load import FootLoad
-from leg_wear_monitor.twin.follower.state import (
-    FRICTION,
-    LAG,
-    LOAD,
-    LOAD_FRICTION,
-    REGRESSORS,
-    TORQUE_SUMS,
-)
-from leg_wear_monitor.twin.follower.torque_estimate import LoadEstimate, find
-from leg_wear_monitor.twin.sample import Samples, gait_samples
-from leg_wear_monitor.twin.settings import CONSTANT, STANCE, TwinSettings
+from leg_wear_monitor.twin.follower_state import FRICTION, LAG, LOAD, LOAD_FRICTION, REGRESSORS, TORQUE_SUMS
+from leg_wear_monitor.twin.load import FootLoad
+from leg_wear_monitor.twin.sample import CONSTANT, STANCE, Samples, TwinSettings, gait_samples
 
 START_NS, RATE = 1_700_000_000_000_000_000, 200
 

@@ -8,18 +8,16 @@ from hypothesis import strategies as st
 
 import leg_wear_monitor as lw
 from leg_wear_monitor import Mechanism
+from leg_wear_monitor.dynamics.clearance.stepper import loaded_tables, put_force
 from leg_wear_monitor.dynamics.clearance.tables import POINTS, build_tables
-from leg_wear_monitor.dynamics.clearance.toe_force import loaded_tables, put_force
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.arrays import Floats, body_names
-from leg_wear_monitor.mechanism.ground_reaction import PHASES, nominal_stance, with_toe_force
-from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.person import PHASES, nominal_stance, with_toe_force
+from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
+from leg_wear_monitor.twin import LOAD
 from leg_wear_monitor.twin.digital_twin import DigitalTwin, TwinSnapshot
-from leg_wear_monitor.twin.kinds import LOAD
-from leg_wear_monitor.twin.sample import Samples, gait_samples
-from leg_wear_monitor.twin.settings import TwinSettings
+from leg_wear_monitor.twin.sample import Samples, TwinSettings, gait_samples
 
 PEAK_N, BEGIN = 300.0, 0.5
 MEASURED = TwinSettings(load_source="wrench", load_model="measured")

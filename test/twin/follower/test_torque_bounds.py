@@ -5,14 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.record import new_records, record_of
+from leg_wear_monitor.compiled.kernel import new_records, record_of
+from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.twin.cycle import INSTANT_CYCLES, LoadEstimate, RepeatingResidual, find
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
-from leg_wear_monitor.twin.follower.repeating import INSTANT_CYCLES, RepeatingResidual
-from leg_wear_monitor.twin.follower.state import PHASES, REGRESSORS, TORQUE_SUMS
-from leg_wear_monitor.twin.follower.torque_estimate import LoadEstimate, find
-from leg_wear_monitor.twin.sample import gait_samples
-from leg_wear_monitor.twin.settings import TwinSettings
+from leg_wear_monitor.twin.follower_state import PHASES, REGRESSORS, TORQUE_SUMS
+from leg_wear_monitor.twin.sample import TwinSettings, gait_samples
 from leg_wear_monitor.twin.statistics import NotCompared
 
 ANGLE = np.linspace(0.0, TURN, 200, endpoint=False)

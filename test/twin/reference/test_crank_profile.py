@@ -5,13 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.twin.reference.crank_profile import (
-    HARMONICS,
-    CrankProfile,
-    cycle_profile,
-    mean_profile,
-)
+from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.twin.reference import HARMONICS, CrankProfile, cycle_profile, mean_profile
 
 AMPLITUDES = st.lists(st.floats(-0.01, 0.01), min_size=HARMONICS, max_size=HARMONICS)
 

@@ -3,14 +3,12 @@
 import attrs
 import numpy as np
 
-from leg_wear_monitor.mechanism.ground_reaction import nominal_stance
-from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.loader import load_mechanism
-from leg_wear_monitor.mechanism.position import build_linkage
-from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
-from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
-from leg_wear_monitor.twin.reference.leg_simulation import LegSimulation
-from leg_wear_monitor.wear.surfaces import SECTORS
+from leg_wear_monitor.mechanism.person import nominal_stance
+from leg_wear_monitor.mechanism.position import TURN, build_linkage
+from leg_wear_monitor.twin.leg_simulation import LegSimulation
+from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
+from leg_wear_monitor.wear import SECTORS
 
 
 def test_what_was_simulated_before_changes_nothing():

@@ -7,11 +7,10 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.twin.reference import torque_reference
-from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
-from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
-from leg_wear_monitor.twin.reference.torque_reference import (
+from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.twin import torque_reference
+from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
+from leg_wear_monitor.twin.torque_reference import (
     HEAVIER,
     LONGER,
     ROUGHER,
@@ -19,7 +18,7 @@ from leg_wear_monitor.twin.reference.torque_reference import (
     TorqueReference,
     TorqueReferenceRun,
 )
-from leg_wear_monitor.wear.surfaces import SECTORS
+from leg_wear_monitor.wear import SECTORS
 
 NEW, UNWORN = np.full(5, 3.0e-4), np.zeros((5, 2, SECTORS))
 STEADY = CrankProfile.steady(TURN)

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from leg_wear_monitor.twin.follower.state import FINE_PHASES
-from leg_wear_monitor.twin.sampling.condition import condition_of, measured_load
+from leg_wear_monitor.twin.follower_state import FINE_PHASES
+from leg_wear_monitor.twin.sampling import condition_of, measured_load
 from leg_wear_monitor.twin.statistics import TorqueProfile
 
 pytestmark = pytest.mark.plain

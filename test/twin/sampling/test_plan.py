@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.errors import LegWearError
-from leg_wear_monitor.twin.sampling.condition import Condition
-from leg_wear_monitor.twin.sampling.plan import SamplingPlan
-from leg_wear_monitor.twin.sampling.settings import SamplingSettings
+from leg_wear_monitor.twin.sample import SamplingSettings
+from leg_wear_monitor.twin.sampling import Condition, SamplingPlan
 
 SETTINGS = SamplingSettings(fraction=0.1)
 SLOW, FAST = Condition(1, 100, 0), Condition(1, 105, 0)

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from leg_wear_monitor.twin.sampling.condition import Condition
-from leg_wear_monitor.twin.sampling.wear_estimate import Block, WearEstimate, student_quantile
+from leg_wear_monitor.twin.sampling import Block, Condition, WearEstimate, student_quantile
 
 SHAPE = (2, 2, 3)
 SLOW, FAST = Condition(1, 100, 0), Condition(1, 110, 1)

@@ -9,11 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 
-from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.twin.kinds import CRANK, TORQUE
-from leg_wear_monitor.twin.sample import Samples, gait_samples
-from leg_wear_monitor.twin.settings import TrackerSettings
-from leg_wear_monitor.twin.steps import (
+from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.twin import CRANK, TORQUE
+from leg_wear_monitor.twin.sample import Samples, TrackerSettings, gait_samples
+from leg_wear_monitor.twin.statistics import (
     EVALUATE,
     LEAVE,
     LOST_BY_JUMP,
@@ -29,7 +28,7 @@ from leg_wear_monitor.twin.steps import (
     STOPPED,
     Steps,
 )
-from leg_wear_monitor.twin.tracker.tracker import CrankTracker
+from leg_wear_monitor.twin.tracker import CrankTracker
 
 START_NS = 1_700_000_000_123_456_789
 S = 1_000_000_000

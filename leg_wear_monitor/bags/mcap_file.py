@@ -1,0 +1,368 @@
+"""MCAP files: by their index, and by a scan where that is missing or damaged."""
+
+import zlib
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import IO, Any
+
+import attrs
+import numpy as np
+from mcap.records import Schema
+from numpy.typing import NDArray
+
+from leg_wear_monitor.bags import mcap_layout
+from leg_wear_monitor.bags.findings import Budget, DamageError, Finding, RecordingError, Severity
+from leg_wear_monitor.bags.mcap_layout import (
+    COUNTS,
+    HEAD,
+    MAGIC,
+    RECORD_HEAD,
+    Channel,
+    Layout,
+    Segment,
+    by_index,
+    channels_of,
+    check,
+    chunk_head,
+    definitions,
+    expand,
+    expand_part,
+)
+from leg_wear_monitor.messages.cdr import MESSAGE
+
+# Sequential scan of a file whose index is missing or damaged, up to the last readable record.
+
+
+_WINDOW = 2**20  # bytes scanned per step outside of chunks
+_OF_A_SEGMENT = 400  # memory of one segment [bytes]
+_LAST_OPCODE, _PRIVATE = 0x0F, 0x80
+_MOST_DEFINITIONS = 4096
+_ALL_IGNORED = np.full(2**16, mcap_layout.IGNORED, np.uint8)
+
+
+def by_scan(file: IO[bytes], size: int, budget: Budget) -> Layout:
+    """Layout from the records; each chunk is decompressed to find its channels and actual log times.
+
+    Parameters
+    ----------
+    file : seekable binary file
+    size : int
+        Size of the file [bytes].
+    budget : Budget
+    """
+    scan = _Scan(file, size, budget)
+    scan.run()
+    layout = scan.layout
+    layout.channels = channels_of(scan.definitions.values())
+    layout.segments.sort(key=lambda segment: (segment.start_ns, segment.at))
+    return layout
+
+
+class _Scan:
+    """State and results of a scan."""
+
+    def __init__(self, file: IO[bytes], size: int, budget: Budget) -> None:
+        self.file, self.size, self.at = file, size, len(MAGIC)
+        self.budget = budget
+        self.layout = Layout([], {})
+        self.definitions: dict[tuple[type, int], Any] = {}  # chunks may repeat them
+        self.defined = 0  # bytes
+
+    def run(self) -> None:
+        """Read record by record until the data section ends or the records become unreadable."""
+        while True:
+            self.file.seek(self.at)
+            head = self.file.read(RECORD_HEAD)
+            if len(head) < RECORD_HEAD:
+                self._ends_early(len(head))
+                return
+            opcode, length = HEAD.unpack(head)
+            if opcode == mcap_layout.DATA_END and length == 4:
+                self.layout.data_end = self.at
+                self.layout.data_crc = int.from_bytes(self.file.read(4), "little")
+                return
+            if not 0 < opcode <= _LAST_OPCODE and opcode < _PRIVATE:
+                self._lost("has no MCAP record")
+                return
+            if not self._step(opcode, length):
+                return
+
+    def _step(self, opcode: int, length: int) -> bool:
+        """Process one record, or several messages outside of chunks; False ends the scan."""
+        end = self.at + RECORD_HEAD + length
+        if opcode == mcap_layout.CHUNK:
+            try:
+                segment = chunk_head(self.file, self.at, self.size)
+            except DamageError as error:
+                self._lost(str(error))
+                return False
+            self._take(segment)
+            if segment.cut:
+                self._ends_early(self.size - self.at)
+                return False
+        elif end > self.size:
+            self._ends_early(self.size - self.at)
+            return False
+        elif opcode in (mcap_layout.SCHEMA, mcap_layout.CHANNEL, mcap_layout.MESSAGE_RECORD):
+            try:
+                self.budget.check(end - self.at)
+                end = self._outside(end)
+            except DamageError as error:
+                self.layout.losses.append(f"record at byte {self.at} {error}: it is lost")
+        self.at = end
+        if len(self.layout.segments) * _OF_A_SEGMENT > self.budget.at_once:
+            self._lost(f"is behind {len(self.layout.segments)} chunks, more than --memory-mb allows")
+            return False
+        return True
+
+    def _outside(self, end: int) -> int:
+        """Process the messages outside of chunks at this offset; return the offset of their end."""
+        window = min(max(end - self.at, _WINDOW), self.size - self.at)
+        self._take(Segment(self.at, self.at, window, window))
+        return self.at + self.layout.segments[-1].stored
+
+    def _take(self, segment: Segment) -> None:
+        """Add a segment with its actual log times, and the definitions it contains."""
+        try:
+            data = content(self.file, segment, self.budget)
+        except DamageError:
+            self.layout.segments.append(segment)  # the reader reports the damage
+            return
+        counts, positions = np.zeros(1, COUNTS), np.zeros(_MOST_DEFINITIONS, np.int64)
+        mcap_layout.walk(np.frombuffer(data, np.uint8), _ALL_IGNORED, np.zeros(0, MESSAGE), positions, counts)
+        self._define(data, positions[: int(counts["definitions"][0])].tolist())
+        if counts["last_log_time_ns"][0] >= 0:
+            first, last = int(counts["first_log_time_ns"][0]), int(counts["last_log_time_ns"][0])
+            segment = attrs.evolve(segment, start_ns=first, end_ns=last)
+        if segment.data_at == segment.at:
+            read = int(counts["read"][0])
+            segment = attrs.evolve(segment, stored=read, size=read)
+        self.layout.segments.append(segment)
+
+    def _define(self, data: bytes, positions: list[int]) -> None:
+        """Store schemas and channels, the last of each number, while memory permits."""
+        for record in definitions(data, positions):
+            self.defined += len(record.data) if isinstance(record, Schema) else len(record.topic)
+            if self.defined <= self.budget.at_once // 4:
+                self.definitions[type(record), record.id] = record
+
+    def _ends_early(self, rest: int) -> None:
+        self.layout.losses.append(
+            f"ends at byte {self.size} without its closing records, in a part of {rest} bytes: the recording "
+            "was cut off, and what came after is lost"
+        )
+
+    def _lost(self, why: str) -> None:
+        self.layout.losses.append(
+            f"byte {self.at} {why}: it and the {self.size - self.at} bytes from there on are lost"
+        )
+
+
+def content(file: IO[bytes], segment: Segment, budget: Budget) -> bytes:
+    """Records of a segment, without verification of its checksum; the readable part of a truncated one.
+
+    Raises
+    ------
+    DamageError
+        If the segment is damaged, or needs more memory than is left in the budget.
+    """
+    budget.check(segment.size + (segment.stored if segment.data_at != segment.at else 0))
+    file.seek(segment.data_at)
+    data = file.read(segment.stored)
+    if segment.cut:
+        return expand_part(data, segment.compression, segment.size)
+    return expand(data, segment.compression, segment.size)
+
+
+# Reader of one MCAP file: its topics, and its messages in pieces ordered by log time.
+
+
+_NO_POSITIONS = np.zeros(0, np.int64)
+_NO_MESSAGES = np.zeros(0, MESSAGE)
+
+
+_OF_A_MESSAGE = 400  # memory overhead of decoding one message into a sample [bytes]
+_MOST_FINDINGS = 1000
+
+
+@attrs.frozen(eq=False)
+class Piece:
+    """Messages that are read in one step.
+
+    Attributes
+    ----------
+    start_ns : int
+        Lower bound of the log times in this piece and all later pieces of the file [ns].
+    data : (bytes,) array of uint8
+    messages : (n,) array of MESSAGE
+    stored : int
+        Bytes that the piece occupies in the file.
+    """
+
+    start_ns: int
+    data: NDArray[np.uint8]
+    messages: NDArray[np.void]
+    stored: int
+
+
+@attrs.frozen(eq=False)
+class Due:
+    """A piece that is not loaded yet; a merge of many files thus holds few pieces in memory.
+
+    Attributes
+    ----------
+    start_ns : int
+        `Piece.start_ns` of the piece [ns].
+    load : callable
+        Returns the piece, or None if it is damaged. Call it before requesting the next piece.
+    """
+
+    start_ns: int
+    load: Callable[[], Piece | None]
+
+
+class McapFile:
+    """An open MCAP file; its faults are listed in `findings`.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        Name of the file in findings and errors.
+    file : binary file
+        Seekable.
+    budget : Budget
+
+    Raises
+    ------
+    RecordingError
+        If the file is empty or is not an MCAP file.
+    """
+
+    def __init__(self, path: Path, file: IO[bytes], budget: Budget) -> None:
+        self.path, self.file, self.budget = path, file, budget
+        self.size = file.seek(0, 2)
+        self.findings: list[Finding] = []
+        self.without_checksum = 0
+        self._found = 0
+        self._check_magic()
+        indexed = by_index(file, self.size, budget)
+        self.layout = indexed or by_scan(file, self.size, budget)
+        self.is_indexed = indexed is not None
+        for text in self.layout.losses:
+            self._find(text)
+        if not (self.is_indexed or self.layout.losses):
+            self._find("has no index, or a damaged one: read from start to end", Severity.NOTE)
+        self._check_data()
+
+    @property
+    def channels(self) -> dict[int, Channel]:
+        """Channels of the file by channel number."""
+        return self.layout.channels
+
+    def pieces(self, types: dict[int, int]) -> Iterator[Due]:
+        """Pieces of the requested channels, for lazy loading; damaged parts are skipped and become findings.
+
+        Parameters
+        ----------
+        types : dict
+            Stream code by channel number.
+        """
+        roles = np.zeros(2**16, np.uint8)
+        roles[list(self.channels)] = mcap_layout.IGNORED
+        for number, code in types.items():
+            roles[number] = code
+        for segment in self.layout.segments:
+            yield Due(segment.start_ns, partial(self._piece, segment, roles))
+        self._account(types, self._found)
+
+    def _piece(self, segment: Segment, roles: NDArray[np.uint8]) -> Piece | None:
+        """Messages of a segment; None if it is damaged."""
+        try:
+            data = np.frombuffer(self._load(segment), np.uint8)
+            messages = self._messages(segment, data, roles)
+        except DamageError as error:
+            self._find(f"chunk at byte {segment.at} {error}: its messages are lost")
+            return None
+        self._found += len(messages)
+        return Piece(segment.start_ns, data, messages, segment.stored)
+
+    def _load(self, segment: Segment) -> bytes:
+        """Records of a segment, after verification of its checksum (if there is one)."""
+        if segment.data_at == segment.at:
+            self.without_checksum += 1
+            return content(self.file, segment, self.budget)
+        head = chunk_head(self.file, segment.at, self.size)
+        if (head.data_at, head.stored, head.size, head.compression) != (
+            segment.data_at,
+            segment.stored,
+            segment.size,
+            segment.compression,
+        ):
+            raise DamageError("differs from the index")
+        data = content(self.file, segment, self.budget)
+        if not segment.cut:
+            check(data, head.crc)
+        self.without_checksum += not head.crc or segment.cut
+        return data
+
+    def _messages(
+        self, segment: Segment, data: NDArray[np.uint8], roles: NDArray[np.uint8]
+    ) -> NDArray[np.void]:
+        counts = np.zeros(1, COUNTS)
+        mcap_layout.walk(data, roles, _NO_MESSAGES, _NO_POSITIONS, counts)
+        wanted = int(counts["wanted"][0])
+        self.budget.check(segment.stored + len(data) + _OF_A_MESSAGE * wanted)
+        messages = np.zeros(wanted, MESSAGE)
+        if len(messages):
+            mcap_layout.walk(data, roles, messages, _NO_POSITIONS, counts)
+        rest = len(data) - int(counts["read"][0])
+        if rest and not segment.cut:
+            self._find(f"chunk at byte {segment.at} holds {rest} bytes that are not records: they are lost")
+        for name, what in (
+            ("unknown_channel", "messages without a channel"),
+            ("foreign", "records of an unknown kind"),
+        ):
+            if counts[name][0]:
+                self._find(f"chunk at byte {segment.at} holds {counts[name][0]} {what}: they are lost")
+        return messages
+
+    def _account(self, types: dict[int, int], found: int) -> None:
+        """Report, after the last piece, how many messages are missing and what could not be checked."""
+        counts = self.layout.counts
+        expected = sum(counts.get(number, 0) for number in types) if counts is not None else found
+        if expected != found:
+            self._find(f"{found} messages could be read of the {expected} that it counts")
+        if self.without_checksum and not self.layout.data_crc:
+            self._find(
+                f"has no checksum for {self.without_checksum} of {len(self.layout.segments)} chunks: "
+                "a damaged number in them would not be detected",
+                Severity.NOTE,
+            )
+
+    def _check_magic(self) -> None:
+        self.file.seek(0)
+        start = self.file.read(len(MAGIC))
+        if not self.size:
+            raise RecordingError(str(self.path), "", "is empty, expected an MCAP file")
+        if start != MAGIC:
+            raise RecordingError(
+                str(self.path), "", f"begins with {start!r}, expected {MAGIC!r}: is not an MCAP file"
+            )
+
+    def _check_data(self) -> None:
+        """Verify the checksum of the data section, if the file has one."""
+        if not self.layout.data_crc:
+            return
+        self.file.seek(0)
+        crc, left = 0, self.layout.data_end
+        while left and (part := self.file.read(min(left, 2**20))):
+            crc, left = zlib.crc32(part, crc), left - len(part)
+        if crc != self.layout.data_crc:
+            self._find("does not match the checksum of its data: a part of it is damaged")
+
+    def _find(self, text: str, severity: Severity = Severity.LOSS) -> None:
+        if len(self.findings) < _MOST_FINDINGS:
+            self.findings.append(Finding(self.path, text, severity))
+        elif len(self.findings) == _MOST_FINDINGS:
+            self.findings.append(Finding(self.path, "has more findings that are not listed"))

@@ -1,0 +1,253 @@
+"""A recording as series of signals over time."""
+
+from collections.abc import Callable, Iterable
+from contextlib import ExitStack
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from leg_wear_monitor.bags.bag import Recordable, Role, Source, check_channel, find_files, open_sources
+from leg_wear_monitor.bags.findings import Budget, Finding, RecordingError, Severity
+from leg_wear_monitor.bags.mcap_layout import Channel
+from leg_wear_monitor.bags.reader import names_in
+from leg_wear_monitor.estimate.torque_model import Series, series
+from leg_wear_monitor.messages import outputs
+from leg_wear_monitor.messages.cdr import Decoder
+from leg_wear_monitor.messages.streams import JOINT_STATE, STREAMS, WRENCH_STAMPED, Stream
+from leg_wear_monitor.monitor.config.inputs import DriveTorque
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.twin import CRANK
+from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, ZERO_STAMP, Samples
+
+# Joint positions and torques of a recording as time series, each a candidate for the crank or its torque.
+
+
+WRENCH, FLOAT64, EFFORT = "wrench", "float64", "effort"
+
+
+@attrs.frozen
+class JointName:
+    """A joint of a recording: its topic and its name in the messages."""
+
+    topic: str
+    joint: str
+
+
+@attrs.frozen
+class TorqueSource:
+    """A torque of a recording.
+
+    Attributes
+    ----------
+    source : str
+        Value of `drive_torque.source`.
+    topic : str
+    component : str
+        Axis of a wrench (x, y, z), joint of an effort; empty for a Float64.
+    """
+
+    source: str
+    topic: str
+    component: str = ""
+
+    @property
+    def label(self) -> str:
+        """The torque in words."""
+        if self.source == WRENCH:
+            return f"wrench, axis {self.component}, of {self.topic}"
+        if self.source == EFFORT:
+            return f"effort of {self.component} in {self.topic}"
+        return f"Float64 of {self.topic}"
+
+
+@attrs.frozen(eq=False)
+class Signals:
+    """All candidates of one or more recordings."""
+
+    joints: dict[JointName, Series]
+    torques: dict[TorqueSource, Series]
+
+
+# All joints and torques of recordings as series, by the monitor's own decoder, one channel at a time.
+
+
+# What the monitor itself publishes: its predicted torque would fit better than any measured one
+_OWN = tuple(each.name.lstrip("~") for each in (outputs.CLEARANCES, outputs.IMPACTS, outputs.TORQUE))
+_MOST_CHANNELS = 250  # a channel's number goes through eight bits
+_MOST_JOINTS = 200
+_NAMED = 20  # messages of a piece whose joint names are read
+_NOBODY = "(no joint)"
+
+
+@attrs.frozen
+class _Selected:
+    """A channel's topic and stream."""
+
+    topic: str
+    stream: Stream
+
+
+@attrs.define
+class _Collected:
+    """Parts of one series: stamps, values, indices of the recording."""
+
+    parts: list[tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]] = attrs.Factory(list)
+
+    def series(self, first_ns: int) -> Series:
+        stamps, values, recording = (np.concatenate(column) for column in zip(*self.parts, strict=True))
+        return series(stamps, values, recording, first_ns)
+
+
+def read_signals(
+    paths: Iterable[Recordable],
+    config: MonitorConfig,
+    *,
+    joint_states: str | None = None,
+    drive_torque: str | None = None,
+    progress: Callable[[float], None] = lambda _fraction: None,
+) -> tuple[Signals, list[Finding]]:
+    """Read all joints and torques of recordings.
+
+    Parameters
+    ----------
+    paths : iterable
+        MCAP, .db3, CSV and Parquet files, bag directories, tables in memory.
+    config : MonitorConfig
+        Columns and units of tables.
+    joint_states, drive_torque : str, optional
+        Topics to read, and no others of their kind; default: all.
+    progress : callable
+        Takes the fraction read.
+
+    Raises
+    ------
+    RecordingError
+        If nothing can be read, or there is no joint.
+    """
+    bag_files, findings = find_files(paths)
+    with ExitStack() as stack:
+        sources, lost = open_sources(bag_files, config, Budget(), stack)
+        selected, skipped = _select(sources, joint_states, drive_torque)
+        if not any(each.stream.kind == CRANK for each in selected):
+            raise RecordingError(
+                ", ".join(str(one.path) for one in bag_files),
+                "joint_states",
+                "no topic of sensor_msgs/msg/JointState",
+            )
+        collected: dict[JointName | TorqueSource, _Collected] = {}
+        read, total = 0, max(1, sum(source.file.size for source in sources))
+        for source in sources:
+            for due in source.pieces():
+                piece = due.load()
+                if piece is not None:
+                    recording = source.bag_file.recording
+                    _take(collected, selected, piece.data, piece.messages, recording)
+                    read += piece.stored
+                    progress(min(1.0, read / total))
+        findings += lost + skipped + [each for source in sources for each in source.file.findings]
+    return _signals(collected), findings
+
+
+def _select(
+    sources: list[Source], joint_states: str | None, drive_torque: str | None
+) -> tuple[list[_Selected], list[Finding]]:
+    """Give each channel that is read a number, which stands in its messages instead of a stream's code."""
+    selected: list[_Selected] = []
+    findings: list[Finding] = []
+    for source in sources:
+        for number, channel in sorted(source.file.channels.items()):
+            path, known = source.bag_file.path, source.bag_file.types.get(channel.topic, "")
+            stream = _stream(channel, known, {CRANK: joint_states}, drive_torque)
+            if stream is None:
+                continue
+            try:
+                check_channel(Role(stream, channel.topic), channel, known, str(path))
+            except RecordingError as error:
+                findings.append(Finding(path, f"{error.key} {error.fault}: it is not read", Severity.NOTE))
+                continue
+            one = _Selected(channel.topic, stream)
+            if one not in selected:
+                selected.append(one)
+            if selected.index(one) < _MOST_CHANNELS:
+                source.types[number] = 1 + selected.index(one)
+    return selected, findings
+
+
+def _stream(
+    channel: Channel, known: str, chosen: dict[int, str | None], drive_torque: str | None
+) -> Stream | None:
+    """Stream of a channel by its type; None for what is not to be read."""
+    if channel.topic.endswith(_OWN):
+        return None
+    for stream in STREAMS:
+        topic = chosen.get(stream.kind, drive_torque)
+        if stream.type == (channel.type or known) and not stream.load_source:
+            return stream if topic in (None, channel.topic, channel.topic.lstrip("/")) else None
+    return None
+
+
+def _take(
+    collected: dict[JointName | TorqueSource, _Collected],
+    selected: list[_Selected],
+    data: NDArray[np.uint8],
+    messages: NDArray[np.void],
+    recording: int,
+) -> None:
+    """Decode a piece channel by channel."""
+    for number in np.unique(messages["type"]).tolist():
+        channel = selected[number - 1]
+        chosen = messages[messages["type"] == number]
+        chosen["type"] = channel.stream.code
+        for name, samples, field in _decoded(channel, data, chosen):
+            good = np.isin(samples["fault"], (NO_FAULT, ZERO_STAMP))
+            stamps = np.where(samples["fault"] == ZERO_STAMP, chosen["log_time_ns"], samples["stamp_ns"])[
+                good
+            ]
+            parts = collected.setdefault(name, _Collected()).parts
+            parts.append((stamps, samples[field][good], np.full(len(stamps), recording)))
+
+
+def _decoded(
+    channel: _Selected, data: NDArray[np.uint8], messages: NDArray[np.void]
+) -> list[tuple[JointName | TorqueSource, Samples, str]]:
+    """Samples of each series in a channel's messages, and the field that holds its values."""
+    topic, code = channel.topic, channel.stream.code
+    found: list[tuple[JointName | TorqueSource, Samples, str]] = []
+    if code == JOINT_STATE:
+        for joint in _joints(data, messages):
+            samples = _decoder(EFFORT, joint=joint).many(data, messages)
+            found.append((JointName(topic, joint), samples, "crank_angle_rad"))
+            if np.isfinite(samples["torque_nm"]).any():
+                found.append((TorqueSource(EFFORT, topic, joint), samples, "torque_nm"))
+        return found
+    if code == WRENCH_STAMPED:
+        return [
+            (TorqueSource(WRENCH, topic, axis), _decoder(WRENCH, axis).many(data, messages), "torque_nm")
+            for axis in "xyz"
+        ]
+    return [(TorqueSource(FLOAT64, topic), _decoder(FLOAT64).many(data, messages), "torque_nm")]
+
+
+def _decoder(source: str, axis: str = "z", joint: str = _NOBODY) -> Decoder:
+    return Decoder(MonitorConfig(crank_joint=joint, drive_torque=DriveTorque(source=source, axis=axis)))
+
+
+def _joints(data: NDArray[np.uint8], messages: NDArray[np.void]) -> list[str]:
+    """Names of the joints in the first sound messages."""
+    faults = _decoder(EFFORT).many(data, messages)["fault"]
+    sound = np.flatnonzero(faults == MISSING_JOINT)[:_NAMED]
+    names: dict[str, None] = {}
+    for message in messages[sound]:
+        names |= dict.fromkeys(names_in(data[message["begin"] : message["end"]].tobytes())[:_MOST_JOINTS])
+    return [name for name in names if name][:_MOST_JOINTS]
+
+
+def _signals(collected: dict[JointName | TorqueSource, _Collected]) -> Signals:
+    full = {name: each for name, each in collected.items() if sum(len(part[0]) for part in each.parts)}
+    first_ns = min(
+        (int(part[0].min()) for each in full.values() for part in each.parts if len(part[0])), default=0
+    )
+    joints = {name: each.series(first_ns) for name, each in full.items() if isinstance(name, JointName)}
+    torques = {name: each.series(first_ns) for name, each in full.items() if isinstance(name, TorqueSource)}
+    return Signals(joints, torques)

@@ -1,1 +1,0 @@
-"""Joint positions and torques of recordings as time series, and each pair of them."""

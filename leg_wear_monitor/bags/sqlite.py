@@ -1,0 +1,341 @@
+"""Recordings in SQLite (db3): a database that is not trusted, and its messages."""
+
+import shutil
+import sqlite3
+import tempfile
+from collections import deque
+from collections.abc import Iterator
+from contextlib import ExitStack
+from functools import partial
+from pathlib import Path
+from urllib.parse import quote
+
+import numpy as np
+
+from leg_wear_monitor.bags.findings import (
+    Budget,
+    DamageError,
+    Finding,
+    RecordingError,
+    Severity,
+    open_regular,
+)
+from leg_wear_monitor.bags.mcap_file import Due, Piece
+from leg_wear_monitor.bags.mcap_layout import Channel
+from leg_wear_monitor.messages.cdr import MESSAGE
+
+# Safe opening of untrusted SQLite files: nothing is written to the file and no code in it is executed.
+
+
+_NEEDED = {"topics": {"id", "name", "type"}, "messages": {"id", "topic_id", "timestamp", "data"}}
+_JOURNALS = ("-wal", "-journal")
+_LONGEST_ROW = 2**25  # bytes
+_LONGEST_TEXT = 32  # of the schema and of topics: this part of what may be read at once
+_MOST_COLUMNS, _LONGEST_SQL = 64, 100_000
+# Instructions of SQLite's machine: a row takes about 80 in all, and has 30 bytes or more.
+# A tree whose branches meet again, or a query that never ends, takes any number.
+_OF_THE_SCHEMA, _OF_A_BYTE, _AT_LEAST, _STEPS_TOGETHER = 200_000, 16, 10**7, 1000
+_FUNCTIONS = {"count", "length", "typeof"}
+UNREADABLE = (sqlite3.Error, UnicodeDecodeError, MemoryError)
+"""What reading a damaged database raises; its own complaint may hold bytes of it that are no text."""
+
+
+def open_database(
+    path: Path, file: Path, budget: Budget, stack: ExitStack
+) -> tuple[sqlite3.Connection, list[str]]:
+    """Open a rosbag2 database for reading, including all committed transactions.
+
+    A ``-wal`` or ``-journal`` file beside the database is part of it. SQLite recovers such a file by writing,
+    so the recovery takes place in a private copy.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        Name of the file in notes and errors.
+    file : pathlib.Path
+        File that is opened.
+    budget : Budget
+    stack : contextlib.ExitStack
+        Closes the database.
+
+    Returns
+    -------
+    database : sqlite3.Connection
+    notes : list of str
+        Remarks for the user.
+
+    Raises
+    ------
+    RecordingError
+        If the file cannot be read or is not a rosbag2 database.
+    """
+    beside = [each for end in _JOURNALS if _size(each := file.with_name(file.name + end))]
+    try:
+        if beside:
+            address = f"file:{quote(str(_copied(file, beside, budget, stack)))}?mode=rw"
+        else:
+            address = f"file:{quote(str(file.absolute()))}?mode=ro&immutable=1"
+        database = sqlite3.connect(address, uri=True, isolation_level=None)
+        stack.callback(database.close)
+        database.text_factory = lambda raw: raw.decode("utf-8", "replace")
+        database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, budget.at_once // _LONGEST_TEXT)
+        database.setlimit(sqlite3.SQLITE_LIMIT_COLUMN, _MOST_COLUMNS)
+        database.setlimit(sqlite3.SQLITE_LIMIT_SQL_LENGTH, _LONGEST_SQL)
+        _limit_work(database, _OF_THE_SCHEMA)
+        database.execute("PRAGMA trusted_schema = OFF")
+        database.set_authorizer(_is_allowed)
+        _check_tables(database)
+        _limit_work(database, _AT_LEAST + _OF_A_BYTE * _size(file))
+    except DamageError as error:
+        raise RecordingError(str(path), "", str(error)) from error
+    except (*UNREADABLE, OSError) as error:
+        raise RecordingError(str(path), "", f"is not a readable .db3 file: {one_line(error)}") from error
+    names = " and ".join(each.name for each in beside)
+    return database, [f"was not closed: the content of {names} beside it is read as well"] if beside else []
+
+
+def allow_rows(database: sqlite3.Connection, budget: Budget) -> None:
+    """Allow rows as long as those of messages, which are longer than any text of the schema and of topics."""
+    database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, max(_LONGEST_ROW, budget.at_once // 8 + 2**16))
+
+
+def one_line(error: BaseException) -> str:
+    """Text of an error on one line."""
+    if str(error) == "interrupted":
+        return "reading it takes more work than its size explains"
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def _limit_work(database: sqlite3.Connection, most: int) -> None:
+    """Interrupt what takes more instructions, counted from now on."""
+    left = most // _STEPS_TOGETHER
+
+    def is_over() -> bool:
+        nonlocal left
+        left -= 1
+        return left < 0
+
+    database.set_progress_handler(is_over, _STEPS_TOGETHER)
+
+
+def _is_allowed(action: int, first: str | None, second: str | None, _: str | None, inside: str | None) -> int:
+    """Allow reading of plain tables; `inside` is the view that reads."""
+    if inside is None:
+        is_one = (
+            action in (sqlite3.SQLITE_SELECT, sqlite3.SQLITE_READ)
+            or (action == sqlite3.SQLITE_FUNCTION and second in _FUNCTIONS)
+            or (action == sqlite3.SQLITE_PRAGMA and first == "table_xinfo")
+        )
+        return sqlite3.SQLITE_OK if is_one else sqlite3.SQLITE_DENY
+    return sqlite3.SQLITE_DENY
+
+
+def _size(file: Path) -> int:
+    """Size of a file [bytes]; 0 if it does not exist."""
+    try:
+        return file.stat().st_size
+    except FileNotFoundError:
+        return 0
+
+
+def _copied(file: Path, beside: list[Path], budget: Budget, stack: ExitStack) -> Path:
+    """Make a private copy of a database and of its journal files."""
+    budget.take(sum(_size(each) for each in (file, *beside)))
+    copy = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "content.db3"
+    for each in (file, *beside):
+        target = copy.with_name(copy.name + each.name.removeprefix(file.name))
+        with open_regular(each) as source, target.open("xb") as content:
+            shutil.copyfileobj(source, content)
+    return copy
+
+
+def _check_tables(database: sqlite3.Connection) -> None:
+    """Check that the tables are plain: a view or a virtual table would execute code when it is read.
+
+    SQLite takes names of any case, and passes over entries that have no text.
+    """
+    found: dict[str, list[tuple[str, str]]] = {}
+    for name, kind, text in database.execute("SELECT name, type, sql FROM sqlite_master"):
+        found.setdefault(str(name).lower(), []).append((str(kind), str(text)))
+    for table, needed in (*_NEEDED.items(), ("message_definitions", set())):
+        entries = found.get(table, [])
+        if not entries and not needed:
+            continue
+        if (
+            len(entries) != 1
+            or entries[0][0] != "table"
+            or not entries[0][1].upper().startswith("CREATE TABLE")
+        ):
+            raise DamageError(f"is not a readable .db3 file: it has no table {table}, or not a plain one")
+        plain = {row[1] for row in database.execute(f"PRAGMA table_xinfo({table})") if not row[6]}
+        if missing := sorted(needed - plain):
+            raise DamageError(f"is not a readable .db3 file: its table {table} has no {', '.join(missing)}")
+
+
+# Reader of one rosbag2 .db3 file: its topics, and its messages in pieces ordered by log time.
+
+
+_Row = tuple[int, int, int]  # id, time, topic
+_TOGETHER = 4096
+_MOST_TOPICS = 65536
+_OF_A_ROW, _OF_A_CHARACTER = 1000, 16  # memory of a topic or definition, with its copies and escapes [bytes]
+_NO_CHECKSUMS = "has no checksums, like all .db3 files: a damaged number would not be detected"
+
+
+class SqliteFile:
+    """An open .db3 file; its faults are listed in `findings`.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        Name of the file in findings and errors.
+    file : pathlib.Path
+        File that is opened; nothing is written to it.
+    budget : Budget
+    stack : contextlib.ExitStack
+        Closes the file.
+
+    Raises
+    ------
+    RecordingError
+        If the file is not a rosbag2 database.
+    """
+
+    def __init__(self, path: Path, file: Path, budget: Budget, stack: ExitStack) -> None:
+        self.path, self.budget = path, budget
+        self.findings: list[Finding] = [Finding(path, _NO_CHECKSUMS, Severity.NOTE)]
+        self._database, notes = open_database(path, file, budget, stack)
+        self.findings += [Finding(path, note, Severity.NOTE) for note in notes]
+        try:
+            self.size = file.stat().st_size
+            self.channels = _channels(self._database, budget)
+            allow_rows(self._database, budget)
+            self._counts = _counts(self._database)
+        except DamageError as error:
+            raise RecordingError(str(path), "", str(error)) from error
+        except (*UNREADABLE, OSError) as error:
+            raise RecordingError(str(path), "", f"is not a readable .db3 file: {one_line(error)}") from error
+        self._found = 0
+        self._report_unknown()
+
+    def pieces(self, types: dict[int, int]) -> Iterator[Due]:
+        """Pieces of the requested channels; unreadable messages are skipped.
+
+        Parameters
+        ----------
+        types : dict
+            Stream code by channel number.
+        """
+        expected = sum(self._counts.get(number, 0) for number in types)
+        for rows in self._pages(types):
+            while rows:
+                yield Due(rows[0][1], partial(self._piece, rows, types, self.size // max(expected, 1)))
+        if self._found != expected:
+            text = f"{self._found} messages could be read of the {expected} that it counts"
+            self.findings.append(Finding(self.path, text))
+
+    def _pages(self, types: dict[int, int]) -> Iterator[deque[_Row]]:
+        """Message rows without content, in order of log time, many at a time."""
+        if not types:
+            return
+        places = ", ".join("?" * len(types))
+        try:
+            cursor = self._database.execute(
+                f"SELECT id, timestamp, topic_id FROM messages WHERE topic_id IN ({places}) "
+                "AND typeof(timestamp) = 'integer' AND typeof(data) = 'blob' ORDER BY timestamp, id",
+                list(types),
+            )
+            while rows := cursor.fetchmany(_TOGETHER):
+                yield deque(rows)
+        except UNREADABLE as error:
+            self.findings.append(Finding(self.path, f"ends early: {one_line(error)}"))
+
+    def _piece(self, rows: deque[_Row], types: dict[int, int], stored: int) -> Piece:
+        """Read the messages of the next rows, as memory permits; these rows are removed from `rows`."""
+        contents: list[bytes] = []
+        kept: list[_Row] = []
+        start_ns, room, number = rows[0][1], self.budget.at_once // 4, len(rows)
+        while rows and room > 0:
+            row = rows.popleft()
+            content = self._content(row[0])
+            if content is not None:
+                contents.append(content)
+                kept.append(row)
+                room -= len(content)
+        self._found += len(kept)
+        messages = np.zeros(len(kept), MESSAGE)
+        messages["end"] = np.cumsum([len(content) for content in contents])
+        messages["begin"][1:] = messages["end"][:-1]
+        messages["log_time_ns"] = messages["publish_time_ns"] = [time for _, time, _ in kept]
+        messages["type"] = [types[topic] for _, _, topic in kept]
+        data = np.frombuffer(b"".join(contents), np.uint8)
+        return Piece(start_ns, data, messages, stored * (number - len(rows)))
+
+    def _content(self, number: int) -> bytes | None:
+        """Content of one message; None if it is unreadable or too large."""
+        try:
+            row = self._database.execute(
+                "SELECT data FROM messages WHERE id = ? AND length(data) <= ?",
+                (number, self.budget.at_once // 8),
+            ).fetchone()
+        except UNREADABLE:
+            return None  # counted as unreadable
+        return row[0] if row and isinstance(row[0], bytes) else None
+
+    def _report_unknown(self) -> None:
+        """Report the number of messages that belong to no listed topic."""
+        count = sum(count for topic, count in self._counts.items() if topic not in self.channels)
+        if count:
+            text = f"contains {count} messages of topics that it does not list: they are lost"
+            self.findings.append(Finding(self.path, text))
+
+
+def _counts(database: sqlite3.Connection) -> dict[int | None, int]:
+    """Number of messages by topic number; None where that is no integer.
+
+    Raises
+    ------
+    DamageError
+        If there are more topics than anybody has.
+    """
+    number = "CASE WHEN typeof(topic_id) = 'integer' THEN topic_id END"
+    query = f"SELECT {number}, COUNT(*) FROM messages NOT INDEXED GROUP BY 1 LIMIT ?"
+    counts = dict(database.execute(query, (_MOST_TOPICS + 1,)).fetchall())
+    if len(counts) > _MOST_TOPICS:
+        raise DamageError(f"has messages of more than {_MOST_TOPICS} topics")
+    return counts
+
+
+def _channels(database: sqlite3.Connection, budget: Budget) -> dict[int, Channel]:
+    """Channels by topic number, with the definitions of their types if the file has them.
+
+    Raises
+    ------
+    DamageError
+        If their texts do not fit into memory.
+    """
+    texts: dict[str, tuple[str, str]] = {}
+    query = "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = 'message_definitions'"
+    size = 0
+
+    def rows(query: str) -> Iterator[tuple[object, ...]]:
+        nonlocal size
+        for row in database.execute(f"{query} LIMIT ?", (_MOST_TOPICS + 1,)):
+            size += _OF_A_ROW + _OF_A_CHARACTER * sum(
+                len(text) for text in row if isinstance(text, str | bytes)
+            )
+            budget.check(size)
+            yield row
+
+    if database.execute(query).fetchone():
+        query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
+        for name, encoding, text in rows(query):
+            texts[str(name)] = str(encoding), str(text)
+    channels = {}
+    for number, name, kind, encoding in rows("SELECT id, name, type, serialization_format FROM topics"):
+        definition_encoding, text = texts.get(str(kind), ("ros2msg", ""))
+        if isinstance(number, int):
+            channels[number] = Channel(str(name), str(kind), str(encoding), text, definition_encoding)
+    if len(channels) > _MOST_TOPICS:
+        raise DamageError(f"has more than {_MOST_TOPICS} topics")
+    return channels

@@ -1,1 +1,0 @@
-"""SQLite recordings (.db3)."""

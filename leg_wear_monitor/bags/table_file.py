@@ -1,0 +1,398 @@
+"""Tables as recordings: their rows, counted, as messages of the streams."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import IO, Any, Protocol
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from leg_wear_monitor.bags.findings import Budget, Finding, RecordingError, Severity
+from leg_wear_monitor.bags.mcap_file import Due, Piece
+from leg_wear_monitor.bags.mcap_layout import Channel
+from leg_wear_monitor.bags.table_layout import (
+    CRANK_ANGLE,
+    CRANK_SPEED,
+    DRIVE_TORQUE,
+    FOOT_LOAD,
+    FOOT_LOAD_ALONG,
+    Rows,
+    unit_doubts,
+)
+from leg_wear_monitor.bags.table_rows import CsvFile
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.messages import encode
+from leg_wear_monitor.messages.cdr import MESSAGE
+from leg_wear_monitor.messages.streams import CONTACT, LOAD_WRENCH, STREAMS, WRENCH_STAMPED
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+
+# What is remarkable about the rows of a table: times that go back, gaps, empty cells.
+
+
+_Found = Iterator[tuple[str, Severity]]
+
+
+@attrs.define
+class _Steps:
+    """How often something happened from one row to the next, the line where it did first, its size there."""
+
+    count: int = 0
+    line: int = 0
+    size_s: float = 0.0
+
+    @property
+    def more(self) -> str:
+        """How often it happened, if more than once."""
+        return f" ({self.count} times in all)" if self.count > 1 else ""
+
+    def add(self, which: NDArray[np.bool_], line: NDArray[np.int64], steps_ns: NDArray[np.int64]) -> None:
+        at = np.flatnonzero(which)
+        if len(at) and not self.count:
+            self.line, self.size_s = int(line[at[0]]), float(steps_ns[at[0]]) * 1.0e-9
+        self.count += len(at)
+
+
+@attrs.define
+class Counts:
+    """Counts over all rows so far.
+
+    Parameters
+    ----------
+    config : MonitorConfig
+    is_effort : bool
+        Whether a torque without an angle in its row cannot be used.
+    word : str
+        What a row is called: ``line`` or ``row``.
+
+    Attributes
+    ----------
+    rows : int
+    first_ns, last_ns : int or None
+        Stamps of the first and of the last row [ns].
+    measured : dict
+        Number of rows with a value, by column.
+    least, most : dict
+        Range of the values in SI units, by column.
+    """
+
+    config: MonitorConfig
+    is_effort: bool
+    word: str
+    rows: int = attrs.field(init=False, default=0)
+    first_ns: int | None = attrs.field(init=False, default=None)
+    last_ns: int | None = attrs.field(init=False, default=None)
+    measured: dict[str, int] = attrs.field(init=False, factory=dict)
+    least: dict[str, float] = attrs.field(init=False, factory=dict)
+    most: dict[str, float] = attrs.field(init=False, factory=dict)
+    _back: _Steps = attrs.field(init=False, factory=_Steps)
+    _repeated: _Steps = attrs.field(init=False, factory=_Steps)
+    _gaps: _Steps = attrs.field(init=False, factory=_Steps)
+    _zero: int = attrs.field(init=False, default=0)
+    _unused: int = attrs.field(init=False, default=0)
+
+    def add(self, rows: Rows) -> None:
+        """Add rows, in their order."""
+        if not len(rows.line):
+            return
+        before = rows.stamp_ns[0] if self.last_ns is None else self.last_ns
+        steps = np.diff(rows.stamp_ns, prepend=before)
+        begin = self.last_ns is None
+        self._back.add(steps < 0, rows.line, steps)
+        self._repeated.add((steps == 0) & (np.arange(len(steps)) >= begin), rows.line, steps)
+        self._gaps.add(steps > 1.0e9 * self.config.tracker.gap_limit_s, rows.line, steps)
+        self.first_ns = int(rows.stamp_ns[0]) if self.first_ns is None else self.first_ns
+        self.last_ns, self.rows = int(rows.stamp_ns[-1]), self.rows + len(rows.line)
+        self._zero += int(np.count_nonzero(rows.stamp_ns == 0))
+        if self.is_effort:
+            alone = rows.measured[DRIVE_TORQUE] & ~rows.measured[CRANK_ANGLE]
+            self._unused += int(np.count_nonzero(alone))
+        for key, there in rows.measured.items():
+            self.measured[key] = self.measured.get(key, 0) + int(np.count_nonzero(there))
+            self._range(key, rows.values[key])
+
+    def findings(self) -> _Found:
+        """Findings after the last row: text and severity."""
+        note, word = Severity.NOTE, self.word
+        if self._back.count:
+            back = f"the time goes back by {-self._back.size_s:.6g} s at {word} {self._back.line}"
+            yield f"{back}{self._back.more}", note
+        if self._repeated.count:
+            yield f"the time repeats at {word} {self._repeated.line}{self._repeated.more}", note
+        if self._gaps.count:
+            gap = f"the time jumps by {self._gaps.size_s:.6g} s at {word} {self._gaps.line}"
+            yield f"{gap}{self._gaps.more}; the leg was not monitored in between", note
+        if self._zero:
+            text = "a time of 0 is that of a clock that is not set, and counts as faulty; set input.start"
+            yield text, note
+        if self._unused:
+            text = f"{self._unused} torques have no angle in their row; drive_torque.source 'effort' needs it"
+            yield f"{text}, 'wrench' does not", Severity.LOSS
+        for key, number in self.measured.items():
+            if number < self.rows:
+                text = (
+                    f"{key} is empty in {self.rows - number} of {self.rows} rows: nothing was measured there"
+                )
+                yield text, note
+
+    def _range(self, key: str, values: NDArray[np.float64]) -> None:
+        finite = values[np.isfinite(values)]
+        if len(finite):
+            self.least[key] = min(self.least.get(key, np.inf), float(finite.min()))
+            self.most[key] = max(self.most.get(key, -np.inf), float(finite.max()))
+
+
+# Rows of a table as the messages that the monitor's node would have received.
+
+
+CRANK_CHANNEL, TORQUE_CHANNEL, LOAD_CHANNEL = 1, 2, 3
+_EFFORT = "effort"
+_Group = tuple[int, NDArray[np.int64], NDArray[np.uint8]]
+"""Number of a channel; the rows and the messages of it."""
+
+
+class Encoder:
+    """Encodes rows as messages, by the parameters with which they are decoded.
+
+    Parameters
+    ----------
+    config : MonitorConfig
+    """
+
+    def __init__(self, config: MonitorConfig) -> None:
+        self._crank, self._further = config.crank_joint, config.encoders.names
+        self._torque = config.drive_torque
+        self.has_torque = bool(config.input.columns.drive_torque)
+        self._streams = {stream.torque_source: stream for stream in STREAMS if not stream.load_source}
+        of_load = {stream.load_source: stream for stream in STREAMS}
+        self._load = of_load.get(config.foot_load.source if config.input.columns.foot_load else "none")
+
+    @property
+    def is_effort(self) -> bool:
+        """Whether the torque is the effort of the crank, which needs an angle in the same row."""
+        return self.has_torque and self._torque.source == _EFFORT
+
+    @property
+    def channels(self) -> dict[int, Channel]:
+        """Channels of a table by channel number."""
+        streams = {CRANK_CHANNEL: self._streams[""]}
+        if self.has_torque and not self.is_effort:
+            streams[TORQUE_CHANNEL] = self._streams[self._torque.source]
+        if self._load:
+            streams[LOAD_CHANNEL] = self._load
+        return {number: Channel(f"/{one.topic}", one.type, "cdr", "", "") for number, one in streams.items()}
+
+    def piece(self, rows: Rows, log_time_ns: NDArray[np.int64], types: dict[int, int]) -> Piece:
+        """Messages of rows, the crank's before the torque's and the foot load's.
+
+        Parameters
+        ----------
+        rows : Rows
+        log_time_ns : (n,) array of int
+            Order of the rows.
+        types : dict
+            Stream code by channel number; other channels are left out.
+        """
+        groups: list[_Group] = []
+        if CRANK_CHANNEL in types:
+            groups += [(CRANK_CHANNEL, *group) for group in self._cranks(rows)]
+        if TORQUE_CHANNEL in types:
+            row = np.flatnonzero(rows.measured[DRIVE_TORQUE])
+            raw = self._torques(rows.stamp_ns[row], rows.values[DRIVE_TORQUE][row])
+            groups.append((TORQUE_CHANNEL, row, raw))
+        if LOAD_CHANNEL in types and self._load:
+            row = np.flatnonzero(rows.measured[FOOT_LOAD])
+            groups.append((LOAD_CHANNEL, row, self._loads(self._load.code, rows, row)))
+        return _piece(groups, log_time_ns, types, rows.stored)
+
+    def _cranks(self, rows: Rows) -> list[tuple[NDArray[np.int64], NDArray[np.uint8]]]:
+        """Rows and messages of the joints, for each set of joints that was measured together."""
+        there = np.stack([rows.measured[name] for name in self._further], axis=1) if self._further else None
+        angled = rows.measured[CRANK_ANGLE]
+        if there is None:
+            return [self._joints(rows, np.flatnonzero(angled), ())]
+        sets, which = np.unique(there, axis=0, return_inverse=True)
+        which = which.reshape(-1)
+        return [
+            self._joints(rows, np.flatnonzero(angled & (which == k)), tuple(np.flatnonzero(one)))
+            for k, one in enumerate(sets)
+        ]
+
+    def _joints(
+        self, rows: Rows, row: NDArray[np.int64], further: Sequence[int]
+    ) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
+        """Messages with the crank and some of the further encoders."""
+        names = [self._further[k] for k in further]
+        angles = [rows.values[CRANK_ANGLE], *(rows.values[name] for name in names)]
+        raw = encode.joint_states(
+            rows.stamp_ns[row],
+            [self._crank, *names],
+            position=np.stack([angle[row] for angle in angles], axis=1),
+            velocity=_of_the_crank(rows, CRANK_SPEED, row, len(names)),
+            effort=_of_the_crank(rows, DRIVE_TORQUE, row, len(names)) if self.is_effort else None,
+        )
+        return row, raw
+
+    def _torques(self, stamp_ns: NDArray[np.int64], torque: Floats) -> NDArray[np.uint8]:
+        if self._streams[self._torque.source].code == WRENCH_STAMPED:
+            vector = np.zeros((len(torque), 3))
+            vector[:, "xyz".index(self._torque.axis)] = torque
+            return encode.wrenches(stamp_ns, torque=vector)
+        return encode.float64s(torque)
+
+    def _loads(self, code: int, rows: Rows, row: NDArray[np.int64]) -> NDArray[np.uint8]:
+        force = rows.values[FOOT_LOAD][row]
+        if code == CONTACT:
+            return encode.bools(force != 0.0)
+        if code == LOAD_WRENCH:
+            vector = np.zeros((len(row), 3))
+            vector[:, 1] = force
+            if FOOT_LOAD_ALONG in rows.values:
+                vector[:, 0] = rows.values[FOOT_LOAD_ALONG][row]
+            return encode.wrenches(rows.stamp_ns[row], force=vector)
+        return encode.float64s(force)
+
+
+def _of_the_crank(rows: Rows, key: str, row: NDArray[np.int64], others: int) -> Floats | None:
+    """A column (n, joints) in which only the crank has a value; None without the column."""
+    if key not in rows.values:
+        return None
+    return np.column_stack([rows.values[key][row], np.full((len(row), others), np.nan)])
+
+
+def _piece(
+    groups: list[_Group],
+    log_time_ns: NDArray[np.int64],
+    types: dict[int, int],
+    stored: int,
+) -> Piece:
+    """Messages of all groups in the order of their rows; of a row, the crank's comes first."""
+    messages, begin = [np.zeros(0, MESSAGE)], 0
+    for number, row, raw in groups:
+        one = np.zeros(len(row), MESSAGE)
+        one["begin"] = begin + raw.shape[1] * np.arange(len(row))
+        one["end"] = one["begin"] + raw.shape[1]
+        one["log_time_ns"] = one["publish_time_ns"] = log_time_ns[row]
+        one["type"] = types[number]
+        messages.append(one)
+        begin += raw.size
+    order = np.argsort(np.concatenate([np.zeros(0, np.int64), *(row for _, row, _ in groups)]), kind="stable")
+    data = np.concatenate([np.zeros(0, np.uint8), *(raw.reshape(-1) for _, _, raw in groups)])
+    start_ns = int(log_time_ns[0]) if len(log_time_ns) else 0
+    return Piece(start_ns, data, np.concatenate(messages)[order], stored)
+
+
+# One table (CSV, Parquet, data frame) as a file of a recording; its faults are listed in `findings`.
+
+
+CSV, PARQUET = ".csv", ".parquet"
+
+
+class Table(Protocol):
+    """Common interface of the kinds of tables."""
+
+    size: int
+    names: list[str]
+
+    def parts(self) -> Iterator[Rows]:
+        """All sound rows, block by block, from the first one."""
+
+
+class TableFile:
+    """An open table.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        Name of the table in findings and errors.
+    content : binary file, mapping of arrays or data frame
+    storage : str
+        `CSV`, `PARQUET`, or empty for columns in memory.
+    config : MonitorConfig
+        Names the columns and their units.
+    budget : Budget
+
+    Raises
+    ------
+    RecordingError
+        If a column is missing, or no row can be read.
+    """
+
+    def __init__(
+        self, path: Path, content: IO[bytes] | Any, storage: str, config: MonitorConfig, budget: Budget
+    ) -> None:
+        self.path, self._config, self._encoder = path, config, Encoder(config)
+        self._open = lambda findings: _opened(path, content, storage, config, budget, findings)
+        self._start_ns = self._check_start()
+        self.findings: list[Finding] = []
+        self._table = self._open(self.findings)
+        self.size = self._table.size
+        self.counts = Counts(config, self._encoder.is_effort, "line" if storage == CSV else "row")
+
+    @property
+    def channels(self) -> dict[int, Channel]:
+        """Channels by channel number."""
+        return self._encoder.channels
+
+    @property
+    def names(self) -> list[str]:
+        """Names of all columns."""
+        return self._table.names
+
+    def pieces(self, types: dict[int, int]) -> Iterator[Due]:
+        """Pieces of the requested channels; lines that cannot be read are skipped and become findings.
+
+        Parameters
+        ----------
+        types : dict
+            Stream code by channel number.
+        """
+        path, parts, last_ns, is_over = self.path, self._table.parts(), self._start_ns, False
+
+        def load() -> Piece | None:
+            nonlocal last_ns, is_over
+            rows = next(parts, None)
+            if rows is None:
+                is_over = True
+                return None
+            if self.counts.rows == 0:
+                self.findings += [Finding(path, text) for text in unit_doubts(rows, self._config)]
+            log_time_ns = _order(rows.stamp_ns, last_ns, self.counts.last_ns)
+            self.counts.add(rows)
+            last_ns = int(log_time_ns[-1]) if len(log_time_ns) else last_ns
+            return self._encoder.piece(rows, log_time_ns, types)
+
+        while not is_over:
+            yield Due(last_ns, load)
+        self.findings += [Finding(path, text, severity) for text, severity in self.counts.findings()]
+
+    def _check_start(self) -> int:
+        """Stamp of the first sound row [ns]; the first part decides whether anything can be read."""
+        found: list[Finding] = []
+        table = self._open(found)
+        rows = next(table.parts(), None)
+        if rows is not None and len(rows.stamp_ns):
+            return int(rows.stamp_ns[0])
+        why = next((f"; {finding.text}" for finding in found), "")
+        raise RecordingError(str(self.path), "", f"has no row that can be read{why}")
+
+
+def _opened(
+    path: Path, content: Any, storage: str, config: MonitorConfig, budget: Budget, findings: list[Finding]
+) -> Table:
+    if storage == CSV:
+        return CsvFile(path, content, config, budget, findings)
+    if storage == PARQUET:
+        from leg_wear_monitor.bags.parquet import ParquetFile
+
+        return ParquetFile(path, content, config, budget, findings)
+    from leg_wear_monitor.bags.table_rows import Frame
+
+    return Frame(path, content, config, findings)
+
+
+def _order(stamp_ns: NDArray[np.int64], last_ns: int, last_stamp_ns: int | None) -> NDArray[np.int64]:
+    """Times that keep the rows in their order: the stamps, but where a stamp goes back, the time stands."""
+    before = stamp_ns[:1] if last_stamp_ns is None else np.array([last_stamp_ns], np.int64)
+    steps = np.diff(stamp_ns, prepend=before)
+    return np.asarray(last_ns + np.cumsum(np.maximum(steps, 0)), np.int64)

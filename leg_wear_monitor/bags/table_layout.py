@@ -1,0 +1,396 @@
+"""Layout of tables: columns, rows, stamps, units that are plausible, damage."""
+
+import math
+from collections.abc import Iterator, Sequence
+from decimal import Decimal
+from pathlib import Path
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from leg_wear_monitor.bags.findings import Finding, RecordingError
+from leg_wear_monitor.errors import printable
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.config.tables import (
+    ANGLES,
+    DATE,
+    FORCES,
+    SPEEDS,
+    STAMPS,
+    TORQUES,
+    TableInput,
+    Units,
+)
+from leg_wear_monitor.twin.sample import CONTACT, NO_LOAD, WRENCH
+
+# Which columns of a table are read, in which units, and which of them it has.
+
+
+STAMP, CRANK_ANGLE, CRANK_SPEED, DRIVE_TORQUE = "stamp", "crank_angle", "crank_speed", "drive_torque"
+FOOT_LOAD, FOOT_LOAD_ALONG = "foot_load", "foot_load_along"
+_MAY_BE_NONE = (CRANK_SPEED, DRIVE_TORQUE, FOOT_LOAD, FOOT_LOAD_ALONG)
+_MOST_LISTED = 20
+
+
+@attrs.frozen
+class Column:
+    """A column that is read.
+
+    Attributes
+    ----------
+    key : str
+        What it is: one of the above, or the name of a further encoder.
+    name : str
+        Its name in the table.
+    parameter : str
+        Parameter that gives the name.
+    unit : str
+    factor, divisor : float
+        To SI.
+    """
+
+    key: str
+    name: str
+    parameter: str
+    unit: str
+    factor: float = 1.0
+    divisor: float = 1.0
+
+    def to_si(self, values: Floats) -> Floats:
+        """Values in SI units; those that are in them already stay the same bit for bit."""
+        return np.asarray(values * self.factor / self.divisor)
+
+
+@attrs.frozen(eq=False)
+class Rows:
+    """Rows of a table, in SI units.
+
+    Attributes
+    ----------
+    line : (n,) array of int
+        Line or row in the table, from 1.
+    stamp_ns : (n,) array of int
+    values : dict
+        Values (n,) by the column's key; NaN where nothing was measured.
+    measured : dict
+        Whether a value was measured (n,), by the column's key: an empty cell was not, a NaN was.
+    stored : int
+        Bytes that the rows occupy in the file.
+    """
+
+    line: NDArray[np.int64]
+    stamp_ns: NDArray[np.int64]
+    values: dict[str, Floats]
+    measured: dict[str, NDArray[np.bool_]]
+    stored: int = 0
+
+    def part(self, which: NDArray[np.bool_]) -> "Rows":
+        """Some of the rows."""
+        values = {key: column[which] for key, column in self.values.items()}
+        measured = {key: column[which] for key, column in self.measured.items()}
+        return Rows(self.line[which], self.stamp_ns[which], values, measured, self.stored)
+
+
+def columns_of(config: MonitorConfig) -> tuple[Column, ...]:
+    """Columns to read, the time first if there is one."""
+    names, units = config.input.columns, config.input.units
+    scales = {
+        STAMP: (1.0, 1.0),
+        CRANK_ANGLE: config.input.angle_scale,
+        CRANK_SPEED: SPEEDS[units.crank_speed],
+        DRIVE_TORQUE: TORQUES[units.drive_torque],
+    }
+    force = (1.0, 1.0) if config.foot_load.source == CONTACT else FORCES[units.foot_load]
+    if config.foot_load.source != NO_LOAD:
+        scales[FOOT_LOAD] = force
+    if config.foot_load.source == WRENCH:
+        scales[FOOT_LOAD_ALONG] = force
+    own = [
+        Column(key, getattr(names, key), f"input.columns.{key}", _unit(key, units), *scale)
+        for key, scale in scales.items()
+        if getattr(names, key) and not (key == STAMP and config.input.rate_hz)
+    ]
+    further = [
+        Column(name, name, "encoders.names", units.crank_angle, *config.input.angle_scale)
+        for name in config.encoders.names
+    ]
+    return (*own, *further)
+
+
+def _unit(key: str, units: Units) -> str:
+    return str(getattr(units, FOOT_LOAD if key == FOOT_LOAD_ALONG else key))
+
+
+def places(source: str, names: Sequence[str], columns: Sequence[Column]) -> list[int]:
+    """Index of each column among the names of a table.
+
+    Raises
+    ------
+    RecordingError
+        If a column is missing, or there twice.
+    """
+    found = []
+    for column in columns:
+        if names.count(column.name) != 1:
+            what = "is there more than once" if column.name in names else "does not exist"
+            nothing = ', or "" if there is none' if column.key in _MAY_BE_NONE else ""
+            fault = f"column {column.name!r} {what}, expected one of: {_listed(names)}{nothing}"
+            raise RecordingError(source, column.parameter, fault)
+        found.append(names.index(column.name))
+    return found
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _MOST_LISTED} more" if len(names) > _MOST_LISTED else ""
+    return ", ".join(printable(name, 100) for name in names[:_MOST_LISTED]) + more
+
+
+# Lines or rows of a table that cannot be read: the first ones are reported, the rest is counted.
+
+
+_MOST = 5
+
+
+@attrs.define
+class LostLines:
+    """Findings about lost lines of a file.
+
+    Attributes
+    ----------
+    path : pathlib.Path
+    findings : list of Finding
+        Where the findings go.
+    word : str
+        What a line is called: ``line`` or ``row``.
+    """
+
+    path: Path
+    findings: list[Finding]
+    word: str = "line"
+    count: int = attrs.field(init=False, default=0)
+
+    def add(self, line: int, fault: str) -> None:
+        """Report a line."""
+        self.count += 1
+        if self.count <= _MOST:
+            self.findings.append(Finding(self.path, f"{self.word} {line} is lost: {fault}"))
+
+    @property
+    def left(self) -> int:
+        """Number of lines that are still reported one by one."""
+        return max(0, _MOST - self.count)
+
+    def close(self) -> None:
+        """Report how many more there are; after the last line."""
+        if self.count > _MOST:
+            self.findings.append(Finding(self.path, f"{self.count - _MOST} more {self.word}s are lost"))
+
+
+# Times of the rows of a table as stamps, exact to the nanosecond where the table is.
+
+
+MOST_NS = (2**31 - 1) * 1_000_000_000  # the seconds of a ROS stamp are an int32: until 2038
+_EXACT_NS = 1.0e15  # below, a double of the time has the nanosecond
+_UTC = ("Z", "+00:00", "+0000")
+
+
+@attrs.frozen
+class Clock:
+    """From the times of a table to stamps.
+
+    Parameters
+    ----------
+    unit : str
+        A key of `STAMPS`, or `DATE`.
+    start_ns : int
+        Stamp of time 0 [ns]; not for dates.
+    """
+
+    unit: str
+    start_ns: int
+
+    @classmethod
+    def of(cls, table: TableInput) -> "Clock":
+        """The clock that the parameters declare."""
+        unit = table.units.stamp
+        return cls(unit, 0 if unit == DATE else table.start_ns)
+
+    def of_numbers(self, times: NDArray[np.number]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Stamps [ns] of times in the clock's unit, and whether each is within what a stamp can be."""
+        if times.dtype.kind in "iu":
+            scale = 10 ** STAMPS[self.unit]
+            within = (times <= MOST_NS // scale) & (times >= -(MOST_NS // scale))
+            stamps = np.where(within, times, 0).astype(np.int64) * scale
+            return self._started(stamps, np.asarray(within))
+        values = np.asarray(times, float)
+        with np.errstate(invalid="ignore"):
+            within = np.abs(values) <= MOST_NS / 10.0 ** STAMPS[self.unit]
+        whole = np.floor(np.where(within, values, 0.0))
+        rest = np.where(within, values, 0.0) - whole
+        scale = 10 ** STAMPS[self.unit]
+        stamps = whole.astype(np.int64) * scale + np.rint(rest * scale).astype(np.int64)
+        return self._started(stamps, within)
+
+    def of_texts(self, texts: Sequence[str], times: Floats) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Stamps [ns] of times that are also there as texts, and whether each is within its range."""
+        stamps, within = self.of_numbers(times)
+        power = STAMPS[self.unit]
+        if np.abs(times[within]).max(initial=0.0) * 10.0**power >= _EXACT_NS:
+            # below 1 a double has the nanosecond, and the text may have an exponent that no Decimal takes
+            for k in np.flatnonzero(within & (np.abs(times) >= 1.0)).tolist():
+                exact = int(Decimal(texts[k].strip().replace("_", "")).scaleb(power).to_integral_value())
+                stamps[k] = exact + self.start_ns
+        return stamps, within
+
+    def _started(
+        self, stamps: NDArray[np.int64], within: NDArray[np.bool_]
+    ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        stamps = stamps + self.start_ns
+        return stamps, within & (np.abs(stamps) <= MOST_NS)
+
+
+def dates(texts: Sequence[str]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Stamps [ns] of dates and times in UTC, and whether each is one."""
+    plain = [_without_zone(text.strip()) for text in texts]
+    try:
+        return _parsed(plain), np.ones(len(plain), bool)
+    except ValueError:
+        stamps, good = np.zeros(len(plain), np.int64), np.zeros(len(plain), bool)
+    for k, text in enumerate(plain):
+        try:
+            stamps[k], good[k] = _parsed([text])[0], bool(text)
+        except ValueError:
+            continue
+    return stamps, good
+
+
+def _without_zone(text: str) -> str:
+    """Text without the mark of UTC; another zone is refused, as numpy reads it with a warning only."""
+    for mark in _UTC:
+        text = text.removesuffix(mark)
+    is_one = len(text) >= 10 and "1970" <= text[:4] < "2038" and "+" not in text and text.count("-") == 2
+    return text.strip() if is_one else "?"
+
+
+def _parsed(texts: Sequence[str]) -> NDArray[np.int64]:
+    parsed = np.array(texts, "datetime64[ns]")
+    if np.isnat(parsed).any():
+        raise ValueError("not a time")
+    return parsed.astype(np.int64)
+
+
+# Columns that are likely in another unit: the wrap of the angle, its speed, the cadence.
+
+
+_LEAST_ROWS = 50
+_LEAST_TURNS = 2.0
+_SAME = 1.02  # a wrapped angle reaches its turn within a sample
+_NEAR = 1.5  # a hint fits if it gives the speed within this factor
+_FAR = 2.0  # beyond this factor of the commanded speed no gait cycle counts (`monitor.evaluation`)
+_APART = 1.25  # speed column against the speed of the angle
+
+
+@attrs.frozen
+class _Turning:
+    """How the crank's joint turns: angle passed [rad], time passed [s], where both are known."""
+
+    angle_rad: float
+    time_s: float
+
+    @property
+    def rpm(self) -> float:
+        """Mean speed [rpm]."""
+        return 60.0 * self.angle_rad / TURN / self.time_s
+
+
+def unit_doubts(rows: Rows, config: MonitorConfig) -> Iterator[str]:
+    """Doubts about units from the first rows of a table."""
+    chosen = rows.measured[CRANK_ANGLE] & np.isfinite(rows.values[CRANK_ANGLE])
+    angle, stamps = rows.values[CRANK_ANGLE][chosen], rows.stamp_ns[chosen]
+    if len(angle) < _LEAST_ROWS:
+        return
+    turn = _other_turn(angle, config)
+    if turn:
+        yield turn
+        return
+    steps_s = np.diff(stamps) * 1.0e-9
+    turned = np.diff(angle)
+    if _wraps(angle):
+        turned = (turned + math.pi) % TURN - math.pi
+    ahead = steps_s > 0.0
+    turning = _Turning(float(turned[ahead].sum()), float(steps_s[ahead].sum()))
+    if abs(turning.angle_rad) < _LEAST_TURNS * TURN:
+        return
+    if hint := _cadence(turning, config):
+        yield hint
+    if CRANK_SPEED in rows.values:
+        speed = rows.values[CRANK_SPEED][chosen][1:][ahead]
+        known = np.isfinite(speed)
+        if hint := _speed(speed[known], steps_s[ahead][known], turned[ahead][known], config):
+            yield hint
+
+
+def _wraps(angle: Floats) -> int:
+    """How often an angle jumps by more than half of its range: a continuous one never does."""
+    return int(np.count_nonzero(np.abs(np.diff(angle)) > 0.5 * np.ptp(angle)))
+
+
+def _other_turn(angle: Floats, config: MonitorConfig) -> str:
+    """Doubt about the unit of an angle that jumps back by a turn of another unit; empty if there is none."""
+    unit, (factor, divisor) = config.input.units.crank_angle, config.input.angle_scale
+    of_unit = factor / divisor
+    if _wraps(angle) < _LEAST_TURNS:
+        return ""
+    span = float(angle.max() - angle.min())
+    step = float(np.median(np.abs(np.diff(angle))))
+    turns = {one: TURN * over / by for one, (by, over) in ANGLES.items()} | {unit: TURN / of_unit}
+    raw = (span + step) / of_unit
+    for other, turn in turns.items():
+        if other != unit and max(raw / turn, turn / raw) < _SAME:
+            key, value = (
+                "input.units.crank_angle",
+                f"the angle jumps back by about {raw:.3g} each turn",
+            )
+            return f"{value}, in {unit!r} a turn is {turns[unit]:.4g}: is it in {other!r} ({key})?"
+    return ""
+
+
+def _cadence(turning: _Turning, config: MonitorConfig) -> str:
+    """Doubt about the time or the angle, if another unit gives the commanded cadence."""
+    units, found = config.input.units, []
+    rpm, commanded = abs(turning.rpm) / config.crank.gear_ratio, abs(config.cadence.commanded_rpm)
+    if 1.0 / _FAR <= rpm / commanded <= _FAR:
+        return ""
+    if units.stamp in STAMPS and not config.input.rate_hz:
+        for other, power in STAMPS.items():
+            found.append((rpm * 10.0 ** (STAMPS[units.stamp] - power), "input.units.stamp", other))
+    factor, divisor = config.input.angle_scale
+    for other, (its_factor, its_divisor) in ANGLES.items():
+        of_other = rpm * (its_factor / its_divisor) / (factor / divisor)
+        found.append((of_other, "input.units.crank_angle", other))
+    told = f"the crank turns at {rpm:.3g} rpm, commanded are {commanded:g} rpm"
+    best, key, other = min(found, key=lambda each: abs(math.log(each[0] / commanded)))
+    fits = 1.0 / _NEAR < best / commanded < _NEAR
+    return f"{told}; with {key} {other!r} it would turn at {best:.3g} rpm" if fits else ""
+
+
+def _speed(speed: Floats, steps_s: Floats, turned: Floats, config: MonitorConfig) -> str:
+    """Doubt about the column of the speed, if it is not the speed of the angle."""
+    passed_s = float(steps_s.sum())
+    told, shown = float((speed * steps_s).sum()), float(turned.sum())
+    if not passed_s or abs(shown) < TURN or (told / shown > 1.0 / _APART and told / shown < _APART):
+        return ""
+    unit = config.input.units.crank_speed
+    of_unit = SPEEDS[unit][0] / SPEEDS[unit][1]
+    text = (
+        f"crank_speed is {told / passed_s / of_unit:.4g} {unit} in the mean, but the angle turns at "
+        f"{shown / passed_s / of_unit:.4g} {unit}"
+    )
+    for other, (factor, divisor) in SPEEDS.items():
+        ratio = told / of_unit * (factor / divisor) / shown
+        if other != unit and 1.0 / _APART < ratio < _APART:
+            return f"{text}: is it in {other!r} (input.units.crank_speed)?"
+    return f"{text}: one of the two columns or its unit is wrong"

@@ -1,1 +1,0 @@
-"""Tables as recordings: CSV, Parquet, data frames and arrays."""

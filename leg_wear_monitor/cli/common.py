@@ -1,0 +1,467 @@
+"""What verbs share: options, numbers within bounds, nodes as verbs, files, lines, progress, warnings."""
+
+import math
+import sys
+import tempfile
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from leg_wear_monitor.errors import ConfigError, ConfigWarning, LegWearError, closed_at_the_end
+from leg_wear_monitor.files import write_whole
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+    from leg_wear_monitor.configuration import Doubt
+    from leg_wear_monitor.mechanism.sourced import SourcedValue
+    from leg_wear_monitor.playback.result import ReplaySummary
+
+
+# A number on the command line: finite, within bounds, and told with its unit when it is not.
+
+
+def bounded(
+    unit: str = "", *, above: float | None = None, at_least: float | None = None
+) -> Callable[[click.Context, click.Parameter, float | None], float | None]:
+    """Callback of a click option of type float; for files see `leg_wear_monitor.configuration`.
+
+    Parameters
+    ----------
+    unit : str
+        SI unit, ``""`` for a pure number.
+    above, at_least : float, optional
+        Bounds.
+    """
+
+    def check(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
+        fault = None
+        if value is None:
+            return None
+        if not math.isfinite(value):
+            fault = (
+                f"{value:g} is not a finite number of {unit}" if unit else f"{value:g} is not a finite number"
+            )
+        elif above is not None and not value > above:
+            fault = f"{value:g} is not above {above:g} {unit}".rstrip()
+        elif at_least is not None and not value >= at_least:
+            fault = f"{value:g} is not at least {at_least:g} {unit}".rstrip()
+        if fault:
+            raise click.BadParameter(fault, ctx, param)
+        return value
+
+    return check
+
+
+@contextmanager
+def options_named() -> Iterator[None]:
+    """Name an option as it is written on the command line, where the library names its parameter."""
+    options = {name for option in click.get_current_context().command.params for name in option.opts}
+    try:
+        yield
+    except ConfigError as error:
+        option = f"--{error.source}".replace("_", "-")
+        if option not in options:
+            raise
+        raise ConfigError(option, error.key, error.fault) from error
+
+
+# Options that several verbs share.
+
+
+Option = Callable[[Callable[..., Any]], Callable[..., Any]]
+
+mechanism_option: Option = click.option(
+    "--mechanism",
+    metavar="FILE",
+    default="bionic_leg",
+    show_default=True,
+    help="A mechanism file, or the name of one that comes with the package.",
+)
+
+speed_option: Option = click.option(
+    "--speed-rpm",
+    type=float,
+    callback=bounded("rpm"),
+    metavar="RPM",
+    help="Crank speed, negative for clockwise.  [default: the mechanism's own]",
+)
+
+config_option: Option = click.option(
+    "--config",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Parameter file of the node.  [default: the one that comes with the package]",
+)
+
+ledger_option: Option = click.option(
+    "--ledger",
+    type=click.Path(path_type=Path, dir_okay=False, exists=True),
+    metavar="FILE",
+    help="Ledger to write into.  [default: the one in the parameters]",
+)
+
+node_option: Option = click.option(
+    "--node",
+    metavar="NAME",
+    help="Full name of a running monitor to enter it into, such as /left/leg_wear_monitor.",
+)
+
+wait_option: Option = click.option(
+    "--wait",
+    "wait_s",
+    type=click.FloatRange(min=0.0, min_open=True),
+    default=10.0,
+    show_default=True,
+    metavar="S",
+    help="With --node: longest wait for the monitor, and again for its answer.",
+)
+
+sample_option: Option = click.option(
+    "--sample",
+    type=click.FloatRange(0.0, 1.0, min_open=True),
+    metavar="FRACTION",
+    help="Follow this fraction of the gait cycles, track and check the others, and estimate their wear; for "
+    "long recordings, where no impact needs to be seen.  [default: all]",
+)
+
+workers_option: Option = click.option(
+    "--workers", type=click.IntRange(min=1), metavar="N", help="Number of local processes.  [default: cores]"
+)
+
+
+def clearances_option(metavar: str) -> Option:
+    """``--clearances``: names of the clearance joints, separated by commas."""
+    text = "The clearance joints.  [default: the mechanism's own]"
+    return click.option("--clearances", metavar=metavar, help=text)
+
+
+def json_option(what: str) -> Option:
+    """``--json FILE`` for an object, such as ``the result``; ``-`` is standard output."""
+    return click.option(
+        "--json",
+        "json_file",
+        type=click.Path(allow_dash=True, path_type=Path),
+        metavar="FILE",
+        help=f"Write {what} as JSON; - for stdout, without other output there.",
+    )
+
+
+def out_option(text: str) -> Option:
+    """``--out DIR``."""
+    return click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help=text)
+
+
+# A node as a verb: its arguments are those of ROS, and without ROS there is one line.
+
+
+_Main = Callable[[Sequence[str] | None], int]
+
+
+def node_main(module: str) -> _Main:
+    """Entry point of a node; raises LegWearError without ROS."""
+    need_rclpy()
+    main: _Main = import_module(f"leg_wear_monitor.ros.{module}").main
+    return main
+
+
+def need_rclpy() -> None:
+    """Raise LegWearError where ROS is not installed, or not found."""
+    try:
+        import_module("rclpy")
+    except ImportError as error:
+        raise LegWearError(
+            f"rclpy: {error}; source a ROS 2 installation, or pip install 'leg_wear_monitor[ros]'"
+        ) from error
+
+
+def check_alone(**others: object) -> None:
+    """Refuse options beside ``--node``: a running monitor has its own parameters and ledger."""
+    if any(others.values()):
+        names = ", ".join(f"--{name.replace('_', '-')}" for name in others)
+        raise click.UsageError(f"--node cannot be combined with {names}")
+
+
+def trigger(node: str, service: str, wait_s: float, times: int = 1) -> str:
+    """Last reply of a service of a running monitor, which is called so many times.
+
+    Raises
+    ------
+    LegWearError
+        Without ROS, if nobody answers, or if the last call is refused.
+    """
+    need_rclpy()
+    from leg_wear_monitor.ros.measure import trigger_on
+
+    return trigger_on(node, service, wait_s, times)
+
+
+def node_verb(name: str, module: str, summary: str, text: str) -> click.Command:
+    """Command that runs a node."""
+
+    @click.command(
+        name=name,
+        short_help=summary,
+        help=text,
+        context_settings={"ignore_unknown_options": True},
+        options_metavar="[--ros-args ...]",
+    )
+    @click.argument("arguments", nargs=-1, type=click.UNPROCESSED, metavar="")
+    def verb(arguments: tuple[str, ...]) -> int:
+        return node_main(module)([name, *arguments])
+
+    return verb
+
+
+# Files written whole or not at all, to places that are known to take them before the work begins.
+
+
+SUMMARY, PAGE = "summary.json", "report.html"
+
+STDOUT = Path("-")
+
+
+def check_file(option: str, path: Path) -> None:
+    """Make sure that a file can be written.
+
+    Raises
+    ------
+    ConfigError
+        Naming the option, the path and why not.
+    """
+    if path.is_dir():
+        raise ConfigError(option, str(path), "is a directory, expected a file to write")
+    if _is_stream(path):
+        return
+    if not path.parent.is_dir():
+        raise ConfigError(option, str(path), f"there is no directory {path.parent}")
+    _try(option, path, path.resolve().parent)
+
+
+def check_directory(option: str, path: Path) -> None:
+    """Make sure that a directory can be written to, or made.
+
+    Raises
+    ------
+    ConfigError
+        Naming the option, the path and why not.
+    """
+    if path.exists() and not path.is_dir():
+        raise ConfigError(option, str(path), "is a file, expected a directory to write to")
+    above = path.resolve()
+    while not above.exists():
+        above = above.parent
+    if not above.is_dir():
+        raise ConfigError(option, str(path), f"{above} is a file, expected a directory")
+    _try(option, path, above)
+
+
+def check_outputs(json_file: Path | None, out: Path | None) -> None:
+    """Make sure that the places of ``--json`` and ``--out`` can be written, as far as they are asked for.
+
+    Raises
+    ------
+    ConfigError
+        Naming the option, the path and why not.
+    """
+    if json_file is not None and json_file != STDOUT:
+        check_file("--json", json_file)
+    if out is not None:
+        check_directory("--out", out)
+
+
+def write_json(path: Path | None, text: str) -> list[Path]:
+    """Write JSON to the place of ``--json``, and give the files written: none for stdout."""
+    if path is None:
+        return []
+    if path == STDOUT:
+        click.echo(text, nl=False)
+        return []
+    write_file(path, text.encode())
+    return [path]
+
+
+def write_file(path: Path, content: bytes) -> None:
+    """Write a file such that no one ever sees a part of it; a device or a pipe just gets the bytes.
+
+    Raises
+    ------
+    ConfigError
+        When the disk does not take it.
+    """
+    if _is_stream(path):
+        path.write_bytes(content)
+        return
+    write_whole(path, content)
+
+
+def write_directory(path: Path, files: Mapping[str, bytes | None]) -> list[Path]:
+    """Write files into a directory, each whole; None removes what an earlier run left.
+
+    Returns
+    -------
+    list of pathlib.Path
+        The files written, in the order given.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(str(path), "", f"cannot be made: {error.strerror}") from error
+    for name, content in files.items():
+        if content is None:
+            (path / name).unlink(missing_ok=True)
+        else:
+            write_file(path / name, content)
+    return [path / name for name, content in files.items() if content is not None]
+
+
+def _is_stream(path: Path) -> bool:
+    """A device or a pipe, which must not be replaced by a file."""
+    return path.exists() and not path.is_file()
+
+
+def _try(option: str, path: Path, directory: Path) -> None:
+    """Only writing tells: rights, a read-only file system, and an administrator whom rights do not stop."""
+    try:
+        with tempfile.TemporaryFile(dir=directory):
+            return
+    except OSError as error:
+        raise ConfigError(option, str(path), f"cannot be written: {error.strerror}") from error
+
+
+def page_of(summary: "ReplaySummary") -> bytes:
+    """The page of a replay."""
+    from leg_wear_monitor.report.page import page_html
+    from leg_wear_monitor.report.replay.page import replay_page
+
+    return page_html(replay_page(summary)).encode()
+
+
+# Numbers of a file with their conditions and sources, as text.
+
+
+def sourced_lines(values: "Iterable[tuple[str, SourcedValue]]") -> list[str]:
+    """Two lines for each number: what it is, and where it is from."""
+    lines = []
+    for key, value in values:
+        lines += [f"{key}: {value.text}, {value.conditions}", f"    {value.source}"]
+    return lines
+
+
+# Values that are likely meant in another unit, as warnings: one line each on stderr.
+
+
+def warn_of(source: str, found: Iterable["Doubt"]) -> None:
+    """Warn of what was found in a file."""
+    for doubt in found:
+        warnings.warn(f"{source}: {doubt}", ConfigWarning, stacklevel=2)
+
+
+# What a user sees while something takes long, on stderr.
+
+
+def _mark(kernels: str) -> Path | None:
+    from leg_wear_monitor.compiled.kernel import cache_directory
+
+    place = cache_directory()
+    return None if place is None else place / f"{kernels}.compiled"
+
+
+def is_compiled(kernels: str) -> bool:
+    """Whether a set of kernels has once been compiled to its end, for exactly these sources."""
+    import numba
+
+    mark = _mark(kernels)
+    return bool(numba.config.DISABLE_JIT) or (mark is not None and mark.exists())
+
+
+@contextmanager
+def compilation(*kernels: str, how_long: str = "about half a minute") -> Iterator[None]:
+    """Show the time that passes while the work inside compiles sets of kernels for the first time.
+
+    In a pipe it is one line when the first of them is compiled: what fails before it is one line, too.
+    """
+    if all(is_compiled(one) for one in kernels):
+        yield
+        return
+    what = f"compiling numerical kernels (once per installation, {how_long})"
+    with _shown(what) if sys.stderr.isatty() else _said_by_the_compiler(what):
+        yield
+    for mark in map(_mark, kernels):
+        if mark is not None:
+            with suppress(FileNotFoundError):  # `cache --clear` meanwhile: then it is to be compiled again
+                mark.touch()
+
+
+@contextmanager
+def _said_by_the_compiler(what: str) -> Iterator[None]:
+    from leg_wear_monitor.compiled.kernel import at_compilation
+
+    said: list[str] = []
+
+    def say() -> None:
+        if not said:
+            said.append(what)
+            print(what, file=sys.stderr, flush=True)
+
+    at_compilation.append(say)
+    try:
+        yield
+    finally:
+        at_compilation.remove(say)
+
+
+@contextmanager
+def progress_bar(what: str) -> Iterator[Callable[[float], None]]:
+    """Give a function that takes the fraction done: it shows a bar on a terminal, and nothing in a pipe."""
+    with _shown(what, total=1.0) as show:
+        yield show
+
+
+# what shows progress on the terminal; rich shows one at a time, so what begins inside is a line of its own
+_display: list["Progress"] = []
+
+
+@contextmanager
+def _shown(what: str, total: float | None = None) -> Iterator[Callable[[float], None]]:
+    """Show a line on a terminal, with the time passed and, where there is a total, how much is done."""
+    if not sys.stderr.isatty():
+        yield lambda _fraction: None
+        return
+    with _progress() as bar:
+        task = bar.add_task(what, total=total)
+        try:
+            yield lambda fraction: bar.update(task, completed=fraction)
+        finally:
+            bar.remove_task(task)
+
+
+@contextmanager
+def _progress() -> Iterator["Progress"]:
+    if _display:
+        yield _display[0]
+        return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        SpinnerColumn,
+        TaskProgressColumn,
+        TextColumn,
+        TimeElapsedColumn,
+    )
+
+    words = TextColumn("{task.description}")
+    columns = SpinnerColumn(), words, BarColumn(), TaskProgressColumn(), TimeElapsedColumn()
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        _display.append(bar)
+        try:
+            with closed_at_the_end(bar.stop):  # it hides the cursor
+                yield bar
+        finally:
+            _display.clear()

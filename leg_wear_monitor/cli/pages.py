@@ -1,0 +1,289 @@
+"""What verbs print and write: proposals, plays, pages of a fleet."""
+
+import json
+import math
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import attrs
+from rich.console import Console
+from rich.table import Table
+
+from leg_wear_monitor.cli.common import PAGE, SUMMARY, page_of, progress_bar, write_directory
+from leg_wear_monitor.cli.main import version
+from leg_wear_monitor.cli.tables import figure
+from leg_wear_monitor.errors import ConfigError, printable
+from leg_wear_monitor.fleet.description import load_fleet
+from leg_wear_monitor.fleet.overview import described, load_overview
+from leg_wear_monitor.playback.result import summary_of
+from leg_wear_monitor.report.fleet_page import fleet_page
+from leg_wear_monitor.report.fleet_standing import Day
+from leg_wear_monitor.report.page import page_html
+from leg_wear_monitor.workers import Job, run_here, run_in_processes
+
+if TYPE_CHECKING:
+    from leg_wear_monitor.commissioning.result import CommissioningItem, CommissioningResult
+    from leg_wear_monitor.play.fit import Clearances, JointClearance, Play, PlayMeasurement
+
+
+# A proposal of parameters as text.
+
+
+_NEVER = 1000  # gait cycles, from which on their number is of no interest
+
+
+def print_commissioning(result: "CommissioningResult") -> None:
+    """Print what was found, what cannot be determined, and what does not fit."""
+    console = Console(highlight=False, markup=False)
+    console.print(f"\nfrom {result.turns:.3g} turns of the crank\n")
+    console.print(_table(result))
+    console.print("\nmismatch: RMS of the torque that stays unexplained, as a fraction of the torque's\n")
+    for item in result.items:
+        if item.better:
+            console.print(f"better known: {item.name}: {item.better}", soft_wrap=True)
+    _print_joints(console, result)
+    texts = (
+        ("not enough to tell", result.not_told),
+        ("does not fit", result.findings),
+        ("note", result.notes),
+    )
+    for label, told in texts:
+        for text in told:
+            console.print(f"{label}: {printable(text)}", soft_wrap=True)
+    if result.config is None:
+        console.print("no parameters are proposed, because a choice between them is not certain")
+
+
+def _print_joints(console: Console, result: "CommissioningResult") -> None:
+    """Print what the torque will show of each joint."""
+    if result.joints:
+        console.print(
+            "\ngait cycles until the drive torque shows a wider joint: detected, as expected;\n"
+            "named, in four of five legs whose masses are 4 % off\n"
+        )
+        console.print(_joints(result))
+        console.print(f"\n{result.judgement}", soft_wrap=True)
+    if result.reference_used:
+        label = "reference: " if result.joints else ""
+        console.print(f"{label}{printable(result.reference_used)}", soft_wrap=True)
+    console.print()
+
+
+def _joints(result: "CommissioningResult") -> Table:
+    table = Table(box=None, pad_edge=False, padding=(0, 1), header_style="bold")
+    table.add_column("joint", no_wrap=True)
+    for name in ("clearance", "detected", "named"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("what else explains it", overflow="fold")
+    for one in result.joints:
+        last = len(one.clearances_m) - 1
+        for i, clearance_m in enumerate(one.clearances_m):
+            table.add_row(
+                "" if i else one.joint,
+                f"{1.0e3 * clearance_m:.3g} mm",
+                _cycles(one.cycles[i]),
+                _cycles(one.named_cycles[i]),
+                one.runner_up if i == last else "",
+            )
+    return table
+
+
+def _cycles(number: float) -> str:
+    return f"{math.ceil(number)}" if number < _NEVER else "never" if math.isnan(number) else f"over {_NEVER}"
+
+
+def _table(result: "CommissioningResult") -> Table:
+    table = Table(box=None, pad_edge=False, padding=(0, 1), header_style="bold")
+    table.add_column("\nparameter", no_wrap=True)
+    table.add_column("\nvalue", overflow="fold", min_width=12)
+    table.add_column("\n±", justify="right", no_wrap=True)
+    table.add_column("mis-\nmatch", justify="right", no_wrap=True)
+    table.add_column("\nrunner-up", overflow="fold", min_width=9)
+    table.add_column("mis-\nmatch", justify="right", no_wrap=True)
+    for item in result.items:
+        table.add_row(*_cells(item))
+    return table
+
+
+def _cells(item: "CommissioningItem") -> list[str]:
+    return [
+        item.name,
+        f"{_shown(item.value)} {item.unit}".strip() if _is_known(item.value) else "-",
+        "" if item.sigma is None else figure(item.sigma),
+        "" if item.mismatch is None else f"{item.mismatch:.3f}",
+        "" if item.other is None else _shown(item.other),
+        "" if item.other_mismatch is None else f"{item.other_mismatch:.3f}",
+    ]
+
+
+def _is_known(value: str | int | float) -> bool:
+    return not isinstance(value, float) or math.isfinite(value)
+
+
+def _shown(value: str | int | float) -> str:
+    if isinstance(value, str):
+        return printable(value, 60)
+    return str(value) if isinstance(value, int) else f"{value:.5g}"
+
+
+# A measured play as text.
+
+
+def lines(result: "PlayMeasurement", mechanism: str, encoder: str) -> Iterator[str]:
+    """Lines of plays, and of the clearances of a mechanism whose joint ``encoder`` has the encoder."""
+    for play in result.plays:
+        if len(result.plays) > 1 or play.crank_angle_rad is not None:
+            at = play.crank_angle_rad
+            yield printable(play.recording) + ("" if at is None else f", crank at {math.degrees(at):g} deg")
+        yield from _play(play)
+    if result.clearances is not None:
+        yield ""
+        yield (
+            f"mean radial clearances of {printable(mechanism)}, if the pushes turn joint {encoder} and other "
+            "joints are ideal:"
+        )
+        yield from _clearances(result.clearances)
+
+
+def _play(play: "Play") -> Iterator[str]:
+    up, down = play.plateaus
+    name, sigma = printable(play.joint), _angle(play.sigma_rad)
+    counts = play.play_rad / play.count_rad
+    yield f"{name}: play {_angle(play.play_rad)}, standard deviation {sigma}; {counts:.3g} counts"
+    yield f"  side by {printable(play.load) or 'the angle itself'}; {up} and {down} pushes count"
+    turn = 2.0 * math.pi / play.count_rad
+    yield f"  count of the encoder {_angle(play.count_rad)}, {turn:.5g} per turn"
+    yield f"  noise {_angle(play.noise_rad)}, scatter of the repeats {_angle(play.scatter_rad)}"
+    for label, texts in (("doubtful", play.findings), ("note", play.notes)):
+        for text in texts:
+            yield f"{label}: {printable(text)}"
+
+
+def _clearances(found: "Clearances") -> Iterator[str]:
+    for one in found.joints:
+        if one.clearance_m is not None and one.sigma_m is not None:
+            mm, sigma = f"{1e3 * one.clearance_m:.4f}", f"{max(1e3 * one.sigma_m, 1e-4):.4f}"
+            yield f"  {one.joint}: {mm} mm, standard deviation {sigma} mm"
+            if float(mm) > 0.0:
+                yield f"     leg-wear-monitor measure {one.joint} {mm} --sigma {sigma}"
+        elif one.most_m is None:
+            yield f"  {one.joint}: has no effect on this encoder"
+    together = [one for one in found.joints if one.joint in found.not_told_apart]
+    if together:
+        names = ", ".join(map(_at_most, together))
+        yield f"not told apart: {names}; measure in further postures or with another encoder"
+    for text in found.findings:
+        yield f"doubtful: {printable(text)}"
+
+
+def _at_most(one: "JointClearance") -> str:
+    return f"{one.joint} (at most {1e3 * (one.most_m or 0.0):.3g} mm)"
+
+
+def _angle(value_rad: float) -> str:
+    return f"{1e3 * value_rad:.3g} mrad ({math.degrees(value_rad):.3g} deg)"
+
+
+# Writes the page of a fleet, and the pages of its legs.
+
+
+_WORTH_WORKERS = 8
+"""Pages from which on workers, which take a second or two to start, write them sooner than one process."""
+
+
+@attrs.define
+class WrittenPages:
+    """Pages that were written.
+
+    Attributes
+    ----------
+    fleet : pathlib.Path
+        The page of the fleet.
+    legs : int
+        Number of legs whose page was written now; those that are up to date are not written again.
+    faults : list of str
+        Why the page of a leg cannot be made.
+    """
+
+    fleet: Path
+    legs: int = 0
+    faults: list[str] = attrs.Factory(list)
+
+
+def write_pages(description: Path, out: Path, fresh_days: float, workers: int = 1) -> WrittenPages:
+    """Write the page of a fleet, and those of its legs that have changed.
+
+    Parameters
+    ----------
+    description, out : pathlib.Path
+        File of the description, and directory of the fleet.
+    fresh_days : float
+        Age of its last recording up to which a leg counts as monitored.
+    workers : int
+        Number of local processes for the pages of the legs; pages do not depend on it.
+
+    Raises
+    ------
+    ConfigError
+        If the description or the overview is unusable, or the disk does not take a page.
+    """
+    overview = described(load_overview(out), load_fleet(description))
+    written = WrittenPages(out / PAGE)
+    homes = [out / "legs" / leg.id for leg in overview.legs]
+    _write_legs([home for home in homes if _is_due(home)], written, workers)
+    pages = {home.name for home in homes if (home / PAGE).is_file()}
+    day = Day(now_ns=time.time_ns(), fresh_days=fresh_days)
+    page = fleet_page(overview, day, pages, {"leg_wear_monitor": version()})
+    write_directory(out, {PAGE: page_html(page).encode()})
+    return written
+
+
+def _is_due(home: Path) -> bool:
+    """Whether the summary of a leg is newer than its page."""
+    source, page = home / SUMMARY, home / PAGE
+    return source.is_file() and not (page.is_file() and page.stat().st_mtime_ns > source.stat().st_mtime_ns)
+
+
+def _write_legs(homes: Sequence[Path], written: WrittenPages, workers: int) -> None:
+    with progress_bar("writing the pages") as progress:
+        done = 0
+
+        def take(_job: Job, fault: str) -> None:
+            nonlocal done
+            done += 1
+            progress(done / len(homes))
+            if fault:
+                written.faults.append(fault)
+            else:
+                written.legs += 1
+
+        jobs = [Job(home.name, write_leg, (home,)) for home in homes]
+        if workers > 1 and len(jobs) >= _WORTH_WORKERS:
+            run_in_processes(jobs, workers, take)
+        else:
+            run_here(jobs, take)
+    written.faults.sort()
+
+
+def write_leg(home: Path) -> str:
+    """Write the page of a leg from its summary; why that is not possible, empty if it is.
+
+    A page that cannot be made any more is removed: the page of the fleet does without.
+    """
+    source = home / SUMMARY
+    try:
+        text = page_of(summary_of(_record(source), str(source)))
+    except ConfigError as error:  # of an earlier version, or damaged
+        write_directory(home, {PAGE: None})
+        return str(error)
+    write_directory(home, {PAGE: text})
+    return ""
+
+
+def _record(source: Path) -> object:
+    try:
+        return json.loads(source.read_bytes())
+    except ValueError as error:
+        raise ConfigError(str(source), "", "is damaged: it is not JSON") from error

@@ -1,0 +1,378 @@
+"""Verbs that run nodes: ``monitor``, ``gait-publisher``, ``demo``, ``dashboard``."""
+
+import asyncio
+import json
+import os
+import signal
+import subprocess
+import time
+from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from leg_wear_monitor.cli.common import (
+    check_directory,
+    compilation,
+    config_option,
+    is_compiled,
+    need_rclpy,
+    node_verb,
+)
+from leg_wear_monitor.cli.start import main as program
+from leg_wear_monitor.errors import LegWearError, closed_at_the_end
+from leg_wear_monitor.files import share_directory
+
+if TYPE_CHECKING:
+    from leg_wear_monitor.dashboard.server import Place
+    from leg_wear_monitor.dashboard.source import LegSetup, Source
+    from leg_wear_monitor.ros.listeners import DemoListener
+
+
+# ``leg-wear-monitor monitor``: the node that follows a real leg.
+
+
+monitor = node_verb(
+    "monitor",
+    "monitor_node",
+    "Run the monitor as a ROS 2 node.",
+    """Monitor the joint wear of a leg from joint_states and drive_torque.
+
+    The node monitors as soon as it runs. Parameters: --ros-args --params-file FILE, or -p NAME:=VALUE;
+    docs/reference/parameters.md lists them. `ros2 run leg_wear_monitor monitor` starts the same node.
+    """,
+)
+
+
+# ``leg-wear-monitor gait-publisher``: the synthetic leg as a node.
+
+
+gait_publisher = node_verb(
+    "gait-publisher",
+    "gait_publisher.node",
+    "Run the synthetic leg as a ROS 2 node.",
+    """Publish the sensor signals of a synthetic leg: joint_states and drive_torque.
+
+    The leg is simulated in full coordinates with its own clearances and wear; noise, loss, load, speed and a
+    knocking joint are parameters: --ros-args -p NAME:=VALUE, or --params-file FILE. `ros2 param describe`
+    explains them. `ros2 run leg_wear_monitor gait_publisher` starts the same node.
+    """,
+)
+
+
+# ``leg-wear-monitor demo``: node and synthetic leg as two processes, recorded, replayed, reported.
+
+
+DONE, WITH_FINDINGS = 0, 1
+_NAMESPACE = "/demo"
+_PATIENCE_S = 60.0
+# topics that nobody's acknowledgement changes
+_COMPARED = ("clearance_states", "impact_forces", "predicted_torque")
+
+
+@click.command(short_help="Run a demonstration on this machine, about half a minute.")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    default="leg_wear_demo",
+    show_default=True,
+    metavar="DIR",
+    help="Directory of recording, report and logs.",
+)
+def demo(out: Path) -> int:
+    """Run the monitor and a synthetic leg as two ROS processes; record, replay and report the run.
+
+    The leg and its twin wear a thousand times as fast as steel. The leg walks faster for a while, until
+    impacts raise an alarm; the demonstration acknowledges it. Then the recording goes through the same
+    monitor again.
+    """
+    need_rclpy()
+    check_directory("--out", out)
+    out.mkdir(parents=True, exist_ok=True)
+    _compile(out)
+    demo_listener = _listen(out)
+    same = _replay(out)
+    _compare_with_truth(out, demo_listener)
+    click.echo(f"report: {(out / 'report.html').resolve()}")
+    if not same or not any(name.startswith("impact_force") for name in demo_listener.acknowledged):
+        click.echo("error: the demo failed; see the logs beside the report", err=True)
+        return WITH_FINDINGS
+    return DONE
+
+
+def _compile(out: Path) -> None:
+    """Compile what the nodes need: the monitor's kernels here, the motion and the leg in processes beside."""
+    from leg_wear_monitor.workers import python_command  # numba: not for --help
+
+    if is_compiled("monitor") and is_compiled("gait"):
+        return
+    from leg_wear_monitor.dynamics.clearance.stepper import advance_beside
+    from leg_wear_monitor.mechanism.loader import load_mechanism
+    from leg_wear_monitor.monitor.wear_monitor import WearMonitor
+
+    log_path = out / "compilation.log"
+    with (
+        compilation("monitor", "gait", how_long="about a minute"),
+        log_path.open("wb") as log,
+        # a group of its own: Ctrl-C reaches it by us, once
+        subprocess.Popen(python_command(compile_leg), stdout=log, stderr=log, start_new_session=True) as leg,
+        closed_at_the_end(leg.kill),
+        advance_beside(),
+    ):
+        try:
+            WearMonitor(load_mechanism()).warm_up()
+            leg.wait()
+        finally:
+            leg.kill()
+    _check_ended(leg, log_path)
+
+
+def compile_leg() -> None:
+    """Compile what the synthetic leg needs."""
+    from leg_wear_monitor.gait.config import GaitConfig
+    from leg_wear_monitor.gait.leg import SyntheticLeg
+
+    SyntheticLeg(GaitConfig()).advance(1.0e-3)
+
+
+def _listen(out: Path) -> "DemoListener":
+    """The two nodes, and what could be heard of them."""
+    from leg_wear_monitor.ros.listeners import DemoListener
+
+    domain = int(os.environ.get("ROS_DOMAIN_ID") or 5 + os.getpid() % 90)
+    first: list[int] = []
+
+    def report(stamp_ns: int, line: str) -> None:
+        first.append(stamp_ns)
+        click.echo(f"{(stamp_ns - first[0]) / 1e9:6.2f} s  {line}")
+
+    paths = {"record": out / "live.mcap", "ledger": out / "wear.db", "truth": out / "truth.json"}
+    for path in paths.values():
+        path.unlink(missing_ok=True)
+    click.echo(f"starting the monitor and the leg in ROS domain {domain}")
+    demo_listener = DemoListener(_NAMESPACE, domain, report)
+    try:
+        with (
+            _process("monitor", out, domain, record=paths["record"], ledger=paths["ledger"]) as monitor,
+            _process("gait-publisher", out, domain, truth=paths["truth"]) as leg,
+        ):
+            demo_listener.attend(lambda: leg.poll() is None and monitor.poll() is None)
+            _check_ended(leg, out / "gait-publisher.log")
+    finally:
+        demo_listener.leave()
+    _check_ended(monitor, out / "monitor.log")
+    return demo_listener
+
+
+@contextmanager
+def _process(verb: str, out: Path, domain: int, **paths: Path) -> "Iterator[subprocess.Popen[bytes]]":
+    """A node as a process of its own, ended as from a terminal."""
+    from leg_wear_monitor.workers import python_command
+
+    command = python_command(program, verb, "--ros-args", "-r", f"__ns:={_NAMESPACE}")
+    command += ["--params-file", str(share_directory() / "config" / "demo.yaml")]
+    for name, path in paths.items():
+        command += ["-p", f"{name}.path:={path.resolve()}"]
+    environment = {**os.environ, "ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    with (out / f"{verb}.log").open("wb") as log:
+        process = subprocess.Popen(command, env=environment, stdout=log, stderr=subprocess.STDOUT)
+        try:
+            with closed_at_the_end(process.terminate):
+                yield process
+        finally:
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+            try:
+                process.wait(_PATIENCE_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+
+
+def _check_ended(process: "subprocess.Popen[bytes]", log: Path) -> None:
+    """Raise with the last line of the log if a node did not end in order."""
+    if process.returncode not in (None, 0):
+        lines = log.read_text(errors="replace").strip().splitlines() or ["nothing"]
+        raise LegWearError(f"{log}: the node ended with {process.returncode}: {lines[-1]}")
+
+
+def _replay(out: Path) -> bool:
+    """The recording through the same monitor; whether it gives the same messages."""
+    arguments = ["replay", str(out / "live.mcap"), "--out", str(out)]
+    arguments += ["--config", str(share_directory() / "config" / "demo.yaml")]
+    click.echo(f"leg-wear-monitor {' '.join(arguments)}")
+    from leg_wear_monitor.workers import python_command
+
+    done = subprocess.run(python_command(program, *arguments), check=False)
+    if done.returncode != DONE:
+        raise LegWearError(f"{out / 'live.mcap'}: its replay ended with {done.returncode}")
+    live, again = _messages(out / "live.mcap"), _messages(out / "reports.mcap")
+    count = sum(map(len, again.values()))
+    same = live == again and count > 0
+    what = "the same, byte for byte" if same else "not the same"
+    click.echo(f"live and replayed: {count} messages on {len(again)} topics, {what}")
+    return same
+
+
+def _messages(path: Path) -> dict[str, list[bytes]]:
+    """Messages of the compared topics, in their order."""
+    from mcap.reader import make_reader
+
+    found: dict[str, list[bytes]] = defaultdict(list)
+    with path.open("rb") as stream:
+        for _, channel, message in make_reader(stream).iter_messages(log_time_order=False):
+            name = channel.topic.rsplit("/", 1)[-1]
+            if name in _COMPARED:
+                found[name].append(message.data)
+    return dict(found)
+
+
+def _compare_with_truth(out: Path, demo_listener: "DemoListener") -> None:
+    """What the leg really lost, beside what the monitor found from crank and torque."""
+    import numpy as np
+
+    truth: dict[str, Any] = json.loads((out / "truth.json").read_text())
+    at_s = (demo_listener.stamp_ns - truth["start_ns"]) / 1e9
+    for joint, column in truth["clearance_m"].items():
+        grown = float(np.interp(at_s, truth["cycle_end_s"], column[:-1])) - column[0]
+        found = demo_listener.clearances_m[joint] - column[0]
+        click.echo(f"joint {joint}: true wear {1e9 * grown:.0f} nm, monitor {1e9 * found:.0f} nm")
+
+
+# ``leg-wear-monitor dashboard``: a live page in a browser, for reading only.
+
+
+_NODE = "/leg_wear_monitor"
+
+
+@click.command(short_help="Show a leg or a fleet live in a browser, for reading only.")
+@click.option(
+    "--node",
+    is_flag=False,
+    flag_value=_NODE,
+    metavar="[NAME]",
+    help=f"Full name of a running monitor, such as /left/leg_wear_monitor.  [default: {_NODE}]",
+)
+@click.option(
+    "--ledger",
+    type=click.Path(path_type=Path, dir_okay=False, exists=True),
+    metavar="FILE",
+    help="A ledger instead, which a monitor may be writing meanwhile.",
+)
+@click.option(
+    "--fleet",
+    type=click.Path(path_type=Path, dir_okay=False, exists=True),
+    metavar="FLEET.yaml",
+    help="A fleet instead, as the last fleet update left it.",
+)
+@config_option
+@click.option(
+    "--host",
+    default="127.0.0.1",
+    show_default=True,
+    metavar="HOST",
+    help="Address to listen on; 0.0.0.0 for all of this machine.",
+)
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=8350,
+    show_default=True,
+    metavar="PORT",
+    help="Port to listen on; 0 for any free one.",
+)
+def dashboard(
+    node: str | None, ledger: Path | None, fleet: Path | None, config: Path | None, host: str, port: int
+) -> int:
+    """Serve a page with the verdict, the leg and the trends, renewed while you look, until Ctrl-C.
+
+    The page cannot change anything. It is served to this machine only, unless --host says otherwise: it has
+    no password. --config is needed for a leg with a mechanism file of its own.
+    """
+    if sum(each is not None for each in (node, ledger, fleet)) > 1:
+        raise click.UsageError("--node, --ledger and --fleet cannot be combined")
+    if fleet and config:
+        raise click.UsageError("--config cannot be combined with --fleet")
+    _need_tornado()
+    from leg_wear_monitor.dashboard.server import listen
+
+    with _source(node, ledger, fleet, config) as source:
+        _serve(source, listen(host, port))
+    return 0
+
+
+def _need_tornado() -> None:
+    try:
+        import_module("tornado")
+    except ImportError as error:
+        raise LegWearError(f"{error}; pip install 'leg_wear_monitor[dashboard]'") from error
+
+
+@contextmanager
+def _source(
+    node: str | None, ledger: Path | None, fleet: Path | None, config: Path | None
+) -> Iterator["Source"]:
+    if ledger:
+        from leg_wear_monitor.cli.verbs.upkeep import leg_of
+        from leg_wear_monitor.dashboard.ledger_leg import LedgerLeg
+
+        settings, leg = leg_of(config, ledger)
+        yield LedgerLeg(ledger, settings, leg, time.time)
+    elif fleet:
+        from leg_wear_monitor.cli.main import version
+        from leg_wear_monitor.dashboard.source import FleetSource
+
+        yield FleetSource(fleet, time.time, {"leg_wear_monitor": version()})
+    else:
+        with _live(node or _NODE, config) as source:
+            yield source
+
+
+@contextmanager
+def _live(node: str, config: Path | None) -> Iterator["Source"]:
+    need_rclpy()
+    from leg_wear_monitor.dashboard.live_leg import LiveLeg
+    from leg_wear_monitor.ros.listeners import full_name, listening, topics_of
+
+    name = full_name(node)
+    leg = LiveLeg(name, topics_of(name), time.monotonic)
+    with listening(name, leg, _setup(config, name) if config else None):
+        yield leg
+
+
+def _setup(config: Path, node: str) -> "LegSetup":
+    from leg_wear_monitor.dashboard.source import leg_setup
+    from leg_wear_monitor.mechanism.loader import load_mechanism
+    from leg_wear_monitor.monitor.config.fitting import fitted
+    from leg_wear_monitor.monitor.config.parameters import load_config
+
+    settings = load_config(config, node)
+    return leg_setup(settings, fitted(load_mechanism(settings.mechanism), settings))
+
+
+def _serve(source: "Source", place: "Place") -> None:
+    """Serve until a signal."""
+    from leg_wear_monitor.dashboard.server import Hub, is_local, serve
+
+    def ready(ended: asyncio.Event) -> None:
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            loop.add_signal_handler(number, ended.set)
+        if not is_local(place.host):
+            click.echo(
+                f"warning: whoever reaches {place.host}:{place.port} can read this page: it has no password "
+                "and no encryption",
+                err=True,
+            )
+        waits = source.freshness()
+        if waits.age_s is None:
+            click.echo(waits.silence)
+        click.echo(f"serving {place.address} (read-only, Ctrl-C ends it)")
+
+    async def run() -> None:
+        await serve(Hub(source), place, ready)
+
+    asyncio.run(run())

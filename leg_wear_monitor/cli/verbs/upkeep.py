@@ -1,0 +1,350 @@
+"""Verbs of upkeep: ``acknowledge``, ``reset``, ``measure``."""
+
+import getpass
+import time
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, nullcontext
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from leg_wear_monitor.cli.common import (
+    bounded,
+    check_alone,
+    config_option,
+    ledger_option,
+    need_rclpy,
+    node_option,
+    trigger,
+    wait_option,
+)
+from leg_wear_monitor.errors import ConfigError
+
+if TYPE_CHECKING:
+    from leg_wear_monitor.mechanism.spec import Mechanism
+    from leg_wear_monitor.monitor.config.settings import MonitorConfig
+    from leg_wear_monitor.monitor.ledger.entry import Measurement
+    from leg_wear_monitor.monitor.ledger.ledger import Ledger
+
+
+# The measurements of a ledger on the command line: opened, listed, withdrawn.
+
+
+LAST = "last"
+
+
+def leg_of(config: Path | None, ledger: Path | None) -> tuple["MonitorConfig", "Mechanism"]:
+    """The parameters, with the ledger that is asked for, and the leg as they want it."""
+    import attrs
+
+    from leg_wear_monitor.mechanism.loader import load_mechanism
+    from leg_wear_monitor.monitor.config.fitting import fitted
+    from leg_wear_monitor.monitor.config.parameters import load_config
+    from leg_wear_monitor.monitor.ledger.file import hardware_id_of
+
+    settings = load_config(config)
+    if ledger is not None:
+        # who names a ledger means its leg, unless the parameters name one
+        hardware = settings.hardware_id or hardware_id_of(ledger)
+        kept = attrs.evolve(settings.ledger, path=str(ledger))
+        settings = attrs.evolve(settings, ledger=kept, hardware_id=hardware)
+    if not settings.ledger.path:
+        raise ConfigError("--ledger", "", "no ledger given, neither by --ledger nor by ledger.path")
+    return settings, fitted(load_mechanism(settings.mechanism), settings)
+
+
+@contextmanager
+def opened(settings: "MonitorConfig", dry_run: bool) -> Iterator["Ledger"]:
+    """The ledger; a copy of it that is thrown away, if nothing shall be written."""
+    import attrs
+
+    from leg_wear_monitor.mechanism.loader import load_mechanism
+    from leg_wear_monitor.monitor.ledger.file import copy_of
+    from leg_wear_monitor.monitor.ledger.ledger import open_ledger
+
+    leg = load_mechanism(settings.mechanism)  # without its parameters, which a ledger applies itself
+    with copy_of(settings.ledger.path) if dry_run else nullcontext(settings.ledger.path) as path:
+        kept = open_ledger(leg, attrs.evolve(settings, ledger=attrs.evolve(settings.ledger, path=str(path))))
+        if kept is None:
+            raise ConfigError("--ledger", "", "no ledger given, neither by --ledger nor by ledger.path")
+        with closing(kept):
+            yield kept
+
+
+def list_measurements(config: Path | None, ledger: Path | None) -> None:
+    """Print all measurements of a ledger, a line each; the ledger is left as it is."""
+    settings, _ = leg_of(config, ledger)
+    with opened(settings, dry_run=True) as kept:
+        for each in kept.measurements:
+            click.echo(_line(each))
+        if not kept.measurements:
+            click.echo("no clearance was measured yet")
+
+
+def withdraw(
+    joint: str | None, which: str, who: str, config: Path | None, ledger: Path | None, dry_run: bool
+) -> None:
+    """Withdraw a measurement, by its number or the last one of a joint, and print what it is then."""
+    settings, _ = leg_of(config, ledger)
+    with opened(settings, dry_run) as kept:
+        number = _number(kept, joint, which)
+        click.echo(_line(kept.withdraw(number, time.time_ns(), who)))
+        kept.record()
+
+
+def _number(kept: "Ledger", joint: str | None, which: str) -> int:
+    """Number of the measurement that is meant."""
+    own = [each for each in kept.measurements if joint in (None, each.joint)]
+    whose = f"of joint {joint} " if joint else ""
+    if which == LAST:
+        open_ones = [each.id for each in own if not each.is_withdrawn]
+        if not open_ones:
+            raise ConfigError("--withdraw", "", f"no measurement {whose}can be withdrawn")
+        return open_ones[-1]
+    if not which.isascii() or not which.isdecimal() or int(which) not in {each.id for each in own}:
+        known = ", ".join(str(each.id) for each in own) or "none"
+        raise ConfigError("--withdraw", "", f"{which!r} is not {LAST}, nor a measurement {whose}({known})")
+    return int(which)
+
+
+def _line(m: "Measurement") -> str:
+    """A measurement for operators."""
+    state = "counts" if m.counts else "does not count"
+    if m.is_withdrawn:
+        state = f"withdrawn {_date(m.withdrawn_ns)} by {m.withdrawn_by}"
+    value = f"{1.0e3 * m.clearance_m:.4g} mm ± {1.0e3 * m.sigma_m:.2g} mm"
+    return f"{m.id}: {m.joint} {value}, {_date(m.stamp_ns)} by {m.who}, {state}"
+
+
+def _date(stamp_ns: int) -> str:
+    return datetime.fromtimestamp(1.0e-9 * stamp_ns, UTC).strftime("%Y-%m-%d %H:%M")
+
+
+# ``leg-wear-monitor acknowledge``: alarms that an operator has seen to.
+
+
+@click.command(short_help="Acknowledge the alarms.")
+@config_option
+@ledger_option
+@node_option
+@wait_option
+@click.option("--dry-run", is_flag=True, help="Print the result and write nothing.")
+def acknowledge(
+    config: Path | None, ledger: Path | None, node: str | None, wait_s: float, dry_run: bool
+) -> int:
+    """Acknowledge all alarms: those that have returned to normal clear, the others stay, marked as seen.
+
+    The service ~/acknowledge_alarms does the same. The others clear when their values return. A running
+    monitor locks its ledger: name it with --node, or stop it first.
+    """
+    if node is not None:
+        check_alone(config=config, ledger=ledger, dry_run=dry_run)
+        click.echo(trigger(node, "acknowledge_alarms", wait_s))
+        return 0
+    from leg_wear_monitor.monitor.resets import acknowledge_in
+
+    settings, leg = leg_of(config, ledger)
+    with opened(settings, dry_run) as kept:
+        click.echo(acknowledge_in(kept, leg, settings, time.time_ns()).words)
+    if dry_run:
+        click.echo("dry run: nothing was written")
+    return 0
+
+
+# ``leg-wear-monitor reset``: a part that was replaced, into a ledger or into a running monitor.
+
+
+@click.command(short_help="Enter a replaced part.")
+@click.argument("joint")
+@config_option
+@ledger_option
+@node_option
+@wait_option
+@click.option("--undo", is_flag=True, help="Undo the last reset: the part was not replaced.")
+@click.option("--dry-run", is_flag=True, help="Print the result and write nothing.")
+def reset(
+    joint: str,
+    config: Path | None,
+    ledger: Path | None,
+    node: str | None,
+    wait_s: float,
+    undo: bool,
+    dry_run: bool,
+) -> int:
+    """Enter that the parts of JOINT were replaced: its wear is 0 again, its history stays in the ledger.
+
+    JOINT is a name or a label, such as knee; with --node, a name. The alarms that rested on the former part
+    are acknowledged and clear. A running monitor locks its ledger: name it with --node, or stop it first.
+    """
+    if node is not None:
+        check_alone(config=config, ledger=ledger, dry_run=dry_run)
+        service = f"{'undo_reset' if undo else 'reset_wear'}/{joint}"
+        click.echo(trigger(node, service, wait_s, times=1 if undo else 2))  # a reset is confirmed
+        return 0
+    _reset_in(joint, config, ledger, undo, dry_run)
+    if dry_run:
+        click.echo("dry run: nothing was written")
+    return 0
+
+
+def _reset_in(joint: str, config: Path | None, ledger: Path | None, undo: bool, dry_run: bool) -> None:
+    """Enter it into a ledger, and print what came of it."""
+    from leg_wear_monitor.monitor.resets import reset_in, undo_in, wear_words
+
+    settings, leg = leg_of(config, ledger)
+    joint, now_ns, who = leg.clearance_joint(joint), time.time_ns(), getpass.getuser()
+    with opened(settings, dry_run) as kept:
+        if undo:
+            words = wear_words(undo_in(kept, joint, now_ns, who))
+            click.echo(
+                f"joint {joint}: the reset is undone, {words} are counted, including those since the reset"
+            )
+            return
+        was, done = reset_in(kept, leg, settings, joint, now_ns, who)
+    words = wear_words(was)
+    click.echo(f"joint {joint}: new surfaces, {words} are set to 0, history kept; --undo reverts it")
+    click.echo(f"alarms {done.words}")
+    click.echo("confirm by walking: the next gait cycles show whether the repair is good")
+
+
+# ``leg-wear-monitor measure``: a clearance that somebody measured, into the ledger.
+
+
+WITH_FINDINGS = 1
+
+
+@click.command(short_help="Enter a measured clearance, which updates the forecast.")
+@click.argument("joint", required=False)
+@click.argument("mm", type=float, required=False, callback=bounded("mm", above=0.0))
+@click.option(
+    "--sigma",
+    type=float,
+    callback=bounded("mm", above=0.0),
+    metavar="MM",
+    help="Standard deviation of the measurement.",
+)
+@config_option
+@ledger_option
+@click.option("--accept", is_flag=True, help="Use it even if it contradicts the model.")
+@click.option("--dry-run", is_flag=True, help="Print the result and write nothing.")
+@node_option
+@wait_option
+@click.option("--list", "listed", is_flag=True, help="Print the ledger's measurements with their numbers.")
+@click.option(
+    "--withdraw",
+    "withdrawn",
+    metavar=f"NUMBER|{LAST}",
+    help=f"Withdraw a measurement: it stays in the ledger and no longer counts. {LAST}: the last one, of "
+    "JOINT if given.",
+)
+def measure(
+    joint: str | None,
+    mm: float | None,
+    sigma: float | None,
+    listed: bool,
+    withdrawn: str | None,
+    node: str | None,
+    wait_s: float,
+    **options: Any,
+) -> int:
+    """Enter the measured mean radial clearance of JOINT, a name or a label such as knee, in millimetres.
+
+    Measure with a feeler gauge, a micrometer or a dial. A dial shows twice the radial clearance if the pin is
+    moved to and fro. A running monitor locks its ledger: name it with --node, or stop it first. The counted
+    clearance stays as it is. Exit code 1 if the measurement contradicts the model or is at its limit.
+    """
+    if node is not None:
+        _check_alone(listed, withdrawn, **options)
+    if (listed or withdrawn) and (mm is not None or sigma is not None or (listed and withdrawn)):
+        raise click.UsageError("--list and --withdraw cannot be combined, nor used with MM or --sigma")
+    if listed:
+        list_measurements(options["config"], options["ledger"])
+        return 0
+    if withdrawn:
+        del options["accept"]
+        withdraw(joint, withdrawn, getpass.getuser(), **options)
+        return 0
+    if joint is None or mm is None or sigma is None:
+        raise click.UsageError("expected JOINT MM --sigma MM, or --list, or --withdraw")
+    size = joint, 1.0e-3 * mm, 1.0e-3 * sigma
+    if node is not None:
+        return _on_node(node, *size, accept=options["accept"], wait_s=wait_s)
+    lines, has_findings = _measured(*size, **options)
+    for line in lines:
+        click.echo(line)
+    if options["dry_run"]:
+        click.echo("dry run: nothing was written")
+    return WITH_FINDINGS if has_findings else 0
+
+
+def _check_alone(
+    listed: bool, withdrawn: str | None, config: Path | None, ledger: Path | None, dry_run: bool, accept: bool
+) -> None:
+    """A running monitor has its own parameters and ledger."""
+    if listed or withdrawn or config or ledger or dry_run:
+        raise click.UsageError(
+            "--node cannot be combined with --config, --ledger, --dry-run, --list or --withdraw"
+        )
+
+
+def _on_node(node: str, joint: str, clearance_m: float, sigma_m: float, accept: bool, wait_s: float) -> int:
+    """Enter it into a running monitor, which says the same as the verb does with a ledger."""
+    need_rclpy()
+    from leg_wear_monitor.monitor.forecast.measurement import asks_to_act
+    from leg_wear_monitor.ros.measure import measure_on
+
+    told = measure_on(node, joint, clearance_m, sigma_m, accept, wait_s)
+    click.echo(told)
+    return WITH_FINDINGS if asks_to_act(told) else 0
+
+
+def _measured(
+    joint: str,
+    clearance_m: float,
+    sigma_m: float,
+    config: Path | None,
+    ledger: Path | None,
+    accept: bool,
+    dry_run: bool,
+) -> tuple[tuple[str, ...], bool]:
+    """What came of a measurement, a line each, and whether the caller has to act."""
+    import attrs
+
+    from leg_wear_monitor.monitor.evaluation import AlarmBoard
+    from leg_wear_monitor.monitor.forecast.measurement import measure as evaluate
+    from leg_wear_monitor.monitor.forecast.wear_coefficients import prior_source
+    from leg_wear_monitor.monitor.ledger.entry import new_part
+    from leg_wear_monitor.monitor.resets import overrule_in, shown_in
+    from leg_wear_monitor.monitor.verdict.situation import SOURCES
+
+    settings, leg = leg_of(config, ledger)
+    joint = leg.clearance_joint(joint)
+    limits_m = AlarmBoard(settings, leg.clearance_joints).clearance_limits_m
+    limit_m = limits_m[leg.clearance_joints.index(joint)]
+    with opened(settings, dry_run) as kept:
+        parts = {wear.name: wear for wear in kept.entry.joints} if kept.entry else {}
+        part = parts.get(joint) or new_part(joint)
+        found = evaluate(
+            settings.forecast,
+            leg.clearances[joint],
+            part,
+            kept.measurements,
+            clearance_m=clearance_m,
+            sigma_m=sigma_m,
+            stamp_ns=time.time_ns(),
+            who=getpass.getuser(),
+            kept_ns=kept.kept_ns,
+            accept=accept,
+            prior=prior_source(leg, settings.forecast).prior(joint, part.replaced_ns),
+            corrections=kept.corrections,
+        )
+        shown = shown_in(kept, joint)
+        if shown:
+            by = SOURCES[shown.by]
+            found = attrs.evolve(found, shown_m=shown.clearance_m, shown_sigma_m=shown.sigma_m, shown_by=by)
+        kept.note(found.measurement)
+        kept.record(overrule_in(kept, leg, settings, found.measurement))
+    told = found.told(limit_m, settings.limits.warn_fraction, kept.measurements)
+    return told, found.has_findings(limit_m)

@@ -1,0 +1,433 @@
+"""The proposed parameters: each with its interval, and how it could be known better."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.bags.series import WRENCH
+from leg_wear_monitor.commissioning.evidence import (
+    LowPass,
+    Sampling,
+    Timing,
+    cadence_rpm,
+    scatter,
+    sensor_noise,
+)
+from leg_wear_monitor.commissioning.result import CommissioningItem as Item
+from leg_wear_monitor.commissioning.search import SAME_GEAR, Candidate, Choice, Rival
+from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.estimate.signature import DriveFigures
+from leg_wear_monitor.estimate.torque_fit import Fit, Terms, fit, repeating
+from leg_wear_monitor.estimate.torque_model import JointMotion, TorqueModel
+from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+
+# A gear's ratio is that of two numbers of teeth: the simplest fraction within a measurement's error.
+
+
+_LARGEST_DENOMINATOR = 20
+_BY_CHANCE = 0.1  # fractions that may lie within the error by chance
+
+
+def exact_ratio(measured: float, error: float) -> float | None:
+    """The simplest fraction within a relative error, if it is not one of many.
+
+    Parameters
+    ----------
+    measured : float
+        Gear ratio; below 1, its inverse is taken for a fraction.
+    error : float
+        Largest relative error.
+
+    Returns
+    -------
+    float or None
+        None if no simple fraction lies within the error, or if one would by chance.
+    """
+    if not measured > 0.0:
+        raise LegWearError(f"{measured!r} is no gear ratio, expected one above 0")
+    if measured < 1.0:
+        inverse = exact_ratio(1.0 / measured, error)
+        return None if inverse is None else 1.0 / inverse
+    fractions = 0
+    for denominator in range(1, _LARGEST_DENOMINATOR + 1):
+        fractions += denominator
+        if 2.0 * error * measured * fractions > _BY_CHANCE:
+            return None
+        numerator = round(measured * denominator)
+        if abs(numerator / denominator / measured - 1.0) <= error:
+            return numerator / denominator
+    return None
+
+
+# What the proposed parameters are made of: the chosen fit, and what follows from it.
+
+
+_SURE = 3.0  # standard deviations
+_DRIFT_RAD = 0.05  # by which clearances may shift the phase over a recording
+# of the torque's RMS, half of its energy: legs with clearance have 0.03 to 0.05 of averages, 0.3 to 0.45 of
+# instants at 50 to 200 Hz (full coordinates, 60 rpm)
+UNEXPLAINED = 0.7
+# factor on the errors of friction where the foot carries a load, whose course is not known exactly
+_UNDER_LOAD = 3.0
+
+
+@attrs.frozen(eq=False)
+class Found:
+    """What the parameters are made of."""
+
+    choice: Choice
+    fit: Fit
+    motion: JointMotion
+    sampling: Sampling
+    timing: Timing
+    declared: DriveFigures
+    base: MonitorConfig
+    low_pass: LowPass | None = None
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Why nothing is proposed; empty if the choice is sure, and explains the torque."""
+        mismatch = self.fit.mismatch
+        if mismatch < UNEXPLAINED:
+            return self.choice.doubts
+        told = f"the torque: {100.0 * mismatch:.0f} % of its RMS is not that of this leg, whatever is chosen"
+        return (*self.choice.doubts, told)
+
+    @property
+    def best(self) -> Candidate:
+        """The chosen joint and torque."""
+        return self.choice.best
+
+    @property
+    def used_sampling(self) -> str:
+        """What is found, or what the given parameters have if it cannot be told."""
+        return self.sampling.value or self.base.drive_torque.sampling
+
+    @property
+    def friction_nm(self) -> tuple[float, float]:
+        """Constant friction on the crank, and its standard deviation [N m]."""
+        one = self.fit
+        by_clearances = one.error.friction * self._roughly * float(one.predicted.std())
+        sigma = math.hypot(one.sigma["friction"], by_clearances)
+        return one.linear["friction"] / one.gain, sigma / abs(one.gain)
+
+    @property
+    def load_friction(self) -> tuple[float, float]:
+        """Friction as a fraction of the torque's size, and its standard deviation."""
+        one = self.fit
+        by_clearances = one.error.load_friction * self._roughly
+        sigma = math.hypot(one.sigma["load_friction"] / one.gain, by_clearances)
+        return one.linear["load_friction"] / one.gain, sigma
+
+    @property
+    def _roughly(self) -> float:
+        """Factor on what clearances change."""
+        return _UNDER_LOAD if "load" in self.fit.linear else 1.0
+
+    @property
+    def turned_radps(self) -> float:
+        """Usual speed of the crank, without its sign: by it, a lag looks like an offset."""
+        return float(np.median(np.abs(self.fit.crank()[1])))
+
+
+def settled(found: Found, model: TorqueModel) -> Found:
+    """The same with a fit for the lag to allow for."""
+    timing, one = found.timing, found.fit
+    if timing.is_lag_separated:
+        terms = Terms(bias="bias" in one.linear, load="load" in one.linear, load_friction=True)
+        start = attrs.evolve(one.refined, lag_s=timing.lag_s)
+        one = fit(one.pair, model, start, terms, with_errors=True)
+    return attrs.evolve(found, fit=one)
+
+
+def gear(found: Found) -> tuple[float, bool]:
+    """Gear ratio, and whether it is exact: the given one or a fraction of small numbers within the error."""
+    measured, error = found.fit.gear_ratio, gear_error(found.fit)
+    given = found.base.crank.gear_ratio
+    if abs(given / measured - 1.0) <= error:
+        return given, True
+    exact = exact_ratio(measured, error)
+    return (measured, False) if exact is None else (exact, True)
+
+
+def gear_error(one: Fit) -> float:
+    """Largest relative error of the gear ratio."""
+    travel = abs(one.ratio) * float(np.ptp(one.pair.position_rad))
+    return _SURE * one.sigma["ratio"] / abs(one.ratio) + _DRIFT_RAD / max(travel, 1.0e-9)
+
+
+def offset_rad(found: Found, number: int) -> float:
+    """Crank angle at joint position 0 of a recording, from -pi to pi."""
+    one = found.fit
+    offset = one.offset_rad[number]
+    # the exact ratio instead of the measured one leaves the phase in the middle of the recording as it is
+    middle = float(np.median(one.pair.position_rad[one.pair.recording == number]))
+    offset += (one.ratio - one.direction / gear(found)[0]) * middle
+    # at one cadence, a lag is a part of the phase
+    offset += (found.timing.lag_s - one.lag_s) * float(np.median(one.crank()[1]))
+    return float((offset + math.pi) % TURN - math.pi)
+
+
+def offset_sigma_rad(found: Found) -> float:
+    """Standard deviation of the offset, with what clearances, a rest that repeats and a lag make of it."""
+    one, timing = found.fit, found.timing
+    # were all of the rest that repeats a shift of the phase, it would shift by this
+    slope = np.gradient(one.predicted) / np.gradient(one.blocks.mean(one.crank()[0]))
+    by_rest = repeating(one) * float(one.measured.std() / np.sqrt(np.mean(slope**2)))
+    by_lag = timing.lag_sigma_s * found.turned_radps
+    return math.hypot(one.sigma["offset_rad"], one.error.phase_rad, by_rest, by_lag)
+
+
+# How each quantity could be known better than a recording shows it.
+
+
+_TWO_CADENCES = "record two cadences in one recording, 40 rpm apart"
+
+
+def better(name: str, found: Found) -> str:
+    """What would tell a quantity better; empty where nothing has to."""
+    return _WAYS[name](found) if name in _WAYS else ""
+
+
+def _gear(found: Found) -> str:
+    return "" if gear(found)[1] else "enter the ratio of the teeth"
+
+
+def _offset(found: Found) -> str:
+    by_lag = found.timing.lag_sigma_s * found.turned_radps
+    if by_lag <= found.fit.error.phase_rad:
+        return "turn the crank to a known angle, such as a dead centre"
+    if found.timing.is_lag_separated:
+        return f"{_further(found)}, or declare drive.lag_s"
+    return f"{_TWO_CADENCES}, or declare drive.lag_s"
+
+
+def _lag(found: Found) -> str:
+    if math.isfinite(found.declared.lag_s):
+        return ""
+    return _further(found) if found.timing.is_lag_separated else _TWO_CADENCES
+
+
+def _further(_found: Found) -> str:
+    return "record cadences further apart"
+
+
+def _sampling(found: Found) -> str:
+    return "" if found.sampling.value else "ask the drive's manual"
+
+
+def _better_scale(_found: Found) -> str:
+    return "measure the torque of a known weight on the crank"
+
+
+def _bandwidth(found: Found) -> str:
+    one = found.low_pass
+    if one is not None and one.is_told and not math.isfinite(one.bandwidth_hz):
+        return ""
+    return "declare drive.bandwidth_hz, or walk faster: stronger impacts show it better"
+
+
+def _load_friction(found: Found) -> str:
+    return f"declare drive.load_friction: clearances change it by {found.fit.error.load_friction:.2g}"
+
+
+_WAYS: Mapping[str, Callable[[Found], str]] = {
+    "crank.gear_ratio": _gear,
+    "crank.offset_rad": _offset,
+    "drive_torque.scale": _better_scale,
+    "drive_torque.sampling": _sampling,
+    "lag": _lag,
+    "bandwidth": _bandwidth,
+    "load friction": _load_friction,
+}
+
+
+# Parameters of the monitor from the chosen fit, each with its error and its runner-up.
+
+
+_NEAR = 0.05  # relative error by which clearances shift the scale: a given one that near is kept
+_HALF_A_GEAR = 0.5, 1.5  # efficiencies with which a torque may be that of the motor's shaft
+
+
+def items(found: Found) -> list[Item]:
+    """Everything that was looked for, parameters first."""
+    told = [*_crank(found), *_torque(found), *_timing(found), *_noises(found)]
+    return [attrs.evolve(item, better=better(item.name, found)) for item in told]
+
+
+def changes(found: list[Item]) -> dict[str, Any]:
+    """Values of the monitor's parameters among items."""
+    return {item.name: item.value for item in found if "." in item.name or item.name == "crank_joint"}
+
+
+def _rival(found: Found, name: str) -> dict[str, Any]:
+    rival = found.choice.rivals.get(name)
+    return {"other": _value(name, rival), "other_mismatch": rival.candidate.fit.mismatch} if rival else {}
+
+
+def _value(name: str, rival: Rival) -> str | int | float:
+    one = rival.candidate
+    if name == "crank_joint":
+        return one.joint.joint
+    if name == "drive_torque.source":
+        return one.torque.label
+    if name == "crank.sign":
+        return one.fit.direction
+    return one.fit.torque_sign if name == "drive_torque.sign" else float(f"{one.fit.gear_ratio:.4g}")
+
+
+def _crank(found: Found) -> Iterator[Item]:
+    one, mismatch = found.fit, found.fit.mismatch
+    ratio, is_exact = gear(found)
+    yield Item(
+        name="crank_joint",
+        value=found.best.joint.joint,
+        mismatch=mismatch,
+        remark=f"in {found.best.joint.topic}",
+        **_rival(found, "crank_joint"),
+    )
+    yield Item(name="crank.sign", value=one.direction, mismatch=mismatch, **_rival(found, "crank.sign"))
+    yield Item(
+        name="crank.gear_ratio",
+        value=ratio,
+        sigma=one.gear_ratio * one.sigma["ratio"] / abs(one.ratio),
+        mismatch=mismatch,
+        remark=f"measured {one.gear_ratio:.7g}" if is_exact else "not a fraction of small numbers",
+        **_rival(found, "crank.gear_ratio"),
+    )
+    last = max(one.offset_rad)
+    yield Item(
+        name="crank.offset_rad",
+        value=round(offset_rad(found, last), 4),
+        unit="rad",
+        sigma=offset_sigma_rad(found),
+        remark="clearances shift the torque's phase"
+        + ("" if found.timing.is_lag_separated else ", at one cadence a lag as well"),
+        mismatch=mismatch,
+    )
+
+
+def _torque(found: Found) -> Iterator[Item]:
+    one, torque = found.fit, found.best.torque
+    yield Item(
+        name="drive_torque.source",
+        value=torque.source,
+        mismatch=one.mismatch,
+        remark=torque.label,
+        **_rival(found, "drive_torque.source"),
+    )
+    if torque.source == WRENCH:
+        yield Item(name="drive_torque.axis", value=torque.component)
+    yield Item(
+        name="drive_torque.sign",
+        value=one.torque_sign,
+        mismatch=one.mismatch,
+        **_rival(found, "drive_torque.sign"),
+    )
+    scale, turns = _scale(found)
+    total = 1.0 / abs(one.gain)
+    yield Item(
+        name="drive_torque.scale",
+        value=scale,
+        sigma=total / turns * math.hypot(one.sigma["gain"] / abs(one.gain), one.error.scale),
+        mismatch=one.mismatch,
+        remark=f"scale times gear ratio measured {total:.4g}",
+    )
+    yield Item(name="drive_torque.gear_ratio", value=turns)
+
+
+def _scale(found: Found) -> tuple[float, float]:
+    """Scale and gear ratio of the torque, of which only the product is measured."""
+    one, given = found.fit, found.base.drive_torque
+    total = 1.0 / abs(one.gain)
+    if abs(given.scale * given.gear_ratio / total - 1.0) <= _NEAR:
+        return given.scale, given.gear_ratio
+    ratio = gear(found)[0]
+    is_geared = abs(ratio - 1.0) > SAME_GEAR and _HALF_A_GEAR[0] < total / ratio < _HALF_A_GEAR[1]
+    turns = ratio if is_geared else 1.0
+    scale = total / turns
+    return (1.0 if abs(scale - 1.0) <= _NEAR else float(f"{scale:.4g}")), turns
+
+
+def _timing(found: Found) -> Iterator[Item]:
+    one, timing = found.fit, found.timing
+    yield Item(
+        name="drive_torque.sampling",
+        value=found.used_sampling,
+        remark=found.sampling.why if found.sampling.value else "as given: not enough to tell",
+    )
+    yield Item(
+        name="lag",
+        value=timing.late_s,
+        unit="s",
+        sigma=timing.error_s if timing.is_lag_separated else None,
+        remark="of the torque, beside that of its sampling"
+        if timing.is_lag_separated
+        else "cannot be distinguished from an offset at one cadence",
+    )
+    yield from _low_pass(found)
+    cadence, tolerance = cadence_rpm(one)
+    yield Item(name="cadence.commanded_rpm", value=cadence, unit="rpm")
+    yield Item(name="cadence.tolerance_rpm", value=tolerance, unit="rpm")
+
+
+def _frictions(found: Found) -> Iterator[Item]:
+    declared = found.declared
+    friction, sigma = found.friction_nm
+    yield Item(
+        name="friction",
+        value=friction,
+        unit="N m",
+        sigma=sigma,
+        remark="constant, on the crank" + _declared(declared.coulomb_nm, " N m"),
+    )
+    friction, sigma = found.load_friction
+    yield Item(
+        name="load friction",
+        value=friction,
+        sigma=sigma,
+        remark="as a fraction of the torque's size" + _declared(declared.load_friction),
+    )
+
+
+def _declared(value: float, unit: str = "") -> str:
+    return f"; declared: {value:.4g}{unit}" if math.isfinite(value) else ""
+
+
+def _low_pass(found: Found) -> Iterator[Item]:
+    one = found.low_pass
+    if one is None:
+        return
+    hz = one.bandwidth_hz
+    value: str | float = hz
+    if not one.is_told:
+        told = "no low-pass is sure: the torque's noise hides it, or clearances and masses are others"
+    elif math.isfinite(hz):
+        told = "corner frequency of a low-pass between the crank and the torque's samples"
+    else:
+        value, told = f"none below {one.least_hz:g}", "no low-pass shows"
+    yield Item(
+        name="bandwidth",
+        value=value,
+        unit="Hz",
+        sigma=hz * one.log_sigma if math.isfinite(hz) else None,
+        remark=told + _declared(found.declared.bandwidth_hz, " Hz"),
+    )
+
+
+def _noises(found: Found) -> Iterator[Item]:
+    one = found.fit
+    yield from _frictions(found)
+    if "bias" in one.linear:
+        bias = one.linear["bias"] / one.gain
+        yield Item(name="bias", value=bias, unit="N m", sigma=one.sigma["bias"] / abs(one.gain))
+    yield Item(name="noise of the encoder", value=found.motion.noise_rad, unit="rad")
+    quiet = sensor_noise(one) / abs(one.gain)
+    yield Item(name="noise of the torque", value=quiet, unit="N m", remark="in the quietest part of the turn")
+    rest = scatter(one) / abs(one.gain)
+    yield Item(name="scatter", value=rest, unit="N m", remark="from turn to turn, over 1/12 turn")
+    yield Item(name="rate of the joint", value=found.motion.rate_hz, unit="Hz")

@@ -1,1 +1,0 @@
-"""The parameters that are proposed, and sentences about them."""

@@ -1,0 +1,257 @@
+"""The result of commissioning: parameters, detectable clearances, text."""
+
+import math
+from collections.abc import Sequence
+from io import StringIO
+from typing import TYPE_CHECKING, Any
+
+import attrs
+from ruamel.yaml import YAML
+
+from leg_wear_monitor.bags.findings import Finding
+from leg_wear_monitor.errors import LegWearError, printable
+from leg_wear_monitor.files import data_frame, json_text
+from leg_wear_monitor.monitor.config.parameters import MARK, PARAMETERS, values_of
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.twin.torque_reference import TorqueReference
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+# Whether a drive torque is good enough to show that a joint wears.
+
+
+@attrs.frozen(kw_only=True)
+class JointDetection:
+    """What the drive torque of a recording will show of a joint.
+
+    Attributes
+    ----------
+    joint : str
+        Its name.
+    is_good : bool
+        Whether a joint with the last clearance of `clearances_m` is found, and named, soon enough.
+    clearances_m : tuple of float
+        Clearances of a wider joint.
+    cycles : tuple of float
+        Expected number of gait cycles until a joint with each of these clearances is detected; NaN where it
+        is not.
+    named_cycles : tuple of float
+        Number of gait cycles until it is named, of four of five legs whose masses are 4 % off; NaN where it
+        is not.
+    runner_up : str
+        What else explains the last clearance best, human-readable; empty if it is not detected.
+    reason : str
+        Why the torque is not good enough for this joint, and what would be; empty if it is.
+    """
+
+    joint: str
+    is_good: bool
+    clearances_m: tuple[float, ...]
+    cycles: tuple[float, ...]
+    named_cycles: tuple[float, ...]
+    runner_up: str
+    reason: str = ""
+
+
+def judgement(joints: Sequence[JointDetection]) -> str:
+    """For which joints a torque is good enough, in a sentence; empty without joints."""
+    good = [each.joint for each in joints if each.is_good]
+    reasons: dict[str, list[str]] = {}
+    for each in joints:
+        if not each.is_good:
+            reasons.setdefault(each.reason, []).append(each.joint)
+    told = f"this torque is good enough for {_joints(good)}" if good else ""
+    bad = [f"{_joints(names)}, because {reason}" for reason, names in reasons.items()]
+    if not bad:
+        return told
+    return f"{told or 'this torque is not good enough'}{'; not' if told else ''} for {'; nor for '.join(bad)}"
+
+
+def _joints(names: Sequence[str]) -> str:
+    return f"joint{'s' if len(names) > 1 else ''} {', '.join(names)}"
+
+
+# A ROS parameter file of what differs from the defaults, as `config/monitor.yaml` is one of the defaults.
+
+
+_HEAD = (
+    "Parameters of the monitor, proposed by `leg-wear-monitor commission`; others have their defaults.",
+    "crank angle = sign * position / gear_ratio + offset_rad",
+    "torque on the crank = sign * scale * gear_ratio * value",
+)
+_ALWAYS = ("mechanism", "crank_joint", "crank.", "drive_torque.", "cadence.")
+
+
+def parameter_text(config: MonitorConfig, remarks: Sequence[str]) -> str:
+    """Text of a parameter file, with remarks as comments at its head."""
+    head = "".join(f"# {printable(line)}\n" for line in (*_HEAD, *remarks))
+    tree: dict[str, Any] = {}
+    for name, value in values_of(config).items():
+        if value == () or (value == PARAMETERS[name].default and not name.startswith(_ALWAYS)):
+            continue
+        *sections, last = name.split(".")
+        place = tree
+        for section in sections:
+            place = place.setdefault(section, {})
+        place[last] = list(value) if isinstance(value, tuple) else value
+    stream = StringIO()
+    yaml: Any = YAML(typ="safe", pure=True)
+    yaml.default_flow_style = False
+    yaml.sort_base_mapping_type_on_output = False
+    yaml.dump({"/**": {MARK: tree}}, stream)
+    return head + stream.getvalue()
+
+
+# Result of commissioning: each parameter with its runner-up, the undetermined ones, what does not fit.
+
+
+SCHEMA_VERSION = 1
+
+
+@attrs.frozen(kw_only=True)
+class CommissioningItem:
+    """A quantity that commissioning determines.
+
+    Attributes
+    ----------
+    name : str
+        A parameter of the monitor, or another measured quantity.
+    value : str, int or float
+        NaN if it cannot be determined.
+    unit : str
+        Unit of the value; empty for a name or a ratio.
+    sigma : float, optional
+        Standard deviation, in the unit.
+    mismatch : float, optional
+        RMS of the torque that this leaves unexplained, as a fraction of the torque's.
+    other : str, int, float or None
+        The runner-up.
+    other_mismatch : float, optional
+        Its mismatch.
+    remark : str
+        Further information.
+    better : str
+        How it could be known better; empty if it need not be.
+    """
+
+    name: str
+    value: str | int | float
+    unit: str = ""
+    sigma: float | None = None
+    mismatch: float | None = None
+    other: str | int | float | None = None
+    other_mismatch: float | None = None
+    remark: str = ""
+    better: str = ""
+
+
+@attrs.frozen(kw_only=True)
+class CommissioningResult:
+    """Result of commissioning.
+
+    Attributes
+    ----------
+    items : tuple of CommissioningItem
+        The quantities, one by one.
+    not_told : tuple of str
+        Parameters that the recording does not determine, and why.
+    findings : tuple of str
+        What does not fit, and the remedy.
+    notes : tuple of str
+        Further information.
+    config : MonitorConfig or None
+        The proposed parameters; None if a choice between alternatives is not certain.
+    turns : float
+        Turns of the crank in the recording.
+    faults : tuple of Finding
+        Of the recordings, whose other parts were used.
+    joints : tuple of JointDetection
+        What the torque will show of each joint; empty where that is not known.
+    reference_used : str
+        Torque reference by which the joints are judged, or why they are not.
+    reference : TorqueReference or None
+        The one that was simulated for ``diagnosis.reference``, if it was asked for.
+    """
+
+    items: tuple[CommissioningItem, ...]
+    not_told: tuple[str, ...]
+    findings: tuple[str, ...]
+    notes: tuple[str, ...]
+    config: MonitorConfig | None
+    turns: float
+    faults: tuple[Finding, ...] = ()
+    joints: tuple[JointDetection, ...] = ()
+    reference_used: str = ""
+    reference: TorqueReference | None = None
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether every parameter was determined, and everything fits."""
+        return self.config is not None and not self.not_told and not self.findings
+
+    @property
+    def judgement(self) -> str:
+        """For which joints the torque is good enough, in a sentence; empty where that is not known."""
+        return judgement(self.joints)
+
+    def item(self, name: str) -> CommissioningItem:
+        """The item of a name; raises KeyError if there is none."""
+        return {each.name: each for each in self.items}[name]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain object for JSON; null for what cannot be determined."""
+        return {
+            "schema_version": SCHEMA_VERSION,
+            "turns": self.turns,
+            "is_sure": self.is_sure,
+            "items": [_document(each) for each in self.items],
+            "not_enough_to_tell": list(self.not_told),
+            "findings": list(self.findings),
+            "notes": list(self.notes),
+            "joints": [_document(each) for each in self.joints],
+            "judgement": self.judgement,
+            "reference_used": self.reference_used,
+        }
+
+    def to_json(self) -> str:
+        """Text of `to_dict`: what ``commission --json`` writes."""
+        return json_text(self.to_dict())
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """Table of the items, a row each.
+
+        Raises
+        ------
+        LegWearError
+            If pandas is not installed.
+        """
+        rows = [attrs.asdict(item) for item in self.items]
+        columns = {key: [row[key] for row in rows] for key in rows[0]}
+        return data_frame(columns, index="name")
+
+    def to_yaml(self) -> str:
+        """Parameter file of the monitor; uncertain parameters are comments at its head.
+
+        Raises
+        ------
+        LegWearError
+            If no parameters are proposed.
+        """
+        if self.config is None:
+            raise LegWearError(f"no parameters are proposed: {'; '.join(self.not_told)}")
+        labels = {"not enough to tell": self.not_told, "does not fit": self.findings, "note": self.notes}
+        labels["torque"] = tuple(text for text in (self.judgement, self.reference_used) if text)
+        remarks = [f"{label}: {text}" for label, texts in labels.items() for text in texts]
+        return parameter_text(self.config, remarks)
+
+
+def _document(part: Any) -> dict[str, Any]:
+    return {key: _plain(value) for key, value in attrs.asdict(part).items()}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return [_plain(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

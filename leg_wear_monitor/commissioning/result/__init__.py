@@ -1,1 +1,0 @@
-"""What commissioning found, as classes, as JSON, as a table, and as a parameter file."""

@@ -1,0 +1,310 @@
+"""The search over joints, torques, directions and signs: where to start, candidates, the choice."""
+
+import math
+from collections.abc import Callable, Iterable
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from leg_wear_monitor.bags.series import EFFORT, JointName, TorqueSource
+from leg_wear_monitor.estimate.torque_fit import Fit, fit, repeating, too_alike
+from leg_wear_monitor.estimate.torque_model import (
+    JointMotion,
+    Pair,
+    Series,
+    Start,
+    TorqueModel,
+    paired,
+    steady_stretch,
+)
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.position import TURN
+
+# Where to start: every gear ratio, direction, offset and torque sign at once, judged by the leg's model.
+#
+# Over the joint's angle, the torque is periodic with the crank's turn. One spectrum holds its harmonics for
+# every gear ratio; their correlation with those of the model, over all offsets, is a further Fourier
+# transform. Multiples and fractions of the true ratio have the wrong harmonics, and the model the wrong
+# speed.
+
+
+LEAST_TURNS = 5.0
+_HARMONICS = 10
+_FINE = (
+    2 * _HARMONICS
+)  # steps of a ratio within a turn more or less: half a step of the highest harmonic's line
+_OFFSETS = 64
+_LEAST_SAMPLES_PER_TURN = 2.5 * _HARMONICS
+_FASTEST_RADPS = 60.0  # 570 rpm
+_APART = 2 * _FINE  # two ratios nearer than two turns in the recording are one
+
+
+def scan(pair: Pair, model: TorqueModel, count: int) -> list[Start]:
+    """The best starts of each direction and torque sign, at most ``count`` each; none if there is too little.
+
+    Parameters
+    ----------
+    pair : Pair
+        A steady stretch.
+    model : TorqueModel
+    count : int
+    """
+    reach = float(np.ptp(pair.position_rad)) if len(pair.position_rad) else 0.0
+    size = float(pair.torque.std()) if len(pair.torque) else 0.0
+    if reach == 0.0 or not size > 0.0:
+        return []
+    speed = float(np.median(pair.speed_radps))
+    lines = _lines(len(pair.torque), reach, abs(speed))
+    if not len(lines):
+        return []
+    spectrum, origin = _spectrum(pair)
+    ratio: Floats = TURN / (_FINE * reach) * lines.astype(np.float64)
+    measured = spectrum[np.outer(lines, np.arange(1, _HARMONICS + 1))]
+    starts = []
+    for direction in (1, -1):
+        wanted = _model_harmonics(model, direction * ratio * speed)
+        both = wanted.conj() * measured if direction == 1 else (wanted * measured).conj()
+        along = np.fft.fft(both, _OFFSETS, axis=1).real
+        energy = (np.abs(wanted) ** 2).sum(axis=1)
+        for sign in (1, -1):
+            best = (sign * along).max(axis=1).clip(0.0)
+            explained = 2.0 * best**2 / energy / size**2
+            for peak in _peaks(explained, count):
+                angle = TURN / _OFFSETS * float((sign * along[peak]).argmax())
+                turned = direction * float(ratio[peak])
+                offset = angle - turned * origin
+                starts.append(Start(turned, offset, sign, float(explained[peak]), int(pair.recording[0])))
+    return starts
+
+
+def _lines(samples: int, reach: float, speed: float) -> NDArray[np.int64]:
+    """Indices in the spectrum of the ratios with enough turns, enough samples a turn, a credible speed."""
+    fastest = _FASTEST_RADPS / speed * reach / TURN
+    most = min(samples / _LEAST_SAMPLES_PER_TURN, fastest)
+    return np.arange(int(np.ceil(LEAST_TURNS * _FINE)), int(most * _FINE) + 1)
+
+
+def _spectrum(pair: Pair) -> tuple[NDArray[np.complex128], float]:
+    """Fourier coefficients of the torque over the joint's angle, and the angle that they start from."""
+    order = np.argsort(pair.position_rad, kind="stable")
+    position = pair.position_rad[order]
+    even = np.linspace(position[0], position[-1], len(position), endpoint=False)
+    torque = np.interp(even, position, pair.torque[order] - pair.torque.mean())
+    return np.fft.rfft(torque, _FINE * len(even)) / len(even), float(position[0])
+
+
+def _model_harmonics(model: TorqueModel, speed: Floats) -> NDArray[np.complex128]:
+    """Harmonics (n, _HARMONICS) of the model at speeds (n,) of the crank [rad/s]."""
+    tables = np.fft.rfft(model.tables[:3], axis=1)[:, 1 : _HARMONICS + 1] / model.tables.shape[1]
+    motion = np.stack([np.ones_like(speed), speed, speed * speed], axis=1)
+    return np.asarray(motion @ tables)
+
+
+def _peaks(value: Floats, count: int) -> list[int]:
+    """Indices of the largest local maxima, each apart from larger ones."""
+    left, peaks = value.copy(), []
+    for _ in range(count):
+        peak = int(left.argmax())
+        if left[peak] <= 0.0:
+            break
+        peaks.append(peak)
+        left[max(0, peak - _APART) : peak + _APART + 1] = 0.0
+    return peaks
+
+
+# All joints, torques, directions and signs, each fitted; which of them are as good as the best.
+
+
+_PEAKS = 2  # ratios that are fitted, of each direction and sign
+_HOPELESS = 0.3  # of the best explained fraction, below which a pair gets one fit only
+_LEAST_PAIRS = 4  # so that there is a runner-up
+_ON_ONE_SHAFT_RAD = 0.005  # more than smoothed noise; the ripple of a gait that a wheel has not is larger
+SAME_GEAR = 0.05
+
+
+@attrs.frozen(eq=False)
+class Candidate:
+    """A joint as the crank, a torque as its drive torque, and the fit of one with the other."""
+
+    joint: JointName
+    torque: TorqueSource
+    fit: Fit
+
+
+def candidates(
+    joints: dict[JointName, JointMotion],
+    torques: dict[TorqueSource, Series],
+    model: TorqueModel,
+    progress: Callable[[float], None] = lambda _fraction: None,
+) -> list[Candidate]:
+    """Fits of all joints that turn with all torques, the best first; none if there is too little of them."""
+    starts: list[tuple[JointName, TorqueSource, Pair, Pair, list[Start]]] = []
+    for joint, motion in joints.items():
+        for torque, series in torques.items():
+            if torque.source == EFFORT and (torque.topic, torque.component) != (joint.topic, joint.joint):
+                continue  # the monitor takes the crank's own effort
+            pair = paired(motion, series)
+            steady = steady_stretch(pair)
+            found = sorted(scan(steady, model, _PEAKS), key=lambda start: -start.explained)
+            if found:
+                starts.append((joint, torque, pair, steady, found))
+    best = max((each[-1][0].explained for each in starts), default=0.0)
+    starts.sort(key=lambda each: -each[-1][0].explained)
+    fitted: list[Candidate] = []
+    for i, (joint, torque, pair, steady, found) in enumerate(starts):
+        is_hopeless = found[0].explained < _HOPELESS * best
+        if is_hopeless and i >= _LEAST_PAIRS:
+            continue
+        kept = found[:1] if is_hopeless else found
+        fitted += [Candidate(joint, torque, _refined(pair, steady, model, start)) for start in kept]
+        progress((i + 1) / len(starts))
+    return sorted(fitted, key=lambda each: each.fit.mismatch)
+
+
+def _refined(pair: Pair, steady: Pair, model: TorqueModel, start: Start) -> Fit:
+    """Fit of the steady stretch, which makes the ratio exact enough for the fit of all."""
+    near = fit(steady, model, start)
+    offset = near.offset_rad[start.recording]
+    return fit(pair, model, attrs.evolve(start, ratio=near.ratio, offset_rad=offset))
+
+
+def on_one_shaft(one: Fit, other: Fit) -> bool:
+    """Whether two joints turn in a fixed ratio: the crank angles that they give differ by a constant."""
+    angle, there = one.crank()[0], other.crank()[0]
+    time_s, times = one.pair.time_s, other.pair.time_s
+    both = (time_s >= times[0]) & (time_s <= times[-1])
+    apart = (angle - np.interp(time_s, times, there))[both]
+    return len(apart) > 0 and float(apart.std()) < _ON_ONE_SHAFT_RAD
+
+
+def first(found: Iterable[Candidate], holds: Callable[[Candidate], bool]) -> Candidate | None:
+    """Best candidate of which something holds."""
+    return next((each for each in found if holds(each)), None)
+
+
+def same_gear(one: Fit, other: Fit) -> bool:
+    """Whether two fits have about the same gear ratio."""
+    return abs(one.gear_ratio / other.gear_ratio - 1.0) < SAME_GEAR
+
+
+# The best candidate, its rival in each respect, and whether the rival may be the truth.
+
+
+_SAME_PHASE_RAD = 0.3  # two sensors of one torque differ by their lags, those of two legs by more
+_SIGNALS = ("crank_joint", "drive_torque.source")
+ANOTHER_LEG = 0.5  # repeating rest beyond which nothing that fits is known
+
+
+@attrs.frozen(eq=False)
+class Rival:
+    """The best candidate that differs in one respect.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    doubt : str
+        Why it may be the truth; empty if it cannot.
+    """
+
+    candidate: Candidate
+    doubt: str = ""
+
+
+@attrs.frozen(eq=False)
+class Choice:
+    """The best candidate and its rivals: ``joint``, ``source``, ``direction``, ``torque sign``, ``gear``."""
+
+    best: Candidate
+    rivals: dict[str, Rival]
+    also: tuple[str, ...]
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Why the choice is not sure; empty if it is."""
+        rest = repeating(self.best.fit)
+        told = [f"{name}: {rival.doubt}" for name, rival in self.rivals.items() if rival.doubt]
+        if rest > ANOTHER_LEG:
+            told.append(
+                f"another leg: {100.0 * rest:.0f} % of the torque repeats with each turn and is not that of "
+                "this mechanism, however it is turned"
+            )
+        return tuple(told)
+
+
+def choose(found: list[Candidate]) -> Choice:
+    """Choose among candidates, the best first; there is at least one."""
+    best = _nearest_to_the_crank(found)
+    of_pair = [each for each in found if (each.joint, each.torque) == (best.joint, best.torque)]
+    respects: dict[str, tuple[list[Candidate], Callable[[Candidate], bool]]] = {
+        "crank.sign": (of_pair, lambda each: each.fit.direction != best.fit.direction),
+        "drive_torque.sign": (of_pair, lambda each: each.fit.torque_sign != best.fit.torque_sign),
+        "crank.gear_ratio": (of_pair, lambda each: not same_gear(each.fit, best.fit)),
+        "crank_joint": (found, lambda each: each.joint != best.joint),
+        "drive_torque.source": (
+            found,
+            lambda each: each.joint == best.joint and each.torque != best.torque,
+        ),
+    }
+    rivals, also = {}, []
+    for name, (among, differs) in respects.items():
+        rival = first(among, differs)
+        if rival is None:
+            continue
+        alike = too_alike(best.fit, rival.fit, other_signal=name in _SIGNALS)
+        same = alike and _is_the_same(name, best, rival)
+        rivals[name] = Rival(rival, _doubt(name, best, rival) if alike and not same else "")
+        if same:
+            also.append(_also(name, rival))
+    return Choice(best, rivals, tuple(also))
+
+
+def _nearest_to_the_crank(found: list[Candidate]) -> Candidate:
+    """Of joints on one shaft, which fit alike, the one with the least gear."""
+    best = found[0]
+    near = [
+        each
+        for each in found
+        if each.joint != best.joint
+        and too_alike(best.fit, each.fit, other_signal=True)
+        and on_one_shaft(best.fit, each.fit)
+        and not same_gear(each.fit, best.fit)
+    ]
+    return min([best, *near], key=lambda each: abs(math.log(each.fit.gear_ratio)))
+
+
+def _is_the_same(name: str, best: Candidate, rival: Candidate) -> bool:
+    """Whether a rival that fits as well means the same: another encoder of the shaft, another sensor."""
+    if name == "crank_joint":
+        return on_one_shaft(best.fit, rival.fit) and not same_gear(best.fit, rival.fit)
+    if name == "drive_torque.source":
+        number = best.fit.pair.recording[0].item()
+        apart = best.fit.offset_rad[number] - rival.fit.offset_rad.get(number, math.inf)
+        apart = abs((apart + math.pi) % TURN - math.pi) if math.isfinite(apart) else math.inf
+        same = best.fit.direction == rival.fit.direction and same_gear(best.fit, rival.fit)
+        return same and apart < _SAME_PHASE_RAD
+    return False
+
+
+def _also(name: str, rival: Candidate) -> str:
+    if name == "crank_joint":
+        return f"{rival.joint.joint} turns with the crank, too, at {rival.fit.gear_ratio:.6g} turns a turn"
+    return f"{rival.torque.label} is the same torque"
+
+
+def _doubt(name: str, best: Candidate, rival: Candidate) -> str:
+    less = f"mismatch {rival.fit.mismatch:.3f} beside {best.fit.mismatch:.3f}"
+    if name == "crank_joint":
+        return (
+            f"{best.joint.joint} and {rival.joint.joint} both turn like this leg's crank ({less}); select "
+            "one with --crank-joint"
+        )
+    if name == "drive_torque.source":
+        return (
+            f"{best.torque.label} and {rival.torque.label} both fit, but not with the same offset ({less}); "
+            "select one with --drive-torque"
+        )
+    return (
+        f"the torque of this leg looks nearly the same the other way round ({less}); walk faster, where "
+        "inertia shapes the torque, or turn the crank by hand and look"
+    )

@@ -1,1 +1,0 @@
-"""All joints and torques tried, the best chosen, and its rivals."""

@@ -1,0 +1,1 @@
+"""All that knows numba: kernels, their cache, vectors."""

@@ -1,0 +1,544 @@
+"""The decorators for compiled code: ``@kernel`` for formulas, ``@entry`` for functions called from Python.
+
+Entries are cached on disk under a digest of all sources that they depend on.
+"""
+
+import ast
+import hashlib
+from collections.abc import Callable, Iterable, Iterator
+from functools import cache, wraps
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+import numpy as np
+from numba.core.compiler_lock import global_compiler_lock
+from numpy.typing import NDArray
+
+from leg_wear_monitor.compiled.cache import PACKAGE, code_directory, one_process_at_a_time
+
+# numba's compiler, told to optimise an entry once and as a whole: all that is private in numba is here.
+#
+# By itself numba compiles every function as a program of its own: it writes the wrappers that Python and C
+# would call it by, optimises it with all that it calls, and makes machine code of it. A chain of kernels pays
+# that at every level, for code that is inlined into the next level and thrown away. Here a kernel is typed
+# and lowered and no more; the entry links the kernels that it needs, and is optimised once.
+#
+# Where numba's internals are not as expected, `AVAILABLE` is False and plain numba compiles: the same
+# results, later.
+
+
+_LIBRARY = (
+    "_finalized", "_linking_libraries", "add_linking_library", "finalize", "get_pointer_to_function",
+)  # fmt: skip
+_FLAGS = ("no_cfunc_wrapper", "no_compile", "no_cpython_wrapper")
+_DISPATCHER = ("add_overload", "get_call_template", "get_overload")
+
+
+def _unliteral(one: Any) -> Any:
+    """The type of a constant; another type as it is."""
+    from numba.core.types.misc import unliteral
+
+    return unliteral(one)
+
+
+def _internals() -> tuple[Any, Any, Any] | None:
+    """Numba's classes for a library, a compiler and a dispatcher, if all that is used here is there."""
+    try:
+        from numba.core.codegen import CodeLibrary, JITCodeLibrary
+        from numba.core.compiler import Compiler, CompileResult, Flags
+        from numba.core.registry import CPUDispatcher
+
+        _unliteral(None)
+        attributes = {*dir(JITCodeLibrary), *JITCodeLibrary.__init__.__code__.co_names}
+        attributes.update(CodeLibrary.__init__.__code__.co_names)
+        used = (
+            *((Flags, name) for name in _FLAGS),
+            *((CPUDispatcher, name) for name in _DISPATCHER),
+            (Compiler, "compile_extra"),
+            (CompileResult, "_replace"),
+        )
+        complete = attributes.issuperset(_LIBRARY) and all(hasattr(owner, name) for owner, name in used)
+    except (AttributeError, ImportError):
+        return None
+    return (JITCodeLibrary, Compiler, CPUDispatcher) if complete else None
+
+
+_FOUND = _internals()
+
+AVAILABLE = _FOUND is not None
+
+_Library: Any
+_Compiler: Any
+_Dispatcher: Any
+_Library, _Compiler, _Dispatcher = _FOUND or (object, object, object)
+
+
+def _read_flags_quickly() -> bool:
+    """Let numba gather its flags from two dictionaries, not by some thirty properties; False if they changed.
+
+    It does so for each call that it types, a hundred thousand times in a compilation: a fifth of its time.
+    """
+    try:
+        from numba.core.compiler import Flags
+        from numba.core.targetconfig import TargetConfig
+
+        defaults = {name: option.default for name, option in Flags.options.items()}
+        flags = Flags()
+        flags.nrt = True
+
+        def values(self: Any) -> dict[str, Any]:
+            return {**defaults, **self._values}
+
+        if Flags.values is not TargetConfig.values or values(flags) != flags.values():
+            return False
+        Flags.values = values
+    except (AttributeError, ImportError):
+        return False
+    return True
+
+
+QUICK_FLAGS = _read_flags_quickly()
+
+
+def _remember_calls() -> bool:
+    """Let numba find out once what it calls for numbers of some types; False if it changed.
+
+    It tries all that it has for an operator, arrays first, each time that one occurs: a tenth of its time.
+    """
+    try:
+        from numba.core.types import Boolean, Number
+        from numba.core.types.functions import BaseFunction
+
+        owner: Any = BaseFunction
+        find = owner.get_call_type
+        if find.__code__.co_varnames[:4] != ("self", "context", "args", "kws"):
+            return False
+        known: dict[Any, Any] = {}
+
+        @wraps(find)
+        def get_call_type(self: Any, context: Any, args: Any, kws: Any) -> Any:
+            if kws or not all(isinstance(one, Number | Boolean) for one in args):
+                return find(self, context, args, kws)
+            key = (self, context, self.templates, tuple(args))  # templates: more may be registered later
+            if key not in known:
+                known[key] = find(self, context, args, kws)
+            return known[key]
+
+        owner.get_call_type = get_call_type
+    except (AttributeError, ImportError):
+        return False
+    return True
+
+
+QUICK_CALLS = _remember_calls()
+
+
+class _Part(_Library):  # type: ignore[misc]
+    """Code of a kernel: only ever linked into an entry, so neither optimised nor made machine code of."""
+
+    def finalize(self) -> None:
+        """Leave it as it was lowered; what it calls is linked beside it, not into it."""
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """No address: it has no machine code."""
+        return 0
+
+
+class _PartCompiler(_Compiler):  # type: ignore[misc]
+    """The usual pipeline up to lowering."""
+
+    def compile_extra(self, func: Callable[..., object]) -> Any:
+        """Type and lower a kernel for the types of this pipeline."""
+        state = self.state
+        state.library = library = _Part(state.targetctx.codegen(), func.__qualname__)
+        state.flags.no_compile = state.flags.no_cpython_wrapper = state.flags.no_cfunc_wrapper = True
+        result = super().compile_extra(func)
+        # who calls it links it and all below it: a kernel that it calls has handed on its own list
+        below = library._linking_libraries = list(dict.fromkeys(library._linking_libraries))
+        key = object()  # stands for the function that Python would call
+        state.targetctx.insert_user_function(key, result.fndesc, [library, *below])
+        return result._replace(entry_point=key)
+
+
+class _PartDispatcher(_Dispatcher):  # type: ignore[misc]
+    """A kernel as other kernels and entries see it."""
+
+    def add_overload(self, cres: Any) -> None:
+        """Note a compiled kernel, without an address that Python could call."""
+        self.overloads[tuple(cres.signature.args)] = cres
+
+
+class KernelDispatcher(_Dispatcher):  # type: ignore[misc]
+    """A kernel: compiled like an entry if Python calls it, a part of what calls it in compiled code.
+
+    Parameters
+    ----------
+    py_func : callable
+    targetoptions : dict
+        As those of `numba.njit`.
+    """
+
+    def __init__(self, py_func: Callable[..., object], targetoptions: dict[str, object]) -> None:
+        options = {"nopython": True, **targetoptions}
+        super().__init__(py_func, targetoptions=options)
+        self._part = _PartDispatcher(py_func, targetoptions=options, pipeline_class=_PartCompiler)
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Compile the part for a call; a constant argument makes no other part, as it is inlined anyway."""
+        general = {name: _unliteral(one) for name, one in kws.items()}
+        return self._part.get_call_template([_unliteral(one) for one in args], general)
+
+    def get_overload(self, sig: Any) -> Any:
+        """What stands for the part with a signature."""
+        return self._part.get_overload(sig)
+
+
+class _Place:
+    """Where numba stores code: a directory whose name is a digest of all sources, wherever they lie.
+
+    Its own locators know the source by its path and time, so an equal copy would be compiled again.
+    """
+
+    def __init__(self, function: Callable[..., object], directory: Path) -> None:
+        self._line, self._directory = function.__code__.co_firstlineno, directory
+
+    def ensure_cache_path(self) -> None:
+        """Nothing to do: it is there."""
+
+    def get_cache_path(self) -> str:
+        """The directory."""
+        return str(self._directory)
+
+    def get_source_stamp(self) -> str:
+        """Always the same: another source has another directory."""
+        return ""
+
+    def get_disambiguator(self) -> str:
+        """What tells functions of one name apart."""
+        return str(self._line)
+
+
+def store(entry: Any, directory: Path) -> None:
+    """Have numba store an entry's code in a directory, and load it from there.
+
+    Parameters
+    ----------
+    entry : dispatcher
+    directory : pathlib.Path
+        For these sources alone, and writable.
+    """
+    try:
+        from numba.core.caching import CompileResultCacheImpl, FunctionCache
+
+        class Locators:
+            """As numba asks for them."""
+
+            @staticmethod
+            def from_function(function: Callable[..., object], _file: str) -> _Place:
+                return _Place(function, directory)
+
+        implementation = type("Stored", (CompileResultCacheImpl,), {"_locator_classes": [Locators]})
+        cache = type("Cache", (FunctionCache,), {"_impl_class": implementation})
+        entry._cache = cache(entry.py_func)
+    except (AttributeError, ImportError):  # then by path and time
+        previous, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(directory)
+        try:
+            entry.enable_caching()
+        finally:
+            numba.config.CACHE_DIR = previous
+
+
+def address_of(entry: Any, arguments: Iterable[object], returns: Any) -> int:
+    """Address of an entry's machine code for arguments; compiles or loads it.
+
+    Parameters
+    ----------
+    entry : dispatcher
+    arguments : iterable
+        Any of the types that it will be called with.
+    returns : numba type
+        Expected type of what it returns.
+
+    Raises
+    ------
+    TypeError
+        If the entry returns another type.
+    """
+    types = tuple(map(entry.typeof_pyval, arguments))
+    entry.compile(types)
+    found = entry.overloads[types]
+    if found.signature.return_type != returns:
+        raise TypeError(f"{entry.py_func.__name__} returns {found.signature.return_type}, not {returns}")
+    return int(found.library.get_pointer_to_function(found.fndesc.llvm_func_name))
+
+
+def caller(returns: Any) -> Any:
+    """Function for compiled code that calls an address with a tuple of arguments.
+
+    Parameters
+    ----------
+    returns : numba type
+        What the code at the address returns.
+    """
+    from numba.core.cgutils import if_unlikely, unpack_tuple
+    from numba.extending import intrinsic
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        address, packed = values
+        types = signature.args[1].types
+        convention = context.call_conv
+        kind = convention.get_function_type(returns, types).as_pointer()
+        code, arguments = builder.inttoptr(address, kind), unpack_tuple(builder, packed, len(types))
+        status, result = convention.call_function(builder, code, returns, types, arguments)
+        with if_unlikely(builder, status.is_error):
+            convention.return_status_propagate(builder, status)
+        return result
+
+    def call(_context: Any, address: Any, arguments: Any) -> Any:
+        return returns(address, arguments), generate
+
+    return intrinsic(call)
+
+
+_Function = TypeVar("_Function", bound=Callable[..., object])
+
+_ENTRY: dict[str, object] = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
+_KERNEL = {**_ENTRY, "forceinline": True}
+
+_HOME = Path(__file__).parents[1]  # of the package
+
+at_compilation: list[Callable[[], None]] = []  # called when an entry is compiled, and not loaded
+
+
+def _module(parts: Iterable[str]) -> Path | None:
+    """File of a module of this package, from the parts of its name; None if there is none."""
+    place = _HOME.joinpath(*parts)
+    files = (place.with_suffix(".py"), place / "__init__.py")
+    return next((file for file in files if file.is_file()), None)
+
+
+def _statements(tree: ast.AST) -> Iterator[ast.AST]:
+    """All statements of a tree; `ast.walk` would go through the expressions, too, three times as long."""
+    found = [tree]
+    while found:
+        node = found.pop()
+        yield node
+        for block in ("body", "orelse", "finalbody", "handlers", "cases"):
+            found.extend(getattr(node, block, ()))
+
+
+@cache
+def _imported(source: Path) -> frozenset[Path]:
+    """Files of this package that a file of it imports by their full names."""
+    found: set[Path | None] = set()
+    for node in _statements(ast.parse(source.read_bytes())):
+        if isinstance(node, ast.Import):
+            names = [alias.name.split(".") for alias in node.names]
+            found.update(_module(name) for package, *name in names if package == PACKAGE)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            package, *name = node.module.split(".")
+            if package == PACKAGE:
+                # the imported name is a module, or an object in a module
+                found.update(_module([*name, alias.name]) or _module(name) for alias in node.names)
+    return frozenset(file for file in found if file)
+
+
+def _sources(roots: Iterable[Path]) -> set[Path]:
+    """The given files and all files of this package that they import, directly or indirectly."""
+    known: set[Path] = set()
+    new = set(roots)
+    while new:
+        known |= new
+        new = {source for known_one in new for source in _imported(known_one)} - known
+    return known
+
+
+def _digest(sources: Iterable[Path]) -> str:
+    """Digest of names and contents of sources, of numba's version and of how it compiles: equal for copies.
+
+    Code that was compiled with `whole_program` calls addresses, which plain numba gives as 0.
+    """
+    digest = hashlib.sha256(f"{numba.__version__} {AVAILABLE}".encode())
+    for source in sorted(sources):
+        text = source.read_bytes()
+        name = source.relative_to(_HOME) if source.is_relative_to(_HOME) else source
+        digest.update(f"{name} {len(text)} ".encode())
+        digest.update(text)
+    return digest.hexdigest()[:16]
+
+
+@cache
+def cache_directory(root: Path | None = None) -> Path | None:
+    """Directory of the compiled code of a file, named by a digest of all its sources.
+
+    numba checks only the file of the cached function itself: after a change of a kernel in another file it
+    would use the old code. The digest covers the file and everything that it imports. A directory outside the
+    package also works if the package directory is read-only.
+
+    Parameters
+    ----------
+    root : pathlib.Path, optional
+        File of this package; default: all kernels of the package.
+
+    Returns
+    -------
+    pathlib.Path or None
+        Below ``$NUMBA_CACHE_DIR`` if set, else ``$XDG_CACHE_HOME`` or ``~/.cache``, else the temporary
+        directory: the first that is private (`leg_wear_monitor.compiled.cache`). None if none is.
+    """
+    if root is None:
+        compiled = (
+            file for file in _HOME.rglob("*.py") if b"leg_wear_monitor.compiled.kernel" in file.read_bytes()
+        )
+        return code_directory(f"all-{_digest(_sources(compiled))}")
+    below = root.relative_to(_HOME) if root.is_relative_to(_HOME) else Path(root.name)
+    return code_directory(f"{'.'.join(below.with_suffix('').parts)}-{_digest(_sources([root]))}")
+
+
+def kernel(function: _Function) -> _Function:
+    """Compile a formula of numbers and arrays; division by zero gives inf, as in numpy.
+
+    A kernel cannot allocate arrays: it is compiled without numba's runtime, because its reference counting
+    would cost more time than the physics where many small arrays are passed. A kernel is inlined into the
+    entry that calls it and is not cached by itself, because cached code cannot be inlined.
+    """
+    if AVAILABLE and not numba.config.DISABLE_JIT:
+        return KernelDispatcher(function, _KERNEL)
+    return numba.njit(**_KERNEL)(function)  # type: ignore[no-any-return]
+
+
+def entry(function: _Function) -> _Function:
+    """Compile a function for calls from Python: cached on disk, and without the interpreter's lock.
+
+    While another process compiles the same entry, this one waits for it and loads the result.
+    """
+    home = cache_directory(Path(function.__code__.co_filename))
+    compiled = numba.njit(nogil=True, **_ENTRY)(function)
+    if home is not None and not numba.config.DISABLE_JIT:
+        store(compiled, home)
+        compiled.compile = _compiled_once(compiled, home / f"{function.__name__}.lock")
+    return compiled  # type: ignore[no-any-return]
+
+
+def _compiled_once(compiled: Any, lock: Path) -> Callable[..., object]:
+    """A dispatcher's method ``compile``, in one process at a time."""
+    compile_or_load = compiled.compile
+
+    def compile_in_turn(signature: object) -> object:
+        # numba's own lock first: two threads that each held one of the two would wait for ever
+        with global_compiler_lock, one_process_at_a_time(lock):
+            if at_compilation and not is_stored(compiled):
+                for call in at_compilation:
+                    call()
+            return compile_or_load(signature)
+
+    return compile_in_turn
+
+
+def compile_for(compiled: Callable[..., object], *arguments: object) -> None:
+    """Compile an entry for the types of arguments, or load it, without running it."""
+    if hasattr(compiled, "py_func"):
+        compiled.compile(tuple(map(numba.typeof, arguments)))  # type: ignore[attr-defined]
+
+
+def is_stored(compiled: Callable[..., object]) -> bool:
+    """Whether code of an entry is in the cache; always without a compiler, never without a cache."""
+    function = getattr(compiled, "py_func", None)
+    if function is None:
+        return True
+    home = cache_directory(Path(function.__code__.co_filename))
+    # the code, not its index, which numba writes first
+    return home is not None and any(home.glob(f"**/*.{function.__name__}-*.nbc"))
+
+
+class ByAddress:
+    """An entry that other compiled code calls by its address, without being compiled again as a part of it.
+
+    Parameters
+    ----------
+    target : callable
+        The entry.
+    returns : numba type
+        What it returns.
+
+    Attributes
+    ----------
+    call : callable
+        For compiled code: takes the address and a tuple of the arguments.
+    """
+
+    def __init__(self, target: Callable[..., object], returns: object) -> None:
+        self._target, self._returns = target, returns
+        self._has_address = AVAILABLE and not numba.config.DISABLE_JIT
+        call: Callable[..., Any]
+        call = caller(returns) if self._has_address else _called_directly(target)
+        self.call = call
+
+    def address(self, *arguments: object) -> int:
+        """Address for arguments of the types that it will be called with; compiles it if need be."""
+        return address_of(self._target, arguments, self._returns) if self._has_address else 0
+
+
+def _called_directly(target: Callable[..., object]) -> Callable[..., Any]:
+    """An entry as compiled with whoever calls it, or not compiled."""
+
+    @kernel
+    def call(_address, arguments):  # type: ignore[no-untyped-def]
+        return target(*arguments)
+
+    return call
+
+
+# Records of a structured dtype as state of compiled code, with the same access in compiled and plain Python.
+#
+# An entry takes an array of records, also for a single one, and begins with ``record = records[0]``: numba
+# identifies the type of an array in half a microsecond, that of a `numpy.record` in ten.
+
+
+Record = Any
+"""One record: ``state.speed`` reads and writes a field, ``state.speed[k]`` a value of an array field.
+
+A `numpy.record` is an object for Python and a pointer for compiled code; no Python type describes its fields.
+"""
+
+Records = NDArray[Any]
+"""Array (n,) of records: ``records["speed"]`` is a column, and in a kernel ``records[k].speed`` a value."""
+
+
+def new_records(n: int, dtype: np.dtype[Any]) -> Records:
+    """Records (n,) for an entry, all fields 0; a copy is a snapshot, ``records[:] = snapshot`` restores it.
+
+    Raises
+    ------
+    ValueError
+        For a field with the name of an attribute of numpy's records, which would hide it.
+    """
+    hidden = sorted(name for name in _names(dtype) if hasattr(np.record, name))
+    if hidden:
+        raise ValueError(f"fields {', '.join(hidden)}: numpy.record has attributes of these names")
+    # uncompiled code needs elements with attributes
+    return np.zeros(n, np.dtype((np.record, dtype)) if numba.config.DISABLE_JIT else dtype)
+
+
+def _names(dtype: np.dtype[Any]) -> Iterator[str]:
+    """Names of all fields, including those of nested records."""
+    for name, (inner, *_) in (dtype.fields or {}).items():
+        yield name
+        yield from _names(inner.base)
+
+
+def record_of(records: Records) -> Record:
+    """The only record of an array, a view, to read and write by field names.
+
+    Each access takes Python some microseconds; use `values_of` to read many fields.
+    """
+    (record,) = records.view(np.recarray)
+    return record
+
+
+def values_of(records: Records) -> dict[str, Any]:
+    """Fields of the only record of an array, as Python's own numbers."""
+    (values,) = records.tolist()
+    return dict(zip(records.dtype.names or (), values, strict=True))

@@ -1,1 +1,0 @@
-"""Normal contact laws: a file for each form of force, `laws` the list of all by name."""

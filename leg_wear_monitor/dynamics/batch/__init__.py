@@ -1,1 +1,0 @@
-"""Many clearance runs of one mechanism, in parallel."""

@@ -1,1 +1,0 @@
-"""Full coordinates: the reference formulation."""

@@ -1,1 +1,0 @@
-"""Contact force and contact events of a clearance joint, for both formulations."""

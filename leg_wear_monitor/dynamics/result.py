@@ -1,0 +1,453 @@
+"""The result of a simulation: its parts in SI units, as JSON and as tables."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import attrs
+
+from leg_wear_monitor.files import data_frame, json_text
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.shown import Drawable
+from leg_wear_monitor.wear import Surfaces
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+# Parts of a simulation's result, in SI units.
+
+
+@attrs.frozen
+class TorqueResult:
+    """Drive torque [N m] over the counted cycles.
+
+    Attributes
+    ----------
+    mean : float
+        Mean over time.
+    rms : float
+        Root of the mean square over time.
+    min : float
+        Smallest value, negative where the drive brakes.
+    max : float
+        Largest value.
+    p99 : float
+        99th percentile of the signed torque over time.
+    max_abs : float
+        Largest magnitude.
+    max_error : float
+        Largest deviation from the ideal linkage at the same crank angle.
+    """
+
+    mean: float
+    rms: float
+    min: float
+    max: float
+    p99: float
+    max_abs: float
+    max_error: float
+
+
+@attrs.frozen
+class EnergyBalance:
+    """Energy balance over the counted cycles [J].
+
+    Attributes
+    ----------
+    work_in : float
+        Work of the drive and of the loads.
+    stored : float
+        Change of kinetic and potential energy.
+    friction_loss : float
+        Energy lost in the tangential direction of the contacts.
+    contact_loss : float
+        Energy lost in the normal direction of the contacts, and in films of oil or grease.
+    wear_loss : float
+        Elastic contact energy lost with removed material: negligible at real wear rates, a thousandth of the
+        losses if clearances double within some thousand cycles.
+    residual : float
+        Work minus stored energy and losses: the integration error.
+    """
+
+    work_in: float
+    stored: float
+    friction_loss: float
+    contact_loss: float
+    wear_loss: float
+    residual: float
+
+
+@attrs.frozen
+class ToeResult:
+    """Largest deviations of the toe from the ideal linkage at the same crank angle.
+
+    Attributes
+    ----------
+    max_position_error_m : float
+        Of the position.
+    max_velocity_error_mps : float
+        Of the velocity.
+    max_acceleration_error_mps2 : float
+        Of the acceleration.
+    """
+
+    max_position_error_m: float
+    max_velocity_error_mps: float
+    max_acceleration_error_mps2: float
+
+
+@attrs.frozen
+class WearDepth:
+    """Wear depth per cycle of both surfaces of a joint [m].
+
+    Attributes
+    ----------
+    bushing_max : float
+        Of the deepest sector of the bushing.
+    bushing_mean : float
+        Mean over all sectors of the bushing.
+    journal_max : float
+        Of the deepest sector of the journal.
+    journal_mean : float
+        Mean over all sectors of the journal.
+    """
+
+    bushing_max: float
+    bushing_mean: float
+    journal_max: float
+    journal_mean: float
+
+
+@attrs.frozen
+class ClearanceResult:
+    """Radial clearance [m] at the end.
+
+    Attributes
+    ----------
+    mean : float
+        Mean around the bushing.
+    max : float
+        Largest around the bushing.
+    """
+
+    mean: float
+    max: float
+
+
+@attrs.frozen
+class JointResult:
+    """Forces in a joint; for a clearance joint also contact and wear, which are None otherwise.
+
+    Attributes
+    ----------
+    mean_force_n : float
+        Mean magnitude of the joint force [N].
+    rms_force_n : float
+        Root of its mean square [N].
+    p99_force_n : float
+        Magnitude that is not exceeded 99 % of the time [N].
+    max_force_n : float
+        Largest magnitude [N]: one sample of a heavy tail, which does not repeat.
+    contact_fraction : float or None
+        Fraction of the time in contact, 0 to 1.
+    friction_work_j_per_cycle : float or None
+        Friction work per cycle [J].
+    archard_integral_j_per_cycle : float or None
+        Integral of ``F_N |v_t| dt`` per cycle [J]; times a wear coefficient [1/Pa] it is the worn volume
+        [m³].
+    wear_depth_m_per_cycle : WearDepth or None
+        Of both surfaces.
+    wear_zone_deg : tuple of two floats or None
+        Narrowest zone (from, to) [deg] with 90 % of the bushing's wear, in the frame of the bushing's body;
+        None without wear.
+    clearance_m : ClearanceResult or None
+        Radial clearance at the end.
+    mean_pressure_pa : float or None
+        Mean force over the projected area of the bushing, its diameter times its width [Pa].
+    p99_pressure_pa : float or None
+        Pressure that is not exceeded 99 % of the time [Pa].
+    mean_sliding_speed_mps : float or None
+        Sliding speed under load: its mean weighted by the force [m/s].
+    mean_pressure_speed_pa_mps : float or None
+        Mean of pressure times sliding speed [Pa m/s].
+    outside_limits : str or None
+        What of ``p99_pressure_pa`` and the two means is beyond the limits of the joint's material, so that
+        its wear coefficient does not hold; None within the limits, and without limits.
+    holds_for : str or None
+        Material pair and regime that the wear holds for.
+    contact_half_angle_deg : float or None
+        Half angle of the contact arc under ``p99_force_n`` [deg].
+    outside_contact_law : str or None
+        Why the joint's normal law does not hold for this arc; None if it does.
+    """
+
+    mean_force_n: float
+    rms_force_n: float
+    p99_force_n: float
+    max_force_n: float
+    contact_fraction: float | None = None
+    friction_work_j_per_cycle: float | None = None
+    archard_integral_j_per_cycle: float | None = None
+    wear_depth_m_per_cycle: WearDepth | None = None
+    wear_zone_deg: tuple[float, float] | None = None
+    clearance_m: ClearanceResult | None = None
+    mean_pressure_pa: float | None = attrs.field(default=None, metadata={"unit": "Pa"})
+    p99_pressure_pa: float | None = attrs.field(default=None, metadata={"unit": "Pa"})
+    mean_sliding_speed_mps: float | None = None
+    mean_pressure_speed_pa_mps: float | None = attrs.field(default=None, metadata={"unit": "Pa m/s"})
+    outside_limits: str | None = None
+    holds_for: str | None = None
+    contact_half_angle_deg: float | None = None
+    outside_contact_law: str | None = None
+
+    @property
+    def has_clearance(self) -> bool:
+        """Whether the joint has clearance, and therefore contact and wear."""
+        return self.clearance_m is not None
+
+
+@attrs.frozen
+class Impact:
+    """One contact between journal and bushing.
+
+    Attributes
+    ----------
+    begin_s : float
+        Time since the start of the simulation [s].
+    speed_mps : float
+        Approach speed [m/s].
+    end_s : float or None
+        End of the contact; None for one that lasts beyond the end of the run.
+    peak_n : float
+        Largest normal force [N].
+    """
+
+    begin_s: float
+    speed_mps: float
+    end_s: float | None
+    peak_n: float
+
+
+@attrs.frozen(eq=False)
+class Trace:
+    """n samples at equal time steps.
+
+    Attributes
+    ----------
+    crank_angle_rad : (n,) array
+        Crank angle, continuous over the turns.
+    toe_x_m : (n,) array or None
+        Toe, to the right; None for a mechanism without a point called ``toe``.
+    toe_y_m : (n,) array or None
+        Toe, upwards.
+    drive_torque_nm : (n,) array
+        Torque of the drive on the crank.
+    force_n : dict of str to (n,) array
+        Magnitude of the force in each joint [N].
+    """
+
+    crank_angle_rad: Floats
+    toe_x_m: Floats | None
+    toe_y_m: Floats | None
+    drive_torque_nm: Floats
+    force_n: dict[str, Floats]
+
+
+# Parts of a simulation's result as JSON objects.
+
+
+JsonObject = dict[str, Any]
+
+_OF_EVERY_JOINT = ("mean_force_n", "rms_force_n", "p99_force_n", "max_force_n")
+
+
+def part_document(part: TorqueResult | EnergyBalance | ToeResult | Impact | None) -> JsonObject | None:
+    """Fields of a part; null for a part without data."""
+    return None if part is None else attrs.asdict(part)
+
+
+def joint_document(joint: JointResult) -> JsonObject:
+    """Fields of a joint; contact and wear are present for clearance joints only."""
+    record = attrs.asdict(joint)
+    return record if joint.has_clearance else {name: record[name] for name in _OF_EVERY_JOINT}
+
+
+def trace_document(trace: Trace) -> JsonObject:
+    """Columns of a trace as lists; without toe columns for a mechanism without a toe."""
+    columns = {"crank_angle_rad": trace.crank_angle_rad}
+    if trace.toe_x_m is not None and trace.toe_y_m is not None:
+        columns |= {"toe_x_m": trace.toe_x_m, "toe_y_m": trace.toe_y_m}
+    columns["drive_torque_nm"] = trace.drive_torque_nm
+    force = {name: force.tolist() for name, force in trace.force_n.items()}
+    return {name: column.tolist() for name, column in columns.items()} | {"force_n": force}
+
+
+# Tables of a simulation's result; a column's name is the path of the value, joined by dots.
+
+
+Columns = dict[str, Sequence[Any] | Floats]
+
+_PARTS = {
+    "wear_depth_m_per_cycle": tuple(field.name for field in attrs.fields(WearDepth)),
+    "wear_zone_deg": ("from", "to"),
+    "clearance_m": tuple(field.name for field in attrs.fields(ClearanceResult)),
+}
+
+
+def joint_columns(joints: Mapping[str, JointResult]) -> Columns:
+    """Columns with a row for each joint; None for contact and wear of joints without clearance."""
+    rows = [{"joint": name, **_cells(joint)} for name, joint in joints.items()]
+    return {name: [row[name] for row in rows] for name in rows[0]}
+
+
+def impact_columns(impacts: Mapping[str, Sequence[Impact]]) -> Columns:
+    """Columns with a row for each impact, joint by joint."""
+    rows = [(name, impact) for name, all_ in impacts.items() for impact in all_]
+    columns: Columns = {"joint": [name for name, _ in rows]}
+    for field in attrs.fields(Impact):
+        columns[field.name] = [getattr(impact, field.name) for _, impact in rows]
+    return columns
+
+
+def trace_columns(trace: Trace) -> Columns:
+    """Columns with a row for each sample."""
+    toe = {"toe_x_m": trace.toe_x_m, "toe_y_m": trace.toe_y_m}
+    return {
+        "crank_angle_rad": trace.crank_angle_rad,
+        **{name: column for name, column in toe.items() if column is not None},
+        "drive_torque_nm": trace.drive_torque_nm,
+        **{f"force_n.{name}": force for name, force in trace.force_n.items()},
+    }
+
+
+def _cells(joint: JointResult) -> dict[str, float | str | None]:
+    cells: dict[str, float | str | None] = {}
+    for name, value in attrs.asdict(joint, recurse=False).items():
+        if name not in _PARTS:
+            cells[name] = value
+        else:
+            values = (None,) * len(_PARTS[name]) if value is None else _values(value)
+            cells |= {f"{name}.{part}": one for part, one in zip(_PARTS[name], values, strict=True)}
+    return cells
+
+
+def _values(part: WearDepth | ClearanceResult | tuple[float, float]) -> tuple[float, ...]:
+    return part if isinstance(part, tuple) else attrs.astuple(part)
+
+
+# The result of a simulation, with its conversion to JSON and to tables.
+
+
+SCHEMA_VERSION = 1
+"""Version of the JSON schema; incremented when a field is renamed, removed or changes its meaning."""
+
+
+@attrs.frozen(eq=False)
+class SimulationResult(Drawable):
+    """Result of `simulate` over the counted cycles.
+
+    Attributes
+    ----------
+    mechanism : str
+        Name of the mechanism.
+    model : str
+        Formulation of the motion: ``clearance``, ``full`` or ``ideal``.
+    speed_rpm : float
+        Mean crank speed, negative for clockwise.
+    cycles : float
+        Number of counted gait cycles.
+    simulated_s : float
+        Simulated time [s], skipped cycles included.
+    drive_torque_nm : TorqueResult
+        Torque of the drive on the crank.
+    energy_j : EnergyBalance or None
+        Energy balance; None for an ideal leg and for a leg of a batch.
+    toe : ToeResult or None
+        Deviations of the toe; None without a point called ``toe`` or without an ideal motion to compare with.
+    joints : dict of str to JointResult
+        All joints, ideal ones included.
+    impacts : dict of str to tuple of Impact
+        The first thousand impacts of each clearance joint.
+    trace : Trace or None
+        Samples over the counted cycles; None if no trace was requested.
+    standard_error : dict of str to float, or None
+        Standard error of a value by its path, such as ``joints.A.mean_force_n``: the standard deviation
+        between gait cycles, divided by the root of their number, as if successive cycles were independent.
+        None below two whole cycles, for an ideal leg and for a leg of a batch.
+    clearance_joints : tuple of str
+        Joints with clearance, in the order of ``surfaces``.
+    surfaces : Surfaces or None
+        Worn surfaces at the end, in the order of ``clearance_joints``; None for an ideal leg.
+    """
+
+    mechanism: str
+    model: str
+    speed_rpm: float
+    cycles: float
+    simulated_s: float
+    drive_torque_nm: TorqueResult
+    energy_j: EnergyBalance | None
+    toe: ToeResult | None
+    joints: dict[str, JointResult]
+    impacts: dict[str, tuple[Impact, ...]] = attrs.Factory(dict)
+    trace: Trace | None = None
+    standard_error: dict[str, float] | None = None
+    clearance_joints: tuple[str, ...] = ()
+    surfaces: Surfaces | None = None
+
+    def to_dict(self, wall_s: float | None = None) -> dict[str, Any]:
+        """Plain object: what ``simulate --json`` writes.
+
+        Parameters
+        ----------
+        wall_s : float, optional
+            Wall-clock duration of the simulation [s]; without it, what follows from it is left out.
+        """
+        clock = {} if wall_s is None else {"wall_s": wall_s}
+        factor = {} if wall_s is None else {"real_time_factor": self.simulated_s / wall_s}
+        record = {
+            "schema_version": SCHEMA_VERSION,
+            "mechanism": self.mechanism,
+            "model": self.model,
+            "speed_rpm": self.speed_rpm,
+            "cycles": self.cycles,
+            **clock,
+            "simulated_s": self.simulated_s,
+            **factor,
+            "drive_torque_nm": part_document(self.drive_torque_nm),
+            "energy_j": part_document(self.energy_j),
+            "toe": part_document(self.toe),
+            "joints": {name: joint_document(joint) for name, joint in self.joints.items()},
+            "impacts": {name: [part_document(one) for one in all_] for name, all_ in self.impacts.items()},
+            "standard_error": self.standard_error,
+        }
+        return record if self.trace is None else {**record, "trace": trace_document(self.trace)}
+
+    def to_json(self, wall_s: float | None = None) -> str:
+        """Text of `to_dict`: what ``simulate --json`` writes.
+
+        Examples
+        --------
+        >>> import json
+        >>> import leg_wear_monitor as lw
+        >>> result = lw.simulate("four_bar", clearances=[], cycles=1)
+        >>> json.loads(result.to_json())["model"]
+        'ideal'
+        """
+        return json_text(self.to_dict(wall_s))
+
+    def to_pandas(self) -> "dict[str, pd.DataFrame]":
+        """Tables ``joints``, ``impacts`` and, if there is a trace, ``trace``; requires pandas.
+
+        Columns have the names of the fields, parts of a field after a dot: ``clearance_m.mean``.
+
+        Raises
+        ------
+        LegWearError
+            If pandas is not installed.
+        """
+        tables = {
+            "joints": data_frame(joint_columns(self.joints), index="joint"),
+            "impacts": data_frame(impact_columns(self.impacts)),
+        }
+        return tables if self.trace is None else {**tables, "trace": data_frame(trace_columns(self.trace))}

@@ -1,1 +1,0 @@
-"""Results of a simulation: classes, their computation from run statistics, JSON and tables."""

@@ -1,0 +1,258 @@
+"""Computation of a simulation's result from run statistics."""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.contact.arrays import contact_doubt, half_angle_under_load, is_winkler_form
+from leg_wear_monitor.dynamics.result import (
+    ClearanceResult,
+    EnergyBalance,
+    Impact,
+    JointResult,
+    ToeResult,
+    TorqueResult,
+    Trace,
+    WearDepth,
+)
+from leg_wear_monitor.dynamics.run import (
+    ARCHARD,
+    CONTACT,
+    DISSIPATION,
+    FORCE,
+    FORCE_SQUARED,
+    FRICTION,
+    IMPACTS,
+    POWER,
+    TORQUE,
+    TORQUE_SQUARED,
+    RunStatistics,
+    Sample,
+    Setup,
+    percentile,
+    signed_percentile,
+)
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.materials import bushing_of, regime_of
+from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.wear import BUSHING, JOURNAL, wear_zone
+
+
+def drive_torque(statistics: RunStatistics) -> TorqueResult:
+    """Drive torque over the counted time."""
+    mean, square = statistics.drive_integral[[TORQUE, TORQUE_SQUARED]] / statistics.time[0]
+    return TorqueResult(
+        mean=float(mean),
+        rms=float(np.sqrt(square)),
+        min=float(statistics.drive_range[0]),
+        max=float(statistics.drive_range[1]),
+        p99=signed_percentile(statistics.torque_time, 0.99),
+        max_abs=float(np.abs(statistics.drive_range).max()),
+        max_error=float(statistics.response[3]),
+    )
+
+
+def toe_errors(statistics: RunStatistics) -> ToeResult:
+    """Largest deviations of the toe from the ideal linkage."""
+    return ToeResult(*(float(value) for value in statistics.response[:3]))
+
+
+def energy_balance(statistics: RunStatistics, stored_before: float, stored_after: float) -> EnergyBalance:
+    """Energy balance over the counted time, from the stored energy [J] at its begin and end."""
+    work = float(statistics.drive_integral[POWER])
+    friction, contact = (float(statistics.integral[:, i].sum()) for i in (FRICTION, DISSIPATION))
+    wear = float(statistics.worn_energy[0])
+    stored = stored_after - stored_before
+    return EnergyBalance(
+        work_in=work,
+        stored=stored,
+        friction_loss=friction,
+        contact_loss=contact,
+        wear_loss=wear,
+        residual=work - stored - friction - contact - wear,
+    )
+
+
+_ADDITIVE = ("time", "integral", "drive_integral", "force_time", "torque_time", "worn_energy")
+_ONE_SAMPLE = ("max_force_n", "clearance_m", "contact_half_angle_deg", "min", "max", "max_abs", "max_error")
+
+
+class CycleScatter:
+    """Scatter of the values between gait cycles (Welford's sums), from run statistics that go on.
+
+    Parameters
+    ----------
+    setup : Setup
+    statistics : RunStatistics
+        Those of the counted time, empty.
+    stored : float, J
+        Stored energy now.
+    """
+
+    def __init__(self, setup: Setup, statistics: RunStatistics, stored: float) -> None:
+        self._setup, self._count = setup, 0
+        self._paths: tuple[str, ...] = ()
+        self._mean = self._squares = np.zeros(0)
+        self._before = self._now(statistics, stored)
+
+    def end_cycle(self, statistics: RunStatistics, stored: float) -> None:
+        """Add the gait cycle since the last call."""
+        before, self._before = self._before, self._now(statistics, stored)
+        names = {name: self._before[name] - before[name] for name in _ADDITIVE}
+        cycle, worn = statistics._replace(**names), self._before["depth"] - before["depth"]
+        parts = {
+            "drive_torque_nm": drive_torque(cycle),
+            "energy_j": energy_balance(cycle, before["stored"], stored),
+            "joints": joint_statistics(self._setup, cycle, worn, 1.0),
+        }
+        values = {path: value for name, part in parts.items() for path, value in _numbers(name, part)}
+        now = np.concatenate([list(values.values()), worn.ravel()])
+        if self._count == 0:
+            self._paths = tuple(values)
+            self._mean, self._squares = np.zeros_like(now), np.zeros_like(now)
+        self._count += 1
+        off = now - self._mean
+        self._mean = self._mean + off / self._count
+        self._squares = self._squares + off * (now - self._mean)
+
+    def standard_errors(self, cycles: float) -> dict[str, float] | None:
+        """Standard errors of the values over a number of cycles, by path; None after fewer than two cycles.
+
+        Energies are sums over the cycles, all else are means. The greatest depth is that of one sector.
+        """
+        if self._count < 2:
+            return None
+        sigma = np.sqrt(self._squares / (self._count - 1.0))
+        number = len(self._paths)
+        errors = {
+            path: float(each * (cycles if path.startswith("energy_j") else 1.0) / math.sqrt(cycles))
+            for path, each in zip(self._paths, sigma[:number], strict=True)
+        }
+        shape = self._before["depth"].shape
+        worn, scatter = self._mean[number:].reshape(shape), sigma[number:].reshape(shape)
+        for k, name in enumerate(self._setup.clearance_joints):
+            for side, surface in (("bushing", BUSHING), ("journal", JOURNAL)):
+                deepest = scatter[k, surface, worn[k, surface].argmax()]
+                path = f"joints.{name}.wear_depth_m_per_cycle.{side}_max"
+                errors[path] = float(deepest / math.sqrt(cycles))
+        return errors
+
+    def _now(self, statistics: RunStatistics, stored: float) -> dict[str, Any]:
+        sums = {name: getattr(statistics, name).copy() for name in _ADDITIVE}
+        return {**sums, "depth": self._setup.surfaces.depth.copy(), "stored": stored}
+
+
+def _numbers(path: str, part: Any) -> Iterator[tuple[str, float]]:
+    """Numbers in a part of a result that add up over cycles, with their paths."""
+    if isinstance(part, float):
+        yield path, part
+    elif isinstance(part, dict) or attrs.has(type(part)):
+        fields = part if isinstance(part, dict) else attrs.asdict(part, recurse=False)
+        for name, value in fields.items():
+            if name not in _ONE_SAMPLE:
+                yield from _numbers(f"{path}.{name}", value)
+
+
+def joint_statistics(
+    setup: Setup, statistics: RunStatistics, worn: Floats, cycles: float
+) -> dict[str, JointResult]:
+    """Results of all joints by name; ``worn`` (k, 2, N) [m] is the wear depth of the counted cycles."""
+    return {
+        name: _joint(setup, statistics, joint, worn, cycles)
+        for joint, name in enumerate(setup.linkage.mechanism.joints)
+    }
+
+
+def _joint(setup: Setup, statistics: RunStatistics, joint: int, worn: Floats, cycles: float) -> JointResult:
+    mean, square, contact = statistics.integral[joint, [FORCE, FORCE_SQUARED, CONTACT]] / statistics.time[0]
+    forces = JointResult(
+        mean_force_n=float(mean),
+        rms_force_n=float(np.sqrt(square)),
+        p99_force_n=percentile(statistics.force_time[joint], 0.99),
+        max_force_n=float(statistics.peak[joint]),
+    )
+    name = list(setup.linkage.mechanism.joints)[joint]
+    if name not in setup.clearance_joints:
+        return forces
+    k = setup.clearance_joints.index(name)
+    return attrs.evolve(
+        _loaded(forces, setup, k, float(statistics.integral[joint, ARCHARD] / statistics.time[0])),
+        contact_fraction=float(contact),
+        friction_work_j_per_cycle=float(statistics.integral[joint, FRICTION] / cycles),
+        archard_integral_j_per_cycle=float(statistics.integral[joint, ARCHARD] / cycles),
+        wear_depth_m_per_cycle=WearDepth(
+            bushing_max=float(worn[k, BUSHING].max() / cycles),
+            bushing_mean=float(worn[k, BUSHING].mean() / cycles),
+            journal_max=float(worn[k, JOURNAL].max() / cycles),
+            journal_mean=float(worn[k, JOURNAL].mean() / cycles),
+        ),
+        wear_zone_deg=wear_zone(worn[k, BUSHING]),
+        clearance_m=_clearance(setup, k),
+    )
+
+
+def _loaded(forces: JointResult, setup: Setup, k: int, rubbing_w: float) -> JointResult:
+    """Pressure and sliding speed of clearance joint k; ``rubbing_w`` is the mean of F_N |v_t| [W]."""
+    load = bushing_of(setup.linkage.mechanism, setup.clearance_joints[k]).load(
+        forces.mean_force_n, forces.p99_force_n, rubbing_w
+    )
+    psi, doubt = _contact(setup, k, forces.p99_force_n)
+    return attrs.evolve(
+        forces,
+        mean_pressure_pa=load.mean_pressure_pa,
+        p99_pressure_pa=load.p99_pressure_pa,
+        mean_sliding_speed_mps=load.mean_sliding_speed_mps,
+        mean_pressure_speed_pa_mps=load.mean_pressure_speed_pa_mps,
+        outside_limits=load.outside_limits,
+        holds_for=regime_of(setup.linkage.mechanism.clearances[setup.clearance_joints[k]]),
+        contact_half_angle_deg=math.degrees(psi),
+        outside_contact_law=doubt,
+    )
+
+
+def _contact(setup: Setup, k: int, force_n: float) -> tuple[float, str | None]:
+    """Half angle [rad] of clearance joint k's contact arc under a force, and why its law does not hold."""
+    contacts = setup.contacts
+    modulus, width, clearance, radius = (
+        float(values[k])
+        for values in (contacts.modulus, contacts.width, contacts.clearance, contacts.bushing_radius)
+    )
+    psi = half_angle_under_load(force_n, modulus, width, clearance)
+    return psi, contact_doubt(psi, force_n, radius, is_winkler_form(int(contacts.normal_form[k])))
+
+
+def _clearance(setup: Setup, k: int) -> ClearanceResult:
+    opened = setup.surfaces.depth[k].sum(axis=0) if setup.surfaces.feeds_back else np.zeros(1)
+    clearance = float(setup.contacts.clearance[k])
+    return ClearanceResult(clearance + float(opened.mean()), clearance + float(opened.max()))
+
+
+def first_impacts(setup: Setup, statistics: RunStatistics) -> dict[str, tuple[Impact, ...]]:
+    """The first thousand impacts of each clearance joint."""
+    names = list(setup.linkage.mechanism.joints)
+    result = {}
+    for name in setup.clearance_joints:
+        joint = names.index(name)
+        rows = statistics.impact[joint, : min(IMPACTS, int(statistics.impacts[joint]))]
+        result[name] = tuple(
+            Impact(float(begin), float(speed), None if np.isnan(end) else float(end), float(peak))
+            for begin, speed, end, peak in rows
+        )
+    return result
+
+
+def trace_of(setup: Setup, samples: list[Sample]) -> Trace:
+    """Trace from samples; the crank angle is continuous and starts in [0, 2 pi)."""
+    angles = np.array([sample.crank_angle for sample in samples])
+    forces = np.array([sample.force for sample in samples])
+    toe = None if samples[0].toe is None else np.array([sample.toe for sample in samples])
+    return Trace(
+        crank_angle_rad=angles - TURN * np.floor(angles[0] / TURN + 1.0e-9),
+        toe_x_m=None if toe is None else toe[:, 0],
+        toe_y_m=None if toe is None else toe[:, 1],
+        drive_torque_nm=np.array([sample.drive_torque for sample in samples]),
+        force_n={name: forces[:, i] for i, name in enumerate(setup.linkage.mechanism.joints)},
+    )

@@ -1,1 +1,0 @@
-"""Fit of a drive torque with that of the ideal leg: shared by commissioning and the monitor."""

@@ -1,0 +1,204 @@
+"""Files that are written whole or not at all, JSON, data frames, and where the files of the package lie."""
+
+import fcntl
+import glob
+import json
+import math
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+from leg_wear_monitor.errors import ConfigError, LegWearError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+# Files that are written whole or not at all.
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file and bring it to the disk; nobody ever sees a part of it.
+
+    Several processes may write the same file at the same time: one waits for the other, and the last one
+    counts. What a kill leaves is used by the next write.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        On a file system with locks; its directory is made if it does not exist. A symbolic link stays, and
+        the file that it leads to is written.
+    content : bytes
+
+    Raises
+    ------
+    ConfigError
+        If the disk does not take it; the file is then as it was.
+    """
+    target = path.resolve()
+    part = target.with_name(f".{target.name}.part")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with _alone(part) as file:
+            try:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+                os.replace(part, target)
+            except BaseException:
+                with suppress(OSError):  # the first fault is the one to report
+                    part.unlink()
+                raise
+    except OSError as error:
+        raise ConfigError(str(path), "", f"cannot be written: {error.strerror}") from error
+
+
+@contextmanager
+def unfinished(path: Path) -> Iterator[Path]:
+    """A new file beside ``path`` to write into; it is removed at the end, unless it was put in its place.
+
+    Those of processes that were killed are removed at the begin.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        In a directory that exists, on a file system with locks.
+
+    Raises
+    ------
+    OSError
+        If the disk does not take it.
+    """
+    remove_parts(path.parent, f"{glob.escape(path.name)}.[0-9]*")
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    with _alone(part):
+        try:
+            yield part
+        finally:
+            part.unlink(missing_ok=True)
+
+
+def remove_parts(directory: Path, names: str) -> None:
+    """Remove parts of files that killed processes left in a directory.
+
+    Parameters
+    ----------
+    directory : pathlib.Path
+        It may not exist.
+    names : str
+        Pattern of the names of the files.
+    """
+    for part in directory.glob(f".{names}.part"):
+        with suppress(OSError):  # a process writes it, or it may not be removed: it harms nobody
+            if part.is_file() and not part.is_symlink():
+                with part.open("r+b") as file:
+                    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    part.unlink()
+
+
+@contextmanager
+def _alone(part: Path) -> Iterator[BinaryIO]:
+    """An empty file with this name, which no other process writes meanwhile."""
+    while True:
+        with part.open("ab") as file:
+            fcntl.flock(file, fcntl.LOCK_EX)
+            if not _is_at(part, file):  # who had it before has put it in its place
+                continue
+            file.truncate(0)
+            yield file
+            return
+
+
+def _is_at(path: Path, file: BinaryIO) -> bool:
+    try:
+        return os.path.samestat(path.stat(), os.fstat(file.fileno()))
+    except FileNotFoundError:
+        return False
+
+
+# JSON as files and standard output hold it, and numbers that are not known, which it has not.
+
+
+def json_text(value: Any) -> str:
+    """JSON of a plain value, indented, with a newline at its end.
+
+    Raises
+    ------
+    ValueError
+        For a number that JSON has not: NaN or infinite.
+    """
+    return json.dumps(value, indent=1, allow_nan=False) + "\n"
+
+
+def finite_or_none(value: float | None) -> float | None:
+    """A number for JSON or a table, None where it is NaN or infinite."""
+    return None if value is None or not math.isfinite(value) else float(value)
+
+
+def or_nan(value: float | None) -> float:
+    """A number out of JSON or a table, NaN for None."""
+    return math.nan if value is None else value
+
+
+# Where the files that come with the package are: config/, launch/, bags/.
+
+
+class ShareNotFoundError(LegWearError):
+    """The package was copied somewhere without its share/ directory."""
+
+
+def share_directory() -> Path:
+    """Directory that contains config/, in every form of installation.
+
+    A checkout is its own share directory; an editable install and ``colcon build --symlink-install`` lead
+    back to it. Otherwise pip and colcon put ``share/leg_wear_monitor`` into the prefix whose
+    ``lib/python3.x/site-packages`` holds this file, so it is met on the way up: no ROS and no environment
+    variable is needed.
+
+    Returns
+    -------
+    pathlib.Path
+        The checkout, or ``<prefix>/share/leg_wear_monitor``.
+
+    Raises
+    ------
+    ShareNotFoundError
+        If neither is there.
+    """
+    package = Path(__file__).resolve().parent
+    if (package.parent / "package.xml").is_file():
+        return package.parent
+    for prefix in package.parents:
+        share = prefix / "share" / package.name
+        if (share / "config").is_dir():
+            return share
+    raise ShareNotFoundError(
+        f"{package}: no share/{package.name}/config in a directory above; install with pip or colcon"
+    )
+
+
+# Tables as pandas has them; pandas is wanted only by whoever asks for one.
+
+
+def data_frame(columns: Mapping[str, Any], index: str | list[str] | None = None) -> "pd.DataFrame":
+    """Columns of equal length as a data frame.
+
+    Parameters
+    ----------
+    columns : mapping of str to sequence
+    index : str or list of str, optional
+        Columns that name the rows.
+
+    Raises
+    ------
+    LegWearError
+        If pandas is not installed.
+    """
+    try:
+        import pandas as pd
+    except ModuleNotFoundError as error:
+        raise LegWearError("tables need pandas, which is not installed; pip install pandas") from error
+    frame = pd.DataFrame(dict(columns))
+    return frame if index is None else frame.set_index(index)

@@ -1,0 +1,519 @@
+"""The recordings of a leg: found, queued, counted, and what is kept of each."""
+
+import hashlib
+import math
+from collections.abc import Iterable, Mapping
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from leg_wear_monitor.bags.bag import find_files
+from leg_wear_monitor.bags.findings import RecordingError
+from leg_wear_monitor.bags.reader import Recording
+from leg_wear_monitor.errors import LegWearError, printable
+from leg_wear_monitor.files import write_whole
+from leg_wear_monitor.fleet.description import FleetLeg
+from leg_wear_monitor.fleet.directory import LegDirectory, Line, cycle_columns, locked, write_parquet
+from leg_wear_monitor.monitor.forecast.forecast import ForecastBasis
+from leg_wear_monitor.monitor.reports import Lost
+from leg_wear_monitor.monitor.verdict.verdict import Verdict
+from leg_wear_monitor.playback.replay import replay
+from leg_wear_monitor.playback.result import JointClearance, LifeHours, part_document
+from leg_wear_monitor.playback.summary import ReplayResult, clearances, life
+from leg_wear_monitor.workers import Job, package_digest
+
+# What is kept of one recording of a leg.
+
+
+_MOST_FINDINGS = 20
+
+
+class Outcome(Enum):
+    """What became of a recording."""
+
+    COUNTED = "counted"
+    ALREADY_COUNTED = "already_counted"
+    """All of its time was in the ledger, from other recordings."""
+    NO_GAIT = "no_gait"
+    """No gait cycle in it fits the leg; nothing is counted."""
+    UNREADABLE = "unreadable"
+    """Nothing in it can be read; nothing is counted."""
+
+    @property
+    def is_final(self) -> bool:
+        """Whether other settings of the leg would change nothing."""
+        return self in (Outcome.COUNTED, Outcome.ALREADY_COUNTED)
+
+
+@attrs.frozen(kw_only=True)
+class RecordingRecord:
+    """One recording of a leg.
+
+    Attributes
+    ----------
+    key : str
+        Digest of its content.
+    file : str
+        Its name when it was counted.
+    outcome : Outcome
+    settings : str
+        Digest of the leg's settings; what was not counted is tried again with others.
+    begin_ns, end_ns : int
+        First and last stamp [ns]; 0 if there are none.
+    duration_s : float
+        Time between them [s].
+    cycles : int
+        Gait cycles that were counted from it.
+    is_partial : bool
+        Whether recorded data are lost or may be wrong.
+    is_late : bool
+        Whether a later recording had been counted before it.
+    findings : tuple of str
+        Faults and remarks; the first twenty.
+    lost : Lost or None
+        Samples and time that were not used; None if nothing was replayed.
+    verdict : Verdict or None
+        Verdict at its end; None unless it was counted, like the next two.
+    clearances : dict of str to JointClearance
+    life : dict of str to LifeHours or None
+        Remaining life of each joint, and of the ``leg``.
+    basis : ForecastBasis or None
+        What the forecast rests on; None without one.
+    knows : str
+        Digest of the measurements and priors in it; with others, the forecast is made again.
+    """
+
+    key: str
+    file: str
+    outcome: Outcome
+    settings: str
+    begin_ns: int = 0
+    end_ns: int = 0
+    duration_s: float = 0.0
+    cycles: int = 0
+    is_partial: bool = False
+    is_late: bool = False
+    findings: tuple[str, ...] = ()
+    lost: Lost | None = None
+    verdict: Verdict | None = None
+    clearances: dict[str, JointClearance] = attrs.Factory(dict)
+    life: dict[str, LifeHours | None] = attrs.Factory(dict)
+    basis: ForecastBasis | None = None
+    knows: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain object, as its line in the file has it."""
+        return dict(part_document(self))
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether nothing of it is lost."""
+        return not self.is_partial and self.outcome.is_final
+
+
+def unreadable(key: str, file: str, settings: str, fault: str) -> RecordingRecord:
+    """Record of a recording that cannot be read."""
+    return RecordingRecord(
+        key=key,
+        file=file,
+        settings=settings,
+        outcome=Outcome.UNREADABLE,
+        is_partial=True,
+        findings=(printable(fault),),
+    )
+
+
+def record_of(
+    result: "ReplayResult", *, key: str, file: str, settings: str, is_late: bool, knows: str = ""
+) -> RecordingRecord:
+    """Record of a replay; `ReplayResult.findings` must be complete."""
+    texts = [printable(one.text) for one in result.findings]
+    about: dict[str, Any] = {
+        "key": key,
+        "file": file,
+        "settings": settings,
+        "begin_ns": result.begin_ns,
+        "end_ns": result.end_ns,
+        "duration_s": result.duration_s,
+        "is_partial": result.is_partial,
+        "is_late": is_late,
+        "lost": result.monitor.lost,
+    }
+    if result.is_unusable:
+        texts.insert(0, f"no gait cycle fits this leg: {printable(result.evidence.missing())}")
+        return RecordingRecord(outcome=Outcome.NO_GAIT, findings=tuple(texts[:_MOST_FINDINGS]), **about)
+    if result.monitor.is_all_counted:
+        texts.insert(
+            0, "all of its time is that of recordings before it; if it is another walk, its clock is wrong"
+        )
+        return RecordingRecord(
+            outcome=Outcome.ALREADY_COUNTED, findings=tuple(texts[:_MOST_FINDINGS]), **about
+        )
+    verdict, basis = result.monitor.verdict.verdict, result.monitor.forecast_basis
+    return RecordingRecord(
+        outcome=Outcome.COUNTED,
+        cycles=len(result.history),
+        findings=tuple(texts[:_MOST_FINDINGS]),
+        verdict=verdict,
+        clearances=clearances(result),
+        life=life(result, verdict),
+        basis=basis if basis and math.isfinite(basis.cycle_s) else None,
+        knows=knows,
+        **about,
+    )
+
+
+# Finds the recordings of a leg: what they contain tells them apart, not their names.
+
+
+_KEY_DIGITS = 20
+
+
+@attrs.frozen
+class Found:
+    """A recording of a leg.
+
+    Attributes
+    ----------
+    path : pathlib.Path
+    size : int
+        Bytes of its files.
+    changed_ns : int
+        Time of the last change of its files.
+    key : str
+        Digest of the content of its files.
+    begin_ns : int
+        First stamp in it [ns]; 0 if it cannot be read.
+    fault : str
+        Why it cannot be read; empty if it can.
+    """
+
+    path: Path
+    size: int
+    changed_ns: int
+    key: str
+    begin_ns: int = 0
+    fault: str = ""
+
+
+def files_of(path: Path) -> list[Path]:
+    """Files of a recording.
+
+    Raises
+    ------
+    RecordingError
+        If it is none.
+    """
+    return [file.path for file in find_files([path])[0]]
+
+
+def state_of(path: Path) -> tuple[int, int]:
+    """Bytes of a recording's files, and the time of their last change [ns]; zeros if there are none."""
+    try:
+        states = [file.stat() for file in files_of(path)]
+    except (RecordingError, OSError):
+        return 0, 0
+    return sum(each.st_size for each in states), max(each.st_mtime_ns for each in states)
+
+
+def known(path: Path, files: Mapping[str, Any]) -> Found | None:
+    """A recording as the index of a leg has it; None if it is not there, or was changed since."""
+    entry = files.get(str(path))
+    if entry is None or (entry["size"], entry["changed_ns"]) != state_of(path):
+        return None
+    return Found(path, **entry)
+
+
+def look(path: Path, leg: FleetLeg) -> Found:
+    """Read what identifies a recording: all of its bytes, and its first stamp."""
+    size, changed_ns = state_of(path)
+    try:
+        files = files_of(path)
+        key = _digest(files)
+    except (RecordingError, OSError) as error:
+        why = error.strerror if isinstance(error, OSError) else error.fault
+        return Found(path, size, changed_ns, _text_key(str(path)), fault=f"cannot be read: {why}")
+    begin_ns, fault = begin_of(path, leg)
+    return Found(path, size, changed_ns, key, begin_ns, fault)
+
+
+def begin_of(path: Path, leg: FleetLeg) -> tuple[int, str]:
+    """First valid stamp in a recording [ns], 0 if there is none; why it cannot be read, empty if it can."""
+    try:
+        return _first_stamp_ns(path, leg), ""
+    except RecordingError as error:
+        return 0, ": ".join(filter(None, (error.key, error.fault)))
+
+
+def entry_of(found: Found) -> dict[str, Any]:
+    """A recording for the index of its leg."""
+    return attrs.asdict(found, filter=lambda attribute, _: attribute.name != "path")
+
+
+def _first_stamp_ns(path: Path, leg: FleetLeg) -> int:
+    """First valid stamp; 0 if there is none."""
+    topics = {"joint_states": leg.joint_states, "drive_torque": leg.drive_torque}
+    with Recording([path], leg.config, **topics) as recording:  # type: ignore[arg-type]
+        for block in recording.blocks():
+            stamps = block.samples["stamp_ns"][block.samples["fault"] == 0]
+            if len(stamps):
+                return int(stamps[0])
+    return 0
+
+
+def _digest(files: list[Path]) -> str:
+    """Digest of the content of files, in their order."""
+    total = hashlib.sha256()
+    for path in files:
+        with path.open("rb") as file:
+            total.update(hashlib.file_digest(file, "sha256").digest())
+    return total.hexdigest()[:_KEY_DIGITS]
+
+
+def _text_key(text: str) -> str:
+    return hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()[:_KEY_DIGITS]
+
+
+def scan(leg: FleetLeg, files: Mapping[str, Any]) -> list[Found]:
+    """All recordings of a leg; read are those that its index does not have as they are now.
+
+    Parameters
+    ----------
+    leg : FleetLeg
+    files : mapping
+        The index, `LegDirectory.files`.
+    """
+    return [known(path, files) or look(path, leg) for path in leg.recordings]
+
+
+# The line of a recording in a leg's log.
+
+
+def words_of(line: Line) -> str:
+    """What became of a recording, on one line."""
+    parts = [line["file"] + ": " + line["outcome"].replace("_", " ")]
+    if line["outcome"] == Outcome.COUNTED.value:
+        verdict = line["verdict"]
+        parts[0] += f", {line['cycles']} gait cycles, verdict {verdict['state'].replace('_', ' ')}"
+        parts[0] += f" ({verdict['fault_code']})"
+    if line["is_late"]:
+        parts.append("a later recording was counted before it")
+    if line["is_partial"]:
+        parts.append("parts of it are lost")
+    return "; ".join([*parts, *line["findings"]])
+
+
+# Counts one recording of a leg: its wear into the ledger, its gait cycles into a table, what was found.
+
+
+def count_or_fault(leg: FleetLeg, out: Path, found: Found, last_ns: int, code: str) -> Line | str:
+    """Record of a recording, or why the leg cannot go on; see `count_recording`.
+
+    ``code`` is the `package_digest` of who asks.
+    """
+    if package_digest() != code:
+        return "a worker has another version of leg_wear_monitor; install the same one everywhere"
+    try:
+        return count_recording(leg, out, found, last_ns)
+    except LegWearError as error:
+        return str(error)
+
+
+def count_recording(leg: FleetLeg, out: Path, found: Found, last_ns: int) -> Line:
+    """Count a recording, so that a kill at any instant costs nothing but time.
+
+    Its table and its record are written before its wear is in the ledger, the record as pending. If the
+    process is killed after that, the next replay finds all of it in the ledger, and the pending record holds;
+    if before, it is counted again, and replaces both. A worker of a killed update may go on for some seconds:
+    it is waited for, and what it has counted is not counted again.
+
+    Parameters
+    ----------
+    leg : FleetLeg
+    out : pathlib.Path
+        Directory of the fleet.
+    found : Found
+    last_ns : int
+        Last stamp that was counted before [ns].
+
+    Returns
+    -------
+    dict
+        Its record, a plain object.
+
+    Raises
+    ------
+    ConfigError, LedgerError
+        If the leg's parameters or its ledger are unusable.
+    """
+    directory = LegDirectory(out, leg.id)
+    with locked(directory.path, waits=True):
+        done = next((line for line in directory.lines() if _is_done(line, found)), None)
+        return done or _counted(leg, directory, found, last_ns)
+
+
+def _is_done(line: Line, found: Found) -> bool:
+    return line["key"] == found.key and Outcome(line["outcome"]).is_final
+
+
+def _counted(leg: FleetLeg, directory: LegDirectory, found: Found, last_ns: int) -> Line:
+    """Count a recording into a leg that is locked."""
+    try:
+        if found.fault:
+            raise RecordingError("", "", found.fault)
+        line = _replayed(leg, directory, found, last_ns)
+    except RecordingError as error:
+        fault = ": ".join(filter(None, (error.key, error.fault)))
+        line = unreadable(found.key, leg.shown(found.path), leg.settings, fault).to_dict()
+    directory.add(line, words_of(line))
+    return line
+
+
+def _replayed(leg: FleetLeg, directory: LegDirectory, found: Found, last_ns: int) -> Line:
+    """Replay a recording into the ledger; its record."""
+    pending, lines = directory.pending(), []
+    knows = directory.knowledge()
+    about = {"key": found.key, "file": leg.shown(found.path), "settings": leg.settings}
+
+    def finish(result: ReplayResult) -> None:
+        record = record_of(result, **about, is_late=found.begin_ns < last_ns, knows=knows)
+        lines.append(record.to_dict())
+        if record.outcome is Outcome.COUNTED:
+            write_parquet(directory.table(found.key), cycle_columns(result, leg.row))
+            write_whole(directory.summary, result.summary().to_json().encode())
+            directory.expect(lines[0])
+
+    replay(
+        found.path,
+        leg.used_config,
+        ledger=directory.ledger,
+        node=leg.node,
+        joint_states=leg.joint_states,
+        drive_torque=leg.drive_torque,
+        sample=leg.sample,
+        finish=finish,
+    )
+    (line,) = lines
+    is_done = line["outcome"] == Outcome.ALREADY_COUNTED.value
+    return pending if is_done and pending and pending["key"] == found.key else line
+
+
+# The recordings of a leg that are to be counted, and the state of the work on them.
+
+
+@attrs.define(eq=False)
+class Chain:
+    """A leg in an update.
+
+    Attributes
+    ----------
+    leg : FleetLeg
+    out : pathlib.Path
+        Directory of the fleet.
+    waiting : list of Found
+        Recordings that are to be counted, the next one last.
+    found : list of Found
+        All of its recordings, in the order of time.
+    new : list of dict
+        Records of this update.
+    copies : list of str
+        Lines about copies that were not known before.
+    refused : list of str
+        Recordings that are not counted because another leg has them.
+    is_renewed : bool
+        Whether its forecast was made again, because something was measured.
+    fault : str
+        Why the leg could not go on; empty if it could.
+    """
+
+    leg: FleetLeg
+    out: Path
+    waiting: list[Found] = attrs.Factory(list)
+    found: list[Found] = attrs.Factory(list)
+    new: list[Line] = attrs.Factory(list)
+    copies: list[str] = attrs.Factory(list)
+    refused: list[str] = attrs.Factory(list)
+    is_renewed: bool = False
+    fault: str = ""
+    _settled: set[str] = attrs.Factory(set)
+    _pending: str = ""
+    _last_ns: int = 0
+
+    @property
+    def directory(self) -> LegDirectory:
+        """Files of the leg."""
+        return LegDirectory(self.out, self.leg.id)
+
+    @property
+    def waiting_bytes(self) -> int:
+        """Bytes of the recordings that are to be counted."""
+        return sum(each.size for each in self.waiting)
+
+    def begin(self) -> Job | None:
+        """Read what is known of the leg; the job that reads unknown recordings, None if there are none."""
+        lines = list(self.directory.lines())
+        self.directory.remove_parts()
+        if any(line["outcome"] == "counted" for line in lines) and not self.directory.ledger.exists():
+            self.fault = f"{self.directory.ledger} is missing: put a copy of it back"
+            return None
+        for line in lines:
+            if Outcome(line["outcome"]).is_final or line["settings"] == self.leg.settings:
+                self._settled.add(line["key"])
+            self._last_ns = max(self._last_ns, line["end_ns"])
+        pending = self.directory.pending()
+        if pending and pending["key"] in self._settled:
+            self.directory.forget_pending()
+        elif pending:
+            self._pending = pending["key"]
+        files = self.directory.files()
+        found = [known(path, files) for path in self.leg.recordings]
+        self.found = [each for each in found if each is not None]
+        if len(self.found) == len(found):
+            return None
+        return Job(f"scan-{self.leg.id}", scan, (self.leg, files), float(len(found) - len(self.found)))
+
+    def take(self, found: Iterable[Found]) -> None:
+        """Take the recordings that were read; what of them can be read is known from now on."""
+        before = {each.path for each in self.found}
+        self.found = list(found)
+        first: dict[str, Found] = {}
+        for each in sorted(self.found, key=lambda one: (one.path not in before, str(one.path))):
+            if first.setdefault(each.key, each) is not each and each.path not in before:
+                original = self.leg.shown(first[each.key].path)
+                self.copies.append(f"{self.leg.shown(each.path)}: is a copy of {original}, counted once")
+        self.directory.note(self.copies)  # before they are known: a kill in between must not lose a line
+        self.directory.keep_files({str(each.path): entry_of(each) for each in self.found if each.size})
+
+    def plan(self) -> None:
+        """Queue what is not counted yet: what is pending, then in the order of time, each content once."""
+        self.found.sort(key=lambda each: (each.key != self._pending, each.begin_ns, each.key, str(each.path)))
+        queue: dict[str, Found] = {}
+        for each in self.found:
+            if each.key not in self._settled and not self.fault:
+                queue.setdefault(each.key, each)
+        self.waiting = list(reversed(queue.values()))
+
+    def refuse(self, key: str, why: str) -> None:
+        """Do not count a recording in this update."""
+        self.refused += [f"{self.leg.shown(each.path)}: {why}" for each in self.waiting if each.key == key]
+        self.waiting = [each for each in self.waiting if each.key != key]
+
+    def next_job(self) -> Job | None:
+        """The job that counts the next recording; None if the leg is up to date or cannot go on."""
+        if not self.waiting or self.fault:
+            return None
+        found = self.waiting[-1]
+        leg = attrs.evolve(self.leg, recordings=())
+        arguments = (leg, self.out, found, self._last_ns, package_digest())
+        return Job(f"count-{leg.id}-{found.key}", count_or_fault, arguments, float(self.waiting_bytes))
+
+    def done(self, result: Line | str) -> None:
+        """Take the result of `next_job`."""
+        if isinstance(result, str):
+            self.fault = result
+            return
+        self.waiting.pop()
+        self.new.append(result)
+        self._last_ns = max(self._last_ns, result["end_ns"])

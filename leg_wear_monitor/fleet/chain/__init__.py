@@ -1,1 +1,0 @@
-"""One leg: its recordings, in the order of time, through its ledger."""

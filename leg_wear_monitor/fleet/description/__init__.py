@@ -1,1 +1,0 @@
-"""The description of a fleet, fleet.yaml."""

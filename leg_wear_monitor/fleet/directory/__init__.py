@@ -1,1 +1,0 @@
-"""The directory that a fleet is kept in."""

@@ -1,1 +1,0 @@
-"""Wear coefficients learned across legs: from measured clearances to the priors of lots and parts."""

@@ -1,1 +1,0 @@
-"""The fleet at a glance: what its page is made of."""

@@ -1,1 +1,0 @@
-"""Drives by name: their lag, bandwidth, friction and stiffness, with sources."""

@@ -1,0 +1,439 @@
+"""Material pairs of bushing and journal: their files, those of joints, load p, v and p v, rating life."""
+
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from leg_wear_monitor.configuration import described
+from leg_wear_monitor.configuration.strict import Library
+from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.mechanism.sourced import SourcedValue, WearCoefficient, sourced
+from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
+from leg_wear_monitor.shown import Shown
+
+# Types of a material file: one pair of bushing and journal, with its lubricant.
+
+
+@attrs.frozen(kw_only=True)
+class Side:
+    """One of the two bodies in contact."""
+
+    material: str = described("what it is made of")
+    youngs_modulus: SourcedValue | None = sourced("pressure", "Young's modulus")
+    poissons_ratio: SourcedValue | None = sourced("number", "Poisson's ratio")
+    wear_coefficient: WearCoefficient | None = sourced("wear coefficient", "its own wear")
+    roughness: SourcedValue | None = sourced("roughness", "Ra that the source asks for")
+    is_counted: bool = described(
+        "whether its own wear counts; false: the source measures the wear of the other body only",
+        default=True,
+    )
+
+    @property
+    def wear_si(self) -> float | None:
+        """Its wear coefficient [1/Pa]; 0 if its wear is not counted, None if it is not known."""
+        if self.wear_coefficient is not None:
+            return self.wear_coefficient.si
+        return None if self.is_counted else 0.0
+
+
+@attrs.frozen(kw_only=True)
+class Limits:
+    """Limits of a pair, beyond which its coefficient does not hold."""
+
+    static_pressure: SourcedValue | None = sourced("pressure", "largest pressure at rest")
+    dynamic_pressure: SourcedValue | None = sourced("pressure", "largest pressure while sliding")
+    sliding_speed: SourcedValue | None = sourced("speed", "largest sliding speed")
+    oscillating_speed: SourcedValue | None = sourced(
+        "speed", "largest sliding speed of a joint that swings; without it, that of any"
+    )
+    pressure_speed: SourcedValue | None = sourced("pressure times speed", "largest pressure times speed")
+    lowest_temperature: SourcedValue | None = sourced("temperature", "lowest temperature")
+    highest_temperature: SourcedValue | None = sourced("temperature", "highest temperature")
+
+
+@attrs.frozen(kw_only=True)
+class RatingLife:
+    """Constants of the maker's formula of the life of a bushing."""
+
+    constant: SourcedValue = sourced("number", "K_M, for p in N/mm^2, v in m/s and a life in h")
+    exponent: SourcedValue = sourced("number", "n of (p v)^n")
+    least_pressure_speed: SourcedValue = sourced("pressure times speed", "least p v to insert")
+    largest_pressure_speed: SourcedValue | None = sourced(
+        "pressure times speed", "largest p v for which these constants hold"
+    )
+
+
+@attrs.frozen(kw_only=True)
+class Material(Shown):
+    """A pair of bushing and journal with its lubricant."""
+
+    name: str = described("name, as the file's")
+    title: str = described("the pair, in words")
+    bushing: Side = described("the bushing, a mapping of the keys below")
+    journal: Side = described("the journal, a mapping of the keys below")
+    lubricant: str = described("none, grease or oil, and which")
+    regime: str = described("regime of wear that the numbers hold for")
+    friction: SourcedValue | None = sourced("number", "friction coefficient")
+    limits: Limits = described("limits, a mapping of the keys below", factory=Limits)
+    rating_life: RatingLife | None = described("constants of the maker's formula of life", default=None)
+    notes: str = described("what else a user must know", default="")
+
+    @property
+    def wear_coefficients(self) -> tuple[float, float] | None:
+        """Wear coefficients of bushing and journal [1/Pa]; None unless both are known or not counted."""
+        bushing, journal = self.bushing.wear_si, self.journal.wear_si
+        return None if bushing is None or journal is None else (bushing, journal)
+
+    def values(self) -> Iterator[tuple[str, SourcedValue]]:
+        """Every number with its dotted key."""
+        yield from _values(self, "")
+
+    def to_dict(self) -> dict[str, Any]:
+        """The keys of the file, and the SI value of each number as ``si``; absent ones are null."""
+        document: dict[str, Any] = _document(self)
+        return document
+
+
+def _values(part: Any, path: str) -> Iterator[tuple[str, SourcedValue]]:
+    for field in attrs.fields(type(part)):
+        value, key = getattr(part, field.name), f"{path}{field.name}"
+        if isinstance(value, SourcedValue):
+            yield key, value
+        if attrs.has(type(value)):
+            yield from _values(value, f"{key}.")
+
+
+def _document(part: Any) -> Any:
+    if not attrs.has(type(part)):
+        return list(part) if isinstance(part, tuple) else part
+    record = {field.name: _document(getattr(part, field.name)) for field in attrs.fields(type(part))}
+    return record | {"si": part.si} if isinstance(part, SourcedValue) else record
+
+
+# Reading of material files.
+
+
+_LIBRARY = Library("materials", "material", Material)
+
+
+def materials() -> dict[str, Path]:
+    """Files of the material pairs that come with the package, by name.
+
+    Examples
+    --------
+    >>> import leg_wear_monitor as lw
+    >>> "du-on-steel-dry" in lw.materials()
+    True
+    """
+    return _LIBRARY.files()
+
+
+def load_material(name_or_path: str | Path) -> Material:
+    """Read a material pair from YAML.
+
+    Parameters
+    ----------
+    name_or_path : str or pathlib.Path
+        Name of a pair that comes with the package, or a path: anything with a suffix or a directory.
+
+    Returns
+    -------
+    Material
+
+    Raises
+    ------
+    ConfigError
+        Names file, key, value and what was expected.
+
+    Examples
+    --------
+    >>> import leg_wear_monitor as lw
+    >>> lw.load_material("steel-on-steel-greased-mild").wear_coefficients  # 1/Pa
+    (1e-15, 1e-15)
+    """
+    material: Material = _LIBRARY.load(name_or_path)
+    return material
+
+
+# Load of a bushing, p, v and p v, against the limits of its material pair.
+
+
+def _si(unit: str, default: Any = attrs.NOTHING) -> Any:
+    return attrs.field(default=default, metadata={"unit": unit})
+
+
+@attrs.frozen
+class Excess:
+    """A load beyond a limit.
+
+    Attributes
+    ----------
+    name : str
+        ``p``, ``v`` or ``p v``.
+    value, limit : float
+    unit : str
+        Of both.
+    """
+
+    name: str
+    value: float
+    limit: float
+    unit: str
+
+    def __str__(self) -> str:
+        return f"{self.name} {self.value:.3g} {self.unit} above {self.limit:.3g}"
+
+
+@attrs.frozen(kw_only=True)
+class BushingLoad:
+    """Pressure and sliding speed in a joint over a gait cycle, and the limits of its material.
+
+    The 99th percentile of the pressure and the means of the others are held against the limits: makers limit
+    the speed and the product because they heat the bushing.
+
+    Attributes
+    ----------
+    mean_pressure_pa : float
+        Mean force over the projected area of the bushing, its diameter times its width.
+    p99_pressure_pa : float
+        Pressure that is not exceeded 99 % of the time.
+    mean_sliding_speed_mps : float
+        Sliding speed under load: its mean weighted by the force.
+    mean_pressure_speed_pa_mps : float
+        Mean of pressure times sliding speed.
+    pressure_limit_pa : float or None
+        Limit of the pressure; None where the material gives none, like the next two.
+    sliding_speed_limit_mps : float or None
+        Limit of the sliding speed.
+    pressure_speed_limit_pa_mps : float or None
+        Limit of their product.
+    outside_limits : str or None
+        What is beyond the limits, so that the wear coefficient does not hold; None within them.
+    """
+
+    mean_pressure_pa: float = _si("Pa")
+    p99_pressure_pa: float = _si("Pa")
+    mean_sliding_speed_mps: float = _si("m/s")
+    mean_pressure_speed_pa_mps: float = _si("Pa m/s")
+    pressure_limit_pa: float | None = _si("Pa", None)
+    sliding_speed_limit_mps: float | None = _si("m/s", None)
+    pressure_speed_limit_pa_mps: float | None = _si("Pa m/s", None)
+    outside_limits: str | None = None
+
+    @property
+    def compared(self) -> tuple[Excess, ...]:
+        """Every value that has a limit, beyond it or not."""
+        limited = (
+            ("p", self.p99_pressure_pa, self.pressure_limit_pa, "Pa"),
+            ("v", self.mean_sliding_speed_mps, self.sliding_speed_limit_mps, "m/s"),
+            ("p v", self.mean_pressure_speed_pa_mps, self.pressure_speed_limit_pa_mps, "Pa m/s"),
+        )
+        return tuple(
+            Excess(name, value, limit, unit) for name, value, limit, unit in limited if limit is not None
+        )
+
+    @property
+    def excesses(self) -> tuple[Excess, ...]:
+        """Values beyond their limits."""
+        return tuple(each for each in self.compared if each.value > each.limit)
+
+    @property
+    def fraction(self) -> float | None:
+        """Largest value as a fraction of its limit; None without limits."""
+        return max((each.value / each.limit for each in self.compared), default=None)
+
+
+@attrs.frozen(kw_only=True)
+class Bushing:
+    """What a bushing's load follows from, and its limits.
+
+    Attributes
+    ----------
+    area_m2 : float
+        Projected area: diameter times width.
+    material : str
+        Its pair; empty if none is named.
+    pressure_pa, sliding_speed_mps, pressure_speed_pa_mps : float or None
+        Limits of the pair; None where it gives none.
+    """
+
+    area_m2: float
+    material: str = ""
+    pressure_pa: float | None = None
+    sliding_speed_mps: float | None = None
+    pressure_speed_pa_mps: float | None = None
+
+    @classmethod
+    def of(cls, settings: Clearance, *, is_swinging: bool = True) -> "Bushing":
+        """The bushing of a joint with these settings; of the crank's joints, which turn, not swinging."""
+        area = 2.0 * settings.bushing_radius * settings.width
+        if not settings.material:
+            return cls(area_m2=area)
+        limits = load_material(settings.material).limits
+        pressure = limits.dynamic_pressure or limits.static_pressure
+        speed = (limits.oscillating_speed if is_swinging else None) or limits.sliding_speed
+        return cls(
+            area_m2=area,
+            material=settings.material,
+            pressure_pa=pressure.si if pressure else None,
+            sliding_speed_mps=speed.si if speed else None,
+            pressure_speed_pa_mps=limits.pressure_speed.si if limits.pressure_speed else None,
+        )
+
+    def load(self, mean_force_n: float, p99_force_n: float, rubbing_w: float) -> BushingLoad:
+        """Load by forces [N] and by the mean of the normal force times the sliding speed [W]."""
+        return self.loaded(
+            mean_force_n / self.area_m2,
+            p99_force_n / self.area_m2,
+            rubbing_w / mean_force_n if mean_force_n > 0.0 else 0.0,
+            rubbing_w / self.area_m2,
+        )
+
+    def loaded(
+        self, mean_pressure_pa: float, p99_pressure_pa: float, speed_mps: float, pressure_speed: float
+    ) -> BushingLoad:
+        """Load by pressures [Pa], sliding speed [m/s] and their product [Pa m/s]."""
+        load = BushingLoad(
+            mean_pressure_pa=mean_pressure_pa,
+            p99_pressure_pa=p99_pressure_pa,
+            mean_sliding_speed_mps=speed_mps,
+            mean_pressure_speed_pa_mps=pressure_speed,
+            pressure_limit_pa=self.pressure_pa,
+            sliding_speed_limit_mps=self.sliding_speed_mps,
+            pressure_speed_limit_pa_mps=self.pressure_speed_pa_mps,
+        )
+        if not load.excesses:
+            return load
+        beyond = ", ".join(map(str, load.excesses))
+        return attrs.evolve(load, outside_limits=f"outside the limits of {self.material}: {beyond}")
+
+
+def bushing_of(mechanism: Mechanism, joint: str) -> Bushing:
+    """The bushing of a joint: those of the crank turn, others swing."""
+    is_swinging = mechanism.drive.body not in mechanism.sides(joint)
+    return Bushing.of(mechanism.clearances[joint], is_swinging=is_swinging)
+
+
+# Material pairs of the joints of a mechanism.
+
+
+_BESIDE = "a value beside "  # a wear coefficient of the mechanism file, in place of the pair's
+
+
+def settings_of(pair: Material) -> dict[str, Any]:
+    """Settings of a clearance joint that a pair gives, as a mechanism file would have them.
+
+    A pair without wear coefficient gives 0: the coefficient of another pair must not take its place.
+    """
+    given: dict[str, Any] = {"wear_coefficient": list(pair.wear_coefficients or (0.0, 0.0))}
+    for key in ("youngs_modulus", "poissons_ratio"):
+        sides = getattr(pair.bushing, key), getattr(pair.journal, key)
+        if None not in sides:
+            given[key] = [side.si for side in sides]
+    if pair.friction is not None:
+        given["friction"] = {"coefficient": pair.friction.si}
+    return given
+
+
+def lacks_wear(settings: Clearance) -> bool:
+    """Whether a joint's pair gives no wear coefficient, and no value stands beside it."""
+    if not settings.material or max(settings.wear_coefficient) > 0.0:
+        return False
+    return load_material(settings.material).wear_coefficients is None
+
+
+def check_wear_is_known(mechanism: Mechanism, joints: Sequence[str]) -> None:
+    """Check that there is something to compute a life from: a coefficient, or a formula of the maker.
+
+    Raises
+    ------
+    ConfigError
+        If the pairs of all joints have limits only; it names the first joint.
+    """
+    known = [mechanism.clearances[joint] for joint in joints if joint in mechanism.clearances]
+    if known and all(lacks_wear(each) and load_material(each.material).rating_life is None for each in known):
+        raise ConfigError(
+            mechanism.source,
+            f"clearances.joints.{joints[0]}.wear_coefficient",
+            f"is missing for a life: {known[0].material} has no wear coefficient of both bodies, "
+            "expected one beside the material [1/Pa]",
+        )
+
+
+def regimes(mechanism: Mechanism, joints: Sequence[str]) -> dict[str, list[str]]:
+    """The joints by what their wear holds for: a pair and its regime, or a bare coefficient."""
+    found: dict[str, list[str]] = {}
+    for joint in joints:
+        settings = mechanism.clearances[joint]
+        wear = " and ".join(f"{k:.3g}" for k in dict.fromkeys(settings.wear_coefficient)) + " 1/Pa"
+        wear = "not known: not counted" if lacks_wear(settings) else wear
+        found.setdefault(f"{regime_of(settings)}, wear coefficient {wear}", []).append(joint)
+    return found
+
+
+def regime_of(settings: Clearance) -> str:
+    """What a joint's wear coefficient holds for: its pair and the pair's regime."""
+    if not settings.material:
+        return "no material named, regime unknown"
+    pair = load_material(settings.material)
+    own = "" if lacks_wear(settings) or settings.wear_coefficient == pair.wear_coefficients else _BESIDE
+    return f"{own}{pair.name} ({pair.regime})"
+
+
+def spread_of(settings: Clearance, usual: float) -> float | None:
+    """Logarithmic standard deviation of a joint's wear coefficient by its pair.
+
+    The clearance grows by the sum of both coefficients. Both bodies are in the same regime, so their
+    deviations are taken as one: their spreads count by their part of the sum.
+
+    Parameters
+    ----------
+    settings : Clearance
+    usual : float
+        Spread of a body for which the pair gives none, while it gives one for the other.
+
+    Returns
+    -------
+    float or None
+        None if the pair gives no spread, or if a wear coefficient stands beside the pair.
+    """
+    if not settings.material:
+        return None
+    pair = load_material(settings.material)
+    both = pair.bushing.wear_coefficient, pair.journal.wear_coefficient
+    if settings.wear_coefficient != pair.wear_coefficients or not any(both):
+        return None
+    spreads = [side.spread if side is not None else None for side in both]
+    if not any(spreads):
+        return None
+    known = [usual if spread is None else spread.si for spread in spreads]
+    weighted = sum(k * spread for k, spread in zip(settings.wear_coefficient, known, strict=True))
+    return weighted / sum(settings.wear_coefficient)
+
+
+# A maker's rating life of a bushing, beside which a life by Archard's law can be held.
+#
+# SKF, Plain bearings, Calculation example, and Federal-Mogul, GLYCODUR, Nominal service life:
+# G_h = c1 c2 c3 c4 c5 K_M / (p v)^n, with p in N/mm^2, v in m/s and the life in h. The factors are read from
+# the makers' diagrams: load, speed, temperature, roughness, kind of load.
+
+
+def rating_life_hours(pressure_speed: float, constants: RatingLife) -> float:
+    """Basic rating life G_h [h], all factors 1; NaN above the p v for which the constants hold.
+
+    Parameters
+    ----------
+    pressure_speed : float
+        Specific load times mean sliding speed [Pa m/s]; the constants have a least value for it.
+    constants : RatingLife
+        Of a pair.
+    """
+    largest = constants.largest_pressure_speed
+    if largest is not None and pressure_speed > largest.si:
+        return math.nan
+    inserted = 1.0e-6 * max(pressure_speed, constants.least_pressure_speed.si)
+    divided_by: float = inserted**constants.exponent.si
+    return constants.constant.si / divided_by

@@ -1,0 +1,450 @@
+"""How far the linkage can turn: its dead points, and what to say of them."""
+
+from collections import deque
+from collections.abc import Iterator
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.errors import AssemblyError
+from leg_wear_monitor.mechanism.arrays import Floats, body_names, com_poses, compile_arrays
+from leg_wear_monitor.mechanism.constraints import select_rows
+from leg_wear_monitor.mechanism.plausible import suspects
+from leg_wear_monitor.mechanism.position import (
+    TURN,
+    Linkage,
+    all_but,
+    evaluate,
+    far_from_start,
+    find_assembly,
+    follow,
+    furthest,
+    mobility,
+    nearest,
+    newton,
+    open_joint,
+    point_path,
+)
+from leg_wear_monitor.mechanism.spec import Mechanism, PrismaticJoint
+
+# Which bodies are in line where the crank cannot go on.
+#
+# At a dead point, the Jacobian is singular: with the crank locked, some bodies can still move a little. Where
+# two of them are joined to each other, and each to something that stays, the three joints are in line
+# (Aronhold and Kennedy's theorem). A body between something that stays and a slider is at a right angle to
+# the guide instead. Other linkages have dead points without two bodies in line.
+
+
+# the position is not exactly that of the dead point
+_STILL = 0.05  # speed of a joint that stays, as a fraction of that of the joint that moves
+_STRAIGHT = 0.1  # sine of the angle between bodies in line
+
+
+@attrs.frozen(eq=False)
+class DeadPoint:
+    """A position that the crank cannot pass.
+
+    Attributes
+    ----------
+    crank_angle : float
+        [rad].
+    q : (n, 3) array
+        Coordinates there.
+    bodies : tuple of str
+        The two bodies in line, or the one at a right angle to a guide; those that can move with the crank
+        locked if it is neither.
+    joints : tuple of str
+        The three joints in line, that of both bodies in the middle; the joint with the slider, then that of
+        the guide; empty if it is neither.
+    is_in_line : bool
+    is_folded : bool
+        Whether the two bodies lie on each other, and are not stretched.
+    """
+
+    crank_angle: float
+    q: Floats
+    bodies: tuple[str, ...]
+    joints: tuple[str, ...] = ()
+    is_in_line: bool = False
+    is_folded: bool = False
+
+
+def dead_point(linkage: Linkage, crank_angle: float, q: Floats) -> DeadPoint:
+    """The dead point beside coordinates q (n, 3) at a crank angle [rad]."""
+    mechanism = linkage.mechanism
+    velocity = _locked_velocity(linkage, q)
+    speed = {body: _joint_speeds(mechanism, q, velocity, body) for body in mechanism.bodies}
+    dyads = list(_dyads(mechanism, q, speed))
+    if dyads:
+        _, bodies, joints, is_folded = min(dyads)
+        return DeadPoint(crank_angle, q, bodies, joints, is_in_line=True, is_folded=is_folded)
+    for joint, a, b in _pairs(mechanism, speed):
+        for rod, slider in ((a, b), (b, a)):
+            guide = _guide(mechanism, slider, speed, _STILL * speed[rod][joint])
+            if guide and _still_joint(speed[rod], joint):
+                return DeadPoint(crank_angle, q, (rod,), (joint, guide))
+    limit = _STILL * max((value for each in speed.values() for value in each.values()), default=0.0)
+    moving = tuple(body for body, each in speed.items() if max(each.values(), default=0.0) > limit)
+    return DeadPoint(crank_angle, q, moving)
+
+
+def _dyads(
+    mechanism: Mechanism, q: Floats, speed: dict[str, dict[str, float]]
+) -> Iterator[tuple[float, tuple[str, str], tuple[str, str, str], bool]]:
+    """Two bodies whose common joint moves while another joint of each stays, all three in line.
+
+    How still these are, the bodies, the joints, and whether the bodies are folded.
+    """
+    for joint, a, b in _pairs(mechanism, speed):
+        first, last = _still_joint(speed[a], joint), _still_joint(speed[b], joint)
+        if first and last:
+            joints = first, joint, last
+            sine, is_folded = _bend(mechanism, q, joints)
+            if abs(sine) < _STRAIGHT:
+                yield (speed[a][first] + speed[b][last]) / speed[a][joint], (a, b), joints, is_folded
+
+
+def _locked_velocity(linkage: Linkage, q: Floats) -> Floats:
+    """Velocities (1, n, 3) that the closures restrict least, with the crank locked, in any unit of size."""
+    jacobian = evaluate(linkage, q, np.zeros_like(q), (q[linkage.arrays.drive_body, 2], 0.0, 0.0)).jacobian
+    size = max(float(np.abs(q[:, :2]).max()), 1.0e-12)  # lengths in this unit are comparable to angles
+    scale = np.tile([size, size, 1.0], len(q) - 1)
+    weakest = np.linalg.svd(jacobian * scale)[2][-1] * scale
+    velocity = np.zeros((1, *q.shape))
+    velocity[0, 1:] = weakest.reshape(-1, 3)
+    return velocity
+
+
+def _joint_speeds(mechanism: Mechanism, q: Floats, velocity: Floats, body: str) -> dict[str, float]:
+    """Speed of every joint of a body, as a point of this body."""
+    i = body_names(mechanism).index(body)
+    speeds = {}
+    for joint in mechanism.joints:
+        if body in mechanism.sides(joint):
+            lever = point_path(mechanism, q[None], body, joint)[0] - q[i, :2]
+            x, y, turn = velocity[0, i]
+            speeds[joint] = float(np.hypot(x - turn * lever[1], y + turn * lever[0]))
+    return speeds
+
+
+def _pairs(mechanism: Mechanism, speed: dict[str, dict[str, float]]) -> Iterator[tuple[str, str, str]]:
+    """Revolute joints of two moving bodies that move with the crank locked, with the bodies."""
+    for joint in mechanism.joints:
+        a, b = mechanism.sides(joint)
+        is_revolute = not isinstance(mechanism.joints[joint], PrismaticJoint)
+        if is_revolute and a in speed and b in speed and min(speed[a][joint], speed[b][joint]) > 0.0:
+            yield joint, a, b
+
+
+def _still_joint(speeds: dict[str, float], moving: str) -> str:
+    """The joint of a body that stays while another moves, empty without one."""
+    limit = _STILL * speeds[moving]
+    still = {name: value for name, value in speeds.items() if name != moving and value <= limit}
+    return min(still, key=lambda name: still[name], default="")
+
+
+def _guide(mechanism: Mechanism, slider: str, speed: dict[str, dict[str, float]], limit: float) -> str:
+    """The prismatic joint in which a body slides along another that stays, empty without one."""
+    for name, joint in mechanism.joints.items():
+        if isinstance(joint, PrismaticJoint) and slider in mechanism.sides(name):
+            other = next(body for body in mechanism.sides(name) if body != slider)
+            if max(speed.get(other, {}).values(), default=0.0) <= limit:
+                return name
+    return ""
+
+
+def _bend(mechanism: Mechanism, q: Floats, joints: tuple[str, str, str]) -> tuple[float, bool]:
+    """Sine of the angle at the middle one of three joints, and whether the outer two lie on one side."""
+    places = [point_path(mechanism, q[None], mechanism.sides(joint)[1], joint)[0] for joint in joints]
+    a, b = places[0] - places[1], places[2] - places[1]
+    length = float(np.hypot(*a) * np.hypot(*b)) or 1.0
+    return float(a[0] * b[1] - a[1] * b[0]) / length, bool(np.dot(a, b) > 0.0)
+
+
+# Positions of a mechanism over its crank's range: all of them where it works, what there is where not.
+
+
+POINTS = 180  # a cycle: smooth to the eye
+_OPEN_POINTS = 72  # of an open mechanism, whose positions take long
+_VISIBLE = 0.02  # of the largest gap
+_CLOSED = 1.0e-9  # gap [m] below which a joint counts as closed
+
+
+@attrs.frozen(eq=False)
+class Reach:
+    """Positions of a mechanism, working or not, with all joints ideal.
+
+    Attributes
+    ----------
+    linkage : Linkage
+    mobility : int
+        Degrees of freedom; 1 for a mechanism with one drive. With another, there is one position.
+    crank_angle : (p,) array, rad
+        Rising; a whole turn from 0 if the crank turns through.
+    q : (p, n, 3) array
+        Coordinates at these angles. Where the mechanism does not close, those with the least gap.
+    turns : bool
+        Whether it closes all over a turn of the crank.
+    open_joint : str
+        Joint that does not close at the crank angle of the assembly, with all others closed; empty if all
+        close there.
+    gap_m : (p,) array
+        Gap of this joint.
+    low, high : DeadPoint or None
+        Ends of the range in which it closes; None if the crank turns through, or it never closes.
+    fault : str
+        What is wrong with the assembly found; empty if nothing is.
+    """
+
+    linkage: Linkage
+    mobility: int
+    crank_angle: Floats
+    q: Floats
+    turns: bool = False
+    open_joint: str = ""
+    gap_m: Floats = attrs.field(factory=lambda: np.zeros(1))
+    low: DeadPoint | None = None
+    high: DeadPoint | None = None
+    fault: str = ""
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The mechanism."""
+        return self.linkage.mechanism
+
+    def path(self, body: str, point: str) -> Floats:
+        """Position (p, 2) [m] of a point of a body."""
+        return point_path(self.mechanism, self.q, body, point)
+
+    def gap_of(self, joint: str) -> Floats:
+        """Distance (p,) [m] of the two points of a joint; 0 for a slider's, which part along the guide."""
+        if isinstance(self.mechanism.joints[joint], PrismaticJoint):
+            return np.zeros(len(self.q))
+        bushing, journal = (self.path(body, joint) for body in self.mechanism.sides(joint))
+        return np.asarray(np.linalg.norm(journal - bushing, axis=1))
+
+    def is_open(self, joint: str) -> bool:
+        """Whether the two points of a joint are visibly apart in a mechanism that does not close."""
+        if self.turns or (self.mobility == 1 and not self.open_joint):
+            return False
+        largest = max(float(self.gap_of(name).max()) for name in self.mechanism.joints)
+        return float(self.gap_of(joint).max()) > max(_VISIBLE * largest, _CLOSED)
+
+
+def reach_of(mechanism: Mechanism, crank_angle: float | None = None, points: int = POINTS) -> Reach:
+    """Positions of a mechanism over the range of its crank.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    crank_angle : float, optional
+        An angle [rad] that is to be among those of the result, if the crank reaches it.
+    points : int
+        Positions over the range, where the mechanism closes.
+
+    Raises
+    ------
+    AssemblyError
+        If its lengths are too far apart for numbers.
+    """
+    arrays = compile_arrays(mechanism)
+    linkage = Linkage(mechanism, arrays, select_rows(arrays, range(len(mechanism.joints)), driven=True))
+    wanted = () if crank_angle is None else (crank_angle,)
+    with np.errstate(all="ignore"):  # what comes of it is looked at
+        reach = _reach(linkage, np.array(wanted), points)
+    if not np.isfinite(reach.q).all():
+        raise AssemblyError(f"{mechanism.source}: bodies: lengths are too far apart to place the bodies")
+    return reach
+
+
+def _reach(linkage: Linkage, wanted: Floats, points: int) -> Reach:
+    freedom, start = mobility(linkage.mechanism), linkage.mechanism.assembly.crank_angle
+    if freedom != 1:
+        q = nearest(linkage, com_poses(linkage.mechanism), start, np.ones(len(linkage.rows.body)))
+        return Reach(linkage, freedom, np.array([start]), q[None])
+    found = find_assembly(linkage)
+    if found is None:
+        return _open(linkage, wanted)
+    return attrs.evolve(_closed(linkage, found, start, wanted, points), fault=far_from_start(linkage, found))
+
+
+def _closed(linkage: Linkage, q: Floats, angle: float, wanted: Floats, points: int) -> Reach:
+    """Reach of a linkage that closes at a crank angle [rad] with coordinates q."""
+    last, there = furthest(linkage, q, angle, angle + TURN)
+    if last == angle + TURN:
+        angles = np.union1d(np.arange(points) * (TURN / points), wanted % TURN)
+        return Reach(
+            linkage, 1, angles, _followed(linkage, q, angle, angles), True, gap_m=np.zeros(len(angles))
+        )
+    high = dead_point(linkage, last, there)
+    low = dead_point(linkage, *furthest(linkage, q, angle, angle - TURN))
+    angles = np.linspace(low.crank_angle, high.crank_angle, points)[1:-1]
+    inside = low.crank_angle + (wanted - low.crank_angle) % TURN
+    angles = np.union1d(angles, np.clip(inside[inside <= high.crank_angle], angles[0], angles[-1]))
+    between = _followed(linkage, q, angle, angles)
+    return Reach(
+        linkage,
+        1,
+        np.array([low.crank_angle, *angles, high.crank_angle]),
+        np.stack([low.q, *between, high.q]),
+        gap_m=np.zeros(len(angles) + 2),
+        low=low,
+        high=high,
+    )
+
+
+def _followed(linkage: Linkage, q: Floats, angle: float, angles: Floats) -> Floats:
+    """Coordinates (p, n, 3) at rising crank angles, from q at one of them outwards."""
+    found = np.empty((len(angles), *q.shape))
+    first = int(np.searchsorted(angles, angle))
+    for order in (range(first, len(angles)), range(first - 1, -1, -1)):
+        here, at = q, angle
+        for i in order:
+            here, at = follow(linkage, here, at, float(angles[i])), float(angles[i])
+            found[i] = here
+    return found
+
+
+def _open(linkage: Linkage, wanted: Floats) -> Reach:
+    """Reach of a linkage that does not close at the crank angle of its assembly."""
+    joint, gap_m, q = open_joint(linkage)
+    start, weight = linkage.mechanism.assembly.crank_angle, all_but(linkage, joint)
+    angles = np.arange(_OPEN_POINTS) * (TURN / _OPEN_POINTS)
+    angles = start + np.union1d(angles, (wanted - start) % TURN)
+    places = np.empty((len(angles), *q.shape))
+    for i, angle in enumerate(angles):
+        q = places[i] = nearest(linkage, q, float(angle), weight)
+    reach = Reach(linkage, 1, angles, places, open_joint=joint)
+    gaps = (
+        np.array([gap_m])
+        if isinstance(linkage.mechanism.joints[joint], PrismaticJoint)
+        else reach.gap_of(joint)
+    )
+    gaps = np.broadcast_to(gaps, (len(angles),)).copy()
+    low, high = _closes_between(linkage, reach, gaps)
+    return attrs.evolve(reach, gap_m=gaps, low=low, high=high)
+
+
+def _closes_between(
+    linkage: Linkage, reach: Reach, gaps: Floats
+) -> tuple[DeadPoint | None, DeadPoint | None]:
+    """Ends of the range of crank angles in which the joint that is open at the start closes."""
+    i = int(gaps.argmin())
+    angle = float(reach.crank_angle[i])
+    q = newton(linkage, reach.q[i], angle) if gaps[i] < _CLOSED else None
+    if q is None:
+        return None, None
+    ends = (furthest(linkage, q, angle, angle + side * TURN) for side in (-1.0, 1.0))
+    low, high = (dead_point(linkage, *end) for end in ends)
+    return low, high
+
+
+# What is wrong with a mechanism that does not close or turn, in words.
+
+
+def headline(reach: Reach) -> str:
+    """In a few words, whether the mechanism works."""
+    if reach.mobility != 1:
+        return f"mobility is {reach.mobility}, expected 1"
+    if reach.open_joint:
+        return f"does not close: {gap_words(reach, 0)}"
+    if not reach.turns:
+        return f"the crank does not turn through: {_range(reach)}"
+    return "closes, and the crank turns through" if not reach.fault else "closes far from the given start"
+
+
+def findings(reach: Reach) -> tuple[str, ...]:
+    """What is wrong, a sentence each with its numbers; empty for a mechanism that works."""
+    found = [*_mobility(reach), *_open_words(reach), *_turns(reach)]
+    if reach.fault:
+        found.append(f"assembly.{reach.fault}")
+    doubts = suspects(reach.mechanism)
+    return (*found[:-1], found[-1] + doubts) if found else ()
+
+
+def gap_words(reach: Reach, i: int) -> str:
+    """The gap of the open joint at position ``i``."""
+    joint = reach.mechanism.joint_words(reach.open_joint)
+    return f"joint {joint} is open by {1e3 * reach.gap_m[i]:.3g} mm"
+
+
+def dead_words(dead: DeadPoint) -> str:
+    """Which bodies are in line at a dead point."""
+    joints = ", ".join(dead.joints)
+    if dead.is_in_line:
+        how = "folded" if dead.is_folded else "stretched"
+        return f"{dead.bodies[0]} and {dead.bodies[1]} are in line, {how} (joints {joints})"
+    if dead.joints:
+        return f"{dead.bodies[0]} is at a right angle to the guide of joint {dead.joints[1]}"
+    return f"no two bodies are in line; {', '.join(dead.bodies)} can move with the crank locked"
+
+
+def loop_of(mechanism: Mechanism, joint: str) -> tuple[str, ...]:
+    """Bodies of the shortest loop through a joint, from one of its bodies to the other; empty without one."""
+    first, last = mechanism.sides(joint)
+    ways: deque[tuple[str, ...]] = deque([(first,)])
+    seen = {first}
+    while ways:
+        way = ways.popleft()
+        if way[-1] == last:
+            return way
+        for other in mechanism.joints:
+            sides = mechanism.sides(other)
+            if other != joint and way[-1] in sides:
+                body = sides[1] if sides[0] == way[-1] else sides[0]
+                if body not in seen:
+                    seen.add(body)
+                    ways.append((*way, body))
+    return ()
+
+
+def _mobility(reach: Reach) -> list[str]:
+    if reach.mobility == 1:
+        return []
+    bodies, joints = len(reach.mechanism.bodies), len(reach.mechanism.joints)
+    sum_ = f"3 x {bodies} bodies - 2 x {joints} joints"
+    more = "a joint is missing" if reach.mobility > 1 else "a joint is too many, or a body is missing"
+    return [f"joints: mobility is {reach.mobility} ({sum_}), expected 1: {more}"]
+
+
+def _open_words(reach: Reach) -> list[str]:
+    if not reach.open_joint:
+        return []
+    mechanism, least = reach.mechanism, int(reach.gap_m.argmin())
+    bodies = " and ".join(mechanism.sides(reach.open_joint))
+    text = (
+        f"assembly: {gap_words(reach, 0)} between {bodies} at crank angle {_degrees(reach.crank_angle[0])}, "
+        "with all other joints closed"
+    )
+    if reach.low is not None:
+        text += f"; it closes only {_range(reach)}"
+    else:
+        angle = _degrees(reach.crank_angle[least] % TURN)
+        text += f"; the least gap is {1e3 * reach.gap_m[least]:.3g} mm, at {angle}"
+    if loop := loop_of(mechanism, reach.open_joint):
+        text += f"; check the lengths of {', '.join(loop)}"
+    return [text, *_ends(reach)]
+
+
+def _turns(reach: Reach) -> list[str]:
+    if reach.open_joint or reach.low is None:
+        return []
+    return [f"drive.body: {reach.mechanism.drive.body} turns only {_range(reach)}", *_ends(reach)]
+
+
+def _ends(reach: Reach) -> list[str]:
+    dead_points = [dead for dead in (reach.low, reach.high) if dead is not None]
+    return [
+        f"dead point at crank angle {_degrees(dead.crank_angle)}: {dead_words(dead)}" for dead in dead_points
+    ]
+
+
+def _range(reach: Reach) -> str:
+    if reach.low is None or reach.high is None:
+        return ""
+    low, high = reach.low.crank_angle, reach.high.crank_angle
+    return f"from {_degrees(low)} to {_degrees(high)}, {np.rad2deg(high - low):.1f} of 360 deg"
+
+
+def _degrees(angle: float) -> str:
+    return f"{np.rad2deg(angle):.1f} deg"

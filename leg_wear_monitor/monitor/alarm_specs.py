@@ -1,0 +1,358 @@
+"""The table of alarms: what each compares with which limit."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+import attrs
+
+from leg_wear_monitor.files import or_nan
+from leg_wear_monitor.monitor.alarms import (
+    EXCHANGED,
+    FOOT_LOAD_LIMITS,
+    GAPS,
+    SCALE,
+    SIGN,
+    STUCK,
+    ZERO,
+    Alarm,
+    Limit,
+)
+from leg_wear_monitor.monitor.torque_checks import BIAS, DRIFT, LAG
+from leg_wear_monitor.twin import KINDS as SAMPLE_KINDS
+from leg_wear_monitor.twin import LOAD
+
+if TYPE_CHECKING:
+    from leg_wear_monitor.monitor.config.settings import Alarms, MonitorConfig
+    from leg_wear_monitor.monitor.inputs import InputGuard, InputHealth
+    from leg_wear_monitor.monitor.reports import CycleReport, JointReport
+    from leg_wear_monitor.monitor.torque_checks import TorqueBounds
+
+
+# The monitor's alarms, one entry each: board, units, status, command line and docs are derived from it.
+#
+# NaN is an unknown value and leaves its alarm unchanged. No slow import is allowed here, because ``--help``
+# lists the kinds.
+
+
+_E = TypeVar("_E")
+
+
+@attrs.frozen
+class LimitSource:
+    """Inputs of the limits: parameters, bounds of the drive torque, and the clearance joint."""
+
+    config: "MonitorConfig"
+    bounds: "TorqueBounds"
+    joint: int = 0
+
+    def by_joint(self, own: tuple[float, ...], of_all: float) -> float:
+        """The joint's own limit if there are limits per joint, otherwise the common one."""
+        return own[self.joint] if own else of_all
+
+
+@attrs.frozen
+class CycleEvidence:
+    """A gait cycle, the values of its torque alarms, and the commanded cadence [rpm]."""
+
+    report: "CycleReport"
+    torque: Mapping[str, float]
+    commanded_rpm: float
+
+
+def _usual(alarms: "Alarms") -> int:
+    return alarms.on_delay_cycles
+
+
+def _knock(alarms: "Alarms") -> int:
+    return alarms.knock_on_delay_cycles
+
+
+@attrs.frozen(kw_only=True)
+class AlarmSpec(Generic[_E]):
+    """An alarm.
+
+    Attributes
+    ----------
+    kind, subject : str
+        The subject of an alarm of a clearance joint is the joint.
+    unit : str
+        Unit of value and limit.
+    quantity : str
+        Noun of the value, for sentences.
+    meaning, limit_words : str
+        For operators: meaning of the value, and the parameters of its limit.
+    value : callable
+        Value from the evidence: a joint's report, a gait cycle, the input's health or its guard.
+    limit : callable
+        Limit of ERROR.
+    on_delay : callable
+        Gait cycles in a row for which a value must be beyond before the level rises.
+    is_least : bool
+        Whether the limit is a lower bound: values below it are faults.
+    is_count : bool
+        Whether the value is a count: ERROR begins at the limit, without WARN and deadband.
+    is_latched : bool
+        Whether the alarm stays until it is acknowledged; that of missing data ends when they return.
+    """
+
+    kind: str
+    subject: str = ""
+    unit: str = ""
+    quantity: str
+    meaning: str
+    limit_words: str
+    value: Callable[[_E], float]
+    limit: Callable[[LimitSource], float]
+    on_delay: Callable[["Alarms"], int] = _usual
+    is_least: bool = False
+    is_count: bool = False
+    is_latched: bool = True
+
+    def new(self, joint: str = "") -> Alarm:
+        """The alarm in its initial state."""
+        return Alarm(kind=self.kind, subject=self.subject or joint, unit=self.unit)
+
+    def name(self, joint: str = "") -> str:
+        """Name of the alarm, such as ``clearance A``."""
+        return f"{self.kind} {self.subject or joint}".rstrip()
+
+    def limits(self, source: LimitSource) -> Limit:
+        """Limits of its levels."""
+        error, alarms, warn = self.limit(source), source.config.alarms, source.config.limits.warn_fraction
+        if self.is_count:
+            return Limit(error, error)
+        first = error / warn if self.is_least else warn * error
+        return Limit(first, error, alarms.deadband, self.on_delay(alarms), self.is_least, self.is_latched)
+
+
+IMPACT: "AlarmSpec[JointReport]" = AlarmSpec(
+    kind="impact_force",
+    unit="N",
+    quantity="peak contact force",
+    meaning="peak contact force of the gait cycle, N",
+    limit_words="`limits.impact_force_n`, `limits.joint_impact_force_n`; within a wider "
+    "`cadence.tolerance_rpm` times the square of the cadence over the commanded one, from 1.1 on",
+    value=lambda joint: joint.peak_force_n,
+    limit=lambda of: of.by_joint(of.config.limits.joint_impact_force_n, of.config.limits.impact_force_n),
+    on_delay=_knock,
+)
+CLEARANCE: "AlarmSpec[JointReport]" = AlarmSpec(
+    kind="clearance",
+    unit="m",
+    quantity="mean radial clearance",
+    meaning="mean radial clearance, counted or, if it is larger, by measurement, m",
+    limit_words="`limits.clearance_m`, `limits.joint_clearance_m`",
+    value=lambda joint: joint.judged_clearance_m,
+    limit=lambda of: of.by_joint(of.config.limits.joint_clearance_m, of.config.limits.clearance_m),
+)
+GROWTH: "AlarmSpec[JointReport]" = AlarmSpec(
+    kind="growth",
+    unit="m/h",
+    quantity="growth of the mean radial clearance",
+    meaning="growth of the mean radial clearance, m/h",
+    limit_words="`limits.growth_m_per_hour`",
+    value=lambda joint: math.nan if joint.growth_mps is None else 3600.0 * joint.growth_mps,
+    limit=lambda of: of.config.limits.growth_m_per_hour,
+)
+LIFE: "AlarmSpec[JointReport]" = AlarmSpec(
+    kind="remaining_life",
+    unit="h",
+    quantity="p10 of the remaining life",
+    meaning="hours of walking that the joint exceeds with a probability of 90 %, h",
+    limit_words="`limits.remaining_life_h`",
+    value=lambda joint: joint.forecast.hours.p10 if joint.forecast and joint.forecast.hours else math.nan,
+    limit=lambda of: of.config.limits.remaining_life_h,
+    is_least=True,
+)
+MATERIAL: "AlarmSpec[JointReport]" = AlarmSpec(
+    kind="material_limit",
+    quantity="load over the limits of the material",
+    meaning="largest of pressure (99th percentile), sliding speed and p v (means) of the gait cycle, as a "
+    "fraction of the limits of the joint's material. Only with a material that has limits",
+    limit_words="1, the limits of the material",
+    value=lambda joint: or_nan(joint.load.fraction if joint.load else None),
+    limit=lambda _: 1.0,
+)
+DEPARTURE: "AlarmSpec[JointReport]" = AlarmSpec(
+    kind="clearance_departure",
+    unit="m",
+    quantity="difference between the clearance from encoders and the counted clearance",
+    meaning="difference between the clearance from further encoders and the counted one, m; 0 below four "
+    "standard deviations. Only with `encoders.names`",
+    limit_words="`limits.clearance_departure_m`",
+    value=lambda joint: joint.seen.surely_m if joint.seen else math.nan,
+    limit=lambda of: of.config.limits.clearance_departure_m,
+)
+MISMATCH: "AlarmSpec[CycleEvidence]" = AlarmSpec(
+    kind="torque_mismatch",
+    quantity="unexplained fraction of the drive torque",
+    meaning="RMS of the torque that repeats over the last gait cycles, and that foot load, friction and lag "
+    "do not explain, as a fraction of the predicted RMS",
+    limit_words="`limits.torque_mismatch`",
+    value=lambda cycle: cycle.report.torque_mismatch,
+    limit=lambda of: of.config.limits.torque_mismatch,
+    on_delay=_knock,
+)
+CADENCE: "AlarmSpec[CycleEvidence]" = AlarmSpec(
+    kind="cadence",
+    unit="rpm",
+    quantity="departure from the commanded cadence",
+    meaning="departure from the commanded cadence, rpm",
+    limit_words="`cadence.tolerance_rpm`",
+    value=lambda cycle: abs(cycle.report.cadence_rpm - cycle.commanded_rpm),
+    limit=lambda of: of.config.cadence.tolerance_rpm,
+)
+SOURCES: "AlarmSpec[InputGuard]" = AlarmSpec(
+    kind="input_sources",
+    quantity="number of sources of the crank angle",
+    meaning="number of sources of the crank angle",
+    limit_words="2, at once",
+    value=lambda guard: float(guard.sources),
+    limit=lambda _: 2.0,
+    is_count=True,
+)
+
+JOINT = (IMPACT, CLEARANCE, GROWTH, LIFE, MATERIAL)
+ENCODERS = (DEPARTURE,)
+TORQUE: "tuple[AlarmSpec[CycleEvidence], ...]" = (
+    MISMATCH,
+    AlarmSpec(
+        kind=BIAS,
+        unit="N m",
+        quantity="constant drive torque beyond the bounds of friction",
+        meaning="constant drive torque outside the bounds of friction, N m: it drives, or exceeds "
+        "`drive_torque.max_friction_nm`",
+        limit_words="`limits.torque_bias_nm`",
+        value=lambda cycle: cycle.torque.get(BIAS, math.nan),
+        limit=lambda of: of.bounds.bias_nm,
+    ),
+    AlarmSpec(
+        kind=DRIFT,
+        unit="N m",
+        quantity="change of the constant drive torque since commissioning",
+        meaning="change of the constant drive torque since this leg was commissioned, N m",
+        limit_words="`limits.torque_drift_nm`",
+        value=lambda cycle: cycle.torque.get(DRIFT, math.nan),
+        limit=lambda of: of.bounds.drift_nm,
+    ),
+    AlarmSpec(
+        kind=LAG,
+        unit="s",
+        quantity="delay of the measured torque",
+        meaning="delay of the measured torque, late or early, s",
+        limit_words="`drive_torque.max_lag_s`",
+        value=lambda cycle: cycle.torque.get(LAG, math.nan),
+        limit=lambda of: of.bounds.max_lag_s,
+    ),
+)
+GAIT = (CADENCE,)
+
+
+def _rate(name: str) -> "AlarmSpec[InputHealth]":
+    """Rate of the used samples of a kind, by the kind's name."""
+    return AlarmSpec(
+        kind="input_rate",
+        subject=name,
+        unit="Hz",
+        quantity=f"rate of usable {name} samples",
+        meaning=f"rate of usable {name} samples, Hz",
+        limit_words="`limits.min_rate_hz`",
+        value=lambda health: health.rate_hz[name],
+        limit=lambda of: of.config.limits.min_rate_hz,
+        is_least=True,
+        is_latched=False,
+    )
+
+
+def _foot_load(kind: str, quantity: str, meaning: str, subject: str = "") -> Any:
+    """A fault of the sensor of the foot load, in a gait cycle."""
+    return AlarmSpec(
+        kind=kind,
+        subject=subject,
+        quantity=quantity,
+        meaning=f"{meaning}. Only with `foot_load.source`",
+        limit_words=f"{FOOT_LOAD_LIMITS[kind]:g}",
+        value=lambda values: values.get(kind, math.nan),
+        limit=lambda _: FOOT_LOAD_LIMITS[kind],
+        is_latched=not subject,
+    )
+
+
+FOOT_LOAD_RATE = _rate(SAMPLE_KINDS[LOAD].name)
+FOOT_LOAD: "tuple[AlarmSpec[Mapping[str, float]], ...]" = (
+    _foot_load(
+        GAPS,
+        "fraction of time without samples of the foot load",
+        "fraction of a gait cycle in gaps of more than 50 ms between samples of the foot load",
+        SAMPLE_KINDS[LOAD].name,
+    ),
+    _foot_load(
+        STUCK,
+        "constant fraction of the foot load",
+        "fraction of the largest foot load that does not change over a gait cycle",
+    ),
+    _foot_load(
+        ZERO,
+        "foot load in swing over its peak",
+        "median of the vertical foot load in swing, over its peak",
+    ),
+    _foot_load(
+        SCALE,
+        "factor between the foot load and what the drive torque shows of it",
+        "factor by which the foot load is larger or smaller than the drive torque shows; or three times the "
+        "largest force received over 50 kN, if that is more than 3",
+    ),
+    _foot_load(
+        EXCHANGED,
+        "correlation of the foot load with the other foot's stance, less that with this one's",
+        "correlation of the vertical foot load with stance half a turn later, less that with stance",
+    ),
+    _foot_load(
+        SIGN,
+        "pull of the foot load over its largest force",
+        "largest pull of the foot load downwards, over its largest vertical force",
+    ),
+)
+
+INPUT: "tuple[AlarmSpec[InputHealth], ...]" = (
+    *(_rate(kind.name) for code, kind in SAMPLE_KINDS.items() if code != LOAD),
+    AlarmSpec(
+        kind="input_samples",
+        quantity="fraction of unusable samples",
+        meaning="fraction of samples that could not be used: faulty, repeated, late, stray stamp, far off",
+        limit_words="`limits.bad_sample_fraction`",
+        value=lambda health: health.bad_fraction,
+        limit=lambda of: of.config.limits.bad_sample_fraction,
+    ),
+    AlarmSpec(
+        kind="input_gaps",
+        quantity="fraction of unmonitored time",
+        meaning="fraction of the time that was not monitored",
+        limit_words="`limits.lost_time_fraction`",
+        value=lambda health: health.lost_fraction,
+        limit=lambda of: of.config.limits.lost_time_fraction,
+        is_latched=False,
+    ),
+    AlarmSpec(
+        kind="input_torque",
+        quantity="fraction of stuck or saturated torque samples",
+        meaning="fraction of torque samples that are saturated, or repeat the largest or the smallest",
+        limit_words="`limits.stuck_torque_fraction`",
+        value=lambda health: health.stuck_torque_fraction,
+        limit=lambda of: of.config.limits.stuck_torque_fraction,
+    ),
+)
+
+OF_INPUT: "tuple[AlarmSpec[Any], ...]" = (*INPUT, SOURCES)
+OF_FOOT_LOAD: "tuple[AlarmSpec[Any], ...]" = (FOOT_LOAD_RATE, *FOOT_LOAD)
+ALL: "tuple[AlarmSpec[Any], ...]" = (*JOINT, *ENCODERS, *TORQUE, *GAIT, *OF_INPUT, *OF_FOOT_LOAD)
+
+INPUT_KINDS = tuple(dict.fromkeys(spec.kind for spec in OF_INPUT))
+KINDS = tuple(dict.fromkeys(spec.kind for spec in ALL))
+
+QUANTITIES = {
+    **{spec.kind: spec.quantity for spec in (*JOINT, *ENCODERS)},
+    **{spec.name(): spec.quantity for spec in (*TORQUE, *GAIT, *OF_INPUT, *OF_FOOT_LOAD)},
+}
+"""Nouns by the alarm's name; by its kind for an alarm of a joint."""

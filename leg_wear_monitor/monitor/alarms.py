@@ -1,0 +1,443 @@
+"""Alarms: levels, limits and latches, their codes, words, and the guide of each."""
+
+import math
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from enum import IntEnum
+
+import attrs
+
+from leg_wear_monitor.estimate.cause import Cause
+
+# Alarms as a state machine: levels with a deadband and an on-delay, latched until acknowledged.
+#
+# An alarm of silence is not latched: when data return, nothing is left to look at but its row in the history.
+#
+# Everything here is a pure function of (alarm, value, limit). A value is evaluated once per gait cycle, so
+# the on-delay counts gait cycles.
+
+
+class Level(IntEnum):
+    """Level of an alarm; numbers as in diagnostic_msgs/DiagnosticStatus."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
+
+
+@attrs.frozen
+class Limit:
+    """Limits of the levels of an alarm.
+
+    Attributes
+    ----------
+    warn, error : float
+        A value at a limit or beyond has reached its level.
+    deadband : float
+        Fraction of a limit by which a value must have returned before the level falls.
+    on_delay : int
+        Gait cycles in a row for which a value must be beyond before the level rises; 1: at once.
+    is_least : bool
+        Whether the limits are lower bounds: values below them are faults.
+    is_latched : bool
+        Whether a level that was shown stays until it is acknowledged.
+    """
+
+    warn: float
+    error: float
+    deadband: float = 0.0
+    on_delay: int = 1
+    is_least: bool = False
+    is_latched: bool = True
+
+    def times(self, factor: float) -> "Limit":
+        """The limits, multiplied."""
+        return attrs.evolve(self, warn=factor * self.warn, error=factor * self.error)
+
+    def reaches(self, value: float, level: Level) -> bool:
+        """Whether a value is at the limit of WARN or ERROR, or beyond it."""
+        limit = self.error if level is Level.ERROR else self.warn
+        return value <= limit if self.is_least else value >= limit
+
+    def leaves(self, value: float, level: Level) -> bool:
+        """Whether a value is back from the limit of WARN or ERROR by more than the deadband."""
+        limit = self.error if level is Level.ERROR else self.warn
+        if self.is_least:
+            return value > limit * (1.0 + self.deadband)
+        return value < limit * (1.0 - self.deadband)
+
+
+@attrs.frozen(kw_only=True)
+class Alarm:
+    """State of an alarm.
+
+    Attributes
+    ----------
+    kind : str
+        Monitored quantity, such as ``clearance``.
+    subject : str
+        Joint or input; empty if there is only one.
+    unit : str
+        Unit of value and limit.
+    present : Level
+        Level of the present value, with deadband and on-delay.
+    level : Level
+        Shown level: the highest present level since the last acknowledgement.
+    acknowledged : bool
+        Whether an operator has acknowledged it at this level.
+    value : float
+        Last evaluated value; NaN before.
+    limit : float
+        Limit of ERROR in the last evaluation; NaN before.
+    raised_ns : int
+        Stamp at which the level last rose; 0 before.
+    worst : float
+        The worst value since it was raised; NaN while its level is OK. Of estimates, which have a standard
+        deviation, the last one at this level: it rests on most, and the largest of many is too large.
+    sigma : float
+        Standard deviation of `worst`; NaN if it is not known.
+    cause : str
+        Source or cause of `worst` as it was known then, such as ``torque``; a value without one keeps it.
+    beyond : tuple of int
+        Number of gait cycles in a row with the value beyond the limits of WARN and ERROR.
+    """
+
+    kind: str
+    subject: str = ""
+    unit: str = ""
+    present: Level = Level.OK
+    level: Level = Level.OK
+    acknowledged: bool = False
+    value: float = math.nan
+    limit: float = math.nan
+    raised_ns: int = 0
+    worst: float = math.nan
+    sigma: float = math.nan
+    cause: str = ""
+    beyond: tuple[int, int] = (0, 0)
+
+    @property
+    def name(self) -> str:
+        """Stable name without values, such as ``clearance A``."""
+        return f"{self.kind} {self.subject}".rstrip()
+
+
+def next_level(
+    level: Level, value: float, limit: Limit, beyond: tuple[int, int], cycles: int = 1
+) -> tuple[Level, tuple[int, int]]:
+    """Level after a value, and the numbers of gait cycles with values beyond WARN and ERROR.
+
+    Parameters
+    ----------
+    level : Level
+        Previous level.
+    value : float
+        Not NaN.
+    limit : Limit
+    beyond : tuple of int
+        As returned by the previous call, (0, 0) at first.
+    cycles : int
+        Gait cycles the value stands for.
+    """
+    beyond_warn, beyond_error = (
+        before + cycles if limit.reaches(value, at) else 0
+        for before, at in zip(beyond, (Level.WARN, Level.ERROR), strict=True)
+    )
+    beyond = (beyond_warn, beyond_error)
+    if beyond_error >= limit.on_delay or (level is Level.ERROR and not limit.leaves(value, Level.ERROR)):
+        return Level.ERROR, beyond
+    if beyond_warn >= limit.on_delay or (level is not Level.OK and not limit.leaves(value, Level.WARN)):
+        return Level.WARN, beyond
+    return Level.OK, beyond
+
+
+def evaluated(
+    alarm: Alarm,
+    value: float,
+    limit: Limit,
+    stamp_ns: int,
+    cycles: int = 1,
+    sigma: float = math.nan,
+    cause: str = "",
+) -> Alarm:
+    """Alarm after a value; NaN leaves the alarm unchanged.
+
+    Parameters
+    ----------
+    alarm : Alarm
+    value : float
+        In the alarm's unit.
+    limit : Limit
+    stamp_ns : int
+        Stamp of the value.
+    cycles : int
+        Gait cycles the value stands for.
+    sigma : float
+        Standard deviation of the value.
+    cause : str
+        Source or cause of the value; empty if it is not known.
+    """
+    if math.isnan(value):
+        return alarm
+    present, beyond = next_level(alarm.present, value, limit, alarm.beyond, cycles)
+    level, is_acknowledged, raised_ns = alarm.level, alarm.acknowledged, alarm.raised_ns
+    if present > level:
+        level, is_acknowledged, raised_ns = present, False, stamp_ns
+    elif (is_acknowledged or not limit.is_latched) and present < level:
+        level, is_acknowledged = present, is_acknowledged and present is not Level.OK
+    is_estimate = not math.isnan(sigma) and present is level is not Level.OK
+    worst = value if is_estimate else _worst(level, alarm.worst, value, limit)
+    if level is Level.OK:
+        sigma, cause = math.nan, ""
+    elif worst == alarm.worst and not is_estimate:  # what was known of the worst value stays with it
+        sigma, cause = alarm.sigma, alarm.cause or cause
+    return Alarm(  # all fields: `attrs.evolve` takes several times as long, for each value of each period
+        kind=alarm.kind,
+        subject=alarm.subject,
+        unit=alarm.unit,
+        present=present,
+        level=level,
+        acknowledged=is_acknowledged,
+        value=value,
+        limit=limit.error,
+        raised_ns=raised_ns,
+        worst=worst,
+        sigma=sigma,
+        cause=cause or (alarm.cause if level is not Level.OK else ""),
+        beyond=beyond,
+    )
+
+
+def _worst(level: Level, worst: float, value: float, limit: Limit) -> float:
+    """The worst value of an alarm since it was raised; NaN while its level is OK."""
+    if level is Level.OK:
+        return math.nan
+    if math.isnan(worst):
+        return value
+    return min(worst, value) if limit.is_least else max(worst, value)
+
+
+def acknowledged(alarm: Alarm) -> Alarm:
+    """Alarm after an acknowledgement: cleared if it has returned to normal, marked if not."""
+    if alarm.level is Level.OK:
+        return alarm
+    if alarm.present is Level.OK:
+        return attrs.evolve(
+            alarm, level=Level.OK, acknowledged=False, worst=math.nan, sigma=math.nan, cause=""
+        )
+    return attrs.evolve(alarm, level=alarm.present, acknowledged=True)
+
+
+def cleared(alarm: Alarm) -> Alarm:
+    """Alarm of a part that is not there any more: as new."""
+    return Alarm(kind=alarm.kind, subject=alarm.subject, unit=alarm.unit)
+
+
+def has_changed(before: Alarm, after: Alarm) -> bool:
+    """Whether the state shown to operators has changed: level, presence or acknowledgement."""
+    return (before.level, before.present, before.acknowledged) != (
+        after.level,
+        after.present,
+        after.acknowledged,
+    )
+
+
+# Stable names of what is wrong, one with each status: those of alarms, and those of the parts of a monitor.
+#
+# A status of the verdict has the code of its rule (`verdict.rules`), which is that of a cause
+# (`estimate.cause`) where one is found.
+
+
+NO_FAULT = "NONE"
+INPUT_SILENCE, NOT_FOLLOWED, CRANK_ZERO = "INPUT_SILENCE", "NOT_FOLLOWED", "CRANK_ZERO"
+ENCODERS, DIAGNOSIS = "ENCODERS", "DIAGNOSIS"
+LEDGER_NOT_WRITTEN, LEDGER_INTERRUPTED = "LEDGER_NOT_WRITTEN", "LEDGER_INTERRUPTED"
+SAMPLES_DROPPED, SAMPLES_NOT_PUBLISHED = "SAMPLES_DROPPED", "SAMPLES_NOT_PUBLISHED"
+TOPICS, RECORDING_STOPPED = "TOPICS", "RECORDING_STOPPED"
+CLOCK_MISSING, CLOCK_STOPPED, CLOCK_SET_BACK = "CLOCK_MISSING", "CLOCK_STOPPED", "CLOCK_SET_BACK"
+STAMPS_AHEAD, ALREADY_COUNTED = "STAMPS_AHEAD", "ALREADY_COUNTED"
+
+GAPS, STUCK, ZERO, SCALE, EXCHANGED, SIGN = (
+    "input_gaps", "foot_load_stuck", "foot_load_zero", "foot_load_scale", "foot_load_exchanged",
+    "foot_load_sign",
+)  # fmt: skip
+"""Kinds of the alarms of the foot load's sensor, by which their values are named."""
+FOOT_LOAD_LIMITS = {GAPS: 0.05, STUCK: 0.9, ZERO: 0.1, SCALE: 3.0, EXCHANGED: 0.5, SIGN: 0.5}
+
+FOOT_LOAD_WORDS = {
+    STUCK: "the foot load does not change between stance and swing: its sensor is stuck, or the leg walks in "
+    "the air",
+    ZERO: "the foot load is not 0 in swing: the zero of its sensor has drifted",
+    SCALE: "the size of the foot load does not fit the drive torque: its unit or scale is wrong",
+    EXCHANGED: "the foot load is there while this foot is in the air: it is that of the other leg",
+    SIGN: "the foot load pulls: its sign is reversed",
+}
+"""What is wrong, by the kind of the alarm."""
+
+FAULT_CODES = {
+    NO_FAULT: "nothing is wrong",
+    INPUT_SILENCE: "no samples come; each status that has no current data then has this code",
+    NOT_FOLLOWED: "the samples of the crank cannot be followed, see `input`",
+    CRANK_ZERO: "the zero of the crank's encoder is not found yet, see `crank zero`",
+    ENCODERS: "a further encoder gives no usable angles",
+    DIAGNOSIS: "the drive torque shows a change; the code of the verdict names it",
+    LEDGER_NOT_WRITTEN: "the ledger cannot be written",
+    LEDGER_INTERRUPTED: "the previous run was interrupted",
+    SAMPLES_DROPPED: "the node is overloaded: samples were dropped",
+    SAMPLES_NOT_PUBLISHED: "the node is overloaded: values of samples are not published",
+    TOPICS: "an input topic has no publisher, several, another type, not the crank, a torque about another "
+    "axis, or messages are lost",
+    RECORDING_STOPPED: "the recording of the node has stopped",
+    CLOCK_MISSING: "`use_sim_time` is set and nobody publishes `/clock`",
+    CLOCK_STOPPED: "`/clock` has stopped",
+    CLOCK_SET_BACK: "the clock was set back",
+    STAMPS_AHEAD: "the stamps of an input are ahead of the clock of the node",
+    ALREADY_COUNTED: "samples of a time that is in the ledger are skipped",
+}
+"""Codes that are not the name of an alarm, and their meaning."""
+
+CAUSES_OF_ALARMS = {
+    "torque_bias": Cause.BIAS,
+    "torque_drift": Cause.FRICTION,
+    "torque_lag": Cause.TIMING,
+}
+"""Causes that have a limit of their own, by the alarm."""
+
+
+def code_of(alarm: Alarm) -> str:
+    """Code of a raised alarm, such as ``CLEARANCE_A``; NONE for another."""
+    return alarm.name.upper().replace(" ", "_") if alarm.level is not Level.OK else NO_FAULT
+
+
+def worst_code(alarms: Iterable[Alarm]) -> str:
+    """Code of the first of the most severe alarms; NONE if none is raised."""
+    found = sorted(alarms, key=lambda alarm: -alarm.level)
+    return code_of(found[0]) if found else NO_FAULT
+
+
+# The page of the how-to guides for each fault code, so that a message leads to what to do.
+
+
+FOLDER = "docs/howto/verdict"
+START = "index"
+
+CODES_OF_GUIDES = {
+    START: ("NONE", "ALARM"),
+    "joint_at_limit": ("CLEARANCE", "CLEARANCE_SEEN", "CLEARANCE_BELIEVED", "PART_REPLACED"),
+    "clearance_changed": (
+        "CLEARANCE_CHANGED",
+        "CLEARANCE_CORRECTED",
+        "CLEARANCE_DEPARTURE",
+        "DIAGNOSIS",
+    ),
+    "torque_sensor": (
+        "TORQUE_SIGN",
+        "TORQUE_SCALE",
+        "TORQUE_TIMING",
+        "TORQUE_BIAS",
+        "TORQUE_DRIFT",
+        "TORQUE_LAG",
+    ),
+    "torque_mismatch": ("TORQUE_MISMATCH", "MECHANISM_CHANGED", "TORQUE_MASS"),
+    "load_and_friction": ("TORQUE_LOAD", "FRICTION_CHANGED"),
+    "foot_load": (
+        "FOOT_LOAD_EXCHANGED",
+        "FOOT_LOAD_MISSING",
+        "FOOT_LOAD_SCALE",
+        "FOOT_LOAD_SIGN",
+        "FOOT_LOAD_STUCK",
+        "FOOT_LOAD_ZERO",
+        "INPUT_GAPS_FOOT_LOAD",
+        "INPUT_RATE_FOOT_LOAD",
+    ),
+    "force_growth_life": ("IMPACT_FORCE", "GROWTH", "REMAINING_LIFE", "MATERIAL_LIMIT"),
+    "input": (
+        "BAD_INPUT",
+        "INPUT_GAPS",
+        "INPUT_RATE_CRANK",
+        "INPUT_RATE_TORQUE",
+        "INPUT_SAMPLES",
+        "INPUT_SILENCE",
+        "INPUT_SOURCES",
+        "INPUT_TORQUE",
+        "NO_GAIT_CYCLE",
+        "TOPICS",
+    ),
+    "gait": ("CADENCE", "CRANK_ZERO", "NOT_FOLLOWED", "NOT_THIS_LEG"),
+    "not_observed": ("ENCODER", "ENCODERS", "NOT_OBSERVED", "NO_DRIVE_TORQUE", "TORQUE_NOT_COMPARED"),
+    "node": (
+        "ALREADY_COUNTED",
+        "CLOCK_MISSING",
+        "CLOCK_SET_BACK",
+        "CLOCK_STOPPED",
+        "LEDGER_INTERRUPTED",
+        "LEDGER_NOT_WRITTEN",
+        "RECORDING_STOPPED",
+        "SAMPLES_DROPPED",
+        "SAMPLES_NOT_PUBLISHED",
+        "STAMPS_AHEAD",
+    ),
+}
+"""Codes without their joints, by the name of the page; a test compares them with the codes that there are."""
+
+_PAGES = {code: page for page, codes in CODES_OF_GUIDES.items() for code in codes}
+
+
+def guide_of(code: str) -> str:
+    """Path of a code's page below the share directory; the overview for an unknown code.
+
+    Parameters
+    ----------
+    code : str
+        Without joints: ``CLEARANCE_SEEN``, not ``CLEARANCE_SEEN_G``.
+    """
+    return f"{FOLDER}/{_PAGES.get(code, START)}.md"
+
+
+# Human-readable texts of an alarm: its state, its worst value, its start.
+
+
+_FIRST_DATE_S = 1.0e8  # a smaller stamp is from a clock that began at zero
+
+ADVICE = "The monitor advises. The absence of an alarm does not mean the joints are healthy."
+
+
+def state_of(alarm: Alarm) -> str:
+    """An alarm's state, without values."""
+    if alarm.level is Level.OK:
+        return "OK"
+    present = "present" if alarm.present is alarm.level else "latched"
+    return f"{present}, acknowledged" if alarm.acknowledged else present
+
+
+def raised_words(state: str, worst: float | None, limit: float | None, unit: str, raised_ns: int) -> str:
+    """Description of a raised alarm, such as ``latched, worst 0.42, limit 0.05, since ...``.
+
+    Parameters
+    ----------
+    state : str
+        As returned by `state_of`.
+    worst, limit : float or None
+        None or NaN if unknown, as for an alarm from an older ledger.
+    unit : str
+    raised_ns : int
+        Stamp at which it was raised.
+    """
+    words = [state]
+    for name, value in (("worst", worst), ("limit", limit)):
+        if value is not None and not math.isnan(value):
+            words.append(f"{name} {_three_digits(value)} {unit}".rstrip())
+    return ", ".join([*words, f"since {time_words(raised_ns)}"])
+
+
+def time_words(stamp_ns: int) -> str:
+    """A stamp as date and time, or as seconds if its clock began at zero."""
+    seconds = stamp_ns / 1.0e9
+    if seconds < _FIRST_DATE_S:
+        return f"{seconds:.3f} s"
+    return datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
+
+
+def _three_digits(value: float) -> str:
+    """Three digits; whole numbers as they are."""
+    return f"{value:.0f}" if 1000.0 <= abs(value) < 1.0e6 else f"{value:.3g}"

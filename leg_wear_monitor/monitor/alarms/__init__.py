@@ -1,1 +1,0 @@
-"""Alarms: levels, limits, deadband and latch, and their words."""

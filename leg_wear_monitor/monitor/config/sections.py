@@ -1,0 +1,165 @@
+"""Sections of the parameters: drive, forecast."""
+
+import attrs
+
+from leg_wear_monitor.configuration import described, quantity
+from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.estimate.signature import DriveFigures
+from leg_wear_monitor.mechanism.sourced import LIBRARY, Drive, load_drive
+
+# What is declared of the drive: a file by name, and numbers that override it.
+
+
+NOT_DECLARED = -1.0
+
+
+def _figure(unit: str, doc: str, least: float, most: float) -> float:
+    """Parameter for a figure within bounds, or `NOT_DECLARED`."""
+
+    def fault(value: float) -> str | None:
+        if value == NOT_DECLARED or least <= value <= most:
+            return None
+        bounds = f"{least:g} to {most:g} {unit}".rstrip()
+        return f"{value!r} is not within its bounds, expected {bounds}, or {NOT_DECLARED} if not declared"
+
+    text = f"{doc}; {NOT_DECLARED:g}: that of drive.type, or estimated"
+    number: float = quantity(
+        unit, text, at_least=NOT_DECLARED, at_most=most, default=NOT_DECLARED, check=fault
+    )
+    return number
+
+
+@attrs.frozen(kw_only=True)
+class DriveParameters:
+    """What is known of the drive beforehand; all else is estimated. The numbers are at the crank."""
+
+    type: str = described(
+        "the drive: a name that `leg-wear-monitor drives` lists, or a file; empty: unknown", default=""
+    )
+    gear_ratio: float = quantity(
+        "",
+        "turns of the drive's output per turn of the crank, for the figures of drive.type",
+        at_least=1.0e-4,
+        at_most=1.0e4,
+        default=1.0,
+    )
+    lag_s: float = _figure("s", "time by which the measured torque is late", 0.0, 1.0)
+    bandwidth_hz: float = _figure(
+        "Hz", "corner frequency of the low-pass between the crank's torque and the measured one", 0.01, 1.0e5
+    )
+    load_friction: float = _figure(
+        "", "friction of the drive by load, as a fraction of the torque's size", 0.0, 0.9
+    )
+    coulomb_nm: float = _figure("N m", "constant friction of the drive, at the crank", 0.0, 1.0e6)
+    viscous_nms: float = _figure("N m s/rad", "friction of the drive by speed, at the crank", 0.0, 1.0e6)
+    stiffness_nm_per_rad: float = _figure(
+        "N m/rad", "stiffness between the measured angle and the crank, at the crank", 1.0e-3, 1.0e12
+    )
+
+
+def drive_figures(parameters: DriveParameters, source: str = "parameters") -> DriveFigures:
+    """Declared figures of a drive at the crank: those of its file, overridden by the numbers.
+
+    Parameters
+    ----------
+    parameters : DriveParameters
+    source : str
+        Origin of the parameters, for messages.
+
+    Raises
+    ------
+    ConfigError
+        If there is no drive of this name, with the nearest name, or if its file has a fault.
+    """
+    figures = DriveFigures()
+    if parameters.type:
+        fault = LIBRARY.unknown(parameters.type)
+        if fault:
+            raise ConfigError(source, "drive.type", f"{parameters.type!r}: {fault}")
+        figures = _of_file(load_drive(parameters.type), parameters.gear_ratio)
+    given = {name: getattr(parameters, name) for name in attrs.asdict(figures)}
+    return attrs.evolve(figures, **{name: value for name, value in given.items() if value != NOT_DECLARED})
+
+
+def _of_file(drive: Drive, output_turns: float) -> DriveFigures:
+    """Figures of a file, at a crank for one turn of which the drive's output makes some turns."""
+    turns = output_turns * drive.motor_turns
+    factors = {
+        "lag_s": (drive.lag, 1.0),
+        "bandwidth_hz": (drive.bandwidth, 1.0),
+        "load_friction": (drive.load_friction, 1.0),
+        "coulomb_nm": (drive.coulomb, turns),
+        "viscous_nms": (drive.viscous, turns**2),
+        "stiffness_nm_per_rad": (drive.stiffness, turns**2),
+    }
+    return DriveFigures(**{name: value.si * by for name, (value, by) in factors.items() if value is not None})
+
+
+# Parameters of the forecast: uncertain quantities and their standard deviations.
+
+
+_LEAST_SIGMA = 0.001  # below, the grid of the estimate would be finer than rounding
+
+
+def _not_next_to_0(sigma: float) -> str | None:
+    if sigma == 0.0 or sigma >= _LEAST_SIGMA:
+        return None
+    return f"{sigma!r} is neither 0 nor at least {_LEAST_SIGMA:g}"
+
+
+@attrs.frozen(kw_only=True)
+class Forecasting:
+    """Uncertainties of the forecast as standard deviations; those of factors are of the natural logarithm."""
+
+    wear_coefficient_sigma: float = quantity(
+        "",
+        "standard deviation of the logarithm of a joint's wear coefficient about the given one; 0: the "
+        "spread of the joint's material pair, or 0.7 where that gives none",
+        at_least=0.0,
+        at_most=3.0,
+        default=0.0,
+        check=_not_next_to_0,
+    )
+    load_sigma: float = quantity(
+        "",
+        "standard deviation of the logarithm of future wear per cycle, because load and pace vary",
+        at_least=0.0,
+        at_most=3.0,
+        default=0.1,
+    )
+    model_sigma: float = quantity(
+        "",
+        "standard deviation of the logarithm of the growth, which is assumed constant without simulated "
+        "lives (docs/explanation/forecast.md)",
+        at_least=0.0,
+        at_most=3.0,
+        default=0.4,
+    )
+    clearance_sigma_m: float = quantity(
+        "m", "standard deviation of a new joint's clearance", at_least=1.0e-9, at_most=1.0e-3, default=5.0e-6
+    )
+    duty_hours_per_day: float = quantity("h", "walking per day", at_least=0.01, at_most=24.0, default=8.0)
+    duty_sigma: float = quantity(
+        "",
+        "standard deviation of the logarithm of the walking per day",
+        at_least=0.0,
+        at_most=3.0,
+        default=0.2,
+    )
+    window_cycles: int = quantity(
+        "",
+        "gait cycles over which the growth of the forecast is averaged",
+        at_least=10,
+        at_most=100000,
+        default=2000,
+    )
+    life: str = described(
+        "file that `leg-wear-monitor life --lives 16 --json` wrote for this leg: how growth changes as all "
+        "clearances open; empty: the one that comes with the package for just this leg, if there is one",
+        default="",
+    )
+    priors: str = described(
+        "file of priors that a fleet has learned for this leg's wear coefficients; empty: "
+        "the spread of wear_coefficient_sigma about the given ones",
+        default="",
+    )

@@ -1,1 +1,0 @@
-"""Clearance estimates from joint encoders."""

@@ -1,0 +1,491 @@
+"""Alarm evaluation of gait cycles and input, once in each evaluation period."""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from leg_wear_monitor.compiled.kernel import Records, entry, new_records
+from leg_wear_monitor.estimate.cause import NamedCause
+from leg_wear_monitor.estimate.mismatch import Allowed
+from leg_wear_monitor.monitor import alarm_specs
+from leg_wear_monitor.monitor.alarm_specs import AlarmSpec, CycleEvidence, LimitSource
+from leg_wear_monitor.monitor.alarms import Alarm, Level, Limit, acknowledged, cleared, evaluated, has_changed
+from leg_wear_monitor.monitor.config.fitting import largest_lag_s
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.gait_evidence import TorqueRecord
+from leg_wear_monitor.monitor.inputs import (
+    InputGuard,
+    InputHealth,
+    TorqueRange,
+    causes,
+    input_health,
+    with_torques,
+)
+from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, JointReport
+from leg_wear_monitor.monitor.torque_checks import TorqueBounds, torque_bounds, torque_causes, torque_values
+from leg_wear_monitor.monitor.verdict.situation import is_held_by_estimate
+from leg_wear_monitor.twin.digital_twin import DigitalTwin
+from leg_wear_monitor.twin.sample import NO_LOAD, Samples
+from leg_wear_monitor.twin.statistics import CycleStatistics, Intake, NotCompared, Tracking
+
+# All alarms of a monitor, and the limits that its parameters set for them.
+
+
+_NO_SOURCES: Mapping[str, tuple[float, str]] = {}
+
+
+def joint_specs(config: MonitorConfig) -> tuple[AlarmSpec[JointReport], ...]:
+    """Specs of the alarms of each clearance joint."""
+    return (*alarm_specs.JOINT, *(alarm_specs.ENCODERS if config.encoders.names else ()))
+
+
+def specs_of(
+    config: MonitorConfig, clearance_joints: tuple[str, ...]
+) -> Iterator[tuple[AlarmSpec[Any], int, Alarm]]:
+    """Specs of all alarms in their order, each with the number of its joint and its initial alarm."""
+    for k, joint in enumerate(clearance_joints):
+        yield from ((spec, k, spec.new(joint)) for spec in joint_specs(config))
+    of_leg: tuple[AlarmSpec[Any], ...] = (*alarm_specs.TORQUE, *alarm_specs.GAIT, *alarm_specs.OF_INPUT)
+    of_leg += alarm_specs.OF_FOOT_LOAD if config.foot_load.source != NO_LOAD else ()
+    yield from ((spec, 0, spec.new()) for spec in of_leg)
+
+
+def limits_of(
+    config: MonitorConfig, clearance_joints: tuple[str, ...], torque_size_nm: float = 1.0
+) -> dict[str, Limit]:
+    """Limit of every alarm by its name; ``torque_size_nm`` is the RMS of the predicted drive torque."""
+    bounds = torque_bounds(config, torque_size_nm, largest_lag_s(config))
+    return {
+        alarm.name: spec.limits(LimitSource(config, bounds, k))
+        for spec, k, alarm in specs_of(config, clearance_joints)
+    }
+
+
+class AlarmBoard:
+    """Present state of all alarms.
+
+    Parameters
+    ----------
+    config : MonitorConfig
+    clearance_joints : tuple of str
+    torque_size_nm : float
+        RMS of the predicted drive torque.
+
+    Attributes
+    ----------
+    alarms : dict of str to Alarm
+        By name, always in the same order.
+    """
+
+    def __init__(
+        self, config: MonitorConfig, clearance_joints: tuple[str, ...], torque_size_nm: float = 1.0
+    ) -> None:
+        self._clearance_joints, self._torque_size_nm = clearance_joints, torque_size_nm
+        self._limits = limits_of(config, clearance_joints, torque_size_nm)
+        self.alarms = {alarm.name: alarm for _, _, alarm in specs_of(config, clearance_joints)}
+
+    def configure(self, config: MonitorConfig) -> None:
+        """Use other limits from now on."""
+        self._limits = limits_of(config, self._clearance_joints, self._torque_size_nm)
+
+    @property
+    def clearance_limits_m(self) -> tuple[float, ...]:
+        """Limit of each clearance joint's clearance."""
+        return tuple(
+            self._limits[alarm_specs.CLEARANCE.name(joint)].error for joint in self._clearance_joints
+        )
+
+    @property
+    def held_by_estimate(self) -> tuple[str, ...]:
+        """Alarms of clearances that are present because of what encoders or the drive torque showed."""
+        names = map(alarm_specs.CLEARANCE.name, self._clearance_joints)
+        return tuple(name for name in names if is_held_by_estimate(self.alarms[name]))
+
+    def evaluate(
+        self,
+        values: Mapping[str, float],
+        stamp_ns: int,
+        cycles: int = 1,
+        sources: Mapping[str, tuple[float, str]] = _NO_SOURCES,
+        impact_factor: float = 1.0,
+    ) -> tuple[AlarmList, ...]:
+        """Evaluate values by alarm name; returns one list of all alarms if the shown state has changed.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+        stamp_ns : int
+        cycles : int
+            Number of gait cycles that the values represent.
+        sources : mapping of str to (float, str)
+            Standard deviation and source of some values, by alarm name.
+        impact_factor : float
+            On the limits of impact forces.
+        """
+        found = []
+        for name, value in values.items():
+            limit = self._limit(name, impact_factor)
+            found.append(evaluated(self.alarms[name], value, limit, stamp_ns, cycles, *sources.get(name, ())))
+        return self._set(found, stamp_ns)
+
+    def _limit(self, name: str, impact_factor: float) -> Limit:
+        """Limit of an alarm, with a factor on those of impact forces."""
+        is_impact = impact_factor != 1.0 and self.alarms[name].kind == alarm_specs.IMPACT.kind
+        return self._limits[name].times(impact_factor) if is_impact else self._limits[name]
+
+    def evaluate_early(
+        self, values: Mapping[str, float], stamp_ns: int, impact_factor: float = 1.0
+    ) -> tuple[AlarmList, ...]:
+        """Evaluate values that may still rise until the gait cycle ends: they can only raise their alarms."""
+        found = []
+        for name, value in values.items():
+            before, limit = self.alarms[name], self._limit(name, impact_factor)
+            after = evaluated(before, value, limit, stamp_ns)
+            if limit.on_delay == 1 and after.present > before.present:
+                found.append(after)
+        return self._set(found, stamp_ns)
+
+    def acknowledge(self) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
+        """Acknowledge all alarms; returns the cleared ones and the remaining ones in their new state."""
+        now = [acknowledged(alarm) for alarm in self.alarms.values() if alarm.level is not Level.OK]
+        self.alarms |= {alarm.name: alarm for alarm in now}
+        normal = tuple(alarm for alarm in now if alarm.level is Level.OK)
+        return normal, tuple(alarm for alarm in now if alarm.level is not Level.OK)
+
+    def acknowledge_one(self, name: str) -> None:
+        """Acknowledge one alarm."""
+        self.alarms = self.alarms | {name: acknowledged(self.alarms[name])}
+
+    def clear(self, names: Iterable[str]) -> None:
+        """Make alarms as new whose part is not there any more."""
+        self.alarms = self.alarms | {name: cleared(self.alarms[name]) for name in names}
+
+    def restore(self, alarms: Iterable[Alarm]) -> None:
+        """Restore alarms from another run."""
+        for alarm in alarms:
+            if alarm.name in self.alarms:
+                own = self.alarms[alarm.name]
+                self.alarms[alarm.name] = attrs.evolve(alarm, unit=own.unit)
+
+    def level(self, *names: str) -> Level:
+        """Highest shown level of some alarms."""
+        return max(self.alarms[name].level for name in names)
+
+    def _set(self, found: Iterable[Alarm], stamp_ns: int) -> tuple[AlarmList, ...]:
+        before = self.alarms
+        self.alarms = before | {alarm.name: alarm for alarm in found}
+        if any(has_changed(before[name], alarm) for name, alarm in self.alarms.items()):
+            return (AlarmList(stamp_ns, tuple(self.alarms.values())),)
+        return ()
+
+
+# Evaluation periods: a quarter of the commanded gait cycle each, at whose end alarms are evaluated.
+#
+# They follow from the samples in their order of arrival alone: however those are cut into blocks, the monitor
+# looks at the same instants. A period ends when two samples in a row lie outside of it; one alone may have a
+# stray stamp. It also ends after many samples that bring no time, or a stream of such would never be judged.
+
+
+A_CYCLE = 4
+IDLE_LIMIT, LIMIT = 50, 50_000  # samples without time, samples in all
+
+PERIOD_STATE = np.dtype(
+    [
+        ("begin", "i8"),  # of the period [ns]
+        ("newest", "i8"),  # stamp in it [ns]
+        ("idle", "i8"),  # samples since the newest
+        ("outside", "i8"),  # 1 where the last sample lay outside
+        ("count", "i8"),  # samples
+    ]
+)
+
+
+@entry
+def find_period_end(stamp, first, length, states):  # type: ignore[no-untyped-def]
+    """Index after the sample, from ``first`` on, that ends the period; -1 if none does.
+
+    ``stamp`` (n,) [ns], not above 0 where a sample has none; ``length`` of a period [ns]; the only one of
+    ``states`` is changed.
+    """
+    state = states[0]
+    for i in range(first, stamp.shape[0]):
+        at = stamp[i]
+        state.idle += 1
+        state.count += 1
+        if at > 0:
+            if state.begin == 0:
+                state.begin, state.newest = at, at
+            since = at - state.begin  # of two stamps above 0: it cannot overflow
+            outside = since >= length or since < -length
+            if at > state.newest and not outside:
+                state.newest, state.idle = at, 0
+            if outside and state.outside > 0:
+                state.begin, state.newest = at, at
+                state.idle, state.outside, state.count = 0, 0, 0
+                return i + 1
+            state.outside = 1 if outside else 0
+        if state.idle >= IDLE_LIMIT or state.count >= LIMIT:
+            state.idle, state.count = 0, 0
+            return i + 1
+    return -1
+
+
+class EvaluationPeriods:
+    """Cuts a stream of samples at the ends of its evaluation periods.
+
+    Parameters
+    ----------
+    length_ns : int
+        Of a period.
+    """
+
+    def __init__(self, length_ns: int) -> None:
+        self._length = length_ns
+        self.state: Records = new_records(1, PERIOD_STATE)
+
+    def pieces(self, samples: Samples) -> Iterator[tuple[Samples, bool]]:
+        """Pieces of a block, and whether a period ends with each."""
+        stamp: NDArray[np.int64] = np.ascontiguousarray(samples["stamp_ns"])
+        begin = 0
+        while begin < len(samples):
+            end = int(find_period_end(stamp, begin, self._length, self.state))
+            yield samples[begin : end if end > 0 else None], end > 0
+            begin = end if end > 0 else len(samples)
+
+
+_FASTER = 1.1  # than commanded; the default tolerance of the cadence is a tenth
+
+
+@attrs.define
+class AlarmEvaluationState:
+    """State of the evaluation; every value is immutable, so a shallow copy is a snapshot.
+
+    Attributes
+    ----------
+    before : Intake
+        Counts at the last evaluation of the input.
+    skipped, skipped_before : int
+        Samples skipped up to the last evaluation, and up to the one before.
+    torque : TorqueRange
+        Range of the torques since the last evaluation.
+    evaluation_periods, cycles : int
+        Evaluation periods and whole gait cycles since the last evaluation.
+    health : InputHealth or None
+        Health of the input at the last evaluation.
+    withheld : int
+        Samples that the guard had withheld at the last evaluation.
+    causes : tuple of str or None
+        Causes of unused samples at the last evaluation.
+    cadence_rpm : float
+        Of the last gait cycle, 0 before the first.
+    """
+
+    before: Intake
+    skipped: int = 0
+    skipped_before: int = 0
+    torque: TorqueRange = TorqueRange()
+    evaluation_periods: int = 0
+    cycles: int = 0
+    health: InputHealth | None = None
+    withheld: int = 0
+    causes: tuple[str, ...] | None = None
+    cadence_rpm: float = 0.0
+
+
+class AlarmEvaluation:
+    """Evaluates a twin's gait cycles and its input.
+
+    Parameters
+    ----------
+    twin : DigitalTwin
+    config : MonitorConfig
+    cycle_ns : int
+        Duration of a commanded gait cycle.
+    guard : InputGuard
+    periods : int
+        Evaluation periods in that duration.
+    """
+
+    def __init__(
+        self,
+        twin: DigitalTwin,
+        config: MonitorConfig,
+        cycle_ns: int,
+        guard: InputGuard,
+        periods: int = A_CYCLE,
+    ) -> None:
+        self._twin, self._periods = twin, periods
+        self.guard = guard
+        self._cycle_ns = cycle_ns
+        self.config = config
+        self.board = AlarmBoard(config, twin.clearance_joints, twin.torque_size_nm)
+        self.state = AlarmEvaluationState(twin.intake)
+
+    def configure(self, config: MonitorConfig) -> None:
+        """Use other limits from now on."""
+        self.config = config
+        self.board.configure(config)
+
+    def holds(self) -> bool:
+        """Whether the model is valid for the present motion: cadence and torque are as expected."""
+        return self.board.level(alarm_specs.CADENCE.name(), alarm_specs.MISMATCH.name()) is not Level.ERROR
+
+    def add_samples(self, piece: Samples) -> None:
+        """Add received samples."""
+        saturation_nm = self.config.drive_torque.saturation_nm
+        self.state.torque = with_torques(self.state.torque, piece, saturation_nm)
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """Causes of unused samples, at present and over the duration of the last gait cycle."""
+        now = (self.guard.cause,) if self.guard.cause else ()
+        return now + (self._causes() if self.state.causes is None else self.state.causes)
+
+    @property
+    def _withheld(self) -> int:
+        return self.guard.conflicting + self.guard.implausible
+
+    def _causes(self) -> tuple[str, ...]:
+        withheld = self._withheld - self.state.withheld
+        return tuple(causes(self.state.before, self._twin.intake, withheld, self.config))
+
+    @property
+    def torque_bounds(self) -> TorqueBounds:
+        """Bounds of the drive torque."""
+        return torque_bounds(self.config, self._twin.torque_size_nm, largest_lag_s(self.config))
+
+    def is_torque_sound(self, report: CycleReport) -> bool:
+        """Whether a gait cycle's torque is as predicted, so that its friction is that of this leg."""
+        return report.torque_mismatch < self.allowed_torque.unexplained
+
+    @property
+    def allowed_torque(self) -> Allowed:
+        """Which torque a leg without a fault may have."""
+        limits, bounds = self.config.limits, self.torque_bounds
+        return Allowed(
+            lag_s=bounds.max_lag_s,
+            loads_n=self._twin.settings.loads_n,
+            friction_nm=bounds.max_friction_nm,
+            unexplained=limits.warn_fraction * limits.torque_mismatch,
+        )
+
+    def present_causes(self, report: CycleReport, record: TorqueRecord) -> dict[str, NamedCause]:
+        """Causes of the torque's alarms whose values are beyond their limits now, by the alarm."""
+        names = {spec.name() for spec in alarm_specs.TORQUE}
+        raised = {name for name in names if self.board.alarms[name].present is not Level.OK}
+        return torque_causes(raised, report, record, self.torque_bounds)
+
+    def why_not_compared(self, statistics: CycleStatistics) -> NotCompared | None:
+        """Why the torque of a gait cycle is not compared with the predicted one; None if it is."""
+        is_allowed = self.config.cadence.allows(statistics.cadence_rpm)
+        return statistics.not_compared if is_allowed else NotCompared.CADENCE
+
+    def end_cycle(
+        self, report: CycleReport, record: TorqueRecord, foot_load: Mapping[str, float] | None = None
+    ) -> tuple[AlarmList, ...]:
+        """Evaluate a whole gait cycle, with its torque and the record; returns all alarms if one changed.
+
+        ``foot_load`` are values of the alarms of the foot load's sensor; None without one.
+        """
+        self.state.cycles += 1
+        sensor = (
+            {}
+            if foot_load is None
+            else {spec.name(): spec.value(foot_load) for spec in alarm_specs.FOOT_LOAD}
+        )
+        if not report.is_followed:
+            return self._end_tracked(report, sensor)
+        torque = torque_values(report, record, self.torque_bounds)
+        cycle = CycleEvidence(report, torque, self.config.cadence.commanded_rpm)
+        values = {
+            spec.name(): spec.value(cycle) for spec in (*alarm_specs.TORQUE, *alarm_specs.GAIT)
+        } | sensor
+        if not self.config.cadence.allows(report.cadence_rpm):
+            del values[alarm_specs.MISMATCH.name()]
+        for joint in report.joints:
+            values |= {spec.name(joint.joint): spec.value(joint) for spec in joint_specs(self.config)}
+        for name in self.board.held_by_estimate:  # it is evaluated with the estimate, at the period's end
+            values.pop(name, None)
+        factor = self._impact_factor(report.cadence_rpm)
+        self.state.cadence_rpm = report.cadence_rpm
+        return self.board.evaluate(values, report.stamp_ns, impact_factor=factor)
+
+    def _impact_factor(self, rpm: float) -> float:
+        """Factor on the limits of impact forces, which are those of the commanded cadence, at another one.
+
+        Forces grow with the square of the speed and more: peaks of a healthy leg are 4.1 kN at 60 and 6.9 kN
+        at 75 rpm (medians of joint A over an hour, benchmarks/cadences.py). A gait cycle that ends slower
+        than it began has the limits of the one before. Up to a tenth faster than commanded, as by a ripple,
+        and slower, the limits stay.
+        """
+        cadence = self.config.cadence
+        commanded = abs(cadence.commanded_rpm)
+        fastest = min(max(abs(rpm), abs(self.state.cadence_rpm)), commanded + cadence.tolerance_rpm)
+        return (fastest / commanded) ** 2 if fastest > _FASTER * commanded else 1.0
+
+    def _end_tracked(self, report: CycleReport, sensor: Mapping[str, float]) -> tuple[AlarmList, ...]:
+        """Evaluate a gait cycle that was tracked only: it has neither forces nor a predicted torque."""
+        departure = abs(report.cadence_rpm - self.config.cadence.commanded_rpm)
+        clearances = {
+            alarm_specs.CLEARANCE.name(joint.joint): alarm_specs.CLEARANCE.value(joint)
+            for joint in report.joints
+        }
+        for name in self.board.held_by_estimate:
+            clearances.pop(name, None)
+        return self.board.evaluate(
+            {alarm_specs.CADENCE.name(): departure, **clearances, **sensor}, report.stamp_ns
+        )
+
+    def end_period(self, skipped: int = 0) -> tuple[AlarmList, ...]:
+        """Evaluate impacts of the running gait cycle, and once per duration of a cycle the input.
+
+        Parameters
+        ----------
+        skipped : int
+            Number of samples skipped so far because their wear is already counted.
+        """
+        peaks = {
+            alarm_specs.IMPACT.name(joint): float(peak)
+            for joint, peak in zip(self._twin.clearance_joints, self._twin.peak_force_n, strict=True)
+        }
+        factor = self._impact_factor(self._twin.speed_radps * 30.0 / math.pi)
+        early = self.board.evaluate_early(peaks, self._twin.intake.followed_stamp_ns, factor)
+        sources = {alarm_specs.SOURCES.name(): alarm_specs.SOURCES.value(self.guard)}
+        early += self.board.evaluate(sources, self.guard.stamp_ns)
+        self.state.evaluation_periods += 1
+        if self.state.evaluation_periods < self._periods:
+            return early
+        return early + self._evaluate_input(skipped)
+
+    def pause(self) -> None:
+        """Note a pause of the recording: the evaluation of the input starts again with the next sample."""
+        intake = attrs.evolve(self._twin.intake, newest_stamp_ns=0)
+        self.state = AlarmEvaluationState(
+            intake, self.state.skipped, self.state.skipped_before, cadence_rpm=self.state.cadence_rpm
+        )
+
+    def _evaluate_input(self, skipped: int) -> tuple[AlarmList, ...]:
+        state, intake, config = self.state, self._twin.intake, self.config
+        is_whole = skipped == state.skipped == state.skipped_before
+        health = input_health(state.before, intake, state.torque, is_whole)
+        rate = alarm_specs.FOOT_LOAD_RATE
+        read = (*alarm_specs.INPUT, rate) if rate.name() in self.board.alarms else alarm_specs.INPUT
+        values = {spec.name(): spec.value(health) for spec in read}
+        if state.cycles == 0 and self._twin.tracking is Tracking.OUT_OF_STEP:
+            speed_rpm = self._twin.speed_radps * 30.0 / math.pi
+            values[alarm_specs.CADENCE.name()] = abs(speed_rpm - config.cadence.commanded_rpm)
+        self.state = AlarmEvaluationState(
+            intake,
+            skipped,
+            state.skipped,
+            health=health,
+            withheld=self._withheld,
+            causes=self._causes(),
+            cadence_rpm=state.cadence_rpm,
+        )
+        cycles = 1 if math.isnan(health.duration_s) else round(1.0e9 * health.duration_s / self._cycle_ns)
+        return self.board.evaluate(values, intake.newest_stamp_ns, max(1, cycles))

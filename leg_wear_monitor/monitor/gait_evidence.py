@@ -1,0 +1,318 @@
+"""What gait cycles say: are they of this leg, its torque at commissioning, how the mismatch went."""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.estimate.cause import NamedCause, TorqueExplanation
+from leg_wear_monitor.estimate.mismatch import TimingBySpeed
+from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.monitor.alarms import Alarm, Level
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.reports import CycleReport
+from leg_wear_monitor.twin import CRANK
+from leg_wear_monitor.twin.sample import FAULTS, NO_FAULT, Samples
+from leg_wear_monitor.twin.statistics import LONGEST, CycleStatistics, NotCompared
+
+# Evidence that the followed motion is a gait of this leg; without one such cycle, forces are meaningless.
+
+
+_SLOWEST, _FASTEST = 0.5, 2.0  # cadence over the commanded one
+_UNLIKE = 0.8  # unexplained torque over the predicted one
+_FLAT = 0.05  # measured torque over the predicted one
+_STEEP = 20.0  # likewise; 1/_FLAT, and far beyond what any load or wear adds
+_SAMPLES_A_TURN = 12
+
+
+def _unit_words(measured: float, predicted: float) -> str:
+    """What to look at if the torque is in another unit; empty if it is not."""
+    if not any(1.0 / 3.0 < factor * measured / predicted < 3.0 for factor in (1.0e-3, 1.0e3)):
+        return ""
+    return (
+        "; that is a factor of 1000: check its unit (of a table input.units.drive_torque, "
+        "else drive_torque.scale)"
+    )
+
+
+def _difference(cycle: CycleReport) -> float:
+    """Difference of measured and predicted torque, as a fraction of the predicted one."""
+    if math.isnan(cycle.torque_mismatch):  # as in the first gait cycles: with load, friction and lag
+        return cycle.residual_torque_rms_nm / cycle.predicted_torque_rms_nm
+    return cycle.torque_mismatch
+
+
+def doubts(cycle: CycleReport, config: MonitorConfig) -> list[str]:
+    """Reasons why a gait cycle is unlikely to be one of this leg; empty if there are none.
+
+    Parameters
+    ----------
+    cycle : CycleReport
+    config : MonitorConfig
+        Gives the commanded cadence.
+    """
+    commanded, found = config.cadence.commanded_rpm, []
+    # in a gait cycle in which the leg stood, it stopped and started, too
+    stood = cycle.stamp_ns - cycle.begin_ns > LONGEST * 1.0e9 * cycle.moving_s
+    if not (stood or _SLOWEST <= cycle.cadence_rpm / commanded <= _FASTEST):
+        found.append(
+            f"the crank turns at {cycle.cadence_rpm:.3g} rpm, the commanded cadence is {commanded:.3g} rpm"
+        )
+    if cycle.torque_samples:
+        predicted, measured = cycle.predicted_torque_rms_nm, cycle.measured_torque_rms_nm
+        if not _FLAT * predicted <= measured <= _STEEP * predicted and math.isfinite(measured):
+            size = f"only {measured:.3g}" if measured < predicted else f"{measured:.3g}"
+            found.append(
+                f"the drive torque is {size} N m RMS, {predicted:.3g} N m are predicted"
+                + _unit_words(measured, predicted)
+            )
+        elif not (differs := _difference(cycle)) < _UNLIKE:
+            found.append(
+                "the drive torque does not resemble the predicted one: they differ by "
+                f"{differs:.2g} times the predicted torque"
+            )
+    return found
+
+
+@attrs.define
+class GaitEvidence:
+    """Counts gait cycles that fit this leg, and reports what is missing.
+
+    Parameters
+    ----------
+    config : MonitorConfig
+
+    Attributes
+    ----------
+    believable, doubtful : int
+        Numbers of gait cycles that fit this leg, and that do not.
+    """
+
+    config: MonitorConfig
+    believable: int = 0
+    doubtful: int = 0
+    _doubts: list[str] = attrs.field(factory=list, init=False)
+    _faults: Counter[str] = attrs.field(factory=Counter, init=False)
+    _sound: int = attrs.field(default=0, init=False)
+    _turned_rad: float = attrs.field(default=0.0, init=False)
+    _passed_s: float = attrs.field(default=0.0, init=False)
+    _last: tuple[int, float] | None = attrs.field(default=None, init=False)
+
+    def add_samples(self, samples: Samples) -> None:
+        """Add samples in the order of arrival."""
+        cranks = samples[samples["kind"] == CRANK]
+        for fault, number in zip(*np.unique(cranks["fault"], return_counts=True), strict=True):
+            if fault != NO_FAULT:
+                self._faults[FAULTS[int(fault)]] += int(number)
+        sound = cranks[cranks["fault"] == NO_FAULT]
+        if not len(sound):
+            return
+        self._sound += len(sound)
+        stamps, angles = sound["stamp_ns"], sound["crank_angle_rad"]
+        if self._last is not None:
+            stamps, angles = np.append(self._last[0], stamps), np.append(self._last[1], angles)
+        self._last = int(stamps[-1]), float(angles[-1])
+        steps = np.diff(stamps.astype(float)) / 1e9
+        ahead = (steps > 0.0) & (steps <= self.config.tracker.gap_limit_s)
+        with np.errstate(over="ignore", invalid="ignore"):  # an angle may be any finite number
+            turned = (np.diff(angles)[ahead] + math.pi) % TURN - math.pi
+        self._turned_rad += abs(float(np.nansum(turned)))
+        self._passed_s += float(steps[ahead].sum())
+
+    def add(self, cycle: CycleReport) -> None:
+        """Add a gait cycle."""
+        found = doubts(cycle, self.config)
+        self.believable += not found
+        self.doubtful += bool(found)
+        self._doubts = self._doubts or found
+
+    def missing(self) -> str:
+        """What is missing for one gait cycle that fits this leg; empty if there is one."""
+        if self.believable:
+            return ""
+        if self.doubtful:
+            return "; ".join(self._doubts)
+        if not self._sound:
+            faults = ", ".join(f"{number} {name}" for name, number in self._faults.items())
+            return f"no crank sample can be used ({faults})" if faults else "there is no crank sample"
+        return self._why_none()
+
+    def _why_none(self) -> str:
+        """Reason why valid samples form no gait cycle."""
+        gap, commanded = self.config.tracker.gap_limit_s, self.config.cadence.commanded_rpm
+        if not self._passed_s:
+            return f"no two of {self._sound} crank samples follow each other within {gap:g} s"
+        turns, rate = self._turned_rad / TURN, self._sound / self._passed_s
+        rpm, needed = 60.0 * turns / self._passed_s, _SAMPLES_A_TURN * abs(commanded) / 60.0
+        if rate < needed:
+            return f"crank samples come at {rate:.3g} Hz, too few: {commanded:.3g} rpm need {needed:.3g} Hz"
+        if turns < 2.0:
+            return (
+                f"the crank turns {turns:.2g} times in {self._passed_s:.3g} s: less than a whole gait cycle"
+            )
+        if not _SLOWEST <= rpm / abs(commanded) <= _FASTEST:
+            return f"the crank turns at {rpm:.3g} rpm, the commanded cadence is {abs(commanded):.3g} rpm"
+        return f"the crank turns {turns:.3g} times, but its motion cannot be followed over a whole gait cycle"
+
+
+# History of a leg's drive torque: friction at commissioning, lag at other speeds.
+
+
+COMMISSIONING_CYCLES = 20  # in a row with the torque as predicted, to store their friction as this leg's
+FRICTION_KEY, SIGMA_KEY = "friction_commissioned_nm", "friction_commissioned_sigma_nm"
+
+_FORGETTING = 0.99  # per gait cycle
+_RESOLVED_RAD = 0.005  # largest standard deviation of a known offset
+
+
+@attrs.frozen
+class TorqueRecord:
+    """Stored properties of a leg's drive torque.
+
+    Attributes
+    ----------
+    cycles : int
+        Gait cycles in a row with the torque as predicted, before commissioning.
+    friction_nm, sigma_nm : float
+        Constant torque at the commissioning of this leg, and its standard deviation; NaN before.
+    timing : TimingBySpeed
+    not_compared : mapping of str to int
+        Gait cycles whose torque was not compared in this run, by the values of `NotCompared`.
+    """
+
+    cycles: int = 0
+    friction_nm: float = math.nan
+    sigma_nm: float = math.nan
+    timing: TimingBySpeed = TimingBySpeed()
+    not_compared: Mapping[str, int] = attrs.field(factory=dict)
+
+    @property
+    def lag_and_offset(self) -> tuple[NamedCause, NamedCause] | None:
+        """Lag, and offset of the crank; None while the speeds are too similar to separate them."""
+        found = self.timing.split
+        return found if found and found[1].sigma < _RESOLVED_RAD else None
+
+    @classmethod
+    def of(cls, totals: dict[str, float]) -> "TorqueRecord":
+        """Record from the totals in a ledger."""
+        return cls(0, totals.get(FRICTION_KEY, math.nan), totals.get(SIGMA_KEY, math.nan))
+
+    @property
+    def totals(self) -> dict[str, float]:
+        """Totals for the ledger; empty before commissioning."""
+        if math.isnan(self.friction_nm):
+            return {}
+        return {FRICTION_KEY: self.friction_nm, SIGMA_KEY: self.sigma_nm}
+
+    def with_cycle(
+        self,
+        statistics: CycleStatistics,
+        report: CycleReport,
+        is_sound: bool,
+        not_compared: NotCompared | None = None,
+    ) -> "TorqueRecord":
+        """Record with one more gait cycle.
+
+        Parameters
+        ----------
+        statistics : CycleStatistics
+        report : CycleReport
+        is_sound : bool
+            Whether its torque was as predicted.
+        not_compared : NotCompared, optional
+            Why it was not compared.
+        """
+        if not report.torque_samples:
+            return self
+        record = attrs.evolve(self, timing=self._timing_with(statistics))
+        if not_compared is not None:
+            number = self.not_compared.get(not_compared.value, 0) + 1
+            return attrs.evolve(record, not_compared={**self.not_compared, not_compared.value: number})
+        if not math.isnan(self.friction_nm):
+            return record
+        cycles = self.cycles + 1 if is_sound else 0
+        if cycles < COMMISSIONING_CYCLES:
+            return attrs.evolve(record, cycles=cycles)
+        friction_nm, sigma_nm = report.friction_nm, report.friction_sigma_nm
+        return attrs.evolve(record, cycles=cycles, friction_nm=friction_nm, sigma_nm=sigma_nm)
+
+    def _timing_with(self, statistics: CycleStatistics) -> TimingBySpeed:
+        """The lag by speed with one more gait cycle; unchanged if the cycle has none."""
+        lag_s, sigma_s = statistics.torque.cycle_lag_s, statistics.torque.cycle_lag_sigma_s
+        if not (math.isfinite(lag_s) and sigma_s > 0.0):
+            return self.timing
+        speed = statistics.direction * TURN / statistics.moving_s
+        return self.timing.with_angle(-lag_s * speed, speed, sigma_s * abs(speed), _FORGETTING)
+
+
+# The gait cycles since the torque is not as predicted, and what explains them.
+
+
+_LONGEST = 60  # gait cycles
+_RISES = 2  # gait cycles of a new mismatch before it is found in the mean of the last ones
+_FIRST, _EVERY = (3, 5, 10), 20  # gait cycles after which they are explained, then each so many
+
+
+@attrs.frozen(eq=False)
+class MismatchWindow:
+    """Gait cycles whose torque is not as predicted.
+
+    Attributes
+    ----------
+    cycles : tuple of CycleStatistics
+        The last ones; while the torque is as predicted, the last few that were compared.
+    number : int
+        How many there were.
+    is_open : bool
+        Whether the alarm was present in the last gait cycle.
+    explanation : TorqueExplanation or None
+        As of the last time that one was found; kept while the alarm is latched.
+    """
+
+    cycles: tuple[CycleStatistics, ...] = ()
+    number: int = 0
+    is_open: bool = False
+    explanation: TorqueExplanation | None = None
+
+    def with_cycle(
+        self,
+        statistics: CycleStatistics,
+        alarm: Alarm,
+        explain: Callable[[Sequence[CycleStatistics]], TorqueExplanation | None],
+    ) -> "MismatchWindow":
+        """Window after one more gait cycle.
+
+        Parameters
+        ----------
+        statistics : CycleStatistics
+        alarm : Alarm
+            ``torque_mismatch`` after that cycle.
+        explain : callable
+            Explanation of some gait cycles.
+        """
+        is_compared = statistics.not_compared is None
+        if alarm.level is Level.OK:
+            if not is_compared:
+                return self
+            return MismatchWindow((*self.cycles, statistics)[-_FIRST[0] :], self.number + 1)
+        if alarm.present is Level.OK:
+            return attrs.evolve(self, cycles=(), number=_FIRST[0], is_open=False)
+        if not is_compared:
+            return self
+        before = self if self.is_open else self._before()
+        cycles, number = (*before.cycles, statistics)[-_LONGEST:], before.number + 1
+        explanation = before.explanation
+        if number in _FIRST or number % _EVERY == 0:
+            explanation = explain(cycles) or explanation  # a cause stays if the mismatch becomes less
+        return MismatchWindow(cycles, number, True, explanation)
+
+    def _before(self) -> "MismatchWindow":
+        """Window before the first gait cycle with the alarm: those in which it was found."""
+        since = self.number if self.number < _FIRST[0] else _RISES - 1
+        cycles = self.cycles[-since:] if since else ()
+        return MismatchWindow(cycles, len(cycles), explanation=self.explanation)
+
+
+NO_MISMATCH = MismatchWindow()

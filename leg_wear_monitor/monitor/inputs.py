@@ -1,0 +1,512 @@
+"""Checks of what comes in: angles that jump or freeze, causes of faults, pauses, health of each input."""
+
+import math
+from collections.abc import Mapping
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.compiled.kernel import Record, Records, entry, kernel, new_records, record_of
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.twin import CRANK, KINDS
+from leg_wear_monitor.twin.sample import (
+    FAULTS,
+    GAIT_SAMPLE,
+    MISSING_JOINT,
+    NO_FAULT,
+    OUT_OF_RANGE,
+    Samples,
+    TrackerSettings,
+)
+from leg_wear_monitor.twin.statistics import Intake
+from leg_wear_monitor.twin.tracker import LARGEST_ANGLE
+
+# Series of crank angles: each sample belongs to the series whose motion it continues best.
+#
+# The records of settings and states have the fields that are used here, and further ones.
+
+
+_TURN = 2.0 * math.pi
+WIDEST = 0.25  # distance from a series [rad] beyond which nothing belongs to it
+_SETTLING = 0.02  # s, over which the speed of a series is averaged
+
+
+@kernel
+def wrapped(angle):
+    """An angle in [-pi, pi)."""
+    return angle - _TURN * math.floor(angle / _TURN + 0.5)
+
+
+@kernel
+def guess_speed(settings, state, k, stamp, angle):
+    """Speed of a series of one sample: at rest, as commanded, or that of the other, what fits best."""
+    if state.number[k] != 1:
+        return
+    h = 1.0e-9 * (stamp - state.stamp[k])
+    moved, least = wrapped(angle - state.angle[k]), math.inf
+    for speed in (0.0, settings.commanded, state.speed[1 - k]):
+        off = abs(wrapped(moved - speed * h))
+        if off < least:
+            least, state.speed[k] = off, speed
+
+
+@kernel
+def distance(settings, state, k, stamp, angle):
+    """How far an angle is from where series k would be; infinite where it cannot belong to it."""
+    if state.number[k] == 0:
+        return math.inf
+    h = 1.0e-9 * (stamp - state.stamp[k])
+    if abs(h) > settings.gap:
+        return math.inf
+    off = abs(wrapped(angle - state.angle[k] - state.speed[k] * h))
+    # by how much the crank's greatest acceleration may have moved it
+    widest = min(WIDEST, settings.gate + 0.5 * (settings.largest * h) ** 2)
+    return off if off <= widest else math.inf
+
+
+@kernel
+def extend(state, k, stamp, angle):
+    """One more sample of series k; a late or repeated one tells nothing new."""
+    h = 1.0e-9 * (stamp - state.stamp[k])
+    if h <= 0.0:
+        return
+    off = wrapped(angle - state.angle[k] - state.speed[k] * h)
+    state.speed[k] += off / (h + _SETTLING)
+    state.angle[k], state.stamp[k] = angle, stamp
+    state.number[k] += 1
+
+
+@kernel
+def begin(state, k, stamp, angle):
+    """A new series takes the place of series k."""
+    state.number[k], state.stamp[k] = 1, stamp
+    state.angle[k], state.speed[k] = angle, 0.0
+
+
+# Crank angles that no one leg can give: two series that interleave, and angles in another unit.
+#
+# Both are found in the samples in their order of arrival alone, so that a replay finds what the live run
+# found.
+#
+# *Series*: each sample belongs to the series whose motion it continues best. Where two series go on side by
+# side and neither continues the other, two sources send one crank's angle. *Unit*: the angle as it was sent,
+# not wrapped to a turn, runs beyond the largest speed that is believed, evenly and for some time.
+
+
+SETTINGS = np.dtype(
+    [
+        ("gate", "f8"),  # of an angle [rad]
+        ("largest", "f8"),  # speed that is believed [rad/s]
+        ("gap", "f8"),  # longest within a series [s]
+        ("alone", "f8"),  # for how long one series must be alone before the other is forgotten [s]
+        ("commanded", "f8"),  # speed [rad/s]
+    ]
+)
+STATE = np.dtype(
+    [
+        # of both series
+        ("number", "i8", (2,)),  # samples
+        ("stamp", "i8", (2,)),  # of the last one [ns]
+        ("angle", "f8", (2,)),  # [rad]
+        ("speed", "f8", (2,)),  # [rad/s]
+        ("last", "i8"),  # which of them had the last sample
+        ("switches", "i8"),  # how often that has changed since the younger one began
+        ("since", "i8"),  # stamp of the last such change [ns]
+        ("two", "i8"),  # 1 where two sources send
+        # of the unit
+        ("anchor", "i8"),  # stamp of the last step's end [ns]
+        ("anchor_angle", "f8"),  # [rad]
+        ("step_speed", "f8"),  # of the last step [rad/s]
+        ("fast", "i8"),  # fast steps in a row
+        ("fast_speed", "f8"),  # of fast steps, averaged [rad/s]
+        ("plausible", "f8"),  # for how long the angle has moved as a leg's does [s]
+        ("other_unit", "i8"),  # 1 where the unit is another
+        # samples withheld
+        ("conflicting", "i8"),  # since two sources send
+        ("implausible", "i8"),  # since the unit is another
+    ]
+)
+
+# Samples that make a series, and changes from one to the other. Glitches at random angles continue each other
+# by chance in one of twelve (2 * WIDEST of a turn): eight in a row are one in thirty million.
+_SERIES, _INTERLEAVED = 8, 8
+_STEP_NS = 20_000_000  # least time of a step: noise of 1 mrad over it is 0.05 rad/s
+_STEPS = 3  # fast steps in a row: the jump of an angle that wraps is one
+
+
+@kernel
+def _are_two(settings, state, stamp, angle):
+    """Whether two series go on side by side, after one more sample."""
+    for k in range(2):
+        guess_speed(settings, state, k, stamp, angle)
+    near = distance(settings, state, 0, stamp, angle)
+    far = distance(settings, state, 1, stamp, angle)
+    k = 0 if near <= far else 1
+    strong = 0 if state.number[0] >= state.number[1] else 1
+    if max(near, far) < math.inf and state.number[1 - strong] < _SERIES:
+        k = strong  # a series must show itself by samples that the other does not explain
+    if min(near, far) < math.inf:
+        extend(state, k, stamp, angle)
+    else:
+        k = 0 if state.number[0] < state.number[1] else 1
+        begin(state, k, stamp, angle)
+        state.switches = 0
+    if k != state.last:
+        state.last, state.since = k, stamp
+        state.switches += 1
+    if min(state.number[0], state.number[1]) >= _SERIES and state.switches >= _INTERLEAVED:
+        state.two = 1
+    if abs(stamp - state.since) > 1.0e9 * settings.alone:
+        # the other has gone; what begins anew must show itself again
+        state.two, state.number[1 - k], state.switches, state.since = 0, 0, 0, stamp
+    return state.two == 1
+
+
+@kernel
+def _is_other_unit(settings, state, stamp, angle):
+    """Whether the angle runs as none of a leg's does, after one more sample."""
+    step = stamp - state.anchor
+    if state.anchor == 0 or abs(step) > 1.0e9 * settings.gap:
+        state.anchor, state.anchor_angle, state.fast = stamp, angle, 0
+    elif step >= _STEP_NS:
+        h, before = 1.0e-9 * step, state.step_speed
+        speed = (angle - state.anchor_angle) / h
+        state.anchor, state.anchor_angle, state.step_speed = stamp, angle, speed
+        if abs(speed) > settings.largest:
+            along = speed * math.copysign(1.0, before)
+            is_even = 0.5 * abs(before) < along < 2.0 * abs(before)
+            state.fast = state.fast + 1 if is_even else 1
+            if is_even:  # and not the jump of an angle that wraps
+                state.plausible, state.fast_speed = 0.0, 0.5 * (state.fast_speed + abs(speed))
+        else:
+            state.fast = 0
+            # at rest every unit is the same
+            if abs(speed) > 0.1 * abs(settings.commanded):
+                state.plausible += h
+    if state.fast >= _STEPS:
+        state.other_unit = 1
+    elif state.plausible * abs(settings.commanded) >= _TURN:  # a gait cycle's time
+        state.other_unit = 0
+    return state.other_unit == 1
+
+
+@entry
+def check_angles(all_settings, states, stamp, kind, angle, out_fault):
+    """Mark crank samples (n,) that cannot be used, as long as two sources send or the unit is another.
+
+    ``out_fault`` (n,) are the faults that are known. Of settings and states there is one each; the state is
+    changed.
+    """
+    settings, state = all_settings[0], states[0]
+    for i in range(stamp.shape[0]):
+        is_usable = kind[i] == CRANK and out_fault[i] == NO_FAULT and stamp[i] > 0
+        if not is_usable or not abs(angle[i]) <= LARGEST_ANGLE:
+            continue
+        if _is_other_unit(settings, state, stamp[i], angle[i]):
+            # its series mean nothing
+            state.number[0], state.number[1], state.two = 0, 0, 0
+            state.implausible += 1
+            out_fault[i] = OUT_OF_RANGE
+        elif _are_two(settings, state, stamp[i], angle[i]):
+            state.conflicting += 1
+            out_fault[i] = OUT_OF_RANGE
+
+
+# Withholds crank angles from the twin that no single leg can send: from two sources, or in another unit.
+
+
+_ALONE_S = 1.0
+_DEGREES, _NEAR = 180.0 / math.pi, 1.5  # factor by which a leg may be faster or slower than commanded
+
+
+class InputGuard:
+    """Checks crank samples before the twin follows them.
+
+    An unusable sample gets the fault ``out_of_range``: it is counted, its time is unmonitored, and it adds no
+    wear.
+
+    Parameters
+    ----------
+    settings : TrackerSettings
+    """
+
+    def __init__(self, settings: TrackerSettings) -> None:
+        self._commanded = abs(settings.commanded_speed_radps)
+        gap, speed = settings.bridge_limit_s, settings.commanded_speed_radps
+        alone = max(_ALONE_S, gap)
+        self._settings = new_records(1, SETTINGS)
+        self._settings[0] = settings.gate_rad, settings.largest_speed, gap, alone, speed
+        self._states = new_records(1, STATE)
+        self._state: Record = record_of(self._states)
+
+    def warm_up(self) -> None:
+        """Compile, before the first sample."""
+        self.checked(np.zeros(1, GAIT_SAMPLE))
+        self.restore(new_records(1, STATE))
+
+    def checked(self, samples: Samples) -> Samples:
+        """The same samples; a copy with faults where some cannot be used."""
+        fault = np.array(samples["fault"])
+        stamp, kind, angle = (np.array(samples[name]) for name in ("stamp_ns", "kind", "crank_angle_rad"))
+        check_angles(self._settings, self._states, stamp, kind, angle, fault)
+        if np.array_equal(fault, samples["fault"]):
+            return samples
+        samples = samples.copy()
+        samples["fault"] = fault
+        return samples
+
+    @property
+    def stamp_ns(self) -> int:
+        """Stamp of the last checked crank sample; 0 before the first."""
+        return int(self._state.stamp[self._state.last])
+
+    @property
+    def sources(self) -> int:
+        """Present number of series of crank angles: 2 if two different ones interleave."""
+        return 1 + int(self._state.two)
+
+    @property
+    def conflicting(self) -> int:
+        """Number of samples withheld because two sources sent them."""
+        return int(self._state.conflicting)
+
+    @property
+    def implausible(self) -> int:
+        """Number of samples withheld because their angle changes as that of no leg."""
+        return int(self._state.implausible)
+
+    @property
+    def speed_ratio(self) -> float:
+        """Speed of the angle over the commanded speed if no leg moves so fast; otherwise NaN."""
+        if not self._state.other_unit:
+            return math.nan
+        return float(self._state.fast_speed) / self._commanded
+
+    @property
+    def cause(self) -> str:
+        """Reason why crank samples are withheld at present, and what to do; empty if none are."""
+        if self.sources > 1:
+            return (
+                "two series of crank angles interleave and disagree: two publishers of one crank, or an "
+                "encoder that jumps; nothing is monitored until one is left"
+            )
+        ratio = self.speed_ratio
+        if math.isnan(ratio):
+            return ""
+        text = f"the crank's angle runs {ratio:.2g} times as fast as commanded, nothing is monitored: "
+        if _DEGREES / _NEAR < ratio < _DEGREES * _NEAR:
+            return text + "it seems to be in degrees; radians are expected"
+        return text + "check its unit (radians), crank.gear_ratio and cadence.commanded_rpm"
+
+    def snapshot(self) -> Records:
+        """A copy of the whole state."""
+        return self._states.copy()
+
+    def restore(self, snapshot: Records) -> None:
+        """Restore a snapshot of a guard with the same settings."""
+        self._states[:] = snapshot
+
+
+# Health of the input over a time: rates, unused samples, lost time, stuck torque.
+
+
+_LEAST_TORQUES = 10
+
+
+@attrs.frozen
+class TorqueRange:
+    """Torques without a fault: their number, extremes, and how many are at each extreme or saturated."""
+
+    number: int = 0
+    least_nm: float = math.inf
+    largest_nm: float = -math.inf
+    at_least: int = 0
+    at_largest: int = 0
+    saturated: int = 0
+
+    @property
+    def stuck_fraction(self) -> float:
+        """Fraction of the torques that are saturated, or repeat an extreme; NaN while there are few."""
+        if self.number < _LEAST_TORQUES:
+            return math.nan
+        repeated = max(count for count in (self.at_least, self.at_largest, 1))
+        return max(repeated if repeated > 1 else 0, self.saturated) / self.number
+
+
+def with_torques(before: TorqueRange, samples: Samples, saturation_nm: float) -> TorqueRange:
+    """Range extended by the torques of more samples, including efforts in crank samples."""
+    found = samples["torque_nm"][samples["fault"] == NO_FAULT]
+    found = found[np.isfinite(found)]
+    if not len(found):
+        return before
+    least, largest = min(before.least_nm, float(found.min())), max(before.largest_nm, float(found.max()))
+    beyond = np.count_nonzero(np.abs(found) >= saturation_nm) if saturation_nm > 0.0 else 0
+    return TorqueRange(
+        before.number + len(found),
+        least,
+        largest,
+        int(np.count_nonzero(found == least)) + (before.at_least if least == before.least_nm else 0),
+        int(np.count_nonzero(found == largest)) + (before.at_largest if largest == before.largest_nm else 0),
+        before.saturated + int(beyond),
+    )
+
+
+@attrs.frozen(kw_only=True)
+class InputHealth:
+    """Input statistics over a time; an unknown value is NaN.
+
+    Attributes
+    ----------
+    duration_s : float
+        Length of this time; NaN if it is unknown, or stamps did not advance.
+    rate_hz : dict of str to float
+        Used samples per second, by the names of `KINDS`.
+    bad_fraction : float
+        Fraction of the samples that were not used: faulty, repeated, late, with a stray stamp, or outliers.
+        Messages of other joints do not count while the crank's come.
+    lost_fraction : float
+        Fraction of the time in which the leg was not followed.
+    stuck_torque_fraction : float
+        Fraction of the torque samples that are saturated or repeat the largest or the smallest one; 1 if all
+        are equal.
+    """
+
+    duration_s: float
+    rate_hz: dict[str, float]
+    bad_fraction: float
+    lost_fraction: float
+    stuck_torque_fraction: float
+
+
+def input_health(before: Intake, after: Intake, torque: TorqueRange, is_whole: bool = True) -> InputHealth:
+    """Health of the input between two counts.
+
+    Parameters
+    ----------
+    before, after : Intake
+    torque : TorqueRange
+        Range of the torques between the two counts.
+    is_whole : bool
+        Whether all received samples were counted; otherwise the values over time are unknown.
+    """
+    span_s = (after.newest_stamp_ns - before.newest_stamp_ns) * 1.0e-9
+    is_known = is_whole and span_s > 0.0 and before.newest_stamp_ns > 0
+    duration_s = span_s if is_known else math.nan
+    monitored_s = after.moving_s - before.moving_s + after.standing_s - before.standing_s
+    others = of_other_joints(before, after)
+    received = after.received - before.received - others
+    return InputHealth(
+        duration_s=duration_s,
+        rate_hz={name: (used - before.used[name]) / duration_s for name, used in after.used.items()},
+        bad_fraction=(unused(after) - unused(before) - others) / received if received else math.nan,
+        lost_fraction=min(1.0, max(0.0, 1.0 - monitored_s / duration_s)) if is_known else math.nan,
+        stuck_torque_fraction=torque.stuck_fraction,
+    )
+
+
+def of_other_joints(before: Intake, after: Intake) -> int:
+    """Number of messages without the crank between two counts, if the crank came from another publisher.
+
+    Several drivers may publish joints of one robot on one topic.
+    """
+    crank, name = KINDS[CRANK].name, FAULTS[MISSING_JOINT]
+    has_crank = after.used[crank] > before.used[crank]
+    return after.faulty[name] - before.faulty[name] if has_crank else 0
+
+
+def unused(counts: Intake) -> int:
+    """Number of unused samples."""
+    faulty = sum(counts.faulty.values())
+    return faulty + counts.duplicates + counts.late + counts.stray_stamps + counts.outliers
+
+
+# Sentences on unused samples: how many of how many, the fault, and what to do.
+
+
+_WORTH_TELLING = 0.01  # fraction of the samples; smaller ones are visible in the counters only
+
+_DROPPED = ("duplicates", "late", "stray_stamps", "outliers")
+
+_SENTENCES = {
+    "zero_stamp": "have a zero stamp: set header.stamp",
+    "missing_joint": "do not name the crank {crank!r}: set crank_joint to its name in joint_states",
+    "empty": "have no name or no position",
+    "wrong_length": "have another number of positions, velocities or efforts than of names",
+    "not_finite": "have a value that is NaN or infinite",
+    "undecodable": "cannot be decoded: another type or another encoding",
+    "wrong_type": "are of a type that is not read",
+    "out_of_range": "have an impossible value: angles are in radians, torques in N m",
+    "duplicates": "repeat a stamp: two publishers, or a header.stamp that is not renewed",
+    "late": "arrive more than tracker.reorder_window_s after newer ones",
+    "stray_stamps": "have a stamp far from the others: see the clock of the sender",
+    "outliers": "have an angle far from the motion of the others",
+}
+
+
+def causes(before: Intake, after: Intake, withheld: int, config: MonitorConfig) -> list[str]:
+    """Sentences on the unused samples between two counts, the most frequent cause first.
+
+    Parameters
+    ----------
+    before, after : Intake
+    withheld : int
+        Number of out-of-range samples that another sentence reports.
+    config : MonitorConfig
+        Gives the name of the crank.
+    """
+    others = of_other_joints(before, after)
+    received = after.received - before.received - others
+    lost = _unused(after, before, withheld, others)
+    frequent = [name for name, count in lost.items() if count > _WORTH_TELLING * received]
+    sentences = [
+        f"{lost[name]} of {received} samples {_SENTENCES[name].format(crank=config.crank_joint)}"
+        for name in sorted(frequent, key=lambda name: -lost[name])
+    ]
+    unused = sum(lost.values())
+    if sentences and unused > max(lost.values()):  # one cause of several: else its number is taken for all
+        sentences[0] = f"{unused} of {received} samples are not used, {sentences[0]}"
+    return sentences
+
+
+def _unused(after: Intake, before: Intake, withheld: int, others: int) -> Mapping[str, int]:
+    lost = {name: count - before.faulty[name] for name, count in after.faulty.items()}
+    lost["out_of_range"] -= withheld
+    lost[FAULTS[MISSING_JOINT]] -= others
+    return lost | {name: getattr(after, name) - getattr(before, name) for name in _DROPPED}
+
+
+# Pauses in a stream of samples: times without a recording, as opposed to faults of the input.
+
+
+@attrs.frozen
+class Pauses:
+    """Pauses between recordings.
+
+    Attributes
+    ----------
+    number : int
+    total_s : float
+    passed_before_s : float
+        Part of the pauses before the last one that the twin's unmonitored time includes.
+    last_s : float
+        Length of the last pause.
+    unmonitored_s : float
+        The twin's unmonitored time when the last pause began; it includes the pause once the leg is followed
+        again.
+    """
+
+    number: int = 0
+    total_s: float = 0.0
+    passed_before_s: float = 0.0
+    last_s: float = 0.0
+    unmonitored_s: float = 0.0
+
+    def passed_s(self, unmonitored_s: float) -> float:
+        """Part of the pauses that the twin's unmonitored time includes [s]."""
+        return self.passed_before_s + min(self.last_s, max(0.0, unmonitored_s - self.unmonitored_s))
+
+    def with_pause(self, pause_s: float, unmonitored_s: float) -> "Pauses":
+        """Pauses with one more, at a value of the twin's unmonitored time [s]."""
+        return Pauses(
+            self.number + 1, self.total_s + pause_s, self.passed_s(unmonitored_s), pause_s, unmonitored_s
+        )

@@ -1,0 +1,847 @@
+"""The result of a replay as classes, which give JSON and tables."""
+
+import math
+import reprlib
+from collections.abc import Iterator, Mapping
+from enum import Enum
+from typing import TYPE_CHECKING, Any, get_args
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.bags.findings import Severity
+from leg_wear_monitor.configuration.strict import structure
+from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.files import data_frame, finite_or_none, json_text
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
+from leg_wear_monitor.mechanism.materials import BushingLoad
+from leg_wear_monitor.monitor.alarms import Level
+from leg_wear_monitor.monitor.angle_regression import ClearanceObservation
+from leg_wear_monitor.monitor.config.settings import Limits
+from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, Quantiles
+from leg_wear_monitor.monitor.ledger.entry import Measurement, WalkedLoad
+from leg_wear_monitor.monitor.reports import FootLoad, Lost
+from leg_wear_monitor.monitor.verdict.verdict import Verdict
+from leg_wear_monitor.shown import Drawable
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+# Condition of the leg after a replay: clearance of each joint as counted and as seen, remaining life.
+
+
+@attrs.frozen(kw_only=True)
+class JointClearance:
+    """Mean radial clearance of a joint [m]; None for what is not known.
+
+    Attributes
+    ----------
+    counted_m : float
+        Clearance when new, plus the wear counted since.
+    seen_m : float or None
+        Clearance that measurements of the gait show.
+    seen_sigma_m : float or None
+        Its standard deviation.
+    seen_by : tuple of str
+        What shows it, such as ``encoders``.
+    new_m : float
+        Clearance when new.
+    limit_m : float
+        Limit of the clearance.
+    measured_m : float or None
+        Clearance that somebody measured last on this part.
+    measured_sigma_m : float or None
+        Its standard deviation.
+    believed_m : float or None
+        The clearance that the verdict rests on; None where nothing known of the joint is valid.
+    believed_sigma_m : float or None
+        Its standard deviation.
+    believed_by : str or None
+        Whose it is: ``counted``, ``torque``, ``encoders``, ``measured``, or ``both`` for what counting and
+        measurements give together.
+    """
+
+    counted_m: float
+    seen_m: float | None = None
+    seen_sigma_m: float | None = None
+    seen_by: tuple[str, ...] = ()
+    new_m: float
+    limit_m: float
+    measured_m: float | None = None
+    measured_sigma_m: float | None = None
+    believed_m: float | None = None
+    believed_sigma_m: float | None = None
+    believed_by: str | None = None
+
+
+@attrs.frozen(kw_only=True)
+class LifeHours:
+    """Remaining hours of walking, as quantiles.
+
+    Attributes
+    ----------
+    p10_h : float
+        Hours that are not exceeded with a probability of 10 %.
+    p50_h : float
+        Hours that are not exceeded with a probability of 50 %.
+    p90_h : float
+        Hours that are not exceeded with a probability of 90 %.
+    """
+
+    p10_h: float
+    p50_h: float
+    p90_h: float
+
+
+def life_hours(hours: Quantiles | None) -> LifeHours | None:
+    """Quantiles of a remaining life; None if it is not known."""
+    return None if hours is None else LifeHours(p10_h=hours.p10, p50_h=hours.p50, p90_h=hours.p90)
+
+
+# The leg that was replayed, as a picture needs it: shapes at crank angle 0, joints with their labels.
+
+
+Place = tuple[float, float]
+
+
+@attrs.frozen(kw_only=True)
+class LegJoint:
+    """A joint.
+
+    Attributes
+    ----------
+    label : str
+        Name for operators, such as ``knee``; empty if the mechanism file has no label.
+    place_m : tuple of float
+        Its place at crank angle 0.
+    is_on_ground : bool
+        Whether it joins a body to the ground.
+    """
+
+    label: str
+    place_m: Place
+    is_on_ground: bool
+
+
+@attrs.frozen(kw_only=True)
+class ReplayLeg:
+    """The mechanism in its plane [m], x to the right and y up.
+
+    Attributes
+    ----------
+    bodies_m : dict of str to tuple of tuples
+        Corners of each moving body.
+    joints : dict of str to LegJoint
+        All joints, those without clearance too.
+    """
+
+    bodies_m: dict[str, tuple[Place, ...]] = attrs.Factory(dict)
+    joints: dict[str, LegJoint] = attrs.Factory(dict)
+
+    def joint_words(self, joint: str) -> str:
+        """A joint by its name and its label, such as ``G (knee)``."""
+        label = self.joints[joint].label if joint in self.joints else ""
+        return f"{joint} ({label})" if label else joint
+
+
+# The leg after a replay: joints, remaining life, alarms, status; SI units, None for what is not known.
+
+
+def _known_values(values: Mapping[str, float | None]) -> dict[str, float | None]:
+    return {name: finite_or_none(value) for name, value in values.items()}
+
+
+def _perhaps() -> Any:
+    """Attrs field for a number that may not be known: NaN and infinity become None."""
+    return attrs.field(converter=finite_or_none)
+
+
+def _perhaps_none() -> Any:
+    """The same for a number that files of older versions do not have."""
+    return attrs.field(default=None, converter=finite_or_none)
+
+
+@attrs.frozen
+class ClearanceChange:
+    """Radial clearance of a joint, as counted [m].
+
+    Attributes
+    ----------
+    first : float
+        Mean around the bushing after the first gait cycle.
+    last : float
+        Mean around the bushing after the last gait cycle.
+    max : float
+        Largest around the bushing at the end.
+    """
+
+    first: float
+    last: float
+    max: float
+
+
+@attrs.frozen(kw_only=True)
+class SeenClearance:
+    """A clearance estimated from further encoders; see `monitor.encoders.ClearanceEstimate`.
+
+    Attributes
+    ----------
+    observation : ClearanceObservation
+        Whether the encoders show it, and why not.
+    clearance_m : float or None
+        The estimate.
+    sigma_m : float or None
+        Its standard deviation.
+    departure_m : float or None
+        Estimated minus counted clearance.
+    believed : bool
+        Whether the forecast uses it.
+    is_other : bool
+        Whether the difference is significant.
+    """
+
+    observation: ClearanceObservation
+    clearance_m: float | None = _perhaps()
+    sigma_m: float | None = _perhaps()
+    departure_m: float | None = _perhaps()
+    believed: bool
+    is_other: bool
+
+
+@attrs.frozen(kw_only=True)
+class ReplayJoint:
+    """A clearance joint at the end of a replay, and its forces meanwhile.
+
+    Attributes
+    ----------
+    clearance_m : ClearanceChange
+        As counted: the clearance when new plus the wear counted since.
+    growth_m_per_cycle : float or None
+        Growth of the mean clearance in a gait cycle; None while there is not enough data.
+    growth_error_m_per_cycle : float or None
+        Standard deviation of its error.
+    growth_mps : float or None
+        Growth of the mean clearance per second of walking.
+    forecast : JointForecast or None
+        Remaining life; None before the first forecast.
+    peak_force_n : float or None
+        Largest contact force.
+    mean_force_n : float or None
+        Mean contact force over all gait cycles.
+    seen : SeenClearance or None
+        Clearance that further encoders show; None without such encoders.
+    impacts : int
+        Number of impacts, in the gait cycles that were followed.
+    load : BushingLoad or None
+        Pressure and sliding speed in the last gait cycle, and the limits of the joint's material; None in a
+        file of an older version.
+    sampling_sigma_m : float
+        Standard deviation of the mean clearance, because sampled replays did not follow all gait cycles.
+    believed_m : float or None
+        The clearance that the verdict rests on, at the end, as in ``clearances``; None where nothing known
+        of the joint is valid.
+    believed_sigma_m : float or None
+        Its standard deviation.
+    believed_by : str or None
+        Whose it is, such as ``counted`` or ``torque``.
+    """
+
+    clearance_m: ClearanceChange
+    growth_m_per_cycle: float | None = _perhaps()
+    growth_error_m_per_cycle: float | None = _perhaps()
+    growth_mps: float | None = _perhaps()
+    forecast: JointForecast | None
+    peak_force_n: float | None = _perhaps()
+    mean_force_n: float | None = _perhaps()
+    seen: SeenClearance | None = None
+    impacts: int
+    load: BushingLoad | None = None
+    sampling_sigma_m: float = 0.0
+    believed_m: float | None = _perhaps_none()
+    believed_sigma_m: float | None = _perhaps_none()
+    believed_by: str | None = None
+
+
+@attrs.frozen(kw_only=True)
+class LegLife:
+    """The leg's remaining life: until the first of its joints reaches its limit.
+
+    Attributes
+    ----------
+    answer : Answer
+        What can be said of it.
+    cycles : Quantiles or None
+        Gait cycles; None unless known.
+    hours : Quantiles or None
+        Hours of walking; None unless known.
+    days : Quantiles or None
+        Days at the usual duty; None unless known.
+    first_probability : dict of str to float
+        Probability that this joint is the first; empty unless known.
+    simulated_lives : int
+        Number of simulated lives, which show the effect of joints on each other.
+    first : str or None
+        The joint that is most likely the first.
+    """
+
+    answer: Answer
+    cycles: Quantiles | None
+    hours: Quantiles | None
+    days: Quantiles | None
+    first_probability: dict[str, float]
+    simulated_lives: int
+    first: str | None
+
+
+@attrs.frozen(kw_only=True)
+class ReplayAlarm:
+    """An alarm as operators see it.
+
+    Attributes
+    ----------
+    name : str
+        Kind and subject, such as ``clearance A``.
+    level : Level
+        Level that is shown; a latched alarm keeps its highest one.
+    state : str
+        Whether it is present or latched, and acknowledged.
+    value : float or None
+        Last value, in ``unit``.
+    limit : float or None
+        Limit of the level ERROR, in ``unit``.
+    worst : float or None
+        Worst value since it was raised, in ``unit``.
+    unit : str
+        Unit of the values, SI; empty for a fraction.
+    raised_ns : int
+        Stamp at which the level last rose [ns]; 0 before.
+    """
+
+    name: str
+    level: Level
+    state: str
+    value: float | None = _perhaps()
+    limit: float | None = _perhaps()
+    unit: str
+    worst: float | None = _perhaps()
+    raised_ns: int
+
+
+@attrs.frozen(kw_only=True)
+class AlarmChange:
+    """An alarm after a change.
+
+    Attributes
+    ----------
+    stamp_ns : int
+        Stamp of the change [ns].
+    alarm : ReplayAlarm
+        The alarm then.
+    """
+
+    stamp_ns: int
+    alarm: ReplayAlarm = attrs.field(metadata={"flat": True})
+
+
+@attrs.frozen(kw_only=True)
+class ReplayAlarms:
+    """All alarms.
+
+    Attributes
+    ----------
+    now : tuple of ReplayAlarm
+        All of them, at the end.
+    changes : tuple of AlarmChange
+        The first ten thousand changes.
+    """
+
+    now: tuple[ReplayAlarm, ...]
+    changes: tuple[AlarmChange, ...]
+
+
+@attrs.frozen(kw_only=True)
+class ReplayStatus:
+    """A line of /diagnostics at the end.
+
+    Attributes
+    ----------
+    name : str
+        Name of the status, such as ``joint A``.
+    level : Level
+        Level of the status.
+    message : str
+        The status in words.
+    values : dict of str to float or None
+        Values of the status; each key ends in its unit.
+    fault_code : str
+        Stable name of what is wrong; empty in a file of an older version.
+    """
+
+    name: str
+    level: Level
+    message: str
+    values: dict[str, float | None] = attrs.field(converter=_known_values)
+    fault_code: str = ""
+
+
+@attrs.frozen(eq=False)
+class WornDepth:
+    """Wear depth (N,) [m] around both surfaces of a joint, by sector.
+
+    Attributes
+    ----------
+    bushing : (N,) array
+        By sector of the bushing's frame, the first one from angle 0 on.
+    journal : (N,) array
+        By sector of the journal's frame.
+    """
+
+    bushing: Floats
+    journal: Floats
+
+
+# Parts of what a replay found as summary.json has them, and back: the only place of its keys.
+
+
+JsonObject = dict[str, Any]
+
+
+def part_document(part: Any) -> Any:
+    """Fields of a part, or a plain value; null for what is not known."""
+    if attrs.has(type(part)):
+        return part_document(attrs.asdict(part, recurse=False))
+    if isinstance(part, dict):
+        return {name: part_document(value) for name, value in part.items()}
+    if isinstance(part, tuple | list):
+        return [part_document(value) for value in part]
+    if isinstance(part, np.ndarray):
+        return part_document(part.tolist())
+    if isinstance(part, Enum):
+        return part.name if isinstance(part, int) else part.value  # as configuration.strict reads them
+    return None if isinstance(part, float) and not math.isfinite(part) else part
+
+
+def joint_document(joint: ReplayJoint) -> JsonObject:
+    """A joint; no key for a clearance that no encoder shows."""
+    record: JsonObject = part_document(joint)
+    return record if joint.seen is not None else {key: record[key] for key in record if key != "seen"}
+
+
+def alarms_document(alarms: ReplayAlarms) -> JsonObject:
+    """All alarms, and their changes with the stamp before what the alarm was."""
+    return {
+        "now": part_document(alarms.now),
+        "changes": [_change(change) for change in alarms.changes],
+    }
+
+
+def _change(change: AlarmChange) -> JsonObject:
+    return {"stamp_ns": change.stamp_ns, **part_document(change.alarm)}
+
+
+# What was replayed: the recording, the settings of the monitor, and whether both fit together.
+
+
+@attrs.frozen(kw_only=True)
+class ReplayFinding:
+    """A fault of the recording.
+
+    Attributes
+    ----------
+    file : str
+        File in which it was found.
+    text : str
+        What was found, on one line.
+    weight : Severity
+        Effect on the result: ``loss`` if data are lost or may be wrong.
+    """
+
+    file: str
+    text: str
+    weight: Severity
+
+
+@attrs.frozen(kw_only=True)
+class ReplayRecording:
+    """What was read.
+
+    Attributes
+    ----------
+    files : tuple of str
+        Files that were read.
+    topics : dict of str to str
+        Topic that was read, by its relative name in the node.
+    time : str
+        Source of the stamps: ``header``, ``log`` or ``publish``.
+    is_partial : bool
+        Whether recorded data are lost or may be wrong.
+    findings : tuple of ReplayFinding
+        Faults of the recording.
+    crank_samples : int
+        Number of samples of the crank.
+    torque_samples : int
+        Number of samples of the drive torque.
+    begin_ns : int
+        First stamp [ns]; 0 without samples.
+    end_ns : int
+        Last stamp [ns]; 0 without samples.
+    duration_s : float
+        Time between the two [s].
+    """
+
+    files: tuple[str, ...]
+    topics: dict[str, str]
+    time: str
+    is_partial: bool
+    findings: tuple[ReplayFinding, ...]
+    crank_samples: int
+    torque_samples: int
+    begin_ns: int
+    end_ns: int
+    duration_s: float
+
+
+@attrs.frozen(kw_only=True)
+class ReplayMonitor:
+    """Settings of the monitor that the results depend on.
+
+    Attributes
+    ----------
+    mechanism : str
+        Name of the mechanism.
+    hardware_id : str
+        Which leg this is.
+    clearance_joints : tuple of str
+        Joints whose wear is counted.
+    commanded_rpm : float
+        Cadence that the gait should have.
+    wear_acceleration : float
+        Factor on all wear.
+    bushing_radius_m : dict of str to float
+        Radius of the bushing.
+    limits : Limits
+        Limits of the alarms.
+    duty_hours_per_day : float
+        Usual walking a day.
+    """
+
+    mechanism: str
+    hardware_id: str
+    clearance_joints: tuple[str, ...]
+    commanded_rpm: float
+    wear_acceleration: float
+    bushing_radius_m: dict[str, float]
+    limits: Limits
+    duty_hours_per_day: float
+
+
+@attrs.frozen(kw_only=True)
+class ReplaySampling:
+    """How much of the gait was followed in a sampled replay.
+
+    Attributes
+    ----------
+    fraction : float
+        Fraction of the gait cycles that was asked for.
+    followed_cycles : int
+        Gait cycles that were followed and counted.
+    estimated_cycles : float
+        Gait cycles that were tracked only: their wear is estimated, their forces are not known.
+    blocks : int
+        Blocks of followed gait cycles with one cadence and load.
+    """
+
+    fraction: float
+    followed_cycles: int
+    estimated_cycles: float
+    blocks: int
+
+
+@attrs.frozen(kw_only=True)
+class ReplayGait:
+    """Whether the motion was a gait of this leg.
+
+    Attributes
+    ----------
+    believable_cycles : int
+        Gait cycles that fit this leg.
+    doubtful_cycles : int
+        Gait cycles that do not.
+    missing : str
+        Why none fits; empty if one does.
+    is_counted : bool
+        Whether all of the recording was in the ledger already.
+    """
+
+    believable_cycles: int
+    doubtful_cycles: int
+    missing: str
+    is_counted: bool
+
+
+# A replay over time: gait cycles as columns, thinned where they are many.
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class ReplayHistory:
+    """Columns over n groups of gait cycles: last value of each; maximum of peaks, sum of impacts.
+
+    NaN where a value is not known, such as forces and torques of gait cycles that were tracked only. What a
+    joint has is an array a joint, by its name.
+
+    Attributes
+    ----------
+    stamp_ns : (n,) array
+        End of the last gait cycle [ns].
+    cycle : (n,) array
+        Number of that gait cycle over the whole life in the ledger.
+    cadence_rpm : (n,) array
+        Mean crank speed while moving.
+    moving_s : (n,) array
+        Time in motion.
+    bridged_s : (n,) array
+        Of it the time bridged in gaps.
+    measured_torque_rms_nm : (n,) array
+        RMS of the measured drive torque.
+    predicted_torque_rms_nm : (n,) array
+        RMS of the predicted drive torque.
+    torque_mismatch : (n,) array
+        Fraction of the predicted RMS that load, friction and lag do not explain.
+    load_n : (n,) array
+        Foot load, as estimated, up positive.
+    friction_nm : (n,) array
+        Friction of the drive, as estimated.
+    clearance_m : dict of str to (n,) array
+        Mean radial clearance around the bushing.
+    clearance_max_m : dict of str to (n,) array
+        Largest radial clearance around the bushing.
+    growth_m_per_cycle : dict of str to (n,) array
+        Growth of the mean clearance in a gait cycle.
+    peak_force_n : dict of str to (n,) array
+        Largest contact force.
+    p99_force_n : dict of str to (n,) array
+        Contact force that is not exceeded 99 % of the time.
+    mean_force_n : dict of str to (n,) array
+        Mean contact force.
+    impacts : dict of str to (n,) array
+        Number of impacts.
+    seen_m : dict of str to (n,) array
+        Mean radial clearance that encoders or the drive torque show, the surer one; empty in a file of an
+        older version.
+    lowest : dict of str to (n,) array
+        Of cadence, torques, mismatch, load and friction, by their names: the smallest value in each group;
+        empty if each group is one gait cycle.
+    highest : dict of str to (n,) array
+        The largest value in each group.
+    """
+
+    stamp_ns: Ints
+    cycle: Floats
+    cadence_rpm: Floats
+    moving_s: Floats
+    bridged_s: Floats
+    measured_torque_rms_nm: Floats
+    predicted_torque_rms_nm: Floats
+    torque_mismatch: Floats
+    load_n: Floats
+    friction_nm: Floats
+    clearance_m: dict[str, Floats]
+    clearance_max_m: dict[str, Floats]
+    growth_m_per_cycle: dict[str, Floats]
+    peak_force_n: dict[str, Floats]
+    p99_force_n: dict[str, Floats]
+    mean_force_n: dict[str, Floats]
+    impacts: dict[str, Floats]
+    seen_m: dict[str, Floats] = attrs.Factory(dict)
+    lowest: dict[str, Floats] = attrs.Factory(dict)
+    highest: dict[str, Floats] = attrs.Factory(dict)
+
+    def columns(self) -> dict[str, Floats | Ints]:
+        """Columns of a table over time; a joint's value after a dot: ``clearance_m.A``."""
+        columns: dict[str, Floats | Ints] = {}
+        for name, value in attrs.asdict(self, recurse=False).items():
+            if isinstance(value, dict):
+                columns |= {f"{name}.{joint}": column for joint, column in value.items()}
+            else:
+                columns[name] = value
+        return columns
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """Table of `columns` by stamp [ns]; requires pandas.
+
+        Raises
+        ------
+        LegWearError
+            If pandas is not installed.
+        """
+        return data_frame(self.columns(), index="stamp_ns")
+
+
+# What a replay found as columns of tables: a value's name is its path, parts after a dot.
+
+
+_Path = tuple[str, ...]
+
+
+def joint_columns(joints: Mapping[str, ReplayJoint]) -> dict[str, list[Any]]:
+    """One row a joint; None for what is not known, or is not there."""
+    columns: dict[str, list[Any]] = {"joint": list(joints)}
+    for path in _paths(ReplayJoint):
+        columns[".".join(path)] = [_value(joint, path) for joint in joints.values()]
+    return columns
+
+
+def _paths(kind: type) -> Iterator[_Path]:
+    """Paths of all plain values below a class of parts."""
+    for field in attrs.fields(attrs.resolve_types(kind)):
+        part = next((each for each in (field.type, *get_args(field.type)) if attrs.has(each)), None)
+        if part is None:
+            yield (field.name,)
+        else:
+            yield from ((field.name, *inner) for inner in _paths(part))
+
+
+def _value(part: Any, path: _Path) -> Any:
+    for name in path:
+        part = None if part is None else getattr(part, name)
+    return part.value if isinstance(part, Enum) else part
+
+
+# What a replay found, how it goes out as JSON and as tables, and how it comes back from a file.
+
+
+SCHEMA_VERSION = 2
+"""Of the JSON; counts up when a field is renamed, removed or means something else."""
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class ReplaySummary(Drawable):
+    """Results of a replay; its page contains nothing else.
+
+    Attributes
+    ----------
+    verdict : Verdict
+        Conclusion of the monitor on the leg, at the end.
+    recording : ReplayRecording
+        What was read.
+    monitor : ReplayMonitor
+        Settings of the monitor.
+    leg : ReplayLeg
+        The mechanism as a picture needs it; empty in a file of an older version.
+    wall_s : float or None
+        Wall-clock duration of the replay [s]; None if nobody measured it.
+    real_time_factor : float or None
+        Duration of the recording, as a multiple of that.
+    cycles : int
+        Gait cycles.
+    gait : ReplayGait
+        Whether the motion was a gait of this leg.
+    joints : dict of str to ReplayJoint
+        Clearance joints; empty without one gait cycle that fits this leg, like the next two.
+    clearances : dict of str to JointClearance
+        Clearance of each joint, as counted and as measured.
+    life : dict of str to LifeHours or None
+        Remaining life of each joint, and of the ``leg``; None where it is not known or not
+        valid.
+    forecast : LegLife or None
+        Remaining life of the leg.
+    measurements : tuple of Measurement
+        Clearances measured by hand, from the ledger.
+    walked : tuple of WalkedLoad
+        Walking since the start of the ledger, or of the replay without one, by the foot load that acted.
+    alarms : ReplayAlarms
+        Alarms at the end and their changes.
+    status : tuple of ReplayStatus
+        Lines of /diagnostics at the end.
+    lost : Lost
+        Samples and time that were not used.
+    sampling : ReplaySampling or None
+        How much of the gait was followed; None if all of it was.
+    load : FootLoad
+        Load at the foot over the last gait cycles.
+    history : ReplayHistory
+        The gait cycles over time.
+    wear_depth_m : dict of str to WornDepth
+        Wear around the surfaces of each joint since the start of the ledger, or of the replay without one.
+    advice : str
+        Limits of the results: the absence of an alarm does not mean the joints are healthy.
+    made_with : dict of str to str
+        Versions of the programs that made it.
+    """
+
+    verdict: Verdict
+    recording: ReplayRecording
+    monitor: ReplayMonitor
+    leg: ReplayLeg = attrs.Factory(ReplayLeg)
+    wall_s: float | None = None
+    real_time_factor: float | None = None
+    cycles: int
+    gait: ReplayGait
+    joints: dict[str, ReplayJoint]
+    clearances: dict[str, JointClearance]
+    life: dict[str, LifeHours | None]
+    forecast: LegLife | None
+    measurements: tuple[Measurement, ...]
+    walked: tuple[WalkedLoad, ...] = ()
+    alarms: ReplayAlarms
+    status: tuple[ReplayStatus, ...]
+    lost: Lost
+    sampling: ReplaySampling | None = None
+    load: FootLoad = FootLoad()
+    history: ReplayHistory
+    wear_depth_m: dict[str, WornDepth]
+    advice: str
+    made_with: dict[str, str] = attrs.Factory(dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain object: what ``replay --json`` writes; null for what is not known."""
+        record = {name: part_document(part) for name, part in attrs.asdict(self, recurse=False).items()}
+        record["joints"] = {name: joint_document(joint) for name, joint in self.joints.items()}
+        record["alarms"] = alarms_document(self.alarms)
+        return {"schema_version": SCHEMA_VERSION, **record}
+
+    def to_json(self) -> str:
+        """Text of ``summary.json``."""
+        return json_text(self.to_dict())
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """Table with a row for each joint; requires pandas.
+
+        Columns are named as the fields are, parts of a field after a dot: ``forecast.hours.p50``. The column
+        ``not_valid`` names the kinds of values that the verdict says are not valid, separated by commas;
+        empty if all are. The table over time is `ReplayHistory.to_pandas`, for which it holds as well.
+
+        Raises
+        ------
+        LegWearError
+            If pandas is not installed.
+        """
+        kinds = ", ".join(figure.value for figure in self.verdict.not_valid)
+        columns = joint_columns(self.joints)
+        return data_frame({**columns, "not_valid": [kinds] * len(self.joints)}, index="joint")
+
+
+def summary_of(record: Any, source: str) -> ReplaySummary:
+    """The summary of a plain object, as `ReplaySummary.to_dict` gives it.
+
+    Parameters
+    ----------
+    record : object
+        What a file of JSON contains.
+    source : str
+        Name of the file, for messages.
+
+    Raises
+    ------
+    ConfigError
+        If the object has another version, or is no summary; it names the key at fault.
+    """
+    record = structure(record, dict[str, Any], source, "")
+    version = record.get("schema_version", 1)
+    if version != SCHEMA_VERSION:
+        fault = f"{reprlib.repr(version)} is not {SCHEMA_VERSION}, the version that this command reads"
+        raise ConfigError(source, "schema_version", f"{fault}; replay the recording again")
+    parts = {name: part for name, part in record.items() if name != "schema_version"}
+    summary: ReplaySummary = structure(parts, ReplaySummary, source, "")
+    return summary

@@ -1,1 +1,0 @@
-"""Picture of a mechanism, working or not: one HTML file, or SVG."""

@@ -1,0 +1,321 @@
+"""Figures in one style: forces, lives, worn bushings, openings."""
+
+import io
+import math
+from collections.abc import Sequence
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from leg_wear_monitor.dynamics.result import Trace
+from leg_wear_monitor.errors import printable
+from leg_wear_monitor.life.result import Life
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
+from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.playback.result import ReplaySummary
+from leg_wear_monitor.wear import BUSHING, JOURNAL, Surfaces, wear_zone
+
+# Style of the figures: matplotlib without pyplot, in colours that colour-blind readers can distinguish.
+
+
+# Okabe and Ito, Color Universal Design, 2008
+BLUE, ORANGE, GREEN, VERMILION = "#0072b2", "#e69f00", "#009e73", "#d55e00"
+PURPLE, SKY, YELLOW = "#cc79a7", "#56b4e9", "#f0e442"
+BODY_COLOURS = (ORANGE, BLUE, GREEN, PURPLE, SKY, VERMILION, YELLOW)
+INK, PALE, PAPER = "#222222", "#d9d9d9", "#ffffff"
+
+SMALL, USUAL = 8.0, 9.5  # font sizes in points
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure of the given width and height [inch], with the Agg backend."""
+    figure = Figure(figsize=(width, height), facecolor=PAPER, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def png(figure: Figure, dots_per_inch: float = 100.0) -> bytes:
+    """The figure as PNG; with the same libraries, equal figures give equal bytes."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=dots_per_inch, metadata={"Software": None})
+    return buffer.getvalue()
+
+
+def svg(figure: Figure, creator: str | None = None) -> bytes:
+    """The figure as SVG, for figures with few lines; equal figures give equal bytes."""
+    buffer = io.BytesIO()
+    with matplotlib.rc_context({"svg.hashsalt": "leg_wear_monitor"}):
+        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": creator})
+    return buffer.getvalue()
+
+
+def plain(text: str) -> str:
+    """A name from a file as matplotlib writes it: on one line, and a dollar sign begins no formula."""
+    return printable(text, 200).replace("$", r"\$")
+
+
+def tidy(axes: Axes) -> None:
+    """Format axes: left and bottom frame lines only, a pale grid below the data."""
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    for side in ("left", "bottom"):
+        axes.spines[side].set_color(PALE)
+    axes.tick_params(labelsize=SMALL, color=PALE, labelcolor=INK)
+    axes.grid(color=PALE, linewidth=0.6, alpha=0.7)
+    axes.set_axisbelow(True)
+
+
+# Units in which values are easy to read.
+
+
+_LENGTHS = ((1.0e12, "pm"), (1.0e9, "nm"), (1.0e6, "µm"), (1.0e3, "mm"))
+
+
+def length_unit(greatest_m: float) -> tuple[float, str]:
+    """Factor from metres, and name, of the smallest unit in which a length [m] is below 1000."""
+    return next(((scale, unit) for scale, unit in _LENGTHS if scale * greatest_m < 1000.0), _LENGTHS[-1])
+
+
+def time_unit(longest_s: float) -> tuple[float, str]:
+    """Factor from seconds, and name, of a unit in which a time [s] is of a handy size."""
+    if longest_s > 3.0 * 3600.0:
+        return 1.0 / 3600.0, "h"
+    return (1.0 / 60.0, "min") if longest_s > 300.0 else (1.0, "s")
+
+
+# Series of a replay's summary over the time since the recording's begin.
+
+
+def time_of(summary: ReplaySummary, stamps_ns: Ints) -> tuple[Floats, str]:
+    """Stamps (n,) [ns] as times since the recording's begin, and their unit, common to all of a recording."""
+    factor, unit = time_unit(summary.recording.duration_s)
+    return np.asarray(factor * (stamps_ns - summary.recording.begin_ns) / 1.0e9, np.float64), unit
+
+
+def opened(summary: ReplaySummary) -> tuple[dict[str, Floats], str]:
+    """How much each clearance has opened since the first gait cycle, by joint, and the unit."""
+    columns = summary.history.clearance_m if len(summary.history.stamp_ns) else {}
+    metres = {joint: values - values[0] for joint, values in columns.items()}
+    scale, unit = length_unit(max((_greatest(values) for values in metres.values()), default=0.0))
+    return {joint: scale * values for joint, values in metres.items()}, unit
+
+
+def _greatest(values: Floats) -> float:
+    known = np.abs(values[np.isfinite(values)])
+    return float(known.max()) if len(known) else 0.0
+
+
+# How much each clearance of a replay has opened, on matplotlib's axes.
+
+
+_COLOURS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, INK)
+
+
+def draw_openings(axes: Axes, summary: ReplaySummary) -> str:
+    """Draw how much each clearance has opened since the first gait cycle; gives the unit of the time."""
+    time, time_unit = time_of(summary, summary.history.stamp_ns)
+    columns, unit = opened(summary)
+    for colour, (joint, values) in zip(_COLOURS, columns.items(), strict=False):
+        axes.plot(time, values, color=colour, label=joint, linewidth=1.3)
+    axes.ticklabel_format(useOffset=False)
+    axes.set_ylabel(f"opened by [{unit}]", fontsize=SMALL)
+    return time_unit
+
+
+# Drive torque and joint forces over the crank angle, from a trace.
+
+
+LEAST_N = 0.1  # lower end of the logarithmic axis [N]: the force of a journal in free flight is 0
+
+
+def force_traces(trace: Trace, joints: Sequence[str]) -> Figure:
+    """Figure of a simulation's trace: a panel for the drive torque and one for each joint.
+
+    Parameters
+    ----------
+    trace : Trace
+    joints : sequence of str
+        Joints to show, in this order.
+
+    Returns
+    -------
+    Figure
+    """
+    turns = trace.crank_angle_rad / TURN
+    figure = new_figure(9.0, 1.1 * (1 + len(joints)) + 0.6)
+    panels = np.atleast_1d(figure.subplots(1 + len(joints), 1, sharex=True))
+    _draw(panels[0], turns, trace.drive_torque_nm, "drive\n[N m]", VERMILION)
+    for axes, name in zip(panels[1:], joints, strict=True):
+        _draw(axes, turns, np.maximum(trace.force_n[name], LEAST_N), f"{name}\n[N]", BLUE)
+        axes.set_yscale("log")
+    panels[-1].set_xlabel("turns of the crank, from the first one counted", fontsize=SMALL)
+    panels[0].set_xlim(turns.min(), turns.max())
+    title = f"Drive torque and joint forces; at {LEAST_N} N the journal is free"
+    figure.suptitle(title, fontsize=USUAL, fontweight="bold", color=INK)
+    return figure
+
+
+def _draw(axes: Axes, turns: Floats, values: Floats, label: str, colour: str) -> None:
+    axes.plot(turns, values, color=colour, linewidth=0.7)
+    axes.set_ylabel(label, fontsize=SMALL, rotation=0.0, ha="right", va="center")
+    tidy(axes)
+
+
+# Figure of a leg's wear life: clearances, peak forces and worn profiles over gait cycles.
+
+
+_PROFILES = 5
+
+
+def life_picture(life: Life) -> bytes:
+    """PNG: mean (solid) and largest (dashed) clearance, peak force, and bushing profiles at five times."""
+    joints = len(life.clearance_joints)
+    figure = new_figure(max(7.0, 2.2 * joints), 6.0)
+    grid = figure.add_gridspec(2, 2 * joints, height_ratios=(1.2, 1.0))
+    clearance, peak = figure.add_subplot(grid[0, :joints]), figure.add_subplot(grid[0, joints:])
+    draw_clearances(clearance, life)
+    for k in range(joints):
+        peak.plot(life.cycles, 1e-3 * life.peak_force_n[:, k], color=_colour(k))
+        _profiles(figure.add_subplot(grid[1, 2 * k : 2 * k + 2]), life, k, _colour(k))
+    clearance.legend(fontsize=SMALL, frameon=False)
+    for axes, name in ((clearance, "radial clearance [µm]"), (peak, "peak contact force [kN]")):
+        axes.set_ylabel(name, fontsize=SMALL, color=INK)
+        axes.set_xlabel("gait cycles", fontsize=SMALL, color=INK)
+        tidy(axes)
+    return png(figure)
+
+
+def draw_clearances(axes: Axes, life: Life) -> None:
+    """Mean (and dashed, largest) clearance [µm] of each joint over the gait cycles."""
+    for k, joint in enumerate(life.clearance_joints):
+        axes.plot(life.cycles, 1e6 * life.clearance_m[:, k], color=_colour(k), label=joint)
+        axes.plot(life.cycles, 1e6 * life.clearance_max_m[:, k], color=_colour(k), ls="--", lw=0.7)
+
+
+def _colour(k: int) -> str:
+    return BODY_COLOURS[k % len(BODY_COLOURS)]
+
+
+def _profiles(axes: Axes, life: Life, k: int, colour: str) -> None:
+    """Draw the wear depth of the bushing of clearance joint k over the angle, darker with age."""
+    sectors = life.depth.shape[-1]
+    angle = (np.arange(sectors) + 0.5) * (360.0 / sectors)
+    times = np.linspace(0.0, life.cycles[-1], _PROFILES + 1)[1:]
+    for shade, time in enumerate(times, 1):
+        at = int(np.abs(life.cycles - time).argmin())
+        axes.plot(angle, 1e6 * life.depth[at, k, 0], color=colour, alpha=shade / _PROFILES, lw=0.9)
+    axes.set(xlim=(0.0, 360.0), xticks=(0.0, 180.0, 360.0))
+    axes.set_title(f"{life.clearance_joints[k]}: bushing [µm] by angle [°]", fontsize=SMALL, color=INK)
+    tidy(axes)
+
+
+# Figure of the worn profiles of bushings and journals, joint by joint.
+
+
+_COLUMN_IN = 2.3
+_BUSHING, _JOURNAL, _RIM = 1.0, 0.86, 1.75  # drawn radii, as multiples of the bushing's radius
+_DEEPEST = 0.5  # drawn depth of the greatest wear depth, as a multiple of the bushing's radius
+_SUPERSCRIPT = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def worn_bushings(
+    surfaces: Surfaces, names: tuple[str, ...], radius_m: tuple[float, ...], cycles: float
+) -> Figure:
+    """Figure of each joint's worn surfaces: a section with exaggerated depth, and the depth over the angle.
+
+    Parameters
+    ----------
+    surfaces : Surfaces
+    names : tuple of str
+        The joints, in the order of the surfaces.
+    radius_m : tuple of float
+        Radii of their bushings [m]; the exaggeration factor refers to them.
+    cycles : float
+        Number of gait cycles of the run, for the title.
+
+    Returns
+    -------
+    Figure
+    """
+    figure = new_figure(max(2, len(names)) * _COLUMN_IN, 4.9)
+    grid = figure.add_gridspec(3, len(names), height_ratios=(3.0, 2.0, 0.3))
+    scale, unit = length_unit(float(surfaces.depth.max()))
+    for k, name in enumerate(names):
+        depth, zone = surfaces.depth[k], wear_zone(surfaces.depth[k, BUSHING])
+        section = figure.add_subplot(grid[0, k], projection="polar")
+        factor = draw_section(section, depth, zone, radius_m[k])
+        section.set_title(
+            f"{name}\n" + (f"depth × {factor}" if factor else "no wear"), fontsize=USUAL, color=INK
+        )
+        unrolled = figure.add_subplot(grid[1, k])
+        _draw_unrolled(unrolled, depth * scale, zone)
+        if k == 0:
+            unrolled.set_ylabel(f"depth [{unit}]", fontsize=SMALL)
+    _draw_key(figure.add_subplot(grid[2, :]))
+    title = f"Wear after {cycles:.4g} gait cycles"
+    figure.suptitle(title, fontsize=USUAL, fontweight="bold", color=INK)
+    return figure
+
+
+def _draw_key(axes: Axes) -> None:
+    axes.set_axis_off()
+    entries = {
+        "bushing": Line2D([], [], color=BLUE, linewidth=2.0),
+        "journal": Line2D([], [], color=VERMILION, linewidth=2.0),
+        "90 % of the bushing's wear": Line2D([], [], color=INK, linewidth=4.0, solid_capstyle="butt"),
+    }
+    axes.legend(list(entries.values()), list(entries), ncols=3, fontsize=SMALL, frameon=False, loc="center")
+
+
+def draw_section(axes: Axes, depth: Floats, zone: tuple[float, float] | None, radius: float) -> str:
+    """Draw a section of bushing and journal with exaggerated wear depth (2, N) [m].
+
+    ``zone`` [deg] is marked by an arc at the rim; ``radius`` is that of the bushing [m]. Returns the
+    exaggeration factor as text, empty without wear.
+    """
+    n, greatest = depth.shape[1], float(depth.max())
+    angle = (np.arange(n + 1) + 0.5) * (TURN / n)
+    drawn = np.concatenate([depth, depth[:, :1]], axis=1) * (_DEEPEST / greatest if greatest > 0.0 else 0.0)
+    axes.fill_between(angle, _BUSHING + drawn[BUSHING], _RIM, color=BLUE, alpha=0.3, linewidth=0.0)
+    axes.plot(angle, _BUSHING + drawn[BUSHING], color=BLUE, linewidth=1.4)
+    axes.fill_between(angle, 0.0, _JOURNAL - drawn[JOURNAL], color=VERMILION, alpha=0.3, linewidth=0.0)
+    axes.plot(angle, _JOURNAL - drawn[JOURNAL], color=VERMILION, linewidth=1.4)
+    if zone is not None:
+        arc = np.deg2rad(np.linspace(*zone, 181))
+        axes.plot(
+            arc, np.full(arc.shape, _RIM), color=INK, linewidth=4.0, solid_capstyle="butt", clip_on=False
+        )
+    axes.set_ylim(0.0, _RIM)
+    axes.set_yticks([])
+    axes.set_xticks(np.deg2rad([0.0, 90.0, 180.0, 270.0]))
+    axes.tick_params(labelsize=SMALL, labelcolor=INK, pad=1.0)
+    axes.grid(False)
+    axes.spines["polar"].set_visible(False)
+    return _factor(_DEEPEST * radius / greatest) if greatest > 0.0 else ""
+
+
+def _factor(value: float) -> str:
+    exponent = math.floor(math.log10(value))
+    power = str(exponent).translate(_SUPERSCRIPT)
+    return f"{value:.0f}" if exponent < 3 else f"{value / 10.0**exponent:.1f}·10{power}"
+
+
+def _draw_unrolled(axes: Axes, depth: Floats, zone: tuple[float, float] | None) -> None:
+    n = depth.shape[1]
+    angle = (np.arange(n) + 0.5) * (360.0 / n)
+    if zone is not None:
+        for turn in (0.0, -360.0):
+            left, right = max(0.0, zone[0] + turn), min(360.0, zone[1] + turn)
+            if right > left:
+                axes.axvspan(left, right, color=PALE, alpha=0.6, linewidth=0.0)
+    axes.fill_between(angle, depth[BUSHING], color=BLUE, alpha=0.25, linewidth=0.0)
+    axes.plot(angle, depth[BUSHING], color=BLUE, linewidth=1.2)
+    axes.plot(angle, depth[JOURNAL], color=VERMILION, linewidth=1.2)
+    tidy(axes)
+    axes.set(xlim=(0.0, 360.0), xticks=(0.0, 90.0, 180.0, 270.0, 360.0))
+    axes.set_ylim(bottom=0.0)
+    axes.set_xlabel("angle in its own body [°]", fontsize=SMALL)

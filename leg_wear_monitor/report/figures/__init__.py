@@ -1,1 +1,0 @@
-"""Figures of mechanisms, forces, wear and lives, drawn by matplotlib."""

@@ -1,0 +1,209 @@
+"""Standing of a leg on the page, how much of its clearances is used up, what changed."""
+
+from collections.abc import Iterable, Sequence
+from enum import Enum
+
+import attrs
+
+from leg_wear_monitor.fleet.overview import LegOverview, urgency
+from leg_wear_monitor.monitor.alarms import time_words
+from leg_wear_monitor.monitor.verdict.verdict import Figure, State
+from leg_wear_monitor.report.page import Part, Section, Sentences, Table
+
+# Standing of a leg on the page: its verdict, unless that is too old to be relied on.
+
+
+DAY_NS = 86_400 * 10**9
+_AHEAD_NS = DAY_NS  # clocks of two machines, and time zones that somebody forgot
+
+
+class Standing(Enum):
+    """Standing of a leg, from the mildest to the most severe."""
+
+    DEMONSTRATION = "demonstration"
+    HEALTHY = "healthy"
+    WATCH = "watch"
+    UNKNOWN = "no recording"
+    OUTDATED = "outdated"
+    NOT_MONITORED = "not monitored"
+    INSPECT = "inspect"
+    STOP = "stop"
+
+    @property
+    def severity(self) -> int:
+        """Rank in the order above, from 0."""
+        return list(Standing).index(self)
+
+    @property
+    def symbol(self) -> str:
+        """Symbol beside the word."""
+        return {"HEALTHY": "✓", "WATCH": "◆", "INSPECT": "▲", "STOP": "■"}.get(self.name, "?")
+
+    @property
+    def tone(self) -> str:
+        """Class of its colour."""
+        if self is Standing.HEALTHY:
+            return "fine"
+        return "bad" if self in (Standing.INSPECT, Standing.STOP) else "careful"
+
+
+@attrs.frozen(kw_only=True)
+class Day:
+    """When the page is made, and how old a recording may be.
+
+    Attributes
+    ----------
+    now_ns : int
+        Time [ns since 1970].
+    fresh_days : float
+        Age of the last recording up to which a leg counts as monitored [days].
+    """
+
+    now_ns: int
+    fresh_days: float
+
+    def age_days(self, leg: LegOverview) -> float | None:
+        """Age of the end of a leg's last counted recording [days]; None without one."""
+        if not leg.recordings.counted:
+            return None
+        return (self.now_ns - leg.recordings.end_ns) / DAY_NS
+
+    def doubt(self, leg: LegOverview) -> str:
+        """Why the verdict of a leg cannot be relied on today; empty if it can."""
+        if leg.is_accelerated:
+            return f"all wear is multiplied by {leg.wear_acceleration:g}: a demonstration, not ranked"
+        if leg.fault:
+            return f"the last update could not count all of its recordings: {leg.fault}"
+        age = self.age_days(leg)
+        if age is None:
+            return "no recording of it was counted"
+        end = time_words(leg.recordings.end_ns)
+        if age * DAY_NS < -_AHEAD_NS:
+            return f"its last recording is dated in the future: {end}"
+        if age > self.fresh_days:
+            return f"its last recording is {age:.0f} days old: {end}"
+        return ""
+
+    def standing(self, leg: LegOverview) -> Standing:
+        """Standing of a leg; a healthy leg without a fresh recording is outdated."""
+        if leg.is_accelerated:
+            return Standing.DEMONSTRATION
+        if leg.verdict is None:
+            return Standing.UNKNOWN
+        if leg.verdict.state is State.HEALTHY and self.doubt(leg):
+            return Standing.OUTDATED
+        return Standing[leg.verdict.state.name]
+
+
+def by_urgency(legs: Iterable[LegOverview], day: Day) -> list[LegOverview]:
+    """Legs by who needs a person first: by standing, then by remaining life, then by clearance."""
+    return sorted(legs, key=lambda leg: (-day.standing(leg).severity, *urgency(leg)[1:]))
+
+
+# How much of each clearance is used up, where the verdict believes it.
+
+
+BANDS = (0.25, 0.5, 0.8, 1.0)
+"""Ends of the bands of the heat map: fractions of the clearance from new to limit."""
+
+
+def valid_used(leg: LegOverview) -> dict[str, float | None]:
+    """Fraction of each joint's clearance that is used up; None where it is not valid, or wear is accelerated.
+
+    While the counted clearances are not valid, only those of the verdict's joints are, as measurements show
+    them: those of the others are estimated from the counted leg.
+    """
+    verdict = leg.verdict
+    if leg.is_accelerated:
+        return dict.fromkeys(leg.used_fraction)
+    if verdict is None or Figure.CLEARANCES not in verdict.not_valid:
+        return dict(leg.used_fraction)
+    return {
+        joint: used if joint in verdict.joints and leg.clearances[joint].seen_m is not None else None
+        for joint, used in leg.used_fraction.items()
+    }
+
+
+def joints_of(legs: Iterable[LegOverview]) -> list[str]:
+    """Names of the joints of all legs, in alphabetical order."""
+    return sorted({joint for leg in legs for joint in leg.used_fraction})
+
+
+def band(used: float) -> int:
+    """Index of the band of a fraction, from 0; the last one begins at the limit."""
+    return sum(used >= end for end in BANDS)
+
+
+# What changed since the update before.
+
+
+_ROWS = 10
+
+
+def was(leg: LegOverview) -> str:
+    """State of the verdict before, if it was another one; empty otherwise."""
+    return State(leg.change.state).words if leg.change.state and leg.change.state != leg.state else ""
+
+
+def growth(leg: LegOverview) -> tuple[float, str] | None:
+    """Largest growth of the used part of a clearance [percentage points], and its joint; None if unknown."""
+    valid = valid_used(leg)
+    grown = [
+        (100.0 * rise, joint)
+        for joint, rise in leg.change.used_fraction.items()
+        if valid.get(joint) is not None
+    ]
+    return max(grown, default=None)
+
+
+def change_section(legs: Sequence[LegOverview]) -> Section:
+    """Legs whose verdict changed, and the joints that wore most, since the update before."""
+    changed = [leg for leg in legs if was(leg) and not leg.is_accelerated]
+    worse = [leg for leg in changed if _step(leg) > 0]
+    grown = sorted(
+        ((*rise, leg.id) for leg in legs if (rise := growth(leg)) and rise[0] > 0.0),
+        key=lambda each: (-each[0], each[2]),
+    )
+    added = sum(leg.change.recordings for leg in legs)
+    sentences = [
+        f"Recordings counted since: {added}.",
+        f"Legs with a worse verdict: {len(worse)}; with a better one: {len(changed) - len(worse)}.",
+    ]
+    parts: list[Part] = [Sentences(sentences)]
+    if changed:
+        parts.append(_verdicts(sorted(changed, key=lambda leg: (-_step(leg), leg.id))))
+    if grown:
+        parts.append(_growth(grown))
+    return Section("What changed since the update before", parts)
+
+
+def _step(leg: LegOverview) -> int:
+    return State(leg.state).severity - State(leg.change.state).severity
+
+
+def _verdicts(changed: Sequence[LegOverview]) -> Table:
+    rows = [
+        (leg.id, was(leg), State(leg.state).words, leg.verdict.why if leg.verdict else "") for leg in changed
+    ]
+    return Table(
+        caption="Legs with another verdict",
+        head=("leg", "before", "now", "why"),
+        rows=rows[:_ROWS],
+        note=_more(len(rows), "change"),
+        is_text=True,
+    )
+
+
+def _growth(grown: Sequence[tuple[float, str, str]]) -> Table:
+    rows = [(leg, joint, f"{points:+.2g}") for points, joint, leg in grown]
+    return Table(
+        caption="Largest growth of a clearance",
+        head=("leg", "joint", "growth [% of the clearance from new to limit]"),
+        rows=rows[:_ROWS],
+        note=_more(len(rows), "change"),
+    )
+
+
+def _more(number: int, column: str) -> str:
+    rest = number - _ROWS
+    return f"{rest} more: sort the table of the legs by {column}." if rest > 0 else ""

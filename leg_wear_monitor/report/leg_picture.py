@@ -1,0 +1,438 @@
+"""The leg as a picture, and as data for a page."""
+
+from collections.abc import Collection, Mapping
+from itertools import cycle
+from typing import Any
+
+import numpy as np
+from matplotlib import patheffects
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Polygon
+
+from leg_wear_monitor.dynamics.result import SimulationResult
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.position import (
+    build_linkage,
+    carriers,
+    corners,
+    ideal_motion,
+    is_on_ground,
+    one_cycle,
+    point_path,
+    rotated,
+)
+from leg_wear_monitor.mechanism.position import corners as body_corners
+from leg_wear_monitor.mechanism.reach import DeadPoint, Reach
+from leg_wear_monitor.mechanism.spec import GROUND, Mechanism, PrismaticJoint
+from leg_wear_monitor.report.figure import (
+    BODY_COLOURS,
+    INK,
+    PAPER,
+    SMALL,
+    USUAL,
+    VERMILION,
+    force_traces,
+    new_figure,
+    plain,
+    png,
+    tidy,
+    worn_bushings,
+)
+
+# Drawing of bodies, joints, supports and springs of a mechanism.
+
+
+_WIDTH = 9.0  # of a bar [points]
+_HALO = [patheffects.withStroke(linewidth=3.0, foreground=PAPER)]
+
+
+def lighter(colour: str, fraction: float) -> tuple[float, float, float]:
+    """A colour (red, green, blue) mixed with a fraction of white, 0 to 1."""
+    red, green, blue = (fraction + (1.0 - fraction) * part for part in to_rgb(colour))
+    return red, green, blue
+
+
+def draw_body(axes: Axes, corners: Floats, colour: str, layer: float) -> None:
+    """Draw a plate or a bar with round ends around the corners (n, 2) [m], a square for one corner."""
+    if len(corners) == 1:  # a slider
+        axes.plot(*corners[0], marker="s", markersize=2.4 * _WIDTH, color=lighter(colour, 0.55), zorder=layer)
+        return
+    for edge, line in ((colour, _WIDTH + 2.0), (lighter(colour, 0.55), _WIDTH)):
+        shape = Polygon(
+            corners, closed=len(corners) > 2, facecolor=edge, edgecolor=edge, linewidth=line, zorder=layer
+        )
+        shape.set_joinstyle("round")
+        shape.set_capstyle("round")
+        axes.add_patch(shape)
+
+
+def draw_support(axes: Axes, place: Floats, away: Floats) -> None:
+    """Draw a ground support: a triangle above or below the pivot, on the side of the vector ``away`` (2,)."""
+    up = 1.6 if away[1] > 0.0 else -1.6
+    triangle = [(0.0, 0.0), (-0.8, up), (0.8, up), (0.0, 0.0)]
+    axes.plot(*place, marker=triangle, markersize=32.0, color=lighter(INK, 0.6), zorder=1.0, linewidth=0.0)
+
+
+def draw_spring(axes: Axes, ends: tuple[Floats, Floats], layer: float) -> None:
+    """Draw a spring as a zigzag between two points (2,) [m]."""
+    start, end = ends
+    fraction = np.array([0.0, 0.15, *np.linspace(0.2, 0.8, 11), 0.85, 1.0])
+    side = np.array([0.0, 0.0, *(1.0 if i % 2 else -1.0 for i in range(11)), 0.0, 0.0])
+    across = 0.04 * np.array([start[1] - end[1], end[0] - start[0]])
+    line = start + fraction[:, None] * (end - start) + side[:, None] * across
+    axes.plot(*line.T, color=INK, linewidth=1.0, zorder=layer)
+
+
+def draw_joint(axes: Axes, place: Floats, names: Mapping[str, bool], away: Floats) -> None:
+    """Draw the joints that share one place; ``names`` maps each name to whether the joint has clearance.
+
+    The names are written side by side on the side of the vector ``away`` (2,).
+    """
+    axes.add_line(joint_mark(any(names.values()), place))
+    dx, dy = 13.0 * away / (np.hypot(*away) or 1.0)
+    wide = [6.0 * len(name) + 5.0 for name in names]
+    start = dx - 0.5 * sum(wide) + 0.5 * np.sign(dx) * (abs(dx) > 8.0) * (sum(wide) - wide[0])
+    for i, (name, has_clearance) in enumerate(names.items()):  # side by side, each in its own colour
+        along = start + sum(wide[:i]) + 0.5 * wide[i]
+        write_beside(axes, place, name, (along, dy), VERMILION if has_clearance else INK)
+
+
+def write_beside(axes: Axes, place: Floats, text: str, offset: tuple[float, float], colour: str) -> None:
+    """Write bold text at an offset (2,) [points] from a place (2,) [m]."""
+    axes.annotate(
+        plain(text),
+        (float(place[0]), float(place[1])),
+        xytext=offset,
+        textcoords="offset points",
+        ha="center",
+        va="center",
+        fontsize=USUAL,
+        fontweight="bold",
+        color=colour,
+        path_effects=_HALO,
+        zorder=30.0,
+    )
+
+
+def draw_gap(axes: Axes, ends: tuple[Floats, Floats], text: str) -> None:
+    """Draw the distance between the two points (2,) [m] of an open joint."""
+    axes.plot(*np.array(ends).T, "--", color=VERMILION, linewidth=1.8, zorder=19.0)
+    axes.plot(*ends[0], "o", markerfacecolor=PAPER, markeredgecolor=VERMILION, markersize=5.5, zorder=20.0)
+    write_beside(axes, 0.5 * (ends[0] + ends[1]), text, (0.0, 22.0), VERMILION)
+
+
+def joint_mark(has_clearance: bool, place: Floats | tuple[float, float] = (0.0, 0.0)) -> Line2D:
+    """The marker of a joint, for the picture or for its legend."""
+    return Line2D(
+        [place[0]],
+        [place[1]],
+        linestyle="none",
+        marker="o",
+        markersize=8.5 if has_clearance else 5.5,
+        markerfacecolor=PAPER,
+        markeredgecolor=VERMILION if has_clearance else INK,
+        markeredgewidth=2.4 if has_clearance else 1.2,
+        zorder=20.0,
+    )
+
+
+# The leg to scale: its bodies, its joints and the path of its toe.
+
+
+PATH_POINTS = 360
+_TOE_EVERY, _BODIES_EVERY = 30, 60
+_NEAR_M = 1.0e-3  # joints closer than this are drawn at one place [m]
+_PANEL_IN, _KEY_IN = 4.4, 1.2
+
+Paths = dict[str, dict[str, Floats]]
+
+
+def leg_picture(
+    mechanism: Mechanism, clearance_joints: Collection[str] | None = None, crank_angle_rad: float = 0.0
+) -> Figure:
+    """Figure of the ideal mechanism at one crank angle (left) and over one gait cycle (right), to one scale.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    clearance_joints : collection of str, optional
+        Joints to mark as clearance joints; default: ``mechanism.clearance_joints``.
+    crank_angle_rad : float
+        Crank angle of the left panel [rad].
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    AssemblyError
+        If the mechanism does not close or has a dead point.
+    """
+    linkage = build_linkage(mechanism)
+    here = _paths(mechanism, ideal_motion(linkage, [crank_angle_rad], 1.0).q)
+    paths = _paths(mechanism, one_cycle(linkage, PATH_POINTS, 1.0).q)
+    low, high = _extent(paths)
+    height = (_PANEL_IN - 0.5) * (high[1] - low[1]) / (high[0] - low[0]) + 0.75
+    figure = new_figure(2.0 * _PANEL_IN + _KEY_IN, float(np.clip(height, 2.8, 6.4)))
+    still, moving, key = figure.subplots(1, 3, width_ratios=(_PANEL_IN, _PANEL_IN, _KEY_IN))
+    _draw_still(
+        still,
+        mechanism,
+        here,
+        paths,
+        mechanism.clearance_joints if clearance_joints is None else clearance_joints,
+    )
+    _draw_cycle(moving, mechanism, paths)
+    _draw_key(key, mechanism)
+    still.set_title(
+        f"{plain(mechanism.name)}, crank at {np.rad2deg(crank_angle_rad):.0f}°", fontsize=USUAL, color=INK
+    )
+    toe = f", the toe every {_TOE_EVERY}° of the crank" if mechanism.toe else ""
+    moving.set_title(f"one cycle{toe}", fontsize=USUAL, color=INK)
+    for axes in (still, moving):
+        tidy(axes)
+        axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        axes.set_xlabel("x [m]", fontsize=SMALL)
+    still.set_ylabel("y [m]", fontsize=SMALL)
+    return figure
+
+
+def draw_leg(axes: Axes, reach: Reach, shown: int) -> None:
+    """Draw one position of a mechanism to scale, the path of its toe, and which joint is open or in line."""
+    mechanism = reach.mechanism
+    paths, here = _paths(mechanism, reach.q), _paths(mechanism, reach.q[shown : shown + 1])
+    low, high = _extent(paths)
+    _draw_still(axes, mechanism, here, paths, mechanism.clearance_joints)
+    _draw_toe_path(axes, mechanism, paths, is_closed=reach.turns)
+    for joint in mechanism.joints:
+        if reach.is_open(joint):
+            first, last = (here[body][joint][0] for body in carriers(mechanism, joint))
+            draw_gap(axes, (first, last), f"{1e3 * reach.gap_of(joint)[shown]:.3g} mm")
+    for dead, i in ((reach.low, 0), (reach.high, len(reach.q) - 1)):
+        if dead is not None and dead.is_in_line and i == shown and not reach.open_joint:
+            line = np.array([here[mechanism.sides(joint)[1]][joint][0] for joint in dead.joints])
+            axes.plot(*line.T, "--", color=VERMILION, linewidth=1.8, zorder=19.0)
+    axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+
+
+def _paths(mechanism: Mechanism, q: Floats) -> Paths:
+    """Path (N, 2) [m] of every point at coordinates q (N, n, 3), by body and point."""
+    return {
+        body: {point: point_path(mechanism, q, body, point) for point in mechanism.points_of(body)}
+        for body in (GROUND, *mechanism.bodies)
+    }
+
+
+def _extent(paths: Paths) -> tuple[Floats, Floats]:
+    """Lower left and upper right corner (2,) [m] of the box around all paths, with a margin."""
+    every = np.concatenate([path for body in paths.values() for path in body.values()])
+    low, high = every.min(axis=0), every.max(axis=0)
+    margin = 0.07 * float((high - low).max())
+    return low - margin, high + margin
+
+
+def _colours(mechanism: Mechanism) -> dict[str, str]:
+    return dict(zip(mechanism.bodies, cycle(BODY_COLOURS), strict=False))
+
+
+def _outline_at(paths: Paths, body: str, i: int) -> Floats:
+    return body_corners({name: path[i] for name, path in paths[body].items()})
+
+
+def _draw_still(
+    axes: Axes, mechanism: Mechanism, here: Paths, paths: Paths, clearance_joints: Collection[str]
+) -> None:
+    shapes = {body: _outline_at(here, body, 0) for body in mechanism.bodies}
+    colours = _colours(mechanism)
+    largest_first = sorted(shapes, key=lambda name: -float(np.ptp(shapes[name], axis=0).sum()))
+    for layer, body in enumerate(largest_first):
+        draw_body(axes, shapes[body], colours[body], 2.0 + 0.5 * layer)
+    for names, place in _places(mechanism, here):
+        sides = {body for name in names for body in mechanism.sides(name)}
+        away = place - np.mean([shapes[body].mean(axis=0) for body in sides - {GROUND}], axis=0)
+        for name in names:
+            joint = mechanism.joints[name]
+            if isinstance(joint, PrismaticJoint):
+                axes.plot(*paths[joint.slider][name].T, color=lighter(INK, 0.6), linewidth=4.0, zorder=1.0)
+            elif GROUND in mechanism.sides(name):
+                draw_support(axes, place, away)
+                away = np.array([-1.0, 0.3 * np.sign(away[1])])
+        draw_joint(axes, place, {name: name in clearance_joints for name in names}, away)
+    for spring in mechanism.springs.values():
+        a, b = (here[body][point][0] for body, point in zip(spring.bodies, spring.points, strict=True))
+        draw_spring(axes, (a, b), 15.0)
+    if mechanism.toe is not None:
+        body, point = mechanism.toe
+        place = here[body][point][0]
+        axes.plot(*place, "o", color=INK, markersize=4.5, zorder=20.0)
+        dx, dy = place - shapes[body].mean(axis=0)
+        write_beside(axes, place, "toe", (16.0 if dx > 0.0 else -16.0, 8.0 if dy > 0.0 else -8.0), INK)
+
+
+def _places(mechanism: Mechanism, here: Paths) -> list[tuple[list[str], Floats]]:
+    """Groups of joints that share a place: their names, and the place (2,) [m]."""
+    groups: list[tuple[list[str], Floats]] = []
+    for name in mechanism.joints:
+        place = here[carriers(mechanism, name)[1]][name][0]
+        near = [names for names, other in groups if np.hypot(*(place - other)) < _NEAR_M]
+        if near:
+            near[0].append(name)
+        else:
+            groups.append(([name], place))
+    return groups
+
+
+def _draw_cycle(axes: Axes, mechanism: Mechanism, paths: Paths) -> None:
+    for body, colour in _colours(mechanism).items():
+        for i in range(0, PATH_POINTS, PATH_POINTS * _BODIES_EVERY // 360):
+            corners = _outline_at(paths, body, i)
+            axes.plot(
+                *np.vstack([corners, corners[:1]]).T,
+                color=lighter(colour, 0.35),
+                marker="s" if len(corners) == 1 else None,
+                linewidth=1.6,
+                alpha=0.7,
+                solid_capstyle="round",
+            )
+    _draw_toe_path(axes, mechanism, paths)
+
+
+def _draw_toe_path(axes: Axes, mechanism: Mechanism, paths: Paths, is_closed: bool = True) -> None:
+    if mechanism.toe is not None:
+        body, point = mechanism.toe
+        path = paths[body][point]
+        if not is_closed:
+            axes.plot(*path.T, color=INK, linewidth=2.0, zorder=20.0)
+            return
+        axes.plot(*np.vstack([path, path[:1]]).T, color=INK, linewidth=2.0, zorder=20.0)
+        every = PATH_POINTS * _TOE_EVERY // 360
+        axes.plot(*path[::every].T, "o", color=INK, markersize=4.0, zorder=21.0)
+
+
+def _draw_key(axes: Axes, mechanism: Mechanism) -> None:
+    axes.set_axis_off()
+    entries = {
+        plain(body): Line2D([], [], color=lighter(colour, 0.4), linewidth=7.0, solid_capstyle="round")
+        for body, colour in _colours(mechanism).items()
+    }
+    entries |= {"clearance joint": joint_mark(True), "ideal joint": joint_mark(False)}
+    if mechanism.toe is not None:
+        entries["path of the toe"] = Line2D([], [], color=INK, linewidth=2.0, marker="o", markersize=4.0)
+    axes.legend(
+        list(entries.values()), list(entries), fontsize=SMALL, frameon=False, loc="center", labelspacing=0.9
+    )
+
+
+# A mechanism over its crank's range as plain data [mm, degrees] for the interactive picture, y downwards.
+
+
+ARROW_FRACTION = 0.3  # length of the longest arrow, as a fraction of the picture's height
+
+
+def leg_data(reach: Reach) -> dict[str, Any]:
+    """Bodies, joints, the toe's path, and what is open or in line."""
+    mechanism = reach.mechanism
+    every = [
+        reach.path(body, point)
+        for body in (GROUND, *mechanism.bodies)
+        for point in mechanism.points_of(body)
+        if body != GROUND or point in mechanism.joints
+    ]
+    low, high = np.concatenate(every).min(axis=0), np.concatenate(every).max(axis=0)
+    margin = 0.09 * float((high - low).max())
+    corner = 1.0e3 * np.array([low[0] - margin, -high[1] - margin])
+    size = 1.0e3 * (high - low + 2.0 * margin)
+    return {
+        "bodies": _bodies(reach),
+        "joints": [_joint(reach, name) for name in mechanism.joints],
+        "box": [round(float(value), 1) for value in (*corner, *size)],
+        "toe": [] if mechanism.toe is None else millimetres(reach.path(*mechanism.toe)),
+        "angles": np.rad2deg(reach.crank_angle).round(1).tolist(),
+        "turns": reach.turns or (bool(reach.open_joint) and len(reach.q) > 1),
+        "marks": [
+            _mark(reach, dead, i)
+            for dead, i in ((reach.low, 0), (reach.high, len(reach.q) - 1))
+            if dead is not None and dead.is_in_line and not reach.open_joint
+        ],
+        "said": {},
+        "first": 0,
+        "digits": 1,
+        "skip": 1,
+        "frames": len(reach.crank_angle),
+        "arrow_mm": round(ARROW_FRACTION * float(size[1]), 1),
+    }
+
+
+def _bodies(reach: Reach) -> list[dict[str, Any]]:
+    """The bodies, the largest first; shapes [mm] in their own frames, and poses of these."""
+    mechanism = reach.mechanism
+    colours = cycle(BODY_COLOURS)
+    bodies = []
+    for i, (name, body) in enumerate(mechanism.bodies.items(), start=1):
+        shape = corners({point: np.array(place) for point, place in body.points.items()})
+        angle = reach.q[:, i, 2]
+        origin = reach.q[:, i, :2] - rotated(body.com, angle)
+        poses = np.column_stack([1.0e3 * origin[:, 0], -1.0e3 * origin[:, 1]]).round(1)
+        turns = (-np.rad2deg(angle)).round(2)
+        bodies.append({
+            "name": name,
+            "colour": next(colours),
+            "outline": millimetres(shape),
+            "poses": [[x, y, turn] for (x, y), turn in zip(poses.tolist(), turns.tolist(), strict=True)],
+        })  # fmt: skip
+    return sorted(bodies, key=lambda body: -float(np.ptp(np.array(body["outline"]), axis=0).sum()))
+
+
+def _joint(reach: Reach, name: str) -> dict[str, Any]:
+    """Name and path of a joint; of an open one, also the path of its other point and the gap [mm]."""
+    other, carrier = carriers(reach.mechanism, name)
+    joint = {
+        "name": name,
+        "path": millimetres(reach.path(carrier, name)),
+        "ground": is_on_ground(reach.mechanism, name),
+    }
+    if reach.is_open(name):
+        joint |= {
+            "other": millimetres(reach.path(other, name)),
+            "gap_mm": [float(f"{1.0e3 * gap:.3g}") for gap in reach.gap_of(name)],
+        }
+    return joint
+
+
+def _mark(reach: Reach, dead: DeadPoint, frame: int) -> dict[str, Any]:
+    """Line through the three joints that are in line at a dead point."""
+    places = [
+        point_path(reach.mechanism, dead.q[None], reach.mechanism.sides(joint)[1], joint)[0]
+        for joint in dead.joints
+    ]
+    return {"frame": frame, "line": millimetres(np.array(places))}
+
+
+def millimetres(points: Floats) -> list[list[float]]:
+    """Places (n, 2) [m] in mm, with y downwards."""
+    return [[round(1.0e3 * float(x), 1), round(-1.0e3 * float(y), 1)] for x, y in points]
+
+
+# Figures of a simulation as PNG files.
+
+
+def pictures(mechanism: Mechanism, result: SimulationResult) -> dict[str, bytes | None]:
+    """PNG files by file name; None for a figure that needs data which the result does not contain."""
+    files: dict[str, bytes | None] = {
+        "leg.png": png(leg_picture(mechanism, result.clearance_joints)),
+        "wear.png": None,
+        "forces.png": None,
+    }
+    if result.trace is not None:
+        files["forces.png"] = png(
+            force_traces(result.trace, result.clearance_joints or tuple(mechanism.joints))
+        )
+    if result.surfaces is not None and result.clearance_joints:
+        radii = tuple(mechanism.clearances[name].bushing_radius for name in result.clearance_joints)
+        cycles = abs(result.speed_rpm) / 60.0 * result.simulated_s
+        files["wear.png"] = png(worn_bushings(result.surfaces, result.clearance_joints, radii, cycles))
+    return files

@@ -1,1 +1,0 @@
-"""The synthetic leg as a node."""

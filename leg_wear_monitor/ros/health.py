@@ -1,0 +1,361 @@
+"""Health of the node itself: silent inputs, clock, load, lost messages, several publishers."""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from datetime import UTC, datetime
+
+import attrs
+
+from leg_wear_monitor.monitor import alarm_specs, alarms
+from leg_wear_monitor.monitor.alarms import (
+    INPUT_SILENCE,
+    Alarm,
+    Level,
+    Limit,
+    acknowledged,
+    evaluated,
+    has_changed,
+)
+from leg_wear_monitor.monitor.reports import AlarmList, Status
+from leg_wear_monitor.ros.inputs import Inbox, InputTopic, misfit, several
+from leg_wear_monitor.ros.outputs import BlackBox
+from leg_wear_monitor.twin import CRANK, KINDS
+
+# Detection of silent inputs (no usable samples), which only the node can do because it has a clock.
+#
+# Unusable messages count as silence, because the leg is not monitored.
+
+
+SILENT_FROM_S = 1.0
+NOTHING_FROM_S = 10.0  # grace period after the start; a leg may be switched on after its monitor
+
+# status values that are rates or speeds, and their values during silence
+_NOW = {
+    "cadence_rpm": math.nan,
+    **{f"{kind.name}_rate_hz": 0.0 for kind in KINDS.values()},
+}
+# statuses of the node itself or of faults; they remain valid during silence
+_KEPT = ("verdict", "input", "alarms", "ledger", "load", "topics", "recording", "clock")
+_NOTHING_WRONG = "in order"
+
+
+def utc(time_ns: int) -> str:
+    """A time in ISO 8601 format, such as 2026-11-21T22:13:05.250Z."""
+    time = datetime.fromtimestamp(time_ns / 1e9, UTC).isoformat(timespec="milliseconds")
+    return time.replace("+00:00", "Z")
+
+
+@attrs.define
+class _Kind:
+    """Number of used samples of a kind, and time of its last increase on both clocks."""
+
+    steady_ns: int
+    wall_ns: int
+    used: int = 0
+
+
+class Silence:
+    """Measures how long samples of each kind have been missing.
+
+    Parameters
+    ----------
+    kinds : iterable of str
+        Names of the kinds that have samples of their own.
+    steady_ns, wall_ns : int
+        Present time on a monotonic clock and on the wall clock [ns].
+    """
+
+    def __init__(self, kinds: Iterable[str], steady_ns: int, wall_ns: int) -> None:
+        self._kinds = {kind: _Kind(steady_ns, wall_ns) for kind in kinds}
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """The expected kinds."""
+        return tuple(self._kinds)
+
+    def note(self, used: Mapping[str, int], steady_ns: int, wall_ns: int) -> None:
+        """Record the number of samples of each kind used so far."""
+        for name, kind in self._kinds.items():
+            if used[name] != kind.used:
+                kind.used, kind.steady_ns, kind.wall_ns = used[name], steady_ns, wall_ns
+
+    def silent_s(self, name: str, steady_ns: int) -> float:
+        """Time since the last used sample of a kind, or since the start [s]; 0 if none is expected."""
+        kind = self._kinds.get(name)
+        return 0.0 if kind is None else (steady_ns - kind.steady_ns) * 1.0e-9
+
+    def level(self, name: str, steady_ns: int) -> Level:
+        """Level of the silence: ERROR; WARN before the first sample during the seconds after the start."""
+        kind, silent_s = self._kinds.get(name), self.silent_s(name, steady_ns)
+        if kind is None or (kind.used and silent_s <= SILENT_FROM_S):
+            return Level.OK
+        return Level.ERROR if kind.used or silent_s >= NOTHING_FROM_S else Level.WARN
+
+    def since(self, name: str) -> str:
+        """Start of the silence as text."""
+        kind = self._kinds[name]
+        return f"since {utc(kind.wall_ns)}" if kind.used else f"since the start at {utc(kind.wall_ns)}"
+
+    def marked(self, statuses: Iterable[Status], steady_ns: int) -> tuple[Status, ...]:
+        """Mark statuses without current data; if the crank is silent, this concerns every status."""
+        silent = {name: level for name in self._kinds if (level := self.level(name, steady_ns)) > Level.OK}
+        crank = KINDS[CRANK].name
+        marked = []
+        for status in statuses:
+            kind = crank if crank in silent else status.name
+            marked.append(self._without(status, kind, silent[kind], steady_ns) if kind in silent else status)
+        return tuple(marked)
+
+    def _without(self, status: Status, kind: str, level: Level, steady_ns: int) -> Status:
+        message = f"no current data {self.since(kind)}"
+        if status.name in _KEPT and status.message != _NOTHING_WRONG:
+            message += f"; {status.message}"
+        values = status.values | {key: now for key, now in _NOW.items() if key in status.values}
+        values["no_data_s"] = self.silent_s(kind, steady_ns)
+        code = status.fault_code if status.level > level else INPUT_SILENCE
+        return attrs.evolve(
+            status, level=max(level, status.level), message=message, values=values, fault_code=code
+        )
+
+
+# Alarms that need a clock or the ROS graph: a silent input, stamps of a time to come, several publishers.
+
+
+SILENCE, AHEAD = "input_silence", "stamps_ahead"
+AHEAD_FROM_S = 1.0  # more than what a network's clocks differ by
+_SILENT = Limit(SILENT_FROM_S, SILENT_FROM_S, is_latched=False)
+_AHEAD = Limit(AHEAD_FROM_S, 2.0 * AHEAD_FROM_S, is_latched=False)
+SOURCES = alarm_specs.SOURCES.kind
+_TWO_SOURCES = Limit(2.0, 2.0)
+_CRANK = KINDS[CRANK].name
+_LIMITS = {SILENCE: _SILENT, AHEAD: _AHEAD, SOURCES: _TWO_SOURCES}
+
+QUANTITIES = {
+    **{f"{SILENCE} {kind.name}": f"time without {kind.name} samples" for kind in KINDS.values()},
+    **{f"{AHEAD} {kind.name}": f"lead of the {kind.name}'s stamps over the clock" for kind in KINDS.values()},
+    **{f"{SOURCES} {kind.name}": f"number of publishers of the {kind.name}" for kind in KINDS.values()},
+    SOURCES: f"number of publishers of the {_CRANK}",
+}
+"""Nouns of the alarms' values, by the alarms' names."""
+
+
+def sources_alarm(kind: str) -> Alarm:
+    """Name of the alarm for several publishers; for the crank, the monitor's alarm without a subject."""
+    return Alarm(kind=SOURCES, subject="" if kind == _CRANK else kind)
+
+
+class NodeAlarms:
+    """Alarms of the node, in addition to those of the monitor.
+
+    The list of alarms contains them only while they are raised; otherwise live runs and replays publish the
+    same bytes. ``input_sources`` is also an alarm of the monitor; the higher level of both is published.
+
+    Parameters
+    ----------
+    kinds : tuple of str
+        Names of the input kinds.
+    """
+
+    def __init__(self, kinds: tuple[str, ...]) -> None:
+        alarms = [Alarm(kind=each, subject=kind, unit="s") for each in (SILENCE, AHEAD) for kind in kinds]
+        alarms += [sources_alarm(kind) for kind in kinds]
+        self._alarms = {alarm.name: alarm for alarm in alarms}
+
+    def evaluate(self, values: Mapping[str, float], stamp_ns: int) -> tuple[Alarm, ...]:
+        """Evaluate values by alarm name; return the alarms whose published state has changed."""
+        changed = []
+        for name, value in values.items():
+            before = self._alarms[name]
+            after = evaluated(before, value, _LIMITS[before.kind], stamp_ns)
+            if has_changed(before, after):
+                changed.append(after)
+            self._alarms[name] = after
+        return tuple(changed)
+
+    def acknowledge(self) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
+        """Acknowledge all raised alarms; return the cleared ones and the remaining ones."""
+        now = [acknowledged(alarm) for alarm in self.raised]
+        self._alarms |= {alarm.name: alarm for alarm in now}
+        cleared = tuple(alarm for alarm in now if alarm.level is Level.OK)
+        return cleared, tuple(alarm for alarm in now if alarm.level is not Level.OK)
+
+    @property
+    def raised(self) -> tuple[Alarm, ...]:
+        """Alarms that are published."""
+        return tuple(alarm for alarm in self._alarms.values() if alarm.level is not Level.OK)
+
+    def beside(self, alarms: AlarmList) -> AlarmList:
+        """Merge the monitor's alarms with those of the node."""
+        if not self.raised:
+            return alarms
+        named = {alarm.name: alarm for alarm in alarms.alarms}
+        for own in self.raised:
+            if own.name not in named or own.level > named[own.name].level:
+                named[own.name] = own
+        return attrs.evolve(alarms, alarms=tuple(named.values()))
+
+
+# Check that ROS time advances.
+
+
+_STANDS_FROM_S = 1.0
+_TURNED_BACK_S = 1.0
+
+
+def both_clocks(one: Status, other: Status) -> Status:
+    """Combine two statuses of the clock into one with the faults of either."""
+    faults = [status for status in (one, other) if status.level is not Level.OK]
+    message = "; ".join(fault.message for fault in faults) or one.message
+    code = max(faults, key=lambda fault: fault.level).fault_code if faults else one.fault_code
+    return Status(one.name, max(one.level, other.level), message, one.values | other.values, code)
+
+
+class ClockMonitor:
+    """Compares the node's clock with a monotonic clock."""
+
+    def __init__(self) -> None:
+        self._ros_ns = self._changed_ns = 0
+
+    def status(self, ros_ns: int, steady_ns: int, is_simulated: bool, ahead_s: float = 0.0) -> Status:
+        """Present status of the clock.
+
+        Parameters
+        ----------
+        ros_ns, steady_ns : int
+            Present time of the node's clock and of a monotonic clock [ns].
+        is_simulated : bool
+            Whether the node follows ``/clock``.
+        ahead_s : float
+            Largest lead of an input's stamps over the node's clock [s].
+        """
+        since_ns, before = ros_ns - self._ros_ns, self._ros_ns
+        if since_ns or not self._changed_ns:
+            self._ros_ns, self._changed_ns = ros_ns, steady_ns
+        stands_s = (steady_ns - self._changed_ns) * 1.0e-9
+        values = {"stands_s": stands_s, "is_simulated": float(is_simulated), "stamps_ahead_s": ahead_s}
+        if is_simulated and not ros_ns:
+            message = "use_sim_time is set and nobody publishes /clock"
+            return Status("clock", Level.ERROR, message, values, alarms.CLOCK_MISSING)
+        if stands_s > _STANDS_FROM_S:
+            message = "stands still: /clock has stopped"
+            return Status("clock", Level.ERROR, message, values, alarms.CLOCK_STOPPED)
+        if before and since_ns < -1.0e9 * _TURNED_BACK_S:
+            message = "was set back; samples keep their own stamps"
+            return Status("clock", Level.WARN, message, values, alarms.CLOCK_SET_BACK)
+        if ahead_s >= AHEAD_FROM_S:
+            message = (
+                "the stamps of the samples are ahead of the node's clock: set the clocks of both computers; "
+                "samples of a time that was counted ahead are skipped later"
+            )
+            return Status("clock", Level.WARN, message, values, alarms.STAMPS_AHEAD)
+        return Status("clock", Level.OK, "goes on", values)
+
+
+# Status of the node itself for /diagnostics: load, message loss, recording.
+
+
+# Above this delay, topics with one message per sample are not published, so that the monitor can catch up.
+COARSE_FROM_S = 0.25
+
+
+@attrs.define
+class Load:
+    """Load of the node.
+
+    Attributes
+    ----------
+    delay_s, worst_delay_s : float
+        Waiting time of the oldest message: present, and maximum since the last report [s].
+    unpublished : int
+        Samples whose torque and forces were not published in order to catch up.
+    shed_reported : int
+        Messages shed up to the last report.
+    """
+
+    delay_s: float = 0.0
+    worst_delay_s: float = 0.0
+    unpublished: int = 0
+    shed_reported: int = 0
+
+    def note(self, delay_s: float) -> bool:
+        """Record a delay; return whether it is too long to publish every sample."""
+        self.delay_s, self.worst_delay_s = delay_s, max(self.worst_delay_s, delay_s)
+        return delay_s > COARSE_FROM_S
+
+
+def load_status(load: Load, inbox: Inbox) -> Status:
+    """Status of the load; starts a new reporting interval."""
+    shed = inbox.shed - load.shed_reported
+    level, message, code = Level.OK, "keeps up", alarms.NO_FAULT
+    if shed:
+        level, message = Level.ERROR, "overloaded: samples were dropped and their wear is not counted"
+        code = alarms.SAMPLES_DROPPED
+    elif load.worst_delay_s > COARSE_FROM_S:
+        level, message = Level.WARN, "overloaded: forces and torques of samples are not published"
+        code = alarms.SAMPLES_NOT_PUBLISHED
+    values = {
+        "received": float(inbox.received),
+        "waiting": float(len(inbox)),
+        "worst_delay_s": load.worst_delay_s,
+        "unpublished_samples": float(load.unpublished),
+        "shed_messages": float(inbox.shed),
+    }
+    load.worst_delay_s, load.shed_reported = load.delay_s, inbox.shed
+    return Status("load", level, message, values, code)
+
+
+def topics_status(topics: Iterable[InputTopic], now_ns: int, started_ns: int) -> Status:
+    """Status of the input topics: their publishers and faults.
+
+    The monitor core has no clock and cannot detect missing messages, so the node does.
+
+    Parameters
+    ----------
+    topics : iterable of InputTopic
+    now_ns, started_ns : int
+        Present time and start time on a monotonic clock [ns].
+    """
+    messages, values, level = [], {}, Level.OK
+    for topic in topics:
+        short = topic.name.rsplit("/", 1)[-1]
+        silent_s = max(0, now_ns - topic.heard_ns) * 1.0e-9 if topic.heard_ns else math.nan
+        values[f"{short}_publishers"] = float(len(topic.publishers.fitting))
+        values[f"{short}_silent_s"] = silent_s
+        values[f"{short}_lost_messages"] = float(topic.lost)
+        for at, fault in _faults(topic, silent_s, (now_ns - started_ns) * 1.0e-9):
+            messages.append(f"{topic.name}: {fault}")
+            level = max(level, at)
+    code = alarms.TOPICS if messages else alarms.NO_FAULT
+    return Status("topics", level, "; ".join(messages) or "connected", values, code)
+
+
+def _faults(topic: InputTopic, silent_s: float, running_s: float) -> Iterator[tuple[Level, str]]:
+    """Faults of a topic with their levels."""
+    if other := misfit(topic.publishers, topic.stream.type):
+        yield Level.ERROR, other
+    elif topic.incompatible:
+        yield Level.ERROR, topic.incompatible
+    if silent_s > SILENT_FROM_S:
+        yield Level.ERROR, f"has been silent since {utc(topic.heard_wall_ns)}: nothing is monitored"
+    elif not topic.publishers.fitting and not topic.publishers.other:
+        yield Level.ERROR if running_s >= NOTHING_FROM_S else Level.WARN, "nobody publishes it"
+    elif math.isnan(silent_s) and running_s >= NOTHING_FROM_S:
+        yield Level.ERROR, "has a publisher, but no message has arrived yet"
+    if topic.lost > topic.lost_reported:
+        yield Level.WARN, "messages are lost on the way to this node"
+    if topic.without_crank:
+        yield Level.ERROR, topic.without_crank
+    if topic.other_axis:
+        yield Level.ERROR, topic.other_axis
+    if len(topic.publishers.fitting) - topic.shared > 1 and (several_of := several(topic.publishers)):
+        at = Level.ERROR if topic.sources > 1 else Level.WARN
+        yield at, f"{several_of}; expected one"
+
+
+def recording_status(black_box: BlackBox) -> Status:
+    """Status of the recording."""
+    values = {"recorded_messages": float(black_box.recorded)}
+    if black_box.fault:
+        message = f"stopped: {black_box.fault}"
+        return Status("recording", Level.ERROR, message, values, alarms.RECORDING_STOPPED)
+    return Status("recording", Level.OK, "on" if black_box.on else "off", values)

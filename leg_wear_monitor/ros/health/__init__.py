@@ -1,1 +1,0 @@
-"""Health of the node: input silence, clocks, node status, node alarms, log."""

@@ -1,0 +1,454 @@
+"""Inputs of the node: subscriptions, what waits in them, names and axes that do not fit."""
+
+import itertools
+import struct
+from collections.abc import Callable, Iterable, Sequence
+from importlib import import_module
+from typing import Any, NamedTuple
+
+import attrs
+import numpy as np
+from geometry_msgs.msg import WrenchStamped
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_policy_name_from_kind
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.serialization import deserialize_message
+from rclpy.subscription import Subscription
+
+from leg_wear_monitor.bags.reader import names_in
+from leg_wear_monitor.errors import printable
+from leg_wear_monitor.messages.cdr import ENCAPSULATION, MESSAGE, Decoder
+from leg_wear_monitor.messages.streams import JOINT_STATE, WRENCH_STAMPED, Stream, streams_read
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, Samples
+
+# When received messages complete the next reports: processing them earlier gives none, later delays them.
+
+
+_STAMP = (struct.Struct(">iI"), struct.Struct("<iI"))  # by the byte order's bit of the encapsulation
+
+_LEAST_NS = 2_000_000  # between two attempts, for messages that look complete and are not
+_MOST_NS = 50_000_000  # for which messages wait, for instance where one of two topics has stopped
+
+
+def stamp_of(raw: bytes) -> int:
+    """Stamp [ns] of a serialized message that begins with a header; 0 if it is too short."""
+    order = _STAMP[raw[1] & 1] if len(raw) > 1 else _STAMP[0]
+    if len(raw) < ENCAPSULATION + order.size:
+        return 0
+    seconds, rest = order.unpack_from(raw, ENCAPSULATION)
+    return int(seconds) * 1_000_000_000 + int(rest)
+
+
+class Due:
+    """Compares the stamps of received messages with the stamp that completes the next reports.
+
+    Parameters
+    ----------
+    due_stamp_ns : callable
+        Stamp that samples of all kinds must reach for the next reports; 0 if it is not known.
+    """
+
+    def __init__(self, due_stamp_ns: Callable[[], int]) -> None:
+        self._due_stamp_ns = due_stamp_ns
+        self._newest: dict[int, int] = {}
+        self._due_ns, self._processed_ns = 0, 0
+
+    def completes(self, stream: Stream, raw: bytes, log_time_ns: int, now_ns: int) -> bool:
+        """Note a received message; whether the reports are due with it.
+
+        Parameters
+        ----------
+        stream : Stream
+        raw : bytes
+        log_time_ns : int
+            Time of arrival [ns], which stamps messages without a header.
+        now_ns : int
+            The same time on a monotonic clock [ns].
+        """
+        self._newest[stream.code] = stamp_of(raw) if stream.has_stamp else log_time_ns
+        return 0 < self._due_ns <= min(self._newest.values()) and now_ns - self._processed_ns >= _LEAST_NS
+
+    def is_late(self, now_ns: int) -> bool:
+        """Whether to process messages without a due report, at a time [ns] of the monotonic clock."""
+        return self._due_ns == 0 or now_ns - self._processed_ns > _MOST_NS
+
+    def processed(self, now_ns: int) -> None:
+        """Note that messages were processed, at a time [ns] of the monotonic clock."""
+        self._due_ns, self._processed_ns = self._due_stamp_ns(), now_ns
+
+
+# Bounded queue of received messages that wait for the monitor; adding a message is cheap.
+
+
+# A message of seven joints has about 300 bytes, one of a hundred thousand joints 2.5 MB; messages taken
+# together are copied for decoding.
+HELD_BYTES = 64 * 2**20
+TAKEN_BYTES = 8 * 2**20
+
+
+class Arrival(NamedTuple):
+    """A received message: stream code, time of arrival [ns], serialized bytes."""
+
+    kind: int
+    log_time_ns: int
+    raw: bytes
+
+
+class Inbox:
+    """Messages in order of arrival.
+
+    Parameters
+    ----------
+    decoder : Decoder
+    limit : int
+        Maximum number of messages. On overflow the older half is shed, so that the rest has no gaps.
+    limit_bytes : int
+        Maximum number of bytes, likewise; a larger single message is itself shed.
+
+    Attributes
+    ----------
+    received, shed : int
+        Numbers of messages since the start.
+    """
+
+    def __init__(self, decoder: Decoder, limit: int, limit_bytes: int = HELD_BYTES) -> None:
+        self._decoder, self._limit, self._limit_bytes = decoder, limit, limit_bytes
+        self._waiting: list[Arrival] = []
+        self._bytes = 0
+        self._last_ns = 0
+        self.received, self.shed = 0, 0
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    def add(self, kind: int, raw: bytes, now_ns: int) -> None:
+        """Add a message.
+
+        Log times strictly increase. A recording that is read in the order of log time thus keeps the order
+        of arrival.
+        """
+        self._last_ns = max(now_ns, self._last_ns + 1)
+        self.received += 1
+        if len(raw) > self._limit_bytes:
+            self.shed += 1
+            return
+        while len(self._waiting) >= self._limit or self._bytes + len(raw) > self._limit_bytes:
+            self._drop((len(self._waiting) + 1) // 2)
+        self._waiting.append(Arrival(kind, self._last_ns, raw))
+        self._bytes += len(raw)
+
+    def _drop(self, number: int) -> None:
+        self._bytes -= sum(len(one.raw) for one in self._waiting[:number])
+        del self._waiting[:number]
+        self.shed += number
+
+    def delay_s(self, now_ns: int) -> float:
+        """Waiting time of the oldest message [s]."""
+        return max(0, now_ns - self._waiting[0].log_time_ns) * 1.0e-9 if self._waiting else 0.0
+
+    def take(self, most: int, most_bytes: int = TAKEN_BYTES) -> list[Arrival]:
+        """Remove and return the oldest messages within both limits; the first one may exceed `most_bytes`."""
+        ends = itertools.accumulate(len(one.raw) for one in self._waiting[:most])
+        number = max(1, sum(1 for end in ends if end <= most_bytes))
+        taken, self._waiting = self._waiting[:number], self._waiting[number:]
+        self._bytes -= sum(len(one.raw) for one in taken)
+        return taken
+
+    def decoded(self, arrivals: list[Arrival]) -> Samples:
+        """Decode messages to samples in the same order."""
+        messages = np.zeros(len(arrivals), MESSAGE)
+        messages["type"] = [arrival.kind for arrival in arrivals]
+        messages["log_time_ns"] = messages["publish_time_ns"] = [one.log_time_ns for one in arrivals]
+        messages["end"] = np.cumsum([len(arrival.raw) for arrival in arrivals])
+        messages["begin"][1:] = messages["end"][:-1]
+        data = np.frombuffer(b"".join(arrival.raw for arrival in arrivals), np.uint8)
+        return self._decoder.many(data, messages)
+
+
+# Check that messages contain the crank joint; otherwise report the joints they contain.
+
+
+_MOST_NAMES, _MOST_LETTERS, _MOST_BYTES = 12, 40, 100_000
+_MOST_PUBLISHERS, _UNNAMED_OF_A_BLOCK = 8, 20
+
+
+class CrankNames:
+    """Searches messages for the name of the crank joint.
+
+    Several nodes may publish joints of one robot on one topic: messages without the crank are a fault only
+    if none has it.
+
+    Parameters
+    ----------
+    crank_joint : str
+    """
+
+    def __init__(self, crank_joint: str) -> None:
+        self._crank = crank_joint
+        self._named = 0
+        self._others: dict[tuple[str, ...], int] = {}
+        self._unnamed: set[tuple[str, ...]] = set()
+        self._report = ""
+
+    def note(self, arrivals: Sequence[Arrival], samples: Samples, now_ns: int) -> None:
+        """Record messages and the samples decoded from them, at a time [ns] of the monotonic clock."""
+        for i in np.flatnonzero(samples["fault"] == MISSING_JOINT).tolist()[-_UNNAMED_OF_A_BLOCK:]:
+            names = _names(arrivals[i].raw)
+            if names in self._others or len(self._others) < _MOST_PUBLISHERS:
+                self._others[names] = now_ns
+                self._unnamed.add(names)
+        joint_states = np.array([one.kind == JOINT_STATE for one in arrivals], bool)
+        self._named += int(np.count_nonzero(joint_states & (samples["fault"] == NO_FAULT)))
+
+    def others(self, since_ns: int) -> int:
+        """Number of different lists of joints without the crank that came since a time."""
+        return sum(at_ns >= since_ns for at_ns in self._others.values())
+
+    def report(self) -> str:
+        """Report that no message names the crank, and which joints they name; empty if one names it."""
+        named, unnamed = self._named, self._unnamed
+        self._named, self._unnamed = 0, set()
+        if named:
+            self._report = ""
+        elif unnamed:
+            names = sorted({name for joints in unnamed for name in joints})
+            self._report = (
+                f"no joint is named {self._crank!r}; there are {_named(names)}; set crank_joint to its name"
+            )
+        return self._report
+
+
+def _names(raw: bytes) -> tuple[str, ...]:
+    """Joint names of a message; none of a message with too many."""
+    return tuple(names_in(raw)) if len(raw) <= _MOST_BYTES else ()
+
+
+def _named(names: Sequence[str]) -> str:
+    """Names as printable text."""
+    shown = ", ".join(printable(name, _MOST_LETTERS) for name in names[:_MOST_NAMES])
+    if not names:
+        return "too many to name"
+    return f"{shown} and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else shown
+
+
+# Message classes by the names of their types.
+
+
+def message_class(name: str) -> Any:
+    """Class of a message type such as ``sensor_msgs/msg/JointState``."""
+    package, _, message = name.split("/")
+    return getattr(import_module(f"{package}.msg"), message)
+
+
+# Publishers of an input: node names, publishers of another type, several publishers of one crank.
+
+
+_UNKNOWN = ("", "_NODE_NAME_UNKNOWN_", "_CREATED_BY_BARE_DDS_APP_")
+
+
+@attrs.frozen
+class Publishers:
+    """Publishers of a topic according to the ROS graph.
+
+    Attributes
+    ----------
+    fitting : tuple of str
+        Full names of the nodes that publish the expected type.
+    other : tuple of (str, str)
+        Full names of the other nodes, and their message types.
+    """
+
+    fitting: tuple[str, ...] = ()
+    other: tuple[tuple[str, str], ...] = ()
+
+
+def publishers_of(node: Node, topic: str, expected: str) -> Publishers:
+    """Publishers of a topic, from the graph: few middlewares raise an event for an incompatible type.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+    topic : str
+        Full name of the topic.
+    expected : str
+        Expected type, such as ``sensor_msgs/msg/JointState``.
+    """
+    found = [(_full_name(one), one.topic_type) for one in node.get_publishers_info_by_topic(topic)]
+    return Publishers(
+        tuple(sorted(name for name, kind in found if kind == expected)),
+        tuple(sorted((name, kind) for name, kind in found if kind != expected)),
+    )
+
+
+def _full_name(info: object) -> str:
+    name, space = getattr(info, "node_name", ""), getattr(info, "node_namespace", "")
+    return "a publisher without a node" if name in _UNKNOWN else f"{space.rstrip('/')}/{name}"
+
+
+def misfit(publishers: Publishers, expected: str) -> str:
+    """Fault text for publishers of another type; empty if there are none."""
+    listed = _listed(f"{name} publishes {kind}" for name, kind in publishers.other)
+    return f"{listed}, expected {expected}; no message arrives from it" if listed else ""
+
+
+def several(publishers: Publishers) -> str:
+    """Fault text for several publishers; empty if there is at most one."""
+    number = len(publishers.fitting)
+    return f"{number} publishers: {_listed(publishers.fitting)}" if number > 1 else ""
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(dict.fromkeys(names))
+
+
+# Subscriptions of the monitor: serialized messages, and the middleware's events about them.
+
+
+DEPTH = 2000  # messages: two seconds at 1 kHz, more than the longest evaluation between two of them takes
+
+
+@attrs.define
+class InputTopic:
+    """A subscription and its faults.
+
+    Attributes
+    ----------
+    name : str
+        Full name of the topic.
+    stream : Stream
+        Expected stream.
+    heard_ns, heard_wall_ns : int
+        Arrival time of the last message on a monotonic clock and on the wall clock [ns]; 0 before the first.
+    lost, lost_reported : int
+        Messages lost in transport according to the middleware, and how many of them have already been
+        reported.
+    incompatible : str
+        Incompatibility of a publisher's quality of service or type; empty if there is none.
+    publishers : Publishers
+        Publishers at the last query of the graph.
+    sources : int
+        Number of publishers that certainly send the expected data; 1 while this is unknown.
+    without_crank : str
+        Report on messages without the crank; empty if there are none.
+    other_axis : str
+        Report on a torque about another axis than the one that is read; empty if there is none.
+    shared : int
+        Number of publishers that are known to publish other joints than the crank.
+    """
+
+    name: str
+    stream: Stream
+    heard_ns: int = 0
+    heard_wall_ns: int = 0
+    lost: int = 0
+    lost_reported: int = 0
+    incompatible: str = ""
+    publishers: Publishers = Publishers()
+    sources: int = 1
+    without_crank: str = ""
+    other_axis: str = ""
+    shared: int = 0
+
+
+def subscribe(
+    node: Node, config: MonitorConfig, take: Callable[[InputTopic, bytes], None]
+) -> list[tuple[InputTopic, Subscription]]:
+    """Subscribe to the configured inputs; best effort, which is compatible with reliable publishers."""
+    return [
+        _subscribe(node, stream, take)
+        for stream in streams_read(config.drive_torque.source, config.foot_load.source)
+    ]
+
+
+def _subscribe(
+    node: Node, stream: Stream, take: Callable[[InputTopic, bytes], None]
+) -> tuple[InputTopic, Subscription]:
+    topic = InputTopic(node.resolve_topic_name(stream.topic), stream)
+
+    def lost(event: Any) -> None:
+        topic.lost += event.total_count_change
+
+    def misfit(what: str) -> None:
+        topic.incompatible = what
+        node.get_logger().warning(
+            f"{topic.name}: a publisher is incompatible: {what}; no message arrives from it"
+        )
+
+    def quality(event: Any) -> None:
+        policy = qos_policy_name_from_kind(event.last_policy_kind)
+        misfit(f"its {policy.lower()} is lower than this node requests; see qos_overrides")
+
+    callbacks = SubscriptionEventCallbacks(
+        incompatible_qos=quality,
+        incompatible_type=lambda _: misfit(f"its type is not {stream.type}"),
+        message_lost=lost,
+    )
+
+    def come(raw: Any) -> None:  # bytes, because of `raw`; rclpy's type hints omit this
+        take(topic, raw)
+
+    subscription = node.create_subscription(
+        message_class(stream.type),
+        stream.topic,
+        come,
+        QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT),
+        raw=True,
+        event_callbacks=callbacks,
+        qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+    )
+    return topic, subscription
+
+
+# Check that the drive's torque is on the axis that is read; otherwise report the axis that carries one.
+
+
+_AXES = "xyz"
+_OF_A_BLOCK = 4  # messages that are read whole, so that this costs little
+_KEPT = 400
+_LEAST = 40
+_SWINGS = 0.3  # RMS of a drive's torque, as a fraction of the predicted one
+_STILL = 0.02  # RMS of noise and of what a sensor's axes take from each other, as a fraction of the largest
+
+
+class WrenchAxis:
+    """Compares the three torques of wrenches.
+
+    Parameters
+    ----------
+    axis : str
+        The one that is read, ``x``, ``y`` or ``z``.
+    predicted_nm : float
+        RMS of the predicted torque, as the sensor has it.
+    """
+
+    def __init__(self, axis: str, predicted_nm: float) -> None:
+        self._axis, self._predicted_nm = _AXES.index(axis), predicted_nm
+        self._torques: list[tuple[float, float, float]] = []
+
+    def note(self, arrivals: Sequence[Arrival], samples: Samples) -> None:
+        """Read some of the messages, given the samples decoded from them."""
+        wrenches = [
+            one.raw
+            for one, fault in zip(arrivals, samples["fault"], strict=True)
+            if one.kind == WRENCH_STAMPED and fault == NO_FAULT
+        ]
+        for raw in wrenches[-_OF_A_BLOCK:]:
+            torque = deserialize_message(raw, WrenchStamped).wrench.torque
+            self._torques.append((torque.x, torque.y, torque.z))
+        del self._torques[:-_KEPT]
+
+    def report(self) -> str:
+        """Report that another axis than the one that is read carries a torque; empty if that is not so."""
+        if len(self._torques) < _LEAST:
+            return ""
+        rms = np.std(self._torques, axis=0)
+        largest = int(np.argmax(np.nan_to_num(rms)))
+        if rms[largest] < _SWINGS * self._predicted_nm or rms[self._axis] > _STILL * rms[largest]:
+            return ""
+        # without values, for each change of a message is a line of the log
+        return (
+            f"the torque about {_AXES[self._axis]} does not change, the one about {_AXES[largest]} does; "
+            f"if that is the drive's, set drive_torque.axis to {_AXES[largest]}"
+        )

@@ -1,1 +1,0 @@
-"""Inputs of the node: subscriptions, publishers, joint names, inbox."""

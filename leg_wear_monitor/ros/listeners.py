@@ -1,0 +1,276 @@
+"""Listeners to a running monitor: of the dashboard, and of the demo."""
+
+import threading
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rcl_interfaces.msg import ParameterValue
+from rcl_interfaces.srv import GetParameters
+from rclpy.context import Context
+from rclpy.exceptions import InvalidTopicNameException
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import parameter_value_to_python
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.task import Future
+from rclpy.utilities import try_shutdown
+from rclpy.validate_full_topic_name import validate_full_topic_name
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+
+from leg_wear_monitor.dashboard.live_leg import LiveLeg
+from leg_wear_monitor.dashboard.received import MOST, received_status
+from leg_wear_monitor.dashboard.source import LegSetup, leg_setup
+from leg_wear_monitor.errors import ConfigError, LegWearError, printable
+from leg_wear_monitor.mechanism.loader import is_file_name, load_mechanism, shipped_mechanisms
+from leg_wear_monitor.messages import outputs
+from leg_wear_monitor.messages.streams import LATCHED, Output, Qos, topic_of
+from leg_wear_monitor.monitor.config.fitting import fitted
+from leg_wear_monitor.monitor.config.parameters import PARAMETERS, config_from
+from leg_wear_monitor.playback.result import ReplayStatus
+from leg_wear_monitor.ros.running import WAKE_S, executor_for, spin, stamp_ns_of
+
+# Listens to a running monitor for the dashboard: its outputs, and its parameters once.
+
+
+_ASK_AGAIN_S = 2.0
+_HEARD = (outputs.VERDICT, outputs.DIAGNOSTICS, outputs.ALARMS, outputs.FORECAST, outputs.CLEARANCES)
+
+
+def full_name(node: str) -> str:
+    """Full name of a node, with its leading slash.
+
+    Raises
+    ------
+    ConfigError
+        If it is not the name of a node.
+    """
+    name = f"/{node.strip('/')}"
+    try:
+        validate_full_topic_name(name)
+    except (InvalidTopicNameException, ValueError) as error:
+        reason = " ".join(str(error).split())
+        raise ConfigError("--node", "", f"{node!r} is not the name of a node: {printable(reason)}") from error
+    return name
+
+
+def topics_of(node: str) -> list[str]:
+    """Topics that are listened to."""
+    return [topic_of(output, node) for output in _HEARD]
+
+
+@contextmanager
+def listening(node: str, leg: LiveLeg, setup: LegSetup | None = None) -> Iterator[None]:
+    """Tell a leg what a monitor publishes, in a thread, until the end of the context.
+
+    Parameters
+    ----------
+    node : str
+        As `full_name` returned it.
+    leg : LiveLeg
+    setup : LegSetup, optional
+        The leg's parameters; without them, the monitor is asked.
+    """
+    context = Context()
+    context.init(args=[])
+    try:
+        listener = _Listener(context, node, leg)
+        if setup is None:
+            listener.ask()
+        else:
+            leg.take_setup(setup)
+        wanted = threading.Event()
+        wanted.set()
+        # with the default executor, what fails in a callback is an exception, and messages are few
+        spinning = listener, wanted.is_set, lambda node: SingleThreadedExecutor(context=node.context)
+        thread = threading.Thread(target=spin, args=spinning, name="listener", daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            wanted.clear()
+            thread.join()
+            listener.destroy_node()
+    finally:
+        try_shutdown(context=context)
+
+
+class _Listener(Node):
+    """Subscribes, and publishes and offers nothing."""
+
+    def __init__(self, context: Context, monitor: str, leg: LiveLeg) -> None:
+        super().__init__(
+            "leg_wear_dashboard", context=context, enable_rosout=False, start_parameter_services=False
+        )
+        self._monitor, self._leg = monitor, leg
+        self._hear(outputs.VERDICT, DiagnosticArray, lambda m: leg.take_verdict(_statuses(m)))
+        self._hear(outputs.ALARMS, DiagnosticArray, lambda m: leg.take_alarms(_statuses(m)))
+        self._hear(outputs.FORECAST, DiagnosticArray, lambda m: leg.take_forecast(_statuses(m)))
+        self._hear(outputs.CLEARANCES, JointState, lambda m: leg.take_cycle(_columns(m)))
+        self._hear(
+            outputs.DIAGNOSTICS,
+            DiagnosticArray,
+            lambda m: leg.take_diagnostics(stamp_ns_of(m.header.stamp), _statuses(m)),
+        )
+
+    def _hear(self, output: Output, kind: type, take: Callable[[Any], None]) -> None:
+        self.create_subscription(kind, topic_of(output, self._monitor), take, _profile(output.qos))
+
+    def ask(self) -> None:
+        """Ask for the parameters until there is an answer."""
+        self._client = self.create_client(GetParameters, f"{self._monitor}/get_parameters")
+        self._asked: Future | None = None
+        self._timer = self.create_timer(_ASK_AGAIN_S, self._ask_now)
+        self._names = list(PARAMETERS)
+        self._ask_now()
+
+    def _ask_now(self) -> None:
+        if self._client.service_is_ready() and (self._asked is None or self._asked.done()):
+            self._asked = self._client.call_async(GetParameters.Request(names=self._names))
+            self._asked.add_done_callback(self._answered)
+
+    def _answered(self, future: Future) -> None:
+        values = future.result().values if future.result() else []
+        if len(values) != len(self._names):  # that is another node of this name, or one of another version
+            self._leg.take_setup(None, "The monitor's parameters cannot be read; give them by --config FILE.")
+            return
+        given = {name: _plain(value) for name, value in zip(self._names, values, strict=True)}
+        try:
+            self._leg.take_setup(_setup(given, self._monitor))
+        except LegWearError as error:
+            self._leg.take_setup(None, f"The leg is not known: {error}")
+        self.destroy_timer(self._timer)
+
+
+def _plain(message: ParameterValue) -> Any:
+    """A value as in a parameter file; ROS passes an empty list as unset."""
+    value = parameter_value_to_python(message)
+    if value is None:
+        return []
+    return value if isinstance(value, bool | int | float | str) else list(value)
+
+
+def _setup(given: dict[str, Any], monitor: str) -> LegSetup:
+    """The leg of a monitor's parameters; its mechanism is one of the package: no message names a file."""
+    config = config_from(given, monitor)
+    if is_file_name(config.mechanism) or config.mechanism not in shipped_mechanisms():
+        raise LegWearError(
+            f"the monitor has a mechanism of its own, {printable(config.mechanism)}; "
+            "give the parameter file of the monitor by --config FILE"
+        )
+    return leg_setup(config, fitted(load_mechanism(config.mechanism), config, monitor))
+
+
+def _profile(qos: Qos) -> QoSProfile:
+    """What publishers of an output offer, also with another quality of service than the usual one."""
+    is_latched = qos == LATCHED
+    return QoSProfile(
+        depth=qos.depth,
+        reliability=ReliabilityPolicy.RELIABLE if is_latched else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if is_latched else DurabilityPolicy.VOLATILE,
+    )
+
+
+def _statuses(message: DiagnosticArray) -> Iterable[ReplayStatus]:
+    first: Sequence[Any] = message.status[:MOST]
+    for status in first:
+        values = {pair.key: pair.value for pair in status.values[:MOST]}
+        yield received_status(status.name, ord(status.level), status.message, values)
+
+
+def _columns(message: JointState) -> dict[str, dict[str, float]]:
+    names = [name.removesuffix("_clearance") for name in message.name]
+    return {
+        "clearance_m": dict(zip(names, message.position, strict=False)),
+        "peak_force_n": dict(zip(names, message.effort, strict=False)),
+    }
+
+
+# Listener of the demo: reports what the monitor publishes, and acknowledges its alarms.
+
+
+_MONITOR = "leg_wear_monitor"
+
+
+class DemoListener:
+    """Subscribes to the monitor in a namespace.
+
+    Parameters
+    ----------
+    namespace : str
+    domain : int
+        ROS domain.
+    report : callable
+        Called with a stamp [ns] and a line of text.
+
+    Attributes
+    ----------
+    clearances_m : dict
+        Last received clearance of each joint [m].
+    stamp_ns : int
+        Stamp of these clearances [ns].
+    raised, acknowledged : list of str
+        Alarms that were raised, and those that were cleared by an acknowledgement.
+    """
+
+    def __init__(self, namespace: str, domain: int, report: Callable[[int, str], None]) -> None:
+        self._report = report
+        self._context = Context()
+        self._context.init(args=[], domain_id=domain)
+        self._node = Node("witness", context=self._context, namespace=namespace)
+        self._executor = executor_for(self._node)
+        self._executor.add_node(self._node)
+        self.clearances_m: dict[str, float] = {}
+        self.stamp_ns = 0
+        self.raised: list[str] = []
+        self.acknowledged: list[str] = []
+        self._asked: Future | None = None
+        self._service = self._node.create_client(Trigger, f"{_MONITOR}/acknowledge_alarms")
+        self._node.create_subscription(JointState, f"{_MONITOR}/clearance_states", self._hear_cycle, 10)
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._node.create_subscription(DiagnosticArray, f"{_MONITOR}/alarms", self._hear_alarms, latched)
+
+    def attend(self, going_on: Callable[[], bool]) -> None:
+        """Process messages while `going_on` returns true."""
+        while going_on():
+            self._executor.spin_once(timeout_sec=WAKE_S)
+
+    def leave(self) -> None:
+        """Shut down the executor."""
+        self._executor.shutdown()
+        self._node.destroy_node()
+        try_shutdown(context=self._context)
+
+    def _hear_cycle(self, message: JointState) -> None:
+        self.stamp_ns = stamp_ns_of(message.header.stamp)
+        names = [name.removesuffix("_clearance") for name in message.name]
+        self.clearances_m = dict(zip(names, message.position, strict=True))
+        clearances = "  ".join(f"{name} {1e6 * c:.3f}" for name, c in self.clearances_m.items())
+        self._report(
+            self.stamp_ns, f"clearance [um]  {clearances}   hardest impact {max(message.effort):.0f} N"
+        )
+
+    def _hear_alarms(self, message: DiagnosticArray) -> None:
+        alarms = {status.name.split(": ", 1)[-1]: status for status in message.status}
+        up = {name: status for name, status in alarms.items() if status.level != DiagnosticStatus.OK}
+        for name, status in up.items():
+            if name not in self.raised:
+                self.raised.append(name)
+                self._report(stamp_ns_of(message.header.stamp), f"ALARM {name}: {_alarm_text(status)}")
+        if up and all(status.message.startswith("latched") for status in up.values()) and not self._asked:
+            self._asked = self._service.call_async(Trigger.Request())
+            self._asked.add_done_callback(lambda future: self._hear_answer(future, list(up)))
+
+    def _hear_answer(self, future: Future, names: list[str]) -> None:
+        self._asked = None
+        self.acknowledged += names
+        self._report(self.stamp_ns, f"alarms acknowledged: {future.result().message}")
+
+
+def _alarm_text(status: DiagnosticStatus) -> str:
+    values = {value.key: value.value for value in status.values}
+    unit = next((key.removeprefix("value_") for key in values if key.startswith("value_")), "")
+    suffix = f"_{unit}" if unit else ""
+    return f"{float(values[f'value{suffix}']):.5g} {unit.upper()}, limit {values[f'limit{suffix}']}"

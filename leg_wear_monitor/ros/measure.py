@@ -1,0 +1,256 @@
+"""Service ``~/measure``, and a client of the services of a monitor in another process."""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from typing import Any
+
+import attrs
+import rclpy
+from rcl_interfaces.msg import Parameter, ParameterType, SetParametersResult
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.context import Context
+from rclpy.exceptions import InvalidServiceNameException
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter as ParameterMessage
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import try_shutdown
+from rclpy.validate_full_topic_name import validate_full_topic_name
+from std_srvs.srv import Trigger
+
+from leg_wear_monitor.errors import ConfigError, LegWearError, did_you_mean, printable
+from leg_wear_monitor.monitor.wear_monitor import WearMonitor
+
+# Service ``~/measure``: a clearance that somebody measured, while the monitor runs.
+
+
+SERVICE = "~/measure"
+WHO = f"service {SERVICE}"
+
+_TYPES = {
+    ParameterType.PARAMETER_STRING: ("string", "string_value"),
+    ParameterType.PARAMETER_DOUBLE: ("double", "double_value"),
+    ParameterType.PARAMETER_BOOL: ("bool", "bool_value"),
+    ParameterType.PARAMETER_INTEGER: ("integer", "integer_value"),
+}
+_WANTED = {
+    "joint": ("string", "the name of a clearance joint"),
+    "clearance_m": ("double", "a mean radial clearance in m, such as 0.00042"),
+    "sigma_m": ("double", "its standard deviation in m, such as 0.000005"),
+    "accept": ("bool", "true or false"),
+}
+_OPTIONAL = ("accept",)
+
+
+@attrs.frozen(kw_only=True)
+class MeasureRequest:
+    """A measured clearance, as the service takes it.
+
+    Attributes
+    ----------
+    joint : str
+    clearance_m, sigma_m : float
+        Mean radial clearance, and its standard deviation.
+    accept : bool
+        Whether the forecast uses it even if it contradicts the model.
+    """
+
+    joint: str
+    clearance_m: float
+    sigma_m: float
+    accept: bool = False
+
+
+def request_of(parameters: Sequence[Parameter]) -> MeasureRequest:
+    """The request that parameters contain.
+
+    Raises
+    ------
+    ConfigError
+        For a parameter that is unknown, missing, given twice or of another type.
+    """
+    values: dict[str, Any] = {}
+    for one in parameters:
+        if one.name not in _WANTED:
+            names = ", ".join(_WANTED)
+            fault = f"unknown parameter, expected {names}{did_you_mean(one.name, _WANTED)}"
+            raise ConfigError(printable(one.name, 100), "", fault)
+        if one.name in values:
+            raise ConfigError(one.name, "", "is given twice")
+        values[one.name] = _value(one)
+    for name, (kind, meaning) in _WANTED.items():
+        if name not in values and name not in _OPTIONAL:
+            raise ConfigError(name, "", f"is missing, expected a {kind}: {meaning}")
+    return MeasureRequest(**values)
+
+
+def _value(one: Parameter) -> Any:
+    kind, meaning = _WANTED[one.name]
+    found, field = _TYPES.get(one.value.type, ("other", ""))
+    if found != kind:
+        raise ConfigError(one.name, "", f"is of type {found}, expected a {kind}: {meaning}")
+    return getattr(one.value, field)
+
+
+def measured(monitor: WearMonitor, wanted: MeasureRequest, stamp_ns: int) -> str:
+    """Enter a measured clearance into a running monitor; what came of it, in one line.
+
+    Raises
+    ------
+    LegWearError
+        For a joint without clearance, or impossible values; then nothing is entered.
+    """
+    found = monitor.measure(
+        wanted.joint, wanted.clearance_m, wanted.sigma_m, stamp_ns, WHO, accept=wanted.accept
+    )
+    limit_m = monitor.clearance_limits_m[monitor.clearance_joints.index(found.measurement.joint)]
+    lines = found.told(limit_m, monitor.config.limits.warn_fraction, monitor.measurements[:-1])
+    try:
+        monitor.save()
+    except LegWearError as error:
+        lines = (*lines, f"it is not stored: {error}")
+    return "; ".join(lines)
+
+
+def offer_measure(node: Node, act: Callable[[MeasureRequest], str]) -> None:
+    """Create the service; an action enters what was measured and returns what came of it."""
+
+    def answer(
+        request: SetParametersAtomically.Request, response: SetParametersAtomically.Response
+    ) -> SetParametersAtomically.Response:
+        try:
+            result = SetParametersResult(successful=True, reason=act(request_of(request.parameters)))
+        except LegWearError as error:
+            result = SetParametersResult(successful=False, reason=" ".join(str(error).split()))
+        node.get_logger().info(f"{SERVICE}: {result.reason}")
+        response.result = result
+        return response
+
+    node.create_service(SetParametersAtomically, SERVICE, answer)
+
+
+# Client of the services of a monitor in another process: measurements, acknowledgements, resets.
+
+
+_NAME = "leg_wear_measure"
+
+
+def measure_on(
+    monitor: str, joint: str, clearance_m: float, sigma_m: float, accept: bool, wait_s: float
+) -> str:
+    """Enter a measured clearance into a running monitor.
+
+    Parameters
+    ----------
+    monitor : str
+        Full name of its node, such as ``/left/leg_wear_monitor``.
+    joint : str
+    clearance_m, sigma_m : float
+        Mean radial clearance, and its standard deviation.
+    accept : bool
+        Whether the forecast uses it even if it contradicts the model.
+    wait_s : float
+        Longest wait for the service, and again for its answer.
+
+    Returns
+    -------
+    str
+        What came of it.
+
+    Raises
+    ------
+    LegWearError
+        If nobody answers, or the monitor refuses it.
+    """
+    service = _service_of(monitor, "measure")
+    values = {"joint": joint, "clearance_m": clearance_m, "sigma_m": sigma_m, "accept": accept}
+    parameters = [ParameterMessage(name, value=value).to_parameter_msg() for name, value in values.items()]
+    with _caller(SetParametersAtomically, service, wait_s) as call:
+        result = call(SetParametersAtomically.Request(parameters=parameters)).result
+    if not result.successful:
+        raise LegWearError(f"{service}: {result.reason}")
+    return str(result.reason)
+
+
+def trigger_on(monitor: str, name: str, wait_s: float, times: int = 1) -> str:
+    """Call a service without arguments of a running monitor.
+
+    Parameters
+    ----------
+    monitor : str
+        Full name of its node.
+    name : str
+        Of the service below the node, such as ``reset_wear/G``.
+    wait_s : float
+        Longest wait for the service, and again for each answer.
+    times : int
+        Number of calls; a reset asks to be called twice.
+
+    Returns
+    -------
+    str
+        The last answer.
+
+    Raises
+    ------
+    LegWearError
+        If nobody answers, or the monitor refuses the last call.
+    """
+    service = _service_of(monitor, name)
+    with _caller(Trigger, service, wait_s) as call:
+        answer = [call(Trigger.Request()) for _ in range(times)][-1]
+    if not answer.success:
+        raise LegWearError(f"{service}: {answer.message}")
+    return str(answer.message)
+
+
+@contextmanager
+def _caller(kind: Any, service: str, wait_s: float) -> Iterator[Callable[[Any], Any]]:
+    """A function that calls a service, from a node of its own.
+
+    Raises
+    ------
+    LegWearError
+        If nobody offers the service, or nobody answers.
+    """
+    context = Context()
+    rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = Node(_NAME, context=context, enable_rosout=False, start_parameter_services=False)
+        try:
+            client = node.create_client(kind, service)
+            if not client.wait_for_service(timeout_sec=wait_s):
+                raise LegWearError(
+                    f"{service}: nobody offers this service within {wait_s:g} s; is the monitor running, "
+                    "with this name and this ROS_DOMAIN_ID?"
+                )
+            yield partial(_answer, node, client, service, wait_s)
+        finally:
+            node.destroy_node()
+    finally:
+        try_shutdown(context=context)
+
+
+def _service_of(monitor: str, name: str) -> str:
+    service = f"/{monitor.strip('/')}/{name}"
+    try:
+        validate_full_topic_name(service, is_service=True)
+    except InvalidServiceNameException as error:
+        reason = " ".join(str(error).split())
+        raise ConfigError("--node", "", f"{monitor!r} is not the name of a node: {reason}") from error
+    return service
+
+
+def _answer(node: Node, client: Any, service: str, wait_s: float, request: Any) -> Any:
+    future = client.call_async(request)
+    executor = SingleThreadedExecutor(context=node.context)
+    executor.add_node(node)
+    executor.spin_until_future_complete(future, timeout_sec=wait_s)
+    executor.shutdown()
+    if not future.done():
+        raise LegWearError(
+            f"{service}: no answer within {wait_s:g} s; whether it was done is not known: "
+            "see the log of the monitor"
+        )
+    return future.result()

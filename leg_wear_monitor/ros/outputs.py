@@ -1,0 +1,256 @@
+"""Outputs of the node: topics, markers, and the recording of all of them."""
+
+import time
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import WrenchStamped
+from numpy.typing import NDArray
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
+from visualization_msgs.msg import MarkerArray
+
+from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.messages.encode import LegDrawing
+from leg_wear_monitor.messages.leg_markers import MARKERS, SILENT_NS, LegMarkers
+from leg_wear_monitor.messages.streams import Outgoing, Output, Qos
+from leg_wear_monitor.monitor.reports import Reports
+from leg_wear_monitor.monitor.wear_monitor import WearMonitor
+from leg_wear_monitor.ros.running import until_down
+
+if TYPE_CHECKING:
+    from leg_wear_monitor.bags.mcap_writer import McapWriter
+
+
+# MCAP recording of all messages the node receives and publishes; its replay reproduces the live run.
+
+
+class BlackBox:
+    """Optional recording: without a path, or after a disk failure, nothing is recorded.
+
+    Parameters
+    ----------
+    path : str
+        MCAP file; empty disables the recording.
+
+    Attributes
+    ----------
+    fault : str
+        Why the recording stopped; empty if it did not.
+    recorded : int
+        Number of recorded messages.
+
+    Raises
+    ------
+    LegWearError
+        If the file cannot be created.
+    """
+
+    def __init__(self, path: str) -> None:
+        self.fault, self.recorded = "", 0
+        self._writer = _writer(path) if path else None
+        self._channels: dict[str, int] = {}
+
+    @property
+    def on(self) -> bool:
+        """Whether messages are recorded."""
+        return self._writer is not None
+
+    def add_topic(self, topic: str, kind: str, qos: "Qos") -> None:
+        """Register a topic by its full name and type."""
+        if self._writer is not None:
+            self._channels[topic] = self._writer.channel(topic, kind, qos)
+
+    def write(self, topic: str, log_time_ns: int, raw: bytes) -> None:
+        """Record a message."""
+        if self._writer is None:
+            return
+        try:
+            self._writer.write(self._channels[topic], log_time_ns, raw)
+            self.recorded += 1
+        except LegWearError as error:
+            self._fail(error)
+
+    def write_many(self, topic: str, log_time_ns: int, rows: NDArray[np.uint8]) -> None:
+        """Record messages of equal length, (n, bytes)."""
+        if self._writer is None:
+            return
+        try:
+            stamps = np.full(len(rows), log_time_ns, np.int64)
+            self._writer.write_many(self._channels[topic], stamps, rows)
+            self.recorded += len(rows)
+        except LegWearError as error:
+            self._fail(error)
+
+    def flush(self) -> None:
+        """Write buffered messages to the disk."""
+        if self._writer is not None:
+            try:
+                self._writer.flush()
+            except LegWearError as error:
+                self._fail(error)
+
+    def close(self) -> None:
+        """Finish the file."""
+        if self._writer is not None:
+            try:
+                self._writer.close()
+            except LegWearError as error:
+                self._fail(error)
+            self._writer = None
+
+    def _fail(self, error: LegWearError) -> None:
+        """Stop recording: written data stay readable, and a disk failure must not stop the monitor."""
+        self.fault, writer, self._writer = str(error), self._writer, None
+        if writer is not None:
+            with suppress(LegWearError):  # already reported
+                writer.close()
+
+
+def _writer(path: str) -> "McapWriter":
+    try:
+        from leg_wear_monitor.bags.mcap_writer import McapWriter
+    except ImportError as error:
+        raise LegWearError(f"record.path: {error}; pip install 'leg_wear_monitor[bags]'") from error
+    return McapWriter(path)
+
+
+# Output topics of the monitor: serialized messages are published and recorded.
+
+
+VOLATILE = "volatile"
+
+_KINDS = {
+    "sensor_msgs/msg/JointState": JointState,
+    "geometry_msgs/msg/WrenchStamped": WrenchStamped,
+    "diagnostic_msgs/msg/DiagnosticArray": DiagnosticArray,
+    "std_msgs/msg/Float64": Float64,
+    "visualization_msgs/msg/MarkerArray": MarkerArray,
+}
+
+
+def qos_profile(qos: Qos) -> QoSProfile:
+    """Convert to a quality-of-service profile of rclpy."""
+    return QoSProfile(
+        depth=qos.depth,
+        reliability=ReliabilityPolicy[qos.reliability.upper()],
+        durability=DurabilityPolicy[qos.durability.upper()],
+    )
+
+
+class Outlets:
+    """Publishers of a node's outputs.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+    outputs : iterable of Output
+    black_box : BlackBox
+    """
+
+    def __init__(self, node: Node, outputs: Iterable[Output], black_box: BlackBox) -> None:
+        self._context, self._black_box = node.context, black_box
+        self._topics: dict[Output, str] = {}
+        self._publishers: dict[Output, Publisher] = {}
+        for output in outputs:
+            # names without a leading slash are in the node's namespace; names may be remapped
+            self._publishers[output] = publisher = node.create_publisher(
+                _KINDS[output.type],
+                output.name,
+                qos_profile(output.qos),
+                qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+            )
+            self._topics[output] = publisher.topic_name
+            black_box.add_topic(publisher.topic_name, output.type, output.qos)
+
+    def wanted(self, output: Output) -> bool:
+        """Whether a message is needed: for a subscriber, for a late one (latched), or for the recording."""
+        if self._black_box.on or output.qos.durability != VOLATILE:
+            return True
+        with until_down(self._context):
+            return self._publishers[output].get_subscription_count() > 0
+        return False
+
+    def send(self, output: Output, now_ns: int, raw: bytes) -> None:
+        """Record and publish a message; only record it after the context has shut down."""
+        self._black_box.write(self._topics[output], now_ns, raw)
+        with until_down(self._context):
+            self._publishers[output].publish(raw)
+
+    def send_many(self, output: Output, now_ns: int, rows: NDArray[np.uint8]) -> None:
+        """Record and publish messages of equal length, (n, bytes)."""
+        self._black_box.write_many(self._topics[output], now_ns, rows)
+        publish = self._publishers[output].publish
+        with until_down(self._context):
+            for row in rows:
+                publish(row.tobytes())
+
+
+# Topic ``~/markers`` of the node; `messages.leg_markers` draws them.
+
+
+class MarkerTopic:
+    """``~/markers``, while its parameter is on and somebody subscribes or the node is recorded.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+    outlets : Outlets
+    monitor : WearMonitor
+    is_current : callable
+        Returns whether there are current data; otherwise the leg is published in grey, once a second.
+    """
+
+    def __init__(
+        self, node: Node, outlets: Outlets, monitor: WearMonitor, is_current: Callable[[], bool]
+    ) -> None:
+        self._node, self._outlets, self._monitor, self._is_current = node, outlets, monitor, is_current
+        self._markers: LegMarkers | None = None
+        if self._is_wanted:
+            self._markers = LegMarkers(monitor, self._drawing)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        node.create_timer(SILENT_NS * 1.0e-9, self._show_silence, clock=steady)
+
+    def publish(self, reports: Reports) -> None:
+        """Publish the markers of reports."""
+        for outgoing in self._drawn.of(reports) if self._is_wanted else ():
+            self._send(outgoing)
+
+    def operated(self) -> None:
+        """Show alarms and verdict that an operator has changed."""
+        if self._markers:
+            self._markers.set_state(self._monitor.alarms, self._monitor.verdict)
+
+    @cached_property
+    def _drawing(self) -> LegDrawing:
+        return LegDrawing(self._monitor.mechanism)
+
+    @property
+    def _drawn(self) -> LegMarkers:
+        self._markers = self._markers or LegMarkers(self._monitor, self._drawing)
+        return self._markers
+
+    @property
+    def _is_wanted(self) -> bool:
+        """Whether markers are needed; if not, what they show is not kept up to date."""
+        wanted = self._monitor.config.publish_markers and self._outlets.wanted(MARKERS)
+        if not wanted:
+            self._markers = None
+        return wanted
+
+    def _show_silence(self) -> None:
+        if not self._is_current() and self._is_wanted:
+            self._send(self._drawn.no_data(self._node.get_clock().now().nanoseconds))
+
+    def _send(self, outgoing: Outgoing) -> None:
+        self._outlets.send_many(outgoing.output, time.time_ns(), outgoing.messages)

@@ -1,1 +1,0 @@
-"""Outputs of the node: publishers, markers, recording."""

@@ -1,1 +1,0 @@
-"""ROS parameters, generated from configuration classes."""

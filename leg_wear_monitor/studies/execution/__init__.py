@@ -1,1 +1,0 @@
-"""Points of a study computed by workers, and each result stored immediately."""

@@ -1,1 +1,0 @@
-"""Settings of a study and the points to compute."""

@@ -1,1 +1,0 @@
-"""Numerical tasks of the studies: the computation of one point."""

@@ -1,0 +1,368 @@
+"""Crank motion from filtered samples: spline, rest, tracking state (physics.md section 9).
+
+A spline node is a crank sample at least a fixed time after the previous node. Once enough later samples have
+arrived, it is smoothed and the leg is advanced to it; the leg is evaluated at all samples up to it.
+"""
+
+import math
+
+from leg_wear_monitor.compiled.kernel import kernel
+from leg_wear_monitor.twin import CRANK, LOAD
+from leg_wear_monitor.twin.statistics import (
+    AHEAD_NS,
+    EVALUATE,
+    LEAVE,
+    LOST_BY_OUTLIERS,
+    MOVE,
+    MOVING,
+    PUSH,
+    REPORT,
+    REST,
+    REVERSED,
+    START,
+    STOPPED,
+    add_step,
+    join_smoothly,
+)
+
+# Kalman filter and modified Bryson-Frazier smoother of the crank's motion (physics.md section 9).
+#
+# The crank's angle, speed and acceleration are driven by a jerk that is white noise. With the sensor's noise
+# spread over the time between samples, the filter's bandwidth is (jerk / noise)^(1/6) rad/s at any rate. The
+# smoother is that of Bierman (1973, *Fixed interval smoothing with discrete measurements*): an adjoint vector
+# is propagated back over the later samples, without a matrix inverse.
+
+
+_TURN = 2.0 * math.pi
+_WIDEST_GATE = 2.5  # rad: above it, an innovation's direction is ambiguous (near half a turn)
+_SIGMAS = 5.0  # standard deviations of the prediction that are added to a gate
+
+
+@kernel
+def begin_filter(model, angle, out_estimate):
+    """Initialise the estimate by a first angle [rad], reduced to [0, 2 pi), and the commanded speed."""
+    e, speed = out_estimate, model.commanded_speed
+    e.angle, e.speed, e.acceleration = angle - _TURN * math.floor(angle / _TURN), speed, 0.0
+    e.p00, e.p01, e.p02 = model.angle_noise / model.longest_spread, 0.0, 0.0
+    e.p11, e.p12, e.p22 = speed**2, 0.0, (speed / model.longest_spread) ** 2
+
+
+@kernel
+def predict(model, h, estimate):
+    """Propagate the filter's state and covariance by a time h [s], in place."""
+    e, x, v, a = estimate, estimate.angle, estimate.speed, estimate.acceleration
+    e.angle, e.speed = x + h * (v + 0.5 * h * a), v + h * a
+    p00, p01, p02, p11, p12, p22 = e.p00, e.p01, e.p02, e.p11, e.p12, e.p22
+    q, g = model.jerk * h, 0.5 * h * h
+    # rows of F P, F = [1 h g; 0 1 h; 0 0 1]
+    a00, a01, a02 = p00 + h * p01 + g * p02, p01 + h * p11 + g * p12, p02 + h * p12 + g * p22
+    a11, a12 = p11 + h * p12, p12 + h * p22
+    e.p00 = a00 + h * a01 + g * a02 + q * h**4 / 20.0
+    e.p01 = a01 + h * a02 + q * h**3 / 8.0
+    e.p02 = a02 + q * h**2 / 6.0
+    e.p11 = a11 + h * a12 + q * h**2 / 3.0
+    e.p12 = a12 + 0.5 * q * h
+    e.p22 = p22 + q
+
+
+@kernel
+def note_prediction(estimate, step, out_row):
+    """Begin the queue's row of a crank sample ``step`` [s] after the last one: the predicted state."""
+    e, row = estimate, out_row
+    row.step, row.bridged = step, 0
+    row.angle, row.speed, row.acceleration = e.angle, e.speed, e.acceleration
+    row.p00, row.p01, row.p02, row.p11, row.p12, row.p22 = e.p00, e.p01, e.p02, e.p11, e.p12, e.p22
+    row.innovation_variance[0], row.innovation_variance[1] = 0.0, 0.0
+
+
+@kernel
+def _correct(i, variance, innovation, estimate, row):
+    """Correct by a measurement of state i (0 angle, 1 speed); store the smoother's data in the row."""
+    e = estimate
+    b0 = e.p00 if i == 0 else e.p01  # column i of P
+    b1 = e.p01 if i == 0 else e.p11
+    b2 = e.p02 if i == 0 else e.p12
+    s = (b0 if i == 0 else b1) + variance
+    k0, k1, k2 = b0 / s, b1 / s, b2 / s
+    e.angle += k0 * innovation
+    e.speed += k1 * innovation
+    e.acceleration += k2 * innovation
+    e.p00 -= k0 * b0
+    e.p01 -= k0 * b1
+    e.p02 -= k0 * b2
+    e.p11 -= k1 * b1
+    e.p12 -= k1 * b2
+    e.p22 -= k2 * b2
+    row.innovation_variance[i], row.innovation[i] = s, innovation
+    row.gain[i, 0], row.gain[i, 1], row.gain[i, 2] = k0, k1, k2
+
+
+@kernel
+def update(model, h, step, angle, velocity, trusted, estimate, row):
+    """Filter a crank sample (angle [rad], velocity [rad/s]) and fill its row of the queue.
+
+    It is h [s] after the filter's time and ``step`` [s] after the last used sample. Its velocity is used if
+    ``trusted``.
+
+    Returns
+    -------
+    used, verdict
+        Whether the sample passed its gate (otherwise the filter contains the prediction); 1 for a velocity
+        that agrees with the angles, -1 for one that does not, 0 without velocity.
+    """
+    predict(model, h, estimate)
+    note_prediction(estimate, step, row)
+    innovation = angle - estimate.angle
+    innovation -= _TURN * math.floor(innovation / _TURN + 0.5)
+    if not abs(innovation) < min(_WIDEST_GATE, model.gate + _SIGMAS * math.sqrt(estimate.p00)):
+        return False, 0
+    spread = min(max(step, 1.0e-6), model.longest_spread)
+    _correct(0, model.angle_noise / spread, innovation, estimate, row)
+    if not math.isfinite(velocity):
+        return True, 0
+    innovation = velocity - estimate.speed
+    if not abs(innovation) < model.velocity_gate + _SIGMAS * math.sqrt(estimate.p11):
+        return True, -1
+    if trusted:
+        _correct(1, model.velocity_noise / spread, innovation, estimate, row)
+    return True, 1
+
+
+@kernel
+def _adjoin(i, row, l0, l1, l2):
+    """Adjoint vector (l0, l1, l2) before a measurement of state i, from that after it."""
+    s, gain = row.innovation_variance[i], row.gain
+    if s > 0.0:
+        along = gain[i, 0] * l0 + gain[i, 1] * l1 + gain[i, 2] * l2 + row.innovation[i] / s
+        if i == 0:
+            l0 -= along
+        else:
+            l1 -= along
+    return l0, l1, l2
+
+
+@kernel
+def smooth(queue, spline_node, tail, out_node):
+    """Smoothed crank motion at index ``spline_node`` of the queue, from all samples before index ``tail``."""
+    l0, l1, l2 = 0.0, 0.0, 0.0
+    for j in range(tail - 1, spline_node - 1, -1):
+        row = queue[j]
+        if row.kind != CRANK:
+            continue
+        l0, l1, l2 = _adjoin(1, row, l0, l1, l2)
+        l0, l1, l2 = _adjoin(0, row, l0, l1, l2)
+        if j > spline_node:
+            h = row.step
+            l2 += h * (l1 + 0.5 * h * l0)
+            l1 += h * l0
+    row = queue[spline_node]
+    out_node.angle = row.angle - (row.p00 * l0 + row.p01 * l1 + row.p02 * l2)
+    out_node.speed = row.speed - (row.p01 * l0 + row.p11 * l1 + row.p12 * l2)
+    out_node.acceleration = row.acceleration - (row.p02 * l0 + row.p12 * l1 + row.p22 * l2)
+
+
+_RESTING = 0.02  # largest change of the angle of a resting crank [rad]
+_PATIENCE = 10  # largest duration of a start, in settling times
+
+IS_STOPPED, IS_STARTING, IS_IN_STEP, IS_OUT_OF_STEP = range(4)
+
+
+@kernel
+def _push(state, j, steps, n):
+    """Add the step of a queued sample of the foot load, with the one that is a filter's delay ahead."""
+    row, after, ahead = state.queue[j], -1, j
+    for k in range(j + 1, state.clock.tail):
+        other = state.queue[k]
+        if other.kind == LOAD:
+            after, ahead = k if after < 0 else after, k
+            # the filtered force is then right until the next sample
+            if other.stamp_ns >= state.queue[after].stamp_ns + AHEAD_NS:
+                break
+    n = add_step(steps, n, PUSH, row.stamp_ns, state.queue[ahead].stamp_ns, 0)
+    push = steps[n - 1]
+    push.until_next_ns = state.queue[after].stamp_ns - row.stamp_ns if after >= 0 else 0
+    for i in range(2):
+        push.motion[i], push.motion[2 + i] = row.foot_force[i], state.queue[ahead].foot_force[i]
+    return n
+
+
+@kernel
+def evaluate_up_to(state, spline_node, steps, n):
+    """Add steps that evaluate the leg at all queued samples before an index, and drop these samples.
+
+    Samples of the foot load push it instead; those ahead have arrived within the lag.
+    """
+    clock = state.clock
+    for j in range(clock.head, spline_node):
+        row = state.queue[j]
+        if row.kind == LOAD:
+            n = _push(state, j, steps, n)
+            continue
+        n = add_step(steps, n, EVALUATE, row.stamp_ns, row.stamp_ns, row.kind)
+        steps[n - 1].torque = row.torque
+    clock.head = spline_node
+    return n
+
+
+@kernel
+def lose(state, stamp, reason, steps, n):
+    """End tracking at a stamp: release waiting samples without the leg; the next crank sample restarts."""
+    clock = state.clock
+    if clock.last_crank_ns != 0:
+        state.counts.lost += 1
+    n = add_step(steps, n, LEAVE, stamp, stamp, reason)
+    n = evaluate_up_to(state, clock.tail, steps, n)
+    if clock.followed != 0:
+        clock.out_since_ns = clock.last_node_ns
+    clock.head, clock.tail, clock.last_crank_ns = 0, 0, 0
+    clock.followed, clock.at_rest, clock.slow_since_ns, clock.tolerance_since_ns = 0, 0, 0, 0
+    clock.tracking, clock.in_tolerance, clock.direction = IS_STARTING, 0, 0
+    return n
+
+
+@kernel
+def _next_spline_node(model, state):
+    """Index of the next spline node in the queue; -1 if it, or a later sample that it needs, is missing."""
+    clock = state.clock
+    due = clock.acquiring_ns + model.acquire_ns
+    if clock.followed != 0:
+        due = clock.last_node_ns + model.node_interval_ns
+    newest = clock.last_crank_ns
+    if newest == 0 or newest - due < model.lag_ns:
+        return -1
+    for j in range(clock.head, clock.tail):
+        row = state.queue[j]
+        if row.kind == CRANK and row.stamp_ns >= due:
+            return j if newest - row.stamp_ns >= model.lag_ns else -1
+    return -1
+
+
+@kernel
+def _drop_turns(state):
+    """Count whole turns separately, so that angles stay small and exact."""
+    turns = math.floor(state.ahead.angle / _TURN)
+    if turns != 0.0:
+        shift = turns * _TURN
+        state.clock.turns += int(turns)
+        state.ahead.angle -= shift
+        state.node.angle -= shift
+        state.estimate.angle -= shift
+        for j in range(state.clock.head, state.clock.tail):
+            state.queue[j].angle -= shift
+
+
+@kernel
+def _evaluate_speed(model, clock, stamp, speed):
+    """Update the tracking state by the time for which the speed has been within tolerance or beyond."""
+    within = 1 if model.slowest <= abs(speed) <= model.fastest else 0
+    if clock.tolerance_since_ns == 0 or within != clock.in_tolerance:
+        clock.tolerance_since_ns, clock.in_tolerance = stamp, within
+    patience = model.settle_ns
+    if within == 0 and clock.tracking == IS_STARTING:
+        patience *= _PATIENCE
+    if stamp - clock.tolerance_since_ns >= patience:
+        clock.tracking = IS_IN_STEP if within != 0 else IS_OUT_OF_STEP
+
+
+@kernel
+def _stops(model, state, stamp, node):
+    """Whether the crank is at rest at a spline node; updates the clock's fields of rest."""
+    clock, least = state.clock, model.stop_speed
+    if clock.at_rest != 0:
+        if abs(node.speed) > 2.0 * least or abs(node.angle - state.node.angle) > _RESTING:
+            clock.slow_since_ns, clock.tolerance_since_ns, clock.tracking = 0, 0, IS_STARTING
+            return False
+        return True
+    if abs(node.speed) > least:
+        clock.slow_since_ns = 0
+    elif clock.slow_since_ns == 0:
+        clock.slow_since_ns = stamp
+    return clock.slow_since_ns != 0 and stamp - clock.slow_since_ns >= model.stop_hold_ns
+
+
+@kernel
+def _report_direction(model, state, stamp, speed, steps, n):
+    """Update the direction of rotation; add a report of a reversal."""
+    clock = state.clock
+    if abs(speed) > model.stop_speed:
+        direction = 1 if speed > 0.0 else -1
+        if clock.direction == -direction:
+            state.counts.reversals += 1
+            n = add_step(steps, n, REPORT, stamp, stamp, REVERSED)
+        clock.direction = direction
+    return n
+
+
+@kernel
+def _bridged(state, spline_node):
+    """Total time [ns] of bridged gaps up to a spline node."""
+    total = 0
+    for j in range(state.clock.head, spline_node + 1):
+        row = state.queue[j]
+        if row.kind == CRANK and row.bridged != 0:
+            total += round(1.0e9 * row.step)
+    return total
+
+
+@kernel
+def _move(model, state, spline_node, stamp, steps, n):
+    """Add the steps from the last spline node to the next: motion or rest."""
+    clock, ahead, rested = state.clock, state.ahead, state.clock.at_rest != 0
+    rests = _stops(model, state, stamp, ahead)
+    if rests:
+        ahead.speed, ahead.acceleration = 0.0, 0.0
+    begin = clock.last_node_ns
+    if rested:
+        # a rest is reported up to a run-up time before the node, to leave time for a smooth start
+        begin = max(clock.rested_ns, stamp - model.run_up_ns)
+        if begin > clock.rested_ns:
+            state.counts.standing_ns += begin - clock.rested_ns
+            n = add_step(steps, n, REST, clock.rested_ns, begin, 0)
+            clock.rested_ns = begin
+        if rests:
+            ahead.angle = state.node.angle
+            return n
+        n = add_step(steps, n, REPORT, begin, begin, MOVING)
+        clock.at_rest = 0
+    bridged = _bridged(state, spline_node)
+    state.counts.bridged_ns += bridged
+    move = steps[n]
+    n = add_step(steps, n, MOVE, begin, stamp, 0)
+    move.turns, move.bridged_ns = clock.turns, bridged
+    join_smoothly(state.node, ahead, 1.0e-9 * (stamp - begin), move.motion)
+    if rests:
+        clock.at_rest, clock.rested_ns, clock.tracking = 1, stamp, IS_STOPPED
+        n = add_step(steps, n, REPORT, stamp, stamp, STOPPED)
+    return n
+
+
+@kernel
+def reach_spline_nodes(model, state, steps, n):
+    """Advance to all spline nodes with enough later samples; add steps from index n; return their number."""
+    clock, node, ahead, largest = state.clock, state.node, state.ahead, model.largest_speed
+    while True:
+        spline_node = _next_spline_node(model, state)
+        if spline_node < 0:
+            return n
+        stamp = state.queue[spline_node].stamp_ns
+        smooth(state.queue, spline_node, clock.tail, ahead)
+        if not (abs(ahead.speed) <= largest and abs(ahead.acceleration) <= largest**2):
+            return lose(state, stamp, LOST_BY_OUTLIERS, steps, n)
+        _drop_turns(state)
+        if clock.followed == 0:
+            n = evaluate_up_to(state, spline_node, steps, n)
+            start = steps[n]
+            n = add_step(steps, n, START, stamp, stamp, 0)
+            start.motion[0], start.motion[1] = ahead.angle, ahead.speed
+            start.motion[2] = ahead.acceleration
+            start.turns = clock.turns
+            state.counts.unmonitored_ns += max(0, stamp - clock.out_since_ns)
+            clock.followed = 1
+        else:
+            n = _move(model, state, spline_node, stamp, steps, n)
+        if clock.at_rest == 0:
+            n = _report_direction(model, state, stamp, ahead.speed, steps, n)
+            _evaluate_speed(model, clock, stamp, ahead.speed)
+        node.angle, node.speed, node.acceleration = ahead.angle, ahead.speed, ahead.acceleration
+        clock.last_node_ns = stamp
+        n = evaluate_up_to(state, spline_node + 1, steps, n)

@@ -1,1 +1,0 @@
-"""Sampled replay: which gait cycles are followed, and what the others wear (docs/explanation/sampling.md)."""

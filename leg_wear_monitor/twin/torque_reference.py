@@ -1,0 +1,366 @@
+"""The drive torque of a leg with given clearances, by simulation under the crank's own motion.
+
+A clearance shows in where in the gait cycle the torque is rough. That depends on how the crank turns, so the
+leg is simulated under the measured profile of the crank: with the clearances that are expected, and with each
+of them wider in turn. That takes seconds of a processor, so threads of low priority do it while the leg walks
+on; compiled code does not hold the interpreter's lock. A reference is there a number of evaluation periods
+after it was begun that depends on what is to be simulated alone: a replay gives what the live monitor gave.
+
+It depends on the leg's masses, lengths and friction, too: legs with each body heavier and longer in turn, and
+one with more friction, show which of them a leg has.
+"""
+
+import os
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
+from typing import NamedTuple
+
+import attrs
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from leg_wear_monitor.errors import AssemblyError
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.twin.leg_simulation import LegSimulation, even_angles
+from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
+
+CADENCES = 6  # of which the references of a leg are kept
+
+CYCLES = 20  # simulated for each wider leg, and twice as many for each other one
+
+_PERIODS = 4  # evaluation periods in a commanded gait cycle
+PACE = 6  # simulated gait cycles in an evaluation period, a quarter cycle; a core does twice as many
+WIDER = (1.2, 1.35, 1.5, 2.0, 3.0, 5.0, 8.0)  # factors on the expected clearance, one joint at a time
+
+WORN, NARROWER = 1.2, 0.8  # a clearance over the new one, and a factor on the others beside it
+
+HEAVIER, LONGER = 0.04, 0.004  # of a body's mass and length, one body at a time
+ROUGHER = 1.5  # factor on the friction in the joints
+STIFFER = 1.08  # factor on the stiffness of a drive that is not rigid: a quarter of its resonance's width
+
+_BEHIND = 2  # legs that are due and not simulated, from which on threads of higher priority help
+_SETTLING = 2  # gait cycles before those that count
+_NICE = 10  # lets the node have as much of a core as it needs, and other programs most of it
+_LEAST_CLEARANCE_M = 5.0e-5
+
+HalfFloats = NDArray[np.float16]
+
+
+@attrs.frozen(eq=False)
+class TorqueReference:
+    """Drive torque of simulated legs.
+
+    Attributes
+    ----------
+    profile : CrankProfile
+    clearance_m : (legs, k) array
+        Mean radial clearances of each leg; the first leg is the expected one, then each joint is wider in
+        turn, all sizes of the first joint before those of the next.
+    torque_nm : tuple of (cycles, POINTS) arrays
+        Mean drive torque between equal steps of time of a gait cycle, which begins at the profile's angle 0.
+    parameters : LegParameters
+        Those of the expected leg.
+    """
+
+    profile: CrankProfile
+    clearance_m: Floats
+    torque_nm: tuple[HalfFloats, ...]
+    parameters: LegParameters
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all legs are simulated: a part of a reference has the torques of the first ones."""
+        return len(self.torque_nm) == len(self.clearance_m)
+
+    @property
+    def is_of_parameters(self) -> bool:
+        """Whether its legs differ in masses, lengths and friction, from those of the first one."""
+        return bool((self.clearance_m == self.clearance_m[0]).all())
+
+    @property
+    def angle(self) -> Floats:
+        """Crank angle (POINTS + 1,) [rad] between the steps, from the profile's angle 0 on."""
+        return self.profile.angles(even_angles(self.profile))
+
+
+class _Leg(NamedTuple):
+    """A leg to be simulated: its parameters, and its clearances (k,) [m]."""
+
+    parameters: LegParameters
+    clearance_m: Floats
+
+
+class TorqueReferenceSnapshot(NamedTuple):
+    """State of a `TorqueReferenceRun`; plain arrays and numbers."""
+
+    profile: CrankProfile
+    legs: tuple[_Leg, ...]
+    depth: Floats
+    done: tuple[HalfFloats, ...]
+    periods: int
+
+
+class TorqueReferenceRun:
+    """Simulates a torque reference while evaluation periods pass.
+
+    Threads simulate some legs ahead of the caller. `advance` waits for them when all are due: what it returns
+    depends on the number of calls alone, and a machine that is busy for a while catches up before. There are
+    as many threads as numba may use (NUMBA_NUM_THREADS); while they are behind, as many of the program's own
+    priority help.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    cycles : int, optional
+        Gait cycles of each wider leg; default: CYCLES.
+    """
+
+    def __init__(self, mechanism: Mechanism, cycles: int | None = None) -> None:
+        self._mechanism, self._cycles = mechanism, cycles
+        joints = [mechanism.clearances[joint] for joint in mechanism.clearance_joints]
+        self._radius = np.array([joint.bushing_radius for joint in joints])
+        self._fresh = np.array([joint.radial_clearance for joint in joints])
+        self._profile, self._depth = CrankProfile.steady(1.0), np.zeros(0)
+        self._legs: tuple[_Leg, ...] = ()
+        self._done: tuple[HalfFloats, ...] = ()
+        self._periods = 0
+        self._threads = numba.config.NUMBA_NUM_THREADS
+        self._pool = ThreadPoolExecutor(self._threads, "torque-reference", _lower_priority)
+        self._urgent = ThreadPoolExecutor(self._threads, "torque-reference-urgent")
+        self._ahead: list[Future[HalfFloats | None]] = []
+        self._hurried: list[Future[HalfFloats | None]] = []
+        self._of_thread = threading.local()
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether there is something to simulate."""
+        return len(self._done) < len(self._legs)
+
+    @property
+    def profile(self) -> CrankProfile:
+        """Motion of the crank of what is simulated."""
+        return self._profile
+
+    @property
+    def progress(self) -> float:
+        """Fraction of the gait cycles that are done; 0 where nothing was begun."""
+        return min(1.0, PACE * self._periods / max(1, self._cost(self._legs)))
+
+    @property
+    def cycles_left(self) -> float:
+        """Commanded gait cycles until all of it is due."""
+        periods = -(-self._cost(self._legs) // PACE) - self._periods
+        return max(0, periods) / _PERIODS
+
+    def begin(
+        self,
+        clearance_m: Floats,
+        depth: Floats,
+        profile: CrankProfile,
+        parameters: LegParameters | None = None,
+    ) -> None:
+        """Begin a reference: the expected leg, and each of its joints wider in turn.
+
+        Parameters
+        ----------
+        clearance_m : (k,) array
+                Expected mean clearances [m].
+        depth : (k, 2, N) array
+            Wear depths [m], which show where joints are worn.
+        profile : CrankProfile
+        parameters : LegParameters, optional
+            Those of the mechanism file by default.
+        """
+        parameters = parameters or LegParameters.none(self._mechanism)
+        centre = np.maximum(clearance_m, _LEAST_CLEARANCE_M)
+        # no clearance is wider than its journal is thick; a worn joint may have got a new part without a word
+        widest, is_worn = 0.5 * self._radius, centre > WORN * self._fresh
+        narrower = np.where(is_worn, self._fresh, NARROWER * centre)
+        legs = [_Leg(parameters, centre)]
+        for k in range(len(centre)):
+            sizes = [min(factor * centre[k], widest[k]) for factor in WIDER]
+            for size in [*sizes, narrower[k]] if is_worn.any() else sizes:
+                other = centre.copy()
+                other[k] = size
+                legs.append(_Leg(parameters, other))
+        self._begin(legs, depth, profile)
+
+    def begin_expected(
+        self, clearance_m: Floats, depth: Floats, profile: CrankProfile, parameters: LegParameters
+    ) -> None:
+        """Begin the expected leg alone, as of `begin`."""
+        self._begin([_Leg(parameters, np.maximum(clearance_m, _LEAST_CLEARANCE_M))], depth, profile)
+
+    def go_on(self, part: TorqueReference, depth: Floats) -> None:
+        """Go on with a reference, or an identification, whose first legs were simulated in an earlier run.
+
+        Parameters
+        ----------
+        part : TorqueReference
+        depth : (k, 2, N) array
+            Wear depths [m], as of `begin`.
+        """
+        if part.is_of_parameters:
+            legs = _changed(part.parameters, part.clearance_m[0])[: len(part.clearance_m)]
+        else:
+            legs = [_Leg(part.parameters, clearance_m) for clearance_m in part.clearance_m]
+        self._begin(legs, depth, part.profile)
+        self._done = part.torque_nm
+        self._periods = -(-self._cost(legs[: len(self._done)]) // PACE)
+
+    @property
+    def part(self) -> TorqueReference | None:
+        """The legs of a reference that are due so far; None where none is, or all are."""
+        self._take(waits=True)
+        return self._so_far() if self._done and self.is_busy else None
+
+    def begin_identification(
+        self,
+        clearance_m: Floats,
+        depth: Floats,
+        profile: CrankProfile,
+        near: LegParameters,
+        is_drive_known: bool = False,
+    ) -> None:
+        """Begin the leg with given parameters, then each body heavier, each longer, and more friction.
+
+        Where its drive is compliant, and not known, a last leg has a stiffer one.
+        """
+        legs = _changed(near, np.maximum(clearance_m, _LEAST_CLEARANCE_M))
+        self._begin(legs[:-1] if near.compliance and is_drive_known else legs, depth, profile)
+
+    def advance(self, waits: bool = False) -> TorqueReference | None:
+        """Note that an evaluation period has passed; return the reference when all of it is due.
+
+        A leg that cannot be simulated ends it then without one. The caller may wait for each leg.
+        """
+        if not self.is_busy:
+            return None
+        self._periods += 1
+        is_due = self._cost(self._legs) <= PACE * self._periods
+        self._take(waits or is_due, hurries=is_due and not waits)
+        if not is_due:
+            return None
+        if self.is_busy:  # a leg could not be simulated
+            self._begin((), self._depth, self._profile)
+            return None
+        self._of_thread = threading.local()  # gives back 20 MB a thread
+        return self._so_far()
+
+    def finish(self, progress: Callable[[float], None] = lambda _fraction: None) -> TorqueReference | None:
+        """Simulate the legs that are left, at once; None where one cannot be simulated."""
+        found = None
+        while self.is_busy:
+            found = self.advance(waits=True)
+            progress(self.progress)
+        return found
+
+    def snapshot(self) -> TorqueReferenceSnapshot:
+        """The whole state; legs that are simulated ahead are simulated again."""
+        self._take(waits=True)
+        return TorqueReferenceSnapshot(self._profile, self._legs, self._depth, self._done, self._periods)
+
+    def restore(self, snapshot: TorqueReferenceSnapshot) -> None:
+        """Restore a snapshot of a run of the same mechanism; it continues bit for bit."""
+        self._begin(snapshot.legs, snapshot.depth, snapshot.profile)
+        self._done, self._periods = snapshot.done, snapshot.periods
+
+    def _begin(self, legs: Sequence[_Leg], depth: Floats, profile: CrankProfile) -> None:
+        for one in self._ahead:
+            one.cancel()
+        self._ahead, self._hurried, self._periods = [], [], 0
+        self._legs, self._depth, self._done, self._profile = tuple(legs), depth.copy(), (), profile
+
+    def _so_far(self) -> TorqueReference:
+        """The reference with the torques of the legs that are simulated."""
+        clearance_m = np.array([leg.clearance_m for leg in self._legs])
+        return TorqueReference(self._profile, clearance_m, self._done, self._legs[0].parameters)
+
+    @property
+    def _due(self) -> int:
+        """Number of legs that are due."""
+        costs = np.cumsum([_SETTLING + self._cycles_of(leg) for leg in self._legs])
+        return int(np.searchsorted(costs, PACE * self._periods, side="right"))
+
+    def _take(self, waits: bool, hurries: bool = False) -> None:
+        """Take the legs that are due and simulated, or wait for them, up to one that cannot be."""
+        self._look_ahead(hurries)
+        while self._ahead and len(self._done) < self._due and (waits or self._ahead[0].done()):
+            torque = self._ahead[0].result()
+            if torque is None:
+                break
+            self._done, self._ahead = (*self._done, torque), self._ahead[1:]
+            self._look_ahead(hurries)
+
+    def _look_ahead(self, hurries: bool = False) -> None:
+        """Let the threads simulate the next legs: not all, since a program's end waits for them."""
+        simulated = len(self._done) + sum(one.done() for one in self._ahead)
+        if hurries or self._due - simulated >= _BEHIND:
+            self._catch_up()
+        first = len(self._done) + len(self._ahead)
+        for leg in self._legs[first : min(self._due, simulated) + 2 * self._threads]:
+            arguments = self._profile, leg, self._depth, self._cycles_of(leg)
+            self._ahead.append(self._pool.submit(self._simulated, *arguments))
+
+    def _catch_up(self) -> None:
+        """Let threads of the program's own priority simulate the next legs, where the others are behind.
+
+        On a machine with a load of 18, threads of low priority had a hundredth of a core: the node waited
+        for more than half a minute.
+        """
+        self._hurried = [one for one in self._hurried if not one.done()]
+        late = [i for i, one in enumerate(self._ahead) if not (one.done() or one in self._hurried)]
+        for i in late[: self._threads - len(self._hurried)]:
+            leg = self._legs[len(self._done) + i]
+            arguments = self._profile, leg, self._depth, self._cycles_of(leg)
+            self._ahead[i].cancel()
+            self._ahead[i] = self._urgent.submit(self._simulated, *arguments)
+            self._hurried.append(self._ahead[i])
+
+    def _cycles_of(self, leg: _Leg) -> int:
+        """Gait cycles of a leg that count."""
+        cycles = self._cycles or CYCLES
+        return cycles if (leg.clearance_m != self._legs[0].clearance_m).any() else 2 * cycles
+
+    def _cost(self, legs: Sequence[_Leg]) -> int:
+        """Gait cycles that are simulated for some legs, with those in which they settle."""
+        return sum(_SETTLING + self._cycles_of(leg) for leg in legs)
+
+    def _simulated(self, profile: CrankProfile, leg: _Leg, depth: Floats, cycles: int) -> HalfFloats | None:
+        """Mean torque (cycles, POINTS) of a leg; None if it cannot be simulated."""
+        own = self._of_thread
+        if not hasattr(own, "simulation"):
+            own.simulation = LegSimulation(self._mechanism)
+        try:
+            torque = own.simulation.torque(
+                profile, leg.parameters, leg.clearance_m, depth, _SETTLING + cycles
+            )
+        except AssemblyError:  # with such lengths it does not close
+            return None
+        return None if torque is None else torque[_SETTLING:].astype(np.float16)
+
+
+def _changed(near: LegParameters, clearance_m: Floats) -> list[_Leg]:
+    """The leg with given parameters, then each body heavier, each longer, more friction, a stiffer drive."""
+    each = np.eye(len(near.mass))
+    changed = [
+        near,
+        *(attrs.evolve(near, mass=near.mass + HEAVIER * one) for one in each),
+        *(attrs.evolve(near, length=near.length + LONGER * one) for one in each),
+        attrs.evolve(near, friction=near.friction * ROUGHER),
+    ]
+    if near.compliance:
+        changed.append(attrs.evolve(near, compliance=near.compliance / STIFFER))
+    return [_Leg(parameters, clearance_m) for parameters in changed]
+
+
+def _lower_priority() -> None:
+    """Lower the priority of this thread: samples come first."""
+    if sys.platform == "linux":  # elsewhere, it would be that of the whole process
+        with suppress(OSError):  # where a container forbids it, the thread runs at its program's priority
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICE)

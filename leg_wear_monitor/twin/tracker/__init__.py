@@ -1,1 +1,0 @@
-"""Crank tracker: order and faults of samples, filter, smoother, spline (physics.md section 9)."""

@@ -1,0 +1,191 @@
+"""State of the tracker: the samples of the crank's angle that wait, and the motion so far."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from leg_wear_monitor.compiled.kernel import Record, Records, new_records, record_of
+from leg_wear_monitor.twin import KINDS
+from leg_wear_monitor.twin.sample import FAULTS, GAIT_SAMPLE, TrackerSettings
+from leg_wear_monitor.twin.statistics import SPLINE_NODE
+
+# State of the crank tracker: settings, counts, clocks, filter, queues.
+
+
+ARRIVALS, QUEUE = 2048, 4096  # capacities for samples that wait for their order, and for the leg
+
+_RUN_UPS = 0.8  # run-up from rest, in 1 / bandwidth
+
+TRACKER_MODEL = np.dtype(
+    [
+        ("reorder_window_ns", "i8"),  # largest delay of a sample behind younger ones
+        ("lag_ns", "i8"),  # time of samples after a spline node
+        ("bridge_limit_ns", "i8"),  # longest gap that is bridged
+        ("mark_gap_ns", "i8"),  # shortest gap that is counted
+        ("backward_jump_ns", "i8"),  # largest backward jump of stamps in one time base
+        ("acquire_ns", "i8"),  # time of samples before the first spline node
+        ("stop_hold_ns", "i8"),  # time of slow motion before the crank is at rest
+        ("settle_ns", "i8"),  # time of a speed within tolerance, or beyond, before the state changes
+        ("node_interval_ns", "i8"),  # least time between spline nodes
+        ("run_up_ns", "i8"),  # time for a smooth start from rest
+        ("jerk", "f8"),  # power density of the jerk [rad^2/s^5]
+        ("angle_noise", "f8"),  # [rad^2 s]
+        ("velocity_noise", "f8"),  # [rad^2/s]
+        ("longest_spread", "f8"),  # longest time that a sample's noise is spread over [s]
+        ("gate", "f8"),  # of the angle's innovation [rad]
+        ("velocity_gate", "f8"),  # of the velocity's innovation [rad/s]
+        ("stop_speed", "f8"),  # least speed of a moving crank [rad/s]
+        ("slowest", "f8"),  # least speed of a gait in step [rad/s]
+        ("fastest", "f8"),  # largest speed of a gait in step [rad/s]
+        ("commanded_speed", "f8"),  # of the gait [rad/s]
+        ("largest_speed", "f8"),  # largest plausible speed [rad/s]
+    ]
+)
+"""Constants: the settings, with times in ns and everything else in SI units."""
+
+TRACKER_COUNTS = np.dtype(
+    [
+        # samples
+        ("received", "i8"),  # all
+        ("used", "i8", (len(KINDS),)),  # with a used value of each kind
+        ("duplicates", "i8"),  # repeated
+        ("late", "i8"),  # behind the released stamps
+        ("stray_stamps", "i8"),  # with a stamp far from all others
+        ("outliers", "i8"),  # with an angle beyond the gate
+        ("velocity_outliers", "i8"),  # with a velocity beyond the gate
+        # events
+        ("gaps_bridged", "i8"),  # bridged gaps
+        ("lost", "i8"),  # losses of tracking
+        ("backward_jumps", "i8"),  # backward jumps of stamps
+        ("reversals", "i8"),  # reversals of the crank
+        # times
+        ("bridged_ns", "i8"),  # in bridged gaps
+        ("standing_ns", "i8"),  # at rest
+        ("unmonitored_ns", "i8"),  # without tracking
+        ("faults", "i8", (len(FAULTS),)),  # samples with each fault
+    ]
+)
+
+TRACKER_CLOCK = np.dtype(
+    [
+        ("newest_ns", "i8"),  # youngest received stamp
+        ("newest_of_ns", "i8", (len(KINDS),)),  # youngest stamp of each kind
+        ("released_ns", "i8"),  # stamp up to which samples are released
+        ("released_kinds", "i8"),  # kinds released at that stamp, as bits
+        ("waiting", "i8"),  # number of waiting arrivals
+        ("head", "i8"),  # begin of the queue
+        ("tail", "i8"),  # end of the queue
+        ("last_crank_ns", "i8"),  # stamp of the last used crank sample, 0 if none
+        ("refused", "i8"),  # outliers since then
+        ("filter_ns", "i8"),  # stamp of the estimate
+        ("acquiring_ns", "i8"),  # stamp of the first crank sample since the last loss
+        ("last_node_ns", "i8"),  # stamp of the last spline node
+        ("out_since_ns", "i8"),  # stamp of the begin of the present loss of tracking
+        ("followed", "i8"),  # 1 while the leg is in motion or at rest
+        ("at_rest", "i8"),  # 1 at rest
+        ("rested_ns", "i8"),  # stamp up to which that rest is reported
+        ("slow_since_ns", "i8"),  # stamp of the begin of slow motion, 0 if not slow
+        ("tracking", "i8"),  # IS_… of `crank_motion`
+        ("tolerance_since_ns", "i8"),  # stamp since which the speed is within tolerance, or beyond
+        ("in_tolerance", "i8"),  # 1 within tolerance
+        ("direction", "i8"),  # 1 or -1, 0 if unknown
+        ("turns", "i8"),  # whole crank turns, counted separately
+        ("velocity_credit", "i8"),  # successive velocities that agreed with the angles
+        ("period_ns", "i8"),  # shortest recent time between crank samples
+    ]
+)
+
+_ESTIMATE = [
+    ("angle", "f8"),  # of the crank [rad]
+    ("speed", "f8"),  # [rad/s]
+    ("acceleration", "f8"),  # [rad/s^2]
+    # covariances of the three
+    ("p00", "f8"),  # of the angle [rad^2]
+    ("p01", "f8"),  # of angle and speed [rad^2/s]
+    ("p02", "f8"),  # of angle and acceleration [rad^2/s^2]
+    ("p11", "f8"),  # of the speed [rad^2/s^2]
+    ("p12", "f8"),  # of speed and acceleration [rad^2/s^3]
+    ("p22", "f8"),  # of the acceleration [rad^2/s^4]
+]
+CRANK_ESTIMATE = np.dtype(_ESTIMATE)
+
+QUEUED = np.dtype(
+    [
+        ("stamp_ns", "i8"),  # of its header
+        ("kind", "i8"),  # of `twin.sample`
+        ("torque", "f8"),  # of the drive [N m], NaN where absent
+        ("foot_force", "f8", (2,)),  # of samples of the foot load only [N]
+        # of crank samples only; pairs are of angle and velocity
+        ("step", "f8"),  # time since the previous crank sample [s]
+        ("bridged", "i8"),  # 1 if that is a bridged gap
+        *_ESTIMATE,  # predicted from the previous samples
+        ("innovation_variance", "f8", (2,)),  # [rad^2, rad^2/s^2]; 0 for an unused value
+        ("innovation", "f8", (2,)),  # measured minus predicted [rad, rad/s]
+        ("gain", "f8", (2, 3)),  # of angle, speed and acceleration, in their units per that of the innovation
+    ]
+)
+"""A sample that waits for the leg, with the smoother's data."""
+
+
+TRACKER_STATE = np.dtype(
+    [
+        ("counts", TRACKER_COUNTS),
+        ("clock", TRACKER_CLOCK),
+        ("estimate", CRANK_ESTIMATE),  # after the last sample
+        ("node", SPLINE_NODE),  # the last spline node, which the leg has reached
+        ("ahead", SPLINE_NODE),  # the next one, during its computation
+        ("candidate", GAIT_SAMPLE),  # sample that may begin a new time base, stamp 0 if there is none
+    ]
+)
+"""State of the tracker without its queues."""
+
+
+class TrackerState(NamedTuple):
+    """Complete state of the tracker for its kernels.
+
+    The fields of `TRACKER_STATE`; ``arrivals`` (ARRIVALS,): `GAIT_SAMPLE` that wait for their order;
+    ``queue``
+    (QUEUE,): `QUEUED` that wait for the leg.
+    """
+
+    counts: Record
+    clock: Record
+    estimate: Record
+    node: Record
+    ahead: Record
+    candidate: Record
+    arrivals: Records
+    queue: Records
+
+
+def _nanoseconds(time_s: float) -> int:
+    return round(1.0e9 * time_s)
+
+
+def tracker_model(settings: TrackerSettings) -> Records:
+    """The settings as a record; noise refers to 200 Hz, so the bandwidth is the same at any rate."""
+    s, w, reference = settings, 2.0 * np.pi * settings.bandwidth_hz, 1.0 / 200.0
+    models, speed = new_records(1, TRACKER_MODEL), abs(settings.commanded_speed_radps)
+    model = record_of(models)
+    model.reorder_window_ns = _nanoseconds(s.reorder_window_s)
+    model.lag_ns = _nanoseconds(s.lag)
+    model.bridge_limit_ns = _nanoseconds(s.bridge_limit_s)
+    model.mark_gap_ns = _nanoseconds(s.mark_gap_s)
+    model.backward_jump_ns = _nanoseconds(s.backward_jump_s)
+    model.acquire_ns = _nanoseconds(s.acquire_s)
+    model.stop_hold_ns = _nanoseconds(s.stop_hold_s)
+    model.settle_ns = _nanoseconds(s.settle_s)
+    model.node_interval_ns = _nanoseconds(s.node_interval)
+    model.run_up_ns = _nanoseconds(_RUN_UPS / s.bandwidth_hz)
+    model.angle_noise = s.encoder_noise_rad**2 * reference
+    model.jerk = model.angle_noise * w**6
+    model.velocity_noise = s.velocity_noise_radps**2 * reference
+    model.longest_spread = 1.0 / w
+    model.gate = s.gate_rad
+    model.velocity_gate = s.velocity_gate_radps
+    model.stop_speed = s.stop_speed_radps
+    model.slowest = speed * (1.0 - s.speed_tolerance)
+    model.fastest = speed * (1.0 + s.speed_tolerance)
+    model.commanded_speed = s.commanded_speed_radps
+    model.largest_speed = s.largest_speed
+    return models

@@ -1,0 +1,347 @@
+"""Worn surfaces by Archard's law, and cycle jumps (physics.md sections 5, 6 and 10)."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.compiled.kernel import kernel
+from leg_wear_monitor.compiled.vectors import floor, gather, where
+from leg_wear_monitor.configuration import quantity
+from leg_wear_monitor.contact.arrays import ContactArrays
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.position import TURN
+
+# Worn surfaces: depth over angular sectors of bushing and journal (physics.md sections 5 and 6).
+#
+# Sector i spans the angles [i, i + 1] x 2 pi / N of its own body's frame. Wear is deposited in the sectors in
+# which the two profiles overlap, in proportion to the overlap. On fresh surfaces these are the sectors of the
+# arc cos psi = (R_b^2 + e^2 - R_j^2) / (2 R_b e); on worn surfaces, those where the journal overlaps the worn
+# profile. A journal under a constant load therefore wears its own shape into the bushing, as in the
+# closed-form solution.
+
+
+SECTORS = 720
+
+BUSHING, JOURNAL = 0, 1
+
+_TURNS_PER_RAD = 0.5 / math.pi
+_BESIDE = 16  # sectors on either side of the eccentricity's direction that are searched for an overlap
+
+
+class Surfaces(NamedTuple):
+    """Wear ``depth`` (k, 2, N) [m] of bushing and journal; ``feeds_back``: 1 if wear widens clearances."""
+
+    depth: Floats
+    feeds_back: int
+
+
+def fresh_surfaces(contacts: ContactArrays, feeds_back: bool, sectors: int = SECTORS) -> Surfaces:
+    """Surfaces without wear."""
+    return Surfaces(np.zeros((len(contacts.joint), 2, sectors)), int(feeds_back))
+
+
+@kernel
+def profile_at(profile, angle):
+    """Depth [m] at an angle [rad] of the surface's own frame, and its derivatives [m/rad, m/rad^2].
+
+    The profile (N,) is interpolated by a quadratic spline, whose slope is continuous. physics.md section 6.
+    """
+    n = profile.shape[0]
+    before, here, after, w = _sectors_at(n, angle)
+    return _spline(n, w, profile[int(before)], profile[int(here)], profile[int(after)])
+
+
+@kernel
+def profiles_at(depth, k, surface, angle):
+    """As `profile_at`, of eight joints from joint k on: depth (k, 2, N), a vector of angles."""
+    n = depth.shape[2]
+    before, here, after, w = _sectors_at(n, angle)
+    return _spline(
+        n,
+        w,
+        gather(depth, k, surface, before),
+        gather(depth, k, surface, here),
+        gather(depth, k, surface, after),
+    )
+
+
+@kernel
+def _sectors_at(n, angle):
+    """Numbers of the sectors before, at and after an angle [rad], and the fraction of the sector before it.
+
+    For numbers or vectors; the sectors' numbers are floats.
+    """
+    turns, last = angle * _TURNS_PER_RAD, n - 1.0
+    u = n * (turns - floor(turns))
+    here = where(u < n, floor(u), last)
+    return where(here > 0.0, here - 1.0, last), here, where(here < last, here + 1.0, 0.0), u - here
+
+
+@kernel
+def _spline(n, w, before, here, after):
+    """Quadratic spline in a sector of n, and its derivatives; for numbers or vectors."""
+    rest = 1.0 - w
+    depth = 0.5 * (rest * rest * before + (1.0 + 2.0 * w * rest) * here + w * w * after)
+    per_rad = n * _TURNS_PER_RAD
+    rise, next_rise = here - before, after - here
+    return depth, (rise + w * (next_rise - rise)) * per_rad, (next_rise - rise) * per_rad * per_rad
+
+
+@kernel
+def local_surfaces(contacts, surfaces, k, direction, angle_b, angle_j):
+    """Local radii [m] of bushing and journal in a direction [rad] of the ground's frame, and derivatives.
+
+    The derivatives are those of the depths by the direction: slopes of bushing and journal [m/rad], then
+    second derivatives [m/rad^2]; 0 without wear feedback. physics.md section 6.
+    """
+    bushing = contacts.bushing_radius[k]
+    journal = bushing - contacts.clearance[k]
+    if not surfaces.feeds_back:
+        return bushing, journal, 0.0, 0.0, 0.0, 0.0
+    depth_b, slope_b, bend_b = profile_at(surfaces.depth[k, BUSHING], direction - angle_b)
+    depth_j, slope_j, bend_j = profile_at(surfaces.depth[k, JOURNAL], direction - angle_j)
+    return bushing + depth_b, journal - depth_j, slope_b, slope_j, bend_b, bend_j
+
+
+@kernel
+def _weigh_arc(contacts, surfaces, k, ex, ey, angle_b, angle_j, centre, side, turning, out_weight):
+    """Overlap [m] of the sectors from ``centre`` to one side (1 or -1); returns its sum [m] and their number.
+
+    ``turning``: cosine and sine of a sector, by which the direction is turned from one to the next.
+    physics.md section 6.
+    """
+    n = surfaces.depth.shape[2]
+    width = TURN / n
+    along = angle_b + (centre + 0.5) * width
+    cos_step, sin_step = turning[0], side * turning[1]
+    c, s = math.cos(along), math.sin(along)
+    total, count, sector = 0.0, 0, centre
+    for step in range(n // 2):
+        if step > 0:
+            c, s = c * cos_step - s * sin_step, s * cos_step + c * sin_step
+            sector = _beside(sector, side, n)
+        if step > 0 or side > 0:
+            overlap = ex * c + ey * s - contacts.clearance[k]
+            if surfaces.feeds_back:
+                overlap -= surfaces.depth[k, BUSHING, sector]
+                overlap -= profile_at(surfaces.depth[k, JOURNAL], along + side * step * width - angle_j)[0]
+            if overlap <= 0.0:
+                break
+            out_weight[sector] = overlap
+            total += overlap
+        count += 1
+    return total, count
+
+
+@kernel
+def _beside(sector, side, n):
+    """The next of n sectors to one side (1 or -1); without a division, which takes longer than all else."""
+    beside = sector + side
+    if beside == n:
+        return 0
+    return n - 1 if beside < 0 else beside
+
+
+@kernel
+def deposit_wear(contacts, surfaces, k, ex, ey, angle_b, angle_j, integral, out_weight):
+    """Deposit the wear of an increment ``integral`` of F_N |v_t| dt [J] on both surfaces of joint k.
+
+    ``ex, ey`` [m] is the eccentricity, ``angle_b, angle_j`` [rad] the angles of the bodies, out_weight (N,) a
+    work array. The removed volumes are k_b and k_j times the integral: sums over sectors of depth x R_b x
+    sector angle x width. Both surfaces have the area of the contact, so equal coefficients give equal depths.
+    physics.md sections 5 and 6.
+    """
+    n = surfaces.depth.shape[2]
+    sector = TURN / n
+    turning = math.cos(sector), math.sin(sector)
+    towards = math.floor((math.atan2(ey, ex) - angle_b) / sector) % n
+    for beside in range(
+        2 * _BESIDE + 1
+    ):  # on a worn flank the overlap may begin some sectors beside; search order 0, 1, -1, 2, ...
+        aside = (beside + 1) // 2
+        centre = (towards + (aside if beside % 2 == 1 else -aside)) % n
+        right, count_right = _weigh_arc(
+            contacts, surfaces, k, ex, ey, angle_b, angle_j, centre, 1, turning, out_weight
+        )
+        if right > 0.0:
+            break
+    left, count_left = _weigh_arc(
+        contacts, surfaces, k, ex, ey, angle_b, angle_j, centre, -1, turning, out_weight
+    )
+    if right <= 0.0:  # contact narrower than a sector
+        centre, count_right, count_left = towards, 1, 1
+        out_weight[centre] = right = 1.0
+        left = 0.0
+    depth = integral / ((right + left) * contacts.bushing_radius[k] * sector * contacts.width[k])
+    shift = (angle_b - angle_j) / sector
+    floor = math.floor(shift)
+    w = shift - floor
+    i = (centre - count_left + 1) % n
+    j = (i + int(floor)) % n
+    for _ in range(count_left + count_right - 1):
+        fraction = depth * out_weight[i]
+        surfaces.depth[k, BUSHING, i] += contacts.wear_coefficient[k, BUSHING] * fraction
+        worn = contacts.wear_coefficient[k, JOURNAL] * fraction
+        after = _beside(j, 1, n)
+        surfaces.depth[k, JOURNAL, j] += (1.0 - w) * worn
+        surfaces.depth[k, JOURNAL, after] += w * worn
+        i, j = _beside(i, 1, n), after
+
+
+def worn_volume(contacts: ContactArrays, surfaces: Surfaces) -> Floats:
+    """Worn volume (k, 2) [m^3] of bushing and journal."""
+    sector = TURN / surfaces.depth.shape[2]
+    area = contacts.bushing_radius * contacts.width * sector
+    return np.asarray(surfaces.depth.sum(axis=2) * area[:, None])
+
+
+def wear_zone(depth: Floats, fraction: float = 0.9) -> tuple[float, float] | None:
+    """Narrowest zone of the surface that contains a fraction of the wear.
+
+    Parameters
+    ----------
+    depth : (N,) array, m
+    fraction : float
+
+    Returns
+    -------
+    (from, to) : tuple of float, or None
+        Angles [deg] in the surface's own frame: ``from`` in [0, 360), ``to`` at most 360 above it. None
+        without wear.
+    """
+    n, total = len(depth), depth.sum()
+    if not total > 0.0:
+        return None
+    sums = np.concatenate([[0.0], np.cumsum(np.concatenate([depth, depth]))])
+    # for every start, the first end that contains the fraction
+    ends = np.searchsorted(sums, sums[:n] + fraction * total * (1.0 - 1.0e-12))
+    start = int(np.argmin(ends - np.arange(n)))
+    return 360.0 * start / n, 360.0 * int(ends[start]) / n
+
+
+# Cycle jumps: the mean wear of a few gait cycles, applied to many (physics.md section 10).
+#
+# Wear depth over gait cycles obeys an ordinary differential equation. Its right-hand side, the mean wear per
+# cycle, has scatter, because single cycles are chaotic. A jump is a step of Heun's method: an Euler step to
+# the end, then the mean of the rates at both ends. The difference of both rates beyond their scatter is the
+# error.
+
+
+# of step-size control: largest growth and shrinkage of a jump, and safety factor, as for ODE solvers
+_GROWS, _SHRINKS, _SAFETY = 2.0, 0.3, 0.8
+_TOLERATED = 0.1  # tolerated error of a jump as a fraction of its deepest change
+
+
+@attrs.frozen(kw_only=True)
+class JumpControl:
+    """Limits on the length and the error of a jump."""
+
+    opens_m: float = quantity(
+        "m", "deepest change of a surface that a jump may make", above=0.0, default=3.0e-5
+    )
+    tolerance_m: float = quantity(
+        "m", "error of the deepest change that a jump may make", above=0.0, default=3.0e-6
+    )
+    smooth_deg: float = quantity(
+        "deg", "standard deviation of the window that rates are smoothed by", at_least=0.0, default=5.0
+    )
+
+    @classmethod
+    def of(cls, opens_m: float) -> "JumpControl":
+        """Control with a deepest change per jump [m] and an error tolerance of 10 % of it."""
+        return cls(opens_m=opens_m, tolerance_m=_TOLERATED * opens_m)
+
+
+@attrs.frozen(eq=False)
+class WearRate:
+    """Mean wear per gait cycle over n simulated cycles; k clearance joints, N sectors.
+
+    Attributes
+    ----------
+    depth : (k, 2, N) array, m
+        Wear depth of bushing and journal per cycle.
+    scatter : (k,) array, m
+        Standard error of the growth of the mean clearance per cycle.
+    """
+
+    depth: Floats
+    scatter: Floats
+
+    @property
+    def clearance(self) -> Floats:
+        """Growth (k,) of the mean clearance per cycle [m]."""
+        return opening(self.depth)
+
+
+def opening(depth: Floats) -> Floats:
+    """Growth (…, k) of the mean clearance [m] by wear of depth (…, k, 2, N) [m]."""
+    return np.asarray(depth.mean(axis=-1).sum(axis=-1))
+
+
+def wear_rate(worn: Floats, smooth_deg: float) -> WearRate:
+    """Mean wear per cycle.
+
+    Parameters
+    ----------
+    worn : (n, k, 2, N) array, m
+        Wear depth of each of n cycles.
+    smooth_deg : float
+        Width of the smoothing window over the angle [deg]: few cycles have contact in few sectors only. The
+        worn volume is conserved.
+    """
+    growth = opening(worn)
+    scatter = growth.std(axis=0, ddof=1) / math.sqrt(len(worn)) if len(worn) > 1 else np.abs(growth[0])
+    return WearRate(smoothed(worn.mean(axis=0), smooth_deg), np.asarray(scatter))
+
+
+def mean_rate(rates: Sequence[WearRate], shares: Floats) -> WearRate:
+    """Wear per cycle of a leg that walks a share (n,) of its cycles with each of n rates."""
+    variance = weighted(np.array([rate.scatter for rate in rates]) ** 2, shares**2)
+    return WearRate(weighted(np.array([rate.depth for rate in rates]), shares), np.sqrt(variance))
+
+
+def weighted(values: Floats, shares: Floats) -> Floats:
+    """Sum (...) of the values (n, ...) times their shares (n,)."""
+    return np.asarray(np.tensordot(shares, values, axes=1))
+
+
+def smoothed(profile: Floats, width_deg: float) -> Floats:
+    """Periodic profiles (..., N) smoothed by a Gaussian of a standard deviation [deg]; sums are conserved."""
+    n = profile.shape[-1]
+    order = np.arange(n // 2 + 1)
+    window = np.exp(-0.5 * (order * math.radians(width_deg)) ** 2)
+    result = np.fft.irfft(np.fft.rfft(profile, axis=-1) * window, n, axis=-1)
+    return np.asarray(np.maximum(result, 0.0) * _ratio(profile, np.maximum(result, 0.0)))
+
+
+def _ratio(before: Floats, after: Floats) -> Floats:
+    """Factors (..., 1) that restore the sum of each profile after negative rounding errors were cut off."""
+    sums = after.sum(axis=-1, keepdims=True)
+    return np.asarray(before.sum(axis=-1, keepdims=True) / np.where(sums > 0.0, sums, 1.0))
+
+
+def longest_jump(rate: WearRate, control: JumpControl) -> float:
+    """Largest number of gait cycles of a jump by the change of the surfaces; infinite without wear."""
+    deepest = float(rate.depth.sum(axis=1).max(initial=0.0))
+    return control.opens_m / deepest if deepest > 0.0 else math.inf
+
+
+def jump_error(first: WearRate, last: WearRate, cycles: float) -> Floats:
+    """Error (k,) [m] of the Euler step in the mean clearance, minus the part that scatter explains.
+
+    The error of Heun's method is smaller, but cannot be estimated from the two rates.
+    """
+    differ = np.square(last.clearance - first.clearance)
+    scatter = np.square(first.scatter) + np.square(last.scatter)
+    return np.asarray(0.5 * cycles * np.sqrt(np.maximum(differ - scatter, 0.0)))
+
+
+def next_jump(cycles: float, error_m: float, control: JumpControl) -> float:
+    """Gait cycles of the next jump, or of the repeated one if its error [m] is above the tolerance."""
+    if error_m == 0.0:
+        return _GROWS * cycles
+    factor = _SAFETY * math.sqrt(control.tolerance_m / error_m)
+    return cycles * min(_GROWS, max(_SHRINKS, factor))

@@ -1,1 +1,0 @@
-"""Wear: Archard's law on worn surfaces, cycle jumps."""

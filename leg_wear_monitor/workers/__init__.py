@@ -1,1 +1,0 @@
-"""Calls computed in processes of this machine or on a Dask cluster."""

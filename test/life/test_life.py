@@ -161,9 +161,11 @@ def test_jumps_too_short_to_reach_the_limit_are_refused(leg):
 
 
 def test_a_life_that_takes_too_many_jumps_says_so(lived, monkeypatch):
-    monkeypatch.setattr(life_module, "MOST_JUMPS", 1)
-    with pytest.raises(SimulationError, match="does not end within 1 jumps"):
-        simulate_life(lived[0], limit_m=9e-3, horizon_cycles=1e9)
+    run, opened_m = lived[0], lived[0].points[-1].opened_m.max()
+    jumps = len(run.points) - 1  # more than a life to this limit takes by the length of a jump
+    monkeypatch.setattr(life_module, "MOST_JUMPS", jumps)
+    with pytest.raises(SimulationError, match=f"does not end within {jumps} jumps"):
+        simulate_life(run, limit_m=run.fresh_m + opened_m + 1e-6, horizon_cycles=1e9)
 
 
 def test_a_leg_without_loose_joints_has_no_life(leg):

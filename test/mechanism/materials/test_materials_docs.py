@@ -2,14 +2,14 @@
 
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import attrs
 import pytest
 
 from leg_wear_monitor.mechanism import materials as material
 from leg_wear_monitor.mechanism import sourced
-from leg_wear_monitor.mechanism.materials import load_material, materials
+from leg_wear_monitor.mechanism.materials import Material, load_material, materials
 from leg_wear_monitor.mechanism.sourced import UNITS, Drive
 
 PAGE = Path(__file__).parents[3] / "docs" / "reference" / "materials.md"
@@ -64,13 +64,21 @@ def renewed(page: str) -> str:
     )
 
 
+def classes_in(kind: Any) -> set[type]:
+    """A class of a file and, in turn, those of its keys; what a key of values is made of."""
+    found = {kind}
+    for field in attrs.fields(attrs.resolve_types(kind)):
+        parts = {field.type, *get_args(field.type)}
+        found |= {each for part in parts if attrs.has(part) for each in classes_in(part)}
+    return found
+
+
 @pytest.mark.plain
 def test_the_page_lists_the_files_the_keys_and_the_units() -> None:
     page = PAGE.read_text(encoding="utf-8")
     assert renewed(page) == page
     told = {found[3] for found in TABLE.finditer(page) if found[3]}
-    kinds = [*vars(material).values(), *vars(sourced).values()]
-    assert told == {kind.__name__ for kind in kinds if isinstance(kind, type) and attrs.has(kind)}
+    assert told == {kind.__name__ for kind in classes_in(Material)}
 
 
 if __name__ == "__main__":

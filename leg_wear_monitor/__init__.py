@@ -136,7 +136,7 @@ __all__ = [
     "with_person",
 ]
 
-VIEWS["html"] = lambda thing: import_module(f"{__name__}.report.notebook").notebook_html(thing)
+VIEWS["html"] = lambda thing: import_module(f"{__name__}.report.plot").notebook_html(thing)
 VIEWS["plot"] = lambda thing, axes: import_module(f"{__name__}.report.plot").plot(thing, axes)
 
 

@@ -32,10 +32,10 @@ def compile_curve():
 SCRIPT = """
 import time
 from shapes import compile_curve, curve, line
-from leg_wear_monitor import beside
+from leg_wear_monitor import workers
 from leg_wear_monitor.compiled.kernel import is_stored
-beside._processors = lambda: 2
-with beside.compiled_beside(compile_curve, curve):
+workers._processors = lambda: 2
+with workers.compiled_beside(compile_curve, curve):
     here = line(3.0)
     while not is_stored(curve):
         time.sleep(0.02)
@@ -93,14 +93,14 @@ def test_a_process_imports_nothing_from_the_current_directory():
 
 
 @pytest.mark.plain
-def test_processes_are_started_in_three_places():
+def test_processes_are_started_in_two_files():
     """Each of which keeps the current directory out."""
     home = Path(workers.__file__).parent
     start = re.compile(
         r"sys\.executable|ProcessPoolExecutor\(|get_context\(|\bPopen\(|subprocess\.run\(|os\.system"
     )
     found = {str(path.relative_to(home)) for path in home.rglob("*.py") if start.search(path.read_text())}
-    assert found == {"beside.py", "cli/verbs/nodes.py", "workers.py"}
+    assert found == {"cli/verbs/nodes.py", "workers.py"}
 
 
 @pytest.mark.plain

@@ -42,14 +42,15 @@ print(cache_directory())
 
 
 class Package:
-    """A package with our kernel.py, a kernel, and entries that call it, each in a module of its own."""
+    """A package with our compiled/, a kernel, and entries that call it, each in a module of its own."""
 
     def __init__(self, directory: Path, **lines: str) -> None:
         self.directory = directory / "leg_wear_monitor"
         self.directory.mkdir()
         (self.directory / "__init__.py").write_text("")
-        for name in ("code_cache", "errors", "kernel", "whole_program"):
-            shutil.copy(Path(leg_wear_monitor.__file__).with_name(f"{name}.py"), self.directory)
+        (self.directory / "compiled").mkdir()
+        for name in ("errors", "compiled/__init__", "compiled/cache", "compiled/kernel"):
+            shutil.copy(Path(leg_wear_monitor.__file__).parent / f"{name}.py", self.directory / f"{name}.py")
         self.roots = lines or {"root": DIRECT}
         for name, line in self.roots.items():
             (self.directory / f"{name}.py").write_text(ROOT.format(line=line))

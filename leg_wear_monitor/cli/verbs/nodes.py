@@ -53,7 +53,7 @@ monitor = node_verb(
 
 gait_publisher = node_verb(
     "gait-publisher",
-    "gait_publisher.node",
+    "gait_publisher",
     "Run the synthetic leg as a ROS 2 node.",
     """Publish the sensor signals of a synthetic leg: joint_states and drive_torque.
 

@@ -32,7 +32,7 @@ def warm() -> None:
     """Import and compile all that reading and a short run need."""
     from leg_wear_monitor.dynamics.simulation import simulate
 
-    for module in ("monitor.forecast.forecaster", "monitor.config.plausible", "studies.plan.settings"):
+    for module in ("monitor.forecast.forecaster", "monitor.config.fitting", "studies.execution"):
         import_module(f"leg_wear_monitor.{module}")
     simulate("four_bar", cycles=1.0 / 64.0, skip_cycles=0.0)
     _life_text()

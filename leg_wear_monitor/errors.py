@@ -1,6 +1,5 @@
 """The one root of everything this package raises on purpose, text that is fit to be shown, names."""
 
-import difflib
 import os
 import signal
 from collections.abc import Callable, Iterable, Iterator
@@ -83,6 +82,8 @@ class ConfigWarning(UserWarning):
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
     """The known name most similar to a given one, ignoring case; None if none is similar."""
+    import difflib  # not at start: ^C is answered only after this file is read
+
     by_lower = {entry.lower(): entry for entry in known}
     near = difflib.get_close_matches(name.lower(), by_lower, n=1)
     return by_lower[near[0]] if near else None

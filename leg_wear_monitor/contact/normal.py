@@ -276,8 +276,8 @@ WINKLER = Form(
 
 # The normal contact laws by name, and kernels that select a joint's law (physics.md section 4).
 #
-# To add a law of another form, add a file beside this one, an entry to `LAWS`, and its name to
-# `mechanism.law_names`, where mechanism files and the command line check it without importing numba.
+# To add a law of another form, add its `Form` above, an entry to `LAWS`, and its name to
+# `NORMAL_LAWS` of `mechanism`, where mechanism files and the command line check it without importing numba.
 
 
 class NormalLaw(NamedTuple):

@@ -1,6 +1,6 @@
 """The measured foot load over the last gait cycles: size, heel strike and toe-off, and faults of its sensor.
 
-The checks compare it with the template of stance (`mechanism.ground_reaction`) and with the drive torque,
+The checks compare it with the template of stance (`mechanism.person`) and with the drive torque,
 which a load at the foot needs by virtual work.
 """
 

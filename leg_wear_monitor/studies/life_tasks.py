@@ -86,7 +86,7 @@ class ObservedLeg:
 
 
 def with_friction(mechanism: Mechanism, changes: dict[str, Any]) -> Mechanism:
-    """The mechanism with changed fields of `mechanism.clearance.Friction` in all its joints."""
+    """The mechanism with changed fields of `mechanism.spec.Friction` in all its joints."""
     clearances = {
         name: attrs.evolve(own, friction=attrs.evolve(own.friction, **changes))
         for name, own in mechanism.clearances.items()
@@ -95,7 +95,7 @@ def with_friction(mechanism: Mechanism, changes: dict[str, Any]) -> Mechanism:
 
 
 def with_film(mechanism: Mechanism, film: dict[str, float]) -> Mechanism:
-    """The mechanism with a film, fields of `mechanism.clearance.Film`, in all its joints.
+    """The mechanism with a film, fields of `mechanism.spec.Film`, in all its joints.
 
     Raises
     ------

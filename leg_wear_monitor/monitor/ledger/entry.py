@@ -447,7 +447,7 @@ class Commissioned:
     centre_rad : (m,) array
     mean : (1 + 2 m,) array
     covariance : array
-        As in `commissioning.EncoderErrors`.
+        As in `EncoderErrors`.
     """
 
     stamp_ns: int

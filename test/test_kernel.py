@@ -18,7 +18,7 @@ from numba.core.targetconfig import TargetConfig
 
 import leg_wear_monitor
 from leg_wear_monitor.compiled import kernel as whole_program
-from leg_wear_monitor.compiled.kernel import ByAddress, kernel
+from leg_wear_monitor.compiled.kernel import ByAddress, cache_directory, kernel
 
 LEAF = (
     "from leg_wear_monitor.compiled.kernel import kernel\n@kernel\ndef slope(x):\n    return {factor} * x\n"
@@ -140,6 +140,8 @@ def test_an_entry_follows_what_it_imports_however_and_nothing_else(tmp_path, hom
         module="import leg_wear_monitor.leaf\nslope = leg_wear_monitor.leaf.slope",
         lines="from leg_wear_monitor import (\n    leaf,\n)\nslope = leaf.slope",
         indented=f"if True: {DIRECT}",
+        attribute="from leg_wear_monitor import leaf\nimport leg_wear_monitor.compiled.kernel as k\n"
+        "slope = k.kernel(lambda x: leaf.slope(x))",
         constant="from leg_wear_monitor.frozen import slope",
         other="from leg_wear_monitor.island import slope",
     )
@@ -153,6 +155,55 @@ def test_an_entry_follows_what_it_imports_however_and_nothing_else(tmp_path, hom
     numbers.write_text("FACTOR = 3.0\n")
     changed = dict.fromkeys(package.roots, ("7.0", "0"))
     assert package.run_all(**home)[0] == changed | {"other": ("5.0", "1")}
+
+
+def test_what_no_code_depends_on_compiles_nothing_anew(tmp_path, home):
+    """A comment, another function of the file, its place in it."""
+    package = Package(tmp_path)
+    assert package.run(**home)[:2] == ["5.0", "0"]
+    leaf = package.directory / "leaf.py"
+    leaf.write_text(f"# a comment\nOTHER = 1\ndef other():\n    return OTHER\n{leaf.read_text()}")
+    assert package.run(**home)[:2] == ["5.0", "1"]
+
+
+def line_of(inner, by=2.0):
+    """A function that stands for an entry before it is compiled."""
+
+    def line(x):
+        return inner(x) * by + FACTOR
+
+    return line
+
+
+FACTOR: object = 2.0
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        (2.0, 2), (2.0, np.nextafter(2.0, 3.0)), (np.array([1.0, 2.0]), np.array([1.0, 3.0])),
+        ((1, (2.0,)), (1, (3.0,))), (np.dtype([("a", float)]), np.dtype([("a", float), ("b", int)])),
+        (math.sin, math.cos), (np.float32(1.0), np.float64(1.0)), (True, 1),
+    ],
+)  # fmt: skip
+def test_a_constant_of_another_value_or_type_is_other_code(monkeypatch, one, other):
+    def directory(value):
+        monkeypatch.setitem(globals(), "FACTOR", value)
+        return cache_directory(line_of(math.sin))
+
+    assert directory(one) == directory(one) != directory(other)
+
+
+def test_what_is_around_a_function_and_its_defaults_are_in_its_digest():
+    found = [cache_directory(line_of(inner, by)) for inner in (math.sin, math.cos) for by in (1.0, 2.0)]
+    assert len({*found}) == 4
+
+
+def test_a_constant_of_an_unknown_kind_is_refused(monkeypatch):
+    """Code that depends on what the digest does not cover could become stale."""
+    monkeypatch.setitem(globals(), "FACTOR", {"a": 1.0})
+    with pytest.raises(TypeError, match="a change of it would not be seen"):
+        cache_directory(line_of(math.sin))
 
 
 def test_a_kernel_that_allocates_is_refused():

@@ -1,18 +1,21 @@
 """The decorators for compiled code: ``@kernel`` for formulas, ``@entry`` for functions called from Python.
 
-Entries are cached on disk under a digest of all sources that they depend on.
+Entries are cached on disk under a digest of all code and constants that they depend on.
 """
 
-import ast
 import hashlib
+import sys
 from collections.abc import Callable, Iterable, Iterator
+from enum import EnumMeta
 from functools import cache, wraps
 from pathlib import Path
+from types import BuiltinFunctionType, CodeType, EllipsisType, FunctionType, ModuleType
 from typing import Any, TypeVar
 
 import numba
 import numpy as np
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.extending import _Intrinsic
 from numpy.typing import NDArray
 
 from leg_wear_monitor.compiled.cache import PACKAGE, code_directory, one_process_at_a_time
@@ -308,93 +311,131 @@ _ENTRY: dict[str, object] = {"error_model": "numpy", "_nrt": False, "no_cfunc_wr
 _KERNEL = {**_ENTRY, "forceinline": True}
 
 _HOME = Path(__file__).parents[1]  # of the package
+_PLAIN = (int, float, complex, str, bytes, slice, np.generic, EllipsisType, type(None))
 
 at_compilation: list[Callable[[], None]] = []  # called when an entry is compiled, and not loaded
 
 
-def _module(parts: Iterable[str]) -> Path | None:
-    """File of a module of this package, from the parts of its name; None if there is none."""
-    place = _HOME.joinpath(*parts)
-    files = (place.with_suffix(".py"), place / "__init__.py")
-    return next((file for file in files if file.is_file()), None)
+def _description(value: object, digest: Any, known: set[object]) -> None:
+    """Add to a digest what a value is for the compiler, with all that it depends on in its turn.
 
-
-def _statements(tree: ast.AST) -> Iterator[ast.AST]:
-    """All statements of a tree; `ast.walk` would go through the expressions, too, three times as long."""
-    found = [tree]
-    while found:
-        node = found.pop()
-        yield node
-        for block in ("body", "orelse", "finalbody", "handlers", "cases"):
-            found.extend(getattr(node, block, ()))
-
-
-@cache
-def _imported(source: Path) -> frozenset[Path]:
-    """Files of this package that a file of it imports by their full names."""
-    found: set[Path | None] = set()
-    for node in _statements(ast.parse(source.read_bytes())):
-        if isinstance(node, ast.Import):
-            names = [alias.name.split(".") for alias in node.names]
-            found.update(_module(name) for package, *name in names if package == PACKAGE)
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            package, *name = node.module.split(".")
-            if package == PACKAGE:
-                # the imported name is a module, or an object in a module
-                found.update(_module([*name, alias.name]) or _module(name) for alias in node.names)
-    return frozenset(file for file in found if file)
-
-
-def _sources(roots: Iterable[Path]) -> set[Path]:
-    """The given files and all files of this package that they import, directly or indirectly."""
-    known: set[Path] = set()
-    new = set(roots)
-    while new:
-        known |= new
-        new = {source for known_one in new for source in _imported(known_one)} - known
-    return known
-
-
-def _digest(sources: Iterable[Path]) -> str:
-    """Digest of names and contents of sources, of numba's version and of how it compiles: equal for copies.
-
-    Code that was compiled with `whole_program` calls addresses, which plain numba gives as 0.
+    Raises
+    ------
+    TypeError
+        For a kind of value of which it is not known what compiled code makes of it.
     """
-    digest = hashlib.sha256(f"{numba.__version__} {AVAILABLE}".encode())
-    for source in sorted(sources):
-        text = source.read_bytes()
-        name = source.relative_to(_HOME) if source.is_relative_to(_HOME) else source
-        digest.update(f"{name} {len(text)} ".encode())
-        digest.update(text)
-    return digest.hexdigest()[:16]
+    function = getattr(value, "py_func", value)
+    if isinstance(function, FunctionType):
+        if function not in known:
+            known.add(function)
+            _add_function(function, digest, known)
+        digest.update(f"function {function.__module__}.{function.__qualname__} ".encode())
+    elif isinstance(value, tuple | frozenset):
+        digest.update(f"{type(value).__qualname__} {len(value)} ".encode())
+        for each in value if isinstance(value, tuple) else sorted(value, key=repr):
+            _description(each, digest, known)
+    elif isinstance(value, np.ndarray):
+        digest.update(f"array {value.dtype.descr} {value.shape} ".encode())
+        digest.update(value.tobytes())
+    elif isinstance(value, CodeType):
+        _add_code(value, digest, known)
+    elif isinstance(value, EnumMeta):
+        digest.update(f"enum {value.__qualname__} {[*map(repr, value)]} ".encode())
+    elif isinstance(value, type | BuiltinFunctionType | np.ufunc | ModuleType):
+        name = f"{getattr(value, '__module__', '')}.{value.__name__}"
+        digest.update(f"name {name} {getattr(value, '_field_defaults', '')} ".encode())
+        digest.update(f"{getattr(value, '_fields', '')} ".encode())
+    elif isinstance(value, _Intrinsic):  # defined in this room, of which all sources are in the digest
+        cells = [cell.cell_contents for cell in value._defn.__closure__ or ()]
+        digest.update(f"intrinsic {value._name} {[str(one) for one in cells if not callable(one)]} ".encode())
+    elif isinstance(value, np.dtype):
+        digest.update(f"dtype {value.descr} ".encode())
+    elif isinstance(value, _PLAIN):
+        digest.update(f"{type(value).__name__} {value!r} ".encode())
+    else:
+        raise TypeError(f"{value!r} in compiled code: a change of it would not be seen by the cache")
+
+
+def _add_code(code: CodeType, digest: Any, known: set[object]) -> None:
+    """Instructions, constants and names of a function's code, not its place in a file."""
+    digest.update(f"{code.co_name} {code.co_names} {code.co_varnames} {code.co_flags} ".encode())
+    digest.update(f"{code.co_argcount} {code.co_freevars} {code.co_cellvars} ".encode())
+    digest.update(code.co_code)
+    _description(code.co_consts, digest, known)
+
+
+def _names_in(code: CodeType) -> Iterator[str]:
+    """Names of globals and attributes in a function and in those inside it."""
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _names_in(constant)
+
+
+def _add_function(function: FunctionType, digest: Any, known: set[object]) -> None:
+    """Code of a function, and every global and every variable around it that it uses.
+
+    A name may be that of an attribute: of a module of this package it is taken as one, and as a global, too.
+    """
+    _add_code(function.__code__, digest, known)
+    _description(function.__defaults__ or (), digest, known)
+    for cell in function.__closure__ or ():
+        _description(cell.cell_contents, digest, known)
+    spaces = [function.__globals__]
+    names = sorted({*_names_in(function.__code__)})
+    for space in spaces:
+        for name in names:
+            if name not in space:
+                continue
+            value = space[name]
+            digest.update(f"{name} = ".encode())
+            _description(value, digest, known)
+            ours = isinstance(value, ModuleType) and value.__name__.split(".")[0] == PACKAGE
+            if ours and not any(vars(value) is one for one in spaces):
+                spaces.append(vars(value))
 
 
 @cache
-def cache_directory(root: Path | None = None) -> Path | None:
-    """Directory of the compiled code of a file, named by a digest of all its sources.
+def _compiler() -> bytes:
+    """Versions of Python and numba and all sources of this room: how anything is compiled."""
+    room = b"".join(source.read_bytes() for source in sorted(Path(__file__).parent.glob("*.py")))
+    return f"{sys.version_info[:2]} {numba.__version__} {AVAILABLE} ".encode() + room
+
+
+@cache
+def cache_directory(function: Callable[..., object] | None = None) -> Path | None:
+    """Directory of the compiled code of a function, named by a digest of all that it is compiled from.
 
     numba checks only the file of the cached function itself: after a change of a kernel in another file it
-    would use the old code. The digest covers the file and everything that it imports. A directory outside the
-    package also works if the package directory is read-only.
+    would use the old code. The digest covers the code of the function, of all that it calls, and the values
+    of the globals that they use; so a change of anything else in their files compiles nothing anew. A
+    directory outside the package also works if the package directory is read-only.
 
     Parameters
     ----------
-    root : pathlib.Path, optional
-        File of this package; default: all kernels of the package.
+    function : callable, optional
+        Before compilation; default: whatever is compiled from any file of the package.
 
     Returns
     -------
     pathlib.Path or None
         Below ``$NUMBA_CACHE_DIR`` if set, else ``$XDG_CACHE_HOME`` or ``~/.cache``, else the temporary
         directory: the first that is private (`leg_wear_monitor.compiled.cache`). None if none is.
+
+    Raises
+    ------
+    TypeError
+        If the function uses a global of a kind of which it is not known what compiled code makes of it.
     """
-    if root is None:
-        compiled = (
-            file for file in _HOME.rglob("*.py") if b"leg_wear_monitor.compiled.kernel" in file.read_bytes()
-        )
-        return code_directory(f"all-{_digest(_sources(compiled))}")
-    below = root.relative_to(_HOME) if root.is_relative_to(_HOME) else Path(root.name)
-    return code_directory(f"{'.'.join(below.with_suffix('').parts)}-{_digest(_sources([root]))}")
+    digest = hashlib.sha256(_compiler())
+    if function is None:
+        name = "all"
+        for source in sorted(_HOME.rglob("*.py")):
+            digest.update(f"{source.relative_to(_HOME)} ".encode() + source.read_bytes())
+    else:
+        name = f"{function.__module__.removeprefix(f'{PACKAGE}.')}.{function.__qualname__}"
+        _description(function, digest, set())
+    return code_directory(f"{name.replace('<locals>', 'in')}-{digest.hexdigest()[:16]}")
 
 
 def kernel(function: _Function) -> _Function:
@@ -414,21 +455,26 @@ def entry(function: _Function) -> _Function:
 
     While another process compiles the same entry, this one waits for it and loads the result.
     """
-    home = cache_directory(Path(function.__code__.co_filename))
     compiled = numba.njit(nogil=True, **_ENTRY)(function)
-    if home is not None and not numba.config.DISABLE_JIT:
-        store(compiled, home)
-        compiled.compile = _compiled_once(compiled, home / f"{function.__name__}.lock")
+    if not numba.config.DISABLE_JIT:
+        compiled.compile = _compiled_once(compiled)
     return compiled  # type: ignore[no-any-return]
 
 
-def _compiled_once(compiled: Any, lock: Path) -> Callable[..., object]:
+def _compiled_once(compiled: Any) -> Callable[..., object]:
     """A dispatcher's method ``compile``, in one process at a time."""
     compile_or_load = compiled.compile
+    kept_in: list[Path] = []
 
     def compile_in_turn(signature: object) -> object:
+        home = cache_directory(compiled.py_func)  # now that all globals are defined
+        if home is None:
+            return compile_or_load(signature)
         # numba's own lock first: two threads that each held one of the two would wait for ever
-        with global_compiler_lock, one_process_at_a_time(lock):
+        with global_compiler_lock, one_process_at_a_time(home / "lock"):
+            if home not in kept_in:
+                kept_in.append(home)
+                store(compiled, home)
             if at_compilation and not is_stored(compiled):
                 for call in at_compilation:
                     call()
@@ -448,7 +494,7 @@ def is_stored(compiled: Callable[..., object]) -> bool:
     function = getattr(compiled, "py_func", None)
     if function is None:
         return True
-    home = cache_directory(Path(function.__code__.co_filename))
+    home = cache_directory(function)
     # the code, not its index, which numba writes first
     return home is not None and any(home.glob(f"**/*.{function.__name__}-*.nbc"))
 

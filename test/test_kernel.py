@@ -1,7 +1,6 @@
 """The cache of compiled code: it works wherever the package lies, and is never stale."""
 
 import math
-import operator
 import os
 import shutil
 import subprocess
@@ -11,10 +10,7 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
-from numba.core.compiler import Flags
 from numba.core.errors import NumbaError
-from numba.core.registry import cpu_target
-from numba.core.targetconfig import TargetConfig
 
 import leg_wear_monitor
 from leg_wear_monitor.compiled import kernel as whole_program
@@ -220,29 +216,6 @@ def test_a_kernel_that_allocates_is_refused():
 def test_numba_has_the_switches_for_a_quick_start():
     """Without them all works, and a start takes three times as long: whole_program.py wants another look."""
     assert whole_program.AVAILABLE
-    assert whole_program.QUICK_FLAGS
-    assert whole_program.QUICK_CALLS
-
-
-def test_flags_read_quickly_are_those_of_numba():
-    flags = Flags()
-    flags.nrt, flags.error_model = True, "numpy"
-    assert (
-        flags.values() == TargetConfig.values(flags) == {name: getattr(flags, name) for name in Flags.options}
-    )
-    assert flags == flags.copy() and hash(flags) == hash(flags.copy()) and flags != Flags()
-
-
-@pytest.mark.parametrize("arguments", [(2.0, 3), (2, 3), (True, 2), (np.float32(2.0), 3.0)])
-def test_a_remembered_call_is_what_numba_finds(arguments):
-    context, types = cpu_target.typing_context, tuple(map(numba.typeof, arguments))
-    context.refresh()
-    for operation in (operator.mul, operator.lt, operator.iadd, math.sqrt):
-        function = context.resolve_value_type(operation)
-        given = types[:1] if operation is math.sqrt else types
-        first, again = (function.get_call_type(context, given, {}) for _ in range(2))
-        assert first is again
-        assert first == type(function).get_call_type.__wrapped__(function, context, given, {})
 
 
 @pytest.mark.parametrize("available", [True, False])

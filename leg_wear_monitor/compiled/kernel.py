@@ -7,7 +7,7 @@ import hashlib
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from enum import EnumMeta
-from functools import cache, wraps
+from functools import cache
 from pathlib import Path
 from types import BuiltinFunctionType, CodeType, EllipsisType, FunctionType, ModuleType
 from typing import Any, TypeVar
@@ -75,66 +75,6 @@ _Library: Any
 _Compiler: Any
 _Dispatcher: Any
 _Library, _Compiler, _Dispatcher = _FOUND or (object, object, object)
-
-
-def _read_flags_quickly() -> bool:
-    """Let numba gather its flags from two dictionaries, not by some thirty properties; False if they changed.
-
-    It does so for each call that it types, a hundred thousand times in a compilation: a fifth of its time.
-    """
-    try:
-        from numba.core.compiler import Flags
-        from numba.core.targetconfig import TargetConfig
-
-        defaults = {name: option.default for name, option in Flags.options.items()}
-        flags = Flags()
-        flags.nrt = True
-
-        def values(self: Any) -> dict[str, Any]:
-            return {**defaults, **self._values}
-
-        if Flags.values is not TargetConfig.values or values(flags) != flags.values():
-            return False
-        Flags.values = values
-    except (AttributeError, ImportError):
-        return False
-    return True
-
-
-QUICK_FLAGS = _read_flags_quickly()
-
-
-def _remember_calls() -> bool:
-    """Let numba find out once what it calls for numbers of some types; False if it changed.
-
-    It tries all that it has for an operator, arrays first, each time that one occurs: a tenth of its time.
-    """
-    try:
-        from numba.core.types import Boolean, Number
-        from numba.core.types.functions import BaseFunction
-
-        owner: Any = BaseFunction
-        find = owner.get_call_type
-        if find.__code__.co_varnames[:4] != ("self", "context", "args", "kws"):
-            return False
-        known: dict[Any, Any] = {}
-
-        @wraps(find)
-        def get_call_type(self: Any, context: Any, args: Any, kws: Any) -> Any:
-            if kws or not all(isinstance(one, Number | Boolean) for one in args):
-                return find(self, context, args, kws)
-            key = (self, context, self.templates, tuple(args))  # templates: more may be registered later
-            if key not in known:
-                known[key] = find(self, context, args, kws)
-            return known[key]
-
-        owner.get_call_type = get_call_type
-    except (AttributeError, ImportError):
-        return False
-    return True
-
-
-QUICK_CALLS = _remember_calls()
 
 
 class _Part(_Library):  # type: ignore[misc]

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from leg_wear_monitor.files import share_directory
     from leg_wear_monitor.fleet.overview import FleetOverview, LegOverview
     from leg_wear_monitor.fleet.update import Fleet
+    from leg_wear_monitor.life.design import BushingChoices, Design, DutyPart, design, read_duty
     from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
     from leg_wear_monitor.life.result import Duty, Life
     from leg_wear_monitor.mechanism.loader import load_mechanism
@@ -45,10 +46,13 @@ if TYPE_CHECKING:
     from leg_wear_monitor.twin.sample import gait_samples
 
 _HOME = {
+    "BushingChoices": "life.design",
     "CommissioningItem": "commissioning.result",
     "CommissioningResult": "commissioning.result",
+    "Design": "life.design",
     "Drive": "mechanism.sourced",
     "Duty": "life.result",
+    "DutyPart": "life.design",
     "EnergyBalance": "dynamics.result",
     "Fleet": "fleet.update",
     "FleetOverview": "fleet.overview",
@@ -71,6 +75,7 @@ _HOME = {
     "Trace": "dynamics.result",
     "WearMonitor": "monitor.wear_monitor",
     "commission": "commissioning.commission",
+    "design": "life.design",
     "drives": "mechanism.sourced",
     "gait_samples": "twin.sample",
     "load_config": "monitor.config.parameters",
@@ -81,6 +86,7 @@ _HOME = {
     "on_the_ground": "mechanism.person",
     "open_ledger": "monitor.ledger.ledger",
     "plot": "report.plot",
+    "read_duty": "life.design",
     "replay": "playback.replay",
     "share_directory": "files",
     "simulate": "dynamics.simulation",
@@ -90,11 +96,14 @@ _HOME = {
 
 __all__ = [
     "AssemblyError",
+    "BushingChoices",
     "CommissioningItem",
     "CommissioningResult",
     "ConfigError",
+    "Design",
     "Drive",
     "Duty",
+    "DutyPart",
     "EnergyBalance",
     "Fleet",
     "FleetOverview",
@@ -119,6 +128,7 @@ __all__ = [
     "Trace",
     "WearMonitor",
     "commission",
+    "design",
     "drives",
     "gait_samples",
     "load_config",
@@ -129,6 +139,7 @@ __all__ = [
     "on_the_ground",
     "open_ledger",
     "plot",
+    "read_duty",
     "replay",
     "share_directory",
     "simulate",

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from leg_wear_monitor.configuration import Doubt
     from leg_wear_monitor.mechanism.sourced import SourcedValue
+    from leg_wear_monitor.mechanism.spec import Mechanism
     from leg_wear_monitor.playback.result import ReplaySummary
 
 
@@ -155,6 +156,15 @@ def json_option(what: str) -> Option:
 def out_option(text: str) -> Option:
     """``--out DIR``."""
     return click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help=text)
+
+
+def with_clearance_joints(leg: "Mechanism", names: str | None) -> "Mechanism":
+    """The leg with these clearance joints, of comma-separated names; as it is without names."""
+    import attrs
+
+    return (
+        attrs.evolve(leg, clearance_joints=tuple(name.strip() for name in names.split(","))) if names else leg
+    )
 
 
 # A node as a verb: its arguments are those of ROS, and without ROS there is one line.

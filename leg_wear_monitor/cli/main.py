@@ -17,8 +17,8 @@ COULD_NOT = 2
 
 _VERBS = {
     "acknowledge": "upkeep", "cache": "check", "check": "check", "commission": "commission",
-    "dashboard": "nodes", "demo": "nodes", "draw": "study", "drives": "check", "fleet": "fleet",
-    "gait-publisher": "nodes", "life": "life", "materials": "check", "measure": "upkeep",
+    "dashboard": "nodes", "demo": "nodes", "design": "design", "draw": "study", "drives": "check",
+    "fleet": "fleet", "gait-publisher": "nodes", "life": "life", "materials": "check", "measure": "upkeep",
     "monitor": "nodes", "play": "commission", "reference": "commission", "replay": "replay",
     "report": "replay", "reset": "upkeep", "simulate": "study", "study": "study",
 }  # fmt: skip

@@ -383,6 +383,14 @@ def regime_of(settings: Clearance) -> str:
     return f"{own}{pair.name} ({pair.regime})"
 
 
+USUAL_SPREAD = 0.7
+"""Logarithmic standard deviation of a wear coefficient whose pair gives none.
+
+A factor of two up or down: reported wear rates scatter by that much and more (Schmitz and others, Journal of
+Tribology 126 (2004) 802). It is a judgement, not a measurement.
+"""
+
+
 def spread_of(settings: Clearance, usual: float) -> float | None:
     """Logarithmic standard deviation of a joint's wear coefficient by its pair.
 

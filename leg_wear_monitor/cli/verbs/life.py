@@ -20,6 +20,7 @@ from leg_wear_monitor.cli.common import (
     progress_bar,
     speed_option,
     warn_of,
+    with_clearance_joints,
     write_directory,
     write_json,
 )
@@ -110,7 +111,7 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
     from leg_wear_monitor.mechanism.plausible import doubts
 
     names = options.pop("clearances")
-    leg = _with_clearance_joints(load_mechanism(mechanism), names)
+    leg = with_clearance_joints(load_mechanism(mechanism), names)
     check_outputs(json_file, out)
     with options_named():
         lives = _lives(leg, **options)
@@ -128,15 +129,6 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
         told += _loads(leg, result)
         for line in [*told, *(f"written: {path}" for path in written)]:
             click.echo(line)
-
-
-def _with_clearance_joints(leg: "Mechanism", names: str | None) -> "Mechanism":
-    """The leg with these clearance joints, of comma-separated names."""
-    import attrs
-
-    return (
-        attrs.evolve(leg, clearance_joints=tuple(name.strip() for name in names.split(","))) if names else leg
-    )
 
 
 def _lives(leg: "Mechanism", lives: int, opens_m: float | None, duty: str | None, **options: Any) -> "Lives":

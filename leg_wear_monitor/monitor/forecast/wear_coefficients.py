@@ -23,7 +23,7 @@ from leg_wear_monitor.configuration import described, quantity
 from leg_wear_monitor.configuration.strict import structure
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.materials import regime_of, spread_of
+from leg_wear_monitor.mechanism.materials import USUAL_SPREAD, regime_of, spread_of
 from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
 from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.ledger.entry import CorrectedClearance
@@ -36,13 +36,6 @@ from leg_wear_monitor.monitor.ledger.entry import CorrectedClearance
 
 
 SCHEMA_VERSION = 1
-
-USUAL_SPREAD = 0.7
-"""Logarithmic standard deviation of a wear coefficient whose pair gives none.
-
-A factor of two up or down: reported wear rates scatter by that much and more (Schmitz and others, Journal of
-Tribology 126 (2004) 802). It is a judgement, not a measurement.
-"""
 
 
 @attrs.frozen(kw_only=True)

@@ -9,13 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from leg_wear_monitor.mechanism.materials import USUAL_SPREAD
 from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.forecast.forecast import Answer, GrowthLaw, JointCondition, forecast, no_law
-from leg_wear_monitor.monitor.forecast.wear_coefficients import (
-    USUAL_SPREAD,
-    MeasuredClearance,
-    estimate_coefficient,
-)
+from leg_wear_monitor.monitor.forecast.wear_coefficients import MeasuredClearance, estimate_coefficient
 
 pytestmark = pytest.mark.plain
 

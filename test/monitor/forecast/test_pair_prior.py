@@ -11,11 +11,11 @@ from ruamel.yaml import YAML
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.mechanism.loader import shipped_mechanisms
-from leg_wear_monitor.mechanism.materials import spread_of
+from leg_wear_monitor.mechanism.materials import USUAL_SPREAD, spread_of
 from leg_wear_monitor.mechanism.plausible import doubts
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.config.sections import Forecasting
-from leg_wear_monitor.monitor.forecast.wear_coefficients import USUAL_SPREAD, usual_prior
+from leg_wear_monitor.monitor.forecast.wear_coefficients import usual_prior
 from leg_wear_monitor.monitor.parts import Parts
 
 pytestmark = pytest.mark.plain

@@ -166,3 +166,16 @@ def test_watch_draws_on_save_survives_a_half_saved_file_and_ends_with_0(shipped,
             process.kill()
     assert log.read_text().count("error:") == 1
     assert "location.reload" not in page.read_text()
+
+
+def test_a_robot_description_in_place_of_a_picture(run, tmp_path):
+    result = run("draw", "slider_crank", "--urdf")
+    assert result.exit_code == 0
+    text = (tmp_path / "slider_crank.urdf").read_text()
+    assert ElementTree.fromstring(text).get("name") == "slider_crank"
+    (comment,) = re.findall("<!--(.*?)-->", text)
+    assert "--" not in comment  # which is no XML, though Python reads it
+    assert run("draw", "slider_crank", "--out", "slider_crank.urdf").exit_code == 0  # ours: replaced
+    refused = run("draw", "slider_crank", "--urdf", "--forces")
+    assert refused.exit_code == 2
+    assert "expected no other option than --out FILE.urdf" in refused.stderr

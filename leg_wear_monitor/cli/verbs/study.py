@@ -145,7 +145,8 @@ def write_study_page(path: Path) -> int:
 
 WITH_FINDINGS = 1
 
-_SUFFIXES = (".html", ".svg")
+_URDF = ".urdf"
+_SUFFIXES = (".html", ".svg", _URDF)
 _OURS = b"leg-wear-monitor draw"  # near the begin of what this verb writes
 _POLL_S = 0.2
 
@@ -158,7 +159,12 @@ _Stamp = tuple[int, int, int]
     "--out",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="A file .html or .svg.  [default: MECHANISM.html in this directory]",
+    help="A file .html, .svg or .urdf.  [default: MECHANISM.html in this directory]",
+)
+@click.option(
+    "--urdf",
+    is_flag=True,
+    help="Write MECHANISM.urdf in place of a picture: a tree of its links with the loops cut, for RViz.",
 )
 @click.option("--forces", is_flag=True, help="Draw the forces in the joints, without clearance (.html).")
 @click.option(
@@ -169,7 +175,9 @@ _Stamp = tuple[int, int, int]
     help="Position to draw, or to show first.  [default: 0, or the one that shows what is wrong]",
 )
 @click.option("--watch", is_flag=True, help="Draw again whenever the mechanism file is saved, until Ctrl-C.")
-def draw(mechanism: str, out: Path | None, forces: bool, crank_angle: float | None, watch: bool) -> int:
+def draw(
+    mechanism: str, out: Path | None, urdf: bool, forces: bool, crank_angle: float | None, watch: bool
+) -> int:
     """Draw a mechanism file, or a mechanism that comes with the package.
 
     The HTML page moves the mechanism through its cycle; it is one file and needs no network. Where the
@@ -177,8 +185,13 @@ def draw(mechanism: str, out: Path | None, forces: bool, crank_angle: float | No
     does not turn through, the page shows the range and the bodies in line at its ends. The exit code is then
     1. Replaces a drawing of an earlier run, and no other file.
     """
-    target = Path(f"{Path(mechanism).stem}.html") if out is None else out
+    target = Path(f"{Path(mechanism).stem}.{'urdf' if urdf else 'html'}") if out is None else out
     _check_target(target)
+    if urdf or target.suffix.lower() == _URDF:
+        if forces or watch or crank_angle is not None or target.suffix.lower() != _URDF:
+            fault = f"{target} is a robot description, expected no other option than --out FILE.urdf"
+            raise ConfigError("--urdf", "", fault)
+        return _describe(mechanism, target)
     if forces and target.suffix.lower() == ".svg":
         raise ConfigError("--forces", "", f"{target} is a still picture, expected an --out FILE.html")
     if watch:
@@ -198,6 +211,21 @@ def _check_target(path: Path) -> None:
             raise ConfigError(
                 "--out", str(path), "exists and is no drawing of this command, expected another --out FILE"
             )
+
+
+def _describe(mechanism: str, target: Path) -> int:
+    """Write a mechanism as URDF."""
+    from leg_wear_monitor.mechanism.loader import load_mechanism
+
+    leg = load_mechanism(mechanism)
+    with compilation("mechanism", how_long="a few seconds"):
+        from leg_wear_monitor.mechanism.urdf import urdf
+
+        text = urdf(leg)
+    head, _, robot = text.partition("\n")
+    write_file(target, f"{head}\n<!-- made by {_OURS.decode()} -->\n{robot}".encode())
+    click.echo(f"written: {target}: {printable(leg.name)}")
+    return 0
 
 
 def _draw(mechanism: str, target: Path, forces: bool, crank_angle: float | None, watch: bool = False) -> int:

@@ -1,8 +1,9 @@
 """A linkage as URDF: a tree of its bodies with its loops cut, and the angles of the joints in the tree.
 
-The plane of the mechanism is x and z of ROS (REP 103: z is upwards), so bodies turn about -y. A link has the
-axes of its body, and its origin in the joint that carries it. Where a loop is cut, each of the two bodies has
-a frame in the joint; the frames coincide (of a slider, along its axis) at the angles of `joint_positions`.
+The plane of the mechanism is -x and z of ROS, as in the markers: a leg walks towards its own -x, and by REP
+103 towards x. So bodies turn about y. A link has the axes of its body, and its origin in the joint that
+carries it. Where a loop is cut, each of the two bodies has a frame in the joint; the frames coincide (of a
+slider, along its axis) at the angles of `joint_positions`.
 """
 
 import math
@@ -68,7 +69,7 @@ def joint_positions(linkage: Linkage, q: Floats) -> dict[str, Floats]:
     Returns
     -------
     dict of str to (N,) array
-        Angles [rad] from parent to child about -y, and the way of a slider along its axis [m].
+        Angles [rad] from parent to child, and the way of a slider along its axis [m].
     """
     mechanism, found = linkage.mechanism, {}
     number = {body: k for k, body in enumerate(body_names(mechanism))}
@@ -140,7 +141,7 @@ def _link(mechanism: Mechanism, body: str, origin: Vector) -> ElementTree.Elemen
         visual = ElementTree.SubElement(link, "visual")
         middle = (0.5 * (begin[0] + end[0]), 0.5 * (begin[1] + end[1]))
         # from the cylinder's axis z to the side
-        pitch = math.atan2(end[0] - begin[0], end[1] - begin[1])
+        pitch = math.atan2(begin[0] - end[0], end[1] - begin[1])
         _origin(visual, middle, origin, pitch)
         geometry = ElementTree.SubElement(visual, "geometry")
         ElementTree.SubElement(geometry, "cylinder", radius=f"{radius:.9g}", length=f"{length:.9g}")
@@ -164,18 +165,18 @@ def _joint(
     kind = "prismatic" if slides else "continuous"
     joint = ElementTree.Element("joint", name=branch.joint, type=kind)
     turned = angle[branch.child] - angle[branch.parent] if slides else 0.0
-    _origin(joint, mechanism.points_of(branch.parent)[branch.joint], origins[branch.parent], -turned)
+    _origin(joint, mechanism.points_of(branch.parent)[branch.joint], origins[branch.parent], turned)
     ElementTree.SubElement(joint, "parent", link=branch.parent)
     ElementTree.SubElement(joint, "child", link=branch.child)
     if slides:
         # the axis of a joint is given in its own frame, which has the child's directions
         guide, axis = _guide(mechanism, branch.joint)
         x, y = axis if guide == branch.child else rotated(axis, -turned).tolist()
-        ElementTree.SubElement(joint, "axis", xyz=f"{x:.12g} 0 {y:.12g}")
+        ElementTree.SubElement(joint, "axis", xyz=f"{-x:.12g} 0 {y:.12g}")
         far = f"{_reach(mechanism):.9g}"
         ElementTree.SubElement(joint, "limit", lower=f"-{far}", upper=far, effort="0", velocity="0")
     else:
-        ElementTree.SubElement(joint, "axis", xyz="0 -1 0")
+        ElementTree.SubElement(joint, "axis", xyz="0 1 0")
     return joint
 
 
@@ -192,7 +193,7 @@ def _cut(mechanism: Mechanism, body: str, joint: str, origin: Vector) -> Iterato
 
 def _origin(of: ElementTree.Element, point: Vector, origin: Vector, pitch: float = 0.0) -> None:
     """Place of a point of a body in the frame of its link; a pitch [rad] is about y."""
-    x, z = point[0] - origin[0], point[1] - origin[1]
+    x, z = origin[0] - point[0], point[1] - origin[1]
     ElementTree.SubElement(of, "origin", xyz=f"{x:.12g} 0 {z:.12g}", rpy=f"0 {pitch:.12g} 0")
 
 

@@ -20,6 +20,7 @@ from leg_wear_monitor.mechanism.position import (
     point_motion,
 )
 from leg_wear_monitor.mechanism.spec import GROUND, Mechanism
+from leg_wear_monitor.mechanism.urdf import joint_positions
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 WRENCH_STAMPED = "geometry_msgs/msg/WrenchStamped"
@@ -366,12 +367,18 @@ class LegDrawing:
         Centres of the magnified bushings, beside the leg.
     title : (3,) array
         Place above the rings.
+    links : tuple of str
+        Joints that carry the links of the mechanism's robot description.
+    link_positions : (STEPS, n) array
+        Their positions [rad, or m of a slider].
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
         linkage = build_linkage(mechanism)
         motion = ideal_motion(linkage, TURN / _STEPS * np.arange(_STEPS), TURN)
         self.lines = _lines(mechanism, motion, linkage)
+        carried = joint_positions(linkage, motion.q)
+        self.links, self.link_positions = tuple(carried), np.stack([*carried.values()], axis=1)
         names = mechanism.clearance_joints
         joints = [_path(motion, linkage, mechanism.sides(name)[0], name) for name in names]
         self.joints = np.stack(joints, axis=1) if joints else np.zeros((_STEPS, 0, 3))

@@ -186,6 +186,8 @@ def _colour(level: Level, shown: Shown) -> tuple[float, float, float]:
 
 
 MARKERS = Output("~/markers", encode.MARKER_ARRAY)
+LINKAGE = Output("~/linkage_states", encode.JOINT_STATE)
+"""Joint positions of its robot description (`leg-wear-monitor draw --urdf`): those of the ideal leg."""
 
 PERIOD_NS = 100_000_000
 _NEVER_NS = 2**63 - 1
@@ -193,7 +195,7 @@ SILENT_NS = 1_000_000_000  # samples apart by more: there was no current data
 
 
 class LegMarkers:
-    """Messages of `MARKERS`: the same live and in replay, however the reports are cut.
+    """Messages of `MARKERS` and `LINKAGE`: the same live and in replay, however the reports are cut.
 
     Bodies, joints and the toe's path are those of the ideal leg. Beside it, each journal moves in its
     bushing as in the twin, magnified so that at the clearance limit it has half of the bushing's radius.
@@ -235,7 +237,7 @@ class LegMarkers:
                 yield self.no_data(int(before_ns[i]) + SILENT_NS)
             self._take(self._drawn_ns or stamp_ns - SILENT_NS, stamp_ns)
             self._drawn_ns = stamp_ns
-            yield self._at(samples, i)
+            yield from self._at(samples, i)
         self._take(0, self._drawn_ns)
         if len(samples):
             self._last_ns = int(samples.stamp_ns[-1])
@@ -249,13 +251,21 @@ class LegMarkers:
         """Set alarms and verdict at once, because an operator has changed them."""
         self._now = attrs.evolve(self._now, levels=self._levels(alarms), verdict=_words(verdict))
 
-    def _at(self, samples: SampleReports, i: int) -> Outgoing:
-        angle = float(samples.crank_angle_rad[i])
+    def _at(self, samples: SampleReports, i: int) -> Iterator[Outgoing]:
+        angle, stamp_ns, drawing = (
+            float(samples.crank_angle_rad[i]),
+            int(samples.stamp_ns[i]),
+            self._scene.drawing,
+        )
         if math.isnan(angle):
-            return self.no_data(int(samples.stamp_ns[i]))
-        self._step = self._scene.drawing.step_at(angle)
+            yield self.no_data(stamp_ns)
+            return
+        self._step = drawing.step_at(angle)
         self._now = attrs.evolve(self._now, is_current=True)
-        return self._drawn(int(samples.stamp_ns[i]), np.nan_to_num(samples.eccentricity_m[i]))
+        yield self._drawn(stamp_ns, np.nan_to_num(samples.eccentricity_m[i]))
+        position = drawing.link_positions[self._step]
+        rows = encode.joint_states(stamp_ns, drawing.links, position=position, frame_id=self._frame_id)
+        yield single(LINKAGE, stamp_ns, rows[0].tobytes())
 
     def _take(self, begin_ns: int, end_ns: int) -> None:
         """Take the changes from a stamp on, up to another one; the others wait."""

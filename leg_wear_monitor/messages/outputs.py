@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from leg_wear_monitor.files import or_nan
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.messages import encode
-from leg_wear_monitor.messages.leg_markers import MARKERS
+from leg_wear_monitor.messages.leg_markers import LINKAGE, MARKERS
 from leg_wear_monitor.messages.streams import LATCHED, SENSOR_DATA, Outgoing, Output, single
 from leg_wear_monitor.monitor.alarms import Alarm, Level, code_of, state_of
 from leg_wear_monitor.monitor.config.parameters import NODE
@@ -87,7 +87,7 @@ FORECAST = Output("~/forecast", encode.DIAGNOSTIC_ARRAY, LATCHED)
 ALARMS = Output("~/alarms", encode.DIAGNOSTIC_ARRAY, LATCHED)
 VERDICT = Output("~/verdict", encode.DIAGNOSTIC_ARRAY, LATCHED)
 DIAGNOSTICS = Output("/diagnostics", encode.DIAGNOSTIC_ARRAY)
-OUTPUTS = (CLEARANCES, IMPACTS, TORQUE, FORECAST, ALARMS, VERDICT, DIAGNOSTICS, MARKERS)
+OUTPUTS = (CLEARANCES, IMPACTS, TORQUE, FORECAST, ALARMS, VERDICT, DIAGNOSTICS, MARKERS, LINKAGE)
 """Those of every monitor; `Messages.outputs` has all."""
 
 _AXES = {"x": 0, "y": 1, "z": 2}

@@ -22,7 +22,7 @@ from visualization_msgs.msg import MarkerArray
 
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.messages.encode import LegDrawing
-from leg_wear_monitor.messages.leg_markers import MARKERS, SILENT_NS, LegMarkers
+from leg_wear_monitor.messages.leg_markers import LINKAGE, MARKERS, SILENT_NS, LegMarkers
 from leg_wear_monitor.messages.streams import Outgoing, Output, Qos
 from leg_wear_monitor.monitor.reports import Reports
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
@@ -196,11 +196,11 @@ class Outlets:
                 publish(row.tobytes())
 
 
-# Topic ``~/markers`` of the node; `messages.leg_markers` draws them.
+# Topics ``~/markers`` and ``~/linkage_states`` of the node; `messages.leg_markers` makes them.
 
 
 class MarkerTopic:
-    """``~/markers``, while its parameter is on and somebody subscribes or the node is recorded.
+    """``~/markers`` and ``~/linkage_states``, while wanted and somebody subscribes or the node is recorded.
 
     Parameters
     ----------
@@ -243,7 +243,7 @@ class MarkerTopic:
     @property
     def _is_wanted(self) -> bool:
         """Whether markers are needed; if not, what they show is not kept up to date."""
-        wanted = self._monitor.config.publish_markers and self._outlets.wanted(MARKERS)
+        wanted = self._monitor.config.publish_markers and any(map(self._outlets.wanted, (MARKERS, LINKAGE)))
         if not wanted:
             self._markers = None
         return wanted

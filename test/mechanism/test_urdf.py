@@ -41,8 +41,8 @@ def frames(robot, positions):
             axis = np.array(list(map(float, joint.find("axis").get("xyz").split())))
             value = positions[joint.get("name")]
             if joint.get("type") == "continuous":
-                assert axis.tolist() == [0.0, -1.0, 0.0]
-                here = here @ transform("0 0 0", f"0 {-value} 0")
+                assert axis.tolist() == [0.0, 1.0, 0.0]
+                here = here @ transform("0 0 0", f"0 {value} 0")
             else:
                 here = here @ np.block([[np.eye(3), value * axis[:, None]], [np.zeros((1, 3)), 1.0]])
         found[child] = here
@@ -66,7 +66,7 @@ def test_cut_loops_close_and_bodies_are_where_they_are_in_the_linkage(name):
         for branch in tree(mechanism):
             expected, _, _ = point_motion(motion, linkage, branch.child, branch.joint)
             x, y, z = here[branch.child][:3, 3]
-            assert (x, z) == pytest.approx(tuple(expected[step]), abs=1e-6)
+            assert (-x, z) == pytest.approx(tuple(expected[step]), abs=1e-6)
             assert y == 0.0
 
 

@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 
 import leg_wear_monitor as lw
+from leg_wear_monitor.mechanism.position import build_linkage, ideal_motion
+from leg_wear_monitor.mechanism.urdf import joint_positions
 from leg_wear_monitor.messages.encode import CYLINDER, LINE_LIST, LINE_STRIP, SPHERE, TEXT, LegDrawing
-from leg_wear_monitor.messages.leg_markers import LegMarkers
+from leg_wear_monitor.messages.leg_markers import LINKAGE, MARKERS, LegMarkers
+from leg_wear_monitor.messages.streams import Output
 from leg_wear_monitor.monitor.alarms import Alarm, Level
 from leg_wear_monitor.monitor.reports import AlarmList, Lost, Reports, SampleReports
 from leg_wear_monitor.twin import CRANK
@@ -65,6 +68,8 @@ def drawn(store: Any, monitor: lw.WearMonitor, drawing: LegDrawing) -> Any:
         markers, found = LegMarkers(monitor, drawing), []
         for each in several:
             for outgoing in markers.of(each):
+                if outgoing.output is not MARKERS:
+                    continue
                 assert len(outgoing.messages) == 1
                 message = store.deserialize_cdr(outgoing.messages[0].tobytes(), outgoing.output.type)
                 named: dict[str, list[Any]] = {}
@@ -189,17 +194,18 @@ def test_markers_are_the_same_however_reports_are_cut(
     ]
     changes += [(140, raised(0.4, Level.WARN))]
 
-    def drawn_from(edges: list[int]) -> list[bytes]:
+    def drawn_from(edges: list[int], *outputs: Output) -> list[bytes]:
         markers, rows = LegMarkers(monitor, drawing), []
         for begin, end in pairwise([0, *edges, len(at_s)]):
             fields = {one.name: getattr(whole, one.name)[begin:end] for one in attrs.fields(SampleReports)}
             told = tuple(change for at, change in changes if begin <= at < end)
-            for outgoing in markers.of(reports(SampleReports(**fields), told)):
-                rows.append(outgoing.messages[0].tobytes())
+            drawn = markers.of(reports(SampleReports(**fields), told))
+            rows += [one.messages[0].tobytes() for one in drawn if one.output in outputs]
         return rows
 
-    one_by_one = drawn_from(list(range(1, len(at_s))))
-    assert drawn_from(cuts) == one_by_one
+    each = list(range(1, len(at_s)))
+    assert drawn_from(cuts, MARKERS, LINKAGE) == drawn_from(each, MARKERS, LINKAGE)
+    one_by_one = drawn_from(each, MARKERS)
     assert [b"G: WARN" in raw for raw in one_by_one] == [False] * 3 + [True] * 2 + [False] * 3 + [True] * 2
     assert [b"G: ERROR" in raw for raw in one_by_one] == [False] * 5 + [True] * 3 + [False] * 2
 
@@ -213,3 +219,20 @@ def test_other_mechanisms_are_drawn_with_all_their_clearance_joints(name: str) -
     assert sum(len(text.split()) for text, _ in drawing.tags) == joints
     assert np.isfinite(drawing.lines).all() and drawing.lines.shape[1] > 0
     assert (len(drawing.path) > 0) == (mechanism.toe is not None)
+
+
+def test_the_joints_of_the_robot_description_follow_the_crank(store, monitor, drawing, leg):
+    """Beside each picture while the leg is followed; what the angles are is tested with the description."""
+    at_s = np.arange(0.0, 1.0, 0.01)
+    found = []
+    for outgoing in LegMarkers(monitor, drawing).of(reports(walk(at_s, len(monitor.clearance_joints)))):
+        if outgoing.output is LINKAGE:
+            message = store.deserialize_cdr(outgoing.messages[0].tobytes(), outgoing.output.type)
+            found.append(((outgoing.stamp_ns[0] - START) / SECOND, message))
+    assert len(found) == 8  # of ten, two before anything is known
+    linkage = build_linkage(leg)
+    for at, message in found:
+        q = ideal_motion(linkage, [2.0 * math.pi * at], 1.0).q
+        expected = {joint: float(values[0]) for joint, values in joint_positions(linkage, q).items()}
+        assert dict(zip(message.name, message.position, strict=True)) == pytest.approx(expected, abs=0.02)
+        assert message.header.frame_id == "pelvis"

@@ -235,10 +235,14 @@ def test_an_impact_beyond_the_limit_raises_its_alarm_within_a_gait_cycle(stage) 
     alarms = stage.listen(f"{ME}/alarms", DiagnosticArray, latched=True)
     peaks = stage.listen(f"{ME}/clearance_states", JointState)
     stage.legs().play(walk, monitor)
-    stage.wait_for(lambda: bool(raised(alarms)), "an alarm")
-    at, name = raised(alarms)[0]
+
+    def of_impacts() -> list[float]:
+        # on a busy machine the leg may be silent for a second, which is an alarm of its own
+        return [at for at, name in raised(alarms) if name.startswith("impact_force")]
+
+    stage.wait_for(lambda: bool(of_impacts()), "an alarm of an impact")
+    at = of_impacts()[0]
     cycle = next(one for one in peaks if max(one.effort) >= limit)
-    assert name.startswith("impact_force")
     # not before the first gait cycle with such an impact began, and not after it ended
     assert seconds(cycle) - 1.0 < at <= seconds(cycle) + 0.01
     assert seconds(cycle) - 1.0 > 2.5

@@ -23,7 +23,7 @@ from leg_wear_monitor.bags.findings import (
     Finding,
     RecordingError,
     Severity,
-    kind_of,
+    irregular_kind,
     open_regular,
 )
 from leg_wear_monitor.bags.mcap_file import Due, McapFile, Piece
@@ -230,7 +230,7 @@ def _file(path: Path, mode: int, **parts: Any) -> BagFile:
     match = _NAME.fullmatch(path.name) or _TABLE.fullmatch(path.name)
     if match is None:
         raise RecordingError(str(path), "", f"is no recording by its name, expected {_EXPECTED}")
-    if what := kind_of(mode):
+    if what := irregular_kind(mode):
         raise RecordingError(str(path), "", f"is {what}, expected a file")
     return BagFile(path, match[1].lower(), match[2] is not None, **parts)
 
@@ -257,7 +257,7 @@ def _recordings(path: Path, findings: list[Finding]) -> list[str]:
         raise RecordingError(str(path), "", f"cannot be read: {error.strerror}") from error
     names = []
     for file in named:
-        what = kind_of(_mode(file) or 0)
+        what = irregular_kind(_mode(file) or 0)
         if what:
             findings.append(Finding(file, f"is {what}, expected a file: it is not read", Severity.NOTE))
         else:
@@ -423,7 +423,7 @@ class Source:
     def _expanded(self, due: Due) -> Piece | None:
         """Load a piece and decompress each of its messages."""
         piece = due.load()
-        return None if piece is None else _expanded(piece, self.budget.at_once // 2)
+        return None if piece is None else _expanded(piece, self.budget.part_limit // 2)
 
 
 def open_sources(
@@ -527,7 +527,7 @@ def _expanded_file(bag_file: BagFile, budget: Budget, stack: ExitStack) -> Path:
             raise DamageError("is not a zstd file, although its name says so")
         file.seek(0)
         for part in expanded(file):
-            budget.take(len(part))
+            budget.reserve(len(part))
             content.write(part)
         if not content.tell():
             raise DamageError("contains nothing that can be decompressed")

@@ -1,4 +1,8 @@
-"""Findings and errors of recordings, and the budgets that bound what a file may cost."""
+"""What all readers of recordings share: findings and errors, the memory limit, and safe opening of files.
+
+A recording is untrusted: it may be damaged, or made to exhaust memory. A reader reads what is usable and
+lists the faults; only an unusable recording raises an error.
+"""
 
 import os
 import stat
@@ -10,7 +14,8 @@ import attrs
 
 from leg_wear_monitor.errors import ConfigError, printable
 
-# Findings: faults of a recording, reported while the remainder of the recording is read.
+# Findings and errors: a reader lists faults as findings and goes on; `RecordingError` ends the reading, and
+# `DamageError` gives up one part of a file.
 
 
 class RecordingError(ConfigError):
@@ -53,7 +58,7 @@ class Finding:
 
     @property
     def line(self) -> str:
-        """What the command line prints: a warning, or a note, which no user needs to act on."""
+        """Line for the command line: a warning, or a note where no action is needed."""
         return f"{'note' if self.severity is Severity.NOTE else 'warning'}: {self}"
 
 
@@ -61,11 +66,11 @@ class DamageError(Exception):
     """A part of a file is unusable; the reader records a finding and continues."""
 
 
-# Memory limit for reading a recording, independent of the sizes it declares; includes temporary files.
+# Memory limit of a reader: independent of the sizes that a file declares, and including temporary files.
 
 
-DEFAULT_MB = 512.0
-_LEAST_MB = 16.0
+DEFAULT_MB = 512.0  # default of --memory-mb
+_MIN_MB = 16.0
 _MB = 1_000_000
 
 
@@ -85,22 +90,23 @@ class Budget:
     """
 
     megabytes: float = DEFAULT_MB
-    taken: int = attrs.field(init=False, default=0)
+    reserved: int = attrs.field(init=False, default=0)
 
     def __attrs_post_init__(self) -> None:
-        if not self.megabytes >= _LEAST_MB:
-            text = f"{self.megabytes:g} MB is too little, expected at least {_LEAST_MB:g} MB"
+        if not self.megabytes >= _MIN_MB:
+            text = f"{self.megabytes:g} MB is too little, expected at least {_MIN_MB:g} MB"
             raise ConfigError("--memory-mb", "", text)
 
     @property
-    def left(self) -> int:
-        """Bytes that are not reserved."""
-        return max(0, int(min(self.megabytes, 1.0e12) * _MB) - self.taken)
+    def available(self) -> int:
+        """Bytes that are not reserved yet."""
+        most = min(self.megabytes, 1.0e12)  # infinity, which means no limit, has no integer
+        return max(0, int(most * _MB) - self.reserved)
 
     @property
-    def at_once(self) -> int:
-        """Bytes that one part of a file may use while it is read; queued samples use the rest."""
-        return self.left // 2
+    def part_limit(self) -> int:
+        """Bytes that one part of a file may use while it is read: half, the rest is for queued samples."""
+        return self.available // 2
 
     def check(self, needed: int) -> None:
         """Check that a part of a file fits into memory.
@@ -110,25 +116,25 @@ class Budget:
         DamageError
             If it needs too much memory; the text is a predicate that follows the name of the part.
         """
-        if needed > self.at_once:
+        if needed > self.part_limit:
             raise DamageError(
-                f"needs {needed / _MB:.0f} MB to be read, more than the {self.at_once / _MB:.0f} MB that "
+                f"needs {needed / _MB:.0f} MB to be read, more than the {self.part_limit / _MB:.0f} MB that "
                 f"--memory-mb {self.megabytes:g} leaves for it"
             )
 
-    def take(self, needed: int) -> None:
+    def reserve(self, needed: int) -> None:
         """Reserve bytes until the recording is closed, for example for a temporary file.
 
         Raises
         ------
         DamageError
         """
-        if needed > self.left:
+        if needed > self.available:
             raise DamageError(f"needs larger temporary files than --memory-mb {self.megabytes:g} allows")
-        self.taken += needed
+        self.reserved += needed
 
 
-# Opening of untrusted paths: accepts regular files only, and never blocks on a pipe.
+# Opening of untrusted paths: regular files only, since a pipe or a device could block or never end.
 
 
 _KINDS = {
@@ -140,8 +146,8 @@ _KINDS = {
 }
 
 
-def kind_of(mode: int) -> str:
-    """File kind of an `os.stat` mode, with its article; empty for a regular file."""
+def irregular_kind(mode: int) -> str:
+    """What a path with this `os.stat` mode is, such as "a pipe"; empty for a regular file."""
     return "" if stat.S_ISREG(mode) else _KINDS.get(stat.S_IFMT(mode), "no file")
 
 
@@ -153,8 +159,9 @@ def open_regular(path: Path) -> IO[bytes]:
     OSError
         If it cannot be opened or is not a regular file (it may have been replaced since an earlier check).
     """
+    # O_NONBLOCK: opening a pipe without a writer would wait forever; it has no effect on regular files
     descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
-    what = kind_of(os.fstat(descriptor).st_mode)
+    what = irregular_kind(os.fstat(descriptor).st_mode)
     if what:
         os.close(descriptor)
         raise OSError(0, f"is {what}, expected a file", str(path))

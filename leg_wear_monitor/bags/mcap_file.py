@@ -111,7 +111,7 @@ class _Scan:
             except DamageError as error:
                 self.layout.losses.append(f"record at byte {self.at} {error}: it is lost")
         self.at = end
-        if len(self.layout.segments) * _OF_A_SEGMENT > self.budget.at_once:
+        if len(self.layout.segments) * _OF_A_SEGMENT > self.budget.part_limit:
             self._lost(f"is behind {len(self.layout.segments)} chunks, more than --memory-mb allows")
             return False
         return True
@@ -144,7 +144,7 @@ class _Scan:
         """Store schemas and channels, the last of each number, while memory permits."""
         for record in definitions(data, positions):
             self.defined += len(record.data) if isinstance(record, Schema) else len(record.topic)
-            if self.defined <= self.budget.at_once // 4:
+            if self.defined <= self.budget.part_limit // 4:
                 self.definitions[type(record), record.id] = record
 
     def _ends_early(self, rest: int) -> None:

@@ -325,7 +325,7 @@ class Layout:
 
 def by_index(file: IO[bytes], size: int, budget: Budget) -> Layout | None:
     """Layout from the summary of a file; None if there is no reliable summary."""
-    records = _summary(file, size, budget.at_once // _OF_A_SUMMARY)
+    records = _summary(file, size, budget.part_limit // _OF_A_SUMMARY)
     if records is None:
         return None
     layout = Layout([], channels_of(records))

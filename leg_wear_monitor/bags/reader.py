@@ -432,7 +432,7 @@ class Recording:
             if passed >= _TOGETHER:
                 yield waiting.part(slice(passed))
                 waiting = waiting.part(slice(passed, None))
-            elif len(waiting.samples) * _OF_A_SAMPLE > self._budget.left:
+            elif len(waiting.samples) * _OF_A_SAMPLE > self._budget.available:
                 self._too_many_wait(bag_file.path)
                 yield waiting
                 waiting = waiting.part(slice(0))

@@ -1,4 +1,4 @@
-"""Recordings in SQLite (db3): a database that is not trusted, and its messages."""
+"""Recordings in SQLite (.db3): opening a database that is not trusted, and reading its messages."""
 
 import shutil
 import sqlite3
@@ -24,20 +24,23 @@ from leg_wear_monitor.bags.mcap_file import Due, Piece
 from leg_wear_monitor.bags.mcap_layout import Channel
 from leg_wear_monitor.messages.cdr import MESSAGE
 
-# Safe opening of untrusted SQLite files: nothing is written to the file and no code in it is executed.
+# Opening of an untrusted database: nothing is written to the file, no code in it (views, triggers, virtual
+# tables) is executed, and memory and work are bounded.
 
 
-_NEEDED = {"topics": {"id", "name", "type"}, "messages": {"id", "topic_id", "timestamp", "data"}}
-_JOURNALS = ("-wal", "-journal")
-_LONGEST_ROW = 2**25  # bytes
-_LONGEST_TEXT = 32  # of the schema and of topics: this part of what may be read at once
-_MOST_COLUMNS, _LONGEST_SQL = 64, 100_000
-# Instructions of SQLite's machine: a row takes about 80 in all, and has 30 bytes or more.
-# A tree whose branches meet again, or a query that never ends, takes any number.
-_OF_THE_SCHEMA, _OF_A_BYTE, _AT_LEAST, _STEPS_TOGETHER = 200_000, 16, 10**7, 1000
-_FUNCTIONS = {"count", "length", "typeof"}
+_REQUIRED_COLUMNS = {"topics": {"id", "name", "type"}, "messages": {"id", "topic_id", "timestamp", "data"}}
+_JOURNALS = ("-wal", "-journal")  # endings of the files of transactions that were not written back
+_LONGEST_ROW = 2**25  # bytes; a longer row needs a larger --memory-mb
+_TEXT_DIVISOR = 32  # a text of the schema or of a topic may have this part of `Budget.part_limit`
+_MOST_COLUMNS, _LONGEST_SQL = 64, 100_000  # far above those of rosbag2
+# Work is bounded in instructions of SQLite's virtual machine, since a damaged tree whose branches meet again,
+# or a query without end, takes any number. A row takes about 80 in all, and has 30 bytes or more: 16 a byte
+# are ample, with a minimum for small files. They are counted in steps of 1000.
+_SCHEMA_INSTRUCTIONS, _INSTRUCTIONS_PER_BYTE, _LEAST_INSTRUCTIONS = 200_000, 16, 10**7
+_INSTRUCTIONS_PER_CHECK = 1000
+_FUNCTIONS = {"count", "length", "typeof"}  # of SQL, as used by the queries below
 UNREADABLE = (sqlite3.Error, UnicodeDecodeError, MemoryError)
-"""What reading a damaged database raises; its own complaint may hold bytes of it that are no text."""
+"""Errors of reading a damaged database; sqlite3 raises UnicodeDecodeError where its message quotes bytes."""
 
 
 def open_database(
@@ -45,8 +48,8 @@ def open_database(
 ) -> tuple[sqlite3.Connection, list[str]]:
     """Open a rosbag2 database for reading, including all committed transactions.
 
-    A ``-wal`` or ``-journal`` file beside the database is part of it. SQLite recovers such a file by writing,
-    so the recovery takes place in a private copy.
+    A ``-wal`` or ``-journal`` file beside the database is part of it. SQLite recovers such a file by
+    writing, so the recovery takes place in a private copy.
 
     Parameters
     ----------
@@ -69,64 +72,67 @@ def open_database(
     RecordingError
         If the file cannot be read or is not a rosbag2 database.
     """
-    beside = [each for end in _JOURNALS if _size(each := file.with_name(file.name + end))]
+    journals = [each for end in _JOURNALS if _size(each := file.with_name(file.name + end))]
     try:
-        if beside:
-            address = f"file:{quote(str(_copied(file, beside, budget, stack)))}?mode=rw"
+        if journals:
+            address = f"file:{quote(str(_private_copy(file, journals, budget, stack)))}?mode=rw"
         else:
             address = f"file:{quote(str(file.absolute()))}?mode=ro&immutable=1"
         database = sqlite3.connect(address, uri=True, isolation_level=None)
         stack.callback(database.close)
         database.text_factory = lambda raw: raw.decode("utf-8", "replace")
-        database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, budget.at_once // _LONGEST_TEXT)
+        database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, budget.part_limit // _TEXT_DIVISOR)
         database.setlimit(sqlite3.SQLITE_LIMIT_COLUMN, _MOST_COLUMNS)
         database.setlimit(sqlite3.SQLITE_LIMIT_SQL_LENGTH, _LONGEST_SQL)
-        _limit_work(database, _OF_THE_SCHEMA)
+        _limit_work(database, _SCHEMA_INSTRUCTIONS)
         database.execute("PRAGMA trusted_schema = OFF")
-        database.set_authorizer(_is_allowed)
+        database.set_authorizer(_authorized)
         _check_tables(database)
-        _limit_work(database, _AT_LEAST + _OF_A_BYTE * _size(file))
+        _limit_work(database, _LEAST_INSTRUCTIONS + _INSTRUCTIONS_PER_BYTE * _size(file))
     except DamageError as error:
         raise RecordingError(str(path), "", str(error)) from error
     except (*UNREADABLE, OSError) as error:
         raise RecordingError(str(path), "", f"is not a readable .db3 file: {one_line(error)}") from error
-    names = " and ".join(each.name for each in beside)
-    return database, [f"was not closed: the content of {names} beside it is read as well"] if beside else []
+    names = " and ".join(each.name for each in journals)
+    return database, [f"was not closed: the content of {names} beside it is read as well"] if journals else []
 
 
 def allow_rows(database: sqlite3.Connection, budget: Budget) -> None:
-    """Allow rows as long as those of messages, which are longer than any text of the schema and of topics."""
-    database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, max(_LONGEST_ROW, budget.at_once // 8 + 2**16))
+    """Raise the limit of a row from that of texts, which `open_database` sets, to that of messages."""
+    database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, max(_LONGEST_ROW, budget.part_limit // 8 + 2**16))
 
 
 def one_line(error: BaseException) -> str:
     """Text of an error on one line."""
-    if str(error) == "interrupted":
+    if str(error) == "interrupted":  # by `_limit_work`
         return "reading it takes more work than its size explains"
     return " ".join(str(error).split()) or type(error).__name__
 
 
 def _limit_work(database: sqlite3.Connection, most: int) -> None:
-    """Interrupt what takes more instructions, counted from now on."""
-    left = most // _STEPS_TOGETHER
+    """Let SQLite stop with the error "interrupted" after so many instructions from now on."""
+    left = most // _INSTRUCTIONS_PER_CHECK
 
     def is_over() -> bool:
         nonlocal left
         left -= 1
         return left < 0
 
-    database.set_progress_handler(is_over, _STEPS_TOGETHER)
+    database.set_progress_handler(is_over, _INSTRUCTIONS_PER_CHECK)
 
 
-def _is_allowed(action: int, first: str | None, second: str | None, _: str | None, inside: str | None) -> int:
-    """Allow reading of plain tables; `inside` is the view that reads."""
+def _authorized(action: int, first: str | None, second: str | None, _: str | None, inside: str | None) -> int:
+    """Whether SQLite may do something (see `set_authorizer`); `inside` is the view or trigger that does it.
+
+    Only reading is allowed, by the queries of this module themselves.
+    """
     if inside is None:
-        is_one = (
+        is_reading = (
             action in (sqlite3.SQLITE_SELECT, sqlite3.SQLITE_READ)
             or (action == sqlite3.SQLITE_FUNCTION and second in _FUNCTIONS)
             or (action == sqlite3.SQLITE_PRAGMA and first == "table_xinfo")
         )
-        return sqlite3.SQLITE_OK if is_one else sqlite3.SQLITE_DENY
+        return sqlite3.SQLITE_OK if is_reading else sqlite3.SQLITE_DENY
     return sqlite3.SQLITE_DENY
 
 
@@ -138,11 +144,11 @@ def _size(file: Path) -> int:
         return 0
 
 
-def _copied(file: Path, beside: list[Path], budget: Budget, stack: ExitStack) -> Path:
-    """Make a private copy of a database and of its journal files."""
-    budget.take(sum(_size(each) for each in (file, *beside)))
+def _private_copy(file: Path, journals: list[Path], budget: Budget, stack: ExitStack) -> Path:
+    """Copy a database and its journal files to a temporary directory."""
+    budget.reserve(sum(_size(each) for each in (file, *journals)))
     copy = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "content.db3"
-    for each in (file, *beside):
+    for each in (file, *journals):
         target = copy.with_name(copy.name + each.name.removeprefix(file.name))
         with open_regular(each) as source, target.open("xb") as content:
             shutil.copyfileobj(source, content)
@@ -157,7 +163,7 @@ def _check_tables(database: sqlite3.Connection) -> None:
     found: dict[str, list[tuple[str, str]]] = {}
     for name, kind, text in database.execute("SELECT name, type, sql FROM sqlite_master"):
         found.setdefault(str(name).lower(), []).append((str(kind), str(text)))
-    for table, needed in (*_NEEDED.items(), ("message_definitions", set())):
+    for table, needed in (*_REQUIRED_COLUMNS.items(), ("message_definitions", set())):
         entries = found.get(table, [])
         if not entries and not needed:
             continue
@@ -172,13 +178,14 @@ def _check_tables(database: sqlite3.Connection) -> None:
             raise DamageError(f"is not a readable .db3 file: its table {table} has no {', '.join(missing)}")
 
 
-# Reader of one rosbag2 .db3 file: its topics, and its messages in pieces ordered by log time.
+# The reader of one .db3 file: its topics, and its messages in pieces in order of log time.
 
 
 _Row = tuple[int, int, int]  # id, time, topic
-_TOGETHER = 4096
-_MOST_TOPICS = 65536
-_OF_A_ROW, _OF_A_CHARACTER = 1000, 16  # memory of a topic or definition, with its copies and escapes [bytes]
+_ROWS_PER_PAGE = 4096  # ids and times fetched at once, without contents
+_MOST_TOPICS = 65536  # no recording has as many; bounds the memory of their lists
+# memory of a topic or definition, with its copies and escapes [bytes]
+_BYTES_PER_ROW, _BYTES_PER_CHARACTER = 1000, 16
 _NO_CHECKSUMS = "has no checksums, like all .db3 files: a damaged number would not be detected"
 
 
@@ -215,8 +222,8 @@ class SqliteFile:
             raise RecordingError(str(path), "", str(error)) from error
         except (*UNREADABLE, OSError) as error:
             raise RecordingError(str(path), "", f"is not a readable .db3 file: {one_line(error)}") from error
-        self._found = 0
-        self._report_unknown()
+        self._read = 0
+        self._report_unlisted()
 
     def pieces(self, types: dict[int, int]) -> Iterator[Due]:
         """Pieces of the requested channels; unreadable messages are skipped.
@@ -230,12 +237,12 @@ class SqliteFile:
         for rows in self._pages(types):
             while rows:
                 yield Due(rows[0][1], partial(self._piece, rows, types, self.size // max(expected, 1)))
-        if self._found != expected:
-            text = f"{self._found} messages could be read of the {expected} that it counts"
+        if self._read != expected:
+            text = f"{self._read} messages could be read of the {expected} that it counts"
             self.findings.append(Finding(self.path, text))
 
     def _pages(self, types: dict[int, int]) -> Iterator[deque[_Row]]:
-        """Message rows without content, in order of log time, many at a time."""
+        """Message rows without contents, in order of log time, a page at a time."""
         if not types:
             return
         places = ", ".join("?" * len(types))
@@ -245,16 +252,19 @@ class SqliteFile:
                 "AND typeof(timestamp) = 'integer' AND typeof(data) = 'blob' ORDER BY timestamp, id",
                 list(types),
             )
-            while rows := cursor.fetchmany(_TOGETHER):
+            while rows := cursor.fetchmany(_ROWS_PER_PAGE):
                 yield deque(rows)
         except UNREADABLE as error:
             self.findings.append(Finding(self.path, f"ends early: {one_line(error)}"))
 
-    def _piece(self, rows: deque[_Row], types: dict[int, int], stored: int) -> Piece:
-        """Read the messages of the next rows, as memory permits; these rows are removed from `rows`."""
+    def _piece(self, rows: deque[_Row], types: dict[int, int], bytes_per_message: int) -> Piece:
+        """Read the messages of the next rows, as memory permits; these rows are removed from `rows`.
+
+        `bytes_per_message` is the mean size of a message in the file, for the progress.
+        """
         contents: list[bytes] = []
         kept: list[_Row] = []
-        start_ns, room, number = rows[0][1], self.budget.at_once // 4, len(rows)
+        start_ns, room, number = rows[0][1], self.budget.part_limit // 4, len(rows)
         while rows and room > 0:
             row = rows.popleft()
             content = self._content(row[0])
@@ -262,27 +272,27 @@ class SqliteFile:
                 contents.append(content)
                 kept.append(row)
                 room -= len(content)
-        self._found += len(kept)
+        self._read += len(kept)
         messages = np.zeros(len(kept), MESSAGE)
         messages["end"] = np.cumsum([len(content) for content in contents])
         messages["begin"][1:] = messages["end"][:-1]
         messages["log_time_ns"] = messages["publish_time_ns"] = [time for _, time, _ in kept]
         messages["type"] = [types[topic] for _, _, topic in kept]
         data = np.frombuffer(b"".join(contents), np.uint8)
-        return Piece(start_ns, data, messages, stored * (number - len(rows)))
+        return Piece(start_ns, data, messages, bytes_per_message * (number - len(rows)))
 
     def _content(self, number: int) -> bytes | None:
-        """Content of one message; None if it is unreadable or too large."""
+        """Content of one message; None if it is unreadable or too large for memory."""
         try:
             row = self._database.execute(
                 "SELECT data FROM messages WHERE id = ? AND length(data) <= ?",
-                (number, self.budget.at_once // 8),
+                (number, self.budget.part_limit // 8),
             ).fetchone()
         except UNREADABLE:
-            return None  # counted as unreadable
+            return None  # `pieces` reports how many are missing
         return row[0] if row and isinstance(row[0], bytes) else None
 
-    def _report_unknown(self) -> None:
+    def _report_unlisted(self) -> None:
         """Report the number of messages that belong to no listed topic."""
         count = sum(count for topic, count in self._counts.items() if topic not in self.channels)
         if count:
@@ -291,13 +301,14 @@ class SqliteFile:
 
 
 def _counts(database: sqlite3.Connection) -> dict[int | None, int]:
-    """Number of messages by topic number; None where that is no integer.
+    """Number of messages by topic number; under None, messages whose topic number is no integer.
 
     Raises
     ------
     DamageError
-        If there are more topics than anybody has.
+        If there are more than 65536 topics.
     """
+    # NOT INDEXED: an index is data of the file, too, and may disagree with the table
     number = "CASE WHEN typeof(topic_id) = 'integer' THEN topic_id END"
     query = f"SELECT {number}, COUNT(*) FROM messages NOT INDEXED GROUP BY 1 LIMIT ?"
     counts = dict(database.execute(query, (_MOST_TOPICS + 1,)).fetchall())
@@ -312,7 +323,7 @@ def _channels(database: sqlite3.Connection, budget: Budget) -> dict[int, Channel
     Raises
     ------
     DamageError
-        If their texts do not fit into memory.
+        If their texts do not fit into memory, or there are more than 65536 topics.
     """
     texts: dict[str, tuple[str, str]] = {}
     query = "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = 'message_definitions'"
@@ -321,7 +332,7 @@ def _channels(database: sqlite3.Connection, budget: Budget) -> dict[int, Channel
     def rows(query: str) -> Iterator[tuple[object, ...]]:
         nonlocal size
         for row in database.execute(f"{query} LIMIT ?", (_MOST_TOPICS + 1,)):
-            size += _OF_A_ROW + _OF_A_CHARACTER * sum(
+            size += _BYTES_PER_ROW + _BYTES_PER_CHARACTER * sum(
                 len(text) for text in row if isinstance(text, str | bytes)
             )
             budget.check(size)

@@ -133,7 +133,7 @@ class CsvFile:
     ) -> None:
         self._path, self._file, self._findings = path, file, findings
         self.size = file.seek(0, 2)
-        self._block = min(_BLOCK, budget.at_once // _OF_A_BYTE)
+        self._block = min(_BLOCK, budget.part_limit // _OF_A_BYTE)
         self._config, self._clock = config.input, Clock.of(config.input)
         self._lost = LostLines(path, findings)
         if not self.size:

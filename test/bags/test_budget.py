@@ -162,13 +162,13 @@ def test_a_name_that_cannot_be_is_refused_in_a_line(tmp_path: Path, read: Any, n
 
 def test_the_budget_is_one_for_all() -> None:
     budget = Budget(100.0)
-    budget.take(60_000_000)
-    assert budget.left == 40_000_000
+    budget.reserve(60_000_000)
+    assert budget.available == 40_000_000
     budget.check(20_000_000)
     with pytest.raises(DamageError, match="needs 21 MB to be read, more than the 20 MB"):
         budget.check(21_000_000)
     with pytest.raises(DamageError, match="--memory-mb 100 allows"):
-        budget.take(41_000_000)
+        budget.reserve(41_000_000)
 
 
 @pytest.mark.parametrize("megabytes", [0.0, -1.0, 15.9, float("nan")])

@@ -27,14 +27,23 @@ from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.twin import CRANK, LOAD, TORQUE
 from leg_wear_monitor.twin.sample import FAULTS, NO_FAULT, OUT_OF_RANGE, WRONG_TYPE
 
-_CONTACT_N = 20.0  # force from which a switch closes
+_SWITCH_N = 20.0  # vertical force above which a contact switch reads 1
 
-# faults that can be injected into messages
-_MADE = tuple(fault for fault in FAULTS if fault not in (NO_FAULT, WRONG_TYPE, OUT_OF_RANGE))
+# Each sensor, and the transport, has a random stream of its own, by this number beside the seed. So another
+# setting of one sensor leaves the noise of the others as it is.
+_CRANK_NOISE, _TORQUE_NOISE, _TRANSPORT_NOISE, _ENCODER_NOISE, _LOAD_NOISE = 1, 2, 3, 4, 5
+
+# Faults that a message can have on the wire. The tracker finds OUT_OF_RANGE in the values, and a message of
+# the wrong type never reaches the topic.
+_INJECTED_FAULTS = tuple(fault for fault in FAULTS if fault not in (NO_FAULT, WRONG_TYPE, OUT_OF_RANGE))
 
 
 class Reading(NamedTuple):
-    """A sensor message: times of arrival and of measurement [s since the start], and its content."""
+    """A sensor message: times of arrival and of measurement [s since the start], and its content.
+
+    ``kind`` is CRANK, TORQUE or LOAD; values that another kind of sensor measures are NaN or empty. A reading
+    with a ``fault`` (a key of `FAULTS`) is sent as a message with that fault.
+    """
 
     arrival_s: float
     taken_s: float
@@ -48,7 +57,7 @@ class Reading(NamedTuple):
 
 
 class Noise:
-    """Sequences of normal and uniform random numbers; drawn in blocks, which is ten times as fast."""
+    """Normal and uniform random numbers one by one; drawn in blocks, which is ten times as fast."""
 
     def __init__(self, seed: list[int]) -> None:
         self._rng = np.random.default_rng(seed)
@@ -72,60 +81,70 @@ class Noise:
 
 def readings(leg: SyntheticLeg, config: GaitConfig) -> Iterator[Reading]:
     """Readings of the leg in order of arrival; endless unless the configuration sets a duration."""
-    return _arriving(_taken(leg, config), config.transport, Noise([config.seed, 3]))
+    return _transported(_measured(leg, config), config.transport, Noise([config.seed, _TRANSPORT_NOISE]))
 
 
 def stamp_ns(reading: Reading, start_ns: int) -> int:
-    """Stamp of a reading [ns]."""
+    """Stamp of a reading [ns]: its time of measurement."""
     return start_ns + round(reading.taken_s * 1.0e9)
 
 
-def _taken(leg: SyntheticLeg, config: GaitConfig) -> Iterator[Reading]:
-    """Readings in order of measurement."""
-    jitter = config.transport.jitter_s
-    encoder, torque = Noise([config.seed, 1]), Noise([config.seed, 2])
-    further = Noise([config.seed, 4])
-    turned: tuple[float, ...] = ()
-    by_effort = config.torque_sensor.source == EFFORT
-    crank_times = _times(config.encoder.rate_hz, jitter, encoder, CRANK)
-    torque_times = iter(()) if by_effort else _times(config.torque_sensor.rate_hz, jitter, torque, TORQUE)
-    of_load = config.foot_load_sensor
-    load, stuck = Noise([config.seed, 5]), (0.0, 0.0)
-    load_times = iter(()) if of_load.source == NO_LOAD else _times(of_load.rate_hz, jitter, load, LOAD)
-    since, impulse, zero_rad, restarts = 0.0, 0.0, 0.0, list(config.encoder.restarts_s)
+def _measured(leg: SyntheticLeg, config: GaitConfig) -> Iterator[Reading]:
+    """Readings in order of measurement; the leg advances to the time of each."""
+    jitter_s, torque_config, load_config = (
+        config.transport.jitter_s,
+        config.torque_sensor,
+        config.foot_load_sensor,
+    )
+    crank_noise, torque_noise, encoder_noise, load_noise = (
+        Noise([config.seed, stream]) for stream in (_CRANK_NOISE, _TORQUE_NOISE, _ENCODER_NOISE, _LOAD_NOISE)
+    )
+    is_torque_with_crank = torque_config.source == EFFORT  # both are in one JointState
+    crank_times = _times(config.encoder.rate_hz, jitter_s, crank_noise, CRANK)
+    torque_times: Iterator[tuple[float, int]] = iter(())
+    if not is_torque_with_crank:
+        torque_times = _times(torque_config.rate_hz, jitter_s, torque_noise, TORQUE)
+    load_times: Iterator[tuple[float, int]] = iter(())
+    if load_config.source != NO_LOAD:
+        load_times = _times(load_config.rate_hz, jitter_s, load_noise, LOAD)
+    foot_force_n = 0.0, 0.0
+    zero_rad, restarts_s = 0.0, list(config.encoder.restarts_s)
+    last_torque_s, last_impulse = 0.0, 0.0  # for the mean torque since the last torque reading
     for t, kind in heapq.merge(crank_times, torque_times, load_times):
         if config.duration_s and t >= config.duration_s:
             return
         instant = leg.advance(t)
         if kind == LOAD:
-            if not of_load.stuck_from_s or t < of_load.stuck_from_s:
-                stuck = _foot_load(of_load, leg, instant.crank.angle, t, load)
-            if not of_load.silent_from_s or t < of_load.silent_from_s:
-                yield Reading(t, t, kind, NO_FAULT, math.nan, math.nan, math.nan, (), stuck)
+            if not load_config.stuck_from_s or t < load_config.stuck_from_s:
+                foot_force_n = _foot_load(load_config, leg, instant.crank.angle, t, load_noise)
+            if not load_config.silent_from_s or t < load_config.silent_from_s:
+                yield Reading(t, t, kind, NO_FAULT, math.nan, math.nan, math.nan, (), foot_force_n)
             continue
         angle, velocity, torque_nm = math.nan, math.nan, math.nan
+        encoder_rad: tuple[float, ...] = ()
         if kind == CRANK:
-            while restarts and t >= restarts[0]:
+            while restarts_s and t >= restarts_s[0]:
                 zero_rad = instant.crank.angle
-                restarts.pop(0)
-            angle, velocity = _encoder(config.encoder, instant.crank, zero_rad, encoder)
-            turned = _further(config.joint_encoders, instant.encoder_rad, further)
-        if kind == TORQUE or by_effort:
-            mean = (instant.torque_impulse - impulse) / (t - since)
-            since, impulse = t, instant.torque_impulse
-            at_once = config.torque_sensor.sampling == INSTANT
-            torque_nm = _torque(config.torque_sensor, instant.torque_nm if at_once else mean, torque)
-        yield Reading(t, t, kind, NO_FAULT, angle, velocity, torque_nm, turned if kind == CRANK else ())
+                restarts_s.pop(0)
+            angle, velocity = _encoder(config.encoder, instant.crank, zero_rad, crank_noise)
+            encoder_rad = _joint_encoders(config.joint_encoders, instant.encoder_rad, encoder_noise)
+        if kind == TORQUE or is_torque_with_crank:
+            mean_nm = (instant.torque_impulse - last_impulse) / (t - last_torque_s)
+            last_torque_s, last_impulse = t, instant.torque_impulse
+            is_instant = torque_config.sampling == INSTANT
+            torque_nm = _torque(torque_config, instant.torque_nm if is_instant else mean_nm, torque_noise)
+        yield Reading(t, t, kind, NO_FAULT, angle, velocity, torque_nm, encoder_rad)
 
 
 def _times(rate_hz: float, jitter_s: float, noise: Noise, kind: int) -> Iterator[tuple[float, int]]:
     """Measurement times of a sensor [s]: equal intervals with jitter, which never swaps two readings."""
-    most = 0.45 / rate_hz
+    most = 0.45 / rate_hz  # below half an interval, so that neighbours keep their order
     for i in itertools.count(1):
         yield i / rate_hz + min(most, max(-most, jitter_s * noise.normal())), kind
 
 
 def _encoder(config: EncoderConfig, crank: CrankMotion, zero_rad: float, noise: Noise) -> tuple[float, float]:
+    """Crank angle [rad] and velocity [rad/s] as measured; `zero_rad` is where the encoder last restarted."""
     angle = crank.angle - zero_rad + config.offset_rad + config.noise_rad * noise.normal()
     velocity = crank.speed + config.velocity_noise_radps * noise.normal()
     if config.counts_per_turn:
@@ -134,7 +153,10 @@ def _encoder(config: EncoderConfig, crank: CrankMotion, zero_rad: float, noise: 
     return angle % TURN if config.wrapped else angle, velocity
 
 
-def _further(config: JointEncodersConfig, angles: tuple[float, ...], noise: Noise) -> tuple[float, ...]:
+def _joint_encoders(
+    config: JointEncodersConfig, angles: tuple[float, ...], noise: Noise
+) -> tuple[float, ...]:
+    """Angles of the joint encoders as measured [rad]."""
     none = (0.0,) * len(angles)
     errors = zip(angles, config.offsets_rad or none, config.scale_errors or none, strict=True)
     return tuple(
@@ -143,6 +165,7 @@ def _further(config: JointEncodersConfig, angles: tuple[float, ...], noise: Nois
 
 
 def _torque(config: TorqueSensorConfig, torque_nm: float, noise: Noise) -> float:
+    """Drive torque as measured [N m]."""
     reading = torque_nm + config.offset_nm + config.noise_nm * noise.normal()
     if config.resolution_nm:
         reading = round(reading / config.resolution_nm) * config.resolution_nm
@@ -152,32 +175,34 @@ def _torque(config: TorqueSensorConfig, torque_nm: float, noise: Noise) -> float
 def _foot_load(
     config: FootLoadSensorConfig, leg: SyntheticLeg, angle: float, t: float, noise: Noise
 ) -> tuple[float, float]:
-    x, y = leg.foot_force_n(angle + (math.pi if config.is_swapped else 0.0))
+    """Horizontal and vertical foot force as measured [N]; of a contact switch, 0 and whether it is closed."""
+    x, y = leg.foot_force_n(angle + (math.pi if config.is_swapped else 0.0))  # swapped: half a turn later
     if config.source == CONTACT:
-        return 0.0, float(y > _CONTACT_N)
+        return 0.0, float(y > _SWITCH_N)
     x, y = x + config.noise_n * noise.normal(), y + config.noise_n * noise.normal()
     y += config.zero_n + config.zero_drift_n_per_s * t
     return config.scale * x if config.source == WRENCH else 0.0, config.scale * y
 
 
-def _arriving(taken: Iterable[Reading], config: TransportConfig, noise: Noise) -> Iterator[Reading]:
-    """Readings that arrive, in order of arrival."""
-    order = itertools.count()
-    faults = itertools.cycle(_MADE)
-    under_way: list[tuple[float, int, Reading]] = []
-    for reading in taken:
-        while under_way and under_way[0][0] <= reading.taken_s:
-            yield heapq.heappop(under_way)[2]
+def _transported(measured: Iterable[Reading], config: TransportConfig, noise: Noise) -> Iterator[Reading]:
+    """Readings that arrive, in order of arrival: some are dropped, late, faulty or duplicated."""
+    sequence = itertools.count()  # orders readings that arrive at the same time
+    faults = itertools.cycle(_INJECTED_FAULTS)
+    in_transit: list[tuple[float, int, Reading]] = []
+    for reading in measured:
+        while in_transit and in_transit[0][0] <= reading.taken_s:
+            yield heapq.heappop(in_transit)[2]
+        # four numbers for each reading, used or not, so that one setting leaves the effects of the others
         chance = [noise.uniform() for _ in range(4)]
         if chance[0] < config.drop_fraction or _in_gap(reading.taken_s, config):
             continue
-        late = config.late_s if chance[1] < config.late_fraction else 0.0
+        delay_s = config.late_s if chance[1] < config.late_fraction else 0.0
         fault = next(faults) if chance[2] < config.fault_fraction else reading.fault
-        sent = reading._replace(arrival_s=reading.taken_s + late, fault=fault)
+        sent = reading._replace(arrival_s=reading.taken_s + delay_s, fault=fault)
         for _ in range(2 if chance[3] < config.duplicate_fraction else 1):
-            heapq.heappush(under_way, (sent.arrival_s, next(order), sent))
-    while under_way:
-        yield heapq.heappop(under_way)[2]
+            heapq.heappush(in_transit, (sent.arrival_s, next(sequence), sent))
+    while in_transit:
+        yield heapq.heappop(in_transit)[2]
 
 
 def _in_gap(t: float, config: TransportConfig) -> bool:

@@ -25,7 +25,7 @@ from leg_wear_monitor.monitor.angle_regression import (
     rms,
 )
 from leg_wear_monitor.monitor.config.inputs import Encoders
-from leg_wear_monitor.monitor.encoders import commissioned, errors_of, known_with
+from leg_wear_monitor.monitor.encoders import commissioned, errors_of, prior_with
 from leg_wear_monitor.twin.reference import ReferenceRun, angle_model
 from leg_wear_monitor.wear import SECTORS
 
@@ -111,7 +111,7 @@ def referred(leg, model, clearance, depth=None):
 
 def commission(model, reference, walk, every, noise):
     """The encoders' errors, from the first gait cycles of a new leg."""
-    new = ClearanceRegression(model, reference, known_with(UNKNOWN, np.full(5, FRESH), 5e-6))
+    new = ClearanceRegression(model, reference, prior_with(UNKNOWN, np.full(5, FRESH), 5e-6))
     for cycle in read([part[:COMMISSIONING] for part in walk], every, noise, 0):
         new.add(*cycle)
     return commissioned(UNKNOWN, new.fused(), [True] * len(SENSORS))
@@ -119,7 +119,7 @@ def commission(model, reference, walk, every, noise):
 
 def known(reference, held):
     """The encoders' errors as held, and nothing of clearances."""
-    return known_with(held, reference.clearance_m, UNKNOWN_M)
+    return prior_with(held, reference.clearance_m, UNKNOWN_M)
 
 
 def show_observability(leg, model, reference, walk):

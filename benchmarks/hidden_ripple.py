@@ -23,7 +23,7 @@ from leg_wear_monitor.mechanism.arrays import body_names
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.angle_regression import ClearanceRegression
-from leg_wear_monitor.monitor.encoders import EncoderErrors, commissioned, known_with
+from leg_wear_monitor.monitor.encoders import EncoderErrors, commissioned, prior_with
 from leg_wear_monitor.twin.reference import AngleModel, CrankProfile, Reference, ReferenceRun, angle_model
 from leg_wear_monitor.wear import SECTORS
 
@@ -72,7 +72,7 @@ def referred(leg: Mechanism, model: AngleModel, clearance_m: np.ndarray, profile
 
 def estimated(model: AngleModel, reference: Reference, held: EncoderErrors, cycles) -> np.ndarray:
     """Clearances (k,) [m] from some gait cycles."""
-    regression = ClearanceRegression(model, reference, known_with(held, reference.clearance_m, UNKNOWN_M))
+    regression = ClearanceRegression(model, reference, prior_with(held, reference.clearance_m, UNKNOWN_M))
     for cycle in cycles:
         regression.add(*cycle)
     return regression.fused().clearance_m
@@ -80,7 +80,7 @@ def estimated(model: AngleModel, reference: Reference, held: EncoderErrors, cycl
 
 def commission(model: AngleModel, reference: Reference, cycles) -> EncoderErrors:
     """The encoders' errors, from the first gait cycles of a new leg."""
-    regression = ClearanceRegression(model, reference, known_with(UNKNOWN, NEW, NEW_SIGMA_M))
+    regression = ClearanceRegression(model, reference, prior_with(UNKNOWN, NEW, NEW_SIGMA_M))
     for cycle in cycles[:COMMISSIONING]:
         regression.add(*cycle)
     return commissioned(UNKNOWN, regression.fused(), [True] * len(SENSORS))

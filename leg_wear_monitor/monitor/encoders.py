@@ -1,4 +1,8 @@
-"""Joint encoders: their commissioning, their samples, and the clearances that they see."""
+"""Joint encoders: their errors, their samples, and the clearances estimated from them.
+
+A joint encoder, or further encoder, measures the angle of a revolute joint other than the crank's. Its
+deviation from the angle of the ideal linkage shows clearances, once its own errors (offset, scale) are known.
+"""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -35,11 +39,12 @@ from leg_wear_monitor.twin.reference import (
 from leg_wear_monitor.twin.sample import KeepsSamples, Samples, indices_within, newest, of_crank
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
-# The encoders' own errors: unknown at first, estimated while the clearances are known, then fixed.
+# Errors of the encoders: unknown at first, estimated together with the clearances of a leg whose clearances
+# are nearly known (commissioning), then fixed and stored in the ledger.
 
 
-_OFFSET_SIGMA_RAD = 0.05  # standard deviation of an encoder's offset before commissioning
-_SCALE_SIGMA = 0.01
+# standard deviations before commissioning, of an encoder's offset and scale error
+_OFFSET_SIGMA_RAD, _SCALE_SIGMA = 0.05, 0.01
 
 
 @attrs.frozen(eq=False)
@@ -49,12 +54,13 @@ class EncoderErrors:
     Attributes
     ----------
     centre_rad : (m,) array
-        Zero of an encoder's deviation, NaN before the first gait cycle: the zero of an encoder is arbitrary.
+        Mean deviation of each encoder in its first gait cycle, subtracted from all its angles, since the zero
+        of an encoder is arbitrary; NaN before that cycle.
     mean : (1 + 2 m,) array
         Offset of the crank's encoder, offsets from the centres [rad] and scale errors of the others.
     covariance : array
     known : tuple of bool
-        Which encoders were commissioned.
+        Whether each encoder is commissioned.
     """
 
     centre_rad: Floats
@@ -72,30 +78,31 @@ def names_of(encoders: Encoders) -> tuple[str, ...]:
     )
 
 
-def errors_of(encoders: Encoders, held: Commissioned | None) -> EncoderErrors:
-    """Stored errors of commissioned encoders; the errors of the others are unknown."""
+def errors_of(encoders: Encoders, stored: Commissioned | None) -> EncoderErrors:
+    """Errors of encoders as stored in the ledger; those of encoders that are not stored are unknown."""
     names = names_of(encoders)
     m = len(names)
     centre, mean = np.full(m, np.nan), np.zeros(1 + 2 * m)
     sigma = np.concatenate([np.full(1 + m, _OFFSET_SIGMA_RAD), np.full(m, _SCALE_SIGMA)])
     covariance = np.diag(np.square(sigma))
-    if held is None:
+    if stored is None:
         return EncoderErrors(centre, mean, covariance, (False,) * m)
-    common = [(i, held.encoders.index(name)) for i, name in enumerate(names) if name in held.encoders]
+    # the configuration may list other encoders than the ledger, in another order
+    common = [(i, stored.encoders.index(name)) for i, name in enumerate(names) if name in stored.encoders]
     here, there = [i for i, _ in common], [j for _, j in common]
-    own, kept = _rows(here, m), _rows(there, len(held.encoders))
-    centre[here], mean[own] = held.centre_rad[there], held.mean[kept]
-    covariance[np.ix_(own, own)] = held.covariance[np.ix_(kept, kept)]
-    return EncoderErrors(centre, mean, covariance, tuple(name in held.encoders for name in names))
+    own, theirs = _rows(here, m), _rows(there, len(stored.encoders))
+    centre[here], mean[own] = stored.centre_rad[there], stored.mean[theirs]
+    covariance[np.ix_(own, own)] = stored.covariance[np.ix_(theirs, theirs)]
+    return EncoderErrors(centre, mean, covariance, tuple(name in stored.encoders for name in names))
 
 
 def _rows(which: Sequence[int], m: int) -> list[int]:
-    """Rows of the crank's offset, and of the offsets and scale errors of some encoders."""
+    """Rows of `EncoderErrors.mean`: the crank's offset, and the offsets and scale errors of some encoders."""
     return [0, *(1 + i for i in which), *(1 + m + i for i in which)]
 
 
-def held(errors: EncoderErrors, encoders: Encoders, stamp_ns: int) -> Commissioned:
-    """Errors of the commissioned encoders, as stored in the ledger."""
+def stored_errors(errors: EncoderErrors, encoders: Encoders, stamp_ns: int) -> Commissioned:
+    """Ledger entry with the errors of the commissioned encoders."""
     which = [i for i, known in enumerate(errors.known) if known]
     rows = _rows(which, len(errors.known))
     return Commissioned(
@@ -107,8 +114,8 @@ def held(errors: EncoderErrors, encoders: Encoders, stamp_ns: int) -> Commission
     )
 
 
-def known_with(errors: EncoderErrors, clearance_m: Floats, sigma_m: Floats | float) -> Estimate:
-    """Estimate of the encoders' errors and of clearances (k,) with the given standard deviation."""
+def prior_with(errors: EncoderErrors, clearance_m: Floats, sigma_m: Floats | float) -> Estimate:
+    """Prior of clearances (k,) with the given standard deviation, and of the encoders' errors."""
     k, p = len(clearance_m), len(errors.mean)
     covariance = np.zeros((k + p, k + p))
     covariance[:k, :k] = np.diag(np.square(np.broadcast_to(sigma_m, k)))
@@ -117,13 +124,14 @@ def known_with(errors: EncoderErrors, clearance_m: Floats, sigma_m: Floats | flo
 
 
 def commissioned(errors: EncoderErrors, found: Estimate, present: Sequence[bool]) -> EncoderErrors:
-    """Errors fixed at the given estimate."""
+    """Errors fixed at an estimate; encoders that were present are commissioned from now on."""
     k = found.joints
     known = tuple(was or is_ for was, is_ in zip(errors.known, present, strict=True))
     return EncoderErrors(errors.centre_rad, found.mean[k:], found.covariance[k:, k:], known)
 
 
-# Samples of further encoders, kept until their gait cycle ends.
+# Samples of the encoders: they arrive in pieces, and are kept until the gait cycle that they belong to is
+# evaluated.
 
 
 @attrs.frozen(eq=False)
@@ -148,7 +156,7 @@ class EncoderSamples:
     no_angle: Ints
 
     def extended(self, piece: Samples) -> "EncoderSamples":
-        """With the valid crank samples of a piece."""
+        """With the crank samples of a piece appended; each has the encoders' angles of the same message."""
         piece = of_crank(piece)
         if not len(piece):
             return self
@@ -163,7 +171,7 @@ class EncoderSamples:
         )
 
     def after(self, stamp_ns: int) -> "EncoderSamples":
-        """Those from a stamp on."""
+        """Without the samples before a stamp."""
         which = newest(self.stamp_ns, stamp_ns)
         return attrs.evolve(
             self,
@@ -179,23 +187,25 @@ def no_encoder_samples(encoders: int) -> EncoderSamples:
     return EncoderSamples(np.zeros(0, np.int64), np.zeros(0), np.zeros((0, encoders)), none, none, none)
 
 
-def within(kept: EncoderSamples, begin_ns: int, end_ns: int) -> tuple[Ints, Floats, Floats]:
+def samples_within(kept: EncoderSamples, begin_ns: int, end_ns: int) -> tuple[Ints, Floats, Floats]:
     """Stamps (n,) [ns], crank (n,) and encoder angles (n, m) [rad] between two stamps."""
     which = indices_within(kept.stamp_ns, begin_ns, end_ns)
     return kept.stamp_ns[which], kept.crank_rad[which], kept.encoder_rad[which]
 
 
-# State of the encoder observer, and possible faults of an encoder.
+# State of the observer (below), and the faults of an encoder.
 
 
-LEAST_PHASES = PHASES // 4  # with samples: at 60 rpm a rate of 32 Hz
-
-_STRANGE_RAD = 0.1  # deviation within a cycle: many times the effect of clearances and scale errors
+_LEAST_PHASES = PHASES // 4  # crank phases with samples that a cycle needs: at 60 rpm a rate of 32 Hz
+# RMS deviation about its mean in a cycle: many times the effect of clearances and scale errors
+_FAULTY_RAD = 0.1
 
 
 @attrs.define
 class EncoderState:
-    """State besides the regression and the reference; every value is immutable.
+    """State of an `EncoderObserver` besides its regression and its reference.
+
+    Every value is immutable, so a shallow copy is a snapshot.
 
     Attributes
     ----------
@@ -204,34 +214,36 @@ class EncoderState:
     due : tuple of (int, int)
         Begin and end [ns] of ended gait cycles that are not evaluated yet.
     present : tuple of bool
-        Which encoders the kept cycles have; empty before the first.
-    otherwise : tuple of bool
-        Encoders of the last cycles, if they differ from `present`.
-    otherwise_cycles : int
+        Whether the cycles of the estimate have each encoder; empty before the first cycle.
+    changed_present : tuple of bool
+        The same of the last cycles, if it differs from `present`; empty otherwise.
+    changed_cycles : int
         Number of these cycles.
     faults : tuple of str
         Fault of each encoder in the last cycle; empty before the first.
-    asked : bool
+    is_requested : bool
         Whether a reference was requested since the last change of the leg.
     since_reference : int
         Cycles since the last reference was ready.
     profiles : tuple of CrankProfile
-        How the crank turned in the last cycles.
+        Crank motion of the last cycles.
     found : Estimate or None
+        Latest estimate of clearances and encoder errors.
     updated_ns : int
-        Stamp of the last forecast update with it, 0 if an update is due.
+        Stamp of the last forecast update with `found`, 0 if an update is due.
     other, believed : tuple of bool
-        Clearances that then differed significantly from the counted ones, and those that the forecast used.
+        At that update: whether each clearance differed significantly from the counted one, and whether the
+        forecast used it. Both are set by `monitor.judgement`.
     """
 
     samples: EncoderSamples
     errors: EncoderErrors
     due: tuple[tuple[int, int], ...] = ()
     present: tuple[bool, ...] = ()
-    otherwise: tuple[bool, ...] = ()
-    otherwise_cycles: int = 0
+    changed_present: tuple[bool, ...] = ()
+    changed_cycles: int = 0
     faults: tuple[str, ...] = ()
-    asked: bool = False
+    is_requested: bool = False
     since_reference: int = 0
     profiles: tuple[CrankProfile, ...] = ()
     found: Estimate | None = None
@@ -243,31 +255,32 @@ class EncoderState:
 def fault_of(raw: Floats, deviation: Floats, joint: str) -> str:
     """Fault of an encoder in a cycle; empty if there is none."""
     finite = deviation[np.isfinite(deviation)]
-    if len(finite) < LEAST_PHASES:
+    if len(finite) < _LEAST_PHASES:
         return "gives no angle" if np.isinf(raw).any() else "is not in joint_states with the crank"
-    if rms(finite - finite.mean()) > _STRANGE_RAD:
+    if rms(finite - finite.mean()) > _FAULTY_RAD:
         return f"does not turn as joint {joint} does, look at encoders.joints and encoders.signs"
     return ""
 
 
 def faults(names: Sequence[str], state: EncoderState) -> list[str]:
-    """Faults of the encoders, for operators."""
+    """Faults of the encoders as text for operators."""
     return [f"{name} {fault}" for name, fault in zip(names, state.faults, strict=False) if fault]
 
 
-# Further encoders in the monitor: from their samples to clearance estimates.
+# The observer: from samples to clearance estimates.
 #
-# All evaluation takes place at the ends of evaluation periods, which depend on the order of arrival only.
-# Each period evaluates the gait cycles that ended, and simulates at most one cycle for the reference.
+# Everything is computed at the end of an evaluation period; periods depend on the order of arrival only, so a
+# replay gives the same results. A period evaluates the gait cycles that ended in it. The cycles are compared
+# with a reference, a simulation of the leg as counted, of which each period computes at most one gait cycle.
 
 
-OTHERWISE_CYCLES = 20  # in a row with other encoders than before, until the change is accepted
+_CHANGE_CYCLES = 20  # cycles in a row with other encoders until the change counts as permanent
 
-_UNKNOWN_M = 1.0e-3  # prior standard deviation of a clearance without prior knowledge
-_FAR_M = 1.0e-4  # difference of a clearance from the reference at which the reference is renewed
-_UNLIKE = 0.015  # of the mean speed: the reference is renewed if the crank turns otherwise by more
-_PROFILES = 10  # gait cycles whose crank motion is averaged
-_AGAIN_CYCLES = 100  # least number of cycles between two references
+_UNKNOWN_SIGMA_M = 1.0e-3  # prior standard deviation of a clearance without prior knowledge
+_PROFILE_CYCLES = 10  # gait cycles whose crank motion is averaged for a reference
+# A reference is renewed if an observable clearance, or the crank's speed as a fraction of its mean, differs
+# from that of the reference by more; and at the earliest this many cycles after the last one.
+_CLEARANCE_DEPARTURE_M, _SPEED_DEPARTURE, _LEAST_BETWEEN_REFERENCES = 1.0e-4, 0.015, 100
 
 
 class EncoderSnapshot(NamedTuple):
@@ -279,7 +292,7 @@ class EncoderSnapshot(NamedTuple):
 
 
 class EncoderObserver(KeepsSamples):
-    """Estimates clearances from further encoders, and the encoders' errors while they are new.
+    """Estimates clearances from joint encoders, and the errors of encoders that are not commissioned yet.
 
     Parameters
     ----------
@@ -305,7 +318,7 @@ class EncoderObserver(KeepsSamples):
     ) -> None:
         self._coefficient_sigma = np.array(coefficient_sigma)
         self._settings, self.config = config.encoders, config
-        self._fresh = np.array(
+        self._new_m = np.array(
             [mechanism.clearances[joint].radial_clearance for joint in mechanism.clearance_joints]
         )
         self._model = angle_model(mechanism, self._settings.joints)
@@ -329,18 +342,20 @@ class EncoderObserver(KeepsSamples):
 
     @property
     def has_failed(self) -> bool:
-        """Whether there is no reference, since the leg could not be simulated for one."""
+        """Whether there is no reference because the leg could not be simulated."""
         return (
-            self.state.asked and not self._reference.is_busy and self._clearance_regression.reference is None
+            self.state.is_requested
+            and not self._reference.is_busy
+            and self._clearance_regression.reference is None
         )
 
     def ended(self, statistics: CycleStatistics) -> None:
-        """Note the end of a gait cycle, which is used if the leg walked as commanded."""
+        """Queue an ended gait cycle for evaluation, if the leg walked steadily at the commanded cadence."""
         if statistics.is_steady and self.config.cadence.allows(statistics.cadence_rpm):
             self.state.due = (*self.state.due, (statistics.begin_ns, statistics.stamp_ns))
 
     def end_period(self, clearance_m: Floats, depth: Floats) -> Commissioned | None:
-        """Evaluate the gait cycles that ended, and simulate one more for the reference.
+        """Evaluate the queued gait cycles, and simulate one more for the reference.
 
         Parameters
         ----------
@@ -360,13 +375,13 @@ class EncoderObserver(KeepsSamples):
             new = self._evaluate(end_ns) or new
         state.samples = state.samples.after(state.due[-1][1] if state.due else 0)
         state.due = ()
-        self._refer(clearance_m, depth)
+        self._advance_reference(clearance_m, depth)
         return new
 
     def replaced(self) -> None:
-        """Start again after the replacement of a part."""
+        """Forget the estimate after the replacement of a part; the errors of the encoders stay."""
         self._clearance_regression.forget()
-        self.state.found, self.state.asked, self.state.updated_ns = None, False, 0
+        self.state.found, self.state.is_requested, self.state.updated_ns = None, False, 0
 
     def estimates(self, counted_m: Floats) -> tuple[ClearanceEstimate, ...]:
         """Clearance estimate of each joint, compared with the counted clearances (k,) [m]."""
@@ -385,20 +400,20 @@ class EncoderObserver(KeepsSamples):
         )
 
     def restore(self, snapshot: EncoderSnapshot) -> None:
-        """Restore a snapshot of the same mechanism and parameters; results are then bit for bit the same."""
+        """Restore a snapshot of the same mechanism and parameters; later results are equal bit for bit."""
         self.state = attrs.evolve(snapshot.state)
         self._clearance_regression.restore(snapshot.regression)
         self._reference.restore(snapshot.reference)
 
     def _add_cycle(self, begin_ns: int, end_ns: int) -> None:
-        """Add a gait cycle if its encoders are those of the previous cycles."""
+        """Add a gait cycle to the regression, unless other encoders are present than before."""
         state = self.state
-        stamp_ns, crank, raw = within(state.samples, begin_ns, end_ns)
-        if len(crank) >= LEAST_PHASES:
+        stamp_ns, crank, raw = samples_within(state.samples, begin_ns, end_ns)
+        if len(crank) >= _LEAST_PHASES:
             turned: Floats = np.asarray(np.unwrap(crank, period=TURN), dtype=np.float64)
             since_s = np.asarray(1.0e-9 * (stamp_ns - begin_ns), dtype=np.float64)
             profile = cycle_profile(since_s, turned, 1.0e-9 * (end_ns - begin_ns))
-            state.profiles = (*state.profiles, profile)[-_PROFILES:]
+            state.profiles = (*state.profiles, profile)[-_PROFILE_CYCLES:]
         angles = np.where(np.isfinite(raw), raw, np.nan)
         self._centre(crank, angles)
         deviation, counts = binned(self._model, crank, angles - state.errors.centre_rad)
@@ -406,7 +421,7 @@ class EncoderObserver(KeepsSamples):
             fault_of(raw[:, i], deviation[:, i], joint) for i, joint in enumerate(self._settings.joints)
         )
         present = tuple(not fault for fault in state.faults)
-        if present != state.present and not self._is_changed(present):
+        if present != state.present and not self._accept_change(present):
             return
         absent = [not here for here in present]
         deviation[:, absent], counts[:, absent] = np.nan, 0.0
@@ -418,32 +433,36 @@ class EncoderObserver(KeepsSamples):
             self._clearance_regression.add_binned(deviation, counts)
             state.since_reference += 1
 
-    def _is_changed(self, present: tuple[bool, ...]) -> bool:
-        """Whether the set of available encoders has changed for more than a few cycles."""
+    def _accept_change(self, present: tuple[bool, ...]) -> bool:
+        """Count a cycle with other encoders; if the change is permanent, start the estimate again with these.
+
+        Returns whether the change was accepted. A change for a few cycles only (lost messages) is ignored.
+        """
         state = self.state
-        state.otherwise_cycles = state.otherwise_cycles + 1 if present == state.otherwise else 1
-        state.otherwise = present
-        if state.present and state.otherwise_cycles < OTHERWISE_CYCLES:
+        state.changed_cycles = state.changed_cycles + 1 if present == state.changed_present else 1
+        state.changed_present = present
+        if state.present and state.changed_cycles < _CHANGE_CYCLES:
             return False
-        state.present, state.otherwise, state.otherwise_cycles = present, (), 0
+        state.present, state.changed_present, state.changed_cycles = present, (), 0
         state.found = None
         self._clearance_regression.forget()
-        self._re_evaluate()
+        self._evaluate_again()
         return True
 
     def _centre(self, crank: Floats, angles: Floats) -> None:
-        """Set the zero of an encoder's deviation from its first cycle."""
+        """Set the centre of each encoder that has none to its mean deviation in this cycle."""
         errors = self.state.errors
         if not np.isnan(errors.centre_rad).any() or not len(crank):
             return
         deviation = self._model.deviation(crank, angles)
-        is_sufficient = np.isfinite(deviation).sum(axis=0) >= LEAST_PHASES
+        is_sufficient = np.isfinite(deviation).sum(axis=0) >= _LEAST_PHASES
+        # mean of directions, because an arbitrary zero may lie anywhere, half a turn included
         mean = np.angle(np.nansum(np.exp(1j * deviation), axis=0))
         first = np.isnan(errors.centre_rad) & is_sufficient
         self.state.errors = attrs.evolve(errors, centre_rad=np.where(first, mean, errors.centre_rad))
 
     def _evaluate(self, stamp_ns: int) -> Commissioned | None:
-        """Renew the estimate; fix the encoders' errors if there are enough cycles."""
+        """Renew the estimate; during commissioning, fix the encoders' errors when there are enough cycles."""
         state, regression = self.state, self._clearance_regression
         if regression.reference is None or not any(state.present):
             return None
@@ -454,51 +473,58 @@ class EncoderObserver(KeepsSamples):
         if found is None:
             return None
         state.errors = commissioned(state.errors, found, state.present)
-        self._re_evaluate()
-        return held(state.errors, self._settings, stamp_ns)
+        self._evaluate_again()
+        return stored_errors(state.errors, self._settings, stamp_ns)
 
-    def _refer(self, clearance_m: Floats, depth: Floats) -> None:
+    def _advance_reference(self, clearance_m: Floats, depth: Floats) -> None:
         """Continue the simulation of a reference, or begin a new one if required."""
         state = self.state
         reference = self._reference.advance()
         if reference is not None:
             state.since_reference = 0
-            self._clearance_regression.refer(reference, self._before(reference.clearance_m))
+            self._clearance_regression.refer(reference, self._prior(reference.clearance_m))
         if self._reference.is_busy or not any(state.present):
             return
-        if not state.asked and state.profiles:
-            state.asked = True
+        if not state.is_requested and state.profiles:
+            state.is_requested = True
             self._reference.begin(clearance_m, depth, mean_profile(state.profiles))
-        elif self._is_far():
+        elif self._is_reference_outdated():
             state.since_reference = 0
-            self._reference.begin(self._best(clearance_m), depth, mean_profile(state.profiles))
+            self._reference.begin(
+                self._reference_clearances(clearance_m), depth, mean_profile(state.profiles)
+            )
 
-    def _is_far(self) -> bool:
+    def _is_reference_outdated(self) -> bool:
+        """Whether the estimated clearances or the crank motion have left those of the reference."""
         found, reference = self.state.found, self._clearance_regression.reference
-        if found is None or reference is None or self.state.since_reference < _AGAIN_CYCLES:
+        if found is None or reference is None or self.state.since_reference < _LEAST_BETWEEN_REFERENCES:
             return False
-        if mean_profile(self.state.profiles).departure(reference.profile) > _UNLIKE:
+        if mean_profile(self.state.profiles).departure(reference.profile) > _SPEED_DEPARTURE:
             return True
-        off = np.abs(found.clearance_m - reference.clearance_m)
-        return bool((off[found.sigma_m <= ESTIMATED_M] > _FAR_M).any())
+        departure_m = np.abs(found.clearance_m - reference.clearance_m)
+        return bool((departure_m[found.sigma_m <= ESTIMATED_M] > _CLEARANCE_DEPARTURE_M).any())
 
-    def _best(self, counted_m: Floats) -> Floats:
-        """Estimated clearances where available, otherwise the counted ones."""
+    def _reference_clearances(self, counted_m: Floats) -> Floats:
+        """Clearances for a new reference: estimated where observable, counted elsewhere."""
         found = self.state.found
         if found is None:
             return counted_m
         return np.where(found.sigma_m <= ESTIMATED_M, found.clearance_m, counted_m)
 
-    def _re_evaluate(self) -> None:
-        """Evaluate the kept cycles with the present errors of the encoders."""
+    def _evaluate_again(self) -> None:
+        """Evaluate the kept cycles again, with a prior from the present errors of the encoders."""
         reference = self._clearance_regression.reference
         if reference is not None:
-            self._clearance_regression.refer(reference, self._before(reference.clearance_m))
+            self._clearance_regression.refer(reference, self._prior(reference.clearance_m))
 
-    def _before(self, clearance_m: Floats) -> Estimate:
-        """Prior without the cycles; includes the clearances only during commissioning of the encoders."""
+    def _prior(self, clearance_m: Floats) -> Estimate:
+        """Prior of the regression.
+
+        While encoders are commissioned, the clearances are known to within their tolerance and the uncertain
+        wear; afterwards they are practically unknown, so that the encoders alone decide.
+        """
         forecast = self.config.forecast
         if not self.commissions:
-            return known_with(self.state.errors, clearance_m, _UNKNOWN_M)
-        worn = self._coefficient_sigma * (clearance_m - self._fresh)
-        return known_with(self.state.errors, clearance_m, np.hypot(forecast.clearance_sigma_m, worn))
+            return prior_with(self.state.errors, clearance_m, _UNKNOWN_SIGMA_M)
+        wear_sigma_m = self._coefficient_sigma * (clearance_m - self._new_m)
+        return prior_with(self.state.errors, clearance_m, np.hypot(forecast.clearance_sigma_m, wear_sigma_m))

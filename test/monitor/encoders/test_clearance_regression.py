@@ -16,7 +16,7 @@ from leg_wear_monitor.monitor.angle_regression import (
     clearance_estimates,
 )
 from leg_wear_monitor.monitor.config.inputs import Encoders
-from leg_wear_monitor.monitor.encoders import commissioned, errors_of, known_with
+from leg_wear_monitor.monitor.encoders import commissioned, errors_of, prior_with
 from leg_wear_monitor.twin.reference import (
     HARMONICS,
     PHASES,
@@ -97,7 +97,7 @@ WORN = [3e-4, 3.3e-4, 4.5e-4, 3e-4, 3.1e-4]
 @pytest.mark.plain
 @pytest.mark.parametrize("noise", [0.0, 1e-4, 1e-3])
 def test_clearances_and_the_encoders_errors_are_found_at_once(model, shape, reference, noise):
-    found = watched(model, shape, reference, known_with(UNKNOWN, FRESH, 3e-4), WORN, noise=noise).fused()
+    found = watched(model, shape, reference, prior_with(UNKNOWN, FRESH, 3e-4), WORN, noise=noise).fused()
     np.testing.assert_allclose(found.clearance_m, WORN, atol=1e-5 + 0.02 * noise)
     np.testing.assert_allclose(found.mean[5:9], ERRORS[:4], atol=2e-4 + noise)
     assert (found.sigma_m < 3e-5 + 0.02 * noise).all()
@@ -105,7 +105,7 @@ def test_clearances_and_the_encoders_errors_are_found_at_once(model, shape, refe
 
 @pytest.mark.plain
 def test_outliers_do_no_harm(model, shape, reference):
-    hidden = ClearanceRegression(model, reference, known_with(UNKNOWN, FRESH, 3e-4))
+    hidden = ClearanceRegression(model, reference, prior_with(UNKNOWN, FRESH, 3e-4))
     for seed in range(30):
         crank, angles = read(model, shape, WORN, seed=seed, noise=1e-4)
         angles[seed::20] += 0.5
@@ -115,7 +115,7 @@ def test_outliers_do_no_harm(model, shape, reference):
 
 @pytest.mark.plain
 def test_more_cycles_make_it_surer(model, shape, reference):
-    before = known_with(UNKNOWN, FRESH, 3e-4)
+    before = prior_with(UNKNOWN, FRESH, 3e-4)
     few, many = (
         watched(model, shape, reference, before, WORN, cycles, noise=1e-3, scatter=0.3).alone().sigma_m
         for cycles in (20, 160)
@@ -125,7 +125,7 @@ def test_more_cycles_make_it_surer(model, shape, reference):
 
 @pytest.mark.plain
 def test_too_few_cycles_say_nothing(model, shape, reference):
-    assert watched(model, shape, reference, known_with(UNKNOWN, FRESH, 3e-4), WORN, cycles=5).fused() is None
+    assert watched(model, shape, reference, prior_with(UNKNOWN, FRESH, 3e-4), WORN, cycles=5).fused() is None
 
 
 @pytest.mark.plain
@@ -133,7 +133,7 @@ def test_the_hip_alone_says_nothing_of_the_ankle(model, shape, reference):
     """What was known before stays, mean and deviation."""
 
     def by_hip(sigma_m):
-        hidden = ClearanceRegression(model, reference, known_with(UNKNOWN, FRESH, sigma_m))
+        hidden = ClearanceRegression(model, reference, prior_with(UNKNOWN, FRESH, sigma_m))
         for seed in range(30):
             crank, angles = read(model, shape, WORN, seed=seed)
             angles[:, 1:] = np.nan
@@ -151,13 +151,13 @@ def test_the_hip_alone_says_nothing_of_the_ankle(model, shape, reference):
 
 @pytest.mark.plain
 def test_all_three_sensors_show_all_joints(model, shape, reference):
-    found = watched(model, shape, reference, known_with(UNKNOWN, FRESH, 1e-3), WORN).fused()
+    found = watched(model, shape, reference, prior_with(UNKNOWN, FRESH, 1e-3), WORN).fused()
     assert observations(found) == [ClearanceObservation.SEEN] * 5
 
 
 @pytest.mark.plain
 def test_a_sensor_that_is_added_later_is_commissioned_by_what_is_known_then(model, shape, reference):
-    hidden = ClearanceRegression(model, reference, known_with(UNKNOWN, FRESH, 2e-4))
+    hidden = ClearanceRegression(model, reference, prior_with(UNKNOWN, FRESH, 2e-4))
     for seed in range(30):
         crank, angles = read(model, shape, WORN, seed=seed)
         angles[:, 2] = np.nan  # no ankle yet
@@ -171,8 +171,8 @@ def test_a_sensor_that_is_added_later_is_commissioned_by_what_is_known_then(mode
 
 @pytest.mark.plain
 def test_a_worn_joint_is_named_and_a_sound_leg_is_left_alone(model, shape, reference):
-    new = watched(model, shape, reference, known_with(UNKNOWN, FRESH, 5e-6), FRESH, noise=1e-4).fused()
-    before = known_with(commissioned(UNKNOWN, new, (True,) * 3), FRESH, 1e-4)
+    new = watched(model, shape, reference, prior_with(UNKNOWN, FRESH, 5e-6), FRESH, noise=1e-4).fused()
+    before = prior_with(commissioned(UNKNOWN, new, (True,) * 3), FRESH, 1e-4)
     for k in range(5):
         worn = [4.5e-4 if j == k else 3e-4 for j in range(5)]
         assert others(watched(model, shape, reference, before, worn, noise=1e-4).fused()) == [k]
@@ -182,8 +182,8 @@ def test_a_worn_joint_is_named_and_a_sound_leg_is_left_alone(model, shape, refer
 @pytest.mark.plain
 def test_fusion_weighs_by_covariance(model, shape, reference):
     """A sure prediction moves little, an unsure one takes over what is seen."""
-    sure = watched(model, shape, reference, known_with(UNKNOWN, FRESH, 1e-7), WORN, scatter=0.2).fused()
-    unsure = watched(model, shape, reference, known_with(UNKNOWN, FRESH, 1e-3), WORN, scatter=0.2).fused()
+    sure = watched(model, shape, reference, prior_with(UNKNOWN, FRESH, 1e-7), WORN, scatter=0.2).fused()
+    unsure = watched(model, shape, reference, prior_with(UNKNOWN, FRESH, 1e-3), WORN, scatter=0.2).fused()
     assert sure.clearance_m[2] == pytest.approx(FRESH[2], abs=1e-6)
     assert unsure.clearance_m[2] == pytest.approx(WORN[2], abs=3e-5)
 
@@ -195,7 +195,7 @@ def test_a_leg_in_full_coordinates_shows_its_worn_knee(leg, model, simulated):
     setup.contacts.clearance[setup.clearance_joints.index("G")] = 4.5e-4
     run, statistics = FullRun(setup, tolerance_m=1e-9), new_run_statistics(len(leg.joints))
     run.advance(1.0, statistics)
-    hidden = ClearanceRegression(model, simulated, known_with(UNKNOWN, FRESH, 1e-3))
+    hidden = ClearanceRegression(model, simulated, prior_with(UNKNOWN, FRESH, 1e-3))
     random, pairs = np.random.default_rng(1), [[names.index(b) for b in leg.sides(j)] for j in SENSORS]
     for cycle in range(20):
         turned = []
@@ -217,8 +217,8 @@ def test_an_encoder_that_is_absent_is_as_one_that_was_never_there(leg, model, si
         simulated, deviation=simulated.deviation[:, :1], columns=simulated.columns[:, :1, own]
     )
     errors = errors_of(Encoders(names=("hip",), joints=("B",)), None)
-    alone = ClearanceRegression(hip, reference, known_with(errors, FRESH, 1e-3))
-    absent = ClearanceRegression(model, simulated, known_with(UNKNOWN, FRESH, 1e-3))
+    alone = ClearanceRegression(hip, reference, prior_with(errors, FRESH, 1e-3))
+    absent = ClearanceRegression(model, simulated, prior_with(UNKNOWN, FRESH, 1e-3))
     for seed in range(30):
         crank, angles = read(model, shape, WORN, seed=seed, noise=1e-4)
         alone.add(crank, angles[:, :1])

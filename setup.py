@@ -8,12 +8,13 @@ from setuptools import setup
 FRACTION = "share/leg_wear_monitor"
 # What builds the pages below docs/ is no page, and what the site's build writes there comes and goes.
 SITE = ("docs/conf.py", "docs/_", "docs/lessons/")
+TOPS = ("bags", "config", "docs", "examples", "foxglove", "launch", "plotjuggler", "rviz", "security")
 
 
 def share_files() -> list[tuple[str, list[str]]]:
     """Every file below the top-level data directories, with the directory it is installed to."""
     found: dict[str, list[str]] = {}
-    for top in ("bags", "config", "docs", "foxglove", "launch", "plotjuggler", "rviz", "security"):
+    for top in TOPS:
         for path in sorted(Path(top).rglob("*")):
             if path.is_file() and "__pycache__" not in path.parts and not path.as_posix().startswith(SITE):
                 found.setdefault(f"{FRACTION}/{path.parent.as_posix()}", []).append(path.as_posix())

@@ -59,13 +59,13 @@ def wrench(store: Any) -> Callable[..., Any]:
 
 
 @pytest.fixture(scope="session")
-def foreign(store: Any) -> Callable[[str, bytes], Any]:
+def foreign() -> Callable[[str, bytes], Any]:
     """Read a message with mcap-ros2-support."""
     decoder = pytest.importorskip("mcap_ros2.decoder").DecoderFactory()
     schema = pytest.importorskip("mcap.records").Schema
 
     def read(name: str, raw: bytes) -> Any:
-        text, _ = store.generate_msgdef(name, ros_version=2)
+        text = definition(name).text
         return decoder.decoder_for("cdr", schema(CODES[name], text.encode(), "ros2msg", name))(raw)
 
     return read

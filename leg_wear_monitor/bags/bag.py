@@ -33,6 +33,7 @@ from leg_wear_monitor.configuration.strict import events_with_depth
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.messages.streams import Stream, streams_read
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.twin import TORQUE
 
 # Reader of a bag directory's metadata.yaml (files, topics, compression), with limits on size and nesting.
 
@@ -333,7 +334,8 @@ def find_topic(role: Role, topics: Iterable[str], where: str) -> str | None:
         return f"/{role.name}"
     near = [topic for topic in recorded if topic.endswith(f"/{role.name}")]
     if len(near) > 1:
-        option = f"--{role.name}".replace("_", "-")
+        of_torque = role.stream.kind == TORQUE  # whichever topic brings it
+        option = "--drive-torque" if of_torque else f"--{role.name}".replace("_", "-")
         raise RecordingError(where, role.name, f"could be {listed(near)}, select one with {option}")
     return near[0] if near else None
 

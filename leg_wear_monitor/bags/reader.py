@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from itertools import repeat
 from pathlib import Path
+from typing import Any
 
 import attrs
 import numpy as np
@@ -39,7 +40,8 @@ from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.messages.cdr import ENCAPSULATION, Clocks, Decoder, mark_zero_stamps
-from leg_wear_monitor.messages.streams import JOINT_STATE
+from leg_wear_monitor.messages.encode import DYNAMIC_JOINT_STATE
+from leg_wear_monitor.messages.streams import JOINT_STATE, types
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, MISSING_JOINT, NO_FAULT, NOT_FINITE, ZERO_STAMP, Samples
@@ -158,11 +160,16 @@ _NAMED = (NO_FAULT, NOT_FINITE, ZERO_STAMP)
 
 @attrs.define
 class _Counts:
-    """Numbers of a file's messages with and without the crank; joint names of those without it."""
+    """Numbers of a file's messages with and without the crank; joint names of those without it.
+
+    And of its messages of interfaces without the wanted one, with a report on the first of them.
+    """
 
     found: int = 0
     missing: int = 0
     names: set[str] = attrs.Factory(set)
+    without_interface: int = 0
+    interfaces: str = ""
 
 
 class JointNames:
@@ -170,11 +177,12 @@ class JointNames:
 
     Parameters
     ----------
-    crank_joint : str
+    crank_joint, interface : str
+        The crank, and its interface that is the torque.
     """
 
-    def __init__(self, crank_joint: str) -> None:
-        self._crank = crank_joint
+    def __init__(self, crank_joint: str, interface: str) -> None:
+        self._crank, self._interface = crank_joint, interface
         self._files: dict[Path, _Counts] = {}
 
     def add_samples(
@@ -184,8 +192,14 @@ class JointNames:
         counts = self._files.setdefault(path, _Counts())
         cranks = messages["type"] == JOINT_STATE
         counts.found += int(np.count_nonzero(cranks & np.isin(samples["fault"], _NAMED)))
-        missing = np.flatnonzero(samples["fault"] == MISSING_JOINT)
+        missing = np.flatnonzero(cranks & (samples["fault"] == MISSING_JOINT))
         counts.missing += len(missing)
+        without = np.flatnonzero(~cranks & (samples["fault"] == MISSING_JOINT))
+        counts.without_interface += len(without)
+        if len(without) and not counts.interfaces:
+            message = messages[without[0]]
+            raw = data[message["begin"] : message["end"]].tobytes()
+            counts.interfaces = without_interface(raw, self._crank, self._interface)
         if len(missing) and len(counts.names) < _MOST:
             message = messages[missing[0]]
             counts.names |= set(names_in(data[message["begin"] : message["end"]].tobytes())[:_MOST])
@@ -201,6 +215,9 @@ class JointNames:
         found = sum(counts.found for counts in self._files.values())
         findings = []
         for path, counts in self._files.items():
+            if counts.interfaces:
+                text = f"{counts.without_interface} messages of dynamic_joint_states: {counts.interfaces}"
+                findings.append(Finding(path, text))
             if not counts.missing:
                 continue
             text = f"is not among the joints of {counts.missing} messages, they have {listed(counts.names)}"
@@ -224,6 +241,15 @@ def names_in(raw: bytes) -> list[str]:
         text, at = _text(body, at, order)
         names.append(text.rstrip(b"\0").decode("utf-8", "replace"))
     return names
+
+
+def without_interface(raw: bytes, joint: str, interface: str) -> str:
+    """Report on a control_msgs/DynamicJointState message, decoded successfully, that lacks an interface."""
+    message: Any = types().deserialize_cdr(raw, DYNAMIC_JOINT_STATE)
+    if joint not in message.joint_names:
+        return f"no joint is named {joint!r}; there are {listed(message.joint_names)}"
+    there = message.interface_values[message.joint_names.index(joint)].interface_names
+    return f"{joint} has no interface {interface!r}, it has {listed(there)}; set drive_torque.interface"
 
 
 def _count(body: bytes, at: int, order: str) -> tuple[int, int]:
@@ -369,12 +395,13 @@ class Recording:
         self._clocks = Clocks()
         self._decoder = Decoder(config)
         self._budget = Budget(memory_mb)
-        self._joints = JointNames(config.crank_joint)
+        self._joints = JointNames(config.crank_joint, config.drive_torque.interface)
         self._one_leg = OneLeg()
         bag_files, self._findings = find_files(paths)
         with ExitStack() as stack:
             self._sources, lost = open_sources(bag_files, config, self._budget, stack)
             given = {"joint_states": joint_states, "drive_torque": drive_torque, "foot_load": foot_load}
+            given["dynamic_joint_states"] = drive_torque
             self.topics, missing = assign(self._sources, roles(config, given))
             self._findings += lost + missing + check_topics(self._sources, self.topics, joint_states)
             self._close = stack.pop_all()

@@ -14,7 +14,7 @@ from leg_wear_monitor.bags.reader import names_in
 from leg_wear_monitor.estimate.torque_model import Series, series
 from leg_wear_monitor.messages import outputs
 from leg_wear_monitor.messages.cdr import Decoder
-from leg_wear_monitor.messages.streams import JOINT_STATE, STREAMS, WRENCH_STAMPED, Stream
+from leg_wear_monitor.messages.streams import INTERFACES, JOINT_STATE, STREAMS, WRENCH_STAMPED, Stream
 from leg_wear_monitor.monitor.config.inputs import DriveTorque
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin import CRANK
@@ -182,7 +182,7 @@ def _stream(
         return None
     for stream in STREAMS:
         topic = chosen.get(stream.kind, drive_torque)
-        if stream.type == (channel.type or known) and not stream.load_source:
+        if stream.type == (channel.type or known) and not stream.load_source and stream.code != INTERFACES:
             return stream if topic in (None, channel.topic, channel.topic.lstrip("/")) else None
     return None
 

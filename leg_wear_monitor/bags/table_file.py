@@ -24,7 +24,7 @@ from leg_wear_monitor.bags.table_rows import CsvFile
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.messages import encode
 from leg_wear_monitor.messages.cdr import MESSAGE
-from leg_wear_monitor.messages.streams import CONTACT, LOAD_WRENCH, STREAMS, WRENCH_STAMPED
+from leg_wear_monitor.messages.streams import CONTACT, INTERFACES, LOAD_WRENCH, STREAMS, WRENCH_STAMPED
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 
 # What is remarkable about the rows of a table: times that go back, gaps, empty cells.
@@ -238,6 +238,9 @@ class Encoder:
             vector = np.zeros((len(torque), 3))
             vector[:, "xyz".index(self._torque.axis)] = torque
             return encode.wrenches(stamp_ns, torque=vector)
+        if self._streams[self._torque.source].code == INTERFACES:
+            values = {self._crank: {self._torque.interface: torque}}
+            return encode.dynamic_joint_states(stamp_ns, values)
         return encode.float64s(torque)
 
     def _loads(self, code: int, rows: Rows, row: NDArray[np.int64]) -> NDArray[np.uint8]:

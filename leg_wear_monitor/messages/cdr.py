@@ -14,6 +14,7 @@ from leg_wear_monitor.compiled.kernel import entry, kernel
 from leg_wear_monitor.messages.streams import CONTACT as CONTACT_SWITCH
 from leg_wear_monitor.messages.streams import (
     FLOAT64,
+    INTERFACES,
     JOINT_STATE,
     LOAD_FLOAT64,
     LOAD_WRENCH,
@@ -242,6 +243,39 @@ def wrench_force(data, begin, end, big, out_force):
 
 
 @kernel
+def dynamic_joint_state(data, begin, end, big, joint, interface):
+    """Read control_msgs/DynamicJointState: fault, stamp [ns], value of an interface of a joint.
+
+    NaN is what joint_state_broadcaster publishes for an interface that has no value yet.
+    """
+    origin = begin + ENCAPSULATION
+    stamp, at = header(data, origin, end, big)
+    count, index, at = names(data, at, end, origin, big, joint)
+    n_interfaces, at = counted(data, at, end, origin, big)
+    if at < 0 or n_interfaces > (end - at) // 8:
+        return UNDECODABLE, np.int64(0), math.nan
+    is_there, is_short, number = False, False, math.nan
+    for i in range(n_interfaces):
+        n_names, found, at = names(data, at, end, origin, big, interface)
+        n_values, first, at = numbers(data, at, end, origin, big)
+        if at < 0:
+            return UNDECODABLE, np.int64(0), math.nan
+        if i == index and found >= 0:
+            is_there, is_short = True, n_values != n_names
+            if not is_short:
+                number = float64(data, first + 8 * found, big)
+    if not ends(at, end):
+        return UNDECODABLE, np.int64(0), math.nan
+    if count == 0 or n_interfaces == 0:
+        return EMPTY, stamp, math.nan
+    if n_interfaces != count or is_short:
+        return WRONG_LENGTH, stamp, math.nan
+    if not is_there:
+        return MISSING_JOINT, stamp, math.nan
+    return NO_FAULT if math.isfinite(number) else NOT_FINITE, stamp, number
+
+
+@kernel
 def bool_message(data, begin, end):
     """Read std_msgs/Bool: fault and 0 or 1."""
     at = begin + ENCAPSULATION
@@ -251,7 +285,7 @@ def bool_message(data, begin, end):
 
 
 @entry
-def decode(data, messages, crank, encoders, ends_at, axis, use_effort, out, out_angles, out_force):
+def decode(data, messages, crank, interface, encoders, ends_at, axis, use_effort, out, out_angles, out_force):
     """Read messages into samples as they are: no sign, no scale, no offset.
 
     Parameters
@@ -260,6 +294,8 @@ def decode(data, messages, crank, encoders, ends_at, axis, use_effort, out, out_
     messages : (n,) array of MESSAGE
     crank : (characters,) array of uint8
         Name of the crank's joint, UTF-8.
+    interface : (characters,) array of uint8
+        Name of the crank's interface that is its torque, UTF-8.
     encoders : (characters,) array of uint8
         Names of the joints with further encoders, one after the other.
     ends_at : (m,) array of int
@@ -295,6 +331,8 @@ def decode(data, messages, crank, encoders, ends_at, axis, use_effort, out, out_
             elif kind == FLOAT64:
                 fault, torque = float64_message(data, begin, end, big)
                 stamp = messages[i]["log_time_ns"]
+            elif kind == INTERFACES:
+                fault, stamp, torque = dynamic_joint_state(data, begin, end, big, crank, interface)
             elif kind == LOAD_WRENCH:
                 fault, stamp = wrench_force(data, begin, end, big, force)
             elif kind == LOAD_FLOAT64:
@@ -341,6 +379,7 @@ class Decoder:
         self._torque_scale = torque.sign * torque.scale * torque.gear_ratio
         self._axis = _AXES[torque.axis]
         self._effort = torque.source == "effort"
+        self._interface = np.frombuffer(torque.interface.encode(), np.uint8)
         load = config.foot_load
         self._force_scale = 1.0 if load.source == CONTACT else load.sign * load.scale
         names = [name.encode() for name in config.encoders.names]
@@ -364,7 +403,8 @@ class Decoder:
         angles = np.empty((len(messages), len(self._ends)))
         force = np.empty((len(messages), 2))
         out = samples, angles, force
-        decode(data, messages, self._crank, self._encoders, self._ends, self._axis, self._effort, *out)
+        names = self._crank, self._interface, self._encoders
+        decode(data, messages, *names, self._ends, self._axis, self._effort, *out)
         samples["foot_force_n"] = force * self._force_scale
         samples["encoder_rad"] = np.nan
         samples["encoder_rad"][:, : len(self._ends)] = angles * self._signs

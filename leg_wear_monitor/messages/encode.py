@@ -25,6 +25,7 @@ from leg_wear_monitor.mechanism.urdf import joint_positions
 JOINT_STATE = "sensor_msgs/msg/JointState"
 WRENCH_STAMPED = "geometry_msgs/msg/WrenchStamped"
 DIAGNOSTIC_ARRAY = "diagnostic_msgs/msg/DiagnosticArray"
+DYNAMIC_JOINT_STATE = "control_msgs/msg/DynamicJointState"
 FLOAT64 = "std_msgs/msg/Float64"
 MARKER_ARRAY = "visualization_msgs/msg/MarkerArray"
 
@@ -154,6 +155,42 @@ def wrenches(
     for values in (force, torque):
         column = np.zeros((len(stamps), 3)) if values is None else np.asarray(values, float)
         layout.column(column.astype("<f8").reshape(len(stamps), 3))
+    return layout.messages(len(stamps))
+
+
+def dynamic_joint_states(
+    stamp_ns: ArrayLike, interfaces: Mapping[str, Mapping[str, ArrayLike]], *, frame_id: str = ""
+) -> NDArray[np.uint8]:
+    """Messages of control_msgs/DynamicJointState.
+
+    Parameters
+    ----------
+    stamp_ns : (n,) array of int
+        Stamps of the headers [ns].
+    interfaces : dict
+        Values (n,) by the names of joints and their interfaces.
+    frame_id : str
+
+    Returns
+    -------
+    (n, bytes) array of uint8
+        A message a row.
+    """
+    stamps = np.atleast_1d(np.asarray(stamp_ns, np.int64))
+    layout = Layout()
+    layout.header(stamps, frame_id)
+    layout.count(len(interfaces))
+    for joint in interfaces:
+        layout.text(joint)
+    layout.count(len(interfaces))
+    for values in interfaces.values():
+        layout.count(len(values))
+        for name in values:
+            layout.text(name)
+        layout.count(len(values))
+        if values:
+            columns = [np.broadcast_to(np.asarray(each, "<f8"), len(stamps)) for each in values.values()]
+            layout.column(np.stack(columns, axis=1))
     return layout.messages(len(stamps))
 
 

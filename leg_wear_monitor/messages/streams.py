@@ -9,14 +9,14 @@ from functools import cache
 import attrs
 import numpy as np
 from numpy.typing import NDArray
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from leg_wear_monitor.monitor.forecast.forecast import Answer
 from leg_wear_monitor.monitor.reports import CycleReport, Reports
 from leg_wear_monitor.twin import CRANK, LOAD, TORQUE
 
-JOINT_STATE, WRENCH_STAMPED, FLOAT64, LOAD_WRENCH, LOAD_FLOAT64, CONTACT = range(1, 7)
+JOINT_STATE, WRENCH_STAMPED, FLOAT64, LOAD_WRENCH, LOAD_FLOAT64, CONTACT, INTERFACES = range(1, 8)
 
 
 @attrs.frozen(kw_only=True)
@@ -86,6 +86,14 @@ STREAMS = (
         kind=TORQUE,
         torque_source="float64",
         has_stamp=False,
+    ),
+    Stream(
+        code=INTERFACES,
+        topic="dynamic_joint_states",
+        type="control_msgs/msg/DynamicJointState",
+        fields=("Header header", "string[] joint_names", "InterfaceValue[] interface_values"),
+        kind=TORQUE,
+        torque_source="interface",
     ),
     Stream(
         code=LOAD_WRENCH,
@@ -227,15 +235,27 @@ class Definition:
     digest: str
 
 
+# of ros2_control, which is not among ROS 2's common interfaces
+_FURTHER = {
+    "control_msgs/msg/InterfaceValue": "string[] interface_names\nfloat64[] values",
+    "control_msgs/msg/DynamicJointState": (
+        "std_msgs/Header header\nstring[] joint_names\nInterfaceValue[] interface_values"
+    ),
+}
+
+
 @cache
 def types() -> Typestore:
-    """Types of ROS 2 Jazzy."""
-    return get_typestore(Stores.ROS2_JAZZY)
+    """Types of ROS 2 Jazzy, and those of ros2_control that are read."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    for name, text in _FURTHER.items():
+        store.register(get_types_from_msg(text, name))
+    return store
 
 
 @cache
 def definition(name: str) -> Definition:
-    """Definition of a message type of ROS 2's common interfaces."""
+    """Definition of a message type of ROS 2's common interfaces or of ros2_control."""
     text, _ = types().generate_msgdef(name, ros_version=2)
     return Definition(name, text, types().hash_rihs01(name))
 

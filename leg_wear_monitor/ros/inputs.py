@@ -16,11 +16,12 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
-from leg_wear_monitor.bags.reader import names_in
+from leg_wear_monitor.bags.reader import names_in, without_interface
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.messages.cdr import ENCAPSULATION, MESSAGE, Decoder
-from leg_wear_monitor.messages.streams import JOINT_STATE, WRENCH_STAMPED, Stream, streams_read
+from leg_wear_monitor.messages.streams import INTERFACES, JOINT_STATE, WRENCH_STAMPED, Stream, streams_read
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.ros.generated_type import generated_class
 from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, Samples
 
 # When received messages complete the next reports: processing them earlier gives none, later delays them.
@@ -194,12 +195,13 @@ class CrankNames:
 
     def note(self, arrivals: Sequence[Arrival], samples: Samples, now_ns: int) -> None:
         """Record messages and the samples decoded from them, at a time [ns] of the monotonic clock."""
-        for i in np.flatnonzero(samples["fault"] == MISSING_JOINT).tolist()[-_UNNAMED_OF_A_BLOCK:]:
+        joint_states = np.array([one.kind == JOINT_STATE for one in arrivals], bool)
+        unnamed = np.flatnonzero(joint_states & (samples["fault"] == MISSING_JOINT))
+        for i in unnamed.tolist()[-_UNNAMED_OF_A_BLOCK:]:
             names = _names(arrivals[i].raw)
             if names in self._others or len(self._others) < _MOST_PUBLISHERS:
                 self._others[names] = now_ns
                 self._unnamed.add(names)
-        joint_states = np.array([one.kind == JOINT_STATE for one in arrivals], bool)
         self._named += int(np.count_nonzero(joint_states & (samples["fault"] == NO_FAULT)))
 
     def others(self, since_ns: int) -> int:
@@ -233,13 +235,45 @@ def _named(names: Sequence[str]) -> str:
     return f"{shown} and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else shown
 
 
+class InterfaceNames:
+    """Searches messages for the interface of the crank that is its torque.
+
+    Parameters
+    ----------
+    crank_joint, interface : str
+    """
+
+    def __init__(self, crank_joint: str, interface: str) -> None:
+        self._crank, self._interface = crank_joint, interface
+        self._without = b""
+
+    def note(self, arrivals: Sequence[Arrival], samples: Samples) -> None:
+        """Record messages and the samples decoded from them."""
+        of_interfaces = np.array([one.kind == INTERFACES for one in arrivals], bool)
+        without = np.flatnonzero(of_interfaces & (samples["fault"] == MISSING_JOINT))
+        if of_interfaces.any():
+            self._without = arrivals[without[-1]].raw if len(without) else b""
+
+    def report(self) -> str:
+        """Report that the last messages lack the interface, and which there are; empty if they have it."""
+        if not self._without:
+            return ""
+        if len(self._without) > _MOST_BYTES:
+            return "too many joints to name"
+        return without_interface(self._without, self._crank, self._interface)
+
+
 # Message classes by the names of their types.
 
 
 def message_class(name: str) -> Any:
-    """Class of a message type such as ``sensor_msgs/msg/JointState``."""
+    """Class of a message type such as ``sensor_msgs/msg/JointState``; generated if it is not installed."""
     package, _, message = name.split("/")
-    return getattr(import_module(f"{package}.msg"), message)
+    try:
+        found = import_module(f"{package}.msg")
+    except ModuleNotFoundError:
+        return generated_class(name)
+    return getattr(found, message)
 
 
 # Publishers of an input: node names, publishers of another type, several publishers of one crank.
@@ -331,7 +365,7 @@ class InputTopic:
     sources : int
         Number of publishers that certainly send the expected data; 1 while this is unknown.
     without_crank : str
-        Report on messages without the crank; empty if there are none.
+        Report on messages without the crank, or without its interface; empty if there are none.
     other_axis : str
         Report on a torque about another axis than the one that is read; empty if there is none.
     shared : int

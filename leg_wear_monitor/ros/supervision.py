@@ -9,7 +9,7 @@ import attrs
 from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
 
-from leg_wear_monitor.messages.streams import WRENCH_STAMPED, streams_read
+from leg_wear_monitor.messages.streams import INTERFACES, WRENCH_STAMPED, streams_read
 from leg_wear_monitor.monitor.alarms import Alarm, Level
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.reports import AlarmList, Status, VerdictReport
@@ -29,7 +29,14 @@ from leg_wear_monitor.ros.health import (
     topics_status,
     utc,
 )
-from leg_wear_monitor.ros.inputs import Arrival, CrankNames, InputTopic, WrenchAxis, publishers_of
+from leg_wear_monitor.ros.inputs import (
+    Arrival,
+    CrankNames,
+    InputTopic,
+    InterfaceNames,
+    WrenchAxis,
+    publishers_of,
+)
 from leg_wear_monitor.twin import CRANK, KINDS
 from leg_wear_monitor.twin.sample import NO_FAULT, Samples
 
@@ -150,6 +157,7 @@ class Supervision:
         self._silence = Silence(kinds, self._started_ns, time.time_ns())
         self._names = CrankNames(config.crank_joint)
         torque = config.drive_torque
+        self._interfaces = InterfaceNames(config.crank_joint, torque.interface)
         predicted_nm = monitor.predicted_torque_nm / abs(torque.scale * torque.gear_ratio)
         self._axis = WrenchAxis(torque.axis, predicted_nm)
         self._ahead_s = dict.fromkeys(kinds, 0.0)
@@ -168,6 +176,7 @@ class Supervision:
         """Record processed messages and their samples."""
         self._names.note(arrivals, samples, time.monotonic_ns())
         self._axis.note(arrivals, samples)
+        self._interfaces.note(arrivals, samples)
         self._note_stamps(samples)
         self._silence.note(self._monitor.used, time.monotonic_ns(), time.time_ns())
 
@@ -236,6 +245,8 @@ class Supervision:
                 topic.shared = self._names.others(now_ns - int(_OTHERS_S * 1.0e9))
             elif topic.stream.code == WRENCH_STAMPED:
                 topic.other_axis = self._other_axis
+            elif topic.stream.code == INTERFACES:
+                topic.without_crank = self._interfaces.report()
             topic.sources = self._sources(topic, now_ns)
             values[sources_alarm(KINDS[topic.stream.kind].name).name] = float(topic.sources)
         return values

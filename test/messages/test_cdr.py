@@ -13,11 +13,13 @@ from leg_wear_monitor.messages.cdr import MESSAGE, Decoder
 from leg_wear_monitor.messages.streams import (
     CONTACT,
     FLOAT64,
+    INTERFACES,
     JOINT_STATE,
     LOAD_FLOAT64,
     LOAD_WRENCH,
     STREAMS,
     WRENCH_STAMPED,
+    types,
 )
 from leg_wear_monitor.monitor.config.inputs import Crank, DriveTorque, Encoders, FootLoad
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -131,6 +133,76 @@ def test_a_wrench_is_read_as_the_libraries_read_it(
         assert same(ours["torque_nm"], about)
         assert ours["fault"] == (NO_FAULT if math.isfinite(about) else NOT_FINITE)
         assert math.isnan(ours["crank_angle_rad"])
+
+
+INTERFACE = "motor_current"
+BY_INTERFACE = MonitorConfig(
+    crank_joint=CRANK_NAME, drive_torque=DriveTorque(source="interface", interface=INTERFACE)
+)
+interface_values = st.one_of(
+    st.lists(st.tuples(st.sampled_from([INTERFACE, "effort", "", "motor"]), numbers), max_size=4).map(
+        lambda pairs: ([name for name, _ in pairs], [value for _, value in pairs])
+    ),
+    st.tuples(st.lists(st.just(INTERFACE), max_size=2), st.lists(numbers, max_size=2)),
+)
+
+
+def expected_interface(message: Any) -> tuple[int, float]:
+    """What a DynamicJointState means, told once more in plain words: fault, value of the interface."""
+    names, values = list(message.joint_names), list(message.interface_values)
+    if not names or not values:
+        return EMPTY, math.nan
+    if len(names) != len(values):
+        return WRONG_LENGTH, math.nan
+    if CRANK_NAME not in names:
+        return MISSING_JOINT, math.nan
+    there = values[names.index(CRANK_NAME)]
+    if INTERFACE not in there.interface_names:
+        return MISSING_JOINT, math.nan
+    if len(there.interface_names) != len(there.values):
+        return WRONG_LENGTH, math.nan
+    value = float(there.values[list(there.interface_names).index(INTERFACE)])
+    return (NO_FAULT if math.isfinite(value) else NOT_FINITE), value
+
+
+@given(
+    names=joints,
+    groups=st.lists(interface_values, max_size=8),
+    is_whole=st.booleans(),
+    stamp_ns=stamps.filter(bool),
+    frame=frames,
+    little=st.booleans(),
+    cut=st.integers(1, 400),
+)
+@example([CRANK_NAME], [([INTERFACE], [2.5])], True, 9, "", True, 1)
+@example(["hip", CRANK_NAME], [([], []), ([INTERFACE], [math.nan])], True, 9, "base_link", False, 30)
+def test_an_interface_is_read_as_the_libraries_read_it(
+    foreign: Callable[[str, bytes], Any],
+    names: list[str],
+    groups: list[tuple[list[str], list[float]]],
+    is_whole: bool,
+    stamp_ns: int,
+    frame: str,
+    little: bool,
+    cut: int,
+) -> None:
+    store, kind = types(), NAME[INTERFACES]
+    if is_whole:
+        names, groups = names[: len(groups)], groups[: len(names)]
+    values = [store.types["control_msgs/msg/InterfaceValue"](each, np.array(of)) for each, of in groups]
+    time = store.types["builtin_interfaces/msg/Time"](stamp_ns // 10**9, stamp_ns % 10**9)
+    message = store.types[kind](store.types["std_msgs/msg/Header"](time, frame), names, values)
+    raw = bytes(store.serialize_cdr(message, kind, little_endian=little))
+    ours = Decoder(BY_INTERFACE).one(raw, INTERFACES)[0]
+    for read in (store.deserialize_cdr(raw, kind), foreign(kind, raw)):
+        fault, value = expected_interface(read)
+        assert FAULTS[ours["fault"]] == FAULTS[fault]
+        assert ours["stamp_ns"] == read.header.stamp.sec * 10**9 + read.header.stamp.nanosec == stamp_ns
+        assert ours["kind"] == TORQUE
+        assert same(ours["torque_nm"], value)
+    short = Decoder(BY_INTERFACE).one(raw[: max(0, len(raw) - cut)], INTERFACES)[0]
+    assert short["fault"] == UNDECODABLE
+    assert math.isnan(short["torque_nm"])
 
 
 @given(number=numbers, little=st.booleans())

@@ -66,6 +66,11 @@ def write(walked: tuple[Samples, Samples], tmp_path: Path) -> Callable[..., Path
                 rows = encode.wrenches(torque["stamp_ns"], torque=axes, frame_id="pelvis")
                 channel = writer.channel("/drive_torque", encode.WRENCH_STAMPED)
                 writer.write_many(channel, torque["stamp_ns"] + TRANSPORT_NS, rows)
+            if source == "interface":
+                there = {"hip": {}, "crank": {"position": 0.0, "effort": values}}
+                rows = encode.dynamic_joint_states(torque["stamp_ns"], there)
+                channel = writer.channel("/dynamic_joint_states", encode.DYNAMIC_JOINT_STATE)
+                writer.write_many(channel, torque["stamp_ns"] + TRANSPORT_NS, rows)
             if source == "float64":
                 channel = writer.channel("/drive_torque", "std_msgs/msg/Float64")
                 head = np.frombuffer(b"\0\1\0\0", np.uint8)
@@ -78,8 +83,10 @@ def write(walked: tuple[Samples, Samples], tmp_path: Path) -> Callable[..., Path
     return bag
 
 
-def replayed(path: Path, source: str) -> Any:
-    return lw.replay(path, attrs.evolve(lw.MonitorConfig(), drive_torque=DriveTorque(source=source)))
+def replayed(path: Path, source: str, **torque: Any) -> Any:
+    return lw.replay(
+        path, attrs.evolve(lw.MonitorConfig(), drive_torque=DriveTorque(source=source, **torque))
+    )
 
 
 @pytest.mark.parametrize("source", TORQUE_SOURCES)
@@ -111,3 +118,13 @@ def test_efforts_that_are_not_one_a_joint_raise_alarms(
     errors = {alarm.name for _, alarm in result.history.changes if alarm.level is Level.ERROR}
     assert "input_samples" in errors
     assert result.monitor.lost.faulty["wrong_length"] == len(walked[0])
+
+
+def test_an_interface_that_is_not_there_is_told_with_those_that_are(write: Callable[..., Path]) -> None:
+    result = replayed(write("interface"), "interface", interface="motor_current")
+    assert {alarm.name for _, alarm in result.history.changes} >= {"input_rate torque"}
+    told = [finding.text for finding in result.findings if "dynamic_joint_states" in finding.text]
+    assert told == [
+        f"{result.crank_samples} messages of dynamic_joint_states: crank has no interface 'motor_current', "
+        "it has effort, position; set drive_torque.interface"
+    ]

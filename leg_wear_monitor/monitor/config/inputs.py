@@ -22,7 +22,7 @@ from leg_wear_monitor.twin.sample import (
 
 LIVE = {"live": True}  # may change while the monitor runs
 
-TORQUE_SOURCES = ("wrench", "float64", "effort")
+TORQUE_SOURCES = ("wrench", "float64", "effort", "interface")
 KNOWN, AT_START = ZEROS = ("known", "at_start")
 
 
@@ -80,6 +80,10 @@ class Crank:
         if self.zero == AT_START and self.offset_rad != 0.0:
             fault = f"{self.offset_rad!r} rad is not used with crank.zero {AT_START!r}, expected 0.0"
             raise FieldError("offset_rad", fault)
+
+
+def _named(name: str) -> str | None:
+    return None if name else "'' is empty, expected a name"
 
 
 def _few_and_different(names: tuple[str, ...]) -> str | None:
@@ -143,8 +147,15 @@ class DriveTorque:
 
     source: str = choice(
         TORQUE_SOURCES,
-        "WrenchStamped or Float64 on drive_torque, or the crank's effort in joint_states",
+        "WrenchStamped or Float64 on drive_torque, the crank's effort in joint_states, or an interface of "
+        "the crank in dynamic_joint_states of ros2_control",
         default="wrench",
+    )
+    interface: str = described(
+        "name of the crank's interface with drive_torque.source interface, such as motor_current; "
+        "drive_torque.scale is then N m per ampere",
+        default="effort",
+        check=_named,
     )
     sampling: str = choice(
         SAMPLINGS,

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.messages import encode
+from leg_wear_monitor.monitor.config.inputs import TORQUE_SOURCES
 from leg_wear_monitor.monitor.config.parameters import config_from
 
 Read = Callable[..., Any]
@@ -94,7 +95,7 @@ def test_times_in_any_unit_are_exact(
     assert np.array_equal(read(tmp_path / "a.csv", config=config)[0]["stamp_ns"], stamps)
 
 
-@pytest.mark.parametrize("source", ["wrench", "float64", "effort"])
+@pytest.mark.parametrize("source", TORQUE_SOURCES)
 def test_a_torque_comes_as_the_parameters_say(read: Read, source: str) -> None:
     config = config_from({"drive_torque.source": source, "drive_torque.axis": "x", "drive_torque.sign": -1})
     columns = {

@@ -42,7 +42,7 @@ WRONG = [
     ("crank.sign", 1.0, ["1.0", "not a whole number"]),
     ("alarms.on_delay_cycles", 0, ["0", "at least 1", "at most 1000"]),
     ("drive_torque.axis", "w", ["'w'", "not one of x, y, z"]),
-    ("drive_torque.source", "odometry", ["'odometry'", "wrench, float64, effort"]),
+    ("drive_torque.source", "odometry", ["'odometry'", "wrench, float64, effort, interface"]),
     ("cadence.commanded_rpm", 5e-324, ["expected a speed of at least 0.1 rpm either way"]),
     ("cadence.commanded_rpm", 1e-9, ["expected a speed of at least 0.1 rpm either way"]),
     ("forecast.clearance_sigma_m", 1e-12, ["not at least 1e-09 m"]),

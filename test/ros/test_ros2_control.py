@@ -1,0 +1,144 @@
+"""The monitor reads a robot on ros2_control, as examples/ros2_control has it; types that no package has."""
+
+import hashlib
+import json
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy")
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.qos import QoSProfile
+from rclpy.serialization import deserialize_message, serialize_message
+from sensor_msgs.msg import JointState
+
+from leg_wear_monitor.messages import encode
+from leg_wear_monitor.messages.streams import definition, types
+from leg_wear_monitor.monitor.config.parameters import load_config
+from leg_wear_monitor.ros import inputs
+from leg_wear_monitor.ros.generated_type import generated_class, type_description
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "ros2_control"
+ME = "/leg_wear_monitor"
+START_NS = 1_700_000_000_000_000_000
+SECONDS = 8.0
+
+
+@pytest.fixture(scope="module")
+def stand_ins() -> Any:
+    """The module of the example."""
+    sys.path.insert(0, str(EXAMPLE))
+    try:
+        import stand_ins as module
+    finally:
+        sys.path.remove(str(EXAMPLE))
+    return module
+
+
+def test_the_leg_on_ros2_control_is_healthy(stage: Any, stand_ins: Any, monkeypatch: Any) -> None:
+    """NaN, another publisher's joints and a sensor that turns with the foot included."""
+    given = load_config(EXAMPLE / "monitor.yaml")
+    torque, load = given.drive_torque, given.foot_load
+    monitor = stage.monitor(
+        crank_joint=given.crank_joint,
+        drive_torque__source=torque.source,
+        drive_torque__interface=torque.interface,
+        drive_torque__scale=torque.scale,
+        drive_torque__gear_ratio=torque.gear_ratio,
+        foot_load__source=load.source,
+        foot_load__frame=load.frame,
+        load__model=given.load.model,
+    )
+    alarms = stage.listen(f"{ME}/alarms", DiagnosticArray, latched=True)
+    robot = stand_ins.Robot(
+        context=stage.node.context,
+        cli_args=["--ros-args", "-r", "foot_sensor_broadcaster:~/wrench:=foot_load"],
+    )
+    for topic in ("joint_states", "dynamic_joint_states", "foot_load"):
+        stage.wait_for(lambda topic=topic: stage.node.count_subscribers(topic) > 0, topic)
+        stage.wait_for(lambda topic=topic: monitor.node.count_publishers(topic) > 0, topic)
+    sent = 0
+    for number in range(1, 1 + round(SECONDS * stand_ins.UPDATE_HZ)):
+        sent += robot.update(number, START_NS)
+        stage.wait_for(lambda sent=sent: monitor.received >= sent, "a message on its way")
+    stage.wait_for(lambda: monitor.waiting == 0, "the monitor to take what it got")
+    stage.wait_for(lambda: bool(alarms), "the alarms")
+    assert [line.name for message in alarms for line in message.status if line.level[0]] == []
+    status = {one.name: one for one in monitor.node.monitor.status()}
+    assert status["input"].values["torque_rate_hz"] == pytest.approx(200.0, rel=0.05)
+    assert status["input"].values["foot_load_rate_hz"] == pytest.approx(200.0, rel=0.05)
+    assert status["torque"].message == "measured as predicted"
+    topics = {one.name: one for one in monitor.node._supervision.statuses(())}["topics"]
+    assert "expected one" not in topics.message
+    for node in robot.nodes:
+        node.destroy_node()
+
+
+def test_joint_states_are_those_of_joint_state_broadcaster(stage: Any, stand_ins: Any) -> None:
+    """As its tests have it: all three fields of each joint of the URDF, NaN for what is not measured."""
+    heard = stage.listen("joint_states", JointState, matched=False)
+    joints = stand_ins.JointStateBroadcaster(context=stage.node.context)
+    states = {"leg_crank": {"position": 1.0, "motor_current": 2.0}, "hip_yaw": {"position": 3.0}}
+    stage.wait_for(lambda: joints.count_subscribers("joint_states") > 0, "a subscriber")
+    stage.wait_for(lambda: heard or joints.update(5_000_000_001, states), "a message")
+    assert heard[0].header.frame_id == "base_link"
+    assert (heard[0].header.stamp.sec, heard[0].header.stamp.nanosec) == (5, 1)
+    assert list(heard[0].name) == ["hip_yaw", "leg_crank"]
+    assert list(heard[0].position) == [3.0, 1.0]
+    assert all(math.isnan(value) for value in [*heard[0].velocity, *heard[0].effort])
+    joints.destroy_node()
+
+
+def test_an_interface_that_is_not_there_is_reported_with_those_that_are() -> None:
+    names = inputs.InterfaceNames("crank", "motor_current")
+    box = inputs.Inbox(inputs.Decoder(load_config(EXAMPLE / "monitor.yaml")), 10)
+    for joint in ("crank", "hip"):
+        raw = encode.dynamic_joint_states([1], {joint: {"effort": 1.0, "position": 2.0}})[0].tobytes()
+        box.add(inputs.INTERFACES, raw, 1)
+        arrivals = box.take(1)
+        names.note(arrivals, box.decoded(arrivals))
+        there = (
+            "crank has no interface 'motor_current', it has effort, position; set drive_torque.interface"
+            if joint == "crank"
+            else "no joint is named 'crank'; there are hip"
+        )
+        assert names.report() == there
+
+
+@pytest.mark.parametrize("name", ["control_msgs/msg/DynamicJointState", "sensor_msgs/msg/JointState"])
+def test_the_description_of_a_type_has_its_hash(name: str) -> None:
+    text = json.dumps(type_description(name))
+    assert definition(name).digest == f"RIHS01_{hashlib.sha256(text.encode()).hexdigest()}"
+
+
+def test_a_generated_type_is_the_type_of_its_package(stage: Any) -> None:
+    """In both directions between a generated type and the package's own, with the same hash in the graph."""
+    name, topic = encode.JOINT_STATE, "generated"
+    generated, message = generated_class(name), JointState(name=["crank"], position=[1.5])
+    raw: list[bytes] = []
+    stage.node.create_subscription(generated, topic, raw.append, QoSProfile(depth=10), raw=True)
+    whole = stage.listen(topic, JointState, matched=False)
+    sender, package = (stage.node.create_publisher(kind, topic, 10) for kind in (generated, JointState))
+    stage.wait_for(lambda: package.get_subscription_count() == sender.get_subscription_count() == 2, "both")
+    sender.publish(serialize_message(message))
+    package.publish(message)
+    stage.wait_for(lambda: len(whole) == len(raw) == 2, "both messages on both subscriptions")
+    assert [deserialize_message(one, JointState) for one in raw] == [message, message] == whole
+    found = stage.node.get_publishers_info_by_topic(topic)
+    assert {(one.topic_type, str(one.topic_type_hash)) for one in found} == {(name, definition(name).digest)}
+
+
+def test_the_stand_ins_interfaces_are_read_by_the_library(stand_ins: Any) -> None:
+    states = stand_ins.Hardware().read(0.5)
+    message: Any = types().deserialize_cdr(
+        encode.dynamic_joint_states([7], states)[0].tobytes(), encode.DYNAMIC_JOINT_STATE
+    )
+    assert message.joint_names == list(stand_ins.INTERFACES)
+    for joint, of in zip(message.joint_names, message.interface_values, strict=True):
+        assert of.interface_names == list(stand_ins.INTERFACES[joint])
+        assert np.isfinite(of.values).all()

@@ -1,5 +1,5 @@
 # `make test` and `make demo` do all the set-up themselves, once: Python 3.11 to 3.13 with venv and a C compiler are enough.
-.PHONY: test test-slow test-slow-in-turn test-machines test-machine-in-turn lint kernels test-oldest test-oldest-quick package colcon docs tables docs-check demo campaign lock sbom clean
+.PHONY: test test-slow test-slow-in-turn test-machines test-machine-in-turn test-without-ros lint kernels test-oldest test-oldest-quick package colcon docs tables docs-check demo campaign lock sbom release clean
 .DELETE_ON_ERROR:
 
 # Percent of lines and branches that the two runs of the tests reach together.
@@ -9,6 +9,9 @@ COVERAGE_MIN ?= 90
 # compiled ones: it is done by `make test COVERAGE=1`, and by CI for one commit of four.
 MEASURED := $(COVERAGE)
 STEPS := $(if $(MEASURED),3,2)
+
+# Of these, the first that there is makes the environments; the oldest libraries have no wheels for the newest one.
+PYTHONS ?= python3.13 python3.12 python3.11 python3
 
 # Two files of tests at a time: more would compile the same kernels more often than they save.
 TWO := --numprocesses 2 --dist loadfile
@@ -84,6 +87,10 @@ demo: .venv/installed
 campaign: .venv/installed
 	PYTHONPATH=test .venv/bin/python -m campaign
 
+# With the libraries of `make test`, but without ROS, whose wheels are for x86-64 only.
+test-without-ros: .venv-without-ros/installed
+	.venv-without-ros/bin/python -m pytest $(TWO) $(IN_ORDER) -m "not slow and not uncompiled"
+
 # The oldest libraries we support, without ROS; their deprecations are not ours to mend.
 test-oldest: .venv-oldest/installed
 	.venv-oldest/bin/python -m pytest $(TWO) -W default
@@ -131,11 +138,11 @@ test-oldest-quick: .venv-oldest/installed
 		test/contact test/messages test/monitor
 
 clean:
-	rm -rf .venv .venv-python* .venv-oldest .venv-tools .venv-docs build dist docs/lessons *.egg-info .coverage .hypothesis .import_linter_cache .*_cache
+	rm -rf .venv .venv-python* .venv-oldest .venv-without-ros .venv-tools .venv-docs build dist docs/lessons *.egg-info .coverage .hypothesis .import_linter_cache .*_cache
 
 # What the packages are built with comes first: without build isolation, which would fetch a setuptools that nothing pins.
 .venv/installed: setup.cfg setup.py package.xml requirements-build.lock requirements.lock
-	$(call environment,python3.13 python3.12 python3.11 python3)
+	$(call environment,$(PYTHONS))
 	$(call locked,requirements-build.lock)
 	$(call locked,requirements.lock)
 	$(@D)/bin/python -m pip install $(QUICKLY) --no-deps --no-build-isolation --editable .
@@ -148,20 +155,22 @@ clean:
 	$(@D)/bin/python -m pip install $(QUICKLY) --no-deps --no-build-isolation --editable .
 	@touch $@
 
-# The oldest ones differ from Python to Python: pinned, without hashes.
-.venv-oldest/installed: setup.cfg setup.py package.xml constraints-oldest.txt
-	$(call environment,python3.12 python3.11 python3)
-	$(@D)/bin/python -m pip install $(QUICKLY) --constraint constraints-oldest.txt setuptools wheel
-	$(@D)/bin/python -m pip install $(QUICKLY) --constraint constraints-oldest.txt --no-build-isolation --editable ".[bags,test]"
+# Without ROS, and without hashes: the oldest ones differ from Python to Python.
+.venv-oldest/installed: CONSTRAINTS := constraints-oldest.txt
+.venv-without-ros/installed: CONSTRAINTS := constraints.txt
+.venv-oldest/installed .venv-without-ros/installed: setup.cfg setup.py package.xml constraints-oldest.txt constraints.txt
+	$(call environment,$(if $(filter .venv-oldest,$(@D)),$(filter-out python3.13,$(PYTHONS)),$(PYTHONS)))
+	$(@D)/bin/python -m pip install $(QUICKLY) --constraint $(CONSTRAINTS) setuptools wheel
+	$(@D)/bin/python -m pip install $(QUICKLY) --constraint $(CONSTRAINTS) --no-build-isolation --editable ".[bags,test]"
 	@touch $@
 
 .venv-docs/installed: requirements-docs.lock
-	$(call environment,python3.13 python3.12 python3.11 python3)
+	$(call environment,$(PYTHONS))
 	$(call locked,requirements-docs.lock)
 	@touch $@
 
 .venv-tools/installed: requirements-build.lock requirements-tools.lock
-	$(call environment,python3.13 python3.12 python3.11 python3)
+	$(call environment,$(PYTHONS))
 	$(call locked,requirements-build.lock)
 	$(call locked,requirements-tools.lock)
 	@touch $@
@@ -179,6 +188,20 @@ sbom: .venv/installed .venv-tools/installed
 	@mkdir -p build
 	.venv-tools/bin/cyclonedx-py environment --spec-version 1.6 --output-format JSON --output-reproducible --validate \
 		--output-file build/sbom.cdx.json .venv/bin/python
+
+# What a release has, in dist/: wheel, sdist, bill of materials and checksums; its notes, of the changelog, are beside it.
+# With TAG, the version and the heading in the changelog must be that of the tag.
+VERSION = $(shell sed --quiet 's|.*<version>\(.*\)</version>.*|\1|p' package.xml)
+TAG ?= $(VERSION)
+release: package sbom
+	@test "$(TAG)" = "$(VERSION)" || { echo "The tag is $(TAG), the version in package.xml $(VERSION)" >&2; exit 1; }
+	awk '/^[0-9]+\.[0-9]+\.[0-9]+ \(/ {inside = $$1 == "$(TAG)"; getline; next} inside' CHANGELOG.rst >build/release_notes.rst
+	@test -s build/release_notes.rst || { echo "CHANGELOG.rst has no section $(TAG) (YYYY-MM-DD)" >&2; exit 1; }
+	rm -rf dist build/of_sdist
+	.venv/bin/python -c 'from setuptools import build_meta; build_meta.build_sdist("dist")'
+	.venv/bin/python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir build/of_sdist dist/*.tar.gz
+	cp build/wheel/*.whl build/sbom.cdx.json dist
+	cd dist && sha256sum -- * >SHA256SUMS
 
 TOOLS := codespell colcon-core colcon-package-selection colcon-python-setup-py colcon-recursive-crawl colcon-ros \
 	colcon-test-result 'cyclonedx-bom[validation]' uv

@@ -2,12 +2,10 @@
 
 import heapq
 import math
-import struct
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from itertools import repeat
 from pathlib import Path
-from typing import Any
 
 import attrs
 import numpy as np
@@ -39,9 +37,8 @@ from leg_wear_monitor.bags.table_layout import (
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.messages.cdr import ENCAPSULATION, Clocks, Decoder, mark_zero_stamps
-from leg_wear_monitor.messages.encode import DYNAMIC_JOINT_STATE
-from leg_wear_monitor.messages.streams import JOINT_STATE, types
+from leg_wear_monitor.messages.cdr import Clocks, Decoder, mark_zero_stamps, names_in, without_interface
+from leg_wear_monitor.messages.streams import JOINT_STATE
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, MISSING_JOINT, NO_FAULT, NOT_FINITE, ZERO_STAMP, Samples
@@ -229,37 +226,6 @@ class JointNames:
             text = f"joint {self._crank} {text}; {counts.found} have it"
             findings.append(Finding(path, text, Severity.NOTE))
         return findings
-
-
-def names_in(raw: bytes) -> list[str]:
-    """Joint names in a sensor_msgs/JointState message that has been decoded successfully."""
-    order = "<" if raw[1] else ">"
-    body, names = raw[ENCAPSULATION:], []
-    _, at = _text(body, 8, order)
-    count, at = _count(body, at, order)
-    for _ in range(count):
-        text, at = _text(body, at, order)
-        names.append(text.rstrip(b"\0").decode("utf-8", "replace"))
-    return names
-
-
-def without_interface(raw: bytes, joint: str, interface: str) -> str:
-    """Report on a control_msgs/DynamicJointState message, decoded successfully, that lacks an interface."""
-    message: Any = types().deserialize_cdr(raw, DYNAMIC_JOINT_STATE)
-    if joint not in message.joint_names:
-        return f"no joint is named {joint!r}; there are {listed(message.joint_names)}"
-    there = message.interface_values[message.joint_names.index(joint)].interface_names
-    return f"{joint} has no interface {interface!r}, it has {listed(there)}; set drive_torque.interface"
-
-
-def _count(body: bytes, at: int, order: str) -> tuple[int, int]:
-    at += -at % 4
-    return struct.unpack_from(f"{order}I", body, at)[0], at + 4
-
-
-def _text(body: bytes, at: int, order: str) -> tuple[bytes, int]:
-    size, at = _count(body, at, order)
-    return body[at : at + size], at + size
 
 
 # Pauses between recordings that are replayed together: time without recording, not an input fault.

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from leg_wear_monitor.bags.bag import Recordable, Role, Source, check_channel, find_files, open_sources
 from leg_wear_monitor.bags.findings import Budget, Finding, RecordingError, Severity
 from leg_wear_monitor.bags.mcap_layout import Channel
-from leg_wear_monitor.bags.reader import names_in
 from leg_wear_monitor.estimate.torque_model import Series, series
 from leg_wear_monitor.messages import outputs
-from leg_wear_monitor.messages.cdr import Decoder
+from leg_wear_monitor.messages.cdr import Decoder, names_in
 from leg_wear_monitor.messages.streams import INTERFACES, JOINT_STATE, STREAMS, WRENCH_STAMPED, Stream
 from leg_wear_monitor.monitor.config.inputs import DriveTorque
 from leg_wear_monitor.monitor.config.settings import MonitorConfig

@@ -5,16 +5,18 @@
 
 from collections.abc import Iterator
 from functools import cache
+from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
 from numpy.typing import NDArray
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from rosbags.typesys.store import Typestore
 
 from leg_wear_monitor.monitor.forecast.forecast import Answer
 from leg_wear_monitor.monitor.reports import CycleReport, Reports
 from leg_wear_monitor.twin import CRANK, LOAD, TORQUE
+
+if TYPE_CHECKING:
+    from rosbags.typesys.store import Typestore
 
 JOINT_STATE, WRENCH_STAMPED, FLOAT64, LOAD_WRENCH, LOAD_FLOAT64, CONTACT, INTERFACES = range(1, 8)
 
@@ -245,8 +247,11 @@ _FURTHER = {
 
 
 @cache
-def types() -> Typestore:
+def types() -> "Typestore":
     """Types of ROS 2 Jazzy, and those of ros2_control that are read."""
+    # recordings need them; a node without one does without rosbags, which no ROS package has
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
     store = get_typestore(Stores.ROS2_JAZZY)
     for name, text in _FURTHER.items():
         store.register(get_types_from_msg(text, name))

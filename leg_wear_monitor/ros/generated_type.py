@@ -13,7 +13,6 @@ from typing import Any
 
 import attrs
 from rclpy.utilities import get_rmw_implementation_identifier
-from rosbags.interfaces import Nodetype
 
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.messages.streams import definition, types
@@ -166,9 +165,9 @@ def _parts(name: str) -> list[_Part]:
     parts, fields = [], types().fielddefs[name][1]
     content: Any
     for field, (node, content) in fields:
-        is_sequence = node is Nodetype.SEQUENCE
+        is_sequence = node.name == "SEQUENCE"
         kind, base = content[0] if is_sequence else (node, content)
-        nested = str(base) if kind is Nodetype.NAME else ""
+        nested = str(base) if kind.name == "NAME" else ""
         parts.append(_Part(field, _NESTED if nested else str(base[0]), nested, is_sequence))
     return parts
 

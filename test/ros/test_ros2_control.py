@@ -3,6 +3,7 @@
 import hashlib
 import json
 import math
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -142,3 +143,13 @@ def test_the_stand_ins_interfaces_are_read_by_the_library(stand_ins: Any) -> Non
     for joint, of in zip(message.joint_names, message.interface_values, strict=True):
         assert of.interface_names == list(stand_ins.INTERFACES[joint])
         assert np.isfinite(of.values).all()
+
+
+def test_a_node_needs_no_library_that_no_ros_package_has() -> None:
+    """Without a recording: Ubuntu has packages for all others."""
+    only_of_recordings = ("apsw", "loky", "lz4", "mcap", "rosbags", "zstandard")
+    text = (
+        f"import sys; sys.modules.update(dict.fromkeys({only_of_recordings}))\n"
+        "import leg_wear_monitor.ros.gait_publisher, leg_wear_monitor.ros.monitor_node"
+    )
+    subprocess.run([sys.executable, "-c", text], check=True, cwd=Path(__file__).parents[2])

@@ -8,6 +8,7 @@ from pathlib import PurePosixPath
 from typing import Any
 
 PAGES = {
+    "CODE_OF_CONDUCT.md": "project/conduct",
     "CONTRIBUTING.md": "project/contributing",
     "QUALITY_DECLARATION.md": "project/quality",
     "SECURITY.md": "project/security",

@@ -28,7 +28,17 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/leg_wear_monitor"]),
         # These pages name files below docs/, and each other.
-        (FRACTION, ["CODE_OF_CONDUCT.md", "CONTRIBUTING.md", "QUALITY_DECLARATION.md", "README.md", "SECURITY.md", "package.xml"]),
+        (
+            FRACTION,
+            [
+                "CODE_OF_CONDUCT.md",
+                "CONTRIBUTING.md",
+                "QUALITY_DECLARATION.md",
+                "README.md",
+                "SECURITY.md",
+                "package.xml",
+            ],
+        ),
         *share_files(),
     ],
 )

@@ -229,8 +229,12 @@ def test_an_impact_beyond_the_limit_raises_its_alarm_within_a_gait_cycle(stage) 
     pace = PaceConfig(times_s=(0.0, 3.0), speeds_rpm=(60.0, 80.0))
     walk = stage.walk(PublisherConfig(duration_s=5.5, pace=pace))
     limit = 7000.0
+    # commanded at the faster cadence: above the commanded one, the limits of impacts grow with it
     monitor = stage.monitor(
-        limits__impact_force_n=limit, limits__warn_fraction=1.0, cadence__tolerance_rpm=50.0
+        limits__impact_force_n=limit,
+        limits__warn_fraction=1.0,
+        cadence__commanded_rpm=80.0,
+        cadence__tolerance_rpm=50.0,
     )
     alarms = stage.listen(f"{ME}/alarms", DiagnosticArray, latched=True)
     peaks = stage.listen(f"{ME}/clearance_states", JointState)

@@ -78,7 +78,7 @@ lint: .venv/installed
 	.venv/bin/lint-imports --no-logo
 
 kernels: .venv/installed
-	.venv/bin/python test/compile_kernels.py
+	.venv/bin/leg-wear-monitor cache --fill
 
 demo: .venv/installed
 	.venv/bin/leg-wear-monitor demo --out build/demo

@@ -402,6 +402,11 @@ def compilation(*kernels: str, how_long: str = "about half a minute") -> Iterato
     what = f"compiling numerical kernels (once per installation, {how_long})"
     with _shown(what) if sys.stderr.isatty() else _said_by_the_compiler(what):
         yield
+    mark_compiled(kernels)
+
+
+def mark_compiled(kernels: Iterable[str]) -> None:
+    """Note that sets of kernels were compiled to their end."""
     for mark in map(_mark, kernels):
         if mark is not None:
             with suppress(FileNotFoundError):  # `cache --clear` meanwhile: then it is to be compiled again

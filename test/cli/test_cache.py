@@ -1,11 +1,20 @@
 """``leg-wear-monitor cache``: what is kept, and nothing of it afterwards."""
 
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
 
-from leg_wear_monitor.cli.common import compilation
+from leg_wear_monitor.cli import kernels
+from leg_wear_monitor.cli.common import compilation, is_compiled
 from leg_wear_monitor.compiled import cache, kernel
 
 pytestmark = pytest.mark.plain
+
+
+def nothing() -> None:
+    """A job that is done at once."""
 
 
 @pytest.fixture
@@ -50,6 +59,24 @@ def test_nothing_is_removed_where_no_place_is_safe(run, monkeypatch):
     result = run("cache", "--clear")
     assert result.exit_code == 2
     assert result.stderr == "error: no directory is safe for compiled code, so it is not stored\n"
+
+
+def test_what_was_filled_is_not_compiled_again(run, place, monkeypatch):
+    monkeypatch.setattr(kernels, "_JOBS", (nothing, nothing))
+    result = run("cache", "--fill")
+    assert result.exit_code == 0
+    assert result.stdout.startswith(f"place: {place}\ntotal: ")
+    assert all(is_compiled(one) for one in kernels.SETS)
+    assert run("cache", "--fill", "--clear").exit_code == 2
+
+
+@pytest.mark.slow
+def test_after_a_fill_nothing_is_compiled(run, place):
+    assert run("cache", "--fill").exit_code == 0
+    line = "import leg_wear_monitor.cli.kernels as kernels; [job() for job in kernels._JOBS]"
+    before = sorted(file for file in place.rglob("*.nbc"))
+    subprocess.run([sys.executable, "-c", line], check=True, cwd=Path(__file__).parents[2])
+    assert before and sorted(file for file in place.rglob("*.nbc")) == before
 
 
 def test_a_run_ends_well_while_the_cache_is_cleared(place, run):

@@ -19,6 +19,8 @@ from leg_wear_monitor.cli.common import (
     compilation,
     is_compiled,
     json_option,
+    mark_compiled,
+    progress_bar,
     sourced_lines,
     warn_of,
     write_json,
@@ -339,10 +341,13 @@ def _in_full(pair: "Material") -> list[str]:
 _MOST = 20  # directories that are listed: one version has about ten
 
 
-@click.command(short_help="List or remove the compiled code on this machine.")
+@click.command(short_help="List, fill or remove the compiled code on this machine.")
+@click.option("--fill", is_flag=True, help="Compile now what the first start would: about two minutes.")
 @click.option("--clear", is_flag=True, help="Remove it; the next start compiles again.")
-def cache(clear: bool) -> None:
-    """Print the place and the size of the compiled code, by version; or remove it.
+def cache(fill: bool, clear: bool) -> None:
+    """Print the place and the size of the compiled code, by version; or remove it, or compile it ahead.
+
+    After `--fill` the first simulation, replay and start of a node are as fast as later ones.
 
     Each change of the source makes a new version. The two versions that were used last are kept, and all
     versions that were used within a day.
@@ -350,9 +355,16 @@ def cache(clear: bool) -> None:
     from leg_wear_monitor.compiled.cache import kept_directories
     from leg_wear_monitor.compiled.kernel import cache_directory
 
+    if fill and clear:
+        raise click.UsageError("--fill and --clear: one at a time")
     here = cache_directory()
     if here is None:
         raise LegWearError("no directory is safe for compiled code, so it is not stored")
+    if fill:
+        from leg_wear_monitor.cli import kernels
+
+        kernels.compile_all(progress_bar("compiling numerical kernels (once per installation)"))
+        mark_compiled(kernels.SETS)
     kept = kept_directories(here.parent)
     click.echo(f"place: {here.parent}")
     if clear:

@@ -1,4 +1,4 @@
-"""Kernels that are compiled ahead of their first use: by ``cache --fill``, before the tests, in a container."""
+"""Kernels compiled ahead of their first use: by ``cache --fill``, before the tests, in a container."""
 
 import itertools
 import multiprocessing

@@ -26,6 +26,7 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.ledger.entry import JointWear
 from leg_wear_monitor.monitor.reports import Reports, Status
 from leg_wear_monitor.monitor.resets import wear_words
+from leg_wear_monitor.monitor.verdict.verdict import State
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor, open_monitor
 from leg_wear_monitor.ros.health import Load, load_status, recording_status
 from leg_wear_monitor.ros.inputs import Due, Inbox, InputTopic, subscribe
@@ -212,7 +213,8 @@ class MonitorNode(ClosingNode):
         self._load = Load()
         self._epochs = Epochs(self._monitor, boot_id(), self._ros_now_ns, self._report)
         self._messages = Messages(config, self._monitor.clearance_joints, self.get_fully_qualified_name())
-        self._black_box = BlackBox(config.record.path)
+        self._is_stop = self._monitor.verdict.verdict.state is State.STOP  # of the ledger: not a new one
+        self._black_box = BlackBox(config.record.path, config.record.stops)
         self._outlets = Outlets(self, self._messages.outputs, self._black_box)
         self._forecasts = ForecastTimes()
         self._compile(decoder)
@@ -289,7 +291,7 @@ class MonitorNode(ClosingNode):
             return
         coarse = self._load.note(self._inbox.delay_s(time.time_ns()))
         arrivals = self._inbox.take(_AT_ONCE)
-        if self._black_box.on:
+        if self._black_box.takes_inputs:
             names = {topic.stream.code: topic.name for topic, _ in self._inputs}
             for arrival in arrivals:
                 self._black_box.write(names[arrival.kind], arrival.log_time_ns, arrival.raw)
@@ -315,6 +317,10 @@ class MonitorNode(ClosingNode):
                 self._load.unpublished += len(outgoing.stamp_ns)
             elif self._outlets.wanted(outgoing.output):
                 self._outlets.send_many(outgoing.output, now_ns, outgoing.messages)
+        for verdict in reports.verdicts:
+            was_stop, self._is_stop = self._is_stop, verdict.verdict.state is State.STOP
+            if self._is_stop and not was_stop:
+                self._black_box.stop(now_ns)
         for cycle in self._forecasts.due(reports):
             self._outlets.send(outputs.FORECAST, now_ns, self._messages.forecast(cycle))
 

@@ -1,9 +1,12 @@
 """Outputs of the node: topics, markers, and the recording of all of them."""
 
 import time
+from collections import deque
 from collections.abc import Callable, Iterable
 from contextlib import suppress
+from datetime import UTC, datetime
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,6 +35,80 @@ if TYPE_CHECKING:
     from leg_wear_monitor.bags.mcap_writer import McapWriter
 
 
+# The seconds around a STOP, in a recording of their own.
+
+
+_BEFORE_NS, _AFTER_NS = 30_000_000_000, 10_000_000_000
+
+
+class StopRecorder:
+    """Keeps the messages of the last 30 s in memory, and writes them and those of the next 10 s at a STOP.
+
+    Parameters
+    ----------
+    directory : str
+        Where the files go, one for each STOP, named by the computer's time (UTC).
+
+    Raises
+    ------
+    LegWearError
+        If the directory cannot be made; later, if a file cannot be written.
+    """
+
+    def __init__(self, directory: str) -> None:
+        self._directory = Path(directory)
+        try:
+            self._directory.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise LegWearError(f"record.stops: {directory} cannot be made: {error.strerror}") from error
+        self._kept: deque[tuple[int, str, bytes | NDArray[np.uint8]]] = deque()
+        self._topics: dict[str, tuple[str, Qos]] = {}
+        self._writer: McapWriter | None = None
+        self._channels: dict[str, int] = {}
+        self._until_ns = 0
+
+    def add_topic(self, topic: str, kind: str, qos: Qos) -> None:
+        """Register a topic by its full name and type."""
+        self._topics[topic] = kind, qos
+
+    def keep(self, topic: str, log_time_ns: int, raw: bytes | NDArray[np.uint8]) -> None:
+        """Keep a message, or several of equal length (n, bytes)."""
+        if self._writer is not None and log_time_ns > self._until_ns:
+            self.close()
+        self._kept.append((log_time_ns, topic, raw))
+        # also what a clock that was set back has left in the future
+        while not log_time_ns - _BEFORE_NS <= self._kept[0][0] <= log_time_ns:
+            self._kept.popleft()
+        if self._writer is not None:
+            self._write(log_time_ns, topic, raw)
+
+    def stop(self, now_ns: int) -> None:
+        """Begin a file with what is kept; while one is being written, there is no other."""
+        if self._writer is not None:
+            return
+        at = datetime.fromtimestamp(now_ns * 1.0e-9, UTC).strftime("%Y%m%dT%H%M%SZ")
+        self._writer = _writer(str(self._directory / f"stop-{at}.mcap"))
+        self._channels = {name: self._writer.channel(name, *spec) for name, spec in self._topics.items()}
+        self._until_ns = now_ns + _AFTER_NS
+        for kept in self._kept:
+            self._write(*kept)
+
+    def close(self) -> None:
+        """Finish the file that is being written."""
+        writer, self._writer = self._writer, None
+        if writer is not None:
+            writer.close()
+
+    def _write(self, log_time_ns: int, topic: str, raw: bytes | NDArray[np.uint8]) -> None:
+        if self._writer is None:
+            return
+        if isinstance(raw, bytes):
+            self._writer.write(self._channels[topic], log_time_ns, raw)
+        else:
+            stamps = np.full(len(raw), log_time_ns, np.int64)
+            self._writer.write_many(self._channels[topic], stamps, raw)
+
+
 # MCAP recording of all messages the node receives and publishes; its replay reproduces the live run.
 
 
@@ -42,6 +119,8 @@ class BlackBox:
     ----------
     path : str
         MCAP file; empty disables the recording.
+    stops : str
+        Directory for recordings of the seconds around a STOP; empty for none.
 
     Attributes
     ----------
@@ -53,26 +132,35 @@ class BlackBox:
     Raises
     ------
     LegWearError
-        If the file cannot be created.
+        If the file, or the directory, cannot be created.
     """
 
-    def __init__(self, path: str) -> None:
+    def __init__(self, path: str, stops: str = "") -> None:
         self.fault, self.recorded = "", 0
+        self._stops = StopRecorder(stops) if stops else None
         self._writer = _writer(path) if path else None
         self._channels: dict[str, int] = {}
 
     @property
     def on(self) -> bool:
-        """Whether messages are recorded."""
+        """Whether all messages are recorded, also those that nobody subscribes to."""
         return self._writer is not None
+
+    @property
+    def takes_inputs(self) -> bool:
+        """Whether received messages are recorded, or kept for a STOP."""
+        return self.on or self._stops is not None
 
     def add_topic(self, topic: str, kind: str, qos: "Qos") -> None:
         """Register a topic by its full name and type."""
+        if self._stops is not None:
+            self._stops.add_topic(topic, kind, qos)
         if self._writer is not None:
             self._channels[topic] = self._writer.channel(topic, kind, qos)
 
     def write(self, topic: str, log_time_ns: int, raw: bytes) -> None:
         """Record a message."""
+        self._keep(topic, log_time_ns, raw)
         if self._writer is None:
             return
         try:
@@ -83,6 +171,7 @@ class BlackBox:
 
     def write_many(self, topic: str, log_time_ns: int, rows: NDArray[np.uint8]) -> None:
         """Record messages of equal length, (n, bytes)."""
+        self._keep(topic, log_time_ns, rows)
         if self._writer is None:
             return
         try:
@@ -91,6 +180,14 @@ class BlackBox:
             self.recorded += len(rows)
         except LegWearError as error:
             self._fail(error)
+
+    def stop(self, now_ns: int) -> None:
+        """Write the seconds around a STOP, where that is asked for."""
+        if self._stops is not None:
+            try:
+                self._stops.stop(now_ns)
+            except LegWearError as error:
+                self._fail_stops(error)
 
     def flush(self) -> None:
         """Write buffered messages to the disk."""
@@ -101,13 +198,29 @@ class BlackBox:
                 self._fail(error)
 
     def close(self) -> None:
-        """Finish the file."""
+        """Finish the files."""
+        if self._stops is not None:
+            try:
+                self._stops.close()
+            except LegWearError as error:
+                self._fail_stops(error)
         if self._writer is not None:
             try:
                 self._writer.close()
             except LegWearError as error:
                 self._fail(error)
             self._writer = None
+
+    def _keep(self, topic: str, log_time_ns: int, raw: bytes | NDArray[np.uint8]) -> None:
+        if self._stops is not None:
+            try:
+                self._stops.keep(topic, log_time_ns, raw)
+            except LegWearError as error:
+                self._fail_stops(error)
+
+    def _fail_stops(self, error: LegWearError) -> None:
+        """Keep nothing more for a STOP: a disk failure must not stop the monitor."""
+        self.fault, self._stops = str(error), None
 
     def _fail(self, error: LegWearError) -> None:
         """Stop recording: written data stay readable, and a disk failure must not stop the monitor."""

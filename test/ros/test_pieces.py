@@ -13,6 +13,7 @@ pytest.importorskip("rclpy")
 from mcap.reader import make_reader
 from rclpy.serialization import serialize_message
 
+from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.gait.sensors import Reading
 from leg_wear_monitor.messages.cdr import Decoder
 from leg_wear_monitor.messages.streams import JOINT_STATE, SENSOR_DATA, STREAMS, WRENCH_STAMPED
@@ -231,6 +232,54 @@ def test_a_full_disk_ends_the_recording_and_not_the_node(tmp_path: Path) -> None
     box.write("/a", 2, b"two")
     box.close()
     assert not box.on
+
+
+SECOND = 10**9
+
+
+def test_the_seconds_around_a_stop_are_kept(tmp_path: Path) -> None:
+    """30 s before and 10 s after; a second stop meanwhile begins no file, one after it does."""
+    box = BlackBox("", str(tmp_path / "stops"))
+    box.add_topic("/a", "sensor_msgs/msg/JointState", SENSOR_DATA)
+    box.add_topic("/b", "sensor_msgs/msg/JointState", SENSOR_DATA)
+    for second in range(100):
+        box.write("/a", second * SECOND, f"{second}".encode())
+        if second in (50, 55, 80):
+            box.write_many("/b", second * SECOND, np.frombuffer(b"onetwo", np.uint8).reshape(2, 3))
+            box.stop(second * SECOND)
+    box.close()
+    assert not box.on and box.takes_inputs
+    files = sorted((tmp_path / "stops").iterdir())
+    assert [file.name for file in files] == ["stop-19700101T000050Z.mcap", "stop-19700101T000120Z.mcap"]
+    for file, at in zip(files, (50, 80), strict=True):
+        with file.open("rb") as stream:
+            found = [(c.topic, m.data) for _, c, m in make_reader(stream).iter_messages()]
+        assert [data for topic, data in found if topic == "/a"] == [
+            f"{second}".encode() for second in range(at - 30, at + 11)
+        ]
+        assert [data for topic, data in found if topic == "/b"][:2] == [b"one", b"two"]
+
+
+def test_a_clock_that_is_set_back_fills_no_memory(tmp_path: Path) -> None:
+    box = BlackBox("", str(tmp_path))
+    box.add_topic("/a", "sensor_msgs/msg/JointState", SENSOR_DATA)
+    for second in (*range(1000, 1020), *range(100)):
+        box.write("/a", second * SECOND, b"")
+    assert len(box._stops._kept) == 31
+
+
+def test_stops_that_cannot_be_written_are_told_and_end_nothing(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(LegWearError, match=r"record\.stops: "):
+        BlackBox("", str(tmp_path / "file" / "stops"))
+    box = BlackBox("", str(tmp_path / "stops"))
+    box.add_topic("/a", "sensor_msgs/msg/JointState", SENSOR_DATA)
+    (tmp_path / "stops").rmdir()
+    box.write("/a", SECOND, b"one")
+    box.stop(SECOND)
+    assert recording_status(box).level is Level.ERROR
+    box.write("/a", 2 * SECOND, b"two")
+    box.close()
 
 
 def test_no_path_no_recording() -> None:

@@ -191,6 +191,10 @@ class Record:
     """A recording of what the node receives and publishes."""
 
     path: str = described("MCAP file to write; empty: none", default="")
+    stops: str = described(
+        "directory for MCAP files of the 30 s before and 10 s after each stop verdict; empty: none",
+        default="",
+    )
 
 
 @attrs.frozen(kw_only=True)

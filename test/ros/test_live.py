@@ -17,7 +17,7 @@ from ruamel.yaml import YAML
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import MarkerArray
 
-from leg_wear_monitor import load_mechanism
+from leg_wear_monitor import load_mechanism, replay
 from leg_wear_monitor.bags.reader import Recording
 from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.gait.config import (
@@ -33,6 +33,7 @@ from leg_wear_monitor.messages.leg_markers import LegMarkers
 from leg_wear_monitor.messages.outputs import Messages
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.verdict.verdict import State
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.ros.gait_publisher import PublisherConfig
 
@@ -206,6 +207,20 @@ def test_a_publisher_that_does_not_fit_is_told_of(stage, walk) -> None:
     stage.wait_for(told, "a line about reliability")
     assert levels(heard[-1])["topics"] == 2
     assert monitor.received == 0
+
+
+def test_the_seconds_before_a_stop_are_kept_and_replay_to_it(stage, walk, tmp_path) -> None:
+    limits = {"limits__clearance_m": 3.02e-4, **FAST}
+    monitor = stage.monitor(record__stops=str(tmp_path / "stops"), **limits)
+    verdicts = stage.listen(f"{ME}/verdict", DiagnosticArray, latched=True)
+    stage.legs().play(walk, monitor)
+    stage.wait_for(lambda: any("stop" in one.status[0].message for one in verdicts), "a verdict")
+    monitor.stop()
+    (kept,) = (tmp_path / "stops").iterdir()
+    replayed = replay([kept], config=config_from(dotted(limits)))
+    verdict = replayed.summary().verdict
+    assert verdict.state is State.STOP
+    assert verdict.joints == ("A",)
 
 
 @pytest.mark.slow  # monitor/test_wear_monitor.py holds it without ROS

@@ -35,7 +35,7 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.inputs import Cadence
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.reports import CycleReport
-from leg_wear_monitor.monitor.verdict.verdict import Verdict
+from leg_wear_monitor.state import Verdict
 from leg_wear_monitor.twin.sample import gait_samples
 
 NOISE_RAD, NOISE_NM = 1.0e-3, 0.5

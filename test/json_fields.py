@@ -14,11 +14,13 @@ import numpy as np
 # What names the entries of a mapping; joints do, unless a mapping is here.
 KEYS = {
     "topics": "topic", "faulty": "fault", "made_with": "program", "values": "key", "bodies_m": "body",
-    "counts": "state", "standard_error": "field", "lowest": "column", "highest": "column",
+    "counts": "state", "cycles_not_used": "reason",
+    "standard_error": "field", "lowest": "column", "highest": "column",
 }  # fmt: skip
 UNITS = {
     "m": "m", "mps": "m/s", "mps2": "m/s²", "n": "N", "nm": "N m", "j": "J", "s": "s", "ns": "ns", "h": "h",
     "hours": "h", "days": "d", "rad": "rad", "deg": "°", "rpm": "rpm", "cycles": "gait cycles",
+    "nms": "N m s", "hz": "Hz",
 }  # fmt: skip
 PLAIN = {str: "text", bool: "true or false", int: "whole number", float: "number"}
 

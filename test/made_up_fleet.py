@@ -13,8 +13,7 @@ from leg_wear_monitor.fleet.overview import (
     first_of,
 )
 from leg_wear_monitor.monitor.alarms import ADVICE
-from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure, State, Verdict
-from leg_wear_monitor.playback.result import JointClearance, LifeHours
+from leg_wear_monitor.state import Evidence, Figure, JointClearance, LifeHours, State, Verdict
 
 NOW_NS = 1_795_000_000 * 10**9
 DAY_NS = 86_400 * 10**9

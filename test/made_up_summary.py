@@ -14,15 +14,12 @@ from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, Qu
 from leg_wear_monitor.monitor.forecast.wear_coefficients import CoefficientPrior
 from leg_wear_monitor.monitor.ledger.entry import Measurement, WalkedLoad
 from leg_wear_monitor.monitor.reports import Lost
-from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure, State, Verdict
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS
 from leg_wear_monitor.playback.result import (
     AlarmChange,
     ClearanceChange,
-    JointClearance,
     LegJoint,
     LegLife,
-    LifeHours,
     ReplayAlarm,
     ReplayAlarms,
     ReplayFinding,
@@ -37,8 +34,49 @@ from leg_wear_monitor.playback.result import (
     SeenClearance,
     WornDepth,
 )
+from leg_wear_monitor.state import (
+    Drive,
+    Estimate,
+    Evidence,
+    Figure,
+    JointClearance,
+    LegState,
+    LifeHours,
+    State,
+    TorqueDiagnosis,
+    Verdict,
+)
 
 LIFE = Quantiles(1.0, 2.0, 3.0)
+
+
+def made_up_state() -> LegState:
+    """Joint A as encoders show it and with a remaining life; joint B with neither."""
+    some = Estimate(value=1.0, sigma=0.1)
+    return LegState(
+        stamp_ns=1_700_000_000_000_000_003,
+        life_cycles=9,
+        verdict=Verdict(
+            state=State.INSPECT, joints=("A",), why="why", since_ns=7, do="do", not_valid=(Figure.FORECAST,),
+            evidence=(Evidence("clearance A", 5e-4, math.nan, "m"),), fault_code="CLEARANCE_CHANGED_A",
+        ),
+        clearances={
+            "A": JointClearance(
+                believed_m=5e-4, believed_sigma_m=1e-5, believed_by="encoders", counted_m=4e-4, seen_m=5e-4,
+                seen_sigma_m=1e-5, seen_by=("encoders",), new_m=3e-4, limit_m=6e-4, status=State.INSPECT,
+            ),
+            "B": JointClearance(
+                believed_m=4e-4, believed_by="counted", counted_m=4e-4, new_m=3e-4, limit_m=6e-4,
+                status=State.HEALTHY,
+            ),
+        },
+        drive=Drive(
+            scale=some, lag_s=some, coulomb_nm=some, viscous_nms=some, load_friction=some,
+            bandwidth_hz=Estimate(value=30.0),
+        ),
+        diagnosis=TorqueDiagnosis(state="changed", cycles_not_used={"gap": 2}, misfit=0.2, cause="clearance"),
+        life={"A": LifeHours(p10_h=1.0, p50_h=2.0, p90_h=3.0), "B": None},
+    )  # fmt: skip
 
 
 def made_up_summary() -> ReplaySummary:

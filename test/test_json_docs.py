@@ -15,13 +15,14 @@ sys.path.insert(0, str(Path(__file__).parent))  # as a script
 
 from filled_fleet import filled_fleet
 from json_fields import Row, descriptions, is_of, leaves, rows_of, unit_of
-from made_up_summary import made_up_summary
+from made_up_summary import made_up_state, made_up_summary
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.commissioning.result import JointDetection
 from leg_wear_monitor.life.life import lives_document
 from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.play.fit import Clearances, JointClearance, Play, PlayMeasurement
+from leg_wear_monitor.state import LegState
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "reference" / "json.md"
@@ -37,6 +38,11 @@ def simulation() -> Iterator[Row]:
     yield VERSION
     yield from ((name, kind, unit_of(name), text) for name, (kind, text) in clock.items())
     yield from rows_of(lw.SimulationResult, left_out=("clearance_joints", "surfaces"))
+
+
+def state() -> Iterator[Row]:
+    yield VERSION
+    yield from rows_of(LegState)
 
 
 def replay() -> Iterator[Row]:
@@ -126,6 +132,7 @@ def fleet() -> Iterator[Row]:
 
 DOCUMENTS = {
     "simulation": simulation,
+    "state": state,
     "replay": replay,
     "life": life,
     "commissioning": commissioning,
@@ -148,6 +155,8 @@ def renewed(page: str) -> str:
 def example(name: str) -> Any:
     if name == "simulation":
         return lw.simulate("four_bar", cycles=0.5, skip_cycles=0.0, trace=8).to_dict(wall_s=1.0)
+    if name == "state":
+        return made_up_state().to_dict()
     if name == "replay":
         return made_up_summary().to_dict()
     if name == "life":

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     )
     from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
     from leg_wear_monitor.monitor.reports import CycleReport, JointReport
-    from leg_wear_monitor.monitor.verdict.verdict import Verdict
     from leg_wear_monitor.playback.summary import ReplayResult
+    from leg_wear_monitor.state import Verdict
     from leg_wear_monitor.wear import Surfaces
 
 
@@ -218,7 +218,7 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
     """
     from leg_wear_monitor.monitor.ledger.entry import walked_words
     from leg_wear_monitor.monitor.verdict.situation import COUNTED, believed_words
-    from leg_wear_monitor.monitor.verdict.verdict import Figure
+    from leg_wear_monitor.state import Figure
 
     console = Console(highlight=False)
     monitor, verdict = result.monitor, result.monitor.verdict.verdict
@@ -238,8 +238,8 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
             console.print(f"{NOT_VALID}: the counted clearances, growth and forces; see the verdict")
         else:
             console.print(_joints(result))
-            for joint, one in monitor.believed_clearances.items():
-                if one is not None and one.by != COUNTED:
+            for joint, one in monitor.state.clearances.items():
+                if one.believed_by not in (None, COUNTED):
                     console.print(f"joint {joint}: {believed_words(one)}")
         console.print(f"torque {_by_torque(result)}", soft_wrap=True)
         errors = [f"{joint.joint} {figure(1.0e9 * joint.sampling_sigma_m)} nm" for joint in last.joints]
@@ -269,11 +269,13 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
 def _print_verdict(console: Console, verdict: "Verdict", joint_words: Callable[[str], str]) -> None:
     """State, joints and reason; what a person does next, and the page on it; which values are not valid."""
     from leg_wear_monitor.monitor.alarms import time_words
+    from leg_wear_monitor.monitor.verdict.verdict import guide_to
 
     whose = f" joint {', '.join(map(joint_words, verdict.joints))}" if verdict.joints else ""
     console.print(f"\n[bold]{verdict.state.words.upper()}{whose}[/bold]: {verdict.why}", soft_wrap=True)
     console.print(f"to do      {verdict.do}", soft_wrap=True)
-    console.print(f"code       {verdict.fault_code}, see {share_directory() / verdict.guide}", soft_wrap=True)
+    page = share_directory() / guide_to(verdict)
+    console.print(f"code       {verdict.fault_code}, see {page}", soft_wrap=True)
     if verdict.not_valid:
         console.print(f"{NOT_VALID}  {', '.join(figure.words for figure in verdict.not_valid)}")
     if verdict.since_ns:
@@ -302,13 +304,13 @@ def _believed(result: "ReplayResult") -> Table:
     from leg_wear_monitor.monitor.verdict.situation import SOURCES
 
     table = _table(("\njoint", "clearance\nmm", "±\nmm", "\naccording to"), 1, 4)
-    for joint, one in result.monitor.believed_clearances.items():
+    for joint, one in result.monitor.state.clearances.items():
         name = result.monitor.mechanism.joint_words(joint)
-        if one is None:
+        if one.believed_m is None or one.believed_by is None:
             table.add_row(name, NOT_VALID, "-", "-")
             continue
-        sigma = "-" if math.isnan(one.sigma_m) else f"{1.0e3 * one.sigma_m:.3f}"
-        table.add_row(name, f"{1.0e3 * one.clearance_m:.3f}", sigma, SOURCES[one.by])
+        sigma = "-" if one.believed_sigma_m is None else f"{1.0e3 * one.believed_sigma_m:.3f}"
+        table.add_row(name, f"{1.0e3 * one.believed_m:.3f}", sigma, SOURCES[one.believed_by])
     return table
 
 

@@ -25,16 +25,11 @@ from leg_wear_monitor.monitor.forecast.measurement import last_measured
 from leg_wear_monitor.monitor.ledger.entry import ClearancePoint, JointWear, binding_of, walked_words
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import LedgerContent, read_ledger
-from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance, believed
-from leg_wear_monitor.monitor.verdict.verdict import Figure
-from leg_wear_monitor.playback.result import (
-    ClearanceChange,
-    JointClearance,
-    LifeHours,
-    ReplayJoint,
-    ReplaySummary,
-)
-from leg_wear_monitor.playback.summary import believed_fields, ledger_verdict, replay_alarm
+from leg_wear_monitor.monitor.leg_state import joint_clearance
+from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance
+from leg_wear_monitor.playback.result import ClearanceChange, ReplayJoint, ReplaySummary
+from leg_wear_monitor.playback.summary import ledger_verdict, replay_alarm
+from leg_wear_monitor.state import JointClearance, LifeHours
 
 OLD_AFTER_S = 60.0  # a monitor of a walking leg writes more often
 
@@ -150,15 +145,7 @@ class LedgerLeg:
         alarms = found.entry.alarms if found.entry else ()
         own = next((each for each in alarms if (each.kind, each.subject) == ("clearance", joint)), None)
         verdict = ledger_verdict(found.verdict) if found.verdict else NO_VERDICT
-        one = believed(known, own, Figure.CLEARANCES not in verdict.not_valid)
-        return JointClearance(
-            counted_m=counted_m,
-            new_m=self._setup.new_m[joint],
-            limit_m=limit_m,
-            measured_m=last.clearance_m if last else None,
-            measured_sigma_m=last.sigma_m if last else None,
-            **(believed_fields(one) if one else {}),
-        )
+        return joint_clearance(known, own, [verdict], self._setup.new_m[joint])
 
 
 def _heading(view: ReplaySummary) -> str:

@@ -34,16 +34,15 @@ from leg_wear_monitor.dashboard.source import (
 )
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.files import finite_or_none
+from leg_wear_monitor.monitor.leg_state import life_hours
 from leg_wear_monitor.playback.result import (
     ClearanceChange,
-    JointClearance,
     LegLife,
-    LifeHours,
     ReplayJoint,
     ReplayStatus,
     ReplaySummary,
-    life_hours,
 )
+from leg_wear_monitor.state import JointClearance, LifeHours
 
 # Joints as a monitor's messages tell them.
 

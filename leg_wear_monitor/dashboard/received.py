@@ -14,9 +14,10 @@ from leg_wear_monitor.files import or_nan
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, Quantiles
-from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure, State, Verdict, unit_of, with_unit
+from leg_wear_monitor.monitor.verdict.verdict import unit_of, with_unit
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS
 from leg_wear_monitor.playback.result import LegLife, ReplayAlarm, ReplayHistory, ReplayStatus
+from leg_wear_monitor.state import Evidence, Figure, State, Verdict
 
 MOST = 200
 """Statuses in a message, values in a status, joints: what exceeds it is not from a monitor."""

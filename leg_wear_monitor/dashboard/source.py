@@ -19,11 +19,9 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.ledger.entry import Measurement, WalkedLoad
 from leg_wear_monitor.monitor.reports import Lost
-from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, Evidence, Figure, State, Verdict, amount
+from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, amount, guide_to
 from leg_wear_monitor.playback.result import (
-    JointClearance,
     LegLife,
-    LifeHours,
     ReplayAlarm,
     ReplayAlarms,
     ReplayGait,
@@ -63,6 +61,7 @@ from leg_wear_monitor.report.replay.charts import (
 )
 from leg_wear_monitor.report.replay.joint_rows import joint_rows, joint_views
 from leg_wear_monitor.report.replay.page import belief, leg_drawing, replay_page
+from leg_wear_monitor.state import Evidence, Figure, JointClearance, LifeHours, State, Verdict
 
 # What is known of a leg at one instant, in the shape of a replay's summary: so the page has its words.
 
@@ -231,7 +230,7 @@ _MOST_EVIDENCE = 6
 
 def verdict_region(view: ReplaySummary) -> str:
     """State, reason, action, evidence and what is not valid; its guide is one of the server's pages."""
-    banner = verdict_banner(view, f"/guides/{PurePosixPath(view.verdict.guide).name}")
+    banner = verdict_banner(view, f"/guides/{PurePosixPath(guide_to(view.verdict)).name}")
     return banner_markup(with_evidence(banner, view.verdict.evidence))
 
 

@@ -12,16 +12,16 @@ import attrs
 from leg_wear_monitor.bags.bag import find_files
 from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.bags.reader import Recording
+from leg_wear_monitor.configuration.strict import part_document
 from leg_wear_monitor.errors import LegWearError, printable
 from leg_wear_monitor.files import write_whole
 from leg_wear_monitor.fleet.description import FleetLeg
 from leg_wear_monitor.fleet.directory import LegDirectory, Line, cycle_columns, locked, write_parquet
 from leg_wear_monitor.monitor.forecast.forecast import ForecastBasis
 from leg_wear_monitor.monitor.reports import Lost
-from leg_wear_monitor.monitor.verdict.verdict import Verdict
 from leg_wear_monitor.playback.replay import replay
-from leg_wear_monitor.playback.result import JointClearance, LifeHours, part_document
-from leg_wear_monitor.playback.summary import ReplayResult, clearances, life
+from leg_wear_monitor.playback.summary import ReplayResult
+from leg_wear_monitor.state import JointClearance, LifeHours, Verdict
 from leg_wear_monitor.workers import Job, package_digest
 
 # What is kept of one recording of a leg.
@@ -151,14 +151,14 @@ def record_of(
         return RecordingRecord(
             outcome=Outcome.ALREADY_COUNTED, findings=tuple(texts[:_MOST_FINDINGS]), **about
         )
-    verdict, basis = result.monitor.verdict.verdict, result.monitor.forecast_basis
+    state, basis = result.monitor.state, result.monitor.forecast_basis
     return RecordingRecord(
         outcome=Outcome.COUNTED,
         cycles=len(result.history),
         findings=tuple(texts[:_MOST_FINDINGS]),
-        verdict=verdict,
-        clearances=clearances(result),
-        life=life(result, verdict),
+        verdict=state.verdict,
+        clearances=state.clearances if result.history.last else {},
+        life=state.life,
         basis=basis if basis and math.isfinite(basis.cycle_s) else None,
         knows=knows,
         **about,

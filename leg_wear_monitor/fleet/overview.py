@@ -10,15 +10,14 @@ from typing import Any
 
 import attrs
 
-from leg_wear_monitor.configuration.strict import structure
+from leg_wear_monitor.configuration.strict import part_document, structure
 from leg_wear_monitor.errors import ConfigError, printable
 from leg_wear_monitor.files import json_text, write_whole
 from leg_wear_monitor.fleet.chain import Outcome
 from leg_wear_monitor.fleet.description import FleetDescription, FleetLeg
 from leg_wear_monitor.fleet.directory import LegDirectory, Line, used_fraction
 from leg_wear_monitor.monitor.alarms import ADVICE
-from leg_wear_monitor.monitor.verdict.verdict import State, Verdict
-from leg_wear_monitor.playback.result import JointClearance, LifeHours, part_document
+from leg_wear_monitor.state import JointClearance, LifeHours, State, Verdict
 
 # The fleet at a glance, as classes; SI units, None for what is not known.
 

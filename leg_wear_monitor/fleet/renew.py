@@ -10,7 +10,7 @@ from typing import Any
 
 import attrs
 
-from leg_wear_monitor.configuration.strict import structure
+from leg_wear_monitor.configuration.strict import part_document, structure
 from leg_wear_monitor.errors import ConfigError, LegWearError
 from leg_wear_monitor.files import json_text, write_whole
 from leg_wear_monitor.fleet.description import FleetLeg
@@ -35,17 +35,16 @@ from leg_wear_monitor.monitor.judgement import with_measured
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.ledger.file import copy_of, measurements_of
 from leg_wear_monitor.monitor.ledger.ledger import Ledger, open_ledger
-from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance, believed
-from leg_wear_monitor.monitor.verdict.verdict import Figure, Verdict
-from leg_wear_monitor.playback.result import JointClearance, part_document, summary_of
+from leg_wear_monitor.monitor.leg_state import joint_clearance, life_of
+from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance
+from leg_wear_monitor.playback.result import summary_of
 from leg_wear_monitor.playback.summary import (
-    believed_fields,
     joint_forecast,
     ledger_verdict,
     leg_forecast,
     leg_life,
-    life_of,
 )
+from leg_wear_monitor.state import JointClearance, Verdict
 
 # What a fleet has learned, as files: ``learning.json``, and for each leg the file of ``forecast.priors``.
 
@@ -268,9 +267,6 @@ def ledger_copy(mechanism: Mechanism, config: MonitorConfig, path: Path) -> Iter
 # Makes the forecast of a leg again, when something was measured after its last recording was counted.
 
 
-_BELIEVED = ("believed_m", "believed_sigma_m", "believed_by")
-
-
 def is_renewal_due(directory: LegDirectory) -> bool:
     """Whether something was measured, or learned, that the last forecast of a leg does not know."""
     line = directory.last_counted()
@@ -324,7 +320,9 @@ def _renew(leg: FleetLeg, directory: LegDirectory) -> None:
             joint: attrs.evolve(
                 one,
                 forecast=joint_forecast(forecasts[joint], verdict),
-                **{name: getattr(clearances[joint], name) for name in _BELIEVED},
+                believed_m=clearances[joint].believed_m,
+                believed_sigma_m=clearances[joint].believed_sigma_m,
+                believed_by=clearances[joint].believed_by,
             )
             for joint, one in summary.joints.items()
         },
@@ -362,10 +360,4 @@ def _clearance(
         if seen_m is None or sigma_m is None
         else tuple(SeenClearance(by, seen_m, sigma_m) for by in before.seen_by),
     )
-    one = believed(with_measured(situation, measured), alarm, Figure.CLEARANCES not in verdict.not_valid)
-    return attrs.evolve(
-        before,
-        measured_m=measured.clearance_m if measured else None,
-        measured_sigma_m=measured.sigma_m if measured else None,
-        **(believed_fields(one) if one else dict.fromkeys(_BELIEVED)),
-    )
+    return joint_clearance(with_measured(situation, measured), alarm, [verdict], before.new_m)

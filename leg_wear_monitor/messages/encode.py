@@ -27,6 +27,7 @@ WRENCH_STAMPED = "geometry_msgs/msg/WrenchStamped"
 DIAGNOSTIC_ARRAY = "diagnostic_msgs/msg/DiagnosticArray"
 DYNAMIC_JOINT_STATE = "control_msgs/msg/DynamicJointState"
 FLOAT64 = "std_msgs/msg/Float64"
+STRING = "std_msgs/msg/String"
 MARKER_ARRAY = "visualization_msgs/msg/MarkerArray"
 
 LITTLE_ENDIAN = b"\0\1\0\0"
@@ -208,6 +209,14 @@ def bools(values: ArrayLike) -> NDArray[np.uint8]:
     layout = Layout()
     layout.column(truths[:, None])
     return layout.messages(len(truths))
+
+
+def string(text: str) -> bytes:
+    """One message of std_msgs/String."""
+    layout = Layout()
+    layout.text(text)
+    raw: bytes = layout.messages(1)[0].tobytes()
+    return raw
 
 
 def diagnostic_array(

@@ -1,5 +1,6 @@
 """Conversion of reports to serialized output messages, byte-identical live and in replay."""
 
+import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
@@ -86,8 +87,9 @@ MEASURED_TORQUE = Output("~/measured_torque", encode.WRENCH_STAMPED, SENSOR_DATA
 FORECAST = Output("~/forecast", encode.DIAGNOSTIC_ARRAY, LATCHED)
 ALARMS = Output("~/alarms", encode.DIAGNOSTIC_ARRAY, LATCHED)
 VERDICT = Output("~/verdict", encode.DIAGNOSTIC_ARRAY, LATCHED)
+STATE = Output("~/state", encode.STRING, LATCHED)
 DIAGNOSTICS = Output("/diagnostics", encode.DIAGNOSTIC_ARRAY)
-OUTPUTS = (CLEARANCES, IMPACTS, TORQUE, FORECAST, ALARMS, VERDICT, DIAGNOSTICS, MARKERS, LINKAGE)
+OUTPUTS = (CLEARANCES, IMPACTS, TORQUE, FORECAST, ALARMS, VERDICT, STATE, DIAGNOSTICS, MARKERS, LINKAGE)
 """Those of every monitor; `Messages.outputs` has all."""
 
 _AXES = {"x": 0, "y": 1, "z": 2}
@@ -120,7 +122,7 @@ class Messages:
         self._impacts = [f"{joint}_impact" for joint in clearance_joints]
 
     def of(self, reports: Reports) -> Iterator[Outgoing]:
-        """All messages for reports: those of samples, of gait cycles, of alarms and of the verdict."""
+        """All messages for reports: those of samples, of gait cycles, of alarms, of verdict and state."""
         yield from self.of_samples(reports.samples)
         for cycle in reports.cycles:
             yield single(CLEARANCES, cycle.stamp_ns, self.clearances(cycle))
@@ -130,6 +132,8 @@ class Messages:
             yield single(ALARMS, alarms.stamp_ns, self.alarms(alarms))
         for verdict in reports.verdicts:
             yield single(VERDICT, verdict.stamp_ns, self.verdict(verdict))
+        for state in reports.states:
+            yield single(STATE, state.stamp_ns, self.state(state))
 
     def of_samples(self, samples: SampleReports) -> Iterator[Outgoing]:
         """Torque at each tracked sample, contact forces at each crank sample, and the measured torque."""
@@ -181,6 +185,10 @@ class Messages:
     def verdict(self, report: VerdictReport) -> bytes:
         """The message of `VERDICT`: one status, as the first one of `DIAGNOSTICS`."""
         return self._array(report.stamp_ns, [verdict_status(report.verdict)])
+
+    def state(self, report: VerdictReport) -> bytes:
+        """The message of `STATE`: JSON of the state of the leg, in one line."""
+        return encode.string(json.dumps(report.state.to_dict(), allow_nan=False))
 
     def diagnostics(self, stamp_ns: int, statuses: Iterable[Status]) -> bytes:
         """The message of `DIAGNOSTICS`."""

@@ -16,7 +16,7 @@ from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle, 
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms import EXCHANGED, FOOT_LOAD_LIMITS, GAPS, SCALE, SIGN, STUCK, ZERO
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.reports import FootLoad
+from leg_wear_monitor.state import FootLoad
 from leg_wear_monitor.twin import KINDS, LOAD
 from leg_wear_monitor.twin.follower_state import FINE_PHASES
 from leg_wear_monitor.twin.sample import CONTACT, MEASURED, NO_FAULT, Samples

@@ -26,23 +26,14 @@ from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.reports import CycleReport, JointReport, VerdictReport
 from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.situation import (
-    BelievedClearance,
     JointSituation,
     SeenClearance,
     Situation,
     at_limit_by_estimate,
-    believed,
     with_sampling,
 )
-from leg_wear_monitor.monitor.verdict.verdict import (
-    NO_GAIT_CYCLE,
-    Figure,
-    Finding,
-    Verdict,
-    dated,
-    has_changed,
-    verdict_of,
-)
+from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, Finding, dated, has_changed, verdict_of
+from leg_wear_monitor.state import Figure
 from leg_wear_monitor.twin.digital_twin import DigitalTwin, TwinSnapshot
 from leg_wear_monitor.twin.statistics import CycleStatistics, Event, Tracking
 
@@ -97,7 +88,8 @@ def _measured(estimate: ClearanceEstimate, wear_m: float) -> MeasuredClearance:
 class MonitorState:
     """State beside twin, alarms and accounting; every value is immutable.
 
-    ``findings`` are those of the last evaluation period; empty before the first.
+    ``findings`` are those of the last evaluation period; empty before the first. ``has_ended``: whether a
+    gait cycle has ended since the last state of the leg was reported.
     """
 
     growth: tuple[GrowthWindow, ...]
@@ -106,6 +98,7 @@ class MonitorState:
     happened: tuple[Event, ...] = ()
     findings: tuple[Finding, ...] = ()
     mismatch: MismatchWindow = NO_MISMATCH
+    has_ended: bool = False
 
 
 @attrs.frozen(eq=False)
@@ -192,14 +185,6 @@ class Judge:
         alarm = self._evaluation.board.alarms[alarm_specs.CLEARANCE.name(joint)]
         best = min(own.seen, key=lambda one: one.sigma_m, default=None)
         return at_limit_by_estimate(own, alarm) or best
-
-    def believed(self, state: MonitorState, verdict: Verdict) -> dict[str, BelievedClearance | None]:
-        """The believed clearance of each joint, in the words of a verdict of this state."""
-        alarms, is_counted_leg = self._evaluation.board.alarms, Figure.CLEARANCES not in verdict.not_valid
-        return {
-            each.joint: believed(each, alarms[alarm_specs.CLEARANCE.name(each.joint)], is_counted_leg)
-            for each in self.joints(state)
-        }
 
     def changed(self, state: MonitorState) -> tuple[VerdictReport, ...]:
         """The verdict if it has changed since the last call; it is then an event, too.

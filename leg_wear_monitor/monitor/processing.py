@@ -13,6 +13,7 @@ from leg_wear_monitor.monitor.diagnosis.state import TorqueState
 from leg_wear_monitor.monitor.forecast.measurement import GrowthWindow, extended
 from leg_wear_monitor.monitor.judgement import update_forecast
 from leg_wear_monitor.monitor.ledger.entry import Audit, CorrectedClearance, IdentifiedLeg, SimulatedReference
+from leg_wear_monitor.monitor.leg_state import leg_state
 from leg_wear_monitor.monitor.parts import Parts
 from leg_wear_monitor.monitor.reports import (
     AlarmList,
@@ -70,6 +71,7 @@ class Processing:
             if self._torque:
                 self._torque.ended(statistics, self._parts.is_torque_wrong)
             cycles.append(self._report(statistics))
+            self._parts.state.has_ended = True
             sensor = self._foot_load.ended(statistics) if self._foot_load else None
             if self._foot_load and sensor is not None:
                 self._twin.freeze_load(*self._foot_load.freezes(sensor))
@@ -80,13 +82,25 @@ class Processing:
                 self._keep_torque(statistics, cycles[-1])
         return update.samples, cycles
 
-    def end_period(self, changes: list[AlarmList]) -> tuple[VerdictReport, ...]:
-        """Evaluate what is due at the end of an evaluation period; returns changes of the verdict."""
+    def end_period(
+        self, changes: list[AlarmList]
+    ) -> tuple[tuple[VerdictReport, ...], tuple[VerdictReport, ...]]:
+        """Evaluate what is due at the end of an evaluation period.
+
+        Returns
+        -------
+        verdicts, states : tuple of VerdictReport
+            Changes of the verdict; the state of the leg, if that or a gait cycle is new.
+        """
         self._add_changes(self._evaluation.end_period(self._accounting.state.skipped), changes)
         self._observe_encoders()
         self._observe_torque()
         self._add_changes(self.evaluate_clearances(), changes)
-        return self._parts.judge.changed(self._parts.state)
+        verdicts, state = self._parts.judge.changed(self._parts.state), self._parts.state
+        if not verdicts and not state.has_ended:
+            return (), ()
+        state.has_ended, leg = False, leg_state(self._parts, state.findings)
+        return verdicts, (VerdictReport(leg.stamp_ns, state.findings, leg),)
 
     def evaluate_clearances(self) -> tuple[AlarmList, ...]:
         """Compare clearances by measurement and by estimate with their limits: at once, for none scatters."""

@@ -18,8 +18,9 @@ from leg_wear_monitor.monitor.forecast.measurement import (
 )
 from leg_wear_monitor.monitor.inputs import InputGuard, Pauses
 from leg_wear_monitor.monitor.ledger.entry import Measurement
-from leg_wear_monitor.monitor.verdict.situation import SeenClearance
-from leg_wear_monitor.monitor.verdict.verdict import Finding, Verdict, verdict_of
+from leg_wear_monitor.monitor.verdict.situation import SeenClearance, joint_status
+from leg_wear_monitor.monitor.verdict.verdict import Finding, verdict_of
+from leg_wear_monitor.state import LegState, Verdict
 from leg_wear_monitor.twin.statistics import CycleStatistics, Intake, SampleStatistics, TorqueStatistics
 
 SampleReports = SampleStatistics
@@ -178,7 +179,7 @@ class AlarmList:
 
 @attrs.frozen
 class VerdictReport:
-    """A changed verdict.
+    """A changed verdict, or the state of the leg with its verdict.
 
     Attributes
     ----------
@@ -186,15 +187,29 @@ class VerdictReport:
         When it changed.
     findings : tuple of Finding
         What it is made of; at least one.
+    leg : LegState or None
+        The leg then, in a report of its state; None in a report of a changed verdict.
     """
 
     stamp_ns: int
     findings: tuple[Finding, ...]
+    leg: LegState | None = None
 
     @property
     def verdict(self) -> Verdict:
         """The verdict of these findings."""
         return verdict_of(self.findings)
+
+    @property
+    def state(self) -> LegState:
+        """The leg with the verdict of these findings, of which a node may have added some."""
+        if self.leg is None:
+            raise ValueError("a report of a changed verdict has no state of the leg")
+        clearances = {
+            joint: attrs.evolve(one, status=joint_status(joint, one.believed_m is not None, self.findings))
+            for joint, one in self.leg.clearances.items()
+        }
+        return attrs.evolve(self.leg, verdict=self.verdict, clearances=clearances)
 
 
 @attrs.frozen(kw_only=True)
@@ -286,6 +301,9 @@ class Reports:
     lost : Lost
     verdicts : tuple of VerdictReport
         One for each change of the verdict, and the first one of a monitor.
+    states : tuple of VerdictReport
+        With the state of the leg: one at the end of each evaluation period in which a gait cycle ended or the
+        verdict changed.
     """
 
     samples: SampleReports
@@ -293,34 +311,7 @@ class Reports:
     alarms: tuple[AlarmList, ...]
     lost: Lost
     verdicts: tuple[VerdictReport, ...] = ()
-
-
-@attrs.frozen(kw_only=True)
-class FootLoad:
-    """The load at the foot over the last gait cycles; None for what is not known.
-
-    Attributes
-    ----------
-    source : str
-        What it is known by: ``measured``, or ``none``.
-    peak_n, peak_sigma_n : float or None
-        Largest vertical force in the mean over gait cycles, and its standard deviation from step to step.
-    heel_strike_phase, toe_off_phase : float or None
-        Crank angles at which the foot strikes and leaves the ground, as fractions of a turn.
-    heel_strike_sigma, toe_off_sigma : float or None
-        Their standard deviations from step to step.
-    cycles : int
-        Number of gait cycles that it is from.
-    """
-
-    source: str = "none"
-    peak_n: float | None = None
-    peak_sigma_n: float | None = None
-    heel_strike_phase: float | None = None
-    toe_off_phase: float | None = None
-    heel_strike_sigma: float | None = None
-    toe_off_sigma: float | None = None
-    cycles: int = 0
+    states: tuple[VerdictReport, ...] = ()
 
 
 @attrs.frozen

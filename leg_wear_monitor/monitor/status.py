@@ -35,16 +35,16 @@ from leg_wear_monitor.monitor.inputs import InputHealth
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.reports import CycleReport, Status
 from leg_wear_monitor.monitor.torque_status import diagnosis_status, torque_status
-from leg_wear_monitor.monitor.verdict.situation import BelievedClearance, believed_words, sampled_words
+from leg_wear_monitor.monitor.verdict.situation import believed_words, sampled_words
 from leg_wear_monitor.monitor.verdict.verdict import (
     Finding,
-    State,
-    Verdict,
     amount,
     estimate,
+    level_of,
     verdict_of,
     with_unit,
 )
+from leg_wear_monitor.state import JointClearance, State, Verdict
 from leg_wear_monitor.twin import KINDS, LOAD
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.statistics import Event, Sampling, Tracking
@@ -72,7 +72,7 @@ def zero_status(crank_zero: CrankZero) -> Status:
     return Status("crank zero", Level.OK, f"crank angle at joint position 0: {found}", values)
 
 
-_NOTHING_BELIEVED: Mapping[str, BelievedClearance | None] = {}
+_NO_CLEARANCES: Mapping[str, JointClearance] = {}
 _INPUT = tuple(spec.name() for spec in alarm_specs.OF_INPUT)
 
 
@@ -89,7 +89,7 @@ def statuses(
     explained: TorqueExplanation | None = None,
     crank_zero: CrankZero | None = None,
     measured: Sequence[Measurement | None] = (),
-    believed: Mapping[str, BelievedClearance | None] = _NOTHING_BELIEVED,
+    clearances: Mapping[str, JointClearance] = _NO_CLEARANCES,
     findings: Sequence[Finding] = (),
     foot_load: FootLoadCheck | None = None,
 ) -> tuple[Status, ...]:
@@ -98,7 +98,7 @@ def statuses(
     joints = [_joint(k, name, twin, evaluation, last) for k, name in enumerate(twin.clearance_joints)]
     joints = [_with_measured(*each) for each in zip(joints, measured or (None,) * len(joints), strict=True)]
     joints = [
-        _as_judged(joint, believed.get(name), [each for each in findings if name in each.joints])
+        _as_judged(joint, clearances.get(name), [each for each in findings if name in each.joints])
         for joint, name in zip(joints, twin.clearance_joints, strict=True)
     ]
     return (
@@ -139,7 +139,7 @@ def verdict_status(verdict: Verdict) -> Status:
         name = each.name.replace(" ", "_")
         values[with_unit(name, each.unit)] = or_nan(each.value)
         values[with_unit(f"{name}_limit", each.unit)] = or_nan(each.limit)
-    return Status("verdict", verdict.level, verdict.words, values, verdict.fault_code)
+    return Status("verdict", level_of(verdict), verdict.words, values, verdict.fault_code)
 
 
 def _gait(
@@ -243,19 +243,19 @@ def _with_measured(joint: Status, measured: Measurement | None) -> Status:
     return attrs.evolve(joint, message=f"{joint.message}; {words}", values=joint.values | values)
 
 
-def _as_judged(joint: Status, believed: BelievedClearance | None, findings: Sequence[Finding]) -> Status:
+def _as_judged(joint: Status, known: JointClearance | None, findings: Sequence[Finding]) -> Status:
     """A joint's status with its believed clearance, and with what the verdict's findings say of it."""
     values, message = joint.values, joint.message
-    if believed is not None:
-        values = {"believed_m": believed.clearance_m, f"believed_by_{believed.by}": 1.0, **values}
-        if not math.isnan(believed.sigma_m):
-            values["believed_sigma_m"] = believed.sigma_m
-        message = f"{believed_words(believed)}; {message}"
+    if known is not None and known.believed_m is not None:
+        values = {"believed_m": known.believed_m, f"believed_by_{known.believed_by}": 1.0, **values}
+        if known.believed_sigma_m is not None:
+            values["believed_sigma_m"] = known.believed_sigma_m
+        message = f"{believed_words(known)}; {message}"
     joint = attrs.evolve(joint, values=values, message=message)
     if not findings:
         return joint
     worst = max(findings, key=lambda finding: finding.state.severity)
-    level, is_grave = verdict_of([worst]).level, worst.state in (State.INSPECT, State.STOP)
+    level, is_grave = level_of(verdict_of([worst])), worst.state in (State.INSPECT, State.STOP)
     if level < joint.level or (level is joint.level and not is_grave):
         return joint
     code = "_".join((worst.code, *worst.joints))

@@ -22,12 +22,12 @@ from leg_wear_monitor.monitor.judgement import MonitorSnapshot
 from leg_wear_monitor.monitor.ledger.entry import AlarmEvent, Audit, JointWear, Measurement, WalkedLoad
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import Ledger, open_ledger
+from leg_wear_monitor.monitor.leg_state import leg_state
 from leg_wear_monitor.monitor.parts import Parts
 from leg_wear_monitor.monitor.processing import Processing
 from leg_wear_monitor.monitor.reports import (
     AlarmList,
     CycleReport,
-    FootLoad,
     Lost,
     Reports,
     SampleReports,
@@ -38,7 +38,8 @@ from leg_wear_monitor.monitor.reports import (
 )
 from leg_wear_monitor.monitor.resets import Acknowledged, last_reset, named_for_clearance, rested_on
 from leg_wear_monitor.monitor.status import statuses
-from leg_wear_monitor.monitor.verdict.situation import SOURCES, BelievedClearance, is_held_by_estimate
+from leg_wear_monitor.monitor.verdict.situation import SOURCES, is_held_by_estimate
+from leg_wear_monitor.state import LegState
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples, SamplingSettings
 from leg_wear_monitor.twin.statistics import Sampling, joined
 
@@ -130,15 +131,18 @@ class WearMonitor:
         cycles: list[CycleReport] = []
         changes: list[AlarmList] = []
         verdicts: list[VerdictReport] = []
+        states: list[VerdictReport] = []
         for piece, ends_period in self._parts.evaluation_periods.pieces(samples):
             reports, ended = self._processing.take(piece, changes, ends_period)
             sampled.append(reports)
             cycles += ended
             if ends_period:
-                verdicts += self._processing.end_period(changes)
+                changed, new = self._processing.end_period(changes)
+                verdicts += changed
+                states += new
             self._accounting.keep_if_due(self._evaluation.board.alarms.values())
         samples_ = joined(sampled, len(self.clearance_joints))
-        return Reports(samples_, tuple(cycles), tuple(changes), self.lost, tuple(verdicts))
+        return Reports(samples_, tuple(cycles), tuple(changes), self.lost, tuple(verdicts), tuple(states))
 
     def pause(self, pause_s: float) -> None:
         """Mark a pause between the previous and the next samples, which is not a fault of the input.
@@ -167,6 +171,17 @@ class WearMonitor:
         return self._parts.judge.report(self._parts.state)
 
     @property
+    def state_report(self) -> VerdictReport:
+        """The verdict now, with the state of the leg."""
+        report = self.verdict
+        return attrs.evolve(report, leg=leg_state(self._parts, report.findings))
+
+    @property
+    def state(self) -> LegState:
+        """The state of the leg now; `update` reports it after each gait cycle."""
+        return self.state_report.state
+
+    @property
     def predicted_torque_nm(self) -> float:
         """RMS of the drive torque that is predicted for the commanded gait."""
         return float(self._twin.torque_size_nm)
@@ -182,19 +197,9 @@ class WearMonitor:
         return self._evaluation.board.clearance_limits_m
 
     @property
-    def believed_clearances(self) -> dict[str, BelievedClearance | None]:
-        """The believed clearance of each clearance joint; None where nothing known of it is valid."""
-        return self._parts.judge.believed(self._parts.state, self.verdict.verdict)
-
-    @property
     def diagnosis(self) -> Diagnosis:
         """Clearances that the drive torque shows; empty while the received torque is wrong."""
         return self._parts.diagnosis
-
-    @property
-    def foot_load(self) -> FootLoad:
-        """The measured load at the foot over the last gait cycles."""
-        return self._parts.foot_load.load if self._parts.foot_load else FootLoad()
 
     @property
     def lost(self) -> Lost:
@@ -264,7 +269,7 @@ class WearMonitor:
 
     def status(self) -> tuple[Status, ...]:
         """Statuses for /diagnostics; their names and order are constant."""
-        state, found = self._parts.state, self.verdict
+        state, found = self._parts.state, self.state_report
         return statuses(
             self._twin,
             self._evaluation,
@@ -278,7 +283,7 @@ class WearMonitor:
             state.mismatch.explanation,
             self._parts.crank_zero,
             self._parts.measured,
-            self._parts.judge.believed(state, found.verdict),
+            found.state.clearances,
             found.findings,
             self._parts.foot_load,
         )

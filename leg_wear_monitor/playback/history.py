@@ -13,7 +13,7 @@ from leg_wear_monitor.bags.mcap_writer import McapWriter
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.messages.encode import LegDrawing
 from leg_wear_monitor.messages.leg_markers import LegMarkers
-from leg_wear_monitor.messages.outputs import ALARMS, DIAGNOSTICS, FORECAST, VERDICT, Messages
+from leg_wear_monitor.messages.outputs import ALARMS, DIAGNOSTICS, FORECAST, STATE, VERDICT, Messages
 from leg_wear_monitor.messages.streams import ForecastTimes, topic_of
 from leg_wear_monitor.monitor.alarms import Alarm, Level
 from leg_wear_monitor.monitor.config.parameters import NODE
@@ -154,7 +154,7 @@ class Sink:
             output: self._writer.channel(topic_of(output, node), output.type, output.qos)
             for output in self._messages.outputs
         }
-        self._start, self._has_begun = (monitor.alarms, monitor.verdict), False
+        self._start, self._has_begun = (monitor.alarms, monitor.state_report), False
         self._forecasts = ForecastTimes()
         self._markers = (
             LegMarkers(monitor, LegDrawing(monitor.mechanism)) if monitor.config.publish_markers else None
@@ -182,10 +182,11 @@ class Sink:
             Stamp of the status [ns]; 0 if no time is known yet.
         """
         if stamp_ns > 0 and not self._has_begun:
-            self._has_begun = True  # like the node, begin with the state of all alarms and the verdict
-            alarms, verdict = self._start
+            self._has_begun = True  # like the node, begin with all alarms, the verdict and the state
+            alarms, report = self._start
             self._writer.write(self._channels[ALARMS], stamp_ns, self._messages.alarms(alarms))
-            self._writer.write(self._channels[VERDICT], stamp_ns, self._messages.verdict(verdict))
+            self._writer.write(self._channels[VERDICT], stamp_ns, self._messages.verdict(report))
+            self._writer.write(self._channels[STATE], stamp_ns, self._messages.state(report))
         for outgoing in self._messages.of(reports):
             self._writer.write_many(self._channels[outgoing.output], outgoing.stamp_ns, outgoing.messages)
         for outgoing in self._markers.of(reports) if self._markers else ():

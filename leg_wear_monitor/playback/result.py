@@ -1,16 +1,14 @@
 """The result of a replay as classes, which give JSON and tables."""
 
-import math
 import reprlib
 from collections.abc import Iterator, Mapping
 from enum import Enum
 from typing import TYPE_CHECKING, Any, get_args
 
 import attrs
-import numpy as np
 
 from leg_wear_monitor.bags.findings import Severity
-from leg_wear_monitor.configuration.strict import structure
+from leg_wear_monitor.configuration.strict import part_document, structure
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.files import data_frame, finite_or_none, json_text
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
@@ -20,83 +18,12 @@ from leg_wear_monitor.monitor.angle_regression import ClearanceObservation
 from leg_wear_monitor.monitor.config.settings import Limits
 from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, Quantiles
 from leg_wear_monitor.monitor.ledger.entry import Measurement, WalkedLoad
-from leg_wear_monitor.monitor.reports import FootLoad, Lost
-from leg_wear_monitor.monitor.verdict.verdict import Verdict
+from leg_wear_monitor.monitor.reports import Lost
 from leg_wear_monitor.shown import Drawable
+from leg_wear_monitor.state import FootLoad, JointClearance, LifeHours, Verdict
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-# Condition of the leg after a replay: clearance of each joint as counted and as seen, remaining life.
-
-
-@attrs.frozen(kw_only=True)
-class JointClearance:
-    """Mean radial clearance of a joint [m]; None for what is not known.
-
-    Attributes
-    ----------
-    counted_m : float
-        Clearance when new, plus the wear counted since.
-    seen_m : float or None
-        Clearance that measurements of the gait show.
-    seen_sigma_m : float or None
-        Its standard deviation.
-    seen_by : tuple of str
-        What shows it, such as ``encoders``.
-    new_m : float
-        Clearance when new.
-    limit_m : float
-        Limit of the clearance.
-    measured_m : float or None
-        Clearance that somebody measured last on this part.
-    measured_sigma_m : float or None
-        Its standard deviation.
-    believed_m : float or None
-        The clearance that the verdict rests on; None where nothing known of the joint is valid.
-    believed_sigma_m : float or None
-        Its standard deviation.
-    believed_by : str or None
-        Whose it is: ``counted``, ``torque``, ``encoders``, ``measured``, or ``both`` for what counting and
-        measurements give together.
-    """
-
-    counted_m: float
-    seen_m: float | None = None
-    seen_sigma_m: float | None = None
-    seen_by: tuple[str, ...] = ()
-    new_m: float
-    limit_m: float
-    measured_m: float | None = None
-    measured_sigma_m: float | None = None
-    believed_m: float | None = None
-    believed_sigma_m: float | None = None
-    believed_by: str | None = None
-
-
-@attrs.frozen(kw_only=True)
-class LifeHours:
-    """Remaining hours of walking, as quantiles.
-
-    Attributes
-    ----------
-    p10_h : float
-        Hours that are not exceeded with a probability of 10 %.
-    p50_h : float
-        Hours that are not exceeded with a probability of 50 %.
-    p90_h : float
-        Hours that are not exceeded with a probability of 90 %.
-    """
-
-    p10_h: float
-    p50_h: float
-    p90_h: float
-
-
-def life_hours(hours: Quantiles | None) -> LifeHours | None:
-    """Quantiles of a remaining life; None if it is not known."""
-    return None if hours is None else LifeHours(p10_h=hours.p10, p50_h=hours.p50, p90_h=hours.p90)
 
 
 # The leg that was replayed, as a picture needs it: shapes at crank angle 0, joints with their labels.
@@ -405,21 +332,6 @@ class WornDepth:
 
 
 JsonObject = dict[str, Any]
-
-
-def part_document(part: Any) -> Any:
-    """Fields of a part, or a plain value; null for what is not known."""
-    if attrs.has(type(part)):
-        return part_document(attrs.asdict(part, recurse=False))
-    if isinstance(part, dict):
-        return {name: part_document(value) for name, value in part.items()}
-    if isinstance(part, tuple | list):
-        return [part_document(value) for value in part]
-    if isinstance(part, np.ndarray):
-        return part_document(part.tolist())
-    if isinstance(part, Enum):
-        return part.name if isinstance(part, int) else part.value  # as configuration.strict reads them
-    return None if isinstance(part, float) and not math.isfinite(part) else part
 
 
 def joint_document(joint: ReplayJoint) -> JsonObject:

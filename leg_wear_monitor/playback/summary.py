@@ -4,7 +4,6 @@ What the verdict does not believe has no remaining life.
 """
 
 import json
-import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -18,23 +17,19 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import is_on_ground, outline_of
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms import ADVICE, Alarm, state_of
-from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate, ClearanceObservation
+from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
 from leg_wear_monitor.monitor.gait_evidence import GaitEvidence
 from leg_wear_monitor.monitor.ledger.entry import VerdictEvent
 from leg_wear_monitor.monitor.reports import JointReport, Status
-from leg_wear_monitor.monitor.verdict.situation import BelievedClearance
-from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure, State, Verdict
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS, History
 from leg_wear_monitor.playback.result import (
     AlarmChange,
     ClearanceChange,
-    JointClearance,
     LegJoint,
     LegLife,
-    LifeHours,
     Place,
     ReplayAlarm,
     ReplayAlarms,
@@ -50,9 +45,9 @@ from leg_wear_monitor.playback.result import (
     ReplaySummary,
     SeenClearance,
     WornDepth,
-    life_hours,
 )
 from leg_wear_monitor.shown import Drawable
+from leg_wear_monitor.state import Evidence, Figure, LegState, State, Verdict
 from leg_wear_monitor.twin import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import Samples, brings
 from leg_wear_monitor.twin.statistics import Sampling
@@ -73,58 +68,6 @@ def leg_forecast(told: LegForecast | None, verdict: Verdict) -> LegForecast | No
     if told is None or Figure.FORECAST not in verdict.not_valid:
         return told
     return attrs.evolve(told, cycles=None, hours=None, days=None, first_probability={})
-
-
-def clearances(result: "ReplayResult") -> dict[str, JointClearance]:
-    """Clearance of each joint, as counted and as encoders or the drive torque show it best."""
-    monitor, last = result.monitor, result.history.last
-    limits = dict(zip(monitor.clearance_joints, monitor.clearance_limits_m, strict=True))
-    diagnosis, found, believed = monitor.diagnosis, {}, monitor.believed_clearances
-    for k, joint in enumerate(last.joints if last else ()):
-        seen = []
-        if joint.seen and joint.seen.observation is ClearanceObservation.SEEN:
-            seen.append((joint.seen.sigma_m, joint.seen.clearance_m, "encoders"))
-        if diagnosis.clearance_m and math.isfinite(diagnosis.clearance_m[k]):
-            seen.append((diagnosis.sigma_m[k], diagnosis.clearance_m[k], "torque"))
-        sigma_m, clearance_m, by = min(seen) if seen else (None, None, None)
-        one = believed[joint.joint]
-        found[joint.joint] = JointClearance(
-            counted_m=joint.clearance_m,
-            seen_m=clearance_m,
-            seen_sigma_m=sigma_m,
-            seen_by=(by,) if by else (),
-            new_m=monitor.mechanism.clearances[joint.joint].radial_clearance,
-            limit_m=limits[joint.joint],
-            measured_m=joint.measured.clearance_m if joint.measured else None,
-            measured_sigma_m=joint.measured.sigma_m if joint.measured else None,
-            **(believed_fields(one) if one else {}),
-        )
-    return found
-
-
-def believed_fields(one: BelievedClearance) -> dict[str, Any]:
-    """A believed clearance as the fields of a `JointClearance` or a `ReplayJoint`."""
-    sigma_m = None if math.isnan(one.sigma_m) else one.sigma_m
-    return {"believed_m": one.clearance_m, "believed_sigma_m": sigma_m, "believed_by": one.by}
-
-
-def life(result: "ReplayResult", verdict: Verdict) -> dict[str, LifeHours | None]:
-    """Remaining life of each joint and of the leg; None where it is not known or not believed."""
-    last = result.history.last
-    if last is None:
-        return {}
-    return life_of({joint.joint: joint.forecast for joint in last.joints}, last.forecast, verdict)
-
-
-def life_of(
-    joints: Mapping[str, JointForecast | None], leg: LegForecast | None, verdict: Verdict
-) -> dict[str, LifeHours | None]:
-    """Remaining life of each joint and of the ``leg`` by their forecasts, as far as it is believed."""
-    told: dict[str, JointForecast | LegForecast | None] = {
-        name: joint_forecast(each, verdict) for name, each in joints.items()
-    }
-    told["leg"] = leg_forecast(leg, verdict)
-    return {name: life_hours(each.hours) if each else None for name, each in told.items()}
 
 
 def ledger_verdict(event: VerdictEvent) -> Verdict:
@@ -253,8 +196,9 @@ def summary(
         Names and versions of what made it.
     """
     last, monitor = result.history.last, result.monitor
+    state = monitor.state
     is_known = result.is_believable and last is not None
-    verdict = monitor.verdict.verdict
+    verdict = state.verdict
     told = leg_forecast(last.forecast, verdict) if is_known and last else None
     return ReplaySummary(
         verdict=verdict,
@@ -265,9 +209,9 @@ def summary(
         real_time_factor=result.duration_s / wall_s if wall_s else None,
         cycles=len(result.history),
         gait=_gait(result),
-        joints=_joints(result, verdict) if is_known else {},
-        clearances=clearances(result) if is_known else {},
-        life=life(result, verdict) if is_known else {},
+        joints=_joints(result, state) if is_known else {},
+        clearances=state.clearances if is_known else {},
+        life=state.life if is_known else {},
         forecast=leg_life(told),
         measurements=tuple(monitor.measurements),
         walked=monitor.walked,
@@ -275,7 +219,7 @@ def summary(
         status=tuple(map(_status, monitor.status())),
         lost=monitor.lost,
         sampling=_sampling(monitor.sampling),
-        load=monitor.foot_load,
+        load=state.load,
         history=_history(result.history),
         wear_depth_m=_wear(result),
         advice=ADVICE,
@@ -357,36 +301,34 @@ def _gait(result: ReplayResult) -> ReplayGait:
     )
 
 
-def _joints(result: ReplayResult, verdict: Verdict) -> dict[str, ReplayJoint]:
+def _joints(result: ReplayResult, state: LegState) -> dict[str, ReplayJoint]:
     """Last values of each joint, and the maximum and the mean of its forces."""
-    history, believed = result.history, result.monitor.believed_clearances
+    history = result.history
     joints = history.last.joints if history.last else ()
-    return {
-        joint.joint: _joint(history, k, joint, verdict, believed[joint.joint])
-        for k, joint in enumerate(joints)
-    }
+    return {joint.joint: _joint(history, k, joint, state) for k, joint in enumerate(joints)}
 
 
-def _joint(
-    history: History, k: int, joint: JointReport, verdict: Verdict, believed: BelievedClearance | None
-) -> ReplayJoint:
+def _joint(history: History, k: int, joint: JointReport, state: LegState) -> ReplayJoint:
     clearance, peak, mean, impacts = (
         history.joint_column(name)[:, k]
         for name in ("clearance_m", "peak_force_n", "mean_force_n", "impacts")
     )
+    known = state.clearances[joint.joint]
     return ReplayJoint(
         clearance_m=ClearanceChange(float(clearance[0]), float(clearance[-1]), joint.clearance_max_m),
         growth_m_per_cycle=joint.growth_m_per_cycle,
         growth_error_m_per_cycle=joint.growth_error_m_per_cycle,
         growth_mps=joint.growth_mps,
-        forecast=joint_forecast(joint.forecast, verdict),
+        forecast=joint_forecast(joint.forecast, state.verdict),
         peak_force_n=_of_known(np.max, peak),
         mean_force_n=_of_known(np.mean, mean),
         seen=_seen(joint.seen) if joint.seen else None,
         impacts=int(np.nansum(impacts)),
         load=joint.load,
         sampling_sigma_m=joint.sampling_sigma_m,
-        **(believed_fields(believed) if believed else {}),
+        believed_m=known.believed_m,
+        believed_sigma_m=known.believed_sigma_m,
+        believed_by=known.believed_by,
     )
 
 

@@ -9,6 +9,7 @@ from urllib.parse import quote
 
 from leg_wear_monitor.fleet.overview import FleetOverview, LegOverview, RecordingHealth
 from leg_wear_monitor.monitor.alarms import time_words
+from leg_wear_monitor.monitor.verdict.verdict import guide_to
 from leg_wear_monitor.report.fleet_standing import (
     BANDS,
     DAY_NS,
@@ -366,7 +367,7 @@ def _card(leg: LegOverview, day: Day, has_page: bool) -> dict[str, str]:
         code = ""
     else:
         why, joints, do = verdict.why, ", ".join(verdict.joints), verdict.do
-        code = f"{verdict.fault_code}, see {verdict.guide}"
+        code = f"{verdict.fault_code}, see {guide_to(verdict)}"
         why += f"; {doubt}" if doubt else ""
     return {
         "name": leg.id,

@@ -7,8 +7,8 @@ import attrs
 
 from leg_wear_monitor.fleet.overview import LegOverview, urgency
 from leg_wear_monitor.monitor.alarms import time_words
-from leg_wear_monitor.monitor.verdict.verdict import Figure, State
 from leg_wear_monitor.report.page import Part, Section, Sentences, Table
+from leg_wear_monitor.state import Figure, State
 
 # Standing of a leg on the page: its verdict, unless that is too old to be relied on.
 

@@ -17,8 +17,8 @@ import numpy as np
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.alarms import Level, raised_words, time_words
 from leg_wear_monitor.monitor.verdict.situation import COUNTED, OF_A_JOINT
-from leg_wear_monitor.monitor.verdict.verdict import Figure, State, Verdict
 from leg_wear_monitor.playback.result import ReplayAlarm, ReplaySummary
+from leg_wear_monitor.state import Figure, State, Verdict
 
 # A chart as data: its series are a CSV file inside the page, which the page's script draws with uPlot.
 

@@ -12,13 +12,13 @@ from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.materials import Material
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.verdict.verdict import Figure, Verdict
 from leg_wear_monitor.playback.result import ReplaySummary
 from leg_wear_monitor.playback.summary import ReplayResult
 from leg_wear_monitor.report.drawing import draw_drawing, drawing_of, drawing_svg
 from leg_wear_monitor.report.figure import BODY_COLOURS, LEAST_N, SMALL, draw_clearances, draw_openings, tidy
 from leg_wear_monitor.report.leg_picture import PATH_POINTS
 from leg_wear_monitor.report.page import Picture, Table, render
+from leg_wear_monitor.state import Figure, Verdict
 
 # A result, or a mechanism, on matplotlib's axes, for a notebook or a script to go on with.
 

@@ -311,6 +311,7 @@ class MonitorNode(ClosingNode):
             reports,
             alarms=tuple(map(self._supervision.alarms, reports.alarms)),
             verdicts=tuple(map(self._supervision.verdict, reports.verdicts)),
+            states=tuple(map(self._supervision.verdict, reports.states)),
         )
         for outgoing in self._messages.of(reports):
             if coarse and outgoing.output in _A_SAMPLE and not self._black_box.on:
@@ -325,11 +326,12 @@ class MonitorNode(ClosingNode):
             self._outlets.send(outputs.FORECAST, now_ns, self._messages.forecast(cycle))
 
     def _send_state(self) -> None:
-        """Publish the present alarms and verdict."""
+        """Publish the present alarms, verdict and state of the leg."""
         alarms = self._supervision.alarms(self._monitor.alarms)
-        verdict = self._supervision.verdict(self._monitor.verdict)
+        report = self._supervision.verdict(self._monitor.state_report)
         self._outlets.send(outputs.ALARMS, time.time_ns(), self._messages.alarms(alarms))
-        self._outlets.send(outputs.VERDICT, time.time_ns(), self._messages.verdict(verdict))
+        self._outlets.send(outputs.VERDICT, time.time_ns(), self._messages.verdict(report))
+        self._outlets.send(outputs.STATE, time.time_ns(), self._messages.state(report))
 
     def _diagnose(self) -> None:
         now_ns = time.time_ns()

@@ -20,7 +20,7 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64
+from std_msgs.msg import Float64, String
 from visualization_msgs.msg import MarkerArray
 
 from leg_wear_monitor.errors import LegWearError
@@ -248,6 +248,7 @@ _KINDS = {
     "geometry_msgs/msg/WrenchStamped": WrenchStamped,
     "diagnostic_msgs/msg/DiagnosticArray": DiagnosticArray,
     "std_msgs/msg/Float64": Float64,
+    "std_msgs/msg/String": String,
     "visualization_msgs/msg/MarkerArray": MarkerArray,
 }
 

@@ -50,7 +50,7 @@ from leg_wear_monitor.twin.follower_state import (
     LOAD_FRICTION,
     PHASES,
     TORQUE_SENSOR,
-    LegState,
+    FollowerState,
     leg_state,
 )
 from leg_wear_monitor.twin.following import CYCLE, LEFT, NEEDS_START, REPORTED, follow
@@ -139,7 +139,7 @@ class LegFollower:
         # a whole number of nanoseconds, so that the stepper's time does not drift from the stamps
         interval = round(1.0e9 * TURN / abs(setup.speed) / INTERVALS) * 1.0e-9
         self._stepper = ClearanceStepper(setup, interval, tables=self._load.tables)
-        self._leg: LegState = leg_state(len(setup.clearance_joints))
+        self._leg: FollowerState = leg_state(len(setup.clearance_joints))
         self.records = self._leg.records
         self.state: Record = record_of(self.records)
         self.statistics = new_run_statistics(len(setup.linkage.mechanism.joints))

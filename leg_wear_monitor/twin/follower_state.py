@@ -179,7 +179,7 @@ EVALUATED = np.dtype(
 """The leg at a sample."""
 
 
-class LegState(NamedTuple):
+class FollowerState(NamedTuple):
     """State of the follower, beside the stepper's.
 
     ``records`` (1,): of `LEG_STATE`; ``polynomial`` (7,): present piece of the crank's motion; ``force`` (k,)
@@ -191,9 +191,9 @@ class LegState(NamedTuple):
     force: Floats
 
 
-def leg_state(clearance_joints: int) -> LegState:
+def leg_state(clearance_joints: int) -> FollowerState:
     """State before the first step."""
-    return LegState(new_records(1, LEG_STATE), np.zeros(7), np.zeros(clearance_joints))
+    return FollowerState(new_records(1, LEG_STATE), np.zeros(7), np.zeros(clearance_joints))
 
 
 # Phase of the crank, in whose bins torques are summed over a gait cycle.

@@ -337,7 +337,7 @@ def follow(
     forces,
     eccentricities,
 ):
-    """Follow steps from index ``first`` to n; ``stepper`` is the ClearanceState, ``state`` the LegState.
+    """Follow steps from index ``first`` to n; ``stepper`` is the ClearanceState, ``state`` the FollowerState.
 
     ``sensors`` (1,) contains the torque sensor, ``load`` the `LoadRows`. Values at samples are written to
     ``evaluated`` (n,) from index m on, contact forces [N] to ``forces`` (n, k) and eccentricities [m] to

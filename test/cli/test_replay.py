@@ -13,7 +13,7 @@ import pytest
 
 from leg_wear_monitor.cli.verbs import replay as verb
 from leg_wear_monitor.monitor.alarms import Level
-from leg_wear_monitor.monitor.verdict.verdict import State
+from leg_wear_monitor.state import State
 
 pytest.importorskip("mcap")
 pytest.importorskip("rosbags")

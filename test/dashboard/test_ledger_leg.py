@@ -25,7 +25,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
 )
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
-from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure, State
+from leg_wear_monitor.state import Evidence, Figure, State
 from leg_wear_monitor.wear import SECTORS
 
 pytestmark = pytest.mark.plain

@@ -13,7 +13,8 @@ from leg_wear_monitor.monitor import alarm_specs
 from leg_wear_monitor.monitor.alarms import Alarm, Level
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.reports import AlarmList, VerdictReport
-from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure, Finding, State, unit_of, with_unit
+from leg_wear_monitor.monitor.verdict.verdict import Finding, unit_of, with_unit
+from leg_wear_monitor.state import Evidence, Figure, State
 
 pytestmark = pytest.mark.plain
 

@@ -26,6 +26,7 @@ TYPES = {
     "/leg_wear_monitor/forecast": "diagnostic_msgs/msg/DiagnosticArray",
     "/leg_wear_monitor/impact_forces": "sensor_msgs/msg/JointState",
     "/leg_wear_monitor/predicted_torque": "geometry_msgs/msg/WrenchStamped",
+    "/leg_wear_monitor/state": "std_msgs/msg/String",
     "/leg_wear_monitor/verdict": "diagnostic_msgs/msg/DiagnosticArray",
 }
 # Messages of the topics whose number does not depend on the motion.

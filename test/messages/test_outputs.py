@@ -1,5 +1,6 @@
 """What the monitor's topics carry: read back by rosbags, it is what was reported."""
 
+import json
 import math
 from collections.abc import Callable
 from itertools import pairwise
@@ -8,6 +9,7 @@ from typing import Any
 import attrs
 import numpy as np
 import pytest
+from made_up_summary import made_up_state
 
 from leg_wear_monitor.messages.outputs import (
     ALARMS,
@@ -17,6 +19,7 @@ from leg_wear_monitor.messages.outputs import (
     IMPACTS,
     MEASURED_TORQUE,
     OUTPUTS,
+    STATE,
     TORQUE,
     Messages,
     plain,
@@ -35,15 +38,19 @@ from leg_wear_monitor.monitor.reports import (
     Reports,
     SampleReports,
     Status,
+    VerdictReport,
 )
 from leg_wear_monitor.monitor.verdict.situation import SeenClearance
+from leg_wear_monitor.monitor.verdict.verdict import Finding
 from leg_wear_monitor.playback.replay import node_beside
+from leg_wear_monitor.state import State
 from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin import TORQUE as TORQUE_SAMPLE
 
 pytestmark = pytest.mark.plain
 
 CLEARANCE_JOINTS = ("A", "G")
+HEALTHY = Finding(code="NONE", state=State.HEALTHY, why="why", do="do")
 PLOTTED = MonitorConfig(publish_scalars=True)
 
 
@@ -80,7 +87,8 @@ def reports() -> Reports:
         raised_ns=1_700_000_000_123_456_789,
     )  # fmt: skip
     lost = Lost(**{**{field.name: 0 for field in attrs.fields(Lost)}, "faulty": {}})
-    return Reports(samples, (cycle,), (AlarmList(36, (alarm,)),), lost)
+    state = VerdictReport(37, (HEALTHY,), made_up_state())
+    return Reports(samples, (cycle,), (AlarmList(36, (alarm,)),), lost, states=(state,))
 
 
 @pytest.fixture(scope="module")
@@ -91,9 +99,21 @@ def sent(store: Any, reports: Reports) -> dict[str, list[Any]]:
         assert len(outgoing.stamp_ns) == len(outgoing.messages)
         for stamp, row in zip(outgoing.stamp_ns.tolist(), outgoing.messages, strict=True):
             message = store.deserialize_cdr(row.tobytes(), outgoing.output.type)
-            assert message.header.stamp.sec * 10**9 + message.header.stamp.nanosec == stamp
+            if outgoing.output != STATE:  # a text has no header
+                assert message.header.stamp.sec * 10**9 + message.header.stamp.nanosec == stamp
             messages.setdefault(outgoing.output.name, []).append(message)
     return messages
+
+
+def test_the_state_is_json_with_the_verdict_of_its_findings(sent: dict[str, list[Any]]) -> None:
+    (message,) = sent[STATE.name]
+    told, expected = json.loads(message.data), made_up_state().to_dict()
+    assert (told["verdict"]["state"], told["clearances"]["A"]["status"]) == ("healthy", "healthy")
+    for one in (told, expected):
+        del one["verdict"]
+        for joint in one["clearances"].values():
+            del joint["status"]
+    assert told == expected
 
 
 def test_forces_are_of_the_crank_samples_that_were_followed(sent: dict[str, list[Any]]) -> None:

@@ -53,7 +53,7 @@ def test_a_healthy_leg_on_the_ground_is_healthy(walk):
     monitor = monitored(walk)
     assert monitor.verdict.verdict.state.value == "healthy"
     assert not raised(monitor)
-    load, stance = monitor.foot_load, nominal_stance(build_linkage(lw.load_mechanism("bionic_leg")))
+    load, stance = monitor.state.load, nominal_stance(build_linkage(lw.load_mechanism("bionic_leg")))
     assert load.source == "measured"
     # ten steps scatter by 10 % in size and by 2 % of a turn in time
     assert load.peak_n == pytest.approx(PEAK_N, rel=0.02 + 5.3 * 0.1 / 10**0.5)
@@ -149,9 +149,9 @@ def test_a_contact_switch_gives_heel_strike_and_toe_off(walk):
     )
     stance = nominal_stance(build_linkage(lw.load_mechanism("bionic_leg")))
     assert not raised(monitor)
-    assert monitor.foot_load.peak_n is None
-    assert monitor.foot_load.heel_strike_phase == pytest.approx(stance.heel_strike, abs=0.05)
-    assert monitor.foot_load.toe_off_phase == pytest.approx(stance.toe_off, abs=0.05)
+    assert monitor.state.load.peak_n is None
+    assert monitor.state.load.heel_strike_phase == pytest.approx(stance.heel_strike, abs=0.05)
+    assert monitor.state.load.toe_off_phase == pytest.approx(stance.toe_off, abs=0.05)
 
 
 def test_blocks_and_snapshots_change_nothing(walk):
@@ -165,7 +165,7 @@ def test_blocks_and_snapshots_change_nothing(walk):
     cycles = [cycle for part in parts for cycle in part.cycles]
     forces = [[each.joints[0].mean_force_n for each in found] for found in (whole.cycles, cycles)]
     assert forces[0] == forces[1]
-    assert one.foot_load == other.foot_load
+    assert one.state.load == other.state.load
     assert repr(one.alarms) == repr(other.alarms)
 
 
@@ -174,7 +174,7 @@ def test_without_a_source_nothing_knows_of_it(leg):
     assert "foot_load" not in monitor.used
     assert not [one for one in monitor.alarms.alarms if "foot_load" in one.name]
     assert not [one for one in monitor.status() if "foot_load" in (one.name, *one.values)]
-    assert monitor.foot_load.source == "none"
+    assert monitor.state.load.source == "none"
 
 
 @pytest.mark.plain

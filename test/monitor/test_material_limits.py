@@ -11,7 +11,7 @@ import leg_wear_monitor as lw
 from leg_wear_monitor.mechanism.loader import shipped_mechanisms
 from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.forecast.forecast import Answer
-from leg_wear_monitor.monitor.verdict.verdict import Figure
+from leg_wear_monitor.state import Figure
 
 SECONDS = 16
 

@@ -1,13 +1,16 @@
 """From a stop by the drive torque to the repair: latched, acknowledged, measured, replaced, restarted."""
 
+import json
 import math
 
 import pytest
 
 from leg_wear_monitor import WearMonitor, open_ledger
+from leg_wear_monitor.configuration.strict import structure
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.parts import Parts
+from leg_wear_monitor.state import SCHEMA_VERSION, LegState, State
 
 START_NS = 1_700_000_000_123_456_789
 WAITING = Diagnosis(state=DiagnosisState.WAITING, reason="not enough gait cycles")
@@ -72,8 +75,9 @@ def test_a_stop_stays_over_unsure_estimates_and_a_restart_until_it_is_acknowledg
     assert changes[-1] == ("stop", "CLEARANCE_SEEN_G")
     for torque in (WAITING, shown(1.43e-3, 6e-4), WAITING, shown(2.1e-3, 2e-4), WAITING):
         assert walker.walks(torque) == []
-    believed = walker.monitor.believed_clearances["G"]
-    assert (believed.clearance_m, believed.sigma_m, believed.by) == (2.1e-3, 2e-4, "torque")
+    knee = walker.monitor.state.clearances["G"]
+    assert (knee.believed_m, knee.believed_sigma_m, knee.believed_by) == (2.1e-3, 2e-4, "torque")
+    assert knee.status is State.STOP
     walker.restart()
     assert walker.walks(WAITING)[-1] == ("stop", "CLEARANCE_SEEN_G")
     assert "2.1 mm ± 0.2 mm" in walker.verdict.why
@@ -81,6 +85,21 @@ def test_a_stop_stays_over_unsure_estimates_and_a_restart_until_it_is_acknowledg
     cleared, _ = walker.monitor.acknowledge(START_NS)
     assert ([one.name for one in cleared], walker.alarms) == (["clearance G"], [])
     assert walker.verdict.state.value != "stop"
+
+
+def test_each_gait_cycle_and_each_verdict_has_a_state_of_the_leg_that_says_the_same(walker):
+    walker.torque = shown(2.05e-3, 3e-4)
+    reports = walker.monitor.update(walker._gait(2.5, begin_s=walker._now_s))
+    assert len(reports.states) >= len(reports.cycles) >= 2
+    last = reports.states[-1].state
+    assert (last.verdict, last.life_cycles) == (walker.verdict, reports.cycles[-1].cycle)
+    knee, hip = last.clearances["G"], last.clearances["A"]
+    assert (knee.believed_m, knee.believed_by, knee.status) == (2.05e-3, "torque", State.STOP)
+    assert knee.counted_m < knee.limit_m
+    assert hip.status is not State.STOP
+    record = json.loads(last.to_json())
+    assert record.pop("schema_version") == SCHEMA_VERSION
+    assert structure(record, LegState, "a state", "") == last
 
 
 def test_a_restored_monitor_tells_the_same_of_a_latched_stop(walker):
@@ -91,7 +110,7 @@ def test_a_restored_monitor_tells_the_same_of_a_latched_stop(walker):
     walker.monitor.restore(kept)
     walker.torque = WAITING
     assert walker.verdict.fault_code == "CLEARANCE_SEEN_G"
-    assert walker.monitor.believed_clearances["G"].clearance_m == 2.05e-3
+    assert walker.monitor.state.clearances["G"].believed_m == 2.05e-3
 
 
 def test_a_measurement_that_contradicts_ends_the_stop_and_says_so(walker):

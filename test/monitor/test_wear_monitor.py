@@ -33,11 +33,13 @@ def said(reports):
     cycles = [cycle for report in reports for cycle in report.cycles]
     alarms = [change for report in reports for change in report.alarms]
     verdicts = [change for report in reports for change in report.verdicts]
+    states = [state.state for report in reports for state in report.states]
     return (
         [look.tobytes() for look in looks],
         repr(cycles),
         repr(alarms),
         repr(verdicts),
+        [state.to_json() for state in states],
         repr(reports[-1].lost),
     )
 
@@ -63,6 +65,7 @@ def test_reports_do_not_depend_on_blocks(new_monitor, gait, cuts):
     limits = {"limits.impact_force_n": 3000.0, "limits.min_rate_hz": 150.0}
     whole = said([new_monitor(limits).update(stream)])
     assert len(whole[2]) > 100  # alarms there were
+    assert len(whole[4]) >= 2  # so were gait cycles
     monitor = new_monitor(limits)
     blocks = np.split(stream, sorted(min(cut, len(stream)) for cut in cuts))
     assert said([monitor.update(block) for block in blocks if len(block)]) == whole

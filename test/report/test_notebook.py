@@ -7,8 +7,8 @@ from matplotlib import pyplot
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.mechanism.loader import parse_mechanism
-from leg_wear_monitor.monitor.verdict.verdict import Figure
 from leg_wear_monitor.report.plot import notebook_html
+from leg_wear_monitor.state import Figure
 
 pytestmark = pytest.mark.plain
 

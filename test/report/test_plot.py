@@ -8,7 +8,7 @@ from matplotlib import pyplot
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.life.result import Life
-from leg_wear_monitor.monitor.verdict.verdict import Figure
+from leg_wear_monitor.state import Figure
 
 pytestmark = pytest.mark.plain
 

@@ -1,6 +1,7 @@
 """The monitor over real DDS: what it publishes of an even gait, and through what it goes on."""
 
 import itertools
+import json
 import time
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,6 +16,7 @@ from geometry_msgs.msg import WrenchStamped
 from mcap.reader import make_reader
 from ruamel.yaml import YAML
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
 from leg_wear_monitor import load_mechanism, replay
@@ -36,6 +38,7 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.verdict.verdict import State
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.ros.gait_publisher import PublisherConfig
+from leg_wear_monitor.state import SCHEMA_VERSION
 
 ME = "/leg_wear_monitor"
 FAST = {"wear_acceleration": 1.0e5}
@@ -78,6 +81,7 @@ def test_an_even_gait_is_followed_told_recorded_and_replayed(stage, walk, tmp_pa
     torques = stage.listen(f"{ME}/predicted_torque", WrenchStamped)
     diagnostics = stage.listen("/diagnostics", DiagnosticArray)
     markers = stage.listen(f"{ME}/markers", MarkerArray)
+    states = stage.listen(f"{ME}/state", String, latched=True)
     stage.legs().play(walk, monitor)
     stage.wait_for(lambda: len(clearances) >= 4 and len(diagnostics) > 2 and markers, "all topics")
     monitor.stop()
@@ -87,6 +91,8 @@ def test_an_even_gait_is_followed_told_recorded_and_replayed(stage, walk, tmp_pa
     assert np.ptp([message.wrench.torque.z for message in torques]) > 50.0
     are_one_number_a_value(diagnostics)
     draws_the_leg(markers[-1])
+    state = json.loads(states[-1].data)
+    assert (state["schema_version"], list(state["clearances"])) == (SCHEMA_VERSION, list("ABGIJ"))
     is_what_a_replay_gives(recording, config_from(dotted(values)), monitor.node.monitor)
 
 
@@ -136,16 +142,17 @@ def is_what_a_replay_gives(recording: Path, config: MonitorConfig, live: WearMon
     assert repr(now) in map(repr, again.status())
     assert len(replayed["~/clearance_states"]) >= 4
     assert len(replayed["~/predicted_torque"]) > 1900
-    for topic in ("~/alarms", "~/verdict"):
+    for topic in ("~/alarms", "~/verdict", "~/state"):
         lived[topic] = without_silence(lived[topic])
     for found in (lived, replayed):
         found["~/markers"] = [raw for raw in found["~/markers"] if b"no current data" not in raw]
     assert len(replayed["~/markers"]) > 50 and len(replayed["~/measured_torque"]) > 1000
     assert len(replayed["~/joints/G/clearance_m"]) == len(replayed["~/clearance_states"])
     assert len(replayed["~/verdict"]) >= 2  # no gait cycle yet, then the first
+    assert len(replayed["~/state"]) >= len(replayed["~/clearance_states"]) - 1
     for topic, messages in replayed.items():
-        begin = len(lived[topic]) - len(messages)  # alarms and verdict as they stood at the start come first
-        assert begin == (topic in ("~/alarms", "~/verdict"))
+        begin = len(lived[topic]) - len(messages)  # alarms, verdict and state at the start come first
+        assert begin == (topic in ("~/alarms", "~/verdict", "~/state"))
         assert lived[topic][begin:] == messages
 
 
@@ -393,13 +400,13 @@ def test_a_foot_load_is_taken_told_recorded_and_replayed(
     stage.wait_for(lambda: diagnostics and levels(diagnostics[-1]).get("foot_load") == 2, "the silence")
     monitor.stop()
     live = monitor.node.monitor
-    assert live.foot_load.source == "measured"
-    assert live.foot_load.cycles >= 4
+    assert live.state.load.source == "measured"
+    assert live.state.load.cycles >= 4
     assert live.used["foot_load"] == pytest.approx(1200, abs=3)
     parameters = config_from(dotted(values))
     again = WearMonitor(load_mechanism(parameters.mechanism), parameters)
     lived, replayed = published(recording), replayed_from(recording, again)
-    assert again.foot_load == live.foot_load
+    assert again.state.load == live.state.load
     assert len(replayed["~/clearance_states"]) >= 4
     for topic in ("~/clearance_states", "~/predicted_torque", "~/impact_forces"):
         assert lived[topic] == replayed[topic]

@@ -193,7 +193,7 @@ def _config(path: Path | None, crank_joint: str | None, node: str | None) -> "Mo
 
 def asks_to_act(result: "ReplayResult") -> bool:
     """Whether the verdict at the end asks a person to do something, or cannot be given."""
-    from leg_wear_monitor.monitor.verdict.verdict import State
+    from leg_wear_monitor.state import State
 
     return result.monitor.verdict.verdict.state in (State.NOT_MONITORED, State.INSPECT, State.STOP)
 

@@ -26,7 +26,8 @@ from leg_wear_monitor.monitor.verdict.situation import (
     of_foot_load,
     raised,
 )
-from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, NONE, Figure, Finding, State
+from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, NONE, Finding
+from leg_wear_monitor.state import Figure, State
 
 _ACKNOWLEDGE = "then acknowledge the alarms: leg-wear-monitor acknowledge --ledger FILE, or --node NAME"
 _COUNTED = "its faults are counted in the status `input` of /diagnostics, and in `lost` of `replay --json`"

@@ -11,7 +11,8 @@ from leg_wear_monitor.mechanism.materials import BushingLoad
 from leg_wear_monitor.monitor.alarms import Alarm, Level, time_words
 from leg_wear_monitor.monitor.config.inputs import Crank, DriveTorque
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
-from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure, Finding, State, amount, estimate
+from leg_wear_monitor.monitor.verdict.verdict import Finding, amount, estimate
+from leg_wear_monitor.state import Evidence, Figure, JointClearance, State, Verdict
 from leg_wear_monitor.twin.statistics import Sampling
 
 # What a verdict depends on, and nothing else; the defaults are those of a leg without a fault.
@@ -194,12 +195,14 @@ class BelievedClearance:
     by: str
 
 
-def believed_words(one: BelievedClearance) -> str:
-    """A believed clearance, such as ``2.05 mm ± 0.65 mm according to the drive torque``."""
-    value = amount(one.clearance_m, "m")
-    if not math.isnan(one.sigma_m):
-        value = estimate(one.clearance_m, one.sigma_m, "m")
-    return f"{value} according to {SOURCES[one.by]}"
+def believed_words(one: JointClearance) -> str:
+    """The believed clearance, such as ``2.05 mm ± 0.65 mm according to the drive torque``; empty if none."""
+    if one.believed_m is None or one.believed_by is None:
+        return ""
+    value = amount(one.believed_m, "m")
+    if one.believed_sigma_m is not None:
+        value = estimate(one.believed_m, one.believed_sigma_m, "m")
+    return f"{value} according to {SOURCES[one.believed_by]}"
 
 
 def judged(joint: JointSituation) -> BelievedClearance:
@@ -271,6 +274,14 @@ def believed(joint: JointSituation, alarm: Alarm | None, is_counted_leg: bool) -
         return None
     best = min(joint.seen, key=lambda one: one.sigma_m)
     return BelievedClearance(best.clearance_m, best.sigma_m, best.by)
+
+
+def joint_status(joint: str, is_known: bool, findings: Sequence[Finding | Verdict]) -> State:
+    """What findings say of a joint: the worst that names it, or whether anything valid is known of it."""
+    found = [finding.state for finding in findings if joint in finding.joints]
+    is_blind = any(finding.state is State.NOT_MONITORED for finding in findings)
+    found.append(State.HEALTHY if is_known and not is_blind else State.NOT_MONITORED)
+    return max(found, key=lambda state: state.severity)
 
 
 def alarm_value(joint: JointSituation, alarm: Alarm) -> BelievedClearance | None:

@@ -19,15 +19,8 @@ from leg_wear_monitor.monitor.verdict.situation import (
     hit_of,
     raised,
 )
-from leg_wear_monitor.monitor.verdict.verdict import (
-    EVIDENCE,
-    CauseWords,
-    Evidence,
-    Figure,
-    State,
-    amount,
-    estimate,
-)
+from leg_wear_monitor.monitor.verdict.verdict import EVIDENCE, CauseWords, amount, estimate
+from leg_wear_monitor.state import Evidence, Figure, State
 
 # Conditions on what explains the drive torque: one code a cause, whoever finds it.
 #

@@ -9,10 +9,10 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, bases, three_digits
 from leg_wear_monitor.monitor.forecast.measurement import validity
 from leg_wear_monitor.monitor.ledger.entry import Measurement
-from leg_wear_monitor.monitor.verdict.verdict import Figure
 from leg_wear_monitor.playback.result import LegLife, ReplaySummary
 from leg_wear_monitor.report.figure import length_unit
 from leg_wear_monitor.report.page import Chart, Panel, Part, Section, Series, Table, Text, not_valid
+from leg_wear_monitor.state import Figure
 
 FRACTIONS = ("p10", "p50", "p90")
 _MEASURED = ((True, "measured", "--series-0"), (False, "contradicts, not used", "--bad"))

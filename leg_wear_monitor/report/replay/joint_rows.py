@@ -8,9 +8,9 @@ import attrs
 from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.forecast.forecast import clearance_mm, three_digits
 from leg_wear_monitor.monitor.verdict.situation import MEASURED, OF_A_JOINT, SEEN, SOURCES
-from leg_wear_monitor.monitor.verdict.verdict import Figure, State
-from leg_wear_monitor.playback.result import JointClearance, LifeHours, ReplayAlarm, ReplaySummary
+from leg_wear_monitor.playback.result import ReplayAlarm, ReplaySummary
 from leg_wear_monitor.report.page import STATE_LOOKS, Fragment, alarm_line, not_valid, render
+from leg_wear_monitor.state import Figure, JointClearance, LifeHours, State
 
 # A clearance joint as the first screen shows it: only values that are valid.
 

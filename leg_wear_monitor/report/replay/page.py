@@ -7,7 +7,7 @@ import attrs
 
 from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.monitor.alarms import Level, time_words
-from leg_wear_monitor.monitor.verdict.verdict import Figure
+from leg_wear_monitor.monitor.verdict.verdict import guide_to
 from leg_wear_monitor.playback.result import (
     AlarmChange,
     Place,
@@ -45,6 +45,7 @@ from leg_wear_monitor.report.replay.charts import (
 )
 from leg_wear_monitor.report.replay.forecast_section import forecast_section, wear_section
 from leg_wear_monitor.report.replay.joint_rows import JointView, joint_rows, joint_views
+from leg_wear_monitor.state import Figure
 
 # Alarms: those that are raised at the end, and all changes over time.
 
@@ -384,7 +385,7 @@ def replay_page(summary: ReplaySummary) -> Page:
         f"{time_words(recording.begin_ns)}, {summary.cycles} gait cycles",
         sections=sections,
         versions=summary.made_with,
-        banner=verdict_banner(summary, (share_directory() / summary.verdict.guide).as_uri()),
+        banner=verdict_banner(summary, (share_directory() / guide_to(summary.verdict)).as_uri()),
         styles=[template_text("uplot/uPlot.min.css"), template_text("replay/replay.css")],
         libraries=[template_text("uplot/uPlot.iife.min.js"), template_text("replay/charts.js")],
         has_dark=True,

@@ -12,7 +12,7 @@ from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.reports import CycleReport, Status
-from leg_wear_monitor.monitor.verdict.verdict import State
+from leg_wear_monitor.state import State
 from leg_wear_monitor.twin.sample import Samples
 
 Walk = Callable[..., Samples]

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor.monitor.alarms import Alarm, Level, Limit, acknowledged, evaluated
+from leg_wear_monitor.monitor.leg_state import joint_clearance
 from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.situation import (
     JointSituation,
@@ -17,7 +18,8 @@ from leg_wear_monitor.monitor.verdict.situation import (
     at_limit_by_estimate,
     believed,
 )
-from leg_wear_monitor.monitor.verdict.verdict import Figure, State, verdict_of
+from leg_wear_monitor.monitor.verdict.verdict import verdict_of
+from leg_wear_monitor.state import State
 
 LIMIT_M = 6.0e-4
 LIMIT = Limit(0.8 * LIMIT_M, LIMIT_M, 0.05, 3)
@@ -122,12 +124,16 @@ def test_the_verdict_and_the_believed_clearance_tell_one_story(
     alarm = after(NEW, *before, joint=joint)
     alarm = evaluated(alarm, counted_m, LIMIT, 1, 3) if alarm.level is Level.OK else alarm
     alarm = after(acknowledged(alarm) if is_acknowledged else alarm, *now, joint=joint)
-    found = verdict(alarm, *now, joint=joint)
-    one = believed(attrs.evolve(joint, seen=tuple(now)), alarm, Figure.CLEARANCES not in found.not_valid)
-    estimate = at_limit_by_estimate(attrs.evolve(joint, seen=tuple(now)), alarm)
+    joint = attrs.evolve(joint, seen=tuple(now))
+    every = findings(Situation(joints=(joint,), alarms=(alarm,)))
+    found, one = verdict_of(every), joint_clearance(joint, alarm, every, 3.0e-4)
+    estimate = at_limit_by_estimate(joint, alarm)
     if estimate is not None:
         assert found.state is State.STOP
-    if one is not None and one.clearance_m >= LIMIT_M:
-        assert found.state is State.STOP
+    if one.believed_m is not None and one.believed_m >= LIMIT_M:
+        assert found.state is one.status is State.STOP
     if found.fault_code == "CLEARANCE_SEEN_G":
-        assert one is not None and one.clearance_m >= LIMIT_M
+        assert one.believed_m is not None and one.believed_m >= LIMIT_M
+    if "G" in found.joints:
+        assert one.status is found.state
+    assert joint_clearance(joint, alarm, [found], 3.0e-4) == one

@@ -38,14 +38,13 @@ from leg_wear_monitor.monitor.verdict.situation import (
 )
 from leg_wear_monitor.monitor.verdict.verdict import (
     CauseWords,
-    Figure,
     Finding,
-    State,
-    Verdict,
     dated,
+    guide_to,
     has_changed,
     verdict_of,
 )
+from leg_wear_monitor.state import Figure, State, Verdict
 
 pytestmark = pytest.mark.plain
 
@@ -259,7 +258,7 @@ def test_each_case_has_its_verdict(
     assert (verdict.state, verdict.fault_code, verdict.not_valid) == (state, code, not_valid)
     assert verdict.why and verdict.do and "{" not in verdict.words
     assert verdict.joints == tuple(part for part in code.split("_") if part in JOINTS)
-    assert verdict.guide == guide_of(re.sub("(_[AG])+$", "", code))
+    assert guide_to(verdict) == guide_of(re.sub("(_[AG])+$", "", code))
 
 
 def test_every_rule_is_the_verdict_of_some_case() -> None:

@@ -10,11 +10,10 @@ from html_reader import read
 from made_up_fleet import DAY_NS, NOW_NS, made_up_fleet, made_up_leg, random_fleet
 
 from leg_wear_monitor.fleet.overview import BadRecording, LegChange, LegOverview, first_of
-from leg_wear_monitor.monitor.verdict.verdict import Figure, State
-from leg_wear_monitor.playback.result import JointClearance
 from leg_wear_monitor.report.fleet_page import counts, deadline, first_legs, fleet_page
 from leg_wear_monitor.report.fleet_standing import Day, Standing
 from leg_wear_monitor.report.page import page_html
+from leg_wear_monitor.state import Figure, JointClearance, State
 
 pytestmark = pytest.mark.plain
 

@@ -5,9 +5,9 @@ import pytest
 from made_up_summary import made_up_summary
 
 from leg_wear_monitor.monitor.angle_regression import ClearanceObservation
-from leg_wear_monitor.monitor.verdict.verdict import Figure
 from leg_wear_monitor.playback.result import SeenClearance
 from leg_wear_monitor.report.replay.charts import clearance_section, clearance_sentences, encoder_sections
+from leg_wear_monitor.state import Figure
 
 pytestmark = pytest.mark.plain
 

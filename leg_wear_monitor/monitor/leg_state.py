@@ -1,0 +1,162 @@
+"""The state of the leg, made of what the monitor holds."""
+
+import math
+from collections.abc import Mapping, Sequence
+
+from leg_wear_monitor.estimate.cause import Cause, NamedCause, TorqueExplanation
+from leg_wear_monitor.files import finite_or_none
+from leg_wear_monitor.monitor.alarm_specs import CLEARANCE
+from leg_wear_monitor.monitor.alarms import Alarm
+from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
+from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast, Quantiles
+from leg_wear_monitor.monitor.parts import Parts
+from leg_wear_monitor.monitor.reports import CycleReport
+from leg_wear_monitor.monitor.verdict.situation import JointSituation, believed, joint_status
+from leg_wear_monitor.monitor.verdict.verdict import Finding, verdict_of
+from leg_wear_monitor.state import (
+    Drive,
+    Estimate,
+    Figure,
+    FootLoad,
+    JointClearance,
+    LegState,
+    LifeHours,
+    TorqueDiagnosis,
+    Verdict,
+)
+
+_FACTORS = (Cause.SCALE, Cause.SIGN)
+_TURN = 2.0 * math.pi
+
+
+def leg_state(parts: Parts, findings: Sequence[Finding]) -> LegState:
+    """State of the leg now, with the verdict of some findings."""
+    last, verdict, diagnosis = parts.state.last, verdict_of(findings), parts.diagnosis
+    explained, intake = parts.state.mismatch.explanation, parts.twin.intake
+    alarms = parts.evaluation.board.alarms
+    return LegState(
+        stamp_ns=intake.followed_stamp_ns or intake.newest_stamp_ns,
+        life_cycles=parts.accounting.state.cycles,
+        verdict=verdict,
+        clearances={
+            joint.joint: joint_clearance(
+                joint,
+                alarms[CLEARANCE.name(joint.joint)],
+                findings,
+                parts.mechanism.clearances[joint.joint].radial_clearance,
+            )
+            for joint in parts.judge.joints(parts.state)
+        },
+        drive=_drive(last, diagnosis, explained),
+        load=_load(parts.foot_load.load if parts.foot_load else FootLoad(), diagnosis),
+        diagnosis=_diagnosis(last, diagnosis, explained),
+        life=life_of({joint.joint: joint.forecast for joint in last.joints}, last.forecast, verdict)
+        if last
+        else {},
+    )
+
+
+def joint_clearance(
+    joint: JointSituation, alarm: Alarm | None, findings: Sequence[Finding | Verdict], new_m: float
+) -> JointClearance:
+    """Clearance of a joint, and what findings say of it.
+
+    Parameters
+    ----------
+    joint : JointSituation
+    alarm : Alarm or None
+        That of the joint's clearance.
+    findings : sequence of Finding or Verdict
+        Those of the verdict, or the verdict alone.
+    new_m : float
+        The clearance when new.
+    """
+    not_valid = {figure for finding in findings for figure in finding.not_valid}
+    one = believed(joint, alarm, Figure.CLEARANCES not in not_valid)
+    best = min(joint.seen, key=lambda seen: seen.sigma_m, default=None)
+    return JointClearance(
+        believed_m=one.clearance_m if one else None,
+        believed_sigma_m=finite_or_none(one.sigma_m) if one else None,
+        believed_by=one.by if one else None,
+        counted_m=joint.counted_m,
+        seen_m=best.clearance_m if best else None,
+        seen_sigma_m=best.sigma_m if best else None,
+        seen_by=(best.by,) if best else (),
+        measured_m=joint.measured.clearance_m if joint.measured else None,
+        measured_sigma_m=joint.measured.sigma_m if joint.measured else None,
+        new_m=new_m,
+        limit_m=joint.limit_m,
+        status=joint_status(joint.joint, one is not None, findings),
+    )
+
+
+def life_of(
+    joints: Mapping[str, JointForecast | None], leg: LegForecast | None, verdict: Verdict
+) -> dict[str, LifeHours | None]:
+    """Remaining life of each joint and of the ``leg`` by their forecasts, as far as it is believed."""
+    told: dict[str, JointForecast | LegForecast | None] = {**joints, "leg": leg}
+    if Figure.FORECAST in verdict.not_valid:
+        return dict.fromkeys(told)
+    return {name: life_hours(each.hours) if each else None for name, each in told.items()}
+
+
+def life_hours(hours: Quantiles | None) -> LifeHours | None:
+    """Quantiles of a remaining life; None if it is not known."""
+    return None if hours is None else LifeHours(p10_h=hours.p10, p50_h=hours.p50, p90_h=hours.p90)
+
+
+def _drive(last: CycleReport | None, diagnosis: Diagnosis, explained: TorqueExplanation | None) -> Drive:
+    """The drive by the last gait cycle, by what explains a torque mismatch, and by the diagnosis."""
+    named = explained.named if explained else ()
+    factor = next((one for one in named if one.cause in _FACTORS), None)
+    pole_s = diagnosis.channel.time_constant_s
+    return Drive(
+        scale=_estimate(factor.value, factor.sigma) if factor else None,
+        lag_s=_estimate(last.torque_lag_s, last.torque_lag_sigma_s) if last else None,
+        coulomb_nm=_estimate(last.friction_nm, last.friction_sigma_nm) if last else None,
+        load_friction=_estimate(last.load_friction, last.load_friction_sigma) if last else None,
+        bandwidth_hz=Estimate(value=1.0 / (_TURN * pole_s)) if pole_s > 0.0 else None,
+    )
+
+
+def _estimate(value: float, sigma: float) -> Estimate | None:
+    return Estimate(value=value, sigma=sigma) if math.isfinite(value) else None
+
+
+def _load(measured: FootLoad, diagnosis: Diagnosis) -> FootLoad:
+    """The measured load, or else the one that the drive torque shows."""
+    if measured.source != "none" or diagnosis.load is None:
+        return measured
+    return FootLoad(
+        source="estimated",
+        peak_n=diagnosis.load.peak_n,
+        peak_sigma_n=diagnosis.load.peak_sigma_n,
+        heel_strike_phase=diagnosis.load.heel_strike % 1.0,
+        toe_off_phase=diagnosis.load.toe_off % 1.0,
+        cycles=diagnosis.cycles,
+    )
+
+
+def _diagnosis(
+    last: CycleReport | None, diagnosis: Diagnosis, explained: TorqueExplanation | None
+) -> TorqueDiagnosis:
+    cause = _cause(diagnosis, explained)
+    return TorqueDiagnosis(
+        state=diagnosis.state.value,
+        reason=diagnosis.reason,
+        cycles_used=diagnosis.cycles,
+        cycles_not_used=dict(diagnosis.cycles_not_used),
+        misfit=last.torque_mismatch if last else None,
+        cause=cause.cause.name.lower() if cause else None,
+        cause_subject=cause.subject if cause else "",
+        cause_value=cause.value if cause else None,
+        cause_sigma=cause.sigma if cause else None,
+    )
+
+
+def _cause(diagnosis: Diagnosis, explained: TorqueExplanation | None) -> NamedCause | None:
+    """What explains the torque: an unsettled change of the leg, or else the one cause of a mismatch."""
+    if diagnosis.state is DiagnosisState.CHANGED and diagnosis.changes:
+        return diagnosis.changes[-1]
+    named = explained.named if explained else ()
+    return named[0] if len(named) == 1 else None

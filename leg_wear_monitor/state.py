@@ -1,0 +1,345 @@
+"""State of a leg: verdict, one believed clearance a joint, drive, load, diagnosis, remaining life.
+
+The monitor makes it, and all else that is shown of a leg is a view of it. SI units; None for what is not
+known.
+"""
+
+from enum import Enum
+from typing import Any
+
+import attrs
+
+from leg_wear_monitor.configuration.strict import part_document
+from leg_wear_monitor.files import finite_or_none, json_text
+from leg_wear_monitor.shown import Shown
+
+SCHEMA_VERSION = 3
+"""Of the JSON; counts up when a field is renamed, removed or means something else."""
+
+
+class _Word(Enum):
+    """Members whose value is the word that files contain."""
+
+    @property
+    def words(self) -> str:
+        """The word as operators read it."""
+        return str(self.value).replace("_", " ")
+
+
+class State(_Word):
+    """State of the leg, from the mildest to the most severe; the value is the word that files contain.
+
+    A leg that is not monitored is worse than one to be watched, and milder than one to be inspected: a reason
+    to inspect or to stop does not end because the input fails.
+    """
+
+    HEALTHY = "healthy"
+    WATCH = "watch"
+    NOT_MONITORED = "not_monitored"
+    INSPECT = "inspect"
+    STOP = "stop"
+
+    @property
+    def severity(self) -> int:
+        """Rank in the order above, from 0."""
+        return list(State).index(self)
+
+
+class Figure(_Word):
+    """Kinds of values that may not be valid; the value is the word that files contain."""
+
+    CLEARANCES = "clearances"
+    GROWTH = "growth"
+    IMPACT_FORCES = "impact_forces"
+    FORECAST = "forecast"
+
+    @property
+    def words(self) -> str:
+        """What operators read: a clearance by torque, by encoders or by hand is not meant."""
+        return "counted clearances" if self is Figure.CLEARANCES else super().words
+
+
+@attrs.frozen
+class Evidence:
+    """A value that a finding rests on, and its limit.
+
+    Attributes
+    ----------
+    name : str
+        Name of the alarm, or of what was observed.
+    value : float or None
+        Its value; None if it is not known.
+    limit : float or None
+        Its limit; None where there is no limit.
+    unit : str
+        Of both, SI; empty for a fraction.
+    """
+
+    name: str
+    value: float | None = attrs.field(converter=finite_or_none)
+    limit: float | None = attrs.field(converter=finite_or_none)
+    unit: str
+
+
+@attrs.frozen(kw_only=True)
+class Verdict(Shown):
+    """Conclusion of the monitor on the leg.
+
+    Attributes
+    ----------
+    state : State
+        State of the leg.
+    joints : tuple of str
+        The joints that the reason concerns; empty if that is not known, or none is.
+    why : str
+        The reason, with values and units.
+    since_ns : int
+        Stamp since which the reason has been valid; 0 if it is not known.
+    do : str
+        Next action of a person.
+    evidence : tuple of Evidence
+        Of all findings, that of the reason first.
+    not_valid : tuple of Figure
+        Kinds of values that are not valid meanwhile.
+    fault_code : str
+        Stable name of the reason, such as ``CLEARANCE_G``; ``NONE`` for a healthy leg.
+    """
+
+    state: State
+    joints: tuple[str, ...]
+    why: str
+    since_ns: int
+    do: str
+    evidence: tuple[Evidence, ...]
+    not_valid: tuple[Figure, ...]
+    fault_code: str
+
+    @property
+    def words(self) -> str:
+        """State, joints, reason and action in one line."""
+        whose = f" joint {', '.join(self.joints)}" if self.joints else ""
+        return f"{self.state.words}{whose}: {self.why}. To do: {self.do}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data as in summary.json; an unknown value is None."""
+        return dict(part_document(self))
+
+
+@attrs.frozen(kw_only=True)
+class JointClearance:
+    """Mean radial clearance of a joint [m].
+
+    Attributes
+    ----------
+    believed_m : float or None
+        The clearance that the verdict rests on; None where nothing known of the joint is valid.
+    believed_sigma_m : float or None
+        Its standard deviation.
+    believed_by : str or None
+        Whose it is: ``counted``, ``torque``, ``encoders``, ``measured``, or ``both`` for what counting and
+        measurements give together.
+    counted_m : float
+        Clearance when new, plus the wear counted since.
+    seen_m : float or None
+        Clearance that measurements of the gait show.
+    seen_sigma_m : float or None
+        Its standard deviation.
+    seen_by : tuple of str
+        What shows it, such as ``encoders``.
+    measured_m : float or None
+        Clearance that somebody measured last on this part.
+    measured_sigma_m : float or None
+        Its standard deviation.
+    new_m : float
+        Clearance when new.
+    limit_m : float
+        Limit of the clearance.
+    status : State
+        What the verdict's findings say of the joint; ``not_monitored`` where nothing known of it is valid.
+    """
+
+    believed_m: float | None = None
+    believed_sigma_m: float | None = None
+    believed_by: str | None = None
+    counted_m: float
+    seen_m: float | None = None
+    seen_sigma_m: float | None = None
+    seen_by: tuple[str, ...] = ()
+    measured_m: float | None = None
+    measured_sigma_m: float | None = None
+    new_m: float
+    limit_m: float
+    status: State = State.NOT_MONITORED
+
+
+@attrs.frozen(kw_only=True)
+class Estimate:
+    """A value that is estimated from measurements.
+
+    Attributes
+    ----------
+    value : float
+        The estimate.
+    sigma : float or None
+        Its standard deviation.
+    """
+
+    value: float
+    sigma: float | None = attrs.field(default=None, converter=finite_or_none)
+
+
+@attrs.frozen(kw_only=True)
+class Drive:
+    """The drive and its torque sensor, as the drive torque shows them.
+
+    Attributes
+    ----------
+    scale : Estimate or None
+        Measured over actual torque; None while a torque mismatch does not show that it is another one than 1.
+    lag_s : Estimate or None
+        Delay of the measured torque.
+    coulomb_nm : Estimate or None
+        Constant friction; at one cadence it contains the viscous one.
+    viscous_nms : Estimate or None
+        Viscous friction; None while gait cycles of one cadence do not separate it.
+    load_friction : Estimate or None
+        Friction over the size of the torque that the drive transmits.
+    bandwidth_hz : Estimate or None
+        Of the first-order low-pass between the leg and the torque; None if none is seen.
+    """
+
+    scale: Estimate | None = None
+    lag_s: Estimate | None = None
+    coulomb_nm: Estimate | None = None
+    viscous_nms: Estimate | None = None
+    load_friction: Estimate | None = None
+    bandwidth_hz: Estimate | None = None
+
+
+@attrs.frozen(kw_only=True)
+class FootLoad:
+    """The load at the foot over the last gait cycles.
+
+    Attributes
+    ----------
+    source : str
+        What it is known by: ``measured``, ``estimated`` from the drive torque, or ``none``.
+    peak_n : float or None
+        Largest vertical force in the mean over gait cycles.
+    peak_sigma_n : float or None
+        Its standard deviation: if measured, from step to step.
+    heel_strike_phase, toe_off_phase : float or None
+        Crank angles at which the foot strikes and leaves the ground, as fractions of a turn.
+    heel_strike_sigma, toe_off_sigma : float or None
+        Their standard deviations from step to step.
+    cycles : int
+        Number of gait cycles that it is from.
+    """
+
+    source: str = "none"
+    peak_n: float | None = None
+    peak_sigma_n: float | None = None
+    heel_strike_phase: float | None = None
+    toe_off_phase: float | None = None
+    heel_strike_sigma: float | None = None
+    toe_off_sigma: float | None = None
+    cycles: int = 0
+
+
+@attrs.frozen(kw_only=True)
+class TorqueDiagnosis:
+    """What the drive torque shows of the leg.
+
+    Attributes
+    ----------
+    state : str
+        ``off``, ``waiting``, ``as_counted`` or ``changed``.
+    reason : str
+        Why there is no estimate yet, or why it is not to be believed now; empty otherwise.
+    cycles_used : int
+        Gait cycles in the estimate.
+    cycles_not_used : dict of str to int
+        Gait cycles that were not used, by reason.
+    misfit : float or None
+        RMS of the torque that load, friction and lag do not explain, as a fraction of the predicted RMS.
+    cause : str or None
+        What explains it, such as ``clearance`` or ``lag``; None where nothing is to be explained, or more
+        than one cause does.
+    cause_subject : str
+        The joint or the body concerned; empty if there is none.
+    cause_value : float or None
+        Value of the cause [SI].
+    cause_sigma : float or None
+        Its standard deviation.
+    """
+
+    state: str = "off"
+    reason: str = ""
+    cycles_used: int = 0
+    cycles_not_used: dict[str, int] = attrs.Factory(dict)
+    misfit: float | None = attrs.field(default=None, converter=finite_or_none)
+    cause: str | None = None
+    cause_subject: str = ""
+    cause_value: float | None = attrs.field(default=None, converter=finite_or_none)
+    cause_sigma: float | None = attrs.field(default=None, converter=finite_or_none)
+
+
+@attrs.frozen(kw_only=True)
+class LifeHours:
+    """Remaining hours of walking, as quantiles.
+
+    Attributes
+    ----------
+    p10_h : float
+        Hours that are not exceeded with a probability of 10 %.
+    p50_h : float
+        Hours that are not exceeded with a probability of 50 %.
+    p90_h : float
+        Hours that are not exceeded with a probability of 90 %.
+    """
+
+    p10_h: float
+    p50_h: float
+    p90_h: float
+
+
+@attrs.frozen(kw_only=True)
+class LegState:
+    """All that is known of a leg at one instant.
+
+    Attributes
+    ----------
+    stamp_ns : int
+        The instant; 0 before the first sample.
+    life_cycles : int
+        Gait cycles over the leg's whole life in the ledger.
+    verdict : Verdict
+        Conclusion of the monitor on the leg.
+    clearances : dict of str to JointClearance
+        Clearance of each clearance joint.
+    drive : Drive
+        The drive and its torque sensor.
+    load : FootLoad
+        Load at the foot over the last gait cycles.
+    diagnosis : TorqueDiagnosis
+        What the drive torque shows of the leg.
+    life : dict of str to LifeHours or None
+        Remaining life of each joint, and of the ``leg``; None where it is not known or not valid.
+    """
+
+    stamp_ns: int = 0
+    life_cycles: int = 0
+    verdict: Verdict
+    clearances: dict[str, JointClearance]
+    drive: Drive = Drive()
+    load: FootLoad = FootLoad()
+    diagnosis: TorqueDiagnosis = TorqueDiagnosis()
+    life: dict[str, LifeHours | None] = attrs.Factory(dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain object; null for what is not known."""
+        return {"schema_version": SCHEMA_VERSION, **part_document(self)}
+
+    def to_json(self) -> str:
+        """Text of the plain object."""
+        return json_text(self.to_dict())

@@ -107,9 +107,7 @@ def expectation(path: Path, parameters: Path) -> dict[str, Any]:
             "not_valid": [figure.value for figure in found.verdict.not_valid],
         },
         "mean_force_n": {name: joint.mean_force_n for name, joint in found.joints.items()},
-        "opened_m": {
-            name: joint.clearance_m.last - joint.clearance_m.first for name, joint in found.joints.items()
-        },
+        "opened_m": {name: joint.opened_m for name, joint in found.joints.items()},
     }
 
 

@@ -86,11 +86,11 @@ def replayed(
         begun[0] = time.process_time()
 
     result = lw.replay(recording, config, ledger=ledger, sample=sample, ready=ready)
-    spent, joints = time.process_time() - begun[0], result.summary().joints
+    spent, found = time.process_time() - begun[0], result.summary()
     sampling = result.monitor.sampling
     followed = sampling.followed_cycles / len(result.history) if sampling else 1.0
-    last = {name: joint.clearance_m.last for name, joint in joints.items()}
-    return last, {name: joint.sampling_sigma_m for name, joint in joints.items()}, spent, followed
+    last = {name: joint.counted_m for name, joint in found.clearances.items()}
+    return last, {name: joint.sampling_sigma_m for name, joint in found.joints.items()}, spent, followed
 
 
 def main() -> None:

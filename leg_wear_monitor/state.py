@@ -309,10 +309,6 @@ class LegState:
 
     Attributes
     ----------
-    stamp_ns : int
-        The instant; 0 before the first sample.
-    life_cycles : int
-        Gait cycles over the leg's whole life in the ledger.
     verdict : Verdict
         Conclusion of the monitor on the leg.
     clearances : dict of str to JointClearance
@@ -325,16 +321,20 @@ class LegState:
         What the drive torque shows of the leg.
     life : dict of str to LifeHours or None
         Remaining life of each joint, and of the ``leg``; None where it is not known or not valid.
+    stamp_ns : int
+        The instant; 0 before the first sample.
+    life_cycles : int
+        Gait cycles over the leg's whole life in the ledger.
     """
 
-    stamp_ns: int = 0
-    life_cycles: int = 0
     verdict: Verdict
     clearances: dict[str, JointClearance]
     drive: Drive = Drive()
     load: FootLoad = FootLoad()
     diagnosis: TorqueDiagnosis = TorqueDiagnosis()
     life: dict[str, LifeHours | None] = attrs.Factory(dict)
+    stamp_ns: int = 0
+    life_cycles: int = 0
 
     def to_dict(self) -> dict[str, Any]:
         """Plain object; null for what is not known."""

@@ -24,7 +24,8 @@ def walk(leg, second=1, clearance_m=3.1e-4, **values):
     """A second of a healthy leg."""
     joints = [
         status(f"joint {joint}", "from the growth", clearance_m=clearance_m, clearance_limit_m=6e-4,
-               clearance_max_m=clearance_m, p10_hours=100, p50_hours=200, p90_hours=300)
+               clearance_max_m=clearance_m, believed_m=clearance_m, believed_by_counted=1,
+               p10_hours=100, p50_hours=200, p90_hours=300)
         for joint in "ABGIJ"
     ]  # fmt: skip
     verdict = {"severity": 0, "since_s": 1.5, "torque_mismatch": 0.04, "torque_mismatch_limit": 0.1, **values}
@@ -41,5 +42,5 @@ def walk(leg, second=1, clearance_m=3.1e-4, **values):
         ],
     )
     leg.take_cycle(
-        {"clearance_m": dict.fromkeys("ABGIJ", clearance_m), "peak_force_n": dict.fromkeys("ABGIJ", 9.0)}
+        {"counted_m": dict.fromkeys("ABGIJ", clearance_m), "peak_force_n": dict.fromkeys("ABGIJ", 9.0)}
     )

@@ -57,9 +57,9 @@ def described(kind: type, field: "attrs.Attribute[Any]") -> str:
     """What a field is: its own words, those of the docstring, or of the class if that has one line."""
     if "doc" in field.metadata:
         return str(field.metadata["doc"])
-    texts = descriptions(kind)
-    if field.name in texts:
-        return texts[field.name]
+    for each in kind.__mro__:  # what a class inherits is described where it is declared
+        if texts := descriptions(each).get(field.name):
+            return texts
     return inspect.cleandoc(kind.__doc__ or "").replace("\n", " ")
 
 

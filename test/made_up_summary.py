@@ -14,10 +14,10 @@ from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, Qu
 from leg_wear_monitor.monitor.forecast.wear_coefficients import CoefficientPrior
 from leg_wear_monitor.monitor.ledger.entry import Measurement, WalkedLoad
 from leg_wear_monitor.monitor.reports import Lost
-from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS
+from leg_wear_monitor.playback.history import CYCLE_COLUMNS, SUMMARY_COLUMNS
 from leg_wear_monitor.playback.result import (
     AlarmChange,
-    ClearanceChange,
+    EncoderEvidence,
     LegJoint,
     LegLife,
     ReplayAlarm,
@@ -31,7 +31,6 @@ from leg_wear_monitor.playback.result import (
     ReplayRecording,
     ReplayStatus,
     ReplaySummary,
-    SeenClearance,
     WornDepth,
 )
 from leg_wear_monitor.state import (
@@ -90,27 +89,24 @@ def made_up_summary() -> ReplaySummary:
         prior=CoefficientPrior(sigma=0.7, basis="a judgement", holds_for="steel on steel (greased)"),
     )  # fmt: skip
     joint = ReplayJoint(
-        clearance_m=ClearanceChange(3e-4, 4e-4, 5e-4), growth_m_per_cycle=1e-12,
+        opened_m=1e-4, growth_m_per_cycle=1e-12,
         growth_error_m_per_cycle=1e-13, growth_mps=None, forecast=forecast, peak_force_n=np.float64(9.0),
         mean_force_n=4.0, impacts=7,
         load=BushingLoad(
             mean_pressure_pa=1e6, p99_pressure_pa=2e6, mean_sliding_speed_mps=0.1,
             mean_pressure_speed_pa_mps=1e5, pressure_limit_pa=1.4e8,
         ),
-        seen=SeenClearance(
-            observation=ClearanceObservation.SEEN, clearance_m=5e-4, sigma_m=math.nan, departure_m=1e-4,
-            believed=True, is_other=True,
+        encoders=EncoderEvidence(
+            observation=ClearanceObservation.SEEN, sigma_m=math.nan, departure_m=1e-4, believed=True,
+            is_other=True,
         ),
     )  # fmt: skip
     stamps = np.array([1_700_000_000_000_000_001, 1_700_000_000_000_000_003])
     over_time = np.array([1.0, math.nan])
     columns = dict.fromkeys(CYCLE_COLUMNS, over_time)
-    columns |= {name: {"A": over_time, "B": np.array([3.0, 4.0])} for name in JOINT_COLUMNS}
+    columns |= {name: {"A": over_time, "B": np.array([3.0, 4.0])} for name in SUMMARY_COLUMNS.values()}
     return ReplaySummary(
-        verdict=Verdict(
-            state=State.INSPECT, joints=("A",), why="why", since_ns=7, do="do", not_valid=(Figure.FORECAST,),
-            evidence=(Evidence("clearance A", 5e-4, math.nan, "m"),), fault_code="CLEARANCE_CHANGED_A",
-        ),
+        **attrs.asdict(made_up_state(), recurse=False),
         recording=ReplayRecording(
             files=("a.mcap",), topics={"joint_states": "/joint_states"}, time="header", is_partial=True,
             findings=(ReplayFinding(file="a.mcap", text="ends at byte 7", weight=Severity.LOSS),),
@@ -133,15 +129,7 @@ def made_up_summary() -> ReplaySummary:
         real_time_factor=4e-9,
         cycles=2,
         gait=ReplayGait(believable_cycles=2, doubtful_cycles=0, missing="", is_counted=False),
-        joints={"A": joint, "B": attrs.evolve(joint, forecast=None, seen=None, peak_force_n=math.inf)},
-        clearances={
-            "A": JointClearance(
-                counted_m=4e-4, seen_m=5e-4, seen_sigma_m=1e-5, seen_by=("encoders",), new_m=3e-4,
-                limit_m=6e-4,
-            ),
-            "B": JointClearance(counted_m=4e-4, new_m=3e-4, limit_m=6e-4),
-        },
-        life={"A": LifeHours(p10_h=1.0, p50_h=2.0, p90_h=3.0), "B": None},
+        joints={"A": joint, "B": attrs.evolve(joint, forecast=None, encoders=None, peak_force_n=math.inf)},
         forecast=LegLife(
             answer=Answer.PARTLY_KNOWN, cycles=LIFE, hours=LIFE, days=LIFE, first_probability={"A": 1.0},
             simulated_lives=0, first="A",

@@ -340,7 +340,7 @@ def _by_torque(result: "ReplayResult") -> str:
 def _counted(joint: "JointReport") -> str:
     from leg_wear_monitor.monitor.forecast.forecast import clearance_mm
 
-    if joint.forecast is None:
+    if joint.forecast is None or joint.forecast.clearance_m is None:
         return f"{1.0e3 * joint.clearance_m:.3f}"
     may_be = joint.forecast.clearance_m
     return clearance_mm(joint.clearance_m, may_be.p10, may_be.p90)

@@ -27,7 +27,7 @@ from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import LedgerContent, read_ledger
 from leg_wear_monitor.monitor.leg_state import joint_clearance
 from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance
-from leg_wear_monitor.playback.result import ClearanceChange, ReplayJoint, ReplaySummary
+from leg_wear_monitor.playback.result import ReplaySummary
 from leg_wear_monitor.playback.summary import ledger_verdict, replay_alarm
 from leg_wear_monitor.state import JointClearance, LifeHours
 
@@ -122,7 +122,6 @@ class LedgerLeg:
             verdict=ledger_verdict(found.verdict) if found.verdict else NO_VERDICT,
             history=_trends(found.clearances).history(self._setup.joints),
             cycles=int(found.entry.totals.get("cycles", 0.0)) if found.entry else 0,
-            joints={joint: _report(part, counted[joint]) for joint, part in joints.items()},
             clearances={
                 joint: self._clearance(found, part, counted[joint]) for joint, part in joints.items()
             },
@@ -153,15 +152,6 @@ def _heading(view: ReplaySummary) -> str:
     return f"As the ledger has it: {words}." if words else "As the ledger has it."
 
 
-def _report(part: JointWear, counted_m: float) -> ReplayJoint:
-    greatest_m = counted_m - part.mean_m + float(part.depth.sum(axis=0).max())
-    return ReplayJoint(
-        clearance_m=ClearanceChange(counted_m, counted_m, greatest_m), forecast=None, impacts=0,
-        growth_m_per_cycle=None, growth_error_m_per_cycle=None, growth_mps=None, peak_force_n=None,
-        mean_force_n=None,
-    )  # fmt: skip
-
-
 def _life(found: LedgerContent, part: JointWear) -> LifeHours | None:
     """Hours of walking from the last forecast on, with the part's own mean duration of a gait cycle."""
     point = found.forecasts.get(part.name)
@@ -182,5 +172,5 @@ def _trends(points: Iterable[ClearancePoint]) -> Trends:
         rows.setdefault(point.stamp_ns, {})[point.joint] = point.clearance_m
     trends = Trends()
     for stamp_ns, clearances in rows.items():
-        trends.add(Row(stamp_ns, {}, {"clearance_m": clearances}))
+        trends.add(Row(stamp_ns, {}, {"counted_m": clearances}))
     return trends

@@ -36,7 +36,6 @@ from leg_wear_monitor.errors import printable
 from leg_wear_monitor.files import finite_or_none
 from leg_wear_monitor.monitor.leg_state import life_hours
 from leg_wear_monitor.playback.result import (
-    ClearanceChange,
     LegLife,
     ReplayJoint,
     ReplayStatus,
@@ -90,7 +89,7 @@ def joints_of(
         if status is None or counted_m is None:
             continue
         told = forecasts.get(f"forecast {joint}")
-        found.reports[joint] = _report(status, counted_m, told, cycle, joint)
+        found.reports[joint] = _report(status, told, cycle, joint)
         found.clearances[joint] = _clearance(setup, joint, status, counted_m, statuses)
         found.life[joint] = life_hours(hours_of(status))
     return found
@@ -98,7 +97,6 @@ def joints_of(
 
 def _report(
     status: ReplayStatus,
-    counted_m: float,
     told: ReplayStatus | None,
     cycle: Mapping[str, Mapping[str, float | None]],
     joint: str,
@@ -106,7 +104,7 @@ def _report(
     values = status.values
     last_peak_n = cycle.get("peak_force_n", {}).get(joint)
     return ReplayJoint(
-        clearance_m=ClearanceChange(counted_m, counted_m, values.get("clearance_max_m") or counted_m),
+        opened_m=None,
         growth_m_per_cycle=values.get("growth_m_per_cycle"),
         growth_mps=values.get("growth_mps"),
         forecast=joint_forecast_of(told) if told else None,

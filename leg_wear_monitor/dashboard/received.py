@@ -15,7 +15,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, Quantiles
 from leg_wear_monitor.monitor.verdict.verdict import unit_of, with_unit
-from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS
+from leg_wear_monitor.playback.history import CYCLE_COLUMNS, SUMMARY_COLUMNS
 from leg_wear_monitor.playback.result import LegLife, ReplayAlarm, ReplayHistory, ReplayStatus
 from leg_wear_monitor.state import Evidence, Figure, State, Verdict
 
@@ -212,7 +212,7 @@ class Trends:
         columns: dict[str, Any] = {name: _column(row.leg.get(name) for row in rows) for name in CYCLE_COLUMNS}
         columns |= {
             name: {joint: _column(row.joints.get(name, {}).get(joint) for row in rows) for joint in joints}
-            for name in (*JOINT_COLUMNS, "seen_m")
+            for name in (*SUMMARY_COLUMNS.values(), "seen_m")
         }
         stamps = np.array([row.stamp_ns for row in rows], np.int64)
         return ReplayHistory(stamp_ns=stamps, **columns)

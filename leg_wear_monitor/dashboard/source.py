@@ -295,7 +295,7 @@ def trends_region(view: ReplaySummary, caption: str) -> str:
         parts.append(health_chart(timed))
     if has_estimates(timed):
         parts.append(estimates_chart(timed))
-    if _is_known(timed.history.clearance_m):
+    if _is_known(timed.history.counted_m):
         parts += _unless_doubted(timed, Figure.CLEARANCES, "Counted clearances", openings_chart(timed))
     if _is_known(timed.history.peak_force_n):
         parts += _unless_doubted(timed, Figure.IMPACT_FORCES, "Impact forces", force_chart(timed))

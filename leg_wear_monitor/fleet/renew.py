@@ -320,9 +320,6 @@ def _renew(leg: FleetLeg, directory: LegDirectory) -> None:
             joint: attrs.evolve(
                 one,
                 forecast=joint_forecast(forecasts[joint], verdict),
-                believed_m=clearances[joint].believed_m,
-                believed_sigma_m=clearances[joint].believed_sigma_m,
-                believed_by=clearances[joint].believed_by,
             )
             for joint, one in summary.joints.items()
         },
@@ -355,7 +352,7 @@ def _clearance(
         joint=joint,
         counted_m=before.counted_m,
         limit_m=before.limit_m,
-        believed_m=forecast.clearance_m.p50,
+        believed_m=forecast.now_m,
         seen=()
         if seen_m is None or sigma_m is None
         else tuple(SeenClearance(by, seen_m, sigma_m) for by in before.seen_by),

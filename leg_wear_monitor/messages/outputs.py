@@ -234,9 +234,9 @@ def _lifetime(joint: JointReport) -> Status:
     if forecast is None:
         return Status(name, Level.OK, "not enough growth or data", {})
     values = lifetime_values(forecast)
-    values |= {
-        f"clearance_{fraction}_m": value for fraction, value in attrs.asdict(forecast.clearance_m).items()
-    }
+    if forecast.clearance_m is not None:
+        quantiles = attrs.asdict(forecast.clearance_m)
+        values |= {f"clearance_{fraction}_m": value for fraction, value in quantiles.items()}
     values["measurements"] = float(forecast.measurements)
     if forecast.prior is not None:
         values["wear_coefficient_sigma"] = forecast.prior.sigma

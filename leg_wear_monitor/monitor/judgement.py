@@ -332,7 +332,7 @@ def _joint(
         joint=name,
         counted_m=counted_m,
         limit_m=limit_m,
-        believed_m=report.forecast.clearance_m.p50 if report and report.forecast else math.nan,
+        believed_m=report.forecast.now_m if report and report.forecast else math.nan,
         seen=tuple(seen),
         is_used=bool(by_encoders and by_encoders.believed),
         label=label,

@@ -87,7 +87,7 @@ class JointReport:
     @property
     def judged_clearance_m(self) -> float:
         """Clearance that is compared with the limit: the counted one, or a larger one by measurement."""
-        believed_m = self.forecast.clearance_m.p50 if self.forecast else math.nan
+        believed_m = self.forecast.now_m if self.forecast else math.nan
         return judged_clearance_m(self.clearance_m, self.measured, believed_m)
 
 

@@ -32,6 +32,9 @@ JOINT_COLUMNS = (
     "mean_force_n",
     "impacts",
 )
+SUMMARY_COLUMNS = {name: name.replace("clearance_", "counted_") for name in JOINT_COLUMNS}
+"""Names of these columns in a summary, whose one clearance of a joint is the believed one."""
+
 CYCLE_COLUMNS = (
     "cycle",
     "cadence_rpm",

@@ -1,7 +1,7 @@
 """The result of a replay as classes, which give JSON and tables."""
 
 import reprlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from enum import Enum
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -10,7 +10,7 @@ import attrs
 from leg_wear_monitor.bags.findings import Severity
 from leg_wear_monitor.configuration.strict import part_document, structure
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.files import data_frame, finite_or_none, json_text
+from leg_wear_monitor.files import data_frame, finite_or_none
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.materials import BushingLoad
 from leg_wear_monitor.monitor.alarms import Level
@@ -20,7 +20,7 @@ from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, Qu
 from leg_wear_monitor.monitor.ledger.entry import Measurement, WalkedLoad
 from leg_wear_monitor.monitor.reports import Lost
 from leg_wear_monitor.shown import Drawable
-from leg_wear_monitor.state import FootLoad, JointClearance, LifeHours, Verdict
+from leg_wear_monitor.state import SCHEMA_VERSION, JointClearance, LegState
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -84,44 +84,18 @@ def _perhaps() -> Any:
     return attrs.field(converter=finite_or_none)
 
 
-def _perhaps_none() -> Any:
-    """The same for a number that files of older versions do not have."""
-    return attrs.field(default=None, converter=finite_or_none)
-
-
-@attrs.frozen
-class ClearanceChange:
-    """Radial clearance of a joint, as counted [m].
-
-    Attributes
-    ----------
-    first : float
-        Mean around the bushing after the first gait cycle.
-    last : float
-        Mean around the bushing after the last gait cycle.
-    max : float
-        Largest around the bushing at the end.
-    """
-
-    first: float
-    last: float
-    max: float
-
-
 @attrs.frozen(kw_only=True)
-class SeenClearance:
-    """A clearance estimated from further encoders; see `monitor.encoders.ClearanceEstimate`.
+class EncoderEvidence:
+    """What further encoders show of a clearance; see `monitor.encoders.ClearanceEstimate`.
 
     Attributes
     ----------
     observation : ClearanceObservation
         Whether the encoders show it, and why not.
-    clearance_m : float or None
-        The estimate.
+    departure_m : float or None
+        Clearance that they show, minus the counted one.
     sigma_m : float or None
         Its standard deviation.
-    departure_m : float or None
-        Estimated minus counted clearance.
     believed : bool
         Whether the forecast uses it.
     is_other : bool
@@ -129,65 +103,54 @@ class SeenClearance:
     """
 
     observation: ClearanceObservation
-    clearance_m: float | None = _perhaps()
-    sigma_m: float | None = _perhaps()
     departure_m: float | None = _perhaps()
+    sigma_m: float | None = _perhaps()
     believed: bool
     is_other: bool
 
 
 @attrs.frozen(kw_only=True)
 class ReplayJoint:
-    """A clearance joint at the end of a replay, and its forces meanwhile.
+    """Growth, forces and forecast of a clearance joint; its clearance is in ``clearances``.
 
     Attributes
     ----------
-    clearance_m : ClearanceChange
-        As counted: the clearance when new plus the wear counted since.
+    opened_m : float or None
+        By how much the counted clearance grew from the first to the last gait cycle of the replay.
     growth_m_per_cycle : float or None
-        Growth of the mean clearance in a gait cycle; None while there is not enough data.
+        Growth of the counted clearance in a gait cycle; None while there is not enough data.
     growth_error_m_per_cycle : float or None
         Standard deviation of its error.
     growth_mps : float or None
-        Growth of the mean clearance per second of walking.
+        Growth of the counted clearance per second of walking.
     forecast : JointForecast or None
         Remaining life; None before the first forecast.
     peak_force_n : float or None
         Largest contact force.
     mean_force_n : float or None
         Mean contact force over all gait cycles.
-    seen : SeenClearance or None
-        Clearance that further encoders show; None without such encoders.
+    encoders : EncoderEvidence or None
+        What further encoders show of the clearance; None without such encoders.
     impacts : int
         Number of impacts, in the gait cycles that were followed.
     load : BushingLoad or None
-        Pressure and sliding speed in the last gait cycle, and the limits of the joint's material; None in a
-        file of an older version.
+        Pressure and sliding speed in the last gait cycle, and the limits of the joint's material; None if
+        they are not known.
     sampling_sigma_m : float
-        Standard deviation of the mean clearance, because sampled replays did not follow all gait cycles.
-    believed_m : float or None
-        The clearance that the verdict rests on, at the end, as in ``clearances``; None where nothing known
-        of the joint is valid.
-    believed_sigma_m : float or None
-        Its standard deviation.
-    believed_by : str or None
-        Whose it is, such as ``counted`` or ``torque``.
+        Standard deviation of the counted clearance, because sampled replays did not follow all gait cycles.
     """
 
-    clearance_m: ClearanceChange
+    opened_m: float | None = _perhaps()
     growth_m_per_cycle: float | None = _perhaps()
     growth_error_m_per_cycle: float | None = _perhaps()
     growth_mps: float | None = _perhaps()
     forecast: JointForecast | None
     peak_force_n: float | None = _perhaps()
     mean_force_n: float | None = _perhaps()
-    seen: SeenClearance | None = None
+    encoders: EncoderEvidence | None = None
     impacts: int
     load: BushingLoad | None = None
     sampling_sigma_m: float = 0.0
-    believed_m: float | None = _perhaps_none()
-    believed_sigma_m: float | None = _perhaps_none()
-    believed_by: str | None = None
 
 
 @attrs.frozen(kw_only=True)
@@ -332,12 +295,6 @@ class WornDepth:
 
 
 JsonObject = dict[str, Any]
-
-
-def joint_document(joint: ReplayJoint) -> JsonObject:
-    """A joint; no key for a clearance that no encoder shows."""
-    record: JsonObject = part_document(joint)
-    return record if joint.seen is not None else {key: record[key] for key in record if key != "seen"}
 
 
 def alarms_document(alarms: ReplayAlarms) -> JsonObject:
@@ -524,10 +481,10 @@ class ReplayHistory:
         Foot load, as estimated, up positive.
     friction_nm : (n,) array
         Friction of the drive, as estimated.
-    clearance_m : dict of str to (n,) array
-        Mean radial clearance around the bushing.
-    clearance_max_m : dict of str to (n,) array
-        Largest radial clearance around the bushing.
+    counted_m : dict of str to (n,) array
+        Counted mean radial clearance around the bushing.
+    counted_max_m : dict of str to (n,) array
+        Counted largest radial clearance around the bushing.
     growth_m_per_cycle : dict of str to (n,) array
         Growth of the mean clearance in a gait cycle.
     peak_force_n : dict of str to (n,) array
@@ -558,8 +515,8 @@ class ReplayHistory:
     torque_mismatch: Floats
     load_n: Floats
     friction_nm: Floats
-    clearance_m: dict[str, Floats]
-    clearance_max_m: dict[str, Floats]
+    counted_m: dict[str, Floats]
+    counted_max_m: dict[str, Floats]
     growth_m_per_cycle: dict[str, Floats]
     peak_force_n: dict[str, Floats]
     p99_force_n: dict[str, Floats]
@@ -570,7 +527,7 @@ class ReplayHistory:
     highest: dict[str, Floats] = attrs.Factory(dict)
 
     def columns(self) -> dict[str, Floats | Ints]:
-        """Columns of a table over time; a joint's value after a dot: ``clearance_m.A``."""
+        """Columns of a table over time; a joint's value after a dot: ``counted_m.A``."""
         columns: dict[str, Floats | Ints] = {}
         for name, value in attrs.asdict(self, recurse=False).items():
             if isinstance(value, dict):
@@ -596,12 +553,9 @@ class ReplayHistory:
 _Path = tuple[str, ...]
 
 
-def joint_columns(joints: Mapping[str, ReplayJoint]) -> dict[str, list[Any]]:
-    """One row a joint; None for what is not known, or is not there."""
-    columns: dict[str, list[Any]] = {"joint": list(joints)}
-    for path in _paths(ReplayJoint):
-        columns[".".join(path)] = [_value(joint, path) for joint in joints.values()]
-    return columns
+def columns_of(kind: type, parts: Sequence[Any]) -> dict[str, list[Any]]:
+    """One row a part of a class; None for what is not known, or is not there."""
+    return {".".join(path): [_value(part, path) for part in parts] for path in _paths(kind)}
 
 
 def _paths(kind: type) -> Iterator[_Path]:
@@ -617,24 +571,20 @@ def _paths(kind: type) -> Iterator[_Path]:
 def _value(part: Any, path: _Path) -> Any:
     for name in path:
         part = None if part is None else getattr(part, name)
+    if isinstance(part, tuple):
+        return ", ".join(part)
     return part.value if isinstance(part, Enum) else part
 
 
 # What a replay found, how it goes out as JSON and as tables, and how it comes back from a file.
 
 
-SCHEMA_VERSION = 2
-"""Of the JSON; counts up when a field is renamed, removed or means something else."""
-
-
 @attrs.frozen(kw_only=True, eq=False)
-class ReplaySummary(Drawable):
-    """Results of a replay; its page contains nothing else.
+class ReplaySummary(LegState, Drawable):
+    """The state of the leg at the end of a replay, and what else was found; its page contains nothing else.
 
     Attributes
     ----------
-    verdict : Verdict
-        Conclusion of the monitor on the leg, at the end.
     recording : ReplayRecording
         What was read.
     monitor : ReplayMonitor
@@ -650,12 +600,7 @@ class ReplaySummary(Drawable):
     gait : ReplayGait
         Whether the motion was a gait of this leg.
     joints : dict of str to ReplayJoint
-        Clearance joints; empty without one gait cycle that fits this leg, like the next two.
-    clearances : dict of str to JointClearance
-        Clearance of each joint, as counted and as measured.
-    life : dict of str to LifeHours or None
-        Remaining life of each joint, and of the ``leg``; None where it is not known or not
-        valid.
+        Clearance joints; empty without one gait cycle that fits this leg, like ``clearances`` and ``life``.
     forecast : LegLife or None
         Remaining life of the leg.
     measurements : tuple of Measurement
@@ -670,8 +615,6 @@ class ReplaySummary(Drawable):
         Samples and time that were not used.
     sampling : ReplaySampling or None
         How much of the gait was followed; None if all of it was.
-    load : FootLoad
-        Load at the foot over the last gait cycles.
     history : ReplayHistory
         The gait cycles over time.
     wear_depth_m : dict of str to WornDepth
@@ -682,7 +625,6 @@ class ReplaySummary(Drawable):
         Versions of the programs that made it.
     """
 
-    verdict: Verdict
     recording: ReplayRecording
     monitor: ReplayMonitor
     leg: ReplayLeg = attrs.Factory(ReplayLeg)
@@ -691,8 +633,6 @@ class ReplaySummary(Drawable):
     cycles: int
     gait: ReplayGait
     joints: dict[str, ReplayJoint]
-    clearances: dict[str, JointClearance]
-    life: dict[str, LifeHours | None]
     forecast: LegLife | None
     measurements: tuple[Measurement, ...]
     walked: tuple[WalkedLoad, ...] = ()
@@ -700,7 +640,6 @@ class ReplaySummary(Drawable):
     status: tuple[ReplayStatus, ...]
     lost: Lost
     sampling: ReplaySampling | None = None
-    load: FootLoad = FootLoad()
     history: ReplayHistory
     wear_depth_m: dict[str, WornDepth]
     advice: str
@@ -708,14 +647,7 @@ class ReplaySummary(Drawable):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain object: what ``replay --json`` writes; null for what is not known."""
-        record = {name: part_document(part) for name, part in attrs.asdict(self, recurse=False).items()}
-        record["joints"] = {name: joint_document(joint) for name, joint in self.joints.items()}
-        record["alarms"] = alarms_document(self.alarms)
-        return {"schema_version": SCHEMA_VERSION, **record}
-
-    def to_json(self) -> str:
-        """Text of ``summary.json``."""
-        return json_text(self.to_dict())
+        return {**super().to_dict(), "alarms": alarms_document(self.alarms)}
 
     def to_pandas(self) -> "pd.DataFrame":
         """Table with a row for each joint; requires pandas.
@@ -730,8 +662,13 @@ class ReplaySummary(Drawable):
             If pandas is not installed.
         """
         kinds = ", ".join(figure.value for figure in self.verdict.not_valid)
-        columns = joint_columns(self.joints)
-        return data_frame({**columns, "not_valid": [kinds] * len(self.joints)}, index="joint")
+        columns = {
+            "joint": list(self.joints),
+            **columns_of(JointClearance, [self.clearances[joint] for joint in self.joints]),
+            **columns_of(ReplayJoint, list(self.joints.values())),
+            "not_valid": [kinds] * len(self.joints),
+        }
+        return data_frame(columns, index="joint")
 
 
 def summary_of(record: Any, source: str) -> ReplaySummary:

@@ -24,10 +24,10 @@ from leg_wear_monitor.monitor.gait_evidence import GaitEvidence
 from leg_wear_monitor.monitor.ledger.entry import VerdictEvent
 from leg_wear_monitor.monitor.reports import JointReport, Status
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
-from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS, History
+from leg_wear_monitor.playback.history import CYCLE_COLUMNS, SUMMARY_COLUMNS, History
 from leg_wear_monitor.playback.result import (
     AlarmChange,
-    ClearanceChange,
+    EncoderEvidence,
     LegJoint,
     LegLife,
     Place,
@@ -43,11 +43,10 @@ from leg_wear_monitor.playback.result import (
     ReplaySampling,
     ReplayStatus,
     ReplaySummary,
-    SeenClearance,
     WornDepth,
 )
 from leg_wear_monitor.shown import Drawable
-from leg_wear_monitor.state import Evidence, Figure, LegState, State, Verdict
+from leg_wear_monitor.state import Evidence, Figure, State, Verdict
 from leg_wear_monitor.twin import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import Samples, brings
 from leg_wear_monitor.twin.statistics import Sampling
@@ -57,10 +56,10 @@ from leg_wear_monitor.wear import BUSHING, JOURNAL
 
 
 def joint_forecast(told: JointForecast | None, verdict: Verdict) -> JointForecast | None:
-    """A joint's forecast; without its remaining life if the verdict does not believe that."""
+    """A joint's forecast; without life and clearance if the verdict does not believe them."""
     if told is None or Figure.FORECAST not in verdict.not_valid:
         return told
-    return attrs.evolve(told, cycles=None, hours=None, days=None)
+    return attrs.evolve(told, cycles=None, hours=None, days=None, clearance_m=None)
 
 
 def leg_forecast(told: LegForecast | None, verdict: Verdict) -> LegForecast | None:
@@ -198,10 +197,10 @@ def summary(
     last, monitor = result.history.last, result.monitor
     state = monitor.state
     is_known = result.is_believable and last is not None
-    verdict = state.verdict
+    verdict, known = state.verdict, attrs.asdict(state, recurse=False)
     told = leg_forecast(last.forecast, verdict) if is_known and last else None
     return ReplaySummary(
-        verdict=verdict,
+        **(known if is_known else known | {"clearances": {}, "life": {}}),
         recording=_recording(result),
         monitor=settings_of(monitor.config, monitor.mechanism),
         leg=leg_shape(monitor.mechanism),
@@ -209,9 +208,7 @@ def summary(
         real_time_factor=result.duration_s / wall_s if wall_s else None,
         cycles=len(result.history),
         gait=_gait(result),
-        joints=_joints(result, state) if is_known else {},
-        clearances=state.clearances if is_known else {},
-        life=state.life if is_known else {},
+        joints=_joints(result, verdict) if is_known else {},
         forecast=leg_life(told),
         measurements=tuple(monitor.measurements),
         walked=monitor.walked,
@@ -219,7 +216,6 @@ def summary(
         status=tuple(map(_status, monitor.status())),
         lost=monitor.lost,
         sampling=_sampling(monitor.sampling),
-        load=state.load,
         history=_history(result.history),
         wear_depth_m=_wear(result),
         advice=ADVICE,
@@ -301,34 +297,30 @@ def _gait(result: ReplayResult) -> ReplayGait:
     )
 
 
-def _joints(result: ReplayResult, state: LegState) -> dict[str, ReplayJoint]:
+def _joints(result: ReplayResult, verdict: Verdict) -> dict[str, ReplayJoint]:
     """Last values of each joint, and the maximum and the mean of its forces."""
     history = result.history
     joints = history.last.joints if history.last else ()
-    return {joint.joint: _joint(history, k, joint, state) for k, joint in enumerate(joints)}
+    return {joint.joint: _joint(history, k, joint, verdict) for k, joint in enumerate(joints)}
 
 
-def _joint(history: History, k: int, joint: JointReport, state: LegState) -> ReplayJoint:
+def _joint(history: History, k: int, joint: JointReport, verdict: Verdict) -> ReplayJoint:
     clearance, peak, mean, impacts = (
         history.joint_column(name)[:, k]
         for name in ("clearance_m", "peak_force_n", "mean_force_n", "impacts")
     )
-    known = state.clearances[joint.joint]
     return ReplayJoint(
-        clearance_m=ClearanceChange(float(clearance[0]), float(clearance[-1]), joint.clearance_max_m),
+        opened_m=float(clearance[-1] - clearance[0]),
         growth_m_per_cycle=joint.growth_m_per_cycle,
         growth_error_m_per_cycle=joint.growth_error_m_per_cycle,
         growth_mps=joint.growth_mps,
-        forecast=joint_forecast(joint.forecast, state.verdict),
+        forecast=joint_forecast(joint.forecast, verdict),
         peak_force_n=_of_known(np.max, peak),
         mean_force_n=_of_known(np.mean, mean),
-        seen=_seen(joint.seen) if joint.seen else None,
+        encoders=_by_encoders(joint.seen) if joint.seen else None,
         impacts=int(np.nansum(impacts)),
         load=joint.load,
         sampling_sigma_m=joint.sampling_sigma_m,
-        believed_m=known.believed_m,
-        believed_sigma_m=known.believed_sigma_m,
-        believed_by=known.believed_by,
     )
 
 
@@ -338,8 +330,14 @@ def _of_known(statistic: Callable[[Floats], Any], values: Floats) -> float | Non
     return float(statistic(known)) if len(known) else None
 
 
-def _seen(seen: ClearanceEstimate) -> SeenClearance:
-    return SeenClearance(**attrs.asdict(seen, recurse=False), is_other=seen.is_other)
+def _by_encoders(seen: ClearanceEstimate) -> EncoderEvidence:
+    return EncoderEvidence(
+        observation=seen.observation,
+        departure_m=seen.departure_m,
+        sigma_m=seen.sigma_m,
+        believed=seen.believed,
+        is_other=seen.is_other,
+    )
 
 
 def leg_life(told: LegForecast | None) -> LegLife | None:
@@ -378,9 +376,9 @@ def _history(history: History) -> ReplayHistory:
     """Columns over groups of gait cycles: last value of each; maximum of peaks, sum of impacts."""
     last = _ends(len(history))
     columns: dict[str, Any] = {name: history.column(name)[last] for name in CYCLE_COLUMNS}
-    for name in JOINT_COLUMNS:
+    for name, shown in SUMMARY_COLUMNS.items():
         thinned = _thinned(name, history.joint_column(name), last)
-        columns[name] = {joint: thinned[:, k] for k, joint in enumerate(history.clearance_joints)}
+        columns[shown] = {joint: thinned[:, k] for k, joint in enumerate(history.clearance_joints)}
     seen_m = history.seen_m[last]
     columns["seen_m"] = {joint: seen_m[:, k] for k, joint in enumerate(history.clearance_joints)}
     if len(history) > len(last):

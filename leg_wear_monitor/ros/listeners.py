@@ -183,7 +183,7 @@ def _statuses(message: DiagnosticArray) -> Iterable[ReplayStatus]:
 def _columns(message: JointState) -> dict[str, dict[str, float]]:
     names = [name.removesuffix("_clearance") for name in message.name]
     return {
-        "clearance_m": dict(zip(names, message.position, strict=False)),
+        "counted_m": dict(zip(names, message.position, strict=False)),
         "peak_force_n": dict(zip(names, message.effort, strict=False)),
     }
 

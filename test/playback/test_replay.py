@@ -163,7 +163,7 @@ def test_the_summary_is_plain_json_and_tells_of_every_joint(out: tuple[Path, Any
     assert not record["recording"]["is_partial"] and not record["recording"]["findings"]
     assert set(record["joints"]) == set(result.monitor.clearance_joints) == set(record["wear_depth_m"])
     for name, joint in record["joints"].items():
-        opened = joint["clearance_m"]["last"] - joint["clearance_m"]["first"]
+        opened = joint["opened_m"]
         assert 0.0 < opened < 1.0e-6
         depth = record["wear_depth_m"][name]
         assert np.mean(depth["bushing"]) + np.mean(depth["journal"]) >= opened

@@ -49,7 +49,7 @@ def sampled(walk: Table, config: lw.MonitorConfig, ledger: Path) -> ReplayResult
 
 
 def clearances(result: ReplayResult) -> np.ndarray:
-    return np.array([joint.clearance_m.last for joint in result.summary().joints.values()])
+    return np.array([joint.counted_m for joint in result.summary().clearances.values()])
 
 
 # Relative bounds of the deviation from a whole replay, as measured in test/twin/test_sampled_twin.py for as

@@ -70,7 +70,7 @@ def test_openings_of_a_replay():
 def test_a_replay_without_a_gait_cycle_draws_nothing():
     summary = made_up_summary()
     none = {joint: np.zeros(0) for joint in ("A", "B")}
-    history = attrs.evolve(summary.history, stamp_ns=np.zeros(0, np.int64), clearance_m=none)
+    history = attrs.evolve(summary.history, stamp_ns=np.zeros(0, np.int64), counted_m=none)
     assert lines(lw.plot(attrs.evolve(summary, history=history))) == {}
 
 

@@ -266,8 +266,8 @@ class JointForecast:
         Hours of walking until then.
     days : Quantiles or None
         Days at the usual duty until then.
-    clearance_m : Quantiles
-        The clearance now, as far as it is known.
+    clearance_m : Quantiles or None
+        The clearance now, as far as it is known; None where the verdict does not believe it.
     measurements : int
         Measured clearances of this part that are in it.
     prior : CoefficientPrior or None
@@ -279,9 +279,14 @@ class JointForecast:
     cycles: Quantiles | None
     hours: Quantiles | None
     days: Quantiles | None
-    clearance_m: Quantiles
+    clearance_m: Quantiles | None
     measurements: int
     prior: CoefficientPrior | None = None
+
+    @property
+    def now_m(self) -> float:
+        """Median of the clearance now; NaN where it is not believed."""
+        return self.clearance_m.p50 if self.clearance_m else math.nan
 
 
 @attrs.frozen(kw_only=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials import BushingLoad
-from leg_wear_monitor.playback.result import AlarmChange, ReplayHistory, ReplaySummary
+from leg_wear_monitor.playback.result import AlarmChange, EncoderEvidence, ReplayHistory, ReplaySummary
 from leg_wear_monitor.report.figure import opened, time_of
 from leg_wear_monitor.report.page import (
     NOT_VALID,
@@ -264,7 +264,6 @@ def _table(summary: ReplaySummary) -> Table:
     is_sampled = any(joint.sampling_sigma_m for joint in summary.joints.values())
     rows = []
     for name, joint in summary.joints.items():
-        clearance = joint.clearance_m
         growth = (
             value(1.0e12, joint.growth_m_per_cycle),
             value(1.0e12, joint.growth_error_m_per_cycle),
@@ -273,7 +272,7 @@ def _table(summary: ReplaySummary) -> Table:
             (
                 summary.leg.joint_words(name),
                 counted_mm(summary, name),
-                value(1.0e9, clearance.last - clearance.first),
+                value(1.0e9, joint.opened_m),
                 *((value(1.0e9, joint.sampling_sigma_m),) if is_sampled else ()),
                 *(growth if has_growth else (NOT_VALID, NOT_VALID)),
             )
@@ -296,7 +295,7 @@ def clearance_sentences(summary: ReplaySummary) -> list[str]:
     """Joints that surely are not as counted, a sentence each."""
     sentences = []
     for name, joint in summary.joints.items():
-        off = joint.seen.departure_m if joint.seen and joint.seen.is_other else None
+        off = joint.encoders.departure_m if joint.encoders and joint.encoders.is_other else None
         if off is not None:
             sentences.append(
                 f"Encoders show that {summary.leg.joint_words(name)} is {1.0e6 * abs(off):.0f} µm "
@@ -311,13 +310,13 @@ def encoder_sections(summary: ReplaySummary) -> list[Section]:
     rows = [
         (
             summary.leg.joint_words(name),
-            _millimetres(joint.clearance_m.last) if is_counted_leg else NOT_VALID,
-            _millimetres(joint.seen.clearance_m),
-            _millimetres(joint.seen.sigma_m),
-            "other than counted" if joint.seen.is_other else joint.seen.observation.value,
+            _millimetres(summary.clearances[name].counted_m) if is_counted_leg else NOT_VALID,
+            _millimetres(_estimated(summary.clearances[name].counted_m, joint.encoders)),
+            _millimetres(joint.encoders.sigma_m),
+            "other than counted" if joint.encoders.is_other else joint.encoders.observation.value,
         )
         for name, joint in summary.joints.items()
-        if joint.seen
+        if joint.encoders
     ]
     if not rows:
         return []
@@ -330,6 +329,10 @@ def encoder_sections(summary: ReplaySummary) -> list[Section]:
         "further encoders over the last gait cycles; the standard deviation includes the model error.",
     )
     return [Section(title, [table], is_folded=True)]
+
+
+def _estimated(counted_m: float, shown: EncoderEvidence) -> float | None:
+    return None if shown.departure_m is None else counted_m + shown.departure_m
 
 
 def _millimetres(metres: float | None) -> str:

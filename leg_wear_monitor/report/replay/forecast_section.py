@@ -118,6 +118,8 @@ def _below(measured: Measurement, joint: str, counts: bool) -> float:
 
 def _clearance(told: JointForecast) -> str:
     may_be = told.clearance_m
+    if may_be is None:
+        return "-"
     return f"{1.0e3 * may_be.p10:.4f} to {1.0e3 * may_be.p90:.4f}"
 
 

@@ -81,8 +81,6 @@ def _view(summary: ReplaySummary, joint: str) -> JointView:
     counted = clearance.counted_m if clearance and not doubt else None
     seen_m, seen_sigma_m, seen_by = _seen(clearance) if clearance else (None, None, "")
     shown = clearance.believed_m if clearance else None
-    if shown is None:  # a file of an older version
-        shown = seen_m if counted is None else counted
     used = _used(clearance, shown) if clearance and shown is not None else None
     if summary.verdict.state is State.NOT_MONITORED and (used or 0.0) < 1.0:
         used = None  # a joint that nobody watches is not shown as one that is all right
@@ -114,7 +112,7 @@ def counted_mm(summary: ReplaySummary, joint: str) -> str:
     """A joint's counted clearance [mm] in the digits that are known of it."""
     found = summary.joints.get(joint)
     counted = summary.clearances[joint].counted_m
-    if found is None or found.forecast is None:
+    if found is None or found.forecast is None or found.forecast.clearance_m is None:
         return f"{1.0e3 * counted:.3f}"
     may_be = found.forecast.clearance_m
     return clearance_mm(counted, may_be.p10, may_be.p90)

@@ -7,8 +7,9 @@ import pytest
 from made_up_summary import made_up_summary
 
 from leg_wear_monitor import ConfigError
-from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS
-from leg_wear_monitor.playback.result import joint_columns, summary_of
+from leg_wear_monitor.playback.history import CYCLE_COLUMNS, SUMMARY_COLUMNS
+from leg_wear_monitor.playback.result import ReplayJoint, columns_of, summary_of
+from leg_wear_monitor.state import JointClearance
 
 pytestmark = pytest.mark.plain
 
@@ -43,17 +44,17 @@ def test_a_file_of_before_the_leg_was_in_it_is_read(summary):
 
 def test_json_has_a_version_and_null_for_what_is_not_known(summary):
     record = json.loads(summary.to_json())
-    assert list(record)[:3] == ["schema_version", "verdict", "recording"] and list(record)[-1] == "made_with"
-    assert record["joints"]["A"]["seen"]["sigma_m"] is None
+    assert list(record)[:3] == ["schema_version", "verdict", "clearances"] and list(record)[-1] == "made_with"
+    assert record["joints"]["A"]["encoders"]["sigma_m"] is None
     assert record["verdict"]["evidence"][0]["limit"] is None
     assert record["clearances"]["B"]["seen_m"] is None and record["life"]["B"] is None
-    assert record["joints"]["A"]["seen"]["observation"] == "seen by encoders"
-    assert record["joints"]["B"]["peak_force_n"] is None and "seen" not in record["joints"]["B"]
+    assert record["joints"]["A"]["encoders"]["observation"] == "seen by encoders"
+    assert record["joints"]["B"]["peak_force_n"] is None and record["joints"]["B"]["encoders"] is None
     assert list(record["alarms"]["changes"][0])[:3] == ["stamp_ns", "name", "level"]
     assert record["alarms"]["now"][0]["level"] == "WARN" and record["alarms"]["now"][0]["worst"] is None
     assert record["status"][0]["values"] == {"cadence_rpm": None}
     assert record["history"]["cycle"] == [1.0, None]
-    columns = ["stamp_ns", *CYCLE_COLUMNS, *JOINT_COLUMNS, "seen_m", "lowest", "highest"]
+    columns = ["stamp_ns", *CYCLE_COLUMNS, *SUMMARY_COLUMNS.values(), "seen_m", "lowest", "highest"]
     assert list(record["history"]) == columns
 
 
@@ -66,7 +67,7 @@ def test_json_has_a_version_and_null_for_what_is_not_known(summary):
         ("monitor.limits.clearance_m", -1.0, "-1.0 is not above 0 m"),
         ("cycles", 1.5, "1.5 is not a whole number"),
         ("history.stamp_ns", [2**70], "has a number that is too large"),
-        ("history.clearance_m.B", [1.0, "2"], "'2' is not a number"),
+        ("history.counted_m.B", [1.0, "2"], "'2' is not a number"),
         ("history.cycle", {}, "{} is not a list of numbers"),
         ("recording.findings", "none", "'none' is not a list of mappings"),
     ],
@@ -104,15 +105,23 @@ def test_what_is_no_object_is_refused(record):
 
 
 def test_a_row_of_the_table_has_what_the_json_of_the_joint_has(summary):
-    columns = joint_columns(summary.joints)
+    parts, empty = (summary.clearances, summary.joints), ({}, {})
+    columns, none = (
+        {"joint": list(joints)}
+        | columns_of(JointClearance, list(clearances.values()))
+        | columns_of(ReplayJoint, list(joints.values()))
+        for clearances, joints in (parts, empty)
+    )
     rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
     for row in rows:
         joint = row.pop("joint")
         known = {name: value for name, value in row.items() if value is not None}
-        record = flat(summary.to_dict()["joints"][joint])
+        told = summary.to_dict()
+        record = flat(told["clearances"][joint]) | flat(told["joints"][joint])
+        record["seen_by"] = ", ".join(record["seen_by"])
         assert known == {name: value for name, value in record.items() if value is not None}
-    assert {"forecast.hours.p50", "seen.is_other", "clearance_m.last"} <= set(columns)
-    assert set(joint_columns({})) == set(columns)
+    assert {"forecast.hours.p50", "encoders.is_other", "believed_m"} <= set(columns)
+    assert set(none) == set(columns)
 
 
 def flat(record, path=""):
@@ -125,9 +134,9 @@ def flat(record, path=""):
 
 def test_the_table_over_time_has_a_column_a_joint(summary):
     columns = summary.history.columns()
-    assert columns["clearance_m.B"].tolist() == [3.0, 4.0]
+    assert columns["counted_m.B"].tolist() == [3.0, 4.0]
     assert {len(column) for column in columns.values()} == {2}
-    assert len(columns) == 1 + len(CYCLE_COLUMNS) + 2 * len(JOINT_COLUMNS)
+    assert len(columns) == 1 + len(CYCLE_COLUMNS) + 2 * len(SUMMARY_COLUMNS)
 
 
 def test_with_pandas_they_are_frames(summary):
@@ -136,4 +145,4 @@ def test_with_pandas_they_are_frames(summary):
     assert joints.loc["A", "forecast.hours.p90"] == 3.0
     assert set(joints["not_valid"]) == {", ".join(each.value for each in summary.verdict.not_valid)}
     assert list(over_time.index) == summary.history.stamp_ns.tolist()
-    assert np.isnan(over_time["clearance_m.A"].iloc[1])
+    assert np.isnan(over_time["counted_m.A"].iloc[1])

@@ -5,7 +5,7 @@ import pytest
 from made_up_summary import made_up_summary
 
 from leg_wear_monitor.monitor.angle_regression import ClearanceObservation
-from leg_wear_monitor.playback.result import SeenClearance
+from leg_wear_monitor.playback.result import EncoderEvidence
 from leg_wear_monitor.report.replay.charts import clearance_section, clearance_sentences, encoder_sections
 from leg_wear_monitor.state import Figure
 
@@ -15,15 +15,14 @@ pytestmark = pytest.mark.plain
 def summary_with(*figures, **seen):
     """A summary whose verdict does not believe some figures, its joints A and B as encoders show them."""
     summary = made_up_summary()
-    joints = {name: attrs.evolve(joint, seen=seen.get(name)) for name, joint in summary.joints.items()}
+    joints = {name: attrs.evolve(joint, encoders=seen.get(name)) for name, joint in summary.joints.items()}
     verdict = attrs.evolve(summary.verdict, not_valid=figures)
     return attrs.evolve(summary, joints=joints, verdict=verdict)
 
 
-def shown(observation, clearance_m=None, departure_m=None, is_other=False):
-    return SeenClearance(
+def shown(observation, departure_m=None, is_other=False):
+    return EncoderEvidence(
         observation=observation,
-        clearance_m=clearance_m,
         sigma_m=2e-5,
         departure_m=departure_m,
         believed=True,
@@ -38,9 +37,9 @@ def test_without_encoders_there_is_nothing_to_say():
 
 def test_a_worn_joint_is_named_and_what_is_not_seen_is_said():
     summary = summary_with(
-        B=shown(ClearanceObservation.SEEN, 4.5e-4, 1.5e-4, True), A=shown(ClearanceObservation.NOT_OBSERVABLE)
+        B=shown(ClearanceObservation.SEEN, 5e-5, True), A=shown(ClearanceObservation.NOT_OBSERVABLE)
     )
-    assert clearance_sentences(summary) == ["Encoders show that B (knee) is 150 µm wider than counted."]
+    assert clearance_sentences(summary) == ["Encoders show that B (knee) is 50 µm wider than counted."]
     (section,) = encoder_sections(summary)
     (table,) = section.parts
     assert table.rows == [
@@ -50,7 +49,7 @@ def test_a_worn_joint_is_named_and_what_is_not_seen_is_said():
 
 
 def test_a_counted_clearance_that_is_not_believed_is_no_number():
-    summary = summary_with(Figure.CLEARANCES, B=shown(ClearanceObservation.SEEN, 4.5e-4))
+    summary = summary_with(Figure.CLEARANCES, B=shown(ClearanceObservation.SEEN, 5e-5))
     ((table,),) = (section.parts for section in encoder_sections(summary))
     assert [row[1] for row in table.rows] == ["not valid"]
     (told,) = clearance_section(summary).parts

@@ -33,6 +33,9 @@ def page_of(summary):
 
 def doubted(*figures, **changes):
     summary = made_up_summary()
+    if Figure.CLEARANCES in figures:  # nothing else is known of B
+        unknown = attrs.evolve(summary.clearances["B"], believed_m=None, believed_by=None)
+        summary = attrs.evolve(summary, clearances={**summary.clearances, "B": unknown})
     return attrs.evolve(summary, verdict=attrs.evolve(summary.verdict, not_valid=figures, **changes))
 
 
@@ -95,9 +98,9 @@ def test_every_raised_alarm_is_unfolded_with_its_level():
 
 def test_what_the_verdict_does_not_believe_is_greyed_and_no_number():
     summary = doubted(*Figure, joints=())
-    seen = attrs.evolve(summary.clearances["A"], seen_by=("torque",))
+    seen = attrs.evolve(summary.clearances["A"], seen_by=("torque",), believed_by="torque")
     clearances = {**summary.clearances, "A": seen}
-    joints = {name: attrs.evolve(joint, seen=None) for name, joint in summary.joints.items()}
+    joints = {name: attrs.evolve(joint, encoders=None) for name, joint in summary.joints.items()}
     page = page_of(attrs.evolve(summary, clearances=clearances, joints=joints))
     told = [data for data in greyed(page) if data.strip()]
     assert len(told) >= 8
@@ -145,7 +148,7 @@ def test_a_clearance_measured_by_hand_has_a_mark_on_its_bar():
 def test_the_marks_of_the_drawing_say_how_much_of_the_limit_is_used():
     page = page_of(doubted())
     (drawing,) = (svg for svg in page.of("svg") if svg.get("role") == "img")
-    assert drawing["aria-label"] == "The leg leg: joint A 33 % used; joint B (knee) 33 % used"
+    assert drawing["aria-label"] == "The leg leg: joint A 67 % used; joint B (knee) 33 % used"
     (drawing,) = (svg for svg in page_of(doubted(*Figure)).of("svg") if svg.get("role") == "img")
     assert drawing["aria-label"] == "The leg leg: joint A 67 % used; joint B (knee) not valid"
 

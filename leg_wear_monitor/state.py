@@ -4,7 +4,7 @@ The monitor makes it, and all else that is shown of a leg is a view of it. SI un
 known.
 """
 
-from enum import Enum
+from enum import Enum, IntEnum
 from typing import Any
 
 import attrs
@@ -15,6 +15,14 @@ from leg_wear_monitor.shown import Shown
 
 SCHEMA_VERSION = 3
 """Of the JSON; counts up when a field is renamed, removed or means something else."""
+
+
+class Level(IntEnum):
+    """Level of an alarm; numbers as in diagnostic_msgs/DiagnosticStatus."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
 
 
 class _Word(Enum):
@@ -304,6 +312,72 @@ class LifeHours:
 
 
 @attrs.frozen(kw_only=True)
+class LegAlarm:
+    """An alarm as operators see it.
+
+    Attributes
+    ----------
+    name : str
+        Kind and subject, such as ``clearance A``.
+    level : Level
+        Level that is shown; a latched alarm keeps its highest one.
+    state : str
+        Whether it is present or latched, and acknowledged.
+    value : float or None
+        Last value, in ``unit``.
+    limit : float or None
+        Limit of the level ERROR, in ``unit``.
+    worst : float or None
+        Worst value since it was raised, in ``unit``.
+    unit : str
+        Unit of the values, SI; empty for a fraction.
+    raised_ns : int
+        Stamp at which the level last rose [ns]; 0 before.
+    """
+
+    name: str
+    level: Level
+    state: str
+    value: float | None = attrs.field(converter=finite_or_none)
+    limit: float | None = attrs.field(converter=finite_or_none)
+    unit: str
+    worst: float | None = attrs.field(converter=finite_or_none)
+    raised_ns: int
+
+
+@attrs.frozen(kw_only=True)
+class AlarmChange:
+    """An alarm after a change.
+
+    Attributes
+    ----------
+    stamp_ns : int
+        Stamp of the change [ns].
+    alarm : LegAlarm
+        The alarm then.
+    """
+
+    stamp_ns: int
+    alarm: LegAlarm = attrs.field(metadata={"flat": True})
+
+
+@attrs.frozen(kw_only=True)
+class LegAlarms:
+    """All alarms.
+
+    Attributes
+    ----------
+    now : tuple of LegAlarm
+        All of them.
+    changes : tuple of AlarmChange
+        Of a replay, the first ten thousand changes; otherwise empty.
+    """
+
+    now: tuple[LegAlarm, ...] = ()
+    changes: tuple[AlarmChange, ...] = ()
+
+
+@attrs.frozen(kw_only=True)
 class LegState:
     """All that is known of a leg at one instant.
 
@@ -321,6 +395,12 @@ class LegState:
         What the drive torque shows of the leg.
     life : dict of str to LifeHours or None
         Remaining life of each joint, and of the ``leg``; None where it is not known or not valid.
+    life_answers : dict of str to str
+        What can be said of the remaining life of each joint, and of the ``leg``.
+    first_probability : dict of str to float
+        Probability of each joint to be the first at its limit; empty unless known.
+    alarms : LegAlarms
+        All alarms.
     stamp_ns : int
         The instant; 0 before the first sample.
     life_cycles : int
@@ -333,12 +413,19 @@ class LegState:
     load: FootLoad = FootLoad()
     diagnosis: TorqueDiagnosis = TorqueDiagnosis()
     life: dict[str, LifeHours | None] = attrs.Factory(dict)
+    life_answers: dict[str, str] = attrs.Factory(dict)
+    first_probability: dict[str, float] = attrs.Factory(dict)
+    alarms: LegAlarms = LegAlarms()
     stamp_ns: int = 0
     life_cycles: int = 0
 
     def to_dict(self) -> dict[str, Any]:
         """Plain object; null for what is not known."""
-        return {"schema_version": SCHEMA_VERSION, **part_document(self)}
+        changes = [
+            {"stamp_ns": change.stamp_ns, **part_document(change.alarm)} for change in self.alarms.changes
+        ]
+        found = {"schema_version": SCHEMA_VERSION, **part_document(self)}
+        return {**found, "alarms": {**found["alarms"], "changes": changes}}
 
     def to_json(self) -> str:
         """Text of the plain object."""

@@ -7,7 +7,6 @@ import numpy as np
 
 from leg_wear_monitor.bags.findings import Severity
 from leg_wear_monitor.mechanism.materials import BushingLoad
-from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.angle_regression import ClearanceObservation
 from leg_wear_monitor.monitor.config.settings import Limits
 from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, Quantiles
@@ -16,12 +15,9 @@ from leg_wear_monitor.monitor.ledger.entry import Measurement, WalkedLoad
 from leg_wear_monitor.monitor.reports import Lost
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, SUMMARY_COLUMNS
 from leg_wear_monitor.playback.result import (
-    AlarmChange,
     EncoderEvidence,
     LegJoint,
     LegLife,
-    ReplayAlarm,
-    ReplayAlarms,
     ReplayFinding,
     ReplayGait,
     ReplayHistory,
@@ -34,12 +30,16 @@ from leg_wear_monitor.playback.result import (
     WornDepth,
 )
 from leg_wear_monitor.state import (
+    AlarmChange,
     Drive,
     Estimate,
     Evidence,
     Figure,
     JointClearance,
+    LegAlarm,
+    LegAlarms,
     LegState,
+    Level,
     LifeHours,
     State,
     TorqueDiagnosis,
@@ -52,6 +52,10 @@ LIFE = Quantiles(1.0, 2.0, 3.0)
 def made_up_state() -> LegState:
     """Joint A as encoders show it and with a remaining life; joint B with neither."""
     some = Estimate(value=1.0, sigma=0.1)
+    alarm = LegAlarm(
+        name="clearance A", level=Level.WARN, state="present", value=5e-4, limit=6e-4, unit="m",
+        worst=math.nan, raised_ns=1_700_000_000_000_000_001,
+    )  # fmt: skip
     return LegState(
         stamp_ns=1_700_000_000_000_000_003,
         life_cycles=9,
@@ -75,15 +79,14 @@ def made_up_state() -> LegState:
         ),
         diagnosis=TorqueDiagnosis(state="changed", cycles_not_used={"gap": 2}, misfit=0.2, cause="clearance"),
         life={"A": LifeHours(p10_h=1.0, p50_h=2.0, p90_h=3.0), "B": None},
+        life_answers={"A": Answer.KNOWN.value, "leg": Answer.PARTLY_KNOWN.value},
+        first_probability={"A": 1.0},
+        alarms=LegAlarms(now=(alarm,), changes=(AlarmChange(stamp_ns=4, alarm=alarm),)),
     )  # fmt: skip
 
 
 def made_up_summary() -> ReplaySummary:
     """Joint A as encoders show it and with a forecast; joint B with neither."""
-    alarm = ReplayAlarm(
-        name="clearance A", level=Level.WARN, state="present", value=5e-4, limit=6e-4, unit="m",
-        worst=math.nan, raised_ns=1_700_000_000_000_000_001,
-    )  # fmt: skip
     forecast = JointForecast(
         answer=Answer.KNOWN, cycles=LIFE, hours=LIFE, days=None, clearance_m=LIFE, measurements=1,
         prior=CoefficientPrior(sigma=0.7, basis="a judgement", holds_for="steel on steel (greased)"),
@@ -135,7 +138,6 @@ def made_up_summary() -> ReplaySummary:
             simulated_lives=0, first="A",
         ),
         measurements=(Measurement(7, "A", "ann", 3e-4, 1e-6, 0.0, 9, 0, 0.2, True, id=3),),
-        alarms=ReplayAlarms(now=(alarm,), changes=(AlarmChange(stamp_ns=4, alarm=alarm),)),
         walked=(WalkedLoad(300, 2, 2.0, 290.0, 5.0),),
         status=(ReplayStatus(name="gait", level=Level.OK, message="m", values={"cadence_rpm": math.nan}),),
         lost=Lost(

@@ -4,12 +4,11 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from leg_wear_monitor.dashboard import source as region
-from leg_wear_monitor.dashboard.received import Row, Trends
+from leg_wear_monitor.dashboard.live_leg import Row, Trends
 from leg_wear_monitor.dashboard.source import (
     NO_VERDICT,
     Content,
     Freshness,
-    Known,
     LegPage,
     Stamps,
     leg_setup,
@@ -25,11 +24,11 @@ from leg_wear_monitor.monitor.forecast.measurement import last_measured
 from leg_wear_monitor.monitor.ledger.entry import ClearancePoint, JointWear, binding_of, walked_words
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import LedgerContent, read_ledger
-from leg_wear_monitor.monitor.leg_state import joint_clearance
+from leg_wear_monitor.monitor.leg_state import joint_clearance, leg_alarm
 from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance
 from leg_wear_monitor.playback.result import ReplaySummary
-from leg_wear_monitor.playback.summary import ledger_verdict, replay_alarm
-from leg_wear_monitor.state import JointClearance, LifeHours
+from leg_wear_monitor.playback.summary import ledger_verdict
+from leg_wear_monitor.state import Figure, JointClearance, LegAlarms, LegState, LifeHours, Verdict
 
 OLD_AFTER_S = 60.0  # a monitor of a walking leg writes more often
 
@@ -117,22 +116,24 @@ class LedgerLeg:
             raise LedgerError(self._fault)
         parts = {part.name: part for part in found.entry.joints} if found.entry else {}
         joints = {joint: parts[joint] for joint in self._setup.joints if joint in parts}
-        counted = {joint: self._setup.new_m[joint] + part.mean_m for joint, part in joints.items()}
-        known = Known(
-            verdict=ledger_verdict(found.verdict) if found.verdict else NO_VERDICT,
-            history=_trends(found.clearances).history(self._setup.joints),
-            cycles=int(found.entry.totals.get("cycles", 0.0)) if found.entry else 0,
+        verdict = ledger_verdict(found.verdict) if found.verdict else NO_VERDICT
+        is_doubted = Figure.FORECAST in verdict.not_valid
+        state = LegState(
+            verdict=verdict,
             clearances={
-                joint: self._clearance(found, part, counted[joint]) for joint, part in joints.items()
+                joint: self._clearance(found, part, self._setup.new_m[joint] + part.mean_m, verdict)
+                for joint, part in joints.items()
             },
-            life={joint: _life(found, part) for joint, part in joints.items()},
-            alarms=[replay_alarm(alarm) for alarm in found.entry.alarms] if found.entry else [],
-            measurements=found.measurements,
-            walked=found.loads,
+            life={joint: None if is_doubted else _life(found, part) for joint, part in joints.items()},
+            alarms=LegAlarms(now=tuple(map(leg_alarm, found.entry.alarms)) if found.entry else ()),
+            life_cycles=int(found.entry.totals.get("cycles", 0.0)) if found.entry else 0,
         )
-        return view_of(self._setup, known)
+        history = _trends(found.clearances).history(self._setup.joints)
+        return view_of(self._setup, state, history, measurements=found.measurements, walked=found.loads)
 
-    def _clearance(self, found: LedgerContent, part: JointWear, counted_m: float) -> JointClearance:
+    def _clearance(
+        self, found: LedgerContent, part: JointWear, counted_m: float, verdict: Verdict
+    ) -> JointClearance:
         joint, limit_m = part.name, self._setup.limits_m[part.name]
         last = last_measured(found.measurements, joint, part.replaced_ns)
         known = JointSituation(
@@ -143,7 +144,6 @@ class LedgerLeg:
         )
         alarms = found.entry.alarms if found.entry else ()
         own = next((each for each in alarms if (each.kind, each.subject) == ("clearance", joint)), None)
-        verdict = ledger_verdict(found.verdict) if found.verdict else NO_VERDICT
         return joint_clearance(known, own, [verdict], self._setup.new_m[joint])
 
 

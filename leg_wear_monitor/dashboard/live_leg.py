@@ -1,30 +1,21 @@
 """A leg as a running monitor reports it: takes in its messages, in any order, and gives the page."""
 
+import json
 import math
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import islice
+from typing import Any
 
 import attrs
+import numpy as np
 
+from leg_wear_monitor.configuration.strict import structure
 from leg_wear_monitor.dashboard import source as region
-from leg_wear_monitor.dashboard.received import (
-    MOST,
-    NO_DATA,
-    Row,
-    Trends,
-    alarm_of,
-    hours_of,
-    joint_forecast_of,
-    leg_life_of,
-    own_statuses,
-    verdict_of,
-)
 from leg_wear_monitor.dashboard.source import (
-    NO_VERDICT,
+    NOTHING_KNOWN,
     Content,
     Freshness,
-    Known,
     LegPage,
     LegSetup,
     Words,
@@ -32,115 +23,163 @@ from leg_wear_monitor.dashboard.source import (
     view_of,
     words_of,
 )
-from leg_wear_monitor.errors import printable
-from leg_wear_monitor.files import finite_or_none
-from leg_wear_monitor.monitor.leg_state import life_hours
-from leg_wear_monitor.playback.result import (
-    LegLife,
-    ReplayJoint,
-    ReplayStatus,
-    ReplaySummary,
-)
-from leg_wear_monitor.state import JointClearance, LifeHours
+from leg_wear_monitor.errors import ConfigError, printable
+from leg_wear_monitor.files import finite_or_none, or_nan
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.playback.history import CYCLE_COLUMNS, SUMMARY_COLUMNS
+from leg_wear_monitor.playback.result import ReplayHistory, ReplayStatus, ReplaySummary
+from leg_wear_monitor.state import SCHEMA_VERSION, LegState, Level
 
-# Joints as a monitor's messages tell them.
+# Messages as other processes sent them; nothing in them is trusted.
 
 
-_SEEN_BY = (("encoders", "encoders", "{}_seen_m"), ("diagnosis", "torque", "{}_clearance_m"))
+MOST = 200
+"""Statuses in a message, values in a status, entries of a list: what exceeds it is not from a monitor."""
 
-_BELIEVED_BY = "believed_by_"
-
-Statuses = Mapping[str, ReplayStatus]
-
-
-@attrs.frozen
-class LiveJoints:
-    """Each joint's report, clearance and remaining life, by its name."""
-
-    reports: dict[str, ReplayJoint]
-    clearances: dict[str, JointClearance]
-    life: dict[str, LifeHours | None]
-
-    def life_with(self, leg: LegLife | None) -> dict[str, LifeHours | None]:
-        """The lives with that of the leg; empty before there is one."""
-        return self.life | ({"leg": life_hours(leg.hours)} if leg else {})
+_MOST_CHARACTERS = 10**6  # of a state; that of a leg with five joints has 10 000
+_HUGE = 2.0**63  # no stamp, no count and no value in SI units is that large
+_CODE, _NO_DATA = "fault_code", "no_data_s"
 
 
-def joints_of(
-    setup: LegSetup,
-    statuses: Statuses,
-    forecasts: Statuses,
-    cycle: Mapping[str, Mapping[str, float | None]],
-) -> LiveJoints:
-    """The joints of a leg that were heard of.
+def received_status(name: str, level: int, message: str, values: Mapping[str, str]) -> ReplayStatus:
+    """A status from the parts of a message: its texts on one line and not too long, its values numbers."""
+    first = islice(values.items(), MOST)
+    return ReplayStatus(
+        name=printable(name),
+        level=Level(min(max(level, Level.OK), Level.ERROR)),
+        message=printable(message),
+        values={printable(key): _number(value) for key, value in first if key != _CODE},
+        fault_code=printable(values.get(_CODE, "")),
+    )
+
+
+def own_statuses(node: str, statuses: Iterable[ReplayStatus]) -> dict[str, ReplayStatus]:
+    """The statuses of a node by their names without the node's; those of other nodes are left out."""
+    prefix, own = f"{node.lstrip('/')}: ", {}
+    for status in islice((each for each in statuses if each.name.startswith(prefix)), MOST):
+        name = status.name.removeprefix(prefix)
+        own[name] = attrs.evolve(status, name=name)
+    return own
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def received_state(text: str, source: str) -> LegState:
+    """The state of a leg from the text of a message.
 
     Parameters
     ----------
-    setup : LegSetup
-    statuses, forecasts : mapping of str to ReplayStatus
-        Of ``/diagnostics`` and ``~/forecast``, by name.
-    cycle : mapping
-        Values of the last gait cycle by column and joint.
+    text : str
+    source : str
+        Name of the topic, for messages.
+
+    Raises
+    ------
+    ConfigError
+        If it is no state, or one of another version.
     """
-    found = LiveJoints({}, {}, {})
-    for joint in setup.joints:
-        status = statuses.get(f"joint {joint}")
-        counted_m = status.values.get("clearance_m") if status else None
-        if status is None or counted_m is None:
-            continue
-        told = forecasts.get(f"forecast {joint}")
-        found.reports[joint] = _report(status, told, cycle, joint)
-        found.clearances[joint] = _clearance(setup, joint, status, counted_m, statuses)
-        found.life[joint] = life_hours(hours_of(status))
-    return found
+    if len(text) > _MOST_CHARACTERS:
+        raise ConfigError(source, "", f"has {len(text)} characters, expected {_MOST_CHARACTERS} at most")
+    try:
+        record = json.loads(text, parse_constant=lambda _: None)
+    except (ValueError, RecursionError) as error:
+        raise ConfigError(source, "", "is not JSON") from error
+    record = structure(_clean(record), dict[str, Any], source, "")
+    version = record.pop("schema_version", None)
+    if version != SCHEMA_VERSION:
+        raise ConfigError(source, "schema_version", f"{version!r} is not {SCHEMA_VERSION}")
+    state: LegState = structure(record, LegState, source, "")
+    return state
 
 
-def _report(
-    status: ReplayStatus,
-    told: ReplayStatus | None,
-    cycle: Mapping[str, Mapping[str, float | None]],
-    joint: str,
-) -> ReplayJoint:
-    values = status.values
-    last_peak_n = cycle.get("peak_force_n", {}).get(joint)
-    return ReplayJoint(
-        opened_m=None,
-        growth_m_per_cycle=values.get("growth_m_per_cycle"),
-        growth_mps=values.get("growth_mps"),
-        forecast=joint_forecast_of(told) if told else None,
-        peak_force_n=values.get("peak_force_n") if last_peak_n is None else last_peak_n,
-        mean_force_n=values.get("mean_force_n"),
-        impacts=int(values.get("impacts") or 0.0),
-        growth_error_m_per_cycle=None,
-    )
+def _clean(part: Any) -> Any:
+    """A part of a message with texts on one line, and with lists and objects that are not too long."""
+    if isinstance(part, dict):
+        return {printable(name): _clean(value) for name, value in islice(part.items(), MOST)}
+    if isinstance(part, list):
+        return [_clean(value) for value in part[:MOST]]
+    if isinstance(part, str):
+        return printable(part)
+    is_huge = isinstance(part, int | float) and not abs(part) < _HUGE
+    return None if is_huge else part
 
 
-def _clearance(
-    setup: LegSetup, joint: str, status: ReplayStatus, counted_m: float, statuses: Statuses
-) -> JointClearance:
-    """What is counted, and what encoders or the drive torque show best."""
-    seen = []
-    for name, by, key in _SEEN_BY:
-        values = statuses[name].values if name in statuses else {}
-        clearance_m, sigma_m = values.get(key.format(joint)), values.get(f"{joint}_sigma_m")
-        if clearance_m is not None and sigma_m is not None:
-            seen.append((sigma_m, clearance_m, by))
-    sigma_m, clearance_m, by = min(seen) if seen else (None, None, "")
-    limit_m = status.values.get("clearance_limit_m")
-    believed = (key.removeprefix(_BELIEVED_BY) for key in status.values if key.startswith(_BELIEVED_BY))
-    return JointClearance(
-        counted_m=counted_m,
-        seen_m=clearance_m,
-        seen_sigma_m=sigma_m,
-        seen_by=(by,) if by else (),
-        new_m=setup.new_m[joint],
-        limit_m=setup.limits_m[joint] if limit_m is None else limit_m,
-        measured_m=status.values.get("measured_clearance_m"),
-        measured_sigma_m=status.values.get("measured_sigma_m"),
-        believed_m=status.values.get("believed_m"),
-        believed_sigma_m=status.values.get("believed_sigma_m"),
-        believed_by=next(believed, None),
-    )
+# What was heard of a leg over time, in a bounded number of rows.
+
+
+MOST_ROWS = 600
+"""So many points are as many as a screen shows; twice as many are thinned by two."""
+
+_MAXIMA = ("peak_force_n",)  # of a group of gait cycles, its largest value
+
+
+@attrs.frozen
+class Row:
+    """Values at a stamp, by column and, for those of a joint, by its name; what is absent is not known."""
+
+    stamp_ns: int
+    leg: Mapping[str, float | None]
+    joints: Mapping[str, Mapping[str, float | None]]
+
+
+class Trends:
+    """The rows, the older ones thinned like the newer ones: always every so many."""
+
+    def __init__(self) -> None:
+        self._begin()
+
+    def _begin(self) -> None:
+        self._rows: list[Row] = []
+        self._every = 1  # rows that were given, for one that is kept
+        self._waiting: list[Row] = []
+
+    def add(self, row: Row) -> None:
+        """Keep a row; one of another time base, before the last, begins anew."""
+        if self._rows and row.stamp_ns < self._rows[-1].stamp_ns:
+            self._begin()
+        self._waiting.append(row)
+        if len(self._waiting) < self._every:
+            return
+        self._rows.append(_merged(self._waiting))
+        self._waiting.clear()
+        if len(self._rows) >= 2 * MOST_ROWS:
+            self._rows = [_merged(self._rows[k : k + 2]) for k in range(0, len(self._rows), 2)]
+            self._every *= 2
+
+    def history(self, joints: Sequence[str]) -> ReplayHistory:
+        """The rows as columns; all NaN in columns that were never heard."""
+        rows = [*self._rows, *self._waiting[-1:]]
+        columns: dict[str, Any] = {name: _column(row.leg.get(name) for row in rows) for name in CYCLE_COLUMNS}
+        columns |= {
+            name: {joint: _column(row.joints.get(name, {}).get(joint) for row in rows) for joint in joints}
+            for name in (*SUMMARY_COLUMNS.values(), "seen_m")
+        }
+        stamps = np.array([row.stamp_ns for row in rows], np.int64)
+        return ReplayHistory(stamp_ns=stamps, **columns)
+
+
+def _merged(rows: Sequence[Row]) -> Row:
+    """One row for some: the last values that are known, and the largest of what counts as such."""
+    leg: dict[str, float | None] = {}
+    joints: dict[str, dict[str, float | None]] = {}
+    for row in rows:
+        leg |= {name: value for name, value in row.leg.items() if value is not None}
+        for name, values in row.joints.items():
+            kept = joints.setdefault(name, {})
+            for joint, value in values.items():
+                before = kept.get(joint)
+                if value is not None and (name not in _MAXIMA or before is None or value > before):
+                    kept[joint] = value
+    return Row(rows[-1].stamp_ns, leg, joints)
+
+
+def _column(values: Iterable[float | None]) -> Floats:
+    return np.array([or_nan(value) for value in values], float)
 
 
 OLD_AFTER_S = 5.0  # the monitor reports every second, whether the leg walks or not
@@ -176,12 +215,10 @@ class LiveLeg:
         self._lock = threading.Lock()
         self._setup: LegSetup | None = None
         self._why_unknown = "The monitor has not told its parameters yet."
+        self._state, self._fault = NOTHING_KNOWN, ""
         self._statuses: dict[str, ReplayStatus] = {}
-        self._verdict: ReplayStatus | None = None
         self._leg_silent_s: float | None = None
-        self._alarms: dict[str, ReplayStatus] = {}
-        self._forecasts: dict[str, ReplayStatus] = {}
-        self._cycle: dict[str, dict[str, float | None]] = {}
+        self._peaks_n: dict[str, float | None] = {}
         self._trends = Trends()
         self._heard_s: float | None = None
         self._is_new = True
@@ -201,40 +238,27 @@ class LiveLeg:
             return
         with self._lock:
             self._hear()
-            self._take_current(own.pop("verdict", None))
+            verdict = own.pop("verdict", None)
+            self._leg_silent_s = verdict.values.get(_NO_DATA) if verdict else None
             self._statuses = own
             self._trends.add(self._row(stamp_ns))
 
-    def _take_current(self, verdict: ReplayStatus | None) -> None:
-        """The verdict of this second: of one without data, what it was is in ``~/verdict``."""
-        self._leg_silent_s = verdict.values.get(NO_DATA) if verdict else None
-        if verdict and (self._leg_silent_s is None or self._verdict is None):
-            self._verdict = verdict
-
-    def take_verdict(self, statuses: Iterable[ReplayStatus]) -> None:
-        """A message of ``~/verdict``; a joint that it names is drawn as it says, before its next report."""
-        own = own_statuses(self._node, statuses)
+    def take_state(self, text: str) -> None:
+        """A message of ``~/state``; what is no state is left out, and said."""
+        try:
+            state, fault = received_state(text, f"{self._node}/state"), ""
+        except ConfigError as error:
+            state, fault = NOTHING_KNOWN, f"The state of the leg cannot be read: {error}"
         with self._lock:
             self._hear()
-            self._verdict = own.get("verdict", self._verdict)
+            self._state, self._fault = state, fault
 
-    def take_alarms(self, statuses: Iterable[ReplayStatus]) -> None:
-        """A message of ``~/alarms``."""
+    def take_peaks(self, peaks_n: Mapping[str, float]) -> None:
+        """A message of ``~/clearance_states``: the largest contact force of each joint in a gait cycle."""
+        first = islice(peaks_n.items(), MOST)
         with self._lock:
             self._hear()
-            self._alarms = own_statuses(self._node, statuses)
-
-    def take_forecast(self, statuses: Iterable[ReplayStatus]) -> None:
-        """A message of ``~/forecast``."""
-        with self._lock:
-            self._hear()
-            self._forecasts = own_statuses(self._node, statuses)
-
-    def take_cycle(self, columns: Mapping[str, Mapping[str, float]]) -> None:
-        """A message of ``~/clearance_states``: values by column and joint."""
-        with self._lock:
-            self._hear()
-            self._cycle = {name: _of_joints(values) for name, values in columns.items()}
+            self._peaks_n = {printable(joint): finite_or_none(peak_n) for joint, peak_n in first}
 
     def _hear(self) -> None:
         self._heard_s, self._is_new = self._clock(), True
@@ -245,9 +269,10 @@ class LiveLeg:
             if status in self._statuses:
                 values = self._statuses[status].values
                 leg |= {column: values.get(name) for column, name in columns.items()}
-        joints = joints_of(self._setup or unknown_leg(), self._statuses, {}, {}).clearances
+        joints = self._state.clearances
+        counted = {joint: each.counted_m for joint, each in joints.items()}
         seen = {joint: each.seen_m for joint, each in joints.items()}
-        return Row(stamp_ns, leg, self._cycle | {"seen_m": seen})
+        return Row(stamp_ns, leg, {"counted_m": counted, "seen_m": seen, "peak_force_n": self._peaks_n})
 
     # --- what the page shows ---
 
@@ -258,7 +283,7 @@ class LiveLeg:
     def content(self) -> Content:
         """The page with all that was heard last."""
         with self._lock:
-            view, why_unknown = self._view(), "" if self._setup else self._why_unknown
+            view, why_unknown = self._view(), self._fault or ("" if self._setup else self._why_unknown)
             self._is_new = False
         regions = {
             region.VERDICT: region.verdict_region(view),
@@ -308,28 +333,11 @@ class LiveLeg:
         return markup
 
     def _view(self) -> ReplaySummary:
-        setup = self._setup or unknown_leg()
-        verdict = verdict_of(self._verdict) if self._verdict else NO_VERDICT
-        gait = self._statuses.get("gait")
-        joints = joints_of(setup, self._statuses, self._forecasts, self._cycle)
-        leg = leg_life_of(self._forecasts["forecast leg"]) if "forecast leg" in self._forecasts else None
-        cycles = int((gait.values.get("cycles") if gait else None) or 0.0)
-        known = Known(
-            verdict=verdict,
-            history=self._trends.history(setup.joints),
-            cycles=cycles,
-            joints=joints.reports,
-            clearances=joints.clearances,
-            life=joints.life_with(leg),
-            forecast=leg,
-            alarms=[alarm_of(status) for status in self._alarms.values()],
+        setup, gait = self._setup or unknown_leg(), self._statuses.get("gait")
+        return view_of(
+            setup,
+            self._state,
+            self._trends.history(setup.joints),
             status=list(self._statuses.values()),
-            missing="" if cycles else gait.message if gait else "nothing was heard",
+            missing="" if self._state.life_cycles else gait.message if gait else "nothing was heard",
         )
-        return view_of(setup, known)
-
-
-def _of_joints(values: Mapping[str, float]) -> dict[str, float | None]:
-    """Values by joint, as far as they are numbers and not too many."""
-    first = islice(values.items(), MOST)
-    return {printable(joint): finite_or_none(value) for joint, value in first}

@@ -14,19 +14,15 @@ from leg_wear_monitor.fleet.description import fleet_directory, load_fleet
 from leg_wear_monitor.fleet.overview import FILE, FleetOverview, described, load_overview
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.alarms import ADVICE, Level
+from leg_wear_monitor.monitor.alarms import ADVICE
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.ledger.entry import Measurement, WalkedLoad
 from leg_wear_monitor.monitor.reports import Lost
 from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, amount, guide_to
 from leg_wear_monitor.playback.result import (
-    LegLife,
-    ReplayAlarm,
-    ReplayAlarms,
     ReplayGait,
     ReplayHistory,
-    ReplayJoint,
     ReplayLeg,
     ReplayMonitor,
     ReplayRecording,
@@ -61,7 +57,7 @@ from leg_wear_monitor.report.replay.charts import (
 )
 from leg_wear_monitor.report.replay.joint_rows import joint_rows, joint_views
 from leg_wear_monitor.report.replay.page import belief, leg_drawing, replay_page
-from leg_wear_monitor.state import Evidence, Figure, JointClearance, LifeHours, State, Verdict
+from leg_wear_monitor.state import Evidence, Figure, LegState, Level, State, Verdict
 
 # What is known of a leg at one instant, in the shape of a replay's summary: so the page has its words.
 
@@ -144,58 +140,45 @@ def unknown_leg() -> LegSetup:
     return LegSetup(monitor, ReplayLeg(), {}, {})
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class Known:
-    """What a source knows of a leg; empty where it knows nothing.
+NOTHING_KNOWN = LegState(verdict=NO_VERDICT, clearances={})
 
-    Attributes
+
+def view_of(
+    setup: LegSetup,
+    state: LegState,
+    history: ReplayHistory,
+    status: Sequence[ReplayStatus] = (),
+    measurements: Sequence[Measurement] = (),
+    walked: Sequence[WalkedLoad] = (),
+    missing: str = "",
+) -> ReplaySummary:
+    """What is known of a leg, as a summary.
+
+    Parameters
     ----------
-    verdict : Verdict
+    setup : LegSetup
+    state : LegState
     history : ReplayHistory
-    cycles : int
-        Gait cycles over the leg's life.
-    joints, clearances, life, forecast, alarms, status, measurements, walked
-        As in `ReplaySummary`; `alarms` are those of now.
+    status, measurements, walked
+        As in `ReplaySummary`.
     missing : str
         Why there is no gait cycle; empty if there is.
     """
-
-    verdict: Verdict
-    history: ReplayHistory
-    cycles: int = 0
-    joints: Mapping[str, ReplayJoint] = attrs.Factory(dict)
-    clearances: Mapping[str, JointClearance] = attrs.Factory(dict)
-    life: Mapping[str, LifeHours | None] = attrs.Factory(dict)
-    forecast: LegLife | None = None
-    alarms: Sequence[ReplayAlarm] = ()
-    status: Sequence[ReplayStatus] = ()
-    measurements: Sequence[Measurement] = ()
-    walked: Sequence[WalkedLoad] = ()
-    missing: str = ""
-
-
-def view_of(setup: LegSetup, known: Known) -> ReplaySummary:
-    """What is known, as a summary; without lives that the verdict does not believe."""
-    is_valid = Figure.FORECAST not in known.verdict.not_valid
+    cycles = state.life_cycles
     return ReplaySummary(
-        verdict=known.verdict,
+        **attrs.asdict(state, recurse=False),
         recording=_NOT_RECORDED,
         monitor=setup.monitor,
         leg=setup.shape,
-        cycles=known.cycles,
-        gait=ReplayGait(
-            believable_cycles=known.cycles, doubtful_cycles=0, missing=known.missing, is_counted=False
-        ),
-        joints=dict(known.joints),
-        clearances=dict(known.clearances),
-        life=dict(known.life) if is_valid else dict.fromkeys(known.life),
-        forecast=known.forecast if is_valid else None,
-        measurements=tuple(known.measurements),
-        walked=tuple(known.walked),
-        alarms=ReplayAlarms(now=tuple(known.alarms), changes=()),
-        status=tuple(known.status),
+        cycles=cycles,
+        gait=ReplayGait(believable_cycles=cycles, doubtful_cycles=0, missing=missing, is_counted=False),
+        joints={},
+        forecast=None,
+        measurements=tuple(measurements),
+        walked=tuple(walked),
+        status=tuple(status),
         lost=_NOTHING_LOST,
-        history=known.history,
+        history=history,
         wear_depth_m={},
         advice=ADVICE,
     )

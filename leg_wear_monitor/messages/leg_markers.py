@@ -22,9 +22,9 @@ from leg_wear_monitor.messages.encode import (
 )
 from leg_wear_monitor.messages.streams import Outgoing, Output, single
 from leg_wear_monitor.monitor import alarm_specs
-from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, Reports, SampleReports, VerdictReport
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
+from leg_wear_monitor.state import Level
 
 # What the markers show: the leg, and beside it each journal in its bushing, magnified, with texts.
 

@@ -14,7 +14,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.messages import encode
 from leg_wear_monitor.messages.leg_markers import LINKAGE, MARKERS
 from leg_wear_monitor.messages.streams import LATCHED, SENSOR_DATA, Outgoing, Output, single
-from leg_wear_monitor.monitor.alarms import Alarm, Level, code_of, state_of
+from leg_wear_monitor.monitor.alarms import Alarm, code_of, state_of
 from leg_wear_monitor.monitor.config.parameters import NODE
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.forecast import LegForecast, answer_words, lifetime_values
@@ -29,6 +29,7 @@ from leg_wear_monitor.monitor.reports import (
 )
 from leg_wear_monitor.monitor.status import verdict_status
 from leg_wear_monitor.monitor.verdict.verdict import with_unit
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin import CRANK
 
 # Values of each clearance joint as numbers of their own, because tools plot arrays by index only.

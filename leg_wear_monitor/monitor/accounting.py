@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
-from leg_wear_monitor.monitor.alarms import Alarm, Level
+from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import LedgerFile
 from leg_wear_monitor.monitor.gait_evidence import FRICTION_KEY, SIGMA_KEY
 from leg_wear_monitor.monitor.inputs import Pauses
@@ -28,6 +28,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
 )
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, VerdictReport
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics, SampleStatistics

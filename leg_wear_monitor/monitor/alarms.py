@@ -3,11 +3,11 @@
 import math
 from collections.abc import Iterable
 from datetime import UTC, datetime
-from enum import IntEnum
 
 import attrs
 
 from leg_wear_monitor.estimate.cause import Cause
+from leg_wear_monitor.state import Level
 
 # Alarms as a state machine: levels with a deadband and an on-delay, latched until acknowledged.
 #
@@ -15,14 +15,6 @@ from leg_wear_monitor.estimate.cause import Cause
 #
 # Everything here is a pure function of (alarm, value, limit). A value is evaluated once per gait cycle, so
 # the on-delay counts gait cycles.
-
-
-class Level(IntEnum):
-    """Level of an alarm; numbers as in diagnostic_msgs/DiagnosticStatus."""
-
-    OK = 0
-    WARN = 1
-    ERROR = 2
 
 
 @attrs.frozen

@@ -13,7 +13,7 @@ from leg_wear_monitor.estimate.cause import NamedCause
 from leg_wear_monitor.estimate.mismatch import Allowed
 from leg_wear_monitor.monitor import alarm_specs
 from leg_wear_monitor.monitor.alarm_specs import AlarmSpec, CycleEvidence, LimitSource
-from leg_wear_monitor.monitor.alarms import Alarm, Level, Limit, acknowledged, cleared, evaluated, has_changed
+from leg_wear_monitor.monitor.alarms import Alarm, Limit, acknowledged, cleared, evaluated, has_changed
 from leg_wear_monitor.monitor.config.fitting import largest_lag_s
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.gait_evidence import TorqueRecord
@@ -28,6 +28,7 @@ from leg_wear_monitor.monitor.inputs import (
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, JointReport
 from leg_wear_monitor.monitor.torque_checks import TorqueBounds, torque_bounds, torque_causes, torque_values
 from leg_wear_monitor.monitor.verdict.situation import is_held_by_estimate
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import NO_LOAD, Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics, Intake, NotCompared, Tracking

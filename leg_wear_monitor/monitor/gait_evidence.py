@@ -10,9 +10,10 @@ import numpy as np
 from leg_wear_monitor.estimate.cause import NamedCause, TorqueExplanation
 from leg_wear_monitor.estimate.mismatch import TimingBySpeed
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.monitor.alarms import Alarm, Level
+from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.reports import CycleReport
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin.sample import FAULTS, NO_FAULT, Samples
 from leg_wear_monitor.twin.statistics import LONGEST, CycleStatistics, NotCompared

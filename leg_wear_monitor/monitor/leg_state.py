@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from leg_wear_monitor.estimate.cause import Cause, NamedCause, TorqueExplanation
 from leg_wear_monitor.files import finite_or_none
 from leg_wear_monitor.monitor.alarm_specs import CLEARANCE
-from leg_wear_monitor.monitor.alarms import Alarm
+from leg_wear_monitor.monitor.alarms import Alarm, state_of
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast, Quantiles
 from leg_wear_monitor.monitor.parts import Parts
@@ -19,6 +19,8 @@ from leg_wear_monitor.state import (
     Figure,
     FootLoad,
     JointClearance,
+    LegAlarm,
+    LegAlarms,
     LegState,
     LifeHours,
     TorqueDiagnosis,
@@ -50,9 +52,28 @@ def leg_state(parts: Parts, findings: Sequence[Finding]) -> LegState:
         drive=_drive(last, diagnosis, explained),
         load=_load(parts.foot_load.load if parts.foot_load else FootLoad(), diagnosis),
         diagnosis=_diagnosis(last, diagnosis, explained),
+        alarms=LegAlarms(now=tuple(map(leg_alarm, alarms.values()))),
+        life_answers=_answers(last),
+        first_probability=last.forecast.first_probability
+        if last and last.forecast and Figure.FORECAST not in verdict.not_valid
+        else {},
         life=life_of({joint.joint: joint.forecast for joint in last.joints}, last.forecast, verdict)
         if last
         else {},
+    )
+
+
+def leg_alarm(alarm: Alarm) -> LegAlarm:
+    """An alarm as operators see it."""
+    return LegAlarm(
+        name=alarm.name,
+        level=alarm.level,
+        state=state_of(alarm),
+        value=alarm.value,
+        limit=alarm.limit,
+        unit=alarm.unit,
+        worst=alarm.worst,
+        raised_ns=alarm.raised_ns,
     )
 
 
@@ -98,6 +119,17 @@ def life_of(
     if Figure.FORECAST in verdict.not_valid:
         return dict.fromkeys(told)
     return {name: life_hours(each.hours) if each else None for name, each in told.items()}
+
+
+def _answers(last: CycleReport | None) -> dict[str, str]:
+    """What the last forecast can say of each joint and of the leg."""
+    if last is None:
+        return {}
+    told: dict[str, JointForecast | LegForecast | None] = {
+        **{joint.joint: joint.forecast for joint in last.joints},
+        "leg": last.forecast,
+    }
+    return {name: each.answer.value for name, each in told.items() if each is not None}
 
 
 def life_hours(hours: Quantiles | None) -> LifeHours | None:

@@ -6,7 +6,6 @@ import numpy as np
 from leg_wear_monitor.estimate.mismatch import explanation
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.alarm_specs import CLEARANCE, MISMATCH
-from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate
 from leg_wear_monitor.monitor.diagnosis.observer import Correction
 from leg_wear_monitor.monitor.diagnosis.state import TorqueState
@@ -24,6 +23,7 @@ from leg_wear_monitor.monitor.reports import (
     latest,
 )
 from leg_wear_monitor.monitor.verdict.situation import COUNTED, alarm_value, is_surely_below
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.reference import LegParameters
 from leg_wear_monitor.twin.sample import Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics
@@ -90,14 +90,15 @@ class Processing:
         Returns
         -------
         verdicts, states : tuple of VerdictReport
-            Changes of the verdict; the state of the leg, if that or a gait cycle is new.
+            Changes of the verdict; the state of the leg, if that, an alarm or a gait cycle is new.
         """
+        before = len(changes)
         self._add_changes(self._evaluation.end_period(self._accounting.state.skipped), changes)
         self._observe_encoders()
         self._observe_torque()
         self._add_changes(self.evaluate_clearances(), changes)
         verdicts, state = self._parts.judge.changed(self._parts.state), self._parts.state
-        if not verdicts and not state.has_ended:
+        if not verdicts and not state.has_ended and len(changes) == before:
             return (), ()
         state.has_ended, leg = False, leg_state(self._parts, state.findings)
         return verdicts, (VerdictReport(leg.stamp_ns, state.findings, leg),)

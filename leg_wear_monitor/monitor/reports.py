@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 import attrs
 
 from leg_wear_monitor.mechanism.materials import Bushing, BushingLoad
-from leg_wear_monitor.monitor.alarms import NO_FAULT, Alarm, Level
+from leg_wear_monitor.monitor.alarms import NO_FAULT, Alarm
 from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate, ClearanceObservation
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
 from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointForecast, LegForecast
@@ -20,7 +20,7 @@ from leg_wear_monitor.monitor.inputs import InputGuard, Pauses
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.verdict.situation import SeenClearance, joint_status
 from leg_wear_monitor.monitor.verdict.verdict import Finding, verdict_of
-from leg_wear_monitor.state import LegState, Verdict
+from leg_wear_monitor.state import LegState, Level, Verdict
 from leg_wear_monitor.twin.statistics import CycleStatistics, Intake, SampleStatistics, TorqueStatistics
 
 SampleReports = SampleStatistics
@@ -302,8 +302,8 @@ class Reports:
     verdicts : tuple of VerdictReport
         One for each change of the verdict, and the first one of a monitor.
     states : tuple of VerdictReport
-        With the state of the leg: one at the end of each evaluation period in which a gait cycle ended or the
-        verdict changed.
+        With the state of the leg: one at the end of each evaluation period in which a gait cycle ended, or an
+        alarm or the verdict changed.
     """
 
     samples: SampleReports

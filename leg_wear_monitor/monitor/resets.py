@@ -13,7 +13,7 @@ from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor import alarm_specs
 from leg_wear_monitor.monitor.accounting import verdict_event
-from leg_wear_monitor.monitor.alarms import Alarm, Level, acknowledged
+from leg_wear_monitor.monitor.alarms import Alarm, acknowledged
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.forecast.measurement import last_measured
@@ -39,6 +39,7 @@ from leg_wear_monitor.monitor.verdict.situation import (
     is_surely_below,
 )
 from leg_wear_monitor.monitor.verdict.verdict import Finding, dated
+from leg_wear_monitor.state import Level
 
 
 @attrs.frozen(eq=False)

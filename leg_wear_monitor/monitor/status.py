@@ -18,7 +18,6 @@ from leg_wear_monitor.monitor.alarms import (
     LEDGER_INTERRUPTED,
     LEDGER_NOT_WRITTEN,
     NOT_FOLLOWED,
-    Level,
     code_of,
     worst_code,
 )
@@ -44,7 +43,7 @@ from leg_wear_monitor.monitor.verdict.verdict import (
     verdict_of,
     with_unit,
 )
-from leg_wear_monitor.state import JointClearance, State, Verdict
+from leg_wear_monitor.state import JointClearance, Level, State, Verdict
 from leg_wear_monitor.twin import KINDS, LOAD
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.statistics import Event, Sampling, Tracking

@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from leg_wear_monitor.estimate.cause import TorqueExplanation
 from leg_wear_monitor.estimate.signature import DIRECT
 from leg_wear_monitor.monitor import alarm_specs
-from leg_wear_monitor.monitor.alarms import CAUSES_OF_ALARMS, DIAGNOSIS, Level, worst_code
+from leg_wear_monitor.monitor.alarms import CAUSES_OF_ALARMS, DIAGNOSIS, worst_code
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState, NotUsed
 from leg_wear_monitor.monitor.evaluation import AlarmEvaluation
 from leg_wear_monitor.monitor.gait_evidence import TorqueRecord
 from leg_wear_monitor.monitor.reports import CycleReport, Status
 from leg_wear_monitor.monitor.torque_checks import offset_error_rad
 from leg_wear_monitor.monitor.verdict.verdict import EVIDENCE, CauseWords, diagnosis_words, with_unit
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.statistics import NotCompared
 
 _TORQUE = tuple(spec.name() for spec in alarm_specs.TORQUE)

@@ -10,7 +10,7 @@ from leg_wear_monitor.errors import LegWearError, closed_at_the_end
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarm_specs import MISMATCH
-from leg_wear_monitor.monitor.alarms import Alarm, Level
+from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.fitting import check_limits
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
@@ -39,7 +39,7 @@ from leg_wear_monitor.monitor.reports import (
 from leg_wear_monitor.monitor.resets import Acknowledged, last_reset, named_for_clearance, rested_on
 from leg_wear_monitor.monitor.status import statuses
 from leg_wear_monitor.monitor.verdict.situation import SOURCES, is_held_by_estimate
-from leg_wear_monitor.state import LegState
+from leg_wear_monitor.state import LegState, Level
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples, SamplingSettings
 from leg_wear_monitor.twin.statistics import Sampling, joined
 

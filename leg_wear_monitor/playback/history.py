@@ -15,10 +15,11 @@ from leg_wear_monitor.messages.encode import LegDrawing
 from leg_wear_monitor.messages.leg_markers import LegMarkers
 from leg_wear_monitor.messages.outputs import ALARMS, DIAGNOSTICS, FORECAST, STATE, VERDICT, Messages
 from leg_wear_monitor.messages.streams import ForecastTimes, topic_of
-from leg_wear_monitor.monitor.alarms import Alarm, Level
+from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.parameters import NODE
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, JointReport, Reports
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
+from leg_wear_monitor.state import Level
 
 # Replay results per gait cycle, stored as compact columns so that days of walking fit into memory.
 

@@ -8,19 +8,18 @@ from typing import TYPE_CHECKING, Any, get_args
 import attrs
 
 from leg_wear_monitor.bags.findings import Severity
-from leg_wear_monitor.configuration.strict import part_document, structure
+from leg_wear_monitor.configuration.strict import structure
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.files import data_frame, finite_or_none
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.materials import BushingLoad
-from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.angle_regression import ClearanceObservation
 from leg_wear_monitor.monitor.config.settings import Limits
 from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, Quantiles
 from leg_wear_monitor.monitor.ledger.entry import Measurement, WalkedLoad
 from leg_wear_monitor.monitor.reports import Lost
 from leg_wear_monitor.shown import Drawable
-from leg_wear_monitor.state import SCHEMA_VERSION, JointClearance, LegState
+from leg_wear_monitor.state import SCHEMA_VERSION, JointClearance, LegState, Level
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -185,72 +184,6 @@ class LegLife:
 
 
 @attrs.frozen(kw_only=True)
-class ReplayAlarm:
-    """An alarm as operators see it.
-
-    Attributes
-    ----------
-    name : str
-        Kind and subject, such as ``clearance A``.
-    level : Level
-        Level that is shown; a latched alarm keeps its highest one.
-    state : str
-        Whether it is present or latched, and acknowledged.
-    value : float or None
-        Last value, in ``unit``.
-    limit : float or None
-        Limit of the level ERROR, in ``unit``.
-    worst : float or None
-        Worst value since it was raised, in ``unit``.
-    unit : str
-        Unit of the values, SI; empty for a fraction.
-    raised_ns : int
-        Stamp at which the level last rose [ns]; 0 before.
-    """
-
-    name: str
-    level: Level
-    state: str
-    value: float | None = _perhaps()
-    limit: float | None = _perhaps()
-    unit: str
-    worst: float | None = _perhaps()
-    raised_ns: int
-
-
-@attrs.frozen(kw_only=True)
-class AlarmChange:
-    """An alarm after a change.
-
-    Attributes
-    ----------
-    stamp_ns : int
-        Stamp of the change [ns].
-    alarm : ReplayAlarm
-        The alarm then.
-    """
-
-    stamp_ns: int
-    alarm: ReplayAlarm = attrs.field(metadata={"flat": True})
-
-
-@attrs.frozen(kw_only=True)
-class ReplayAlarms:
-    """All alarms.
-
-    Attributes
-    ----------
-    now : tuple of ReplayAlarm
-        All of them, at the end.
-    changes : tuple of AlarmChange
-        The first ten thousand changes.
-    """
-
-    now: tuple[ReplayAlarm, ...]
-    changes: tuple[AlarmChange, ...]
-
-
-@attrs.frozen(kw_only=True)
 class ReplayStatus:
     """A line of /diagnostics at the end.
 
@@ -289,24 +222,6 @@ class WornDepth:
 
     bushing: Floats
     journal: Floats
-
-
-# Parts of what a replay found as summary.json has them, and back: the only place of its keys.
-
-
-JsonObject = dict[str, Any]
-
-
-def alarms_document(alarms: ReplayAlarms) -> JsonObject:
-    """All alarms, and their changes with the stamp before what the alarm was."""
-    return {
-        "now": part_document(alarms.now),
-        "changes": [_change(change) for change in alarms.changes],
-    }
-
-
-def _change(change: AlarmChange) -> JsonObject:
-    return {"stamp_ns": change.stamp_ns, **part_document(change.alarm)}
 
 
 # What was replayed: the recording, the settings of the monitor, and whether both fit together.
@@ -607,8 +522,6 @@ class ReplaySummary(LegState, Drawable):
         Clearances measured by hand, from the ledger.
     walked : tuple of WalkedLoad
         Walking since the start of the ledger, or of the replay without one, by the foot load that acted.
-    alarms : ReplayAlarms
-        Alarms at the end and their changes.
     status : tuple of ReplayStatus
         Lines of /diagnostics at the end.
     lost : Lost
@@ -636,7 +549,6 @@ class ReplaySummary(LegState, Drawable):
     forecast: LegLife | None
     measurements: tuple[Measurement, ...]
     walked: tuple[WalkedLoad, ...] = ()
-    alarms: ReplayAlarms
     status: tuple[ReplayStatus, ...]
     lost: Lost
     sampling: ReplaySampling | None = None
@@ -644,10 +556,6 @@ class ReplaySummary(LegState, Drawable):
     wear_depth_m: dict[str, WornDepth]
     advice: str
     made_with: dict[str, str] = attrs.Factory(dict)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain object: what ``replay --json`` writes; null for what is not known."""
-        return {**super().to_dict(), "alarms": alarms_document(self.alarms)}
 
     def to_pandas(self) -> "pd.DataFrame":
         """Table with a row for each joint; requires pandas.

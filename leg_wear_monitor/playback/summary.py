@@ -16,23 +16,21 @@ from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import is_on_ground, outline_of
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.alarms import ADVICE, Alarm, state_of
+from leg_wear_monitor.monitor.alarms import ADVICE
 from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
 from leg_wear_monitor.monitor.gait_evidence import GaitEvidence
 from leg_wear_monitor.monitor.ledger.entry import VerdictEvent
+from leg_wear_monitor.monitor.leg_state import leg_alarm
 from leg_wear_monitor.monitor.reports import JointReport, Status
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, SUMMARY_COLUMNS, History
 from leg_wear_monitor.playback.result import (
-    AlarmChange,
     EncoderEvidence,
     LegJoint,
     LegLife,
     Place,
-    ReplayAlarm,
-    ReplayAlarms,
     ReplayFinding,
     ReplayGait,
     ReplayHistory,
@@ -46,7 +44,7 @@ from leg_wear_monitor.playback.result import (
     WornDepth,
 )
 from leg_wear_monitor.shown import Drawable
-from leg_wear_monitor.state import Evidence, Figure, State, Verdict
+from leg_wear_monitor.state import AlarmChange, Evidence, Figure, State, Verdict
 from leg_wear_monitor.twin import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import Samples, brings
 from leg_wear_monitor.twin.statistics import Sampling
@@ -198,6 +196,7 @@ def summary(
     state = monitor.state
     is_known = result.is_believable and last is not None
     verdict, known = state.verdict, attrs.asdict(state, recurse=False)
+    known["alarms"] = attrs.evolve(state.alarms, changes=_changes(result))
     told = leg_forecast(last.forecast, verdict) if is_known and last else None
     return ReplaySummary(
         **(known if is_known else known | {"clearances": {}, "life": {}}),
@@ -212,7 +211,6 @@ def summary(
         forecast=leg_life(told),
         measurements=tuple(monitor.measurements),
         walked=monitor.walked,
-        alarms=_alarms(result),
         status=tuple(map(_status, monitor.status())),
         lost=monitor.lost,
         sampling=_sampling(monitor.sampling),
@@ -347,25 +345,9 @@ def leg_life(told: LegForecast | None) -> LegLife | None:
     return LegLife(**attrs.asdict(told, recurse=False), first=told.first)
 
 
-def _alarms(result: ReplayResult) -> ReplayAlarms:
-    changes = (
-        AlarmChange(stamp_ns=stamp, alarm=replay_alarm(alarm)) for stamp, alarm in result.history.changes
-    )
-    return ReplayAlarms(now=tuple(map(replay_alarm, result.monitor.alarms.alarms)), changes=tuple(changes))
-
-
-def replay_alarm(alarm: Alarm) -> ReplayAlarm:
-    """An alarm as operators see it."""
-    return ReplayAlarm(
-        name=alarm.name,
-        level=alarm.level,
-        state=state_of(alarm),
-        value=alarm.value,
-        limit=alarm.limit,
-        unit=alarm.unit,
-        worst=alarm.worst,
-        raised_ns=alarm.raised_ns,
-    )
+def _changes(result: ReplayResult) -> tuple[AlarmChange, ...]:
+    changes = result.history.changes
+    return tuple(AlarmChange(stamp_ns=stamp_ns, alarm=leg_alarm(alarm)) for stamp_ns, alarm in changes)
 
 
 def _status(status: Status) -> ReplayStatus:

@@ -15,10 +15,10 @@ import jinja2
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.monitor.alarms import Level, raised_words, time_words
+from leg_wear_monitor.monitor.alarms import raised_words, time_words
 from leg_wear_monitor.monitor.verdict.situation import COUNTED, OF_A_JOINT
-from leg_wear_monitor.playback.result import ReplayAlarm, ReplaySummary
-from leg_wear_monitor.state import Figure, State, Verdict
+from leg_wear_monitor.playback.result import ReplaySummary
+from leg_wear_monitor.state import Figure, LegAlarm, Level, State, Verdict
 
 # A chart as data: its series are a CSV file inside the page, which the page's script draws with uPlot.
 
@@ -568,7 +568,7 @@ class AlarmLine:
     since: str
 
 
-def alarm_line(summary: ReplaySummary, alarm: ReplayAlarm) -> AlarmLine:
+def alarm_line(summary: ReplaySummary, alarm: LegAlarm) -> AlarmLine:
     """A raised alarm in words."""
     symbol, look = LEVEL_LOOKS[alarm.level]
     kind, _, subject = alarm.name.partition(" ")
@@ -587,7 +587,7 @@ def alarm_line(summary: ReplaySummary, alarm: ReplayAlarm) -> AlarmLine:
     )
 
 
-def alarm_doubt(summary: ReplaySummary, alarm: ReplayAlarm) -> str:
+def alarm_doubt(summary: ReplaySummary, alarm: LegAlarm) -> str:
     """Why the value of an alarm does not hold; empty if it does: that of an estimate does."""
     kind, _, subject = alarm.name.partition(" ")
     figure, clearance = _FIGURES.get(kind), summary.clearances.get(subject)

@@ -7,18 +7,11 @@ from datetime import UTC, datetime
 import attrs
 
 from leg_wear_monitor.monitor import alarm_specs, alarms
-from leg_wear_monitor.monitor.alarms import (
-    INPUT_SILENCE,
-    Alarm,
-    Level,
-    Limit,
-    acknowledged,
-    evaluated,
-    has_changed,
-)
+from leg_wear_monitor.monitor.alarms import INPUT_SILENCE, Alarm, Limit, acknowledged, evaluated, has_changed
 from leg_wear_monitor.monitor.reports import AlarmList, Status
 from leg_wear_monitor.ros.inputs import Inbox, InputTopic, misfit, several
 from leg_wear_monitor.ros.outputs import BlackBox
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin import CRANK, KINDS
 
 # Detection of silent inputs (no usable samples), which only the node can do because it has a clock.

@@ -18,10 +18,10 @@ from rclpy.task import Future
 from rclpy.utilities import try_shutdown
 from rclpy.validate_full_topic_name import validate_full_topic_name
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from leg_wear_monitor.dashboard.live_leg import LiveLeg
-from leg_wear_monitor.dashboard.received import MOST, received_status
+from leg_wear_monitor.dashboard.live_leg import MOST, LiveLeg, received_status
 from leg_wear_monitor.dashboard.source import LegSetup, leg_setup
 from leg_wear_monitor.errors import ConfigError, LegWearError, printable
 from leg_wear_monitor.mechanism.loader import is_file_name, load_mechanism, shipped_mechanisms
@@ -36,7 +36,7 @@ from leg_wear_monitor.ros.running import WAKE_S, executor_for, spin, stamp_ns_of
 
 
 _ASK_AGAIN_S = 2.0
-_HEARD = (outputs.VERDICT, outputs.DIAGNOSTICS, outputs.ALARMS, outputs.FORECAST, outputs.CLEARANCES)
+_HEARD = (outputs.STATE, outputs.DIAGNOSTICS, outputs.CLEARANCES)
 
 
 def full_name(node: str) -> str:
@@ -105,10 +105,8 @@ class _Listener(Node):
             "leg_wear_dashboard", context=context, enable_rosout=False, start_parameter_services=False
         )
         self._monitor, self._leg = monitor, leg
-        self._hear(outputs.VERDICT, DiagnosticArray, lambda m: leg.take_verdict(_statuses(m)))
-        self._hear(outputs.ALARMS, DiagnosticArray, lambda m: leg.take_alarms(_statuses(m)))
-        self._hear(outputs.FORECAST, DiagnosticArray, lambda m: leg.take_forecast(_statuses(m)))
-        self._hear(outputs.CLEARANCES, JointState, lambda m: leg.take_cycle(_columns(m)))
+        self._hear(outputs.STATE, String, lambda m: leg.take_state(m.data))
+        self._hear(outputs.CLEARANCES, JointState, lambda m: leg.take_peaks(_peaks_n(m)))
         self._hear(
             outputs.DIAGNOSTICS,
             DiagnosticArray,
@@ -180,12 +178,9 @@ def _statuses(message: DiagnosticArray) -> Iterable[ReplayStatus]:
         yield received_status(status.name, ord(status.level), status.message, values)
 
 
-def _columns(message: JointState) -> dict[str, dict[str, float]]:
+def _peaks_n(message: JointState) -> dict[str, float]:
     names = [name.removesuffix("_clearance") for name in message.name]
-    return {
-        "counted_m": dict(zip(names, message.position, strict=False)),
-        "peak_force_n": dict(zip(names, message.effort, strict=False)),
-    }
+    return dict(zip(names, message.effort, strict=False))
 
 
 # Listener of the demo: reports what the monitor publishes, and acknowledges its alarms.

@@ -20,7 +20,7 @@ from leg_wear_monitor.messages import outputs
 from leg_wear_monitor.messages.cdr import Decoder
 from leg_wear_monitor.messages.outputs import Messages
 from leg_wear_monitor.messages.streams import SENSOR_DATA, STREAMS, ForecastTimes
-from leg_wear_monitor.monitor.alarms import ADVICE, ALREADY_COUNTED, Alarm, Level
+from leg_wear_monitor.monitor.alarms import ADVICE, ALREADY_COUNTED, Alarm
 from leg_wear_monitor.monitor.config.fitting import acceleration_doubts, check_limits
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.ledger.entry import JointWear
@@ -34,6 +34,7 @@ from leg_wear_monitor.ros.measure import MeasureRequest, measured, offer_measure
 from leg_wear_monitor.ros.outputs import BlackBox, MarkerTopic, Outlets
 from leg_wear_monitor.ros.running import ClosingNode, Parameters, repeated, run, spin
 from leg_wear_monitor.ros.supervision import Supervision
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.sample import NO_FAULT, Samples
 
 # Samples whose time is already in the ledger: the clock was reset, or a recording is played back.
@@ -311,7 +312,7 @@ class MonitorNode(ClosingNode):
             reports,
             alarms=tuple(map(self._supervision.alarms, reports.alarms)),
             verdicts=tuple(map(self._supervision.verdict, reports.verdicts)),
-            states=tuple(map(self._supervision.verdict, reports.states)),
+            states=tuple(map(self._supervision.state, reports.states)),
         )
         for outgoing in self._messages.of(reports):
             if coarse and outgoing.output in _A_SAMPLE and not self._black_box.on:
@@ -328,7 +329,7 @@ class MonitorNode(ClosingNode):
     def _send_state(self) -> None:
         """Publish the present alarms, verdict and state of the leg."""
         alarms = self._supervision.alarms(self._monitor.alarms)
-        report = self._supervision.verdict(self._monitor.state_report)
+        report = self._supervision.state(self._monitor.state_report)
         self._outlets.send(outputs.ALARMS, time.time_ns(), self._messages.alarms(alarms))
         self._outlets.send(outputs.VERDICT, time.time_ns(), self._messages.verdict(report))
         self._outlets.send(outputs.STATE, time.time_ns(), self._messages.state(report))

@@ -10,8 +10,9 @@ from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
 
 from leg_wear_monitor.messages.streams import INTERFACES, WRENCH_STAMPED, streams_read
-from leg_wear_monitor.monitor.alarms import Alarm, Level
+from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.leg_state import leg_alarm
 from leg_wear_monitor.monitor.reports import AlarmList, Status, VerdictReport
 from leg_wear_monitor.monitor.status import verdict_status
 from leg_wear_monitor.monitor.verdict.rules import findings
@@ -37,6 +38,7 @@ from leg_wear_monitor.ros.inputs import (
     WrenchAxis,
     publishers_of,
 )
+from leg_wear_monitor.state import LegAlarms, Level
 from leg_wear_monitor.twin import CRANK, KINDS
 from leg_wear_monitor.twin.sample import NO_FAULT, Samples
 
@@ -208,6 +210,17 @@ class Supervision:
         if not found and monitors == report.findings:
             return report
         return attrs.evolve(report, findings=(*monitors, *dated(found, (), report.stamp_ns)))
+
+    def state(self, report: VerdictReport) -> VerdictReport:
+        """Merge the state of the leg with what the node knows: its alarms, and its part of the verdict."""
+        report, leg = self.verdict(report), report.leg
+        if leg is None or not self._alarms.raised:
+            return report
+        named = {alarm.name: alarm for alarm in leg.alarms.now}
+        for own in map(leg_alarm, self._alarms.raised):
+            if own.name not in named or own.level > named[own.name].level:
+                named[own.name] = own
+        return attrs.evolve(report, leg=attrs.evolve(leg, alarms=LegAlarms(now=tuple(named.values()))))
 
     def _with_axis(self, finding: Finding) -> Finding:
         """A finding about the drive torque with its cause, if the torque is about another axis."""

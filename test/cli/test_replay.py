@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.cli.verbs import replay as verb
-from leg_wear_monitor.monitor.alarms import Level
-from leg_wear_monitor.state import State
+from leg_wear_monitor.state import Level, State
 
 pytest.importorskip("mcap")
 pytest.importorskip("rosbags")
@@ -150,7 +149,7 @@ def test_a_summary_of_another_version_is_refused(run, complaints, tmp_path, vers
     assert result.exit_code == 2
     (line,) = complaints(result)
     assert line.startswith(f"error: out/summary.json: schema_version: {shown}")
-    assert "is not 2" in line and line.endswith("replay the recording again")
+    assert "is not 3" in line and line.endswith("replay the recording again")
     assert len(line) < 200
 
 

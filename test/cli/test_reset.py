@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.mechanism.loader import load_mechanism
-from leg_wear_monitor.monitor.alarms import Alarm, Level
+from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.ledger.entry import Entry, JointWear
 from leg_wear_monitor.monitor.ledger.ledger import open_ledger
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
+from leg_wear_monitor.state import Level
 
 LEG = load_mechanism("bionic_leg")
 

@@ -1,13 +1,15 @@
 """The page in a browser, on a desk and on a phone: it is renewed, loud when it is old, and runs no markup."""
 
+import attrs
 import pytest
 from browser import NEEDS_CHROMIUM, WIDTHS
-from heard_leg import status, walk
+from heard_leg import raised, state_of, walk
 
 pytest.importorskip("tornado")
 from live_browser import LivePage
 
 from leg_wear_monitor.dashboard.live_leg import OLD_AFTER_S
+from leg_wear_monitor.state import State
 
 pytestmark = NEEDS_CHROMIUM
 
@@ -33,10 +35,8 @@ def test_it_is_renewed_says_when_it_is_old_and_runs_no_markup(page, leg, clock):
     assert page.value("document.querySelectorAll('[data-region=trends] canvas').length") >= 4
     assert page.value(TOO_WIDE) <= 0
 
-    leg.take_verdict([
-        status("verdict", f"stop joint G: {NASTY}. To do: {NASTY}", severity=4, joint_G=1, fault_code="X")
-    ])  # fmt: skip
-    leg.take_alarms([status("clearance G", NASTY, level=2, value_m=7e-4, limit_m=6e-4, worst_m=7e-4)])
+    stop = {"state": State.STOP, "joints": ("G",), "why": NASTY, "do": NASTY, "fault_code": "X"}
+    leg.take_state(attrs.evolve(state_of(11, **stop), alarms=raised("clearance G", state=NASTY)).to_json())
     page.wait("document.title.startsWith('■ stop joint G (knee)')", "the new verdict")
     assert "STOP" in page.text("[data-region=verdict]") and "<img" in page.text("[data-region=verdict]")
     assert "ERROR clearance G (knee)" in page.text("[data-region=alarms]")

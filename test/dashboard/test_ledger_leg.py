@@ -10,7 +10,7 @@ from html_reader import read
 from leg_wear_monitor.dashboard import ledger_leg
 from leg_wear_monitor.dashboard.ledger_leg import LedgerLeg, ledger_verdict
 from leg_wear_monitor.mechanism.loader import load_mechanism
-from leg_wear_monitor.monitor.alarms import Alarm, Level
+from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.ledger.entry import (
@@ -25,7 +25,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
 )
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
-from leg_wear_monitor.state import Evidence, Figure, State
+from leg_wear_monitor.state import Evidence, Figure, Level, State
 from leg_wear_monitor.wear import SECTORS
 
 pytestmark = pytest.mark.plain

@@ -4,14 +4,14 @@ from html.parser import HTMLParser
 
 import attrs
 import pytest
-from heard_leg import NODE, status, walk
+from heard_leg import NODE, raised, state_of, status, walk
 from html_reader import read
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from leg_wear_monitor.dashboard.live_leg import OLD_AFTER_S, LiveLeg
-from leg_wear_monitor.dashboard.received import MOST_ROWS, Row, Trends
+from leg_wear_monitor.dashboard.live_leg import MOST_ROWS, OLD_AFTER_S, LiveLeg, Row, Trends
+from leg_wear_monitor.state import Evidence, State
 
 pytestmark = pytest.mark.plain
 
@@ -36,21 +36,17 @@ def test_the_page_says_verdict_joints_and_lives(leg):
 
 def test_a_joint_that_opens_changes_verdict_alarms_and_joints(leg):
     before = leg.content()
-    leg.take_verdict([
-        status("verdict", "stop joint G: the counted clearance of joint G (knee) is 0.7 mm. To do: stop it",
-               level=2, severity=4, since_s=9, joint_G=1, fault_code="CLEARANCE_G")
-    ])  # fmt: skip
-    leg.take_alarms([
-        status("clearance G", "present", level=2, value_m=7e-4, limit_m=6e-4, worst_m=7e-4, raised_s=9)
-    ])  # fmt: skip
+    stop = {"state": State.STOP, "joints": ("G",), "fault_code": "CLEARANCE_G", "do": "stop it"}
+    told = state_of(11, **stop)
+    wide = attrs.evolve(told.clearances["G"], believed_m=7e-4, counted_m=7e-4, status=State.STOP)
+    told = attrs.evolve(told, clearances={**told.clearances, "G": wide}, alarms=raised("clearance G"))
+    leg.take_state(told.to_json())
     after = leg.content()
     assert leg.content().page == before.page
     assert "STOP" in after.regions["verdict"] and "Stop it".lower() in after.regions["verdict"].lower()
     assert "ERROR clearance G (knee)" in words(after.regions["alarms"])
     assert "STOP" in after.regions["joints"]
-    assert (
-        "at its limit, see the verdict" in after.regions["joints"]
-    )  # not green beside a banner that says stop
+    assert "0.7 mm, limit 0.6 mm" in after.regions["joints"]
     assert 'class="over"' in after.regions["joints"]
     assert after.words.state == f"{NODE}: stop joint G (knee)"
 
@@ -132,10 +128,15 @@ def shown(setup, clock, name, node=NODE):
     leg.take_setup(setup)
     for second in (1, 2, 3):
         walk(leg, second)
-    leg.take_verdict([status("verdict", f"stop: {name}. To do: {name}", severity=4, fault_code=name,
-                             **{"x": 1, "x_limit": 2})])  # fmt: skip
-    leg.take_alarms([status("clearance G", name, level=2, value_m=1), status("growth", name, level=1)])
-    leg.take_cycle({"peak_force_n": {name: 1.0, "G": 2.0}})
+    evidence = (Evidence(name, 1.0, 2.0, name),)
+    verdict = {"state": State.STOP, "why": name, "do": name, "fault_code": name, "evidence": evidence}
+    told = attrs.evolve(state_of(4, **verdict), alarms=raised("clearance G", state=name))
+    joint = attrs.evolve(told.clearances["G"], believed_by=name, seen_m=4e-4, seen_by=(name,))
+    told = attrs.evolve(
+        told, clearances={**told.clearances, "G": joint, name: joint}, life_answers={"A": name}, life={}
+    )
+    leg.take_state(told.to_json())
+    leg.take_peaks({name: 1.0, "G": 2.0})
     return leg.content()
 
 

@@ -14,8 +14,9 @@ from leg_wear_monitor.mechanism.urdf import joint_positions
 from leg_wear_monitor.messages.encode import CYLINDER, LINE_LIST, LINE_STRIP, SPHERE, TEXT, LegDrawing
 from leg_wear_monitor.messages.leg_markers import LINKAGE, MARKERS, LegMarkers
 from leg_wear_monitor.messages.streams import Output
-from leg_wear_monitor.monitor.alarms import Alarm, Level
+from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.reports import AlarmList, Lost, Reports, SampleReports
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin import CRANK
 
 pytestmark = pytest.mark.plain

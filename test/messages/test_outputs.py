@@ -25,7 +25,7 @@ from leg_wear_monitor.messages.outputs import (
     plain,
 )
 from leg_wear_monitor.messages.streams import ForecastTimes, topic_of
-from leg_wear_monitor.monitor.alarms import Alarm, Level
+from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate, ClearanceObservation
 from leg_wear_monitor.monitor.config.inputs import DriveTorque
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -43,7 +43,7 @@ from leg_wear_monitor.monitor.reports import (
 from leg_wear_monitor.monitor.verdict.situation import SeenClearance
 from leg_wear_monitor.monitor.verdict.verdict import Finding
 from leg_wear_monitor.playback.replay import node_beside
-from leg_wear_monitor.state import State
+from leg_wear_monitor.state import Level, State
 from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin import TORQUE as TORQUE_SAMPLE
 

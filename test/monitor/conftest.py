@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import Mechanism, WearMonitor
-from leg_wear_monitor.monitor.alarms import Alarm, Level
+from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.ledger.entry import Binding, Entry, JointWear, WalkedLoad
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.sample import Samples, gait_samples
 
 SECOND = 10**9

@@ -13,8 +13,9 @@ from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.sensors import readings
 from leg_wear_monitor.mechanism.person import nominal_stance
 from leg_wear_monitor.mechanism.position import build_linkage
-from leg_wear_monitor.monitor.alarms import FOOT_LOAD_WORDS, Level
+from leg_wear_monitor.monitor.alarms import FOOT_LOAD_WORDS
 from leg_wear_monitor.monitor.config.parameters import config_from
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin import LOAD
 from leg_wear_monitor.twin.sample import Samples
 

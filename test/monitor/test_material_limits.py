@@ -9,9 +9,8 @@ from ruamel.yaml import YAML
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.mechanism.loader import shipped_mechanisms
-from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.forecast.forecast import Answer
-from leg_wear_monitor.state import Figure
+from leg_wear_monitor.state import Figure, Level
 
 SECONDS = 16
 

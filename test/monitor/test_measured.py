@@ -3,9 +3,9 @@
 import pytest
 
 from leg_wear_monitor import WearMonitor, open_ledger
-from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.ledger.entry import Measurement
+from leg_wear_monitor.state import Level
 
 START_NS = 1_700_000_000_123_456_789
 LIMIT_M = 6.0e-4

@@ -13,11 +13,11 @@ from leg_wear_monitor.errors import ConfigError, LegWearError
 from leg_wear_monitor.gait.config import GaitConfig, KnockConfig
 from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.sensors import readings
-from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.config.fitting import twin_settings
 from leg_wear_monitor.monitor.config.parameters import changed, config_from
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.forecast import Answer
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin import TORQUE
 from leg_wear_monitor.twin.sample import EMPTY, TwinSettings, gait_samples
 

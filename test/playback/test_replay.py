@@ -126,6 +126,10 @@ def test_a_replay_reports_bit_for_bit_what_the_monitor_reported_live(
     assert changes == live.pop("/leg_wear_monitor/verdict")
     assert begun_with == messages.verdict(new.verdict)
     assert len(changes) >= 2  # at first there is no gait cycle
+    begun_with, *changes = replayed.pop("/leg_wear_monitor/state")
+    assert changes == live.pop("/leg_wear_monitor/state")
+    assert begun_with == messages.state(new.state_report)
+    assert len(changes) >= CYCLES
     for topic, rows in live.items():
         assert replayed[topic] == rows
     assert set(replayed) - set(live) == {"/diagnostics", "/leg_wear_monitor/forecast"}

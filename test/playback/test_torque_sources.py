@@ -13,8 +13,8 @@ from leg_wear_monitor.bags.mcap_writer import McapWriter
 from leg_wear_monitor.bags.reader import Recording
 from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.messages import encode
-from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.config.inputs import TORQUE_SOURCES, DriveTorque
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin.sample import Samples
 

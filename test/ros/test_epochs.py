@@ -14,9 +14,9 @@ from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import JointState
 
 from leg_wear_monitor.messages.streams import JOINT_STATE
-from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.ledger.entry import JointWear
 from leg_wear_monitor.ros.monitor_node import BEGUN, UNDECIDED, Epochs, MonitorNode
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.sample import Samples, gait_samples
 
 SECOND = 10**9

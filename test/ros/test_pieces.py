@@ -17,12 +17,12 @@ from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.gait.sensors import Reading
 from leg_wear_monitor.messages.cdr import Decoder
 from leg_wear_monitor.messages.streams import JOINT_STATE, SENSOR_DATA, STREAMS, WRENCH_STAMPED
-from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.ros.gait_publisher import PublisherConfig, sensor_message
 from leg_wear_monitor.ros.health import Load, load_status, recording_status, topics_status
 from leg_wear_monitor.ros.inputs import Inbox, InputTopic, Publishers
 from leg_wear_monitor.ros.outputs import BlackBox
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import FAULTS, NO_FAULT, OUT_OF_RANGE, WRONG_TYPE
 

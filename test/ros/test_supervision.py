@@ -21,12 +21,13 @@ from visualization_msgs.msg import MarkerArray
 
 from leg_wear_monitor.messages.cdr import Decoder
 from leg_wear_monitor.messages.streams import JOINT_STATE
-from leg_wear_monitor.monitor.alarms import Alarm, Level
+from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.reports import AlarmList, Status
 from leg_wear_monitor.ros.health import ClockMonitor, NodeAlarms, Silence, both_clocks
 from leg_wear_monitor.ros.inputs import CrankNames, Inbox
 from leg_wear_monitor.ros.supervision import AlarmLog, StatusLog
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin import KINDS
 
 ME = "/leg_wear_monitor"

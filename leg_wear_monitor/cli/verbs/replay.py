@@ -200,7 +200,7 @@ def asks_to_act(result: "ReplayResult") -> bool:
 
 def is_raised(result: "ReplayResult", fail_on: tuple[str, ...]) -> bool:
     """Whether an alarm asked for was raised at any time."""
-    from leg_wear_monitor.monitor.alarms import Level
+    from leg_wear_monitor.state import Level
 
     worst = result.history.worst
     highest = max(worst.values(), default=Level.OK)

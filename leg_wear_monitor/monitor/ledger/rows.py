@@ -9,7 +9,7 @@ import numpy as np
 from leg_wear_monitor.estimate.signature import Channel, CommissionedTorque
 from leg_wear_monitor.files import finite_or_none, or_nan
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.monitor.alarms import Alarm, Level
+from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.ledger.entry import (
     AlarmEvent,
     Audit,
@@ -30,6 +30,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
     together,
 )
 from leg_wear_monitor.monitor.ledger.schema import add, replace, sealed
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.leg_simulation import POINTS
 from leg_wear_monitor.twin.reference import UNLIKE, CrankProfile, LegParameters
 from leg_wear_monitor.twin.torque_reference import CADENCES, CYCLES, TorqueReference

@@ -13,7 +13,6 @@ from leg_wear_monitor.monitor.alarms import (
     SIGN,
     STUCK,
     ZERO,
-    Level,
 )
 from leg_wear_monitor.monitor.verdict import subject_rules
 from leg_wear_monitor.monitor.verdict.situation import (
@@ -27,7 +26,7 @@ from leg_wear_monitor.monitor.verdict.situation import (
     raised,
 )
 from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, NONE, Finding
-from leg_wear_monitor.state import Figure, State
+from leg_wear_monitor.state import Figure, Level, State
 
 _ACKNOWLEDGE = "then acknowledge the alarms: leg-wear-monitor acknowledge --ledger FILE, or --node NAME"
 _COUNTED = "its faults are counted in the status `input` of /diagnostics, and in `lost` of `replay --json`"

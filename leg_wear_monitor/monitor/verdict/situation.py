@@ -8,11 +8,11 @@ import attrs
 from leg_wear_monitor.estimate.cause import NamedCause, TorqueExplanation
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials import BushingLoad
-from leg_wear_monitor.monitor.alarms import Alarm, Level, time_words
+from leg_wear_monitor.monitor.alarms import Alarm, time_words
 from leg_wear_monitor.monitor.config.inputs import Crank, DriveTorque
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
 from leg_wear_monitor.monitor.verdict.verdict import Finding, amount, estimate
-from leg_wear_monitor.state import Evidence, Figure, JointClearance, State, Verdict
+from leg_wear_monitor.state import Evidence, Figure, JointClearance, Level, State, Verdict
 from leg_wear_monitor.twin.statistics import Sampling
 
 # What a verdict depends on, and nothing else; the defaults are those of a leg without a fault.

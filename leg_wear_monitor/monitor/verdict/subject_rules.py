@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 import attrs
 
 from leg_wear_monitor.estimate.cause import Cause, Change, NamedCause
-from leg_wear_monitor.monitor.alarms import CAUSES_OF_ALARMS, Alarm, Level, time_words
+from leg_wear_monitor.monitor.alarms import CAUSES_OF_ALARMS, Alarm, time_words
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.verdict.situation import (
     SEEN,
@@ -20,7 +20,7 @@ from leg_wear_monitor.monitor.verdict.situation import (
     raised,
 )
 from leg_wear_monitor.monitor.verdict.verdict import EVIDENCE, CauseWords, amount, estimate
-from leg_wear_monitor.state import Evidence, Figure, State
+from leg_wear_monitor.state import Evidence, Figure, Level, State
 
 # Conditions on what explains the drive torque: one code a cause, whoever finds it.
 #

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Sequence
 import attrs
 
 from leg_wear_monitor.estimate.cause import Cause, NamedCause, TorqueExplanation
-from leg_wear_monitor.monitor.alarms import Level, guide_of
+from leg_wear_monitor.monitor.alarms import guide_of
 from leg_wear_monitor.monitor.config.inputs import AT_START, Crank, DriveTorque
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
-from leg_wear_monitor.state import Evidence, Figure, State, Verdict
+from leg_wear_monitor.state import Evidence, Figure, Level, State, Verdict
 
 # A verdict and the findings it is made of; everything here is immutable.
 
@@ -111,7 +111,6 @@ def _identity(verdict: Verdict) -> tuple[object, ...]:
 
 
 _KEYS = {"m/h": "m_per_hour", "N m": "nm"}
-_UNITS = {key: unit for unit, key in _KEYS.items()} | {"n": "N", "hz": "Hz", "pa": "Pa"}
 _SHOWN = {"m": (1.0e3, "mm"), "m/h": (1.0e6, "um/h"), "s": (1.0e3, "ms"), "rad": (1.0e3, "mrad")}
 
 
@@ -119,14 +118,6 @@ def with_unit(name: str, unit: str) -> str:
     """Key of a value in a status: a name that ends in the value's unit."""
     key = _KEYS.get(unit, unit.lower())
     return f"{name}_{key}" if key and not name.endswith(f"_{key}") else name
-
-
-def unit_of(key: str, name: str) -> str:
-    """Unit of a value by its key, for which `with_unit` was given a name; empty if the key is not of it."""
-    if not key.startswith(f"{name}_"):
-        return ""
-    found = key.removeprefix(f"{name}_")
-    return _UNITS.get(found, found)
 
 
 def amount(value: float, unit: str) -> str:

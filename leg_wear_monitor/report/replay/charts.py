@@ -8,7 +8,7 @@ import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials import BushingLoad
-from leg_wear_monitor.playback.result import AlarmChange, EncoderEvidence, ReplayHistory, ReplaySummary
+from leg_wear_monitor.playback.result import EncoderEvidence, ReplayHistory, ReplaySummary
 from leg_wear_monitor.report.figure import opened, time_of
 from leg_wear_monitor.report.page import (
     NOT_VALID,
@@ -23,7 +23,7 @@ from leg_wear_monitor.report.page import (
     value,
 )
 from leg_wear_monitor.report.replay.joint_rows import counted_mm
-from leg_wear_monitor.state import Figure
+from leg_wear_monitor.state import AlarmChange, Figure
 
 SERIES_COLOURS = 7  # of the style sheet
 _GROUP = "time"

@@ -5,12 +5,11 @@ from collections.abc import Sequence
 
 import attrs
 
-from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.forecast.forecast import clearance_mm, three_digits
 from leg_wear_monitor.monitor.verdict.situation import MEASURED, OF_A_JOINT, SEEN, SOURCES
-from leg_wear_monitor.playback.result import ReplayAlarm, ReplaySummary
+from leg_wear_monitor.playback.result import ReplaySummary
 from leg_wear_monitor.report.page import STATE_LOOKS, Fragment, alarm_line, not_valid, render
-from leg_wear_monitor.state import Figure, JointClearance, LifeHours, State
+from leg_wear_monitor.state import Figure, JointClearance, LegAlarm, Level, LifeHours, State
 
 # A clearance joint as the first screen shows it: only values that are valid.
 
@@ -49,7 +48,7 @@ class JointView:
         Why there is no remaining life; empty if there is.
     life_doubt : bool
         Whether that is because the verdict lists it as not valid.
-    alarms : tuple of ReplayAlarm
+    alarms : tuple of LegAlarm
         Those that are raised.
     """
 
@@ -68,7 +67,7 @@ class JointView:
     life: LifeHours | None
     life_words: str
     life_doubt: bool
-    alarms: tuple[ReplayAlarm, ...]
+    alarms: tuple[LegAlarm, ...]
 
 
 def joint_views(summary: ReplaySummary) -> tuple[JointView, ...]:
@@ -156,11 +155,10 @@ def _look(
 
 
 def _answer(summary: ReplaySummary, joint: str) -> str:
-    found = summary.joints.get(joint)
-    return found.forecast.answer.value if found and found.forecast else "not known"
+    return summary.life_answers.get(joint, "not known")
 
 
-def _is_of(alarm: ReplayAlarm, joint: str) -> bool:
+def _is_of(alarm: LegAlarm, joint: str) -> bool:
     return alarm.name in {f"{kind} {joint}" for kind in OF_A_JOINT}
 
 
@@ -229,11 +227,12 @@ def _leg_life(summary: ReplaySummary) -> LifeHours | None:
 
 def _first(summary: ReplaySummary) -> str:
     """The joint that is probably the first at its limit; empty if that is not known."""
-    leg = summary.forecast
-    if leg is None or leg.first is None:
+    chances = summary.first_probability
+    first = max(chances, key=lambda joint: chances[joint], default=None)
+    if first is None:
         return ""
-    probability = 100.0 * leg.first_probability[leg.first]
-    return f"{summary.leg.joint_words(leg.first)} first at its limit with {probability:.0f} % probability"
+    joint, percent = summary.leg.joint_words(first), 100.0 * chances[first]
+    return f"{joint} first at its limit with {percent:.0f} % probability"
 
 
 def _findings(summary: ReplaySummary, view: JointView) -> list[tuple[str, str, str]]:

@@ -6,10 +6,9 @@ from typing import Any
 import attrs
 
 from leg_wear_monitor.files import share_directory
-from leg_wear_monitor.monitor.alarms import Level, time_words
+from leg_wear_monitor.monitor.alarms import time_words
 from leg_wear_monitor.monitor.verdict.verdict import guide_to
 from leg_wear_monitor.playback.result import (
-    AlarmChange,
     Place,
     ReplayGait,
     ReplayLeg,
@@ -45,7 +44,7 @@ from leg_wear_monitor.report.replay.charts import (
 )
 from leg_wear_monitor.report.replay.forecast_section import forecast_section, wear_section
 from leg_wear_monitor.report.replay.joint_rows import JointView, joint_rows, joint_views
-from leg_wear_monitor.state import Figure
+from leg_wear_monitor.state import AlarmChange, Figure, Level
 
 # Alarms: those that are raised at the end, and all changes over time.
 

@@ -137,8 +137,9 @@ def _walk(path: Path, run: int, closed: bool) -> None:
 
 
 def _entry(run: int, step: int):  # type: ignore[no-untyped-def]
-    from leg_wear_monitor.monitor.alarms import Alarm, Level
+    from leg_wear_monitor.monitor.alarms import Alarm
     from leg_wear_monitor.monitor.ledger.entry import Entry, JointWear
+    from leg_wear_monitor.state import Level
 
     n = 9 * run + step + 1
     depth = np.random.default_rng(7).random((2, 2, 720)) * 1.0e-10 * n

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.monitor.alarms import Alarm, Level, Limit, acknowledged, evaluated, has_changed
+from leg_wear_monitor.monitor.alarms import Alarm, Limit, acknowledged, evaluated, has_changed
+from leg_wear_monitor.state import Level
 
 pytestmark = pytest.mark.plain
 

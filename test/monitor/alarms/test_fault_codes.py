@@ -6,7 +6,8 @@ from pathlib import Path
 import attrs
 import pytest
 
-from leg_wear_monitor.monitor.alarms import FAULT_CODES, NO_FAULT, Alarm, Level, code_of, worst_code
+from leg_wear_monitor.monitor.alarms import FAULT_CODES, NO_FAULT, Alarm, code_of, worst_code
+from leg_wear_monitor.state import Level
 
 pytestmark = pytest.mark.plain
 

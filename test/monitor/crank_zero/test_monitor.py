@@ -9,10 +9,9 @@ import pytest
 
 from leg_wear_monitor import Mechanism, WearMonitor
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.reports import CycleReport, Status
-from leg_wear_monitor.state import State
+from leg_wear_monitor.state import Level, State
 from leg_wear_monitor.twin.sample import Samples
 
 Walk = Callable[..., Samples]

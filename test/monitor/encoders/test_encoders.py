@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 
 from leg_wear_monitor import ConfigError, WearMonitor, open_ledger
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.angle_regression import ClearanceObservation
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.encoders import errors_of
 from leg_wear_monitor.monitor.ledger.ledger import LedgerError
 from leg_wear_monitor.monitor.ledger.rows import read_commissioned
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.reference import PHASES, ReferenceRun, angle_model
 from leg_wear_monitor.twin.sample import EMPTY
 

@@ -7,11 +7,11 @@ from types import SimpleNamespace
 import pytest
 
 from leg_wear_monitor.monitor import alarm_specs
-from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.evaluation import AlarmBoard, limits_of
 from leg_wear_monitor.monitor.forecast.forecast import Quantiles
+from leg_wear_monitor.state import Level
 
 pytestmark = pytest.mark.plain
 

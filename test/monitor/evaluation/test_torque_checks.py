@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor.estimate.cause import Cause, NamedCause
-from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.gait_evidence import COMMISSIONING_CYCLES, TorqueRecord
@@ -22,6 +21,7 @@ from leg_wear_monitor.monitor.torque_checks import (
     torque_causes,
     torque_values,
 )
+from leg_wear_monitor.state import Level
 
 pytestmark = pytest.mark.plain
 

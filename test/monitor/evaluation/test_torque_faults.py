@@ -10,9 +10,10 @@ pytest.importorskip("mcap")
 from leg_wear_monitor.bags.reader import Recording
 from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.monitor import alarm_specs
-from leg_wear_monitor.monitor.alarms import FAULT_CODES, Level
+from leg_wear_monitor.monitor.alarms import FAULT_CODES
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.verdict.rules import RULES
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.cycle import LEAST_CYCLES
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import TwinSettings

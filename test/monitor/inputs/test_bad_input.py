@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from leg_wear_monitor.monitor.alarms import Level
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import ENCODERS, FAULTS, GAIT_SAMPLE, NO_FAULT
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.inputs import InputGuard
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.sample import (
     EMPTY,
     MISSING_JOINT,

@@ -10,7 +10,7 @@ import pytest
 from ledger_contents import contents
 
 from leg_wear_monitor.estimate.signature import CommissionedTorque
-from leg_wear_monitor.monitor.alarms import Alarm, Level
+from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.ledger.entry import (
     AlarmEvent,
     Audit,
@@ -25,6 +25,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
 )
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.schema import create_tables, expected_definitions
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.leg_simulation import POINTS
 from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
 from leg_wear_monitor.twin.torque_reference import TorqueReference

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from ledger_contents import contents
 
-from leg_wear_monitor.monitor.alarms import Alarm, Level
+from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.ledger.file import copy_of
 from leg_wear_monitor.monitor.ledger.ledger import WHOLE_S
+from leg_wear_monitor.state import Level
 
 pytestmark = pytest.mark.plain
 

@@ -10,9 +10,9 @@ import pytest
 from leg_wear_monitor import WearMonitor, open_ledger
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.monitor.accounting import next_point_s
-from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.ledger.ledger import LedgerError
+from leg_wear_monitor.state import Level
 
 SECOND = 10**9
 START_NS = 1_700_000_000_123_456_789

@@ -13,7 +13,7 @@ from ledger_contents import contents
 
 from leg_wear_monitor.estimate.signature import CommissionedTorque
 from leg_wear_monitor.mechanism.loader import load_mechanism
-from leg_wear_monitor.monitor.alarms import Alarm, Level
+from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.ledger.entry import (
@@ -29,6 +29,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.ledger.schema import FORMAT, UNRELEASED_ID
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.leg_simulation import POINTS
 from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
 from leg_wear_monitor.twin.torque_reference import CYCLES, TorqueReference

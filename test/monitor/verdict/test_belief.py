@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.monitor.alarms import Alarm, Level, Limit, acknowledged, evaluated
+from leg_wear_monitor.monitor.alarms import Alarm, Limit, acknowledged, evaluated
 from leg_wear_monitor.monitor.leg_state import joint_clearance
 from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.situation import (
@@ -19,7 +19,7 @@ from leg_wear_monitor.monitor.verdict.situation import (
     believed,
 )
 from leg_wear_monitor.monitor.verdict.verdict import verdict_of
-from leg_wear_monitor.state import State
+from leg_wear_monitor.state import Level, State
 
 LIMIT_M = 6.0e-4
 LIMIT = Limit(0.8 * LIMIT_M, LIMIT_M, 0.05, 3)

@@ -12,17 +12,7 @@ from hypothesis import strategies as st
 
 from leg_wear_monitor.estimate.cause import Cause, Change, NamedCause, TorqueExplanation
 from leg_wear_monitor.monitor import alarm_specs
-from leg_wear_monitor.monitor.alarms import (
-    ADVICE,
-    EXCHANGED,
-    SCALE,
-    SIGN,
-    STUCK,
-    ZERO,
-    Alarm,
-    Level,
-    guide_of,
-)
+from leg_wear_monitor.monitor.alarms import ADVICE, EXCHANGED, SCALE, SIGN, STUCK, ZERO, Alarm, guide_of
 from leg_wear_monitor.monitor.config.inputs import Crank, DriveTorque
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
@@ -44,7 +34,7 @@ from leg_wear_monitor.monitor.verdict.verdict import (
     has_changed,
     verdict_of,
 )
-from leg_wear_monitor.state import Figure, State, Verdict
+from leg_wear_monitor.state import Figure, Level, State, Verdict
 
 pytestmark = pytest.mark.plain
 

@@ -11,12 +11,11 @@ from html_reader import read
 from made_up_summary import made_up_summary
 
 from leg_wear_monitor.files import share_directory
-from leg_wear_monitor.monitor.alarms import Level
-from leg_wear_monitor.playback.result import AlarmChange, ReplayLeg, WornDepth
+from leg_wear_monitor.playback.result import ReplayLeg, WornDepth
 from leg_wear_monitor.report.page import page_html, template_text
 from leg_wear_monitor.report.replay.joint_rows import joint_rows, joint_views
 from leg_wear_monitor.report.replay.page import replay_page
-from leg_wear_monitor.state import Figure, State
+from leg_wear_monitor.state import AlarmChange, Figure, Level, State
 
 pytestmark = pytest.mark.plain
 

@@ -25,7 +25,7 @@ from leg_wear_monitor.monitor.ledger.entry import ClearancePoint, JointWear, bin
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import LedgerContent, read_ledger
 from leg_wear_monitor.monitor.leg_state import joint_clearance, leg_alarm
-from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance
+from leg_wear_monitor.monitor.verdict.situation import JointSituation, KnownClearance
 from leg_wear_monitor.playback.result import ReplaySummary
 from leg_wear_monitor.playback.summary import ledger_verdict
 from leg_wear_monitor.state import Figure, JointClearance, LegAlarms, LegState, LifeHours, Verdict
@@ -140,7 +140,7 @@ class LedgerLeg:
             joint=joint,
             counted_m=counted_m,
             limit_m=limit_m,
-            measured=SeenClearance("measurement", last.clearance_m, last.sigma_m) if last else None,
+            measured=KnownClearance("measured", last.clearance_m, last.sigma_m) if last else None,
         )
         alarms = found.entry.alarms if found.entry else ()
         own = next((each for each in alarms if (each.kind, each.subject) == ("clearance", joint)), None)

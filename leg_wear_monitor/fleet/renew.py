@@ -36,7 +36,7 @@ from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.ledger.file import copy_of, measurements_of
 from leg_wear_monitor.monitor.ledger.ledger import Ledger, open_ledger
 from leg_wear_monitor.monitor.leg_state import joint_clearance, life_of
-from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance
+from leg_wear_monitor.monitor.verdict.situation import JointSituation, KnownClearance
 from leg_wear_monitor.playback.result import summary_of
 from leg_wear_monitor.playback.summary import (
     joint_forecast,
@@ -355,6 +355,6 @@ def _clearance(
         believed_m=forecast.now_m,
         seen=()
         if seen_m is None or sigma_m is None
-        else tuple(SeenClearance(by, seen_m, sigma_m) for by in before.seen_by),
+        else tuple(KnownClearance(by, seen_m, sigma_m) for by in before.seen_by),
     )
     return joint_clearance(with_measured(situation, measured), alarm, [verdict], before.new_m)

@@ -27,7 +27,7 @@ from leg_wear_monitor.monitor.reports import CycleReport, JointReport, VerdictRe
 from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.situation import (
     JointSituation,
-    SeenClearance,
+    KnownClearance,
     Situation,
     at_limit_by_estimate,
     with_sampling,
@@ -179,7 +179,7 @@ class Judge:
         measured = self._forecaster.last_measured(self._accounting.replaced_ns)
         return joint_situations(self._twin, self._evaluation, state.last, self._diagnosis(), measured)
 
-    def shown(self, state: MonitorState, joint: str) -> SeenClearance | None:
+    def shown(self, state: MonitorState, joint: str) -> KnownClearance | None:
         """What encoders or the drive torque show of a joint best, or showed when its alarm was raised."""
         own = next(each for each in self.joints(state) if each.joint == joint)
         alarm = self._evaluation.board.alarms[alarm_specs.CLEARANCE.name(joint)]
@@ -325,9 +325,9 @@ def _joint(
 ) -> JointSituation:
     report = last.joints[k] if last else None
     by_encoders = _seen_by_encoders(report)
-    seen = [SeenClearance("encoders", by_encoders.clearance_m, by_encoders.sigma_m)] if by_encoders else []
+    seen = [KnownClearance("encoders", by_encoders.clearance_m, by_encoders.sigma_m)] if by_encoders else []
     if diagnosis and diagnosis.clearance_m and math.isfinite(diagnosis.clearance_m[k]):
-        seen.append(SeenClearance("torque", diagnosis.clearance_m[k], diagnosis.sigma_m[k]))
+        seen.append(KnownClearance("torque", diagnosis.clearance_m[k], diagnosis.sigma_m[k]))
     return JointSituation(
         joint=name,
         counted_m=counted_m,
@@ -344,7 +344,7 @@ def with_measured(joint: JointSituation, measured: Measurement | None) -> JointS
     """A joint with the last measurement of its part."""
     if measured is None:
         return joint
-    by = SeenClearance("measurement", measured.clearance_m, measured.sigma_m)
+    by = KnownClearance("measured", measured.clearance_m, measured.sigma_m)
     return attrs.evolve(joint, measured=by, is_measurement_used=measured.counts)
 
 

@@ -18,7 +18,7 @@ from leg_wear_monitor.monitor.forecast.measurement import (
 )
 from leg_wear_monitor.monitor.inputs import InputGuard, Pauses
 from leg_wear_monitor.monitor.ledger.entry import Measurement
-from leg_wear_monitor.monitor.verdict.situation import SeenClearance, joint_status
+from leg_wear_monitor.monitor.verdict.situation import KnownClearance, joint_status
 from leg_wear_monitor.monitor.verdict.verdict import Finding, verdict_of
 from leg_wear_monitor.state import LegState, Level, Verdict
 from leg_wear_monitor.twin.statistics import CycleStatistics, Intake, SampleStatistics, TorqueStatistics
@@ -55,7 +55,7 @@ class JointReport:
         Pressure and sliding speed in this cycle, against the limits of the joint's material.
     sampling_sigma_m : float
         Standard deviation of the mean clearance, because sampled replays did not follow all gait cycles.
-    shown : SeenClearance or None
+    shown : KnownClearance or None
         The clearance that the drive torque shows; None if it shows none.
     """
 
@@ -74,7 +74,7 @@ class JointReport:
     measured: Measurement | None = None
     load: BushingLoad | None = None
     sampling_sigma_m: float = 0.0
-    shown: SeenClearance | None = None
+    shown: KnownClearance | None = None
 
     @property
     def seen_m(self) -> float | None:
@@ -459,7 +459,7 @@ def _joint_report(
     seen: ClearanceEstimate | None,
     measured: Measurement | None,
     sampling_sigma_m: float,
-    shown: SeenClearance | None,
+    shown: KnownClearance | None,
 ) -> JointReport:
     rate = growth_rate(window)
     mean_n, p99_n = float(statistics.mean_force_n[k]), float(statistics.p99_force_n[k])
@@ -484,8 +484,8 @@ def _joint_report(
     )
 
 
-def _shown(k: int, diagnosis: Diagnosis | None) -> SeenClearance | None:
+def _shown(k: int, diagnosis: Diagnosis | None) -> KnownClearance | None:
     """The clearance of joint k that the drive torque shows."""
     if diagnosis is None or not diagnosis.clearance_m or not math.isfinite(diagnosis.clearance_m[k]):
         return None
-    return SeenClearance("torque", diagnosis.clearance_m[k], diagnosis.sigma_m[k])
+    return KnownClearance("torque", diagnosis.clearance_m[k], diagnosis.sigma_m[k])

@@ -34,7 +34,7 @@ from leg_wear_monitor.monitor.verdict.situation import (
     OF_A_JOINT,
     SEEN,
     JointSituation,
-    SeenClearance,
+    KnownClearance,
     Situation,
     is_surely_below,
 )
@@ -176,12 +176,12 @@ def acknowledge_in(ledger: Ledger, leg: Mechanism, config: MonitorConfig, stamp_
     return Acknowledged(cleared, tuple(alarm.name for alarm in entry.alarms))
 
 
-def shown_in(ledger: Ledger, joint: str) -> SeenClearance | None:
+def shown_in(ledger: Ledger, joint: str) -> KnownClearance | None:
     """What encoders or the drive torque showed of a joint when the alarm in a ledger was raised."""
     name = alarm_specs.CLEARANCE.name(joint)
     alarms = ledger.entry.alarms if ledger.entry else ()
     own = next((alarm for alarm in alarms if alarm.name == name and alarm.cause in SEEN), None)
-    return SeenClearance(own.cause, own.worst, own.sigma) if own else None
+    return KnownClearance(own.cause, own.worst, own.sigma) if own else None
 
 
 def overrule_in(ledger: Ledger, leg: Mechanism, config: MonitorConfig, found: Measurement) -> Entry | None:
@@ -242,7 +242,7 @@ def note_verdict_of(
     joints = []
     for part in entry.joints:
         last = last_measured(known, part.name, part.replaced_ns)
-        by = SeenClearance("measurement", last.clearance_m, last.sigma_m) if last else None
+        by = KnownClearance("measured", last.clearance_m, last.sigma_m) if last else None
         joints.append(
             JointSituation(
                 joint=part.name,

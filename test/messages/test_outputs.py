@@ -40,7 +40,7 @@ from leg_wear_monitor.monitor.reports import (
     Status,
     VerdictReport,
 )
-from leg_wear_monitor.monitor.verdict.situation import SeenClearance
+from leg_wear_monitor.monitor.verdict.situation import KnownClearance
 from leg_wear_monitor.monitor.verdict.verdict import Finding
 from leg_wear_monitor.playback.replay import node_beside
 from leg_wear_monitor.state import Level, State
@@ -153,7 +153,7 @@ def test_each_known_value_of_a_joint_is_a_number_of_its_own(store: Any, reports:
     by_encoders = ClearanceEstimate(observation=ClearanceObservation.SEEN, clearance_m=4.1e-4, sigma_m=2.0e-5)
     one, other = reports.cycles[0].joints
     joints = (
-        attrs.evolve(one, forecast=known, seen=by_encoders, shown=SeenClearance("torque", 4.2e-4, 1.0e-5)),
+        attrs.evolve(one, forecast=known, seen=by_encoders, shown=KnownClearance("torque", 4.2e-4, 1.0e-5)),
         attrs.evolve(other, forecast=unknown, peak_force_n=math.nan),
     )
     cycle = attrs.evolve(reports.cycles[0], joints=joints)

@@ -35,7 +35,7 @@ def dashboard(domain: int, tmp_path: Path):
         process = subprocess.Popen([*command, "--port", "0"], stdout=stream, stderr=subprocess.STDOUT)
     try:
         found = wait_for(lambda: re.search(r"serving (http://[0-9.:]+/)", log.read_text()), "the dashboard")
-        assert "/left/leg_wear_monitor/verdict" in log.read_text()  # it waits for it, and says so
+        assert "/left/leg_wear_monitor/state" in log.read_text()  # it waits for it, and says so
         yield found[1]
         process.send_signal(signal.SIGTERM)
         assert process.wait(60) == 0

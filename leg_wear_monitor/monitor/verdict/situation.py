@@ -19,14 +19,16 @@ from leg_wear_monitor.twin.statistics import Sampling
 
 
 @attrs.frozen
-class SeenClearance:
-    """A clearance that measurements show.
+class KnownClearance:
+    """A clearance, and who says so.
 
     Attributes
     ----------
     by : str
-        ``encoders``, ``torque``, or ``measurement`` for what a person measured.
+        ``encoders``, ``torque``, ``measured`` for what a person measured, ``counted``, or ``both`` for what
+        counting and measurements give together.
     clearance_m, sigma_m : float
+        Mean radial clearance and its standard deviation; NaN if that is not known.
     """
 
     by: str
@@ -47,9 +49,9 @@ class JointSituation:
         Counted mean radial clearance, and its limit.
     believed_m : float
         Median of what the forecast believes of the clearance; NaN before the first forecast.
-    measured : SeenClearance or None
+    measured : KnownClearance or None
         What a person measured last on the present part.
-    seen : tuple of SeenClearance
+    seen : tuple of KnownClearance
         Estimates from measurements, as far as there are any.
     is_used : bool
         Whether the forecast rests on what encoders show of this joint.
@@ -65,8 +67,8 @@ class JointSituation:
     counted_m: float
     limit_m: float
     believed_m: float = math.nan
-    measured: SeenClearance | None = None
-    seen: tuple[SeenClearance, ...] = ()
+    measured: KnownClearance | None = None
+    seen: tuple[KnownClearance, ...] = ()
     is_used: bool = False
     is_measurement_used: bool = False
     replaced_ns: int = 0
@@ -177,24 +179,6 @@ SOURCES = {
 }
 
 
-@attrs.frozen
-class BelievedClearance:
-    """The one clearance of a joint.
-
-    Attributes
-    ----------
-    clearance_m, sigma_m : float
-        Mean radial clearance and its standard deviation; NaN if that is not known.
-    by : str
-        ``counted``, ``torque``, ``encoders``, ``measured``, or ``both`` for what counting and measurements
-        give together.
-    """
-
-    clearance_m: float
-    sigma_m: float
-    by: str
-
-
 def believed_words(one: JointClearance) -> str:
     """The believed clearance, such as ``2.05 mm ± 0.65 mm according to the drive torque``; empty if none."""
     if one.believed_m is None or one.believed_by is None:
@@ -205,18 +189,18 @@ def believed_words(one: JointClearance) -> str:
     return f"{value} according to {SOURCES[one.believed_by]}"
 
 
-def judged(joint: JointSituation) -> BelievedClearance:
+def judged(joint: JointSituation) -> KnownClearance:
     """The counted clearance, or a larger one by measurement: what somebody found on the leg counts."""
-    found = [BelievedClearance(joint.counted_m, math.nan, COUNTED)]
+    found = [KnownClearance(COUNTED, joint.counted_m, math.nan)]
     if joint.measured is not None:
-        found.append(BelievedClearance(joint.measured.clearance_m, joint.measured.sigma_m, MEASURED))
+        found.append(joint.measured)
     rests_on_it = joint.measured is not None and joint.is_measurement_used
     if rests_on_it or joint.believed_m >= joint.limit_m:  # never with NaN
-        found.append(BelievedClearance(joint.believed_m, math.nan, BOTH))
+        found.append(KnownClearance(BOTH, joint.believed_m, math.nan))
     return max((one for one in found if not math.isnan(one.clearance_m)), key=lambda one: one.clearance_m)
 
 
-def surely_at(limit_m: float, seen: Sequence[SeenClearance]) -> SeenClearance | None:
+def surely_at(limit_m: float, seen: Sequence[KnownClearance]) -> KnownClearance | None:
     """The surest of the estimates that are beyond a limit by `SURE_SIGMAS`; None without one."""
     found = [one for one in seen if one.clearance_m - SURE_SIGMAS * one.sigma_m >= limit_m]
     return min(found, key=lambda one: one.sigma_m, default=None)
@@ -242,17 +226,17 @@ def is_overruled(joint: JointSituation, alarm: Alarm | None) -> bool:
     )
 
 
-def at_limit_by_estimate(joint: JointSituation, alarm: Alarm | None) -> SeenClearance | None:
+def at_limit_by_estimate(joint: JointSituation, alarm: Alarm | None) -> KnownClearance | None:
     """What encoders or the drive torque surely show at the limit, now or as the latched alarm keeps it."""
     if is_overruled(joint, alarm):
         return None
     now = surely_at(joint.limit_m, joint.seen)
     if now is None and alarm is not None and alarm.level is Level.ERROR and alarm.cause in SEEN:
-        return SeenClearance(alarm.cause, alarm.worst, alarm.sigma)
+        return KnownClearance(alarm.cause, alarm.worst, alarm.sigma)
     return now
 
 
-def believed(joint: JointSituation, alarm: Alarm | None, is_counted_leg: bool) -> BelievedClearance | None:
+def believed(joint: JointSituation, alarm: Alarm | None, is_counted_leg: bool) -> KnownClearance | None:
     """The clearance that the verdict rests on; None where nothing known of the joint is valid.
 
     Parameters
@@ -265,15 +249,14 @@ def believed(joint: JointSituation, alarm: Alarm | None, is_counted_leg: bool) -
     """
     known, estimate = judged(joint), at_limit_by_estimate(joint, alarm)
     if estimate is not None and estimate.clearance_m > known.clearance_m:
-        return BelievedClearance(estimate.clearance_m, estimate.sigma_m, estimate.by)
+        return estimate
     if is_counted_leg or known.clearance_m >= joint.limit_m:
         return known
     if joint.measured is not None:
-        return BelievedClearance(joint.measured.clearance_m, joint.measured.sigma_m, MEASURED)
+        return joint.measured
     if not joint.seen:
         return None
-    best = min(joint.seen, key=lambda one: one.sigma_m)
-    return BelievedClearance(best.clearance_m, best.sigma_m, best.by)
+    return min(joint.seen, key=lambda one: one.sigma_m)
 
 
 def joint_status(joint: str, is_known: bool, findings: Sequence[Finding | Verdict]) -> State:
@@ -284,14 +267,14 @@ def joint_status(joint: str, is_known: bool, findings: Sequence[Finding | Verdic
     return max(found, key=lambda state: state.severity)
 
 
-def alarm_value(joint: JointSituation, alarm: Alarm) -> BelievedClearance | None:
+def alarm_value(joint: JointSituation, alarm: Alarm) -> KnownClearance | None:
     """The clearance that its alarm is evaluated with at the end of a period; None to leave it as it is.
 
     A counted clearance is evaluated once a gait cycle instead, unless an estimate had raised the alarm.
     """
     known, sure = judged(joint), surely_at(joint.limit_m, joint.seen)
     if sure is not None and sure.clearance_m > known.clearance_m:
-        return BelievedClearance(sure.clearance_m, sure.sigma_m, sure.by)
+        return sure
     if is_held_by_estimate(alarm):
         # what the torque said, only the torque takes back: a new run shows nothing for a while
         return None if is_overruled(joint, alarm) and not joint.seen else known

@@ -13,7 +13,7 @@ from leg_wear_monitor.monitor.verdict.situation import (
     SOURCES,
     Hit,
     JointSituation,
-    SeenClearance,
+    KnownClearance,
     Situation,
     at_limit_by_estimate,
     hit_of,
@@ -191,7 +191,7 @@ def seen_at_limit(situation: Situation) -> Sequence[Hit]:
     return [_seen_hit(each, alarm, seen, situation) for each, alarm, seen in estimates if seen is not None]
 
 
-def _seen_hit(each: JointSituation, alarm: Alarm | None, seen: SeenClearance, situation: Situation) -> Hit:
+def _seen_hit(each: JointSituation, alarm: Alarm | None, seen: KnownClearance, situation: Situation) -> Hit:
     raised_ns = alarm.raised_ns if alarm is not None and alarm.level is Level.ERROR else 0
     is_present = seen in each.seen
     past = "" if is_present else f" (since {time_words(raised_ns)}; not shown now)"

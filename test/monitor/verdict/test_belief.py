@@ -12,7 +12,7 @@ from leg_wear_monitor.monitor.leg_state import joint_clearance
 from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.situation import (
     JointSituation,
-    SeenClearance,
+    KnownClearance,
     Situation,
     alarm_value,
     at_limit_by_estimate,
@@ -25,10 +25,10 @@ LIMIT_M = 6.0e-4
 LIMIT = Limit(0.8 * LIMIT_M, LIMIT_M, 0.05, 3)
 COUNTED = JointSituation(joint="G", counted_m=3.0e-4, limit_m=LIMIT_M, label="knee")
 NEW = Alarm(kind="clearance", subject="G", unit="m")
-BROKEN = SeenClearance("torque", 2.05e-3, 0.65e-3)
+BROKEN = KnownClearance("torque", 2.05e-3, 0.65e-3)
 
 
-def after(alarm: Alarm, *seen: SeenClearance, joint: JointSituation = COUNTED) -> Alarm:
+def after(alarm: Alarm, *seen: KnownClearance, joint: JointSituation = COUNTED) -> Alarm:
     """The alarm after a period in which the torque or encoders show something."""
     known = alarm_value(attrs.evolve(joint, seen=seen), alarm)
     if known is None:
@@ -36,7 +36,7 @@ def after(alarm: Alarm, *seen: SeenClearance, joint: JointSituation = COUNTED) -
     return evaluated(alarm, known.clearance_m, LIMIT, 1, 3, known.sigma_m, known.by)
 
 
-def verdict(alarm: Alarm, *seen: SeenClearance, joint: JointSituation = COUNTED):
+def verdict(alarm: Alarm, *seen: KnownClearance, joint: JointSituation = COUNTED):
     joints = (attrs.evolve(joint, seen=seen),)
     return verdict_of(findings(Situation(joints=joints, alarms=(alarm,))))
 
@@ -47,9 +47,9 @@ def test_a_stop_stays_while_the_estimate_comes_and_goes() -> None:
     estimates = (
         BROKEN,
         None,
-        SeenClearance("torque", 1.43e-3, 0.6e-3),
+        KnownClearance("torque", 1.43e-3, 0.6e-3),
         None,
-        SeenClearance("torque", 2.1e-3, 0.2e-3),
+        KnownClearance("torque", 2.1e-3, 0.2e-3),
     )
     for seen in estimates:
         shown = () if seen is None else (seen,)
@@ -72,13 +72,13 @@ def test_what_the_alarm_keeps_is_what_was_known_when_the_estimate_was_last_sure(
 
 @pytest.mark.parametrize("by", ["torque", "encoders"])
 def test_an_estimate_that_is_not_surely_beyond_raises_nothing(by: str) -> None:
-    unsure = SeenClearance(by, 9.0e-4, 2.0e-4)  # 1.5 sigma
+    unsure = KnownClearance(by, 9.0e-4, 2.0e-4)  # 1.5 sigma
     assert after(NEW, unsure) is NEW
     assert verdict(NEW, unsure).state is State.HEALTHY
 
 
 def test_a_measurement_that_contradicts_ends_the_stop_until_the_estimate_rises_anew() -> None:
-    measured = attrs.evolve(COUNTED, measured=SeenClearance("measurement", 3.1e-4, 1.0e-5))
+    measured = attrs.evolve(COUNTED, measured=KnownClearance("measured", 3.1e-4, 1.0e-5))
     raised = after(NEW, BROKEN)
     assert verdict(raised, BROKEN, joint=measured).state is State.STOP  # measured long before
     overruled = acknowledged(raised)
@@ -87,18 +87,18 @@ def test_a_measurement_that_contradicts_ends_the_stop_until_the_estimate_rises_a
     again = after(overruled, BROKEN, joint=measured)
     assert again.acknowledged  # the same estimate, and a start of the monitor without any, change nothing
     assert after(again, joint=measured) is again
-    returned = after(again, SeenClearance("torque", 3.2e-4, 2.0e-5), joint=measured)
+    returned = after(again, KnownClearance("torque", 3.2e-4, 2.0e-5), joint=measured)
     assert returned.level is Level.OK
     assert verdict(after(returned, BROKEN, joint=measured), BROKEN, joint=measured).state is State.STOP
 
 
 def test_a_measurement_at_the_limit_ends_no_stop() -> None:
-    measured = attrs.evolve(COUNTED, measured=SeenClearance("measurement", 5.9e-4, 1.0e-5))
+    measured = attrs.evolve(COUNTED, measured=KnownClearance("measured", 5.9e-4, 1.0e-5))
     assert verdict(acknowledged(after(NEW, BROKEN)), BROKEN, joint=measured).state is State.STOP
 
 
 def test_an_estimate_is_believed_although_the_counted_clearance_is_not_valid() -> None:
-    other = attrs.evolve(COUNTED, joint="A", seen=(SeenClearance("torque", 2.93e-4, 2.8e-5),))
+    other = attrs.evolve(COUNTED, joint="A", seen=(KnownClearance("torque", 2.93e-4, 2.8e-5),))
     one = believed(other, None, is_counted_leg=False)
     assert one is not None
     assert (one.clearance_m, one.sigma_m, one.by) == (2.93e-4, 2.8e-5, "torque")
@@ -106,12 +106,12 @@ def test_an_estimate_is_believed_although_the_counted_clearance_is_not_valid() -
 
 
 METRES = st.floats(1.0e-4, 3.0e-3)
-SEEN = st.builds(SeenClearance, st.sampled_from(("torque", "encoders")), METRES, st.floats(1.0e-6, 1.0e-3))
+SEEN = st.builds(KnownClearance, st.sampled_from(("torque", "encoders")), METRES, st.floats(1.0e-6, 1.0e-3))
 
 
 @given(
     counted_m=METRES,
-    measured=st.none() | st.builds(SeenClearance, st.just("measurement"), METRES, st.floats(1e-6, 1e-4)),
+    measured=st.none() | st.builds(KnownClearance, st.just("measured"), METRES, st.floats(1e-6, 1e-4)),
     before=st.lists(SEEN, max_size=2),
     now=st.lists(SEEN, max_size=2),
     is_acknowledged=st.booleans(),

@@ -23,7 +23,7 @@ from leg_wear_monitor.monitor.verdict.situation import (
     OF_THE_GAIT,
     OF_THE_MODEL,
     JointSituation,
-    SeenClearance,
+    KnownClearance,
     Situation,
 )
 from leg_wear_monitor.monitor.verdict.verdict import (
@@ -74,7 +74,7 @@ def explained(*causes: Cause, **values: Any) -> TorqueExplanation:
 
 
 def seen(by: str, clearance_m: float, sigma_m: float, **more: Any) -> tuple[JointSituation, ...]:
-    return (NEW[0], attrs.evolve(NEW[1], seen=(SeenClearance(by, clearance_m, sigma_m),), **more))
+    return (NEW[0], attrs.evolve(NEW[1], seen=(KnownClearance(by, clearance_m, sigma_m),), **more))
 
 
 CASES = [
@@ -215,7 +215,7 @@ CASES = [
     (
         {
             "diagnosis": Diagnosis(state=DiagnosisState.AS_COUNTED, clearance_m=(3e-4, math.nan)),
-            "joints": (attrs.evolve(NEW[0], seen=(SeenClearance("torque", 3.0e-4, 1.0e-5),)), NEW[1]),
+            "joints": (attrs.evolve(NEW[0], seen=(KnownClearance("torque", 3.0e-4, 1.0e-5),)), NEW[1]),
         },
         State.WATCH,
         "NOT_OBSERVED",
@@ -225,7 +225,7 @@ CASES = [
         {
             "diagnosis": Diagnosis(state=DiagnosisState.AS_COUNTED, clearance_m=(3e-4, 3e-4)),
             "joints": tuple(
-                attrs.evolve(each, seen=(SeenClearance("torque", 3.0e-4, 1.0e-5),)) for each in NEW
+                attrs.evolve(each, seen=(KnownClearance("torque", 3.0e-4, 1.0e-5),)) for each in NEW
             ),
         },
         State.HEALTHY,
@@ -415,7 +415,7 @@ def test_an_alarm_of_the_ledger_without_a_new_value_is_told_with_its_worst_value
 
 
 def test_encoders_on_all_joints_observe_the_leg_without_a_drive_torque() -> None:
-    eyes = (SeenClearance("encoders", 3.0e-4, 1.0e-5),)
+    eyes = (KnownClearance("encoders", 3.0e-4, 1.0e-5),)
     verdict = judged(has_torque=False, joints=tuple(attrs.evolve(each, seen=eyes) for each in NEW))
     assert (verdict.state, verdict.why) == (
         State.HEALTHY,
@@ -437,7 +437,7 @@ def test_a_healthy_leg_is_told_that_the_diagnosis_is_off() -> None:
 
 
 def test_joints_that_encoders_show_need_no_diagnosis() -> None:
-    eyes = (SeenClearance("encoders", 3.0e-4, 1.0e-5),)
+    eyes = (KnownClearance("encoders", 3.0e-4, 1.0e-5),)
     waiting = Diagnosis(state=DiagnosisState.WAITING, reason="gait cycles: 2 of 5")
     all_seen = judged(diagnosis=waiting, joints=tuple(attrs.evolve(each, seen=eyes) for each in NEW))
     some_seen = judged(diagnosis=waiting, joints=(attrs.evolve(NEW[0], seen=eyes), NEW[1]))

@@ -12,7 +12,6 @@ from leg_wear_monitor.monitor.diagnosis.state import TorqueState
 from leg_wear_monitor.monitor.forecast.measurement import GrowthWindow, extended
 from leg_wear_monitor.monitor.judgement import update_forecast
 from leg_wear_monitor.monitor.ledger.entry import Audit, CorrectedClearance, IdentifiedLeg, SimulatedReference
-from leg_wear_monitor.monitor.leg_state import leg_state
 from leg_wear_monitor.monitor.parts import Parts
 from leg_wear_monitor.monitor.reports import (
     AlarmList,
@@ -82,15 +81,15 @@ class Processing:
                 self._keep_torque(statistics, cycles[-1])
         return update.samples, cycles
 
-    def end_period(
-        self, changes: list[AlarmList]
-    ) -> tuple[tuple[VerdictReport, ...], tuple[VerdictReport, ...]]:
+    def end_period(self, changes: list[AlarmList]) -> tuple[tuple[VerdictReport, ...], bool]:
         """Evaluate what is due at the end of an evaluation period.
 
         Returns
         -------
-        verdicts, states : tuple of VerdictReport
-            Changes of the verdict; the state of the leg, if that, an alarm or a gait cycle is new.
+        verdicts : tuple of VerdictReport
+            Changes of the verdict.
+        is_new : bool
+            Whether the verdict, an alarm or a gait cycle is new.
         """
         before = len(changes)
         self._add_changes(self._evaluation.end_period(self._accounting.state.skipped), changes)
@@ -98,10 +97,9 @@ class Processing:
         self._observe_torque()
         self._add_changes(self.evaluate_clearances(), changes)
         verdicts, state = self._parts.judge.changed(self._parts.state), self._parts.state
-        if not verdicts and not state.has_ended and len(changes) == before:
-            return (), ()
-        state.has_ended, leg = False, leg_state(self._parts, state.findings)
-        return verdicts, (VerdictReport(leg.stamp_ns, state.findings, leg),)
+        is_new = bool(verdicts) or state.has_ended or len(changes) > before
+        state.has_ended = False
+        return verdicts, is_new
 
     def evaluate_clearances(self) -> tuple[AlarmList, ...]:
         """Compare clearances by measurement and by estimate with their limits: at once, for none scatters."""

@@ -130,6 +130,7 @@ def replay(
         mechanism = load_mechanism(config.mechanism)
         monitor = open_monitor(mechanism, config, at_end=True, sampling=sampling)
         stack.callback(monitor.abandon)
+        monitor.reports_states = out is not None  # otherwise the last one is enough
         history, evidence = History(monitor.clearance_joints), GaitEvidence(config)
         result = ReplayResult(monitor, history, recording.files, recording.topics, time, evidence)
         part = None if out is None else stack.enter_context(_part(Path(out), recording.files))

@@ -12,6 +12,7 @@ from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.materials import Material
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.verdict.situation import SOURCES
 from leg_wear_monitor.playback.result import ReplaySummary
 from leg_wear_monitor.playback.summary import ReplayResult
 from leg_wear_monitor.report.drawing import draw_drawing, drawing_of, drawing_svg
@@ -204,11 +205,15 @@ def _life_html(life: Life) -> _Shown:
 
 @_shown.register
 def _replay_html(summary: ReplaySummary) -> _Shown:
-    shown, verdict = _verdict(summary.verdict), summary.verdict
-    is_valid = Figure.CLEARANCES not in verdict.not_valid
-    head = ["joint", "counted clearance [mm]", "limit [mm]"]
+    shown = _verdict(summary.verdict)
+    head = ["joint", "clearance [mm]", "according to", "limit [mm]"]
     rows = [
-        (name, _number(1.0e3 * each.counted_m) if is_valid else _NOT_VALID, _number(1.0e3 * each.limit_m))
+        (
+            name,
+            _NOT_VALID if each.believed_m is None else _number(1.0e3 * each.believed_m),
+            "" if each.believed_by is None else SOURCES[each.believed_by],
+            _number(1.0e3 * each.limit_m),
+        )
         for name, each in summary.clearances.items()
     ]
     return attrs.evolve(

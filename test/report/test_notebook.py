@@ -54,12 +54,16 @@ def test_a_replay_is_its_verdict_and_clearances_only_where_valid():
     summary = made_up_summary()
     html = summary._repr_html_()
     assert summary.verdict.fault_code in html
-    for not_valid, cells in (((), 0), ((Figure.CLEARANCES,), len(summary.clearances))):
-        verdict = attrs.evolve(summary.verdict, not_valid=not_valid)
-        html = attrs.evolve(summary, verdict=verdict)._repr_html_()
-        assert html.count("<td>not valid</td>") == cells
-        for each in summary.clearances.values():
-            assert (f"<td>{1e3 * each.counted_m:.4g}</td>" in html) is (cells == 0)
+    for each in summary.clearances.values():
+        assert f"<td>{1e3 * each.believed_m:.4g}</td>" in html and "not valid</td>" not in html
+    unknown = {
+        joint: attrs.evolve(each, believed_m=None, believed_by=None)
+        for joint, each in summary.clearances.items()
+    }
+    html = attrs.evolve(summary, clearances=unknown)._repr_html_()
+    assert html.count("<td>not valid</td>") == len(unknown)
+    for each in summary.clearances.values():
+        assert f"<td>{1e3 * each.counted_m:.4g}</td>" not in html
 
 
 def test_a_verdict_says_what_is_not_valid_and_a_material_has_its_sources():

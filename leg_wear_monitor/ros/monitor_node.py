@@ -26,7 +26,6 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.ledger.entry import JointWear
 from leg_wear_monitor.monitor.reports import Reports, Status
 from leg_wear_monitor.monitor.resets import wear_words
-from leg_wear_monitor.monitor.verdict.verdict import State
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor, open_monitor
 from leg_wear_monitor.ros.health import Load, load_status, recording_status
 from leg_wear_monitor.ros.inputs import Due, Inbox, InputTopic, subscribe
@@ -34,7 +33,7 @@ from leg_wear_monitor.ros.measure import MeasureRequest, measured, offer_measure
 from leg_wear_monitor.ros.outputs import BlackBox, MarkerTopic, Outlets
 from leg_wear_monitor.ros.running import ClosingNode, Parameters, repeated, run, spin
 from leg_wear_monitor.ros.supervision import Supervision
-from leg_wear_monitor.state import Level
+from leg_wear_monitor.state import Level, State
 from leg_wear_monitor.twin.sample import NO_FAULT, Samples
 
 # Samples whose time is already in the ledger: the clock was reset, or a recording is played back.

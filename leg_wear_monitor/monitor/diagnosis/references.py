@@ -1,4 +1,9 @@
-"""The torque reference of a measured leg: chosen, simulated, renewed, and its parameters identified."""
+"""The torque reference of a measured leg: chosen, simulated, renewed, and its parameters identified.
+
+A reference is the drive torque of simulated legs: the expected one, and ones with a joint of another
+clearance. `LegModels` computes what follows from a reference and the state of the observer; `References`
+decides which reference is used, and simulates it.
+"""
 
 import math
 from collections.abc import Sequence
@@ -40,30 +45,33 @@ from leg_wear_monitor.twin.torque_reference import (
     TorqueReferenceSnapshot,
 )
 
-# The models that follow from an observer's state: legs that may be the measured one, tests, the misfit.
+# Models that follow from the state of a `TorqueObserver`: explanations, tests and the misfit.
 #
-# They are made where they are needed first, and again where what they depend on has changed.
+# They are computed when first used, and again after what they depend on has changed.
 
 
-COMMISSIONING_CYCLES = 50  # a recording of a minute has them
+COMMISSIONING_CYCLES = 50  # gait cycles of a baseline: a recording of a minute at 60 rpm has them
 
-# misfit from which on names of joints are not sure: they are right up to 3 in the air, partly wrong at 23
-# with load friction of 20 %, and from 40 on the ground (docs/explanation/diagnosis.md)
+# Misfit above which the name of a joint is not sure: names are right up to a misfit of 3 in the air, partly
+# wrong at 23 with load friction of 20 %, and from 40 on the ground (docs/explanation/diagnosis.md).
 NAMED_TO = 5.0
 
-# factor on the misfit by a channel that is none: 5 for leg c of benchmarks/diagnosis.py, whose lengths are
-# 1 % off; at most 1.9 by true ones, under a load of 300 N that is in both
-_WORSE = 2.5
+# A channel that makes the misfit this many times as large is refused, as it stands for other lengths: 5 times
+# for leg c of benchmarks/diagnosis.py, whose lengths are 1 % off; true channels at most 1.9 times (under 300
+# N of load).
+_CHANNEL_MISFIT_FACTOR = 2.5
 
 
-_UNLIKE_ON_GROUND = 2.0  # misfit that another shape of the ground's force leaves: 1.2 to 1.5
+# misfit up to which a leg on the ground counts as that of its reference: other shapes of the force leave 1.2
+# to 1.5
+_UNLIKE_ON_GROUND = 2.0
 
-_KEPT = 6  # models of the last cadences, sensors and baselines
+_MOST_KEPT = 6  # latest sets of models: of the last cadences, sensors and baselines
 
 
 @attrs.define(eq=False)
-class _Models:
-    """What follows from a reference, a sensor and a baseline."""
+class _ModelsOfState:
+    """Models of one reference, sensor and baseline; the last three are computed when first used."""
 
     reference: TorqueReference
     sensor: TorqueSensor
@@ -81,23 +89,23 @@ class LegModels:
     ----------
     mechanism : Mechanism
     figures : DriveFigures, optional
-        Declared ones of the drive.
+        Declared values of the drive.
     """
 
     def __init__(self, mechanism: Mechanism, figures: DriveFigures = UNDECLARED) -> None:
         self._mechanism, self._figures = mechanism, figures
-        self._kept: list[_Models] = []
+        self._kept: list[_ModelsOfState] = []
 
     def warm_up(self) -> None:
-        """Compute what bodies change of the torque: it takes longer than samples may wait."""
+        """Compute the torque's derivatives by masses and lengths now: later, samples would wait too long."""
         body_torques(self._mechanism)
 
     def explainer(self, state: TorqueState) -> Explainer:
-        """Legs that may be the measured one."""
+        """Possible explanations of the measured torque: other clearances and other causes."""
         return self._of(state).explainer
 
     def detector(self, state: TorqueState, config: MonitorConfig) -> ChangeDetector:
-        """Tests against the counted leg."""
+        """Tests for a change of the counted clearances."""
         own = self._of(state)
         if own.detector is None or own.counted_m is not state.counted_m:
             cycles = 60.0 * abs(config.cadence.commanded_rpm) * config.diagnosis.false_alarm_hours
@@ -106,9 +114,9 @@ class LegModels:
         return own.detector
 
     def misfit(self, state: TorqueState) -> float:
-        """Misfit of the commissioned leg to that of the reference; 0 where that is not known.
+        """Misfit between the commissioned leg and the reference; 0 if it is not known.
 
-        The baseline after a correction has clearances that are not sure.
+        It is not known for the baseline after a correction, since the corrected clearance is not exact.
         """
         commissioned = state.commissioned
         if state.reference is None or commissioned is None or not commissioned.is_as_counted:
@@ -123,22 +131,22 @@ class LegModels:
     ) -> TorqueSensor:
         """The sensor with the noise and the channel of a commissioned leg.
 
-        A leg of other lengths has its impacts elsewhere, which a channel seems to explain, but its mean
-        torque then fits much worse: such a leg has to be identified, not delayed.
+        Other lengths than expected move the impacts, as a delay does. A channel that explains the impacts of
+        such a leg fits the mean torque much worse: it is refused, and the leg is to be identified.
         """
         columns = nuisances(self._mechanism, reference, attrs.evolve(sensor, channel=DIRECT))
         found = with_channel_of(reference, sensor, known.mean, columns, self._figures)
         plain = with_noise_of(reference, attrs.evolve(sensor, channel=DIRECT), known.mean)
         if found == plain:
             return plain
-        off, without = (
+        with_channel, without = (
             misfit(signature_model(reference, one), nuisances(self._mechanism, reference, one), known)
             for one in (found, plain)
         )
-        return plain if off > _WORSE * without else found
+        return plain if with_channel > _CHANNEL_MISFIT_FACTOR * without else found
 
     def ground_load(self, state: TorqueState, reference: TorqueReference) -> GroundLoad:
-        """The ground's force by the commissioned leg, from a reference of the leg under any force."""
+        """Force of the ground on the commissioned leg; the reference may be one under another force."""
         own, known, sensor = self._of(state), state.commissioned, state.sensor
         if known is None or sensor is None:
             raise RuntimeError("the leg is not commissioned yet")
@@ -148,34 +156,41 @@ class LegModels:
         return ground_load(linkage, reference, sensor, known.mean, covariance, columns, self._figures)
 
     def fits(self, state: TorqueState) -> bool:
-        """Whether the reference explains the commissioned leg so well that names of joints are right."""
+        """Whether the reference explains the commissioned leg well enough to name a joint."""
         return self.misfit(state) < NAMED_TO
 
     def is_of_file(self, state: TorqueState) -> bool:
-        """Whether the commissioned leg is that of the reference."""
+        """Whether the commissioned leg is that of the mechanism file, or of the identified parameters."""
         is_loaded = state.reference is not None and state.reference.parameters.load.size > 0
         return self.misfit(state) < (_UNLIKE_ON_GROUND if is_loaded else UNLIKE_FILE)
 
-    def _of(self, state: TorqueState) -> _Models:
-        """Those of a state; they are kept while its reference, its sensor and its baseline stay."""
+    def _of(self, state: TorqueState) -> _ModelsOfState:
+        """Models of a state: kept ones if its reference, sensor and baseline are the same, or new ones."""
         reference, sensor, known = state.reference, state.sensor, state.commissioned
         if reference is None or sensor is None:
             raise RuntimeError("there is no reference yet")
         for one in self._kept:
             if one.reference is reference and one.commissioned is known and one.sensor == sensor:
                 return one
-        made = _Models(reference, sensor, known, explainer_of(self._mechanism, reference, sensor, known))
-        self._kept = [made, *self._kept][:_KEPT]
+        made = _ModelsOfState(
+            reference, sensor, known, explainer_of(self._mechanism, reference, sensor, known)
+        )
+        self._kept = [made, *self._kept][:_MOST_KEPT]
         return made
 
 
-FIRST_CYCLES = 5  # before a reference is chosen
-UNLIKE_CYCLES = 20  # alike, until another reference is made: less would make one while the cadence changes
+# The choice of the reference, its simulation in the background, and the identification of the leg.
 
-ROUNDS = 3  # of identification
-LOAD_ROUNDS = 4  # in which the ground's force is found: joints rub, and impacts fall, under a force otherwise
 
-_FAR = 0.1  # of a counted clearance: the reference is renewed where it was made for another one
+FIRST_CYCLES = 5  # gait cycles before the first reference is chosen
+# gait cycles alike without a reference until one is made for them; a change of the cadence has fewer
+UNLIKE_CYCLES = 20
+
+ROUNDS = 3  # most rounds of identification
+LOAD_ROUNDS = 4  # rounds of finding the ground's force: friction and impacts change with it, and it with them
+
+# a reference is renewed if a counted clearance differs by more than this fraction from that of its leg
+_FAR_FRACTION = 0.1
 
 
 class References:
@@ -185,15 +200,14 @@ class References:
     ----------
     mechanism : Mechanism
     models : LegModels
-        Told to forget what depends on a reference.
     given : sequence of TorqueReference, optional
-        Those known beforehand: of files first, then of the ledger; the shipped ones come last.
+        References known beforehand: of files first, then of the ledger. Those of the package follow them.
     part : TorqueReference or None
-        One whose simulation was not finished in an earlier run.
+        Unfinished reference of an earlier run, which is continued if it fits.
     is_drive_known : bool
-        Whether the stiffness of the drive is declared, and not to be found.
+        Whether the stiffness of the drive is declared; otherwise it is identified.
     is_on_ground : bool
-        Whether the leg walks on the ground, whose force is to be found.
+        Whether the leg walks on the ground; then the force is identified.
 
     Raises
     ------
@@ -222,36 +236,36 @@ class References:
 
     @property
     def percent(self) -> int:
-        """How much of what is being simulated is done [%]."""
+        """Progress of the simulation [%]."""
         return math.floor(100.0 * self._run.progress) if self._run is not None else 0
 
     def is_for(self, profile: CrankProfile) -> bool:
-        """Whether what is being simulated is for a motion of the crank."""
+        """Whether the running simulation is for this motion of the crank."""
         return self.is_busy and self._run is not None and profile.is_like(self._run.profile)
 
     @property
     def cycles_left(self) -> float:
-        """Commanded gait cycles until what is being simulated is there."""
+        """Commanded gait cycles until the simulation is complete."""
         return self._run.cycles_left if self._run is not None else 0.0
 
     @property
     def part(self) -> TorqueReference | None:
-        """The legs that are simulated so far; None where none is, or all are."""
+        """The unfinished reference with the legs simulated so far; None if there are none, or all are."""
         return self._run.part if self._run is not None else None
 
     def is_given(self, reference: TorqueReference) -> bool:
-        """Whether a reference comes from the ledger or with the package."""
+        """Whether a reference was known beforehand."""
         return any(reference is one for one in self._given)
 
     def snapshot(self) -> TorqueReferenceSnapshot | None:
-        """A copy of what is being simulated; None before anything was."""
+        """State of the simulation; None before the first one."""
         return self._run.snapshot() if self._run else None
 
     def restore(self, snapshot: TorqueReferenceSnapshot | None) -> None:
-        """Restore a snapshot of the same mechanism; it continues bit for bit."""
+        """Restore a snapshot of the same mechanism; later results are equal bit for bit."""
         self._run = None
         if snapshot is not None:
-            self._begun().restore(snapshot)
+            self._running().restore(snapshot)
 
     def advance(self, state: TorqueState, counted_m: Floats, depth: Floats) -> bool:
         """Choose a reference, continue its simulation, or begin a new one if required.
@@ -259,7 +273,7 @@ class References:
         Returns
         -------
         bool
-            Whether the state has another reference, with which the kept cycles are to be evaluated again.
+            Whether the reference of the state was replaced, so that the kept cycles must be evaluated again.
         """
         if self._run is not None and self._run.is_busy:
             return self._continue(self._run, state, counted_m, depth)
@@ -272,7 +286,7 @@ class References:
         own, identified = state.reference.parameters, state.parameters
         if _is_far(state.reference, counted_m):
             self._begin(own if state.is_final else identified, counted_m, depth, state.profile)
-        elif not state.is_final and identified not in (None, own):  # at another cadence, or in the ledger
+        elif not state.is_final and identified not in (None, own):  # identified at another cadence or earlier
             self._begin(identified, counted_m, depth, state.reference.profile)
         elif self._may_be_loaded(state):
             self._begin_under_load(state, state.reference, depth)
@@ -281,30 +295,35 @@ class References:
         return False
 
     def is_load_left_out(self, state: TorqueState) -> bool:
-        """Whether the foot carries a load that the model is to walk without."""
+        """Whether the foot surely carries a load, but the configuration has the model walk without one."""
         return state.load is not None and state.load.is_sure and not self._is_on_ground
 
     def _may_be_loaded(self, state: TorqueState) -> bool:
-        """Whether to look for the ground's force on a leg that was commissioned just now."""
+        """Whether to estimate the ground's force on a leg that has just been commissioned."""
         is_new = state.commissioned is not None and not state.load_rounds and self._mechanism.toe is not None
         return is_new and (self._is_on_ground or not self._models.is_of_file(state))
 
     def _begin_under_load(self, state: TorqueState, reference: TorqueReference, depth: Floats) -> None:
-        """Begin the simulation of the expected leg under the ground's force that a reference of it shows.
+        """Estimate the ground's force with a reference, and begin to simulate the expected leg under it.
 
-        A force that is not asked for is told only: taken for masses, it would make other joints wear.
+        If the configuration does not put the leg on the ground, the force is estimated to be reported only.
         """
         if state.commissioned is None:
             return
-        is_known = state.load_rounds > 0  # sure by the first round: a later one is nearer to it
+        is_known = state.load_rounds > 0  # it was sure in the first round; later rounds only improve it
         state.load, state.load_rounds = self._models.ground_load(state, reference), state.load_rounds + 1
         if self._is_on_ground and (is_known or state.load.is_sure):
             parameters = attrs.evolve(reference.parameters, load=state.load.force)
             state.is_identifying = True
-            self._begun().begin_expected(state.commissioned.clearance_m, depth, reference.profile, parameters)
+            self._running().begin_expected(
+                state.commissioned.clearance_m, depth, reference.profile, parameters
+            )
 
     def _begin_identification(self, state: TorqueState, reference: TorqueReference, depth: Floats) -> None:
-        """Begin the simulation of legs with other parameters, near the commissioned leg."""
+        """Begin a round of identification: simulate legs with each parameter changed.
+
+        The first round may find a compliant drive, or start from parameters fitted with ideal joints.
+        """
         known = state.commissioned
         if known is None:
             return
@@ -320,16 +339,19 @@ class References:
         if is_first and not start.compliance and self._models.misfit(state) >= FAR_FROM_FILE:
             start = leg_of_ideal_torque(self._mechanism, model, known, profile.speed, start.load)
         state.is_identifying = True
-        part = self._part_of(start, profile, clearance_m, is_of_parameters=True)
+        part = self._unfinished(start, profile, clearance_m, is_of_parameters=True)
         if part is not None:
-            self._begun().go_on(part, depth)
+            self._running().go_on(part, depth)
         else:
-            self._begun().begin_identification(clearance_m, depth, profile, start, self._is_drive_known)
+            self._running().begin_identification(clearance_m, depth, profile, start, self._is_drive_known)
 
     def _continue(
         self, run: TorqueReferenceRun, state: TorqueState, counted_m: Floats, depth: Floats
     ) -> bool:
-        """Go on for a period with what is being simulated; what was made is of its own cadence."""
+        """Continue the simulation for a period, and use what it completes.
+
+        Returns whether the state has another reference; it belongs to the cadence that it was simulated for.
+        """
         found = run.advance()
         if found is not None and state.is_identifying:
             self._identify(state, found, counted_m, depth)
@@ -337,11 +359,11 @@ class References:
             self._install(state, found)
             return True
         elif not run.is_busy:
-            _give_up(state)
+            _abandon(state)
         return False
 
     def _choose(self, state: TorqueState, counted_m: Floats, depth: Floats) -> bool:
-        """Use a given reference if the crank turns as in it, preferably one of the leg; or begin one."""
+        """Use a given reference of the same motion, preferably one of this leg, or begin a new one."""
         profile = mean_profile([cycle.profile for cycle in state.waiting])
         drive = state.parameters.compliance if state.parameters else 0.0
         alike = [
@@ -353,8 +375,8 @@ class References:
         self._begin(state.parameters, counted_m, depth, profile)
         return False
 
-    def _begun(self) -> TorqueReferenceRun:
-        """The run, made when it is needed first."""
+    def _running(self) -> TorqueReferenceRun:
+        """The run, created when first needed."""
         if self._run is None:
             self._run = TorqueReferenceRun(self._mechanism)
         return self._run
@@ -362,27 +384,30 @@ class References:
     def _begin(
         self, parameters: LegParameters | None, counted_m: Floats, depth: Floats, profile: CrankProfile
     ) -> None:
-        """Begin the simulation of a reference, or go on with that of an earlier run."""
+        """Begin the simulation of a reference, or continue that of an earlier run."""
         own = parameters or LegParameters.none(self._mechanism)
-        part = self._part_of(own, profile, counted_m)
+        part = self._unfinished(own, profile, counted_m)
         if part is not None:
-            self._begun().go_on(part, depth)
+            self._running().go_on(part, depth)
         else:
-            self._begun().begin(counted_m, depth, profile, own)
+            self._running().begin(counted_m, depth, profile, own)
 
-    def _part_of(
+    def _unfinished(
         self, own: LegParameters, profile: CrankProfile, clearance_m: Floats, is_of_parameters: bool = False
     ) -> TorqueReference | None:
-        """What an earlier run simulated of such legs; None without any."""
+        """The unfinished reference of an earlier run, if it is of such legs; otherwise None."""
         part = self._part
         if part is None or part.is_of_parameters is not is_of_parameters or part.parameters != own:
             return None
         return part if profile.is_like(part.profile) and not _is_far(part, clearance_m) else None
 
     def _identify(self, state: TorqueState, legs: TorqueReference, counted_m: Floats, depth: Floats) -> None:
-        """Begin a reference with the parameters that explain the commissioned leg."""
+        """Find the parameters that explain the commissioned leg, and begin a reference with them.
+
+        A single leg among `legs` is one under a load: then the force is found again, or is final.
+        """
         state.is_identifying = False
-        _turn(state, legs.profile)
+        _turn_to(state, legs.profile)
         if state.commissioned is not None and len(legs.torque_nm) == 1:
             if state.load_rounds < LOAD_ROUNDS:
                 self._begin_under_load(state, legs, depth)
@@ -397,43 +422,46 @@ class References:
     def _install(self, state: TorqueState, reference: TorqueReference) -> None:
         """Use a new reference at its cadence.
 
-        One with identified parameters must explain the leg better than the one before.
+        A reference with identified parameters must explain the leg at least as well as the former one;
+        otherwise the former one stays, and the identification ends.
         """
-        _turn(state, reference.profile)
-        before, off = state.reference, self._models.misfit(state)
+        _turn_to(state, reference.profile)
+        before, misfit_before = state.reference, self._models.misfit(state)
         if before is None or not before.profile.is_like(reference.profile):
-            _take_up(state, reference)
+            _start_at_cadence(state, reference)
             return
         state.reference = reference
         own, former, sensor = reference.parameters, before.parameters, state.sensor
         is_new_drive = own.compliance != former.compliance
         is_new_load = not np.array_equal(own.load, former.load)
         if (is_new_drive or is_new_load) and sensor is not None and state.commissioned is not None:
-            # what a compliant drive does looks like a channel to a rigid one, and a load hides load friction
+            # the channel was found with a rigid drive, which takes compliance for delay, or without the load,
+            # which hides load friction
             state.sensor = self._models.channel(reference, sensor, state.commissioned)
-        if own == former or self._models.misfit(state) <= off:
+        if own == former or self._models.misfit(state) <= misfit_before:
             return
         state.reference, state.sensor = before, sensor
-        if is_new_drive and not former.compliance:  # the leg of a rigid drive is still to be identified
+        if is_new_drive and not former.compliance:  # no coupling: identify the leg with a rigid drive
             state.parameters = former
             return
         state.is_final, state.rounds = True, ROUNDS
+        # other cadences may use the identified parameters; if none does, they are withdrawn
         if all(one.reference.parameters != state.parameters for one in state.set_aside):
             state.parameters = before.parameters
 
 
-def _turn(state: TorqueState, profile: CrankProfile) -> None:
-    """Turn to the cadence that something was simulated for: the leg may walk at another one by now."""
+def _turn_to(state: TorqueState, profile: CrankProfile) -> None:
+    """Make the cadence that was simulated the present one: the leg may walk at another one by now."""
     other = state.at(profile)
     if other is not None and not (state.reference and state.reference.profile.is_like(profile)):
         state.turn_to(other)
 
 
-def _take_up(state: TorqueState, reference: TorqueReference) -> None:
-    """Begin with a further cadence, by the gait cycles that waited for its reference.
+def _start_at_cadence(state: TorqueState, reference: TorqueReference) -> None:
+    """Begin a new cadence with the gait cycles that waited for its reference.
 
-    Its baseline is its own, if the ledger has one: inertia is another at another speed. Compared with the
-    baseline of 60 rpm, a healthy leg at 57 rpm had a wide joint A.
+    It has a baseline of its own, from the ledger if there is one, because forces of inertia depend on the
+    speed: compared with the baseline of 60 rpm, a healthy leg at 57 rpm had a wide joint A.
     """
     if state.sensor is None:
         raise RuntimeError("there are no samples yet")
@@ -445,12 +473,12 @@ def _take_up(state: TorqueState, reference: TorqueReference) -> None:
 
 
 def _is_far(reference: TorqueReference, counted_m: Floats) -> bool:
-    """Whether a reference is for other clearances than the counted ones (k,) [m]."""
-    return bool((np.abs(reference.clearance_m[0] / counted_m - 1.0) > _FAR).any())
+    """Whether the expected leg of a reference has other clearances than the counted ones (k,) [m]."""
+    return bool((np.abs(reference.clearance_m[0] / counted_m - 1.0) > _FAR_FRACTION).any())
 
 
-def _give_up(state: TorqueState) -> None:
-    """Go on without what could not be simulated."""
+def _abandon(state: TorqueState) -> None:
+    """Give up a simulation that failed: keep the present reference, or report the failure without one."""
     state.waiting = ()
     if state.reference is None:
         state.has_failed = True

@@ -1,4 +1,4 @@
-"""A recording as series of signals over time."""
+"""All joints and torques of recordings as time series, for finding the crank and its torque."""
 
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack
@@ -19,7 +19,7 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, ZERO_STAMP, Samples
 
-# Joint positions and torques of a recording as time series, each a candidate for the crank or its torque.
+# The series: each joint is a candidate for the crank, each torque one for the drive torque.
 
 
 WRENCH, FLOAT64, EFFORT = "wrench", "float64", "effort"
@@ -62,25 +62,30 @@ class TorqueSource:
 
 @attrs.frozen(eq=False)
 class Signals:
-    """All candidates of one or more recordings."""
+    """All candidates of one or more recordings, as series over time."""
 
     joints: dict[JointName, Series]
     torques: dict[TorqueSource, Series]
 
 
-# All joints and torques of recordings as series, by the monitor's own decoder, one channel at a time.
+# Reading: each channel is decoded by the monitor's own decoder, once for each joint or axis.
+#
+# A decoder yields a crank angle and a torque, of one joint or axis that its configuration names. So it is
+# configured with each joint in turn as if that were the crank, and with each axis as if that were the
+# torque's.
 
 
-# What the monitor itself publishes: its predicted torque would fit better than any measured one
-_OWN = tuple(each.name.lstrip("~") for each in (outputs.CLEARANCES, outputs.IMPACTS, outputs.TORQUE))
-_MOST_CHANNELS = 250  # a channel's number goes through eight bits
-_MOST_JOINTS = 200
-_NAMED = 20  # messages of a piece whose joint names are read
-_NOBODY = "(no joint)"
+# Ends of topics that the monitor itself publishes: its predicted torque would fit better than any measured
+# one.
+_PUBLISHED = tuple(each.name.lstrip("~") for each in (outputs.CLEARANCES, outputs.IMPACTS, outputs.TORQUE))
+_MOST_CHANNELS = 250  # the field `type` of a message, which contains a channel's number here, has eight bits
+_MOST_JOINTS = 200  # of a channel, to bound the work: each joint is decoded by itself
+_NAMING_MESSAGES = 20  # first messages of a piece, whose joint names are read
+_NO_JOINT = "(no joint)"  # name of a crank joint that no message has
 
 
 @attrs.frozen
-class _Selected:
+class _SelectedChannel:
     """A channel's topic and stream."""
 
     topic: str
@@ -88,8 +93,8 @@ class _Selected:
 
 
 @attrs.define
-class _Collected:
-    """Parts of one series: stamps, values, indices of the recording."""
+class _SeriesParts:
+    """Parts of one series, from successive pieces: stamps [ns], values, indices of the recording."""
 
     parts: list[tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]] = attrs.Factory(list)
 
@@ -134,14 +139,14 @@ def read_signals(
                 "joint_states",
                 "no topic of sensor_msgs/msg/JointState",
             )
-        collected: dict[JointName | TorqueSource, _Collected] = {}
+        collected: dict[JointName | TorqueSource, _SeriesParts] = {}
         read, total = 0, max(1, sum(source.file.size for source in sources))
         for source in sources:
             for due in source.pieces():
                 piece = due.load()
                 if piece is not None:
                     recording = source.bag_file.recording
-                    _take(collected, selected, piece.data, piece.messages, recording)
+                    _add_piece(collected, selected, piece.data, piece.messages, recording)
                     read += piece.stored
                     progress(min(1.0, read / total))
         findings += lost + skipped + [each for source in sources for each in source.file.findings]
@@ -150,9 +155,13 @@ def read_signals(
 
 def _select(
     sources: list[Source], joint_states: str | None, drive_torque: str | None
-) -> tuple[list[_Selected], list[Finding]]:
-    """Give each channel that is read a number, which stands in its messages instead of a stream's code."""
-    selected: list[_Selected] = []
+) -> tuple[list[_SelectedChannel], list[Finding]]:
+    """Channels to be read.
+
+    The messages of a source get the number of their channel here, from 1, as their `type`; a reader of one
+    channel for each stream has the stream's code there. Channels of the same topic and stream share a number.
+    """
+    selected: list[_SelectedChannel] = []
     findings: list[Finding] = []
     for source in sources:
         for number, channel in sorted(source.file.channels.items()):
@@ -165,19 +174,19 @@ def _select(
             except RecordingError as error:
                 findings.append(Finding(path, f"{error.key} {error.fault}: it is not read", Severity.NOTE))
                 continue
-            one = _Selected(channel.topic, stream)
-            if one not in selected:
-                selected.append(one)
-            if selected.index(one) < _MOST_CHANNELS:
-                source.types[number] = 1 + selected.index(one)
+            selected_channel = _SelectedChannel(channel.topic, stream)
+            if selected_channel not in selected:
+                selected.append(selected_channel)
+            if (index := selected.index(selected_channel)) < _MOST_CHANNELS:
+                source.types[number] = 1 + index
     return selected, findings
 
 
 def _stream(
     channel: Channel, known: str, chosen: dict[int, str | None], drive_torque: str | None
 ) -> Stream | None:
-    """Stream of a channel by its type; None for what is not to be read."""
-    if channel.topic.endswith(_OWN):
+    """Stream of a channel by its message type; None for a channel that is not read."""
+    if channel.topic.endswith(_PUBLISHED):
         return None
     for stream in STREAMS:
         topic = chosen.get(stream.kind, drive_torque)
@@ -186,35 +195,35 @@ def _stream(
     return None
 
 
-def _take(
-    collected: dict[JointName | TorqueSource, _Collected],
-    selected: list[_Selected],
+def _add_piece(
+    collected: dict[JointName | TorqueSource, _SeriesParts],
+    selected: list[_SelectedChannel],
     data: NDArray[np.uint8],
     messages: NDArray[np.void],
     recording: int,
 ) -> None:
-    """Decode a piece channel by channel."""
+    """Decode a piece, and add its values to the series of each joint and torque."""
     for number in np.unique(messages["type"]).tolist():
         channel = selected[number - 1]
         chosen = messages[messages["type"] == number]
         chosen["type"] = channel.stream.code
-        for name, samples, field in _decoded(channel, data, chosen):
-            good = np.isin(samples["fault"], (NO_FAULT, ZERO_STAMP))
-            stamps = np.where(samples["fault"] == ZERO_STAMP, chosen["log_time_ns"], samples["stamp_ns"])[
-                good
-            ]
-            parts = collected.setdefault(name, _Collected()).parts
-            parts.append((stamps, samples[field][good], np.full(len(stamps), recording)))
+        for name, samples, field in _decoded_series(channel, data, chosen):
+            # a message without a stamp is usable at its log time
+            is_unstamped = samples["fault"] == ZERO_STAMP
+            is_usable = is_unstamped | (samples["fault"] == NO_FAULT)
+            stamps = np.where(is_unstamped, chosen["log_time_ns"], samples["stamp_ns"])[is_usable]
+            parts = collected.setdefault(name, _SeriesParts()).parts
+            parts.append((stamps, samples[field][is_usable], np.full(len(stamps), recording)))
 
 
-def _decoded(
-    channel: _Selected, data: NDArray[np.uint8], messages: NDArray[np.void]
+def _decoded_series(
+    channel: _SelectedChannel, data: NDArray[np.uint8], messages: NDArray[np.void]
 ) -> list[tuple[JointName | TorqueSource, Samples, str]]:
-    """Samples of each series in a channel's messages, and the field that holds its values."""
+    """Samples of each series in a channel's messages, and the field of its values."""
     topic, code = channel.topic, channel.stream.code
     found: list[tuple[JointName | TorqueSource, Samples, str]] = []
     if code == JOINT_STATE:
-        for joint in _joints(data, messages):
+        for joint in _joint_names(data, messages):
             samples = _decoder(EFFORT, joint=joint).many(data, messages)
             found.append((JointName(topic, joint), samples, "crank_angle_rad"))
             if np.isfinite(samples["torque_nm"]).any():
@@ -228,21 +237,26 @@ def _decoded(
     return [(TorqueSource(FLOAT64, topic), _decoder(FLOAT64).many(data, messages), "torque_nm")]
 
 
-def _decoder(source: str, axis: str = "z", joint: str = _NOBODY) -> Decoder:
+def _decoder(source: str, axis: str = "z", joint: str = _NO_JOINT) -> Decoder:
+    """Decoder of one torque source and of one joint as the crank."""
     return Decoder(MonitorConfig(crank_joint=joint, drive_torque=DriveTorque(source=source, axis=axis)))
 
 
-def _joints(data: NDArray[np.uint8], messages: NDArray[np.void]) -> list[str]:
-    """Names of the joints in the first sound messages."""
+def _joint_names(data: NDArray[np.uint8], messages: NDArray[np.void]) -> list[str]:
+    """Names of the joints in the first messages without a fault.
+
+    A decoder for a joint that no message has reports only sound messages as MISSING_JOINT.
+    """
     faults = _decoder(EFFORT).many(data, messages)["fault"]
-    sound = np.flatnonzero(faults == MISSING_JOINT)[:_NAMED]
+    sound = np.flatnonzero(faults == MISSING_JOINT)[:_NAMING_MESSAGES]
     names: dict[str, None] = {}
     for message in messages[sound]:
         names |= dict.fromkeys(names_in(data[message["begin"] : message["end"]].tobytes())[:_MOST_JOINTS])
     return [name for name in names if name][:_MOST_JOINTS]
 
 
-def _signals(collected: dict[JointName | TorqueSource, _Collected]) -> Signals:
+def _signals(collected: dict[JointName | TorqueSource, _SeriesParts]) -> Signals:
+    """Series that are not empty, with times since the first stamp of all."""
     full = {name: each for name, each in collected.items() if sum(len(part[0]) for part in each.parts)}
     first_ns = min(
         (int(part[0].min()) for each in full.values() for part in each.parts if len(part[0])), default=0

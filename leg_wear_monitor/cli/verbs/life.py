@@ -32,9 +32,9 @@ if TYPE_CHECKING:
     from leg_wear_monitor.mechanism.materials import RatingLife
     from leg_wear_monitor.mechanism.spec import Mechanism
 
-    Lives = list[tuple[Floats, Life]]  # with the factors on their wear coefficients
+    Lives = list[tuple[Floats, Life]]  # factors on the joints' wear coefficients, and the life with them
 
-_ROWS = 12  # of the table
+_TABLE_ROWS = 12  # most rows of the printed table, spread over the life
 
 
 @click.command(short_help="Simulate the wear of a leg over its life, by cycle jumps.")
@@ -115,7 +115,8 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
     check_outputs(json_file, out)
     with options_named():
         lives = _lives(leg, **options)
-    warn_of(leg.source, doubts(leg))  # what fails names them itself, in its one line
+    # only after success: the message of a failure names the doubts itself
+    warn_of(leg.source, doubts(leg))
     result = lives[0][1]
     text = json_text(_document(leg, lives, options["limit_m"]))
     written = write_json(json_file, text)
@@ -125,13 +126,14 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
         files = {"life.json": text.encode(), "life.png": life_picture(result)}
         written += write_directory(out, files)
     if json_file != STDOUT:
-        told = [*lines(result, options["limit_m"], _not_counted(leg)), *_validity(leg, result)]
-        told += _loads(leg, result)
-        for line in [*told, *(f"written: {path}" for path in written)]:
+        printed = [*lines(result, options["limit_m"], _without_coefficient(leg)), *_regimes(leg, result)]
+        printed += _load_remarks(leg, result)
+        for line in [*printed, *(f"written: {path}" for path in written)]:
             click.echo(line)
 
 
 def _lives(leg: "Mechanism", lives: int, opens_m: float | None, duty: str | None, **options: Any) -> "Lives":
+    """Check the options, and simulate the lives."""
     import attrs
     import numpy as np
 
@@ -141,21 +143,24 @@ def _lives(leg: "Mechanism", lives: int, opens_m: float | None, duty: str | None
     from leg_wear_monitor.mechanism.materials import check_wear_is_known
     from leg_wear_monitor.wear import JumpControl
 
+    # options that were not given have the defaults of LifeSettings
     given = {name: value for name in ("legs", "cycles") if (value := options.pop(name)) is not None}
     settings = LifeSettings(**given)
     if opens_m is not None:
         settings = attrs.evolve(settings, jump=JumpControl.of(opens_m))
     loads = None if duty is None else Duty.parse(duty)
-    own = clearance_settings(leg, leg.clearance_joints)
-    check_wear_is_known(leg, leg.clearance_joints)  # before any compilation
-    fresh_m, radius_m = np.array([[c.radial_clearance, c.bushing_radius] for c in own]).reshape(-1, 2).T
-    check_life(leg.clearance_joints, fresh_m, radius_m, options["limit_m"], settings.jump)
+    # bad settings are refused before the kernels are compiled, which takes a while
+    joints = clearance_settings(leg, leg.clearance_joints)
+    check_wear_is_known(leg, leg.clearance_joints)
+    sizes = np.array([[joint.radial_clearance, joint.bushing_radius] for joint in joints])
+    clearance_m, radius_m = sizes.reshape(-1, 2).T
+    check_life(leg.clearance_joints, clearance_m, radius_m, options["limit_m"], settings.jump)
     with compilation("clearance"), progress_bar("life") as progress:
         return list(simulate_lives(leg, settings, lives, progress=progress, duty=loads, **options))
 
 
 def _document(leg: "Mechanism", lives: "Lives", limit_m: float) -> dict[str, Any]:
-    """Lives, bound to the leg that they are of."""
+    """Content of the JSON file: the lives, and the fingerprint of the leg that they belong to."""
     from leg_wear_monitor.life.life import lives_document
     from leg_wear_monitor.life.result import validity
     from leg_wear_monitor.monitor.ledger.entry import fingerprint
@@ -168,57 +173,61 @@ def _document(leg: "Mechanism", lives: "Lives", limit_m: float) -> dict[str, Any
     }
 
 
-def _validity(leg: "Mechanism", result: "Life") -> list[str]:
-    """What the life holds for: the regime of each joint's wear."""
+def _regimes(leg: "Mechanism", result: "Life") -> list[str]:
+    """Remarks on the wear regime of each joint, for which alone the life is valid."""
     from leg_wear_monitor.mechanism.materials import regimes
 
     found = regimes(leg, result.clearance_joints).items()
     return [f"holds for {', '.join(joints)}: {what}" for what, joints in found]
 
 
-def _not_counted(leg: "Mechanism") -> list[str]:
-    """Joints whose pair gives no wear coefficient."""
+def _without_coefficient(leg: "Mechanism") -> list[str]:
+    """Joints whose material pair has no wear coefficient; their wear is not counted."""
     from leg_wear_monitor.mechanism.materials import lacks_wear
 
     return [joint for joint in leg.clearance_joints if lacks_wear(leg.clearances[joint])]
 
 
-def _loads(leg: "Mechanism", result: "Life") -> list[str]:
-    """What p v of the new leg is beyond, the makers' own life of their bushings, and contacts too wide."""
+def _load_remarks(leg: "Mechanism", result: "Life") -> list[str]:
+    """Remarks on each bushing: exceeded limits of load and speed, the maker's rating life, wide contacts."""
     from leg_wear_monitor.life.result import contact_doubts, pressure_speed, rating_hours
     from leg_wear_monitor.mechanism.materials import bushing_of, load_material
 
-    told = []
+    remarks = []
     for joint, load in pressure_speed(leg, result).items():
         settings = leg.clearances[joint]
         beyond = bushing_of(leg, joint).loaded(0.0, 0.0, 0.0, load).outside_limits
-        told += [f"{joint}: {beyond}"] if beyond else []
+        remarks += [f"{joint}: {beyond}"] if beyond else []
         hours = rating_hours(settings, load)
         if hours is not None:
             constants = load_material(settings.material).rating_life
-            told.append(f"{joint}: maker's rating life {_rated(hours, load, result.period_s, constants)}")
-    return told + [f"{joint}: {doubt}" for joint, doubt in contact_doubts(leg, result).items()]
+            remarks.append(
+                f"{joint}: maker's rating life {_rating_life(hours, load, result.period_s, constants)}"
+            )
+    return remarks + [f"{joint}: {doubt}" for joint, doubt in contact_doubts(leg, result).items()]
 
 
-def _rated(hours: float, load: float, period_s: float, constants: "RatingLife | None") -> str:
-    """A maker's life, and the p v for which it holds."""
+def _rating_life(hours: float, load: float, period_s: float, constants: "RatingLife | None") -> str:
+    """The maker's rating life of a bushing at a load p v [Pa m/s], and the range of its formula."""
     least = constants.least_pressure_speed.si if constants else 0.0
     largest = constants.largest_pressure_speed if constants else None
-    held = f"its formula holds from {1e-6 * least:g}"
-    held += f" to {1e-6 * largest.si:g} MPa m/s" if largest else " MPa m/s"
+    validity = f"its formula holds from {1e-6 * least:g}"
+    validity += f" to {1e-6 * largest.si:g} MPa m/s" if largest else " MPa m/s"
     at = f"p v {1e-6 * load:.3g} MPa m/s"
     if math.isnan(hours):
-        return f"not given at {at}: {held}"
+        return f"not given at {at}: {validity}"
+    # below its range, the formula is evaluated at the lower end
     below = f", {1e-6 * least:g} inserted" if load < least else ""
-    return (
-        f"{hours:.3g} h ({3600.0 * hours / period_s:.3g} gait cycles) at {at}{below}, all factors 1; {held}"
-    )
+    cycles = 3600.0 * hours / period_s
+    return f"{hours:.3g} h ({cycles:.3g} gait cycles) at {at}{below}, all factors 1; {validity}"
 
 
 def lines(result: "Life", limit_m: float, not_counted: Sequence[str] = ()) -> list[str]:
-    """The life as a table, and when each joint reaches the limit."""
+    """The life as a table of some of its points, and when each joint reaches the limit."""
     points = len(result.cycles)
-    shown = sorted({round(i * (points - 1) / max(1, _ROWS - 1)) for i in range(min(_ROWS, points))})
+    shown = sorted(
+        {round(i * (points - 1) / max(1, _TABLE_ROWS - 1)) for i in range(min(_TABLE_ROWS, points))}
+    )
     head = "".join(f"{joint:>22}" for joint in result.clearance_joints)
     table = [
         f"{'cycles':>10}{head}",
@@ -239,12 +248,12 @@ def lines(result: "Life", limit_m: float, not_counted: Sequence[str] = ()) -> li
         if joint in not_counted:
             table.append(f"{joint} not counted: its pair gives no wear coefficient")
         else:
-            table.append(f"{joint} {_end(result, ends[joint], limit_m)}")
+            table.append(f"{joint} {_life_end(result, ends[joint], limit_m)}")
     return table
 
 
 def _growth_by_load(result: "Life") -> list[str]:
-    """Growth of each joint when new under each load of the duty."""
+    """Growth of each joint's clearance in the new leg, under each load of the duty."""
     table = [
         "growth when new [µm a million gait cycles]" + "".join(f"{j:>10}" for j in result.clearance_joints)
     ]
@@ -255,14 +264,15 @@ def _growth_by_load(result: "Life") -> list[str]:
 
 
 def _degrees(sector_deg: float) -> str:
+    """Direction of the deepest wear, for the table; a dash before there is any."""
     return "-" if math.isnan(sector_deg) else f"{sector_deg:.0f}"
 
 
-def _end(result: "Life", end: dict[str, float | None], limit_m: float) -> str:
-    """When a joint reaches its limit."""
+def _life_end(result: "Life", end: dict[str, float | None], limit_m: float) -> str:
+    """When a joint, or the leg, reaches the limit."""
     if end["cycles"] is None:
         return f"does not reach {1e6 * limit_m:g} µm: at its last rate, its clearance does not grow"
     days = f", {end['days']:.3g} days of {result.duty.hours_per_day:g} h" if result.duty else ""
-    held = "" if end["cycles"] <= result.cycles[-1] else ", extrapolated at its last rate"
+    beyond = "" if end["cycles"] <= result.cycles[-1] else ", extrapolated at its last rate"
     after = f"{end['cycles']:.3g} gait cycles, {end['hours']:.3g} h{days}"
-    return f"reaches {1e6 * limit_m:g} µm after {after}{held}"
+    return f"reaches {1e6 * limit_m:g} µm after {after}{beyond}"

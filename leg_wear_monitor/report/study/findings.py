@@ -1,4 +1,8 @@
-"""Conclusions of a study as sentences computed from its data."""
+"""Conclusions of a study as sentences computed from its results, for the page of the study.
+
+A function returns the sentences of one question; `labelled` are the results of the points of a study, each
+with its label. Values are means of an ensemble with their spread.
+"""
 
 from collections.abc import Sequence
 
@@ -29,34 +33,35 @@ from leg_wear_monitor.studies.plan import (
     worst_zone,
 )
 
-_SUM_WITHIN = 0.1  # relative deviation up to which the combined effect counts as the sum of the single ones
-_NO_POWER = 0.1  # standard error of a power law's exponent above which the power law is not reported
+# relative deviation up to which the combined effect counts as the sum of the single ones
+_LARGEST_SUM_DEVIATION = 0.1
+# standard error of a power law's exponent above which the power law is not reported
+_LARGEST_EXPONENT_ERROR = 0.1
 
 
-def _known(arrays: Arrays) -> list[Quantity]:
+def _simulated_quantities(arrays: Arrays) -> list[Quantity]:
+    """Quantities whose error against the ideal leg the results contain."""
     return [quantity for quantity in QUANTITIES if f"ideal_{quantity.name}" in arrays]
 
 
 def disturbance(labelled: Labelled) -> list[str]:
     """Largest errors of displacement, velocity and acceleration relative to the range of the ideal curves."""
-    known = [quantity for quantity in _known(labelled[0][1]) if quantity.name.startswith("toe")]
-    if len(known) < 3:
+    toe = [quantity for quantity in _simulated_quantities(labelled[0][1]) if quantity.name.startswith("toe")]
+    if len(toe) < 3:  # displacement, velocity, acceleration
         return []
-    fractions = {
-        each.title: [fraction_of_range(arrays, each.name) for _, arrays in labelled] for each in known
-    }
+    fractions = {each.title: [fraction_of_range(arrays, each.name) for _, arrays in labelled] for each in toe}
     texts = [
         f"{percent(min(each))} to {percent(max(each))}" if min(each) < max(each) else percent(each[0])
         for each in fractions.values()
     ]
     rises = all(a < b < c for a, b, c in zip(*fractions.values(), strict=True))
-    evaluated = (
+    conclusion = (
         "the higher the derivative, the more it is disturbed"
         if rises
         else "the order displacement, velocity, acceleration does not hold everywhere"
     )
     parts = [f"{title} {text}" for title, text in zip(fractions, texts, strict=True)]
-    return [f"Largest errors in a cycle, of the ideal curve's range: {joined(parts)}; {evaluated}."]
+    return [f"Largest errors in a cycle, of the ideal curve's range: {joined(parts)}; {conclusion}."]
 
 
 def growth(values: Sequence[float], labelled: Labelled, what: str) -> list[str]:
@@ -72,20 +77,20 @@ def growth(values: Sequence[float], labelled: Labelled, what: str) -> list[str]:
         Name of the parameter.
     """
     sentences = []
-    for each in _known(labelled[0][1]):
+    for each in _simulated_quantities(labelled[0][1]):
         spreads = [largest_error(arrays, each.name) for _, arrays in labelled]
         sentences.append(
             f"The largest {each.title} error goes from {with_spread(spreads[0], each.factor)} to "
-            f"{with_spread(spreads[-1], each.factor)} {each.unit}{_as_power(values, spreads, what)}."
+            f"{with_spread(spreads[-1], each.factor)} {each.unit}{_power_law(values, spreads, what)}."
         )
     for joint in clearance_joints_of(labelled[0][1]):
         forces = [peak_force(arrays, joint) for _, arrays in labelled]
         wear = [depth_per_cycle(arrays, joint) for _, arrays in labelled]
         sentences.append(
             f"Joint {joint}: the largest contact force in a cycle goes from {with_spread(forces[0])} to "
-            f"{with_spread(forces[-1])} N{_as_power(values, forces, what)}; the greatest wear depth from "
+            f"{with_spread(forces[-1])} N{_power_law(values, forces, what)}; the greatest wear depth from "
             f"{with_spread(wear[0], PICO)} to {with_spread(wear[-1], PICO)} pm a cycle"
-            f"{_as_power(values, wear, what)}."
+            f"{_power_law(values, wear, what)}."
         )
     return sentences
 
@@ -108,12 +113,13 @@ def regular_where(labelled: Labelled) -> list[str]:
     return sentences
 
 
-def _as_power(values: Sequence[float], spreads: Sequence[Spread], what: str) -> str:
+def _power_law(values: Sequence[float], spreads: Sequence[Spread], what: str) -> str:
+    """Power law of means over the parameter, as the end of a sentence; empty if there is no clear one."""
     means = np.array([each.mean for each in spreads])
     if len(values) < 4 or min(values) <= 0.0 or not (means > 0.0).all():
         return ""
     power, error = power_law(values, means)
-    if error > _NO_POWER:
+    if error > _LARGEST_EXPONENT_ERROR:
         return ""
     return f", about as {what} to the power {with_spread(Spread(power, error, power, power))}"
 
@@ -121,20 +127,20 @@ def _as_power(values: Sequence[float], spreads: Sequence[Spread], what: str) -> 
 def places(labelled: Labelled) -> list[str]:
     """Ranking of the clearance joints by errors, forces, wear, impacts and periodicity."""
     sentences = []
-    for each in _known(labelled[0][1]):
+    for each in _simulated_quantities(labelled[0][1]):
         errors = [(label, largest_error(arrays, each.name)) for label, arrays in labelled]
-        ranking = _ranked(errors, each.factor)
+        ranking = _ranking(errors, each.factor)
         sentences.append(
             f"Largest {each.title} error in a cycle [{each.unit}], the greatest first: {ranking}."
         )
-    joints = _joints(labelled)
+    joints = _labelled_joints(labelled)
     forces = [(name, peak_force(arrays, joint)) for name, joint, arrays in joints]
-    sentences.append(f"Largest contact force in a cycle [N], the greatest first: {_ranked(forces)}.")
+    sentences.append(f"Largest contact force in a cycle [N], the greatest first: {_ranking(forces)}.")
     return [*sentences, *wear(labelled), *impacts(labelled), *regularity(labelled), *zones(labelled)]
 
 
-def _joints(labelled: Labelled) -> list[tuple[str, str, Arrays]]:
-    """A unique name, the joint and the arrays, for every clearance joint of every point."""
+def _labelled_joints(labelled: Labelled) -> list[tuple[str, str, Arrays]]:
+    """Every clearance joint of every point: a unique name, the joint, and the results of the point."""
     several = len(labelled) > 1
     return [
         (f"{joint} of {{{label}}}" if several and label != joint else joint, joint, arrays)
@@ -143,35 +149,37 @@ def _joints(labelled: Labelled) -> list[tuple[str, str, Arrays]]:
     ]
 
 
-def _ranked(values: Sequence[tuple[str, Spread]], factor: float = 1.0) -> str:
-    ranked = sorted(values, key=lambda one: -one[1].mean)
+def _ranking(values: Sequence[tuple[str, Spread]], factor: float = 1.0) -> str:
+    """Names with their values, times a factor for the unit, the largest mean first."""
+    ranked = sorted(values, key=lambda item: -item[1].mean)
     return "; ".join(f"{name} {with_spread(value, factor)}" for name, value in ranked)
 
 
 def wear(labelled: Labelled) -> list[str]:
     """Ranking of the joints by wear depth."""
-    joints = _joints(labelled)
+    joints = _labelled_joints(labelled)
     depths = [(name, depth_per_cycle(arrays, joint)) for name, joint, arrays in joints]
-    return [f"Greatest wear depth [pm a cycle], the greatest first: {_ranked(depths, PICO)}."]
+    return [f"Greatest wear depth [pm a cycle], the greatest first: {_ranking(depths, PICO)}."]
 
 
 def impacts(labelled: Labelled) -> list[str]:
     """Ranking of the joints by impacts per cycle."""
     counts = [
-        (name, of_clearance_joints(arrays, "impacts", joint)) for name, joint, arrays in _joints(labelled)
+        (name, of_clearance_joints(arrays, "impacts", joint))
+        for name, joint, arrays in _labelled_joints(labelled)
     ]
-    return [f"Impacts a cycle, the most first: {_ranked(counts)}."]
+    return [f"Impacts a cycle, the most first: {_ranking(counts)}."]
 
 
 def regularity(labelled: Labelled) -> list[str]:
     """Ranking of the joints by the periodicity of their contact force."""
     fractions = [
         (name, of_clearance_joints(arrays, "repeats_contact_force", joint))
-        for name, joint, arrays in _joints(labelled)
+        for name, joint, arrays in _labelled_joints(labelled)
     ]
     return [
         "Fraction of the contact force's variance that repeats from cycle to cycle [%] (100 is periodic), "
-        f"the most regular first: {_ranked(fractions, 100.0)}."
+        f"the most regular first: {_ranking(fractions, 100.0)}."
     ]
 
 
@@ -180,9 +188,11 @@ def zones(labelled: Labelled) -> list[str]:
     sentences = []
     for fraction in (0.5, 0.9):
         known = [
-            (name, zone) for name, joint, a in _joints(labelled) if (zone := worst_zone(a, joint, fraction))
+            (name, zone)
+            for name, joint, a in _labelled_joints(labelled)
+            if (zone := worst_zone(a, joint, fraction))
         ]
-        ranked = sorted(known, key=lambda one: one[1][1] - one[1][0])
+        ranked = sorted(known, key=lambda item: item[1][1] - item[1][0])
         texts = "; ".join(f"{name} {zone_text(zone)}" for name, zone in ranked)
         if texts:
             head = f"Zone that holds {percent(fraction)} of the bushing's wear"
@@ -193,22 +203,23 @@ def zones(labelled: Labelled) -> list[str]:
 def superposition(parts: Labelled, whole: Arrays) -> list[str]:
     """Comparison of all clearances at once with the sum of the effects of single clearance joints."""
     ratios, texts = [], []
-    for each in _known(whole):
+    for each in _simulated_quantities(whole):
         together = largest_error(whole, each.name)
         total = sum(largest_error(arrays, each.name).mean for _, arrays in parts)
         ratios.append(together.mean / total)
         summed = f"{number(each.factor * total)} {each.unit}"
         texts.append(f"{each.title} {with_spread(together, each.factor)} against {summed}")
-    verdict = "is" if all(abs(ratio - 1.0) < _SUM_WITHIN for ratio in ratios) else "is not"
+    verdict = "is" if all(abs(ratio - 1.0) < _LARGEST_SUM_DEVIATION for ratio in ratios) else "is not"
     fractions = joined([percent(ratio) for ratio in ratios])
     return [
         f"All at once {verdict} the sum of the places alone: largest errors are {fractions} of the sum "
         f"({joined(texts)}).",
-        *(_against_alone(joint, arrays, whole) for _, joint, arrays in _joints(parts)),
+        *(_joint_against_alone(joint, arrays, whole) for _, joint, arrays in _labelled_joints(parts)),
     ]
 
 
-def _against_alone(joint: str, alone: Arrays, whole: Arrays) -> str:
+def _joint_against_alone(joint: str, alone: Arrays, whole: Arrays) -> str:
+    """Sentence on a joint: with all clearances, relative to its clearance alone."""
     force = peak_force(whole, joint).mean / peak_force(alone, joint).mean
     depth = depth_per_cycle(whole, joint).mean / depth_per_cycle(alone, joint).mean
     volume = of_clearance_joints(whole, "archard_integral_j_per_cycle", joint).mean
@@ -234,16 +245,17 @@ def worst_joint(whole: Arrays) -> list[str]:
 
 def laws(labelled: Labelled) -> list[str]:
     """Sensitivity of errors and wear to the normal law and to the friction law."""
+    # a point is labelled with its normal law, or with "friction" and a friction law or coefficient
     normal = [one for one in labelled if one[0] in NORMAL_LAWS]
-    lossy = [one for one in normal if one[0] != "hertz"]
+    dissipative = [one for one in normal if one[0] != "hertz"]  # Hertz is elastic
     friction = [one for one in labelled if one[0] not in NORMAL_LAWS]
-    groups = (("The normal laws", normal), ("The dissipative ones", lossy), ("Friction", friction))
+    groups = (("The normal laws", normal), ("The dissipative ones", dissipative), ("Friction", friction))
     sentences = [_law_sentence(what, group) for what, group in groups if len(group) > 1]
     for joint in clearance_joints_of(labelled[0][1]):
         volumes = [
             of_clearance_joints(arrays, "archard_integral_j_per_cycle", joint) for _, arrays in labelled
         ]
-        low, high = _ends(volumes)
+        low, high = _extremes(volumes)
         sentences.append(
             f"Wear of {joint}, ∫ F |v| dt [J a cycle]: from {with_spread(volumes[low])} ({labelled[low][0]}) "
             f"to {with_spread(volumes[high])} ({labelled[high][0]})."
@@ -251,7 +263,7 @@ def laws(labelled: Labelled) -> list[str]:
     return sentences
 
 
-def _ends(spreads: Sequence[Spread]) -> tuple[int, int]:
+def _extremes(spreads: Sequence[Spread]) -> tuple[int, int]:
     """Indices of the smallest and of the largest mean."""
     means = [each.mean for each in spreads]
     return means.index(min(means)), means.index(max(means))
@@ -260,16 +272,17 @@ def _ends(spreads: Sequence[Spread]) -> tuple[int, int]:
 def _law_sentence(what: str, group: Labelled) -> str:
     """Sentence on the relative range of the means within a group of laws."""
     parts = []
-    for each in _known(group[0][1]):
+    for each in _simulated_quantities(group[0][1]):
         parts.append((each.title, [largest_error(arrays, each.name) for _, arrays in group]))
     for joint in clearance_joints_of(group[0][1]):
         volumes = [of_clearance_joints(arrays, "archard_integral_j_per_cycle", joint) for _, arrays in group]
         parts.append((f"wear of {joint}", volumes))
-    texts = [f"{name} {percent(_span(spreads))}" for name, spreads in parts]
+    texts = [f"{name} {percent(_relative_range(spreads))}" for name, spreads in parts]
     names = joined([label.removeprefix("friction ") for label, _ in group])
     return f"{what} ({names}): largest minus smallest mean, relative to the mean: {', '.join(texts)}."
 
 
-def _span(spreads: Sequence[Spread]) -> float:
+def _relative_range(spreads: Sequence[Spread]) -> float:
+    """Largest minus smallest mean, relative to the mean."""
     means = np.array([each.mean for each in spreads])
     return float(np.ptp(means) / means.mean())

@@ -15,7 +15,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from leg_wear_monitor.fleet.learning import LOT, PAIR, PART, Part, learn
+from leg_wear_monitor.fleet.learning import LOT_FRACTION, PAIR_FRACTION, PART_FRACTION, Part, learn
 from leg_wear_monitor.monitor.forecast.wear_coefficients import CoefficientPrior
 
 SIGMA, ERROR_M, Z90 = 0.7, 7.0e-6, NormalDist().inv_cdf(0.9)  # 5 µm of the new part, 5 µm of the measurement
@@ -41,7 +41,8 @@ def inside(prior, truth):
 
 def one_fleet(random, earlier, growth_m, scale):
     """Coverage, sigma and parts set aside, for each leg that is asked."""
-    pair, between, within = (SIGMA * math.sqrt(scale * one) for one in (PAIR, LOT, PART))
+    fractions = PAIR_FRACTION, LOT_FRACTION, PART_FRACTION
+    pair, between, within = (SIGMA * math.sqrt(scale * one) for one in fractions)
     centre, parts, found = pair * random.standard_normal(), [], []
     for lot in range(earlier + 1):
         level = centre + between * random.standard_normal()

@@ -1,4 +1,9 @@
-"""Wear coefficients of a fleet: three levels, ln x = pair + lot + part, fitted to measured clearances."""
+"""Wear coefficients of a fleet: priors of parts, learned from the measured clearances of all other parts.
+
+The model has three levels: a material pair, the lots of its parts, and the parts of a lot. The file goes from
+the inside to the outside: the model with normal likelihoods, the parts of a leg, the fit to measured parts,
+and `learn`.
+"""
 
 import itertools
 import math
@@ -23,22 +28,23 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
 )
 from leg_wear_monitor.monitor.ledger.entry import CorrectedClearance, Measurement
 
-# Three levels of wear coefficients: ln x = pair + lot + part, normal on each level.
+# The model with normal likelihoods: ln x = pair + lot + part, each of them normal.
 #
 # x is a part's factor on its nominal wear coefficient. The three levels share the variance of the pair's
 # prior. Half of it is the pair's, since a published coefficient holds for the tests of another laboratory; a
 # quarter each is expected between lots and between the parts of a lot. These fractions are a judgement. The
 # variances between lots and parts are not known: their standard deviations have lognormal priors, a factor of
 # 1.65 up and down, on a grid. Given the variances, all is normal and in closed form.
+# Normal distributions are kept as precision (inverse variance) and pull (precision times mean), which add up.
 
 
-PAIR, LOT, PART = 0.5, 0.25, 0.25
-"""Expected fractions of the variance."""
+PAIR_FRACTION, LOT_FRACTION, PART_FRACTION = 0.5, 0.25, 0.25
+"""Expected fractions of the prior variance of ln x, on each level."""
 
-_LOG_SIGMA = 0.5  # of the standard deviations between lots and between parts
-_STEP = 0.15  # between nodes: a standard deviation is at most 8 % beside one
-_NODES = np.arange(-10, 11) * _STEP
-_CHUNK = 256  # parts at a time, to bound the memory
+_LOG_SIGMA = 0.5  # of the logarithm of the standard deviations between lots and between parts
+_NODE_STEP = 0.15  # between nodes of the grid: a standard deviation is within 8 % of a node
+_NODES = np.arange(-10, 11) * _NODE_STEP
+_PARTS_PER_CHUNK = 256  # parts at a time, to bound the memory
 
 
 @attrs.frozen(eq=False)
@@ -79,13 +85,14 @@ class Prediction:
 
 @attrs.frozen(eq=False)
 class Variances:
-    """Variances that are possible: of the pair, and nodes of a grid for lots (l,) and parts (p,).
+    """Possible variances of ln x: of the pair, known, and between lots (l,) and parts (p,), on a grid.
 
     Attributes
     ----------
     pair : float
     lot, part : (l,) array, (p,) array
     log_prior : (l, p) array
+        Logarithm of the prior density at the nodes.
     """
 
     pair: float
@@ -108,26 +115,29 @@ def variances(sigma: float) -> Variances:
     ratio *= weight.sum() / float(weight @ ratio)  # to a mean of 1
     square = sigma**2
     return Variances(
-        PAIR * square, LOT * square * ratio, PART * square * ratio, log_prior[:, None] + log_prior
+        PAIR_FRACTION * square,
+        LOT_FRACTION * square * ratio,
+        PART_FRACTION * square * ratio,
+        log_prior[:, None] + log_prior,
     )
 
 
 @attrs.frozen(eq=False)
-class _Sums:
-    """Normal distributions in closed form for all variances of the grid, as precision and pull.
+class _Levels:
+    """Evidence passed from level to level, for all variances of the grid, as precision and pull.
 
     Attributes
     ----------
     own, own_pull : (p, n) array
-        Of each part for the level of its lot.
+        From each part to the value of its lot.
     of_lot, of_lot_pull : (p, lots) array
-        Of all parts of a lot for its level.
+        From all parts of a lot to its value.
     of_pair, of_pair_pull : (l, p, lots) array
-        Of each lot for the level of the pair.
+        From each lot to the value of the pair.
     total, total_pull : (l, p, 1) array
-        Of all lots and the prior for the level of the pair.
+        From all lots and the prior to the value of the pair.
     log_weight : (l, p) array
-        Posterior of the variances.
+        Logarithm of the posterior of the variances.
     """
 
     own: Floats
@@ -143,11 +153,11 @@ class _Sums:
 
 def predict(evidence: Evidence, given: Variances) -> Prediction:
     """Prediction of each part from all other parts; a part without precision is predicted from all."""
-    sums = _sums(evidence, given)
+    sums = _summed_levels(evidence, given)
     count = len(evidence.lot)
     chunks = [
-        _left_out(evidence, given, sums, slice(first, min(first + _CHUNK, count)))
-        for first in range(0, count, _CHUNK)
+        _leave_one_out(evidence, given, sums, slice(first, min(first + _PARTS_PER_CHUNK, count)))
+        for first in range(0, count, _PARTS_PER_CHUNK)
     ]
     mean, sigma = (np.concatenate(parts) for parts in zip(*chunks, strict=True))
     weight = _normalized(sums.log_weight)
@@ -159,8 +169,10 @@ def predict(evidence: Evidence, given: Variances) -> Prediction:
     )
 
 
-def _sums(evidence: Evidence, given: Variances) -> _Sums:
+def _summed_levels(evidence: Evidence, given: Variances) -> _Levels:
+    """Pass the evidence from the parts to the lots and to the pair."""
     starts = np.flatnonzero(np.diff(evidence.lot, prepend=-1))
+    # a part's evidence of its lot has the variance between parts added
     shrink = 1.0 / (1.0 + given.part[:, None] * evidence.precision)
     own, own_pull = evidence.precision * shrink, evidence.pull * shrink
     of_lot, of_lot_pull = (np.add.reduceat(each, starts, axis=1) for each in (own, own_pull))
@@ -175,15 +187,17 @@ def _sums(evidence: Evidence, given: Variances) -> _Sums:
     log_scale = np.log(shrink).sum(axis=1) + np.log(shrink_lot).sum(axis=2)
     log_scale -= np.log(given.pair * total[:, :, 0])
     log_weight = given.log_prior + 0.5 * (log_scale + square)
-    return _Sums(own, own_pull, of_lot, of_lot_pull, of_pair, of_pair_pull, total, total_pull, log_weight)
+    return _Levels(own, own_pull, of_lot, of_lot_pull, of_pair, of_pair_pull, total, total_pull, log_weight)
 
 
-def _left_out(evidence: Evidence, given: Variances, sums: _Sums, parts: slice) -> tuple[Floats, Floats]:
+def _leave_one_out(
+    evidence: Evidence, given: Variances, sums: _Levels, parts: slice
+) -> tuple[Floats, Floats]:
     """Mean and standard deviation (c,) of parts, each from all others; arrays in between are (l, p, c)."""
     lot, precision, pull = evidence.lot[parts], evidence.precision[parts], evidence.pull[parts]
     others = np.maximum(sums.of_lot[:, lot] - sums.own[:, parts], 0.0)
     others_pull = sums.of_lot_pull[:, lot] - sums.own_pull[:, parts]
-    # the lot's level: from the other lots, then from the other parts of this one
+    # value of the lot: from the other lots, then from the other parts of this one
     pair = sums.total - sums.of_pair[:, :, lot]
     before = 1.0 / (1.0 / pair + given.lot[:, None, None])
     level = before + others
@@ -204,7 +218,7 @@ def _normalized(log_weight: Floats) -> Floats:
     return np.asarray(weight / weight.sum(axis=(0, 1), keepdims=True))
 
 
-# Parts of the legs of a fleet, with what their measured clearances say about their wear coefficients.
+# The parts of a leg, each with the factor on its wear coefficient that its measured clearances show.
 
 
 @attrs.frozen(kw_only=True)
@@ -215,20 +229,20 @@ class Part:
     ----------
     leg, joint : str
     replaced_ns : int
-        When it was mounted, 0 for the first part.
+        When it was mounted [ns], 0 for the first part.
     is_present : bool
         Whether it is in the leg now.
     pair : str
         Material pair and nominal wear coefficients.
     lot : str
-        Empty if it is not known.
+        Empty if unknown.
     nominal_per_pa : float
         Nominal wear coefficient of bushing and journal together.
     prior : CoefficientPrior
-        That of its material pair, before anything is learned.
+        Prior of its material pair, before anything is learned.
     factor, precision : float
-        Factor on the nominal coefficient by the measured clearances, and the inverse of its variance; a
-        precision of 0 means that nothing is measured.
+        Measured factor on the nominal coefficient, and the inverse of its variance; a precision of 0 means
+        that nothing is measured.
     """
 
     leg: str
@@ -244,7 +258,7 @@ class Part:
 
     @property
     def key(self) -> tuple[str, str, int]:
-        """Leg, joint and time of mounting, which name a part."""
+        """Leg, joint and time of mounting, which identify a part."""
         return self.leg, self.joint, self.replaced_ns
 
 
@@ -259,14 +273,14 @@ def parts_of(
     lots: Mapping[str, str] | None = None,
     corrections: Sequence[CorrectedClearance] = (),
 ) -> list[Part]:
-    """All parts that a leg has, and those it had that were measured.
+    """All present parts of a leg, and its former parts that were measured.
 
     Parameters
     ----------
     leg : str
         Its name in the fleet.
     mechanism : Mechanism
-        As the configuration wants it.
+        With the parameters of the leg's configuration applied.
     settings : Forecasting
     measurements : sequence of Measurement
         Of its ledger.
@@ -311,42 +325,45 @@ def pair_of(clearance: Clearance) -> str:
     return f"{clearance.material or 'no material'}, {bushing:.6g} and {journal:.6g} 1/Pa"
 
 
-# Fit of the three levels to the measured parts of a material pair.
+# The fit of the model to the measured parts of a material pair, by expectation propagation.
 #
-# A measured clearance is normal in the factor x, the levels are normal in ln x. So each part's likelihood is
-# approximated by a normal one in ln x, at the place that the other parts predict: with it, that prediction
-# leads to the same mean and variance (expectation propagation). Predictions and likelihoods are repeated
-# until they agree.
+# A measured clearance is normal in the factor x, but the levels are normal in ln x. So each part's likelihood
+# is replaced by a normal one in ln x, chosen so that the prediction from the other parts, updated with it,
+# has the same mean and variance as with the true one. Predictions and likelihoods are computed in turn until
+# they agree.
 
 
-ASIDE = 4.0
-"""Residual beyond which other parts do not learn from a part: one in 16 000 parts if the model is right."""
+_MOST_TRUSTED_RESIDUAL = 4.0
+"""Residual above which other parts do not learn from a part: one in 16 000 parts if the model is right."""
 
-LEAST = 5
-"""Other parts that count, below which no part is set aside: it is not known which of them is wrong."""
+_LEAST_OTHERS = 5
+"""With fewer other parts, none is set aside, because it is unclear which of them is wrong."""
 
-MOST_RESIDUAL = 8.0  # beyond it, probabilities are 0 in double precision
+_LARGEST_RESIDUAL = 8.0  # beyond it, probabilities are 0 in double precision
 
-_ROUNDS, _SETTLED = 50, 1.0e-4  # the second in standard deviations
-_DAMPING = 0.7  # fraction of a change that is made, since all parts change at the same time
+_ITERATIONS, _CONVERGED = 50, 1.0e-4  # at most; largest change, in standard deviations
+_DAMPING = 0.7  # fraction of each change that is applied, since all parts change at once
 
-_Group = tuple[str, ...]  # a lot; a part of an unknown lot is a group of its own
-_NEW: _Group = ("2",)
+# A group is a lot; a part of an unknown lot is a group of its own. The first string is its kind, by which
+# groups are sorted: "0" part of an unknown lot, "1" known lot, "2" new lot.
+_Group = tuple[str, ...]
+_NEW_LOT: _Group = ("2",)
 
-_NORMAL = np.linspace(-MOST_RESIDUAL, MOST_RESIDUAL, 201)
-_DENSITY = np.exp(-0.5 * np.square(_NORMAL))
-_DENSITY /= _DENSITY.sum()
+# nodes and weights of a standard normal distribution, for integrals over a prediction
+_STANDARD_NODES = np.linspace(-_LARGEST_RESIDUAL, _LARGEST_RESIDUAL, 201)
+_STANDARD_WEIGHTS = np.exp(-0.5 * np.square(_STANDARD_NODES))
+_STANDARD_WEIGHTS /= _STANDARD_WEIGHTS.sum()
 
-_phi = np.frompyfunc(NormalDist().cdf, 1, 1)
+_normal_cdf = np.frompyfunc(NormalDist().cdf, 1, 1)
 
 
 class Fit:
-    """Predictions of the measured parts, of a further part of each lot, and of a part of a new lot.
+    """Predictions for the measured parts, for a further part of each lot, and for a part of a new lot.
 
     Parameters
     ----------
     measured : sequence of Part
-        In an order that depends on the parts only.
+        In an order that depends on the parts only, so that results do not depend on that of the fleet.
     lots : sequence of str
         Known lots.
     sigma : float
@@ -371,28 +388,30 @@ class Fit:
     prediction: Prediction
 
     def __init__(self, measured: Sequence[Part], lots: Sequence[str], sigma: float) -> None:
-        self._measured, self._sigma, self._given = measured, sigma, variances(sigma)
+        self._measured, self._sigma, self._variances = measured, sigma, variances(sigma)
+        # The model needs the parts sorted by lot: `_groups` is in the order of the attributes, `_sorted` are
+        # the numbers in the order of lots.
         places = [(_group(part), k) for k, part in enumerate(measured)]
         places += [(("1", lot), len(measured) + j) for j, lot in enumerate(lots)]
-        places.append((_NEW, len(measured) + len(lots)))
+        places.append((_NEW_LOT, len(measured) + len(lots)))
         groups, numbers = zip(*sorted(places), strict=True)
         self._groups: list[_Group] = [group for group, _ in places]
-        self._order = np.array(numbers)
+        self._sorted = np.array(numbers)
         begins = [one != before for before, one in itertools.pairwise(groups)]
         self._lot = np.cumsum([False, *begins])
         self.counts = np.ones(len(measured), dtype=bool)
-        self._counting: Counter[_Group] = Counter()
+        self._counts_by_group: Counter[_Group] = Counter()
 
-    def settle(self) -> None:
-        """Fit the parts that count, from the beginning."""
-        self._counting = Counter(self._groups[k] for k in np.flatnonzero(self.counts).tolist())
+    def iterate(self) -> None:
+        """Fit the parts that count, starting from the prior."""
+        self._counts_by_group = Counter(self._groups[k] for k in np.flatnonzero(self.counts).tolist())
         self.mean, self.spread = np.zeros(len(self._groups)), np.full(len(self._groups), self._sigma)
-        for _ in range(_ROUNDS):
-            self.prediction = predict(self._evidence(), self._given)
+        for _ in range(_ITERATIONS):
+            self.prediction = predict(self._evidence(), self._variances)
             mean, spread = np.empty_like(self.mean), np.empty_like(self.spread)
-            mean[self._order], spread[self._order] = self.prediction.mean, self.prediction.sigma
+            mean[self._sorted], spread[self._sorted] = self.prediction.mean, self.prediction.sigma
             change = np.maximum(np.abs(mean - self.mean), np.abs(spread - self.spread)) / spread
-            if change.max() < _SETTLED:
+            if change.max() < _CONVERGED:
                 break
             self.mean += _DAMPING * (mean - self.mean)
             self.spread += _DAMPING * (spread - self.spread)
@@ -401,49 +420,50 @@ class Fit:
         )
 
     def _evidence(self) -> Evidence:
+        """Normal likelihoods at the present predictions, sorted by lot."""
         likelihood = np.zeros((2, len(self._groups)))
         for k in np.flatnonzero(self.counts).tolist():
             likelihood[:, k] = _normal_likelihood(self._measured[k], self.mean[k], self.spread[k])
-        precision, pull = likelihood[:, self._order]
+        precision, pull = likelihood[:, self._sorted]
         return Evidence(precision, pull, self._lot)
 
     def prior(self, number: int) -> CoefficientPrior:
-        """Prior of a measured part, and after these of a further part of each lot, and of a new lot."""
+        """Learned prior of a part, numbered as `mean`."""
         basis = self._basis(number)
         if not basis:  # nothing else is measured
             return self._measured[number].prior
         return CoefficientPrior(mean=float(self.mean[number]), sigma=float(self.spread[number]), basis=basis)
 
     def outlier(self) -> int | None:
-        """The part that contradicts all others most, if it is to be set aside."""
+        """Number of the part with the largest residual, if it is to be set aside."""
         sizes = np.where(self.counts, np.abs(self.residuals), 0.0)
-        if np.count_nonzero(self.counts) <= LEAST or sizes.max() <= ASIDE:
+        if np.count_nonzero(self.counts) <= _LEAST_OTHERS or sizes.max() <= _MOST_TRUSTED_RESIDUAL:
             return None
         return int(sizes.argmax())
 
     def _basis(self, number: int) -> str:
-        """What was measured for a prior; empty if nothing was."""
+        """Text on the measured parts that a prior is learned from; empty without any."""
         group = self._groups[number]
         is_in = number < len(self.counts) and bool(self.counts[number])
-        own = self._counting[group] - is_in
-        others = self._counting.total() - self._counting[group]
-        texts = [f"{_parts(own)} of lot {group[1]}"] if own else []
+        own = self._counts_by_group[group] - is_in
+        others = self._counts_by_group.total() - self._counts_by_group[group]
+        texts = [f"{_part_count(own)} of lot {group[1]}"] if own else []
         if others:
-            texts.append(f"{others} of other lots" if own else f"{_parts(others)} of other lots")
+            texts.append(f"{others} of other lots" if own else f"{_part_count(others)} of other lots")
         return " and ".join(texts)
 
 
 def _residual(part: Part, mean: float, sigma: float) -> float:
-    """Measured factor of a part in standard deviations of what is predicted, by its tail probability."""
-    predicted = np.exp(mean + sigma * _NORMAL)
+    """Deviation of a measured factor from its prediction [standard deviations], from its tail probability."""
+    predicted = np.exp(mean + sigma * _STANDARD_NODES)
     z = (part.factor - predicted) * math.sqrt(part.precision)
     # the smaller tail, since the other one is 1 to all digits
-    below, above = (float(_DENSITY @ np.asarray(_phi(tail), dtype=float)) for tail in (z, -z))
-    size = -NormalDist().inv_cdf(max(min(below, above, 0.5), NormalDist().cdf(-MOST_RESIDUAL)))
+    below, above = (float(_STANDARD_WEIGHTS @ np.asarray(_normal_cdf(tail), dtype=float)) for tail in (z, -z))
+    size = -NormalDist().inv_cdf(max(min(below, above, 0.5), NormalDist().cdf(-_LARGEST_RESIDUAL)))
     return size if above < below else -size
 
 
-def _parts(count: int) -> str:
+def _part_count(count: int) -> str:
     return f"{count} part" if count == 1 else f"{count} parts"
 
 
@@ -454,29 +474,29 @@ def _group(part: Part) -> _Group:
 
 
 def _normal_likelihood(part: Part, mean: float, sigma: float) -> tuple[float, float]:
-    """Precision and pull of the normal likelihood of ln x that takes a prior to the same moments."""
+    """Precision and pull of the normal likelihood of ln x that leads to the same posterior moments."""
     grid, log_weight = posterior_grid(CoefficientPrior(mean=mean, sigma=sigma), part.factor, part.precision)
     weight = np.exp(log_weight - log_weight.max())
     weight /= weight.sum()
     after = float(weight @ grid)
     variance = float(weight @ np.square(grid - after))
-    # a factor far below a prior moves and widens it: then the mean alone is kept
+    # a factor far below the prior would widen it, and no likelihood does that: only the mean is matched then
     variance = min(variance, sigma**2)
     return 1.0 / variance - 1.0 / sigma**2, after / variance - mean / sigma**2
 
 
-# Learn the wear coefficients of a fleet: priors of parts from the measured clearances of all other parts.
+# The result for a fleet: what the parts of each material pair show, and parts that contradict the others.
 
 
 @attrs.frozen(kw_only=True)
 class LearnedPart:
-    """A measured part.
+    """A measured part, its prior from the other parts, and how well it fits.
 
     Attributes
     ----------
     part : Part
     prior : CoefficientPrior
-        From all other parts that count.
+        Learned from all other parts that count.
     residual : float
         Measured factor against this prior, in standard deviations, at most 8; positive if it wears faster.
     counts : bool
@@ -490,8 +510,8 @@ class LearnedPart:
 
     @property
     def finding(self) -> str:
-        """What an operator has to look at; empty if it fits."""
-        if abs(self.residual) <= ASIDE:
+        """Text for operators if the part contradicts the others; empty otherwise."""
+        if abs(self.residual) <= _MOST_TRUSTED_RESIDUAL:
             return ""
         doubt = "it counts, too few others are measured" if self.counts else "others do not learn from it"
         than = "faster" if self.residual > 0.0 else "slower"
@@ -503,7 +523,7 @@ class LearnedPart:
 
 @attrs.frozen(kw_only=True)
 class LearnedPair:
-    """What the parts of a material pair say together.
+    """What the parts of a material pair show together.
 
     Attributes
     ----------
@@ -552,12 +572,13 @@ def learn(parts: Sequence[Part]) -> dict[str, LearnedPair]:
 
 
 def _learned(pair: str, measured: Sequence[Part], lots: Sequence[str]) -> LearnedPair:
+    """Fit the parts of a pair, and set aside the worst outlier until none is left."""
     sigma = max(part.prior.sigma for part in measured)
     fit = Fit(measured, lots, sigma)
-    fit.settle()
+    fit.iterate()
     while (outlier := fit.outlier()) is not None:
         fit.counts[outlier] = False
-        fit.settle()
+        fit.iterate()
     return LearnedPair(
         pair=pair,
         prior_sigma=sigma,

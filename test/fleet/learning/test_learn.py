@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from leg_wear_monitor.fleet.learning import LOT, PAIR, PART, Part, learn, variances
+from leg_wear_monitor.fleet.learning import LOT_FRACTION, PAIR_FRACTION, PART_FRACTION, Part, learn, variances
 from leg_wear_monitor.monitor.forecast.wear_coefficients import CoefficientPrior
 
 pytestmark = pytest.mark.plain
@@ -32,7 +32,8 @@ def measured(random, leg, lot, log_factor, growth_m=GROWTH_M):
 
 def fleet(random, lots, legs, growth_m=GROWTH_M, scale=1.0):
     """Parts of some lots of so many legs each, and their ln x, drawn from the model with scaled variances."""
-    pair, between, within = (SIGMA * math.sqrt(scale * one) for one in (PAIR, LOT, PART))
+    fractions = PAIR_FRACTION, LOT_FRACTION, PART_FRACTION
+    pair, between, within = (SIGMA * math.sqrt(scale * one) for one in fractions)
     centre, drawn = pair * random.standard_normal(), []
     for lot in range(lots):
         level = centre + between * random.standard_normal()
@@ -181,4 +182,4 @@ def test_coverage_and_narrowing_over_synthetic_fleets():
     assert first == pytest.approx(SIGMA)
     assert twentieth < fifth < 0.7 * first
     # what is left is the spread within a lot, which no other part can tell
-    assert SIGMA * math.sqrt(PART) < twentieth < 1.15 * SIGMA * math.sqrt(PART)
+    assert SIGMA * math.sqrt(PART_FRACTION) < twentieth < 1.15 * SIGMA * math.sqrt(PART_FRACTION)

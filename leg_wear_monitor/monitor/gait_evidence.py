@@ -245,7 +245,7 @@ class TorqueRecord:
         if not (math.isfinite(lag_s) and sigma_s > 0.0):
             return self.timing
         speed = statistics.direction * TURN / statistics.moving_s
-        return self.timing.with_angle(-lag_s * speed, speed, sigma_s * abs(speed), _FORGETTING)
+        return self.timing.with_cycle(-lag_s * speed, speed, sigma_s * abs(speed), _FORGETTING)
 
 
 # The gait cycles since the torque is not as predicted, and what explains them.

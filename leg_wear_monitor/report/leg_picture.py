@@ -1,4 +1,4 @@
-"""The leg as a picture, and as data for a page."""
+"""The leg as a figure, as data for the interactive picture of a page, and the figures of a simulation."""
 
 from collections.abc import Collection, Mapping
 from itertools import cycle
@@ -42,10 +42,11 @@ from leg_wear_monitor.report.figure import (
     worn_bushings,
 )
 
-# Drawing of bodies, joints, supports and springs of a mechanism.
+# Drawing of single bodies, joints, supports and springs.
 
 
-_WIDTH = 9.0  # of a bar [points]
+_BAR_WIDTH = 9.0  # points
+# white edge of texts, so that they can be read on any body
 _HALO = [patheffects.withStroke(linewidth=3.0, foreground=PAPER)]
 
 
@@ -58,9 +59,12 @@ def lighter(colour: str, fraction: float) -> tuple[float, float, float]:
 def draw_body(axes: Axes, corners: Floats, colour: str, layer: float) -> None:
     """Draw a plate or a bar with round ends around the corners (n, 2) [m], a square for one corner."""
     if len(corners) == 1:  # a slider
-        axes.plot(*corners[0], marker="s", markersize=2.4 * _WIDTH, color=lighter(colour, 0.55), zorder=layer)
+        axes.plot(
+            *corners[0], marker="s", markersize=2.4 * _BAR_WIDTH, color=lighter(colour, 0.55), zorder=layer
+        )
         return
-    for edge, line in ((colour, _WIDTH + 2.0), (lighter(colour, 0.55), _WIDTH)):
+    # a dark shape, and on it a lighter one that is narrower by the outline
+    for edge, line in ((colour, _BAR_WIDTH + 2.0), (lighter(colour, 0.55), _BAR_WIDTH)):
         shape = Polygon(
             corners, closed=len(corners) > 2, facecolor=edge, edgecolor=edge, linewidth=line, zorder=layer
         )
@@ -93,9 +97,11 @@ def draw_joint(axes: Axes, place: Floats, names: Mapping[str, bool], away: Float
     """
     axes.add_line(joint_mark(any(names.values()), place))
     dx, dy = 13.0 * away / (np.hypot(*away) or 1.0)
+    # estimated widths of the names [points]; beside the joint the row of names starts or ends at it, above or
+    # below it the row is centred
     wide = [6.0 * len(name) + 5.0 for name in names]
     start = dx - 0.5 * sum(wide) + 0.5 * np.sign(dx) * (abs(dx) > 8.0) * (sum(wide) - wide[0])
-    for i, (name, has_clearance) in enumerate(names.items()):  # side by side, each in its own colour
+    for i, (name, has_clearance) in enumerate(names.items()):  # each in its own colour
         along = start + sum(wide[:i]) + 0.5 * wide[i]
         write_beside(axes, place, name, (along, dy), VERMILION if has_clearance else INK)
 
@@ -139,15 +145,15 @@ def joint_mark(has_clearance: bool, place: Floats | tuple[float, float] = (0.0, 
     )
 
 
-# The leg to scale: its bodies, its joints and the path of its toe.
+# Figures of the whole leg to scale: its bodies, its joints and the path of its toe.
 
 
-PATH_POINTS = 360
-_TOE_EVERY, _BODIES_EVERY = 30, 60
-_NEAR_M = 1.0e-3  # joints closer than this are drawn at one place [m]
-_PANEL_IN, _KEY_IN = 4.4, 1.2
+PATH_POINTS = 360  # of a gait cycle
+_TOE_STEP_DEG, _BODIES_STEP_DEG = 30, 60  # of the crank, between dots of the toe and between drawn positions
+_ONE_PLACE_M = 1.0e-3  # joints closer than this are drawn at one place [m]
+_PANEL_IN, _LEGEND_IN = 4.4, 1.2  # widths [inch]
 
-Paths = dict[str, dict[str, Floats]]
+Paths = dict[str, dict[str, Floats]]  # path (N, 2) [m] of each point, by body and point
 
 
 def leg_picture(
@@ -177,36 +183,39 @@ def leg_picture(
     paths = _paths(mechanism, one_cycle(linkage, PATH_POINTS, 1.0).q)
     low, high = _extent(paths)
     height = (_PANEL_IN - 0.5) * (high[1] - low[1]) / (high[0] - low[0]) + 0.75
-    figure = new_figure(2.0 * _PANEL_IN + _KEY_IN, float(np.clip(height, 2.8, 6.4)))
-    still, moving, key = figure.subplots(1, 3, width_ratios=(_PANEL_IN, _PANEL_IN, _KEY_IN))
-    _draw_still(
-        still,
+    figure = new_figure(2.0 * _PANEL_IN + _LEGEND_IN, float(np.clip(height, 2.8, 6.4)))
+    position, cycle_axes, legend = figure.subplots(1, 3, width_ratios=(_PANEL_IN, _PANEL_IN, _LEGEND_IN))
+    _draw_position(
+        position,
         mechanism,
         here,
         paths,
         mechanism.clearance_joints if clearance_joints is None else clearance_joints,
     )
-    _draw_cycle(moving, mechanism, paths)
-    _draw_key(key, mechanism)
-    still.set_title(
+    _draw_cycle(cycle_axes, mechanism, paths)
+    _draw_legend(legend, mechanism)
+    position.set_title(
         f"{plain(mechanism.name)}, crank at {np.rad2deg(crank_angle_rad):.0f}°", fontsize=USUAL, color=INK
     )
-    toe = f", the toe every {_TOE_EVERY}° of the crank" if mechanism.toe else ""
-    moving.set_title(f"one cycle{toe}", fontsize=USUAL, color=INK)
-    for axes in (still, moving):
+    toe = f", the toe every {_TOE_STEP_DEG}° of the crank" if mechanism.toe else ""
+    cycle_axes.set_title(f"one cycle{toe}", fontsize=USUAL, color=INK)
+    for axes in (position, cycle_axes):
         tidy(axes)
         axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         axes.set_xlabel("x [m]", fontsize=SMALL)
-    still.set_ylabel("y [m]", fontsize=SMALL)
+    position.set_ylabel("y [m]", fontsize=SMALL)
     return figure
 
 
 def draw_leg(axes: Axes, reach: Reach, shown: int) -> None:
-    """Draw one position of a mechanism to scale, the path of its toe, and which joint is open or in line."""
+    """Draw one position of a mechanism to scale, the path of its toe, an open joint, and joints in line.
+
+    ``shown`` is the number of the position in the reach.
+    """
     mechanism = reach.mechanism
     paths, here = _paths(mechanism, reach.q), _paths(mechanism, reach.q[shown : shown + 1])
     low, high = _extent(paths)
-    _draw_still(axes, mechanism, here, paths, mechanism.clearance_joints)
+    _draw_position(axes, mechanism, here, paths, mechanism.clearance_joints)
     _draw_toe_path(axes, mechanism, paths, is_closed=reach.turns)
     for joint in mechanism.joints:
         if reach.is_open(joint):
@@ -220,7 +229,7 @@ def draw_leg(axes: Axes, reach: Reach, shown: int) -> None:
 
 
 def _paths(mechanism: Mechanism, q: Floats) -> Paths:
-    """Path (N, 2) [m] of every point at coordinates q (N, n, 3), by body and point."""
+    """Paths of all points at coordinates q (N, n, 3)."""
     return {
         body: {point: point_path(mechanism, q, body, point) for point in mechanism.points_of(body)}
         for body in (GROUND, *mechanism.bodies)
@@ -240,12 +249,14 @@ def _colours(mechanism: Mechanism) -> dict[str, str]:
 
 
 def _outline_at(paths: Paths, body: str, i: int) -> Floats:
+    """Corners (n, 2) [m] of a body at position i."""
     return body_corners({name: path[i] for name, path in paths[body].items()})
 
 
-def _draw_still(
+def _draw_position(
     axes: Axes, mechanism: Mechanism, here: Paths, paths: Paths, clearance_joints: Collection[str]
 ) -> None:
+    """Draw the mechanism in the single position of ``here``; sliders have their whole path in ``paths``."""
     shapes = {body: _outline_at(here, body, 0) for body in mechanism.bodies}
     colours = _colours(mechanism)
     largest_first = sorted(shapes, key=lambda name: -float(np.ptp(shapes[name], axis=0).sum()))
@@ -260,7 +271,7 @@ def _draw_still(
                 axes.plot(*paths[joint.slider][name].T, color=lighter(INK, 0.6), linewidth=4.0, zorder=1.0)
             elif GROUND in mechanism.sides(name):
                 draw_support(axes, place, away)
-                away = np.array([-1.0, 0.3 * np.sign(away[1])])
+                away = np.array([-1.0, 0.3 * np.sign(away[1])])  # the name beside the support, not on it
         draw_joint(axes, place, {name: name in clearance_joints for name in names}, away)
     for spring in mechanism.springs.values():
         a, b = (here[body][point][0] for body, point in zip(spring.bodies, spring.points, strict=True))
@@ -274,11 +285,11 @@ def _draw_still(
 
 
 def _places(mechanism: Mechanism, here: Paths) -> list[tuple[list[str], Floats]]:
-    """Groups of joints that share a place: their names, and the place (2,) [m]."""
+    """Groups of joints at one place: their names, and the place (2,) [m]."""
     groups: list[tuple[list[str], Floats]] = []
     for name in mechanism.joints:
         place = here[carriers(mechanism, name)[1]][name][0]
-        near = [names for names, other in groups if np.hypot(*(place - other)) < _NEAR_M]
+        near = [names for names, other in groups if np.hypot(*(place - other)) < _ONE_PLACE_M]
         if near:
             near[0].append(name)
         else:
@@ -287,8 +298,9 @@ def _places(mechanism: Mechanism, here: Paths) -> list[tuple[list[str], Floats]]
 
 
 def _draw_cycle(axes: Axes, mechanism: Mechanism, paths: Paths) -> None:
+    """Draw outlines of the bodies in positions over a gait cycle, and the path of the toe."""
     for body, colour in _colours(mechanism).items():
-        for i in range(0, PATH_POINTS, PATH_POINTS * _BODIES_EVERY // 360):
+        for i in range(0, PATH_POINTS, PATH_POINTS * _BODIES_STEP_DEG // 360):
             corners = _outline_at(paths, body, i)
             axes.plot(
                 *np.vstack([corners, corners[:1]]).T,
@@ -309,11 +321,11 @@ def _draw_toe_path(axes: Axes, mechanism: Mechanism, paths: Paths, is_closed: bo
             axes.plot(*path.T, color=INK, linewidth=2.0, zorder=20.0)
             return
         axes.plot(*np.vstack([path, path[:1]]).T, color=INK, linewidth=2.0, zorder=20.0)
-        every = PATH_POINTS * _TOE_EVERY // 360
+        every = PATH_POINTS * _TOE_STEP_DEG // 360
         axes.plot(*path[::every].T, "o", color=INK, markersize=4.0, zorder=21.0)
 
 
-def _draw_key(axes: Axes, mechanism: Mechanism) -> None:
+def _draw_legend(axes: Axes, mechanism: Mechanism) -> None:
     axes.set_axis_off()
     entries = {
         plain(body): Line2D([], [], color=lighter(colour, 0.4), linewidth=7.0, solid_capstyle="round")
@@ -327,14 +339,15 @@ def _draw_key(axes: Axes, mechanism: Mechanism) -> None:
     )
 
 
-# A mechanism over its crank's range as plain data [mm, degrees] for the interactive picture, y downwards.
+# Data of the interactive picture: a mechanism over its crank's range in mm and degrees. The y axis points
+# down, as in SVG.
 
 
 ARROW_FRACTION = 0.3  # length of the longest arrow, as a fraction of the picture's height
 
 
 def leg_data(reach: Reach) -> dict[str, Any]:
-    """Bodies, joints, the toe's path, and what is open or in line."""
+    """Data of the interactive picture: bodies, joints, path of the toe, open joints, and joints in line."""
     mechanism = reach.mechanism
     every = [
         reach.path(body, point)

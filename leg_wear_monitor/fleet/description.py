@@ -1,4 +1,7 @@
-"""The description of a fleet: fleet.yaml, and the recordings and parameters that it names."""
+"""The description of a fleet: fleet.yaml, and the recordings and parameters that it names.
+
+The parts: the result (`FleetDescription`), recordings by patterns, the keys of the file, and its reading.
+"""
 
 import glob
 import hashlib
@@ -22,19 +25,19 @@ from leg_wear_monitor.monitor.config.fitting import acceleration_doubts, fitted
 from leg_wear_monitor.monitor.config.parameters import load_config
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 
-# The legs of a fleet as a description names them, with their recordings and parameters.
+# The result: the legs of a fleet with their recordings and parameters.
 
 
 @attrs.frozen(kw_only=True)
 class FleetLeg:
-    """One leg.
+    """A leg with its recordings and parameters.
 
     Attributes
     ----------
     id : str
         Name of the leg; its directories are named after it.
     lot : str
-        Production lot of its joints; empty if it is not known.
+        Production lot of its joints; empty if unknown.
     config : MonitorConfig
         Parameters of its monitor.
     config_file : pathlib.Path or None
@@ -44,11 +47,11 @@ class FleetLeg:
     home : pathlib.Path
         Directory of the description.
     row : str
-        Row of the table of cycles, ``minute`` or ``cycle``.
+        What a row of its table of cycles is: ``minute`` or ``cycle``.
     node, joint_states, drive_torque : str or None
         As in `leg_wear_monitor.replay`.
     learned_priors : str
-        File with the priors of its wear coefficients that the fleet has learned; empty without.
+        File with the priors of its wear coefficients that were learned from the fleet; empty if none.
     sample : float, optional
         Fraction of the gait cycles that are followed, as in `leg_wear_monitor.replay`.
     """
@@ -67,19 +70,19 @@ class FleetLeg:
     config_file: Path | None = None
 
     def shown(self, recording: Path) -> str:
-        """Name of a recording in tables: relative to the description where it is below it, and printable."""
+        """Printable name of a recording in tables; relative to `home` if it is below it."""
         is_below = recording.is_relative_to(self.home)
         return printable(str(recording.relative_to(self.home) if is_below else recording))
 
     def with_priors(self, file: Path) -> "FleetLeg":
-        """The leg with what its fleet has learned for its forecasts, unless its parameters name a file."""
+        """The leg with priors learned from its fleet, unless its parameters name a file of priors."""
         if self.config.forecast.priors or self.learned_priors:
             return self
         return attrs.evolve(self, learned_priors=str(file))
 
     @property
     def used_config(self) -> MonitorConfig:
-        """Parameters of its monitor, with what its fleet has learned."""
+        """Parameters of its monitor, with the learned priors."""
         if not self.learned_priors:
             return self.config
         forecast = attrs.evolve(self.config.forecast, priors=self.learned_priors)
@@ -87,14 +90,14 @@ class FleetLeg:
 
     @property
     def settings(self) -> str:
-        """Digest of what decides whether a recording can be read and fits the leg."""
+        """Digest of all settings that decide whether a recording can be read and fits the leg."""
         parts = (self.config, self.node, self.joint_states, self.drive_torque)
         return hashlib.sha256(repr(parts).encode()).hexdigest()[:20]
 
 
 @attrs.frozen(kw_only=True)
 class FleetDescription:
-    """A fleet.
+    """A fleet as its description defines it.
 
     Attributes
     ----------
@@ -111,7 +114,7 @@ class FleetDescription:
     legs: tuple[FleetLeg, ...]
 
 
-# Recordings that a pattern matches.
+# Recordings by patterns: as `glob`, but safe with links that lead back.
 
 
 def recordings_of(home: Path, pattern: str) -> list[Path]:
@@ -122,9 +125,9 @@ def recordings_of(home: Path, pattern: str) -> list[Path]:
     home : pathlib.Path
         Directory that a relative pattern starts at.
     pattern : str
-        With wildcards, only recordings are taken: files by their name, and directories that contain such
-        files. Files in a directory that is taken are part of it. Below ``**``, links are followed, and each
-        directory counts once. Without wildcards, the path is taken as it is, if it exists.
+        Without wildcards, the path itself, if it exists. With wildcards, only recordings match: files by
+        their name, and bag directories; files in a matching bag directory are part of it. Below ``**``, links
+        are followed, and each directory counts once.
     """
     if not glob.has_magic(pattern):
         path = home / pattern
@@ -136,21 +139,26 @@ def recordings_of(home: Path, pattern: str) -> list[Path]:
 
 
 def _matches(home: Path, pattern: str) -> set[Path]:
-    """Files and directories; the one difference to `glob` is that links which lead back do not hang it."""
+    """Files and directories that match, as with `glob`; but links that lead back do not make it endless."""
     found = {Path("/") if pattern.startswith("/") else home}
     is_recursive = False
     for is_recursive, parts in groupby(pattern.lstrip("/").split("/"), "**".__eq__):
-        found = _directories(found) if is_recursive else _in(found, "/".join(parts))
-    return found | {path for path in _in(found, "*") if not path.is_dir()} if is_recursive else found
+        found = _all_directories(found) if is_recursive else _glob_in(found, "/".join(parts))
+    return found | {path for path in _glob_in(found, "*") if not path.is_dir()} if is_recursive else found
 
 
-def _in(directories: Iterable[Path], pattern: str) -> set[Path]:
+def _glob_in(directories: Iterable[Path], pattern: str) -> set[Path]:
+    """Matches of a pattern without ``**`` in some directories."""
     places = (os.path.join(glob.escape(str(each)), pattern) for each in directories)
     return {Path(name) for place in places for name in glob.glob(place)}
 
 
-def _directories(tops: Iterable[Path]) -> set[Path]:
-    """Directories and all below them, without hidden ones: each once, by the path with the fewest links."""
+def _all_directories(tops: Iterable[Path]) -> set[Path]:
+    """Directories and all below them, without hidden ones.
+
+    A directory that several paths lead to is in the result once, by the path with the fewest links: the queue
+    returns paths in this order, and a directory is known by its device and inode.
+    """
     found: dict[tuple[int, int], Path] = {}
     waiting = sorted((int(top.is_symlink()), str(top)) for top in tops if top.is_dir())
     while waiting:
@@ -163,12 +171,12 @@ def _directories(tops: Iterable[Path]) -> set[Path]:
                 for entry in entries:
                     if not entry.name.startswith(".") and os.path.isdir(entry):
                         heapq.heappush(waiting, (links + entry.is_symlink(), entry.path))
-        except OSError:  # may not be read: like `glob`, without it
+        except OSError:  # not readable: skipped, as by `glob`
             continue
     return set(found.values())
 
 
-# Keys of fleet.yaml.
+# The keys of fleet.yaml.
 
 
 Patterns = str | tuple[str, ...]
@@ -177,12 +185,14 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
 def _name_fault(name: str) -> str | None:
+    """Why a leg cannot have this name; None if it can."""
     if _NAME.fullmatch(name):
         return None
     return f"{name!r} is no name for a directory, expected up to 100 letters, digits, '.', '_' or '-'"
 
 
 def _patterns_fault(patterns: Patterns) -> str | None:
+    """Why these patterns cannot be used; None if they can."""
     return None if patterns and all(listed(patterns)) else "has an empty pattern, expected files"
 
 
@@ -191,6 +201,7 @@ def listed(patterns: Patterns) -> tuple[str, ...]:
     return (patterns,) if isinstance(patterns, str) else patterns
 
 
+# in the file, a list or a single pattern
 choose(Patterns, lambda value: (tuple[str, ...] if isinstance(value, list) else str, value))
 
 
@@ -203,7 +214,7 @@ class Defaults:
 
 @attrs.frozen(kw_only=True)
 class LegEntry:
-    """One leg."""
+    """Keys of one leg."""
 
     id: str = described("name of the leg; its directories are named after it", check=_name_fault)
     recordings: Patterns = described(
@@ -231,11 +242,11 @@ class FleetFile:
     )
 
 
-# Reads fleet.yaml, and finds the recordings and parameters that it names.
+# Reading of fleet.yaml, with checks across its legs.
 
 
 def is_fleet_file(document: Any) -> bool:
-    """Whether the content of a YAML file is meant as the description of a fleet."""
+    """Whether the content of a YAML file is the description of a fleet, and not a mechanism."""
     return isinstance(document, dict) and ("legs" in document or "defaults" in document)
 
 
@@ -265,22 +276,23 @@ def load_fleet(path: str | Path) -> FleetDescription:
     for entry in file.legs:
         name = entry.config or file.defaults.config
         if (name, entry.node) not in configs:
-            configs[name, entry.node] = _config(home, name, entry.node, source)
-        leg = _leg(entry, configs[name, entry.node], file.row, home, source)
+            configs[name, entry.node] = _load_parameters(home, name, entry.node, source)
+        leg = _fleet_leg(entry, configs[name, entry.node], file.row, home, source)
         legs.append(attrs.evolve(leg, config_file=home / name if name else None))
     _check_recordings(legs, source)
     return FleetDescription(path=Path(path), out=home / file.out, legs=tuple(legs))
 
 
 def fleet_directory(path: str | Path) -> Path:
-    """Directory of a fleet, given itself or the description of the fleet."""
+    """Directory of a fleet, from this directory itself or from the description."""
     if Path(path).is_dir():
         return Path(path)
     file: FleetFile = structure(read_yaml(Path(path), str(path)), FleetFile, str(path), "")
     return Path(path).resolve().parent / file.out
 
 
-def _leg(entry: LegEntry, config: MonitorConfig, row: str, home: Path, source: str) -> FleetLeg:
+def _fleet_leg(entry: LegEntry, config: MonitorConfig, row: str, home: Path, source: str) -> FleetLeg:
+    """Leg of an entry; warns of patterns that match nothing."""
     recordings: dict[Path, None] = {}
     for pattern in listed(entry.recordings):
         found = recordings_of(home, pattern)
@@ -301,7 +313,7 @@ def _leg(entry: LegEntry, config: MonitorConfig, row: str, home: Path, source: s
     )
 
 
-def _config(home: Path, name: str, node: str, source: str) -> MonitorConfig:
+def _load_parameters(home: Path, name: str, node: str, source: str) -> MonitorConfig:
     """Parameters in a file, checked against their mechanism; paths in them become absolute."""
     config = load_config(home / name if name else None, node or None)
     if is_file_name(Path(config.mechanism)):
@@ -309,7 +321,7 @@ def _config(home: Path, name: str, node: str, source: str) -> MonitorConfig:
     if config.diagnosis.reference:
         path = str(Path(config.diagnosis.reference).absolute())
         config = attrs.evolve(config, diagnosis=attrs.evolve(config.diagnosis, reference=path))
-    fitted(load_mechanism(config.mechanism), config)
+    fitted(load_mechanism(config.mechanism), config)  # raises if they do not fit
     for doubt in acceleration_doubts(config, most=1.0):
         text = f"{home / name}: {doubt}; legs with it are not ranked, and others learn nothing from them"
         warnings.warn(text, ConfigWarning, stacklevel=3)
@@ -317,7 +329,7 @@ def _config(home: Path, name: str, node: str, source: str) -> MonitorConfig:
 
 
 def _check_names(legs: Iterable[LegEntry], source: str) -> None:
-    """Refuse two legs with one name, also where a file system does not tell them apart."""
+    """Refuse two legs with the same name, or with names that differ in case only: both name directories."""
     known: dict[str, str] = {}
     for leg in legs:
         if leg.id.casefold() in known:
@@ -327,7 +339,7 @@ def _check_names(legs: Iterable[LegEntry], source: str) -> None:
 
 
 def _check_recordings(legs: Iterable[FleetLeg], source: str) -> None:
-    """Refuse a recording of two legs, unless the legs have a topic each in it."""
+    """Refuse a recording that two legs share, unless each leg has a topic of its own in it."""
     owners: dict[Path, list[FleetLeg]] = {}
     for leg in legs:
         for path in leg.recordings:

@@ -1,4 +1,8 @@
-"""Brings the ledgers of a fleet up to date with recordings that are not counted yet."""
+"""The update of a fleet: every recording that is not counted yet is replayed into the ledger of its leg.
+
+Further parts: which recordings are complete while others are being recorded, the tables of an updated fleet
+for Python (`Fleet`), and the check of a description before an update.
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -31,22 +35,25 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-_NOT_COUNTED = ("no_gait", "already_counted")
+# The update: jobs of all legs, which run in this process, in local processes or on a cluster.
 
-Tell = Callable[[str, str], None]
+
+_UNCOUNTED_OUTCOMES = ("no_gait", "already_counted")  # of a recording that was read
+
+Report = Callable[[str, str], None]
 """Called with the id of a leg and a line about it."""
 
 
 @attrs.frozen
 class FleetUpdate:
-    """What an update did.
+    """Result of an update.
 
     Attributes
     ----------
     chains : tuple of Chain
-        The legs, in the order of the description.
+        Results of the legs, in the order of the description.
     learned : tuple of (str, str)
-        The leg, and a line about what is not learned from its measured clearances.
+        Findings of the learning: the leg, and a line about a measured clearance that it does not use.
     """
 
     chains: tuple[Chain, ...]
@@ -66,15 +73,15 @@ class FleetUpdate:
 
     @property
     def renewed(self) -> int:
-        """Number of legs without a new recording whose forecast follows a measurement."""
+        """Number of legs without a new recording whose forecast was updated with a new measurement."""
         return sum(chain.is_renewed and not chain.fault for chain in self.chains)
 
     @property
     def findings(self) -> list[tuple[str, str]]:
-        """What a person must see: the leg, and a line about what is lost or was not done."""
+        """Findings for operators: the leg, and a line about what is lost or was not done."""
         found = list(self.learned)
         for chain in self.chains:
-            bad = [line for line in chain.new if line["is_partial"] or line["outcome"] in _NOT_COUNTED]
+            bad = [line for line in chain.new if line["is_partial"] or line["outcome"] in _UNCOUNTED_OUTCOMES]
             found += [(chain.leg.id, words_of(line)) for line in bad]
             found += [(chain.leg.id, text) for text in [*chain.refused, chain.fault] if text]
         return found
@@ -89,11 +96,11 @@ def update_fleet(
     sample: float | None = None,
     begin: Callable[[Sequence[Chain]], None] | None = None,
     progress: Callable[[float], None] | None = None,
-    tell: Tell | None = None,
+    report: Report | None = None,
 ) -> FleetUpdate:
-    """Count what is not counted yet: each leg in the order of time, the legs independently of each other.
+    """Count the recordings of a fleet that are not counted yet, those of a leg in the order of time.
 
-    Interrupted, it keeps every recording that is finished; the next update goes on there.
+    An interrupted update keeps every recording that is finished; the next update continues from there.
 
     Parameters
     ----------
@@ -107,10 +114,10 @@ def update_fleet(
     sample : float, optional
         Fraction of the gait cycles that are followed, as in `leg_wear_monitor.replay`; without it, all.
     begin : callable, optional
-        Called with the legs that have work, before it begins, such as to compile.
+        Called with all legs before the first job, if there is one; for example to compile.
     progress : callable, optional
         Called with the completed fraction of the work, 0 to 1.
-    tell : callable, optional
+    report : callable, optional
         Called with the id of a leg and a line, for each recording.
 
     Raises
@@ -120,24 +127,28 @@ def update_fleet(
     LegWearError
         If pyarrow is not installed, or workers die repeatedly.
     """
-    arrow()
+    arrow()  # fails early if pyarrow is not installed
     out = out.absolute()
     with locked(out):
-        work = _Work([Chain(attrs.evolve(leg, sample=sample), out) for leg in fleet.legs], progress, tell)
+        work = _UpdateJobs(
+            [Chain(attrs.evolve(leg, sample=sample), out) for leg in fleet.legs], progress, report
+        )
         scans = work.scans()
         if begin and (scans or work.is_due):
             begin(work.chains)
+        # further jobs follow from the results of the first ones, in `done`
         if jobs := scans or work.first_jobs():
-            _run(jobs, work.done, workers, scheduler)
+            _run_jobs(jobs, work.done, workers, scheduler)
         write_overview(fleet, out, {chain.leg.id: _first_fault(chain) for chain in work.chains})
     return FleetUpdate(tuple(work.chains), work.learned)
 
 
 def _first_fault(chain: Chain) -> str:
+    """Fault of a leg for the overview; empty without any."""
     return next(filter(None, [chain.fault, *chain.refused]), "")
 
 
-def _run(jobs: Sequence[Job], done: Any, workers: int, scheduler: str | None) -> None:
+def _run_jobs(jobs: Sequence[Job], done: Any, workers: int, scheduler: str | None) -> None:
     if scheduler is not None:
         run_on_cluster(jobs, scheduler, done)
     elif workers > 1:
@@ -146,50 +157,55 @@ def _run(jobs: Sequence[Job], done: Any, workers: int, scheduler: str | None) ->
         run_here(jobs, done)
 
 
-class _Work:
-    """All legs: first unknown recordings are read, then all that is not counted yet is counted."""
+class _UpdateJobs:
+    """Jobs of an update, each with those that follow from its result.
+
+    First, unknown recordings are scanned for their time and content. When all scans are done, the order of
+    the recordings is known, and those of each leg are counted one after the other. A leg with a new
+    measurement has its forecast updated at last.
+    """
 
     def __init__(
-        self, chains: list[Chain], progress: Callable[[float], None] | None, tell: Tell | None
+        self, chains: list[Chain], progress: Callable[[float], None] | None, report: Report | None
     ) -> None:
         self.chains = chains
         self._by_leg = {chain.leg.id: chain for chain in chains}
-        self._progress, self._tell = progress or (lambda _fraction: None), tell or (lambda *_: None)
-        self._scans = 0
+        self._progress, self._report = progress or (lambda _fraction: None), report or (lambda *_: None)
+        self._open_scans = 0
         self._total = 1
         self.learned: tuple[tuple[str, str], ...] = ()
 
     @property
     def is_due(self) -> bool:
-        """Whether anything that is known is not counted yet; after `scans`."""
+        """Whether known recordings are not counted yet; valid after `scans`."""
         return any(chain.waiting for chain in self.chains)
 
     def scans(self) -> list[Job]:
-        """Jobs that read the recordings that are not known yet."""
+        """Jobs that scan unknown recordings; without any, the counting is planned at once."""
         jobs = [job for job in (chain.begin() for chain in self.chains) if job is not None]
-        self._scans = len(jobs)
+        self._open_scans = len(jobs)
         if not jobs:
             self._plan()
         return jobs
 
     def first_jobs(self) -> list[Job]:
-        """The first recording of each leg, or its forecast."""
+        """The first job of each leg after the scans."""
         return [job for job in map(self._next_job, self.chains) if job is not None]
 
     def _next_job(self, chain: Chain) -> Job | None:
-        """The next recording of a leg; after the last one, its forecast if something was measured."""
+        """Job of the next recording of a leg; after the last one, of its forecast if that is due."""
         if chain.waiting or chain.fault or chain.is_renewed or not is_renewal_due(chain.directory):
             return chain.next_job()
         leg = attrs.evolve(chain.leg, recordings=())
         return Job(f"renew-{leg.id}", renew, (leg, chain.directory))
 
     def done(self, job: Job, result: Any) -> list[Job]:
-        """Take a result; the jobs that follow from it."""
+        """Accept the result of a job, and return the jobs that follow from it."""
         chain = self._by_leg[job.arguments[0].id]
         if job.key.startswith("scan-"):
             chain.take(result)
-            self._scans -= 1
-            if self._scans:
+            self._open_scans -= 1
+            if self._open_scans:
                 return []
             self._plan()
             return self.first_jobs()
@@ -197,20 +213,20 @@ class _Work:
             chain.is_renewed, chain.fault = True, result
             return []
         chain.done(result)
-        self._tell(chain.leg.id, result if isinstance(result, str) else words_of(result))
+        self._report(chain.leg.id, result if isinstance(result, str) else words_of(result))
         left = sum(each.waiting_bytes for each in self.chains if not each.fault)
         self._progress(1.0 - left / self._total)
         following = self._next_job(chain)
         return [following] if following else []
 
     def _plan(self) -> None:
-        """Queue the recordings of all legs."""
+        """Queue the recordings of all legs, and learn from measured clearances if there is work."""
         for chain in self.chains:
             chain.plan()
         _refuse_shared(self.chains)
         for chain in self.chains:
             for line in chain.copies:
-                self._tell(chain.leg.id, line)
+                self._report(chain.leg.id, line)
         self._total = max(1, sum(chain.waiting_bytes for chain in self.chains))
         out = self.chains[0].out
         if (
@@ -221,7 +237,7 @@ class _Work:
             self._learn()
 
     def _learn(self) -> None:
-        """Let the forecasts of all legs use what the measured clearances of the fleet tell."""
+        """Set the priors of all legs' forecasts from the measured clearances of the fleet."""
         learning = learn_fleet([chain.leg for chain in self.chains], self.chains[0].out)
         self.learned = learning.findings
         for chain in self.chains if learning.pairs else ():
@@ -230,7 +246,7 @@ class _Work:
 
 
 def _refuse_shared(chains: Sequence[Chain]) -> None:
-    """Refuse recordings whose content two legs have, unless the legs have a topic each in it."""
+    """Refuse recordings that two legs share by content, unless each leg has a topic of its own in them."""
     owners: dict[str, list[Chain]] = {}
     for chain in chains:
         for found in {each.key: each for each in chain.found}.values():
@@ -243,23 +259,25 @@ def _refuse_shared(chains: Sequence[Chain]) -> None:
                 chain.refuse(key, f"the leg {others} has a recording with the same content; not counted")
 
 
-# Which recordings are complete, while others are being recorded.
+# Which recordings are complete, for an update that is repeated while others are being recorded.
 
 
 PATIENCE = 6
-"""Looks during which a recording without an end must not change: its recorder may have been killed."""
+"""Checks in which a recording without an end must be unchanged: its recorder may have been killed."""
 
-_ENDS = {".mcap": MAGIC, PARQUET: b"PAR1"}
+# what a recorder writes last, by the kind of the file
+_LAST_BYTES = {".mcap": MAGIC, PARQUET: b"PAR1"}
 
 
 class Followed:
-    """Looks again and again at the recordings of a fleet."""
+    """Finds complete recordings in repeated checks of a fleet."""
 
     def __init__(self) -> None:
-        self._seen: dict[Path, tuple[tuple[int, int], int]] = {}
+        # state at the last check, and number of checks in a row with that state
+        self._states: dict[Path, tuple[tuple[int, int], int]] = {}
 
     def complete(self, fleet: FleetDescription) -> FleetDescription:
-        """The fleet with the recordings that are complete: unchanged since the last look, and with their end.
+        """Check again: the fleet with complete recordings only, which have an end and did not change.
 
         Parameters
         ----------
@@ -276,19 +294,19 @@ class Followed:
 
     def _is_complete(self, path: Path) -> bool:
         state = state_of(path)
-        before, looks = self._seen.get(path, (None, 0))
-        looks = looks + 1 if before == state else 0
-        self._seen[path] = state, looks
-        return looks >= (1 if has_end(path) else PATIENCE)
+        before, unchanged = self._states.get(path, (None, 0))
+        unchanged = unchanged + 1 if before == state else 0
+        self._states[path] = state, unchanged
+        return unchanged >= (1 if has_end(path) else PATIENCE)
 
 
 def has_end(path: Path) -> bool:
-    """Whether a recording has what its recorder writes last."""
+    """Whether a recording contains what its recorder writes last."""
     if path.is_dir():
         return (path / METADATA).is_file()
     try:
         (file,) = find_files([path])[0]
-        end = _ENDS.get(file.storage, b"")
+        end = _LAST_BYTES.get(file.storage, b"")
         if file.compressed or not end:
             return False
         with path.open("rb") as content:
@@ -298,14 +316,14 @@ def has_end(path: Path) -> bool:
         return False
 
 
-# A fleet that was updated, for Python.
+# The tables of an updated fleet, for Python.
 
 
 TABLES = ("verdicts", "cycles", "recordings", "lives")
 
 
 class Fleet:
-    """A fleet that ``leg-wear-monitor fleet update`` keeps; the tables require pandas.
+    """Results of a fleet that ``leg-wear-monitor fleet update`` maintains; the tables require pandas.
 
     Parameters
     ----------
@@ -322,7 +340,7 @@ class Fleet:
     Raises
     ------
     ConfigError
-        If no fleet is there.
+        If the directory contains no fleet.
 
     Examples
     --------
@@ -368,7 +386,7 @@ class Fleet:
         return _frame(self.table("verdicts"))
 
     def recordings(self) -> "pd.DataFrame":
-        """Table with a row for each recording: what became of it."""
+        """Table with a row for each recording: whether it was counted, and if not, why."""
         return _frame(self.table("recordings"))
 
     def lives(self) -> "pd.DataFrame":
@@ -376,12 +394,12 @@ class Fleet:
         return _frame(self.table("lives"))
 
     def export(self, out: str | Path) -> list[Path]:
-        """Write all tables as CSV and Parquet files; the files.
+        """Write all tables as CSV and Parquet files; returns the files.
 
         Parameters
         ----------
         out : str or pathlib.Path
-            Directory, made if it does not exist.
+            Directory; created if it does not exist.
         """
         make_directory(Path(out))
         files = []
@@ -399,16 +417,16 @@ def _frame(table: Any) -> "pd.DataFrame":
     return frame
 
 
-# What is understood of the description of a fleet: its legs, their parameters, and their recordings.
+# The check of a description before an update: its legs, their parameters, and their recordings.
 
 
-_DAY_NS = 86_400 * 10**9
+_DAY_NS = 86_400 * 10**9  # smaller stamps are no dates
 
 
 def understood(
     fleet: FleetDescription, progress: Callable[[float], None] | None = None
 ) -> Iterator[tuple[str, str]]:
-    """What is understood, and what is wrong: pairs of a line and a fault, one of which is empty.
+    """Summary and faults of a description: pairs of a line and a fault, one of which is empty.
 
     Of each leg the first and the last recording by name are opened, so that a column or a topic that is
     missing shows before an update; damage within a recording does not.
@@ -420,22 +438,23 @@ def understood(
         Called with the completed fraction, 0 to 1.
     """
     number = sum(len(leg.recordings) for leg in fleet.legs)
-    yield f"fleet of {_many(len(fleet.legs), 'leg')}, {_many(number, 'recording')}, kept in {fleet.out}", ""
+    legs, recordings = _count_of(len(fleet.legs), "leg"), _count_of(number, "recording")
+    yield f"fleet of {legs}, {recordings}, kept in {fleet.out}", ""
     for done, leg in enumerate(fleet.legs, 1):
-        ends = [
+        outermost = [
             (each, *begin_of(each, leg)) for each in dict.fromkeys(leg.recordings[:1] + leg.recordings[-1:])
         ]
-        yield _line(leg, [begin_ns for _, begin_ns, _ in ends if begin_ns]), ""
-        for path, _, fault in ends:
+        yield _leg_line(leg, [begin_ns for _, begin_ns, _ in outermost if begin_ns]), ""
+        for path, _, fault in outermost:
             if fault:
                 yield "", f"{leg.id}: {leg.shown(path)}: {fault}"
         if progress:
             progress(done / len(fleet.legs))
 
 
-def _line(leg: FleetLeg, begins_ns: list[int]) -> str:
+def _leg_line(leg: FleetLeg, begins_ns: list[int]) -> str:
     megabytes = sum(state_of(path)[0] for path in leg.recordings) / 1.0e6
-    parts = [f"{_many(len(leg.recordings), 'recording')}, {megabytes:.3g} MB"]
+    parts = [f"{_count_of(len(leg.recordings), 'recording')}, {megabytes:.3g} MB"]
     parts.append(f"parameters {leg.config_file.name if leg.config_file else 'of the package'}")
     if leg.config.hardware != leg.id:
         parts.append(f"hardware {leg.config.hardware}")
@@ -446,5 +465,5 @@ def _line(leg: FleetLeg, begins_ns: list[int]) -> str:
     return f"{leg.id}: {'; '.join(parts)}"
 
 
-def _many(number: int, what: str) -> str:
+def _count_of(number: int, what: str) -> str:
     return f"{number} {what}{'' if number == 1 else 's'}"

@@ -114,7 +114,7 @@ def test_a_cluster_gives_the_same_though_a_worker_is_killed(home, updated, updat
             if workers[0].poll() is None:
                 os.kill(workers[0].pid, signal.SIGKILL)
 
-        done = update(home / "fleet.yaml", tmp_path / "out", scheduler=address, tell=kill_one)
+        done = update(home / "fleet.yaml", tmp_path / "out", scheduler=address, report=kill_one)
         assert workers[0].wait() == -signal.SIGKILL
     assert done.counted == 3
     assert contents(tmp_path / "out") == contents(updated)
@@ -129,9 +129,9 @@ def test_interrupted_between_two_recordings_it_goes_on_there(home, updated, upda
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        update(home / "fleet.yaml", tmp_path, tell=interrupt)
+        update(home / "fleet.yaml", tmp_path, report=interrupt)
     assert not (tmp_path / "fleet.json").exists()
-    update(home / "fleet.yaml", tmp_path, tell=interrupt)
+    update(home / "fleet.yaml", tmp_path, report=interrupt)
     assert len(told) == 4
     assert contents(tmp_path) == contents(updated)
 
@@ -169,7 +169,7 @@ def test_a_copy_counts_once(walk, describe, update, tmp_path):
     path = walk(tmp_path / "a/1.mcap")
     shutil.copy(path, tmp_path / "a/2.mcap")
     description, out, told = describe(tmp_path, "a"), tmp_path / "out", []
-    assert update(description, out, tell=lambda *line: told.append(line)).counted == 1
+    assert update(description, out, report=lambda *line: told.append(line)).counted == 1
     assert told[0] == ("a", "a/2.mcap: is a copy of a/1.mcap, counted once")
     path.rename(tmp_path / "a/3.mcap")
     assert update(description, out).counted == 0

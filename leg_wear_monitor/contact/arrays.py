@@ -1,4 +1,4 @@
-"""A journal in a bushing: geometry, friction, film and conformity, and the arrays of all clearance joints."""
+"""A journal in a bushing: geometry, conformity, friction, arrays of all clearance joints, and film."""
 
 import math
 import warnings
@@ -20,7 +20,9 @@ from leg_wear_monitor.mechanism.spec import Clearance, Mechanism, SpeedDrive, Tr
 # Geometry of the contact of journal and bushing, and its elastic modulus (physics.md sections 3 to 5).
 
 
-_SHARPEST = 1.0  # bound of the gradient's part across e by the bend; the wall's unit normal has length 1
+# Bound of that part of the gradient across the eccentricity which is due to the bend (`worn_contact`),
+# compared with the wall's unit normal, whose length is 1.
+_SHARPEST = 1.0
 
 
 @kernel
@@ -69,7 +71,7 @@ def contact_modulus(youngs_b: float, poisson_b: float, youngs_j: float, poisson_
     return 4.0 / (3.0 * sigma)
 
 
-# Whether a contact is narrow, as Hertz's force K delta^1.5 supposes (physics.md section 4).
+# Conformity: whether a contact is narrow, as Hertz's force K delta^1.5 supposes (physics.md section 4).
 #
 # The half angle psi of the contact arc is that of the elastic foundation (`normal.winkler`), which is Hertz's
 # line contact where it is narrow: F = kappa E* w c (2 psi / sin 2 psi - 1). It grows with force and softness,
@@ -82,8 +84,8 @@ WIDEST_RAD = math.radians(60.0)
 """Largest half angle of Winkler's law: its force is 11 % low there."""
 
 _KAPPA_E_STAR = 0.75 * 3.0 * math.pi / 8.0  # kappa E* over the contact modulus
-_HALVINGS = 60  # of a right angle: to rounding
-_POINTS = 180  # of a gait cycle
+_HALVINGS = 60  # bisections of a right angle, down to rounding errors
+_POINTS = 180  # points of a gait cycle
 
 
 def half_angle_under_load(force_n: float, modulus_pa: float, width_m: float, clearance_m: float) -> float:
@@ -97,6 +99,7 @@ def half_angle_under_load(force_n: float, modulus_pa: float, width_m: float, cle
     width_m, clearance_m : float
         Axial contact width, and radial clearance.
     """
+    # bisection: the load grows with psi
     load = force_n / (_KAPPA_E_STAR * modulus_pa * width_m * clearance_m)
     low, high = 0.0, 0.5 * math.pi
     for _ in range(_HALVINGS):
@@ -109,7 +112,7 @@ def half_angle_under_load(force_n: float, modulus_pa: float, width_m: float, cle
 
 
 def contact_doubt(half_angle_rad: float, force_n: float, radius_m: float, is_winkler: bool) -> str | None:
-    """Why a joint's normal law does not hold at a force, as one text; None if it does.
+    """Why a joint's normal law is not valid at a force, as one text; None if it is.
 
     Parameters
     ----------
@@ -136,7 +139,7 @@ def contact_doubt(half_angle_rad: float, force_n: float, radius_m: float, is_win
 
 
 def conformity_doubts(linkage: Linkage) -> Iterator[Doubt]:
-    """Clearance joints whose law does not hold at the 99th percentile of the ideal motion's force."""
+    """Clearance joints whose law is not valid at the 99th percentile of the force in the ideal motion."""
     mechanism, drive = linkage.mechanism, linkage.mechanism.drive
     if not mechanism.clearance_joints or not isinstance(drive, SpeedDrive | TrackDrive):
         return
@@ -211,6 +214,7 @@ def against(slip, force):
 # Clearance joints as arrays for the kernels.
 
 
+# laws that are valid for nearly elastic impacts only, and the restitution from which they are
 NEARLY_ELASTIC, LEAST_RESTITUTION = ("hunt-crossley", "lankarani-nikravesh"), 0.7
 
 
@@ -265,11 +269,11 @@ def clearance_settings(
     settings = {}
     for name in joints:
         if name not in mechanism.clearances:
-            ready = ", ".join(mechanism.clearances) or "none"
+            known = ", ".join(mechanism.clearances) or "none"
             raise ConfigError(
                 "clearances",
                 "",
-                f"{name!r} has no clearance settings in {mechanism.source}, expected some of: {ready}",
+                f"{name!r} has no clearance settings in {mechanism.source}, expected some of: {known}",
             )
         try:
             settings[name] = attrs.evolve(mechanism.clearances[name], **changes)
@@ -282,7 +286,7 @@ def clearance_settings(
 
 
 def _refuse_stiffness(source: str, name: str, settings: Clearance) -> None:
-    """Raise ConfigError for a stiffness [N/m^1.5] with a law that has no such coefficient."""
+    """Raise ConfigError if a stiffness [N/m^1.5] is given with a law that has no such coefficient."""
     if settings.stiffness is not None and not LAWS[settings.normal_law].form.takes_stiffness:
         raise ConfigError(
             source,
@@ -293,12 +297,12 @@ def _refuse_stiffness(source: str, name: str, settings: Clearance) -> None:
 
 
 def _warn_of_restitution(source: str, settings: dict[str, Clearance]) -> None:
-    """Warn of a restitution far below 1 with the two laws that are valid near 1 only: they return more."""
-    asked: dict[tuple[str, float], list[str]] = {}
+    """Warn of laws for nearly elastic impacts with a small restitution: impacts then return more than set."""
+    joints: dict[tuple[str, float], list[str]] = {}  # by law and restitution, for one warning each
     for name, c in settings.items():
         if c.normal_law in NEARLY_ELASTIC and c.restitution < LEAST_RESTITUTION:
-            asked.setdefault((c.normal_law, c.restitution), []).append(name)
-    for (law, restitution), names in asked.items():
+            joints.setdefault((c.normal_law, c.restitution), []).append(name)
+    for (law, restitution), names in joints.items():
         returned = delivered_restitution(LAWS[law].hysteresis(restitution))
         warnings.warn(
             f"{source}: joint {', '.join(names)}: {law} asked for a restitution of {restitution:g} returns "
@@ -347,7 +351,7 @@ def compile_contacts(
 # and 2.4° in its direction. Beyond these widths their polynomials are wrong: at 1.25 squeezing would pull.
 
 
-_NUDGE = 1.0e-4  # step of a difference, as a fraction of the gap
+_NUDGE = 1.0e-4  # step of the finite difference in `film_stiffness`, as a fraction of the gap
 
 
 @kernel

@@ -22,23 +22,25 @@ from leg_wear_monitor.twin.follower_state import FINE_PHASES
 from leg_wear_monitor.twin.sample import CONTACT, MEASURED, NO_FAULT, Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics, LoadProfile, TorqueProfile
 
-_CYCLES = 10  # over which the load is averaged
-_NOISES = 3.0
-_JUDGED = 3  # fewest of them for a judgement of the sensor
-_STANDS = (
-    0.25  # fraction of the peak above which the foot stands; the template tells when it strikes and leaves
-)
-_INDEPENDENT = 16.0  # phases of a drive torque that is not as predicted
-_SWING = 0.08  # of a turn, from stance as the template has it, where the foot is surely in the air
-_SURE = 5.0  # standard deviations of what the drive torque shows
-_OF_MODEL = 0.1  # of the drive torque may be wrong by other masses and clearances
+_CYCLES = 10  # gait cycles over which the load is averaged
+_LEAST_CYCLES = 3  # gait cycles from which on the sensor is checked
+_NOISE_SIGMAS = 3.0  # a force that changes by less within a gait cycle, in units of its noise, is none
+# Fraction of the peak above which the foot stands. The template has the same fraction some time after heel
+# strike and before toe-off; the difference is known, and subtracted (`_phase_bias`).
+_STANCE_FRACTION = 0.25
+_SWING_MARGIN = 0.08  # turns from the template's stance at which the foot is surely in the air
+# Comparison with the drive torque: number of independent values in the residual of a gait cycle, standard
+# deviations from which a load in the torque counts, and error of the torque by other masses and clearances,
+# as a fraction of it.
+_INDEPENDENT_PHASES, _SURE_SIGMAS, _MODEL_FRACTION = 16.0, 5.0, 0.1
 
 
 @attrs.frozen(eq=False)
 class _Cycle:
-    """A gait cycle with samples of the load; by phase: force (2, n) [N], unexplained torque (n,) [N m].
+    """A gait cycle with samples of the load: by phase, force (2, n) [N], unexplained torque (n,) [N m].
 
-    ``acted``: 1 if the load acted in the twin, which then has its torque, else 0.
+    ``acted`` is 1 if the twin walked under this load, so that its predicted torque contains it, and 0
+    otherwise.
     """
 
     load: LoadProfile
@@ -52,12 +54,12 @@ class FootLoadState:
     """State of the checks; every value is immutable."""
 
     cycles: tuple[_Cycle, ...] = ()
-    acts: float = 0.0  # in the present gait cycle, as `_Cycle.acted`
-    largest_n: float = 0.0  # received since the last gait cycle, unusable ones included
+    acts: float = 0.0  # `_Cycle.acted` of the present gait cycle
+    largest_n: float = 0.0  # largest force received since the last gait cycle, unusable values included
 
 
 class FootLoadCheck:
-    """Follows the measured foot load.
+    """Averages the measured foot load over gait cycles, and checks its sensor.
 
     Parameters
     ----------
@@ -79,16 +81,21 @@ class FootLoadCheck:
         self._expected = stance.force(points=2 * FINE_PHASES)[1::2] @ stance.up
         motion = one_cycle(linkage, 2 * FINE_PHASES, 1.0)
         speed = getattr(mechanism.drive, "speed", TURN)
-        self._model_nm = _OF_MODEL * float(
+        self._model_nm = _MODEL_FRACTION * float(
             np.sqrt(np.mean(one_cycle(linkage, FINE_PHASES, speed).drive_torque ** 2))
         )
         self._toe_per_turn = point_motion(motion, linkage, *(mechanism.toe or ("", "")))[1][1::2].T
         phase = (np.arange(FINE_PHASES) + 0.5) / FINE_PHASES
+        # phases from the margin before heel strike on; stance lasts `whole` turns
         whole = (stance.turned * (stance.toe_off - stance.heel_strike)) % 1.0
-        self._swing = (stance.turned * (phase - stance.heel_strike) + _SWING) % 1.0 > whole + 2.0 * _SWING
-        self._late = self._phases(self._expected) - np.array([stance.heel_strike, stance.toe_off])
-        self._acts = float(config.load.model == MEASURED)
-        self.state = FootLoadState(acts=self._acts)
+        self._swing = (
+            stance.turned * (phase - stance.heel_strike) + _SWING_MARGIN
+        ) % 1.0 > whole + 2.0 * _SWING_MARGIN
+        self._phase_bias = self._stance_phases(self._expected) - np.array(
+            [stance.heel_strike, stance.toe_off]
+        )
+        self._load_acts = float(config.load.model == MEASURED)
+        self.state = FootLoadState(acts=self._load_acts)
 
     def add_samples(self, piece: Samples) -> None:
         """Add received samples."""
@@ -98,26 +105,31 @@ class FootLoadCheck:
             self.state.largest_n = max(self.state.largest_n, largest)
 
     def ended(self, statistics: CycleStatistics) -> dict[str, float]:
-        """Add a gait cycle; returns the values of the alarms that can be judged."""
+        """Add a gait cycle; returns the values of the alarms that can be evaluated."""
         state, load = self.state, statistics.load
+        # scaled so that a force at the end of its valid range has the limit of the alarm
         beyond = FOOT_LOAD_LIMITS[SCALE] * state.largest_n / KINDS[LOAD].largest
         state.largest_n = 0.0
         if load is None:
             return {SCALE: beyond} if beyond > FOOT_LOAD_LIMITS[SCALE] else {}
-        force = _by_phase(load.number, load.force_n)
+        force = _means_by_phase(load.number, load.force_n)
         cycle = _Cycle(load, force, _unexplained(statistics.torque_profile), state.acts)
         state.cycles = (*state.cycles, cycle)[-_CYCLES:]
-        stuck = _unchanged(load)
+        stuck = _stuck_fraction(load)
         values = {GAPS: load.gap_s / statistics.duration_s, STUCK: stuck}
         if stuck < FOOT_LOAD_LIMITS[STUCK]:
-            values |= self._compared()
+            values |= self._comparisons()
         return values | ({SCALE: beyond} if beyond > FOOT_LOAD_LIMITS[SCALE] else {})
 
     def freezes(self, values: Mapping[str, float]) -> tuple[bool, bool]:
-        """Whether values of a gait cycle show a wrong load, and whether it has been wrong from the start."""
+        """Whether values of a gait cycle show a wrong load, and whether it has always been wrong.
+
+        A sensor that got stuck or lost its zero was right before; any other fault holds for earlier cycles,
+        too.
+        """
         wrong = {kind for kind, limit in FOOT_LOAD_LIMITS.items() if values.get(kind, 0.0) >= limit}
         is_frozen, clears = bool(wrong - {GAPS}), bool(wrong - {GAPS, STUCK, ZERO})
-        self.state.acts = 0.0 if clears else self._acts
+        self.state.acts = 0.0 if clears else self._load_acts
         return is_frozen, clears
 
     @property
@@ -128,10 +140,10 @@ class FootLoadCheck:
             return FootLoad()
         up = np.array([self._stance.up @ each.force_n for each in cycles])
         mean = up.mean(axis=0)
-        found, several = self._phases(mean), len(cycles) > 1
-        spread = (np.array([self._phases(each) for each in up]) - found + 0.5) % 1.0 - 0.5
+        found, several = self._stance_phases(mean), len(cycles) > 1
+        spread = (np.array([self._stance_phases(each) for each in up]) - found + 0.5) % 1.0 - 0.5
         sigma = spread.std(axis=0, ddof=1).tolist() if several else [None, None]
-        heel_strike, toe_off = ((found - self._late) % 1.0).tolist()
+        heel_strike, toe_off = ((found - self._phase_bias) % 1.0).tolist()
         size = up @ mean / (mean @ mean or 1.0)
         peak_n, scatter = float(mean.max()), float(size.std(ddof=1)) if several else math.nan
         return FootLoad(
@@ -159,60 +171,62 @@ class FootLoadCheck:
         """Restore a snapshot of checks of the same mechanism and parameters."""
         self.state = attrs.evolve(snapshot)
 
-    def _phases(self, up: Floats) -> Floats:
-        """Phases (2,) at which a vertical force by phase rises and falls, around the middle of stance."""
+    def _stance_phases(self, up: Floats) -> Floats:
+        """Phases (2,) [turns] at which a vertical force rises and falls, around the middle of stance."""
         low = min(float(np.median(up)), 0.0)
-        stands = up - low > _STANDS * (up.max() - low)
+        stands = up - low > _STANCE_FRACTION * (up.max() - low)
         angle = TURN * (np.arange(len(up)) + 0.5) / len(up)
         middle = math.atan2(float(np.sin(angle) @ stands), float(np.cos(angle) @ stands)) / TURN
         half = 0.5 * self._stance.turned * float(stands.mean())
         return np.array([middle - half, middle + half]) % 1.0
 
-    def _compared(self) -> dict[str, float]:
+    def _comparisons(self) -> dict[str, float]:
         """Values of the alarms that compare the load with stance and with the drive torque."""
         cycles = self.state.cycles
         force = np.mean([each.force_n for each in cycles], axis=0)
         up = self._stance.up @ force
         largest = float(np.abs(up).max())
-        if len(cycles) < _JUDGED or not self._stands(up):
+        if len(cycles) < _LEAST_CYCLES or not self._is_above_noise(up):
             return {}
         sign = -1.0 if -up.min() > up.max() else 1.0
         fits = [_correlation(sign * up, np.roll(self._expected, k)) for k in (0, FINE_PHASES // 2)]
         values = {EXCHANGED: fits[1] - fits[0], SIGN: max(0.0, -float(up.min()) / largest)}
-        # the foot of the other leg stands in swing, and needs another torque
+        # with the sensor of the other foot, the next checks would compare stance with swing
         if not self.is_contact and values[EXCHANGED] < FOOT_LOAD_LIMITS[EXCHANGED]:
             values[ZERO] = abs(float(np.median(up[self._swing]))) / largest
             if sign > 0.0:
-                values[SCALE] = self._scale(force)
+                values[SCALE] = self._scale_factor(force)
         return values
 
-    def _stands(self, up: Floats) -> bool:
+    def _is_above_noise(self, up: Floats) -> bool:
         """Whether the mean vertical force (n,) changes within a gait cycle by more than its noise."""
         cycles = np.array([self._stance.up @ each.force_n for each in self.state.cycles])
         noise = float(cycles.std(axis=0, ddof=1).mean()) / math.sqrt(len(cycles))
-        return float(up.std()) > _NOISES * noise
+        return float(up.std()) > _NOISE_SIGMAS * noise
 
-    def _scale(self, force: Floats) -> float:
-        """Factor between the load and what the drive torque shows of it, at least 1; NaN if it does not."""
+    def _scale_factor(self, force: Floats) -> float:
+        """Factor between the load and what the drive torque shows of it, at least 1; NaN if not shown."""
         unexplained = np.mean([each.unexplained_nm for each in self.state.cycles], axis=0)
         if not np.isfinite(unexplained).all():
             return math.nan
         needed = -np.einsum("cn,cn->n", force, self._toe_per_turn)
-        of_load, left = needed - needed.mean(), unexplained - unexplained.mean()
+        # regression of the unexplained torque on that of the load, by virtual work; a constant is friction
+        of_load, residual = needed - needed.mean(), unexplained - unexplained.mean()
         square = float(of_load @ of_load)
         if not square > 0.0:
             return math.nan
-        shown = float(of_load @ left) / square
-        variance = float(np.mean((left - shown * of_load) ** 2)) + self._model_nm**2
-        sigma = math.sqrt(variance * FINE_PHASES / square / _INDEPENDENT)
-        shown += float(np.mean([each.acted for each in self.state.cycles]))  # what the twin has already
+        shown = float(of_load @ residual) / square
+        variance = float(np.mean((residual - shown * of_load) ** 2)) + self._model_nm**2
+        sigma = math.sqrt(variance * FINE_PHASES / square / _INDEPENDENT_PHASES)
+        # the part that the twin explains already
+        shown += float(np.mean([each.acted for each in self.state.cycles]))
         if shown > 1.0:
-            return shown if shown > _SURE * sigma else math.nan
+            return shown if shown > _SURE_SIGMAS * sigma else math.nan
         return min(1.0 / shown, 1.0e3) if 0.0 < shown < 1.0 - 2.0 * sigma else 1.0
 
 
-def _by_phase(number: Floats, sums: Floats) -> Floats:
-    """Means (m, n) by phase of sums (m, n); those of empty phases lie between their neighbours'."""
+def _means_by_phase(number: Floats, sums: Floats) -> Floats:
+    """Means (m, n) by phase of sums (m, n); empty phases are interpolated."""
     there = np.flatnonzero(number)
     if not len(there):
         return np.full(sums.shape, math.nan)
@@ -223,16 +237,17 @@ def _by_phase(number: Floats, sums: Floats) -> Floats:
 def _unexplained(profile: TorqueProfile) -> Floats:
     """Measured minus predicted drive torque (n,) by phase [N m]; NaN without measured ones."""
     unexplained = (profile.measured_nm - profile.predicted_nm)[None]
-    return np.asarray(_by_phase(profile.number, unexplained)[0])
+    return np.asarray(_means_by_phase(profile.number, unexplained)[0])
 
 
-def _unchanged(load: LoadProfile) -> float:
-    """Part of the largest force, either way, that does not change over a gait cycle; 1 if nothing does."""
+def _stuck_fraction(load: LoadProfile) -> float:
+    """Fraction of the largest force, of either sign, that is constant over a gait cycle; 1 if it is stuck."""
     largest = max(abs(load.least_n), abs(load.largest_n))
     return 1.0 - min(1.0, (load.largest_n - load.least_n) / largest) if largest > 0.0 else 1.0
 
 
 def _correlation(one: Floats, other: Floats) -> float:
+    """Correlation coefficient; 0 if one is constant."""
     a, b = one - one.mean(), other - other.mean()
     size = math.sqrt(float(a @ a) * float(b @ b))
     return float(a @ b) / size if size > 0.0 else 0.0

@@ -1,6 +1,8 @@
-"""A foot load that may change with every cycle: drive torque, effect on the tables (physics.md section 9).
+"""A foot load on the twin: its effect on the leg's tables and on the drive torque (physics.md section 9).
 
-The tables are linear in the load.
+The tables are linear in the load. The first part writes a measured force into their rows, sample by sample
+(kernels); the second one sets a load of a given shape and size, which may change with every gait cycle
+(`FootLoad`).
 """
 
 import math
@@ -21,21 +23,26 @@ from leg_wear_monitor.twin.follower_state import pass_low
 from leg_wear_monitor.twin.sample import GROUND, STANCE
 from leg_wear_monitor.twin.statistics import AHEAD_NS
 
-# A measured force on the toe, at each point of the leg's tables (physics.md section 9).
+# A measured force on the toe, at each point of the leg's tables.
 #
 # The tables are linear in the force at each point. A sample writes the rows that the crank passes until the
 # next sample; a row that no sample reaches keeps the force of the cycle before. White noise of a sensor would
-# wear an unloaded joint: 5 % of the peak nearly four times as fast as the load does (joint J under 300 N,
-# samples at 200 Hz, 2026-11-25). So the mean over gait cycles acts, with the filtered departure from it.
+# wear an unloaded joint: noise of 5 % of the peak nearly four times as fast as the load itself (joint J under
+# 300 N, samples at 200 Hz, 2026-11-25). So the force that acts is the mean over gait cycles, plus the
+# filtered departure of the present cycle from it.
 
 
-_STAGE_S = 0.5e-9 * AHEAD_NS  # time constant of each of the two stages of the departure's filter
-LONGEST_PUSH = 0.05  # s: longest time between samples that is no gap; at twenty a second a stance has eight
-_LEARNED = 10.0  # gait cycles of the mean force
-# fractions of the peak below which a vertical force is none, and above which it is one; in gait analysis 20
-# to 30 N are the least force of a standing foot. A jump between them would be an impact.
+# time constant of each of the two stages of the departure's filter: their delay is that of the sample ahead
+_STAGE_S = 0.5e-9 * AHEAD_NS
+# s: a longer time between samples is a gap; at twenty samples a second a stance has eight
+LONGEST_PUSH = 0.05
+_LEARNED = 10.0  # gait cycles over which the mean force is averaged
+# Fractions of the peak: a smaller vertical force than the first counts as none, a larger one than the second
+# acts as it is, with a smooth transition, since a jump would be an impact. Gait analysis takes 20 to 30 N as
+# the least force of a standing foot.
 _NONE, _SURE = 0.02, 0.08
-_MARGIN = COARSER  # rows beyond the next sample, of which the present rows of all tables need one
+# rows written beyond the next sample: the coarsest table is interpolated up to its next row
+_MARGIN = COARSER
 
 
 class LoadRows(NamedTuple):
@@ -44,15 +51,15 @@ class LoadRows(NamedTuple):
     Attributes
     ----------
     force : (N, 2) array
-        Along the axes of the mechanism [N]; (0, 2) if the force does not act.
+        Force along the axes of the mechanism [N]; (0, 2) if no measured force acts.
     axis : (N, 2) array
-        First axis of the samples' frame; the second one is a quarter turn on.
+        First axis of the samples' frame at each row; the second axis is a quarter turn further.
     up : (2,) array
-        Unit vector.
+        Unit vector upwards.
     mean : (N, 2) array
-        Mean force over gait cycles, or (0, 2) [N].
+        Mean force over gait cycles [N]; (0, 2) as `force`.
     learned : (N,) array
-        Gait cycles in it, as far as they count.
+        Number of gait cycles in the mean, at most 10.
     tables : LoadedTables
     """
 
@@ -65,17 +72,17 @@ class LoadRows(NamedTuple):
 
 
 def load_rows(linkage: Linkage, tables: LoadedTables, acts: bool, is_of_foot: bool) -> LoadRows:
-    """Rows without a force.
+    """Rows at the start: no force yet.
 
     Parameters
     ----------
     linkage : Linkage
     tables : LoadedTables
-        Of this linkage, which the kernels change.
+        Tables of this linkage; the kernels change them.
     acts : bool
         Whether the force acts on the leg.
     is_of_foot : bool
-        Whether the samples' frame is that of the toe's body, and not the ground's.
+        Whether the samples' frame is that of the toe's body instead of the ground's.
     """
     mechanism = linkage.mechanism
     force = np.zeros((POINTS if acts and mechanism.toe else 0, 2))
@@ -206,40 +213,45 @@ def _put(table, row, fx, fy):
 
 
 def force_of(load: LoadRows) -> tuple[Floats, ...]:
-    """A copy of what the samples have made of the rows."""
+    """A copy of force, mean and number of cycles, for a snapshot."""
     return load.force.copy(), load.mean.copy(), load.learned.copy()
 
 
 def set_force(load: LoadRows, force: tuple[Floats, ...]) -> None:
-    """Set it, and the tables with it."""
+    """Restore what `force_of` returned, and set the tables accordingly."""
     for own, value in zip((load.force, load.mean, load.learned), force, strict=True):
         own[:] = value
     if len(load.force):
         put_force(load.tables, load.force)
 
 
-# by how much measured stances differ from the template: RMS over the peak, of the vertical force (0.055 to
-# 0.119) and of the fore-aft one (0.034 to 0.062; docs/appendix/benchmarks.md)
+# A load of a given shape and size.
+
+
+# Deviation of measured stances from the template, RMS over the peak: 0.055 to 0.119 of the vertical force,
+# and 0.034 to 0.062 of the fore-aft one (docs/appendix/benchmarks.md).
 _VERTICAL, _FORE_AFT = 0.09, 0.05
 
 
 class FootLoad:
-    """The leg's tables under a vertical load at the toe.
+    """The leg's tables under a load at the toe: of a shape and a size, or measured.
 
     Parameters
     ----------
     linkage : Linkage
     contacts : ContactArrays
     shape : str
-        Shape of the load over the gait cycle, one of `settings.LOAD_SHAPES`; that of a known load goes first.
+        Shape of the load over the gait cycle, one of `settings.LOAD_SHAPES`; a known load (`rebuild`) has
+        priority.
     is_measured, is_of_foot : bool
-        Whether a measured force acts; whether it is measured along the axes of the foot.
+        Whether a measured force acts, and whether its axes are those of the foot.
 
     Attributes
     ----------
     tables : ClearanceTables
         Tables for the present load, changed in place.
     shape : str
+        Present shape.
     signature : (N + 1,) array
         Drive torque per upward load [N m/N], zeros for a mechanism without a toe.
     rows : LoadRows
@@ -269,7 +281,8 @@ class FootLoad:
         linkage : Linkage
             Without the load.
         known : (PHASES, 2) array
-            A load of the shape that the load has [N]; (0, 2) for the shape of the settings.
+            Force that gives the shape of the load [N], such as an identified one; (0, 2) for the shape by
+            name.
         """
         self._known = known
         load, self._load, measured = self._load, 0.0, force_of(self.rows)
@@ -282,7 +295,7 @@ class FootLoad:
         set_force(self.rows, measured)
 
     def _learn(self, linkage: Linkage) -> None:
-        """Learn what a load changes; the tables are those without one."""
+        """Compute the effect of a load on the tables, which must be those without a load."""
         self._linkage = linkage
         self._shaped: dict[str, tuple[Floats, Floats]] = {}
         self._loaded = loaded_tables(linkage, self._contacts, self.tables)
@@ -290,21 +303,21 @@ class FootLoad:
         self.take_shape(self.shape)
 
     def take_shape(self, shape: str) -> None:
-        """Let the load have another shape, unless that of a known load goes first; none acts then."""
+        """Change the shape of the load, unless a known load gives it. The load is 0 afterwards."""
         self.set(0.0)
         self.shape, known = shape, self._known
         if known.size:
             self._force = known / (known @ upwards(self._linkage.mechanism)).max()
             self.signature[:] = load_signature(self._linkage, self._force)
         else:
-            self._force, self.signature[:] = self._of_shape(shape)
+            self._force, self.signature[:] = self._force_and_signature(shape)
 
     def signature_of(self, shape: str) -> Floats:
         """Drive torque (N,) per upward load of a shape [N m/N]."""
-        return self._of_shape(shape)[1][:-1]
+        return self._force_and_signature(shape)[1][:-1]
 
-    def _of_shape(self, shape: str) -> tuple[Floats, Floats]:
-        """Force and signature of a shape; kept, since a leg with a mismatch asks in each gait cycle."""
+    def _force_and_signature(self, shape: str) -> tuple[Floats, Floats]:
+        """Force and signature of a shape; kept, since a leg with a mismatch needs them in each gait cycle."""
         if shape not in self._shaped:
             force = load_shape(self._linkage, shape)
             self._shaped[shape] = force, load_signature(self._linkage, force)
@@ -312,7 +325,7 @@ class FootLoad:
 
     @property
     def peak_n(self) -> float:
-        """Largest vertical part of the load over a gait cycle that acts now [N]."""
+        """Largest vertical part over a gait cycle of the load that acts now [N]."""
         rows = self.rows
         return float((rows.force @ rows.up).max()) if len(rows.force) else self._load
 
@@ -324,7 +337,7 @@ class FootLoad:
 
 
 def load_shape(linkage: Linkage, shape: str = STANCE) -> Floats:
-    """Force on the toe (PHASES, 2), over its largest vertical part; zeros for a mechanism without a toe."""
+    """Force on the toe (PHASES, 2), divided by its largest vertical part; zeros without a toe."""
     mechanism = linkage.mechanism
     if mechanism.toe is None:
         return np.zeros((PHASES, 2))
@@ -332,11 +345,11 @@ def load_shape(linkage: Linkage, shape: str = STANCE) -> Floats:
         return nominal_stance(linkage).force()
     up = upwards(mechanism)
     position, _, _ = point_motion(one_cycle(linkage, PHASES, 1.0), linkage, *mechanism.toe)
-    return np.outer(_fraction(position @ up, shape), up)
+    return np.outer(_load_fraction(position @ up, shape), up)
 
 
 def shape_torque(linkage: Linkage) -> float:
-    """RMS of the drive torque per newton of the peak [N m/N] by which steps differ from the template."""
+    """RMS by which steps differ from the template in drive torque, per newton of the peak [N m/N]."""
     toe = linkage.mechanism.toe
     if toe is None:
         return 0.0
@@ -348,7 +361,7 @@ def shape_torque(linkage: Linkage) -> float:
 
 
 def load_signature(linkage: Linkage, force: Floats | None = None) -> Floats:
-    """Drive torque (POINTS + 1,) [N m/N] by a force on the toe (PHASES, 2); by default a push in stance.
+    """Drive torque (POINTS + 1,) [N m/N] for a force on the toe (PHASES, 2); by default in stance.
 
     Zeros for a mechanism without a toe.
     """
@@ -373,7 +386,7 @@ def torque_size(linkage: Linkage, speed: float) -> float:
     return float(np.sqrt(np.mean(one_cycle(linkage, POINTS, speed).drive_torque ** 2)))
 
 
-def _fraction(height: Floats, shape: str) -> Floats:
+def _load_fraction(height: Floats, shape: str) -> Floats:
     """Fraction (n,) of the full load at equal crank steps, from the toe's height (n,) [m]."""
     if shape != STANCE:
         return np.ones(len(height))

@@ -1,4 +1,4 @@
-"""MCAP files: by their index, and by a scan where that is missing or damaged."""
+"""Reading of MCAP files: by their index, or by a sequential scan if the index is missing or damaged."""
 
 import zlib
 from collections.abc import Callable, Iterator
@@ -31,18 +31,20 @@ from leg_wear_monitor.bags.mcap_layout import (
 )
 from leg_wear_monitor.messages.cdr import MESSAGE
 
-# Sequential scan of a file whose index is missing or damaged, up to the last readable record.
+# The scan of a file without a usable index, from the first to the last readable record. Its result is a
+# layout as an index gives one.
 
 
 _WINDOW = 2**20  # bytes scanned per step outside of chunks
-_OF_A_SEGMENT = 400  # memory of one segment [bytes]
-_LAST_OPCODE, _PRIVATE = 0x0F, 0x80
-_MOST_DEFINITIONS = 4096
+_BYTES_PER_SEGMENT = 400  # memory of one segment [bytes]
+_LAST_STANDARD_OPCODE, _FIRST_PRIVATE_OPCODE = 0x0F, 0x80  # opcodes between them are not MCAP
+_MOST_DEFINITIONS = 4096  # schemas and channels read from one segment
+# role of each channel: a scan reads definitions and times only
 _ALL_IGNORED = np.full(2**16, mcap_layout.IGNORED, np.uint8)
 
 
 def by_scan(file: IO[bytes], size: int, budget: Budget) -> Layout:
-    """Layout from the records; each chunk is decompressed to find its channels and actual log times.
+    """Layout of a file by its records; each chunk is decompressed to find its channels and log times.
 
     Parameters
     ----------
@@ -67,7 +69,7 @@ class _Scan:
         self.budget = budget
         self.layout = Layout([], {})
         self.definitions: dict[tuple[type, int], Any] = {}  # chunks may repeat them
-        self.defined = 0  # bytes
+        self.definition_bytes = 0
 
     def run(self) -> None:
         """Read record by record until the data section ends or the records become unreadable."""
@@ -82,22 +84,22 @@ class _Scan:
                 self.layout.data_end = self.at
                 self.layout.data_crc = int.from_bytes(self.file.read(4), "little")
                 return
-            if not 0 < opcode <= _LAST_OPCODE and opcode < _PRIVATE:
-                self._lost("has no MCAP record")
+            if not 0 < opcode <= _LAST_STANDARD_OPCODE and opcode < _FIRST_PRIVATE_OPCODE:
+                self._report_loss("has no MCAP record")
                 return
             if not self._step(opcode, length):
                 return
 
     def _step(self, opcode: int, length: int) -> bool:
-        """Process one record, or several messages outside of chunks; False ends the scan."""
+        """Process one record, or the messages outside of chunks from here on; False ends the scan."""
         end = self.at + RECORD_HEAD + length
         if opcode == mcap_layout.CHUNK:
             try:
                 segment = chunk_head(self.file, self.at, self.size)
             except DamageError as error:
-                self._lost(str(error))
+                self._report_loss(str(error))
                 return False
-            self._take(segment)
+            self._add_segment(segment)
             if segment.cut:
                 self._ends_early(self.size - self.at)
                 return False
@@ -107,23 +109,23 @@ class _Scan:
         elif opcode in (mcap_layout.SCHEMA, mcap_layout.CHANNEL, mcap_layout.MESSAGE_RECORD):
             try:
                 self.budget.check(end - self.at)
-                end = self._outside(end)
+                end = self._add_messages(end)
             except DamageError as error:
                 self.layout.losses.append(f"record at byte {self.at} {error}: it is lost")
         self.at = end
-        if len(self.layout.segments) * _OF_A_SEGMENT > self.budget.part_limit:
-            self._lost(f"is behind {len(self.layout.segments)} chunks, more than --memory-mb allows")
+        if len(self.layout.segments) * _BYTES_PER_SEGMENT > self.budget.part_limit:
+            self._report_loss(f"is behind {len(self.layout.segments)} chunks, more than --memory-mb allows")
             return False
         return True
 
-    def _outside(self, end: int) -> int:
-        """Process the messages outside of chunks at this offset; return the offset of their end."""
+    def _add_messages(self, end: int) -> int:
+        """Add the messages outside of chunks from here on as one segment; return the offset of its end."""
         window = min(max(end - self.at, _WINDOW), self.size - self.at)
-        self._take(Segment(self.at, self.at, window, window))
+        self._add_segment(Segment(self.at, self.at, window, window))
         return self.at + self.layout.segments[-1].stored
 
-    def _take(self, segment: Segment) -> None:
-        """Add a segment with its actual log times, and the definitions it contains."""
+    def _add_segment(self, segment: Segment) -> None:
+        """Add a segment with the log times that it contains, and its definitions."""
         try:
             data = content(self.file, segment, self.budget)
         except DamageError:
@@ -131,29 +133,31 @@ class _Scan:
             return
         counts, positions = np.zeros(1, COUNTS), np.zeros(_MOST_DEFINITIONS, np.int64)
         mcap_layout.walk(np.frombuffer(data, np.uint8), _ALL_IGNORED, np.zeros(0, MESSAGE), positions, counts)
-        self._define(data, positions[: int(counts["definitions"][0])].tolist())
+        self._add_definitions(data, positions[: int(counts["definitions"][0])].tolist())
         if counts["last_log_time_ns"][0] >= 0:
             first, last = int(counts["first_log_time_ns"][0]), int(counts["last_log_time_ns"][0])
             segment = attrs.evolve(segment, start_ns=first, end_ns=last)
-        if segment.data_at == segment.at:
+        if segment.data_at == segment.at:  # not a chunk: it ends with the last whole record
             read = int(counts["read"][0])
             segment = attrs.evolve(segment, stored=read, size=read)
         self.layout.segments.append(segment)
 
-    def _define(self, data: bytes, positions: list[int]) -> None:
-        """Store schemas and channels, the last of each number, while memory permits."""
+    def _add_definitions(self, data: bytes, positions: list[int]) -> None:
+        """Store schemas and channels while memory permits; of each number, the last one."""
         for record in definitions(data, positions):
-            self.defined += len(record.data) if isinstance(record, Schema) else len(record.topic)
-            if self.defined <= self.budget.part_limit // 4:
+            self.definition_bytes += len(record.data) if isinstance(record, Schema) else len(record.topic)
+            if self.definition_bytes <= self.budget.part_limit // 4:
                 self.definitions[type(record), record.id] = record
 
     def _ends_early(self, rest: int) -> None:
+        """Report that the file was cut off."""
         self.layout.losses.append(
             f"ends at byte {self.size} without its closing records, in a part of {rest} bytes: the recording "
             "was cut off, and what came after is lost"
         )
 
-    def _lost(self, why: str) -> None:
+    def _report_loss(self, why: str) -> None:
+        """Report the rest of the file as lost."""
         self.layout.losses.append(
             f"byte {self.at} {why}: it and the {self.size - self.at} bytes from there on are lost"
         )
@@ -175,15 +179,15 @@ def content(file: IO[bytes], segment: Segment, budget: Budget) -> bytes:
     return expand(data, segment.compression, segment.size)
 
 
-# Reader of one MCAP file: its topics, and its messages in pieces ordered by log time.
+# The reader of one MCAP file: its topics, and its messages in pieces in order of log time.
 
 
 _NO_POSITIONS = np.zeros(0, np.int64)
 _NO_MESSAGES = np.zeros(0, MESSAGE)
 
 
-_OF_A_MESSAGE = 400  # memory overhead of decoding one message into a sample [bytes]
-_MOST_FINDINGS = 1000
+_BYTES_PER_MESSAGE = 400  # memory overhead of decoding one message into a sample [bytes]
+_MOST_FINDINGS = 1000  # of a file, so that damage everywhere does not fill the memory
 
 
 @attrs.frozen(eq=False)
@@ -208,7 +212,7 @@ class Piece:
 
 @attrs.frozen(eq=False)
 class Due:
-    """A piece that is not loaded yet; a merge of many files thus holds few pieces in memory.
+    """A piece that is not loaded yet, so that a merge of many files has few pieces in memory.
 
     Attributes
     ----------
@@ -244,15 +248,15 @@ class McapFile:
         self.size = file.seek(0, 2)
         self.findings: list[Finding] = []
         self.without_checksum = 0
-        self._found = 0
+        self._read = 0
         self._check_magic()
         indexed = by_index(file, self.size, budget)
         self.layout = indexed or by_scan(file, self.size, budget)
         self.is_indexed = indexed is not None
         for text in self.layout.losses:
-            self._find(text)
+            self._add_finding(text)
         if not (self.is_indexed or self.layout.losses):
-            self._find("has no index, or a damaged one: read from start to end", Severity.NOTE)
+            self._add_finding("has no index, or a damaged one: read from start to end", Severity.NOTE)
         self._check_data()
 
     @property
@@ -274,22 +278,22 @@ class McapFile:
             roles[number] = code
         for segment in self.layout.segments:
             yield Due(segment.start_ns, partial(self._piece, segment, roles))
-        self._account(types, self._found)
+        self._report_missing(types, self._read)
 
     def _piece(self, segment: Segment, roles: NDArray[np.uint8]) -> Piece | None:
         """Messages of a segment; None if it is damaged."""
         try:
-            data = np.frombuffer(self._load(segment), np.uint8)
+            data = np.frombuffer(self._verified_content(segment), np.uint8)
             messages = self._messages(segment, data, roles)
         except DamageError as error:
-            self._find(f"chunk at byte {segment.at} {error}: its messages are lost")
+            self._add_finding(f"chunk at byte {segment.at} {error}: its messages are lost")
             return None
-        self._found += len(messages)
+        self._read += len(messages)
         return Piece(segment.start_ns, data, messages, segment.stored)
 
-    def _load(self, segment: Segment) -> bytes:
-        """Records of a segment, after verification of its checksum (if there is one)."""
-        if segment.data_at == segment.at:
+    def _verified_content(self, segment: Segment) -> bytes:
+        """Records of a segment, whose head must agree with the index and whose checksum with the data."""
+        if segment.data_at == segment.at:  # messages outside of chunks
             self.without_checksum += 1
             return content(self.file, segment, self.budget)
         head = chunk_head(self.file, segment.at, self.size)
@@ -309,38 +313,42 @@ class McapFile:
     def _messages(
         self, segment: Segment, data: NDArray[np.uint8], roles: NDArray[np.uint8]
     ) -> NDArray[np.void]:
+        """Messages of requested channels in a segment: counted first, then read."""
         counts = np.zeros(1, COUNTS)
         mcap_layout.walk(data, roles, _NO_MESSAGES, _NO_POSITIONS, counts)
         wanted = int(counts["wanted"][0])
-        self.budget.check(segment.stored + len(data) + _OF_A_MESSAGE * wanted)
+        self.budget.check(segment.stored + len(data) + _BYTES_PER_MESSAGE * wanted)
         messages = np.zeros(wanted, MESSAGE)
         if len(messages):
             mcap_layout.walk(data, roles, messages, _NO_POSITIONS, counts)
         rest = len(data) - int(counts["read"][0])
         if rest and not segment.cut:
-            self._find(f"chunk at byte {segment.at} holds {rest} bytes that are not records: they are lost")
+            self._add_finding(
+                f"chunk at byte {segment.at} holds {rest} bytes that are not records: they are lost"
+            )
         for name, what in (
             ("unknown_channel", "messages without a channel"),
             ("foreign", "records of an unknown kind"),
         ):
             if counts[name][0]:
-                self._find(f"chunk at byte {segment.at} holds {counts[name][0]} {what}: they are lost")
+                self._add_finding(f"chunk at byte {segment.at} holds {counts[name][0]} {what}: they are lost")
         return messages
 
-    def _account(self, types: dict[int, int], found: int) -> None:
+    def _report_missing(self, types: dict[int, int], found: int) -> None:
         """Report, after the last piece, how many messages are missing and what could not be checked."""
         counts = self.layout.counts
         expected = sum(counts.get(number, 0) for number in types) if counts is not None else found
         if expected != found:
-            self._find(f"{found} messages could be read of the {expected} that it counts")
+            self._add_finding(f"{found} messages could be read of the {expected} that it counts")
         if self.without_checksum and not self.layout.data_crc:
-            self._find(
+            self._add_finding(
                 f"has no checksum for {self.without_checksum} of {len(self.layout.segments)} chunks: "
                 "a damaged number in them would not be detected",
                 Severity.NOTE,
             )
 
     def _check_magic(self) -> None:
+        """Check that the file is an MCAP file."""
         self.file.seek(0)
         start = self.file.read(len(MAGIC))
         if not self.size:
@@ -359,9 +367,10 @@ class McapFile:
         while left and (part := self.file.read(min(left, 2**20))):
             crc, left = zlib.crc32(part, crc), left - len(part)
         if crc != self.layout.data_crc:
-            self._find("does not match the checksum of its data: a part of it is damaged")
+            self._add_finding("does not match the checksum of its data: a part of it is damaged")
 
-    def _find(self, text: str, severity: Severity = Severity.LOSS) -> None:
+    def _add_finding(self, text: str, severity: Severity = Severity.LOSS) -> None:
+        """Add a finding, up to a largest number."""
         if len(self.findings) < _MOST_FINDINGS:
             self.findings.append(Finding(self.path, text, severity))
         elif len(self.findings) == _MOST_FINDINGS:

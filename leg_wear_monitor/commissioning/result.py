@@ -1,4 +1,4 @@
-"""The result of commissioning: parameters, detectable clearances, text."""
+"""The result of commissioning: detectable clearances, the parameter file, and the result with all of it."""
 
 import math
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-# Whether a drive torque is good enough to show that a joint wears.
+# Detection: whether the drive torque is good enough to show the wear of each joint.
 
 
 @attrs.frozen(kw_only=True)
@@ -56,40 +56,42 @@ class JointDetection:
 
 
 def judgement(joints: Sequence[JointDetection]) -> str:
-    """For which joints a torque is good enough, in a sentence; empty without joints."""
+    """Sentence: for which joints a torque is good enough, and why not for others; empty without joints."""
     good = [each.joint for each in joints if each.is_good]
     reasons: dict[str, list[str]] = {}
     for each in joints:
         if not each.is_good:
             reasons.setdefault(each.reason, []).append(each.joint)
-    told = f"this torque is good enough for {_joints(good)}" if good else ""
-    bad = [f"{_joints(names)}, because {reason}" for reason, names in reasons.items()]
+    good_for = f"this torque is good enough for {_joint_names(good)}" if good else ""
+    bad = [f"{_joint_names(names)}, because {reason}" for reason, names in reasons.items()]
     if not bad:
-        return told
-    return f"{told or 'this torque is not good enough'}{'; not' if told else ''} for {'; nor for '.join(bad)}"
+        return good_for
+    not_for = f"for {'; nor for '.join(bad)}"
+    return f"{good_for}; not {not_for}" if good_for else f"this torque is not good enough {not_for}"
 
 
-def _joints(names: Sequence[str]) -> str:
+def _joint_names(names: Sequence[str]) -> str:
     return f"joint{'s' if len(names) > 1 else ''} {', '.join(names)}"
 
 
-# A ROS parameter file of what differs from the defaults, as `config/monitor.yaml` is one of the defaults.
+# The ROS parameter file: parameters that differ from the defaults, which `config/monitor.yaml` lists.
 
 
-_HEAD = (
+_HEAD_LINES = (
     "Parameters of the monitor, proposed by `leg-wear-monitor commission`; others have their defaults.",
     "crank angle = sign * position / gear_ratio + offset_rad",
     "torque on the crank = sign * scale * gear_ratio * value",
 )
-_ALWAYS = ("mechanism", "crank_joint", "crank.", "drive_torque.", "cadence.")
+# parameters that are written even if they have their default, because a leg depends on them
+_ALWAYS_WRITTEN = ("mechanism", "crank_joint", "crank.", "drive_torque.", "cadence.")
 
 
 def parameter_text(config: MonitorConfig, remarks: Sequence[str]) -> str:
     """Text of a parameter file, with remarks as comments at its head."""
-    head = "".join(f"# {printable(line)}\n" for line in (*_HEAD, *remarks))
+    head = "".join(f"# {printable(line)}\n" for line in (*_HEAD_LINES, *remarks))
     tree: dict[str, Any] = {}
     for name, value in values_of(config).items():
-        if value == () or (value == PARAMETERS[name].default and not name.startswith(_ALWAYS)):
+        if value == () or (value == PARAMETERS[name].default and not name.startswith(_ALWAYS_WRITTEN)):
             continue
         *sections, last = name.split(".")
         place = tree
@@ -104,7 +106,7 @@ def parameter_text(config: MonitorConfig, remarks: Sequence[str]) -> str:
     return head + stream.getvalue()
 
 
-# Result of commissioning: each parameter with its runner-up, the undetermined ones, what does not fit.
+# The result: each parameter with its runner-up, the undetermined ones, and what does not fit.
 
 
 SCHEMA_VERSION = 1
@@ -206,11 +208,11 @@ class CommissioningResult:
             "schema_version": SCHEMA_VERSION,
             "turns": self.turns,
             "is_sure": self.is_sure,
-            "items": [_document(each) for each in self.items],
+            "items": [_json_object(each) for each in self.items],
             "not_enough_to_tell": list(self.not_told),
             "findings": list(self.findings),
             "notes": list(self.notes),
-            "joints": [_document(each) for each in self.joints],
+            "joints": [_json_object(each) for each in self.joints],
             "judgement": self.judgement,
             "reference_used": self.reference_used,
         }
@@ -247,11 +249,13 @@ class CommissioningResult:
         return parameter_text(self.config, remarks)
 
 
-def _document(part: Any) -> dict[str, Any]:
-    return {key: _plain(value) for key, value in attrs.asdict(part).items()}
+def _json_object(part: Any) -> dict[str, Any]:
+    """Plain object of an attrs class."""
+    return {key: _json_value(value) for key, value in attrs.asdict(part).items()}
 
 
-def _plain(value: Any) -> Any:
+def _json_value(value: Any) -> Any:
+    """Plain value: lists for tuples, null for NaN and infinity."""
     if isinstance(value, tuple):
-        return [_plain(each) for each in value]
+        return [_json_value(each) for each in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value

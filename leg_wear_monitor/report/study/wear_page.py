@@ -1,4 +1,4 @@
-"""HTML page of the wear study: wear of new joints, and its development over a life."""
+"""HTML pages and conclusions of three studies: wear over a life, legs of other sizes, and lubrication."""
 
 import textwrap
 from collections.abc import Sequence
@@ -41,8 +41,13 @@ from leg_wear_monitor.studies.results import (
 )
 from leg_wear_monitor.wear import BUSHING, wear_zone
 
-_NEW, _END = 0, 1  # indices of states: rates when new and at the end (depths: halfway and at the end)
-_MILLION = 1.0e-6
+# The page of the wear study: wear of new joints, and its development over a life.
+
+
+# Indices of the two stored states of a life: of the wear rates, new and at the end; of the depths, halfway
+# and at the end.
+_NEW, _END = 0, 1
+_MILLION = 1.0e-6  # factor from cycles to millions of cycles
 
 
 def life(results: StudyResults, labelled: Labelled) -> Sections:
@@ -50,7 +55,7 @@ def life(results: StudyResults, labelled: Labelled) -> Sections:
     lives = [(point.label, arrays) for point, arrays in results.of("life")]
     sentences = [*findings.wear(labelled), *findings.zones(labelled)]
     for label, arrays in lives:
-        sentences += _of_a_life(label, arrays, several=len(lives) > 1)
+        sentences += _life_sentences(label, arrays, several=len(lives) > 1)
     sections = [asked(results), conclude(sentences), wear(results, labelled)]
     if lives:
         sections += [_clearances(lives), _worn_surfaces(results, lives)]
@@ -59,7 +64,7 @@ def life(results: StudyResults, labelled: Labelled) -> Sections:
     return [*sections, Section("Tables", tables + ([life_table(lives, "clearance joints")] if lives else []))]
 
 
-def _of_a_life(label: str, arrays: Arrays, several: bool) -> list[str]:
+def _life_sentences(label: str, arrays: Arrays, several: bool) -> list[str]:
     """Sentence on a life: its length, the opened joints, the change of the wear rate, the toe's error."""
     cycles, mean = arrays["cycles"][:, -1], arrays["clearance_mean_m"]
     opened = 1.0e3 * (mean[:, -1] - mean[:, 0]).mean(axis=0)
@@ -75,13 +80,9 @@ def _of_a_life(label: str, arrays: Arrays, several: bool) -> list[str]:
     toe = arrays["toe_position_m"]
     return [
         f"{sets}{first} opens first, after {with_spread(spread(cycles), _MILLION)} million cycles; opened "
-        "by then, "
-        ""
-        ""
-        f"on the mean: {', '.join(parts)}. Wear of a cycle at the end against new: {', '.join(rates)}; "
-        "largest toe "
-        f"error {number(1.0e3 * toe[:, 0].mean())} mm when new, {number(1.0e3 * toe[:, -1].mean())} mm at "
-        "the end."
+        f"by then, on the mean: {', '.join(parts)}. Wear of a cycle at the end against new: "
+        f"{', '.join(rates)}; largest toe error {number(1.0e3 * toe[:, 0].mean())} mm when new, "
+        f"{number(1.0e3 * toe[:, -1].mean())} mm at the end."
     ]
 
 
@@ -110,17 +111,17 @@ def _clearances(lives: Labelled) -> Section:
         axes.set_title(label, fontsize=SMALL + 1.0, color=INK, fontweight="bold")
         axes.legend(fontsize=SMALL, frameon=False, ncols=5, handletextpad=0.3)
         pictures.append(
-            Picture(image=png(figure), alt=f"Clearances of {label} over the life: {_ends(arrays)}")
+            Picture(image=png(figure), alt=f"Clearances of {label} over the life: {_first_and_last(arrays)}")
         )
     caption = (
         "Clearances as wear feeds back. Full: mean around the joint; dashed: where it is largest, both "
-        "surfaces "
-        "added up in their own frames. A line for each run."
+        "surfaces added up in their own frames. A line for each run."
     )
     return Section("Over a life", [Gallery(pictures=pictures, caption=caption)])
 
 
-def _ends(arrays: Arrays) -> str:
+def _first_and_last(arrays: Arrays) -> str:
+    """Mean clearance of each joint at the first and at the last point of the life."""
     mean = 1.0e3 * arrays["clearance_mean_m"].mean(axis=0)
     parts = [
         f"{joint} {mean[0, k]:.3f} to {mean[-1, k]:.3f} mm"
@@ -173,22 +174,23 @@ def life_table(lives: Labelled, head: str) -> Table:
     )
 
 
-# HTML page of the study of other lengths and masses: claims against fractions of legs.
+# The page of the study of other lengths and masses: in what fraction of drawn legs each claim holds.
 
 
-_ALWAYS, _NEVER = 0.9, 0.1  # a fraction whose interval is beyond these hardly depends on the leg
+# a claim whose fraction of legs is surely above the first or below the second hardly depends on the leg
+_IN_MOST, _IN_FEW = 0.9, 0.1
 _REASONS = {
     OPEN: "no assembly near that of the file",
     DEAD_POINT: "dead point",
     TRANSMISSION: "transmission near a dead point",
     STEP: "step of another size",
 }
-_LOOKS = ((HOLDS, BLUE, "o"), (FAILS, VERMILION, "s"), (UNDECIDED, GREEN, "^"))
-_WIDE = 52  # characters in a line of a picture's title
+_STATE_MARKS = ((HOLDS, BLUE, "o"), (FAILS, VERMILION, "s"), (UNDECIDED, GREEN, "^"))
+_TITLE_WIDTH = 52  # characters in a line of a picture's title
 
 
 def legs(results: StudyResults, _labelled: Labelled) -> Sections:
-    """Sections of the page."""
+    """Sections of this study's page."""
     found = results.claims()
     sections = [asked(results), conclude(_sentences(found)), Section("Claims", [claim_table(found)])]
     gallery = influence_gallery(found)
@@ -198,20 +200,21 @@ def legs(results: StudyResults, _labelled: Labelled) -> Sections:
 
 
 def _sentences(found: LegClaims) -> list[str]:
+    """Conclusions: how many legs walk, and which claims hold in most of them, in few, or in some."""
     rejected = [f"{_REASONS[reason]} {count}" for reason, count in found.rejected.items()]
     drawn = found.legs + sum(found.rejected.values())
-    sentences = [f"Of {drawn} drawn legs {found.legs} walk" + _tail(rejected) + "."]
+    sentences = [f"Of {drawn} drawn legs {found.legs} walk" + _rejected_text(rejected) + "."]
     known = [result for result in found.claims if result.fraction is not None]
     groups = (
-        ("Hold in more than 90 % of legs", [one for one in known if one.interval[0] > _ALWAYS]),
-        ("Hold in less than 10 % of legs", [one for one in known if one.interval[1] < _NEVER]),
+        ("Hold in more than 90 % of legs", [one for one in known if one.interval[0] > _IN_MOST]),
+        ("Hold in less than 10 % of legs", [one for one in known if one.interval[1] < _IN_FEW]),
     )
     for head, group in groups:
         if group:
             sentences.append(f"{head}: {'; '.join(one.claim.text for one in group)}.")
-    between = [one for one in known if one.interval[0] <= _ALWAYS and one.interval[1] >= _NEVER]
+    between = [one for one in known if one.interval[0] <= _IN_MOST and one.interval[1] >= _IN_FEW]
     if between:
-        texts = [f"{one.claim.text} ({_fraction(one)})" for one in between]
+        texts = [f"{one.claim.text} ({_fraction_text(one)})" for one in between]
         sentences.append(f"Depend on lengths and masses, or are not sure: {'; '.join(texts)}.")
     open_ones = sum(result.count(UNDECIDED) for result in found.claims)
     if found.legs:
@@ -220,7 +223,8 @@ def _sentences(found: LegClaims) -> list[str]:
     return sentences
 
 
-def _tail(rejected: Sequence[str]) -> str:
+def _rejected_text(rejected: Sequence[str]) -> str:
+    """Rejected legs by reason, as the end of a sentence."""
     return f"; rejected: {', '.join(rejected)}" if rejected else ""
 
 
@@ -231,7 +235,7 @@ def claim_table(found: LegClaims) -> Table:
             result.claim.place,
             result.claim.text,
             *(str(result.count(state)) for state in (HOLDS, FAILS, UNDECIDED)),
-            _fraction(result),
+            _fraction_text(result),
             result.file_state or "–",
             ", ".join(f"{one.factor} ({one.rank_correlation:+.2f})" for one in result.influences) or "–",
         ]
@@ -258,7 +262,8 @@ def claim_table(found: LegClaims) -> Table:
     )
 
 
-def _fraction(result: ClaimResult) -> str:
+def _fraction_text(result: ClaimResult) -> str:
+    """Fraction of the decided legs in which a claim holds, with its interval [%]."""
     if result.fraction is None:
         return "–"
     low, high = result.interval
@@ -266,14 +271,14 @@ def _fraction(result: ClaimResult) -> str:
 
 
 def influence_gallery(found: LegClaims) -> Gallery:
-    """For every claim that a factor decides, its measure in all legs over the strongest factor."""
+    """Pictures of claims that some factor influences: the measure of the claim over the strongest factor."""
     pictures = []
     for result in (one for one in found.claims if one.influences):
         first = result.influences[0]
         factor, values = found.factors[first.factor], [effect.value for effect in result.effects]
         figure = new_figure(4.6, 3.1)
         axes = figure.subplots()
-        for state, colour, mark in _LOOKS:
+        for state, colour, mark in _STATE_MARKS:
             chosen = [i for i, each in enumerate(result.states) if each == state]
             axes.plot(
                 factor[chosen], [values[i] for i in chosen], mark, color=colour, markersize=4.5,
@@ -286,7 +291,9 @@ def influence_gallery(found: LegClaims) -> Gallery:
         tidy(axes)
         axes.set_xlabel(f"factor on the {first.factor}", fontsize=SMALL)
         axes.set_ylabel("measure of the claim", fontsize=SMALL)
-        axes.set_title(textwrap.fill(result.claim.text, _WIDE), fontsize=SMALL, color=INK, fontweight="bold")
+        axes.set_title(
+            textwrap.fill(result.claim.text, _TITLE_WIDTH), fontsize=SMALL, color=INK, fontweight="bold"
+        )
         axes.legend(fontsize=SMALL, frameon=False, ncols=3, handletextpad=0.1)
         alt = f"{result.claim.text}: over the {first.factor}, rank correlation {first.rank_correlation:+.2f}"
         pictures.append(Picture(image=png(figure), alt=alt))
@@ -298,16 +305,16 @@ def influence_gallery(found: LegClaims) -> Gallery:
     return Gallery(pictures=pictures, caption=caption)
 
 
-# Conclusions of the study of oil and grease, from its data.
+# The conclusions of the study of oil and grease, from its data.
 
 
-_OPENS_M = 1.0e-4  # depth of the bushing at which a life is compared
+_OPENS_M = 1.0e-4  # depth of a bushing up to which lives are compared
 
 
 def lubrication(labelled: Labelled) -> list[str]:
     """Order of the joints by wear, life of the first, forces and contact, dry and with each viscosity."""
     (_, dry), *greased = labelled
-    sentences = [f"{_capital(label)}: {_order(arrays)}" for label, arrays in labelled]
+    sentences = [f"{_capital(label)}: {_joints_by_wear(arrays)}" for label, arrays in labelled]
     for joint in clearance_joints_of(dry):
         loads = [
             f"{label} {with_spread(joint_force(arrays, 'p99_force_n', joint))}" for label, arrays in labelled
@@ -316,7 +323,7 @@ def lubrication(labelled: Labelled) -> list[str]:
             f"Joint {joint}: force of contact and film, 99 % of the time below [N]: {'; '.join(loads)}."
         )
     for label, arrays in greased:
-        sentences.append(f"With {label} {_against(arrays, dry)}.")
+        sentences.append(f"With {label} {_against_dry(arrays, dry)}.")
     return sentences
 
 
@@ -324,8 +331,8 @@ def _capital(label: str) -> str:
     return label[:1].upper() + label[1:]
 
 
-def _order(arrays: Arrays) -> str:
-    """The joints by wear of the bushing, most first, and the life of the first."""
+def _joints_by_wear(arrays: Arrays) -> str:
+    """The joints by wear of the bushing, the largest first, and the life of the first one."""
     depths = {joint: depth_per_cycle(arrays, joint) for joint in clearance_joints_of(arrays)}
     worn = sorted((joint for joint in depths if depths[joint].mean > 0.0), key=lambda j: -depths[j].mean)
     if not worn:
@@ -343,16 +350,18 @@ def _order(arrays: Arrays) -> str:
     )
 
 
-def _against(arrays: Arrays, dry: Arrays) -> str:
-    """Wear and time in contact against those of the dry joints."""
-    wear, touch = [], []
+def _against_dry(arrays: Arrays, dry: Arrays) -> str:
+    """Wear relative to that of the dry joints, and the fraction of time in contact."""
+    wear_texts, contact_texts = [], []
     for joint in clearance_joints_of(dry):
         before, after = (
             of_clearance_joints(each, "archard_integral_j_per_cycle", joint).mean for each in (dry, arrays)
         )
-        wear.append(f"{joint} {percent(after / before)}" if before > 0.0 else f"{joint} –")
-        touch.append(f"{joint} {percent(of_clearance_joints(arrays, 'contact_fraction', joint).mean)}")
+        wear_texts.append(f"{joint} {percent(after / before)}" if before > 0.0 else f"{joint} –")
+        contact_texts.append(
+            f"{joint} {percent(of_clearance_joints(arrays, 'contact_fraction', joint).mean)}"
+        )
     return (
-        f"the wear, ∫ F |v| dt of the contact's share, is of the dry one: {', '.join(wear)}; surfaces touch "
-        f"for: {', '.join(touch)} of the time"
+        f"the wear, ∫ F |v| dt of the contact's share, is of the dry one: {', '.join(wear_texts)}; surfaces "
+        f"touch for: {', '.join(contact_texts)} of the time"
     )

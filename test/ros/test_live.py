@@ -35,10 +35,9 @@ from leg_wear_monitor.messages.leg_markers import LegMarkers
 from leg_wear_monitor.messages.outputs import Messages
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.verdict.verdict import State
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.ros.gait_publisher import PublisherConfig
-from leg_wear_monitor.state import SCHEMA_VERSION
+from leg_wear_monitor.state import SCHEMA_VERSION, State
 
 ME = "/leg_wear_monitor"
 FAST = {"wear_acceleration": 1.0e5}

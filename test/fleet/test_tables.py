@@ -116,7 +116,10 @@ def test_a_fleet_that_is_none_is_one_line(tmp_path):
 
 def test_with_pandas_they_are_frames(fleet):
     pytest.importorskip("pandas")
-    assert list(fleet.lives().query("leg == 'a'").joint) == ["A", "B", "G", "I", "J", "leg"]
+    lives = fleet.lives().query("leg == 'a'")
+    assert list(lives.joint) == ["A", "B", "G", "I", "J", "leg"]
+    assert set(lives.believed_by[:-1]) <= {"counted", "torque", "encoders", "measured", "both"}
+    assert set(lives.status[:-1]) <= {"healthy", "watch", "not_monitored", "inspect", "stop"}
     assert len(fleet.cycles()) == fleet.table("cycles").num_rows
     assert len(fleet.verdicts()) == 2 and len(fleet.recordings()) == 3
 

@@ -4,6 +4,7 @@ import attrs
 import numpy as np
 import pytest
 
+from leg_wear_monitor.estimate import ground_load as fits
 from leg_wear_monitor.estimate.ground_load import ground_load, nuisances
 from leg_wear_monitor.estimate.signature import Channel, TorqueSensor, signature_model, simulated_signatures
 from leg_wear_monitor.mechanism.loader import load_mechanism
@@ -90,3 +91,28 @@ def test_a_known_force_is_taken_away_first(leg, linkage, reference):
     first, second = (found(leg, linkage, one, walked) for one in (reference, under))
     assert second.peak_n == pytest.approx(first.peak_n, rel=0.05)
     assert at_points(force).shape == (8 * PHASES, 2)
+
+
+def test_of_several_minima_the_least_is_taken_and_the_others_are_in_the_sigma(
+    leg, linkage, reference, monkeypatch
+) -> None:
+    """100 N with shapes as people's differ, a draw with two minima: 102 and 121 N explain as well."""
+    draws, stance = np.random.default_rng(0), nominal_stance(linkage)
+    for _ in range(7):
+        heel, toe, shape = draws.standard_normal(), draws.standard_normal(), draws.standard_normal(8)
+    stance = attrs.evolve(
+        stance, heel_strike=stance.heel_strike + 0.02 * heel, toe_off=stance.toe_off + 0.02 * toe
+    )
+    s = stance.fractions()
+    waves = np.where(s <= 1.0, np.sin(np.pi * np.outer(np.arange(1, 9), s)), 0.0)
+    walked = pushed(reference, linkage, 100.0 * (stance.force() + np.outer(0.05 * shape @ waves, stance.up)))
+    whole, singles = found(leg, linkage, reference, walked), []
+    for start in (50.0, 200.0, 600.0):
+        for toe_off in (-2.0, 0.0, 2.0):
+            monkeypatch.setattr(fits, "_STARTS_N", (start,))
+            monkeypatch.setattr(fits, "_TOE_OFFS", (toe_off,))
+            singles.append(found(leg, linkage, reference, walked))
+    best = min(singles, key=lambda one: one.square)
+    assert max(one.peak_n for one in singles) - min(one.peak_n for one in singles) > 15.0
+    assert (whole.peak_n, whole.square) == (best.peak_n, best.square)
+    assert whole.peak_sigma_n > best.peak_sigma_n

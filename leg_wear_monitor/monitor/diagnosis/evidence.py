@@ -243,6 +243,9 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
         )
         what = what if state.is_identifying else "a reference for it is"
         return f"{known}{what} being simulated, {references.percent} %"
+    if state.load and not state.load.is_sure and not math.isnan(state.load.other_n):
+        sizes = f"{state.load.peak_n:.0f} N and {state.load.other_n:.0f} N explain its drive torque as well"
+        return f"{known}the force on the foot is not observable: {sizes}"
     return f"{known}masses, lengths and friction near those of the file do not explain its drive torque"
 
 

@@ -3,9 +3,11 @@
 import math
 from types import SimpleNamespace
 
+import attrs
 import numpy as np
 import pytest
 
+from leg_wear_monitor.estimate.ground_load import GroundLoad
 from leg_wear_monitor.estimate.signature import CommissionedTorque, TorqueSensor
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.inputs import Cadence
@@ -136,3 +138,14 @@ def test_a_healthy_leg_is_told_how_well_it_is_known_and_what_comes_next() -> Non
     assert hit.words["observed"].endswith(
         "; 10 gait cycles show clearances to ± 0.02 mm; the baseline is complete in 40 gait cycles (40 s)"
     )
+
+
+def test_a_force_on_the_foot_that_has_two_sizes_is_not_observable() -> None:
+    load = GroundLoad(np.zeros((128, 2)), 40.0, 30.0, 0.1, 0.5, 0.0, 1.0, 9.0, other_n=95.0)
+    on_ground = SimpleNamespace(**vars(IDLE), is_load_left_out=lambda _: False)
+    models = SimpleNamespace(is_of_file=lambda _: False)
+    now = state(reference=of_reference(), cycles=cycles(50), commissioned=known(), load=load)
+    told = doubt(now, on_ground, models)
+    assert told.endswith("not observable: 40 N and 95 N explain its drive torque as well")
+    now.load = attrs.evolve(load, other_n=math.nan)
+    assert "not observable" not in doubt(now, on_ground, models)

@@ -7,6 +7,7 @@ import numpy as np
 
 from leg_wear_monitor.estimate.torque_model import torque_model
 from leg_wear_monitor.mechanism.materials import bushing_of
+from leg_wear_monitor.mechanism.person import with_toe_force
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.accounting import Accounting
 from leg_wear_monitor.monitor.config.fitting import fitted, twin_settings
@@ -20,7 +21,7 @@ from leg_wear_monitor.monitor.encoders import EncoderObserver
 from leg_wear_monitor.monitor.evaluation import A_CYCLE, AlarmEvaluation, EvaluationPeriods
 from leg_wear_monitor.monitor.foot_load import FootLoadCheck
 from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
-from leg_wear_monitor.monitor.forecast.measurement import GrowthWindow, model_error
+from leg_wear_monitor.monitor.forecast.measurement import GrowthWindow, ModelError, model_error
 from leg_wear_monitor.monitor.gait_evidence import TorqueRecord
 from leg_wear_monitor.monitor.inputs import InputGuard
 from leg_wear_monitor.monitor.judgement import Judge, MonitorSnapshot, MonitorState
@@ -28,7 +29,7 @@ from leg_wear_monitor.monitor.ledger.entry import Measurement, SimulatedReferenc
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.reference import LegParameters
-from leg_wear_monitor.twin.sample import NO_LOAD, SamplingSettings
+from leg_wear_monitor.twin.sample import GROUND, NO_LOAD, SamplingSettings
 from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 WRONG_TORQUE = "the received drive torque is wrong; see the status `torque`"
@@ -113,8 +114,7 @@ class Parts:
         )
         if ledger and ledger.entry:
             self.evaluation.board.restore(ledger.entry.alarms)
-        speed = self.twin.settings.tracker.commanded_speed_radps
-        self.model_error = model_error(self.mechanism, speed, self.config.wear_acceleration)
+        self._of_leg = self.twin.parameters, self._model_error()
         self.evaluation_periods = EvaluationPeriods(cycle_ns // periods)
         kept = TorqueRecord.of(self.accounting.state.commissioned)
         self.state = MonitorState(tuple(GrowthWindow() for _ in self.clearance_joints), kept)
@@ -139,7 +139,8 @@ class Parts:
             return None
         order = [known.names.index(name) for name in self.mechanism.bodies]
         bodies = np.array(known.mass)[order], np.array(known.length)[order]
-        return LegParameters(*bodies, known.friction, known.compliance, known.damping, known.load)
+        own = LegParameters(*bodies, known.friction, known.compliance, known.damping, known.load)
+        return attrs.evolve(own, load_sigma=known.load_sigma)
 
     def _known_references(self, ledger: Ledger | None) -> list[TorqueReference]:
         """Torque references of the ledger, their parameters in the order of the mechanism."""
@@ -150,6 +151,19 @@ class Parts:
             parameters = attrs.evolve(own, mass=own.mass[order], length=own.length[order])
             known.append(attrs.evolve(kept.reference, parameters=parameters))
         return known
+
+    @property
+    def model_error(self) -> ModelError:
+        """What the growth may be off by masses, and by a load that was found; a measured one is known."""
+        if self._of_leg[0] is not self.twin.parameters:
+            self._of_leg = self.twin.parameters, self._model_error()
+        return self._of_leg[1]
+
+    def _model_error(self) -> ModelError:
+        own, speed = self.twin.parameters, self.twin.settings.tracker.commanded_speed_radps
+        sigma = own.load_sigma if self.config.load.model == GROUND else 0.0
+        leg = with_toe_force(self.mechanism, own.load) if own.load.size else self.mechanism
+        return model_error(leg, speed, self.config.wear_acceleration, sigma)
 
     @property
     def measured(self) -> tuple[Measurement | None, ...]:

@@ -163,6 +163,7 @@ class Processing:
             limits,
             lambda: self._parts.judge.is_forecast_valid(state.findings),
             sigma_m,
+            self._parts.model_error,
         )
         report = cycle_report(
             statistics,
@@ -257,9 +258,8 @@ class Processing:
         names = tuple(self._parts.mechanism.bodies)
         stamp_ns = self._twin.intake.followed_stamp_ns
         factors = tuple(found.mass.tolist()), tuple(found.length.tolist()), found.friction
-        self._accounting.note(
-            IdentifiedLeg(stamp_ns, names, *factors, found.compliance, found.damping, found.load)
-        )
+        drive = found.compliance, found.damping
+        self._accounting.note(IdentifiedLeg(stamp_ns, names, *factors, *drive, found.load, found.load_sigma))
         self._parts.state.growth = tuple(GrowthWindow() for _ in self._clearance_joints)
         self._parts.keep()
 

@@ -474,7 +474,11 @@ class WearMonitor:
         limits = self._evaluation.board.clearance_limits_m
         sigma_m = self._accounting.sampling_sigma_m
         forecast = self._forecaster.renewed(
-            worn_m, limits, self._parts.judge.is_forecast_valid(self.verdict.findings), sigma_m
+            worn_m,
+            limits,
+            self._parts.judge.is_forecast_valid(self.verdict.findings),
+            sigma_m,
+            self._parts.model_error,
         )
         self._parts.state.last = with_forecast(last, forecast, self._parts.measured, sigma_m.tolist())
         return self._parts.state.last

@@ -162,6 +162,8 @@ class LegParameters:
         Of the crank on a compliant drive, over the critical one with the mean inertia of the ideal leg.
     load : (PHASES, 2) array
         Mean force of the ground on the toe at equal steps of the crank angle from 0 [N]; (0, 2) without one.
+    load_sigma : float
+        Standard deviation of its size, as a fraction of it; no part of the leg, which is equal with any.
     """
 
     mass: Floats = attrs.field(eq=attrs.cmp_using(eq=np.array_equal))
@@ -170,6 +172,7 @@ class LegParameters:
     compliance: float = 0.0
     damping: float = COUPLING_DAMPING
     load: Floats = attrs.field(factory=lambda: np.zeros((0, 2)), eq=attrs.cmp_using(eq=np.array_equal))
+    load_sigma: float = attrs.field(default=0.0, eq=False)
 
     @classmethod
     def none(cls, mechanism: Mechanism) -> "LegParameters":

@@ -110,6 +110,7 @@ def write_references(file: IO[bytes], mechanism: Mechanism, references: Sequence
             f"compliance_rad_per_nm_{i}": one.parameters.compliance,
             f"damping_ratio_{i}": one.parameters.damping,
             f"load_n_{i}": one.parameters.load,
+            f"load_sigma_{i}": one.parameters.load_sigma,
             f"clearance_m_{i}": one.clearance_m,
             f"expected_torque_nm_{i}": one.torque_nm[0],
             f"torque_nm_{i}": np.stack(one.torque_nm[1:]),
@@ -175,17 +176,19 @@ def _reference(parts: Any, i: int, order: list[int], joints: int) -> TorqueRefer
     if f"damping_ratio_{i}" in parts:
         compliance = float(_checked(parts, f"compliance_rad_per_nm_{i}", ()))
         damping = float(_checked(parts, f"damping_ratio_{i}", ()))
-    load = np.zeros((0, 2))  # files from before a leg could walk on the ground are without one
+    load, load_sigma = np.zeros((0, 2)), 0.0  # files from before a leg could walk on the ground are without
     if f"load_n_{i}" in parts and parts[f"load_n_{i}"].size:
         load = _checked(parts, f"load_n_{i}", (None, 2))
+    if f"load_sigma_{i}" in parts:
+        load_sigma = float(_checked(parts, f"load_sigma_{i}", ()))
     for name, values in (("mass", mass), ("length", length), ("clearance", clearance_m)):
         if not (values > 0.0).all():
             raise ValueError(f"a {name} is not above 0")
-    if min(friction, compliance, damping) < 0.0 or speed == 0.0:
-        raise ValueError("friction, compliance or damping is below 0, or speed is 0")
+    if min(friction, compliance, damping, load_sigma) < 0.0 or speed == 0.0:
+        raise ValueError("friction, compliance, damping or a sigma is below 0, or speed is 0")
     profile, leg = (
         CrankProfile(speed, cosine, sine),
-        LegParameters(mass, length, friction, compliance, damping, load),
+        LegParameters(mass, length, friction, compliance, damping, load, load_sigma),
     )
     return TorqueReference(profile, clearance_m, (expected, *torque), leg)
 

@@ -313,7 +313,8 @@ class References:
         is_known = state.load_rounds > 0  # it was sure in the first round; later rounds only improve it
         state.load, state.load_rounds = self._models.ground_load(state, reference), state.load_rounds + 1
         if self._is_on_ground and (is_known or state.load.is_sure):
-            parameters = attrs.evolve(reference.parameters, load=state.load.force)
+            sigma = state.load.peak_sigma_n / max(state.load.peak_n, state.load.peak_sigma_n)
+            parameters = attrs.evolve(reference.parameters, load=state.load.force, load_sigma=sigma)
             state.is_identifying = True
             self._running().begin_expected(
                 state.commissioned.clearance_m, depth, reference.profile, parameters
@@ -337,7 +338,8 @@ class References:
                 self._begin(found, clearance_m, depth, profile)
                 return
         if is_first and not start.compliance and self._models.misfit(state) >= FAR_FROM_FILE:
-            start = leg_of_ideal_torque(self._mechanism, model, known, profile.speed, start.load)
+            ideal = leg_of_ideal_torque(self._mechanism, model, known, profile.speed, start.load)
+            start = attrs.evolve(ideal, load_sigma=start.load_sigma)
         state.is_identifying = True
         part = self._unfinished(start, profile, clearance_m, is_of_parameters=True)
         if part is not None:

@@ -339,8 +339,9 @@ class JointCondition:
     growth_m : float or None
         A cycle; None while there is not enough data.
     growth_error_m : float
-        Uncertainty of this mean because cycles scatter. What the model is off is the same in all cycles of a
-        leg: it is in the factor of the wear coefficient, which a measured clearance corrects.
+        Uncertainty of this mean because cycles scatter, and because of the load, which was found for them.
+        What the model is off is the same in all cycles of a leg: it is in the factor of the wear coefficient,
+        which a measured clearance corrects.
     has_coefficient : bool
         Whether its wear coefficient is above 0; without one no wear is counted.
     """

@@ -30,6 +30,7 @@ from leg_wear_monitor.monitor.forecast.measurement import (
     GrowthRate,
     GrowthWindow,
     MeasurementResult,
+    ModelError,
     extended,
     growth_rate,
     last_measured,
@@ -250,6 +251,7 @@ class Forecaster:
         limits_m: Sequence[float],
         is_valid: Callable[[], bool],
         sampling_sigma_m: Floats | None = None,
+        model: ModelError | None = None,
     ) -> Forecast:
         """Forecast after a gait cycle: a new one if it is due, else the last.
 
@@ -264,6 +266,8 @@ class Forecaster:
             Whether the leg is in the range of the model.
         sampling_sigma_m : (k,) array, optional
             Standard deviation of the wear, because not all gait cycles were followed [m].
+        model : ModelError, optional
+            What the growth may be off by the load.
         """
         state = self.state
         if statistics.is_followed:
@@ -277,7 +281,7 @@ class Forecaster:
         rates = [growth_rate(window) for window in state.growth]
         if state.last is None or not is_recent or _known(rates) > state.known:
             state.stamp_ns = statistics.stamp_ns
-            return self.renewed(wear_m, limits_m, is_valid(), sampling_sigma_m)
+            return self.renewed(wear_m, limits_m, is_valid(), sampling_sigma_m, model)
         return state.last
 
     def renewed(
@@ -286,13 +290,15 @@ class Forecaster:
         limits_m: Sequence[float],
         is_valid: bool,
         sampling_sigma_m: Floats | None = None,
+        model: ModelError | None = None,
     ) -> Forecast:
         """A new forecast from the present state; parameters as in `after`."""
         rates = [growth_rate(window) for window in self.state.growth]
         self.state.known = _known(rates)
         if sampling_sigma_m is None:
             sampling_sigma_m = np.zeros(len(wear_m))
-        self.state.last = self._forecast(rates, wear_m, sampling_sigma_m, limits_m, is_valid)
+        model = model or ModelError.none(len(wear_m))
+        self.state.last = self._forecast(rates, model, wear_m, sampling_sigma_m, limits_m, is_valid)
         return self.state.last
 
     def expire(self) -> None:
@@ -420,6 +426,7 @@ class Forecaster:
     def _forecast(
         self,
         rates: Sequence[GrowthRate | None],
+        model: ModelError,
         wear_m: Floats,
         sampling_sigma_m: Floats,
         limits_m: Sequence[float],
@@ -434,7 +441,7 @@ class Forecaster:
                 wear_sigma_m=float(sampling_sigma_m[k]),
                 limit_m=limits_m[k],
                 growth_m=rate.per_cycle_m if rate else None,
-                growth_error_m=rate.sampling_m if rate else 0.0,
+                growth_error_m=rate.error_m(model.by_load(k, rate.per_cycle_m)) if rate else 0.0,
                 has_coefficient=max(self._clearances[k].wear_coefficient) > 0.0,
             )
             for k, (joint, rate) in enumerate(zip(self._clearance_joints, rates, strict=True))

@@ -472,6 +472,8 @@ class IdentifiedLeg:
         Between the measured crank angle and the crank [rad/(N m)]; of the critical damping.
     load : (n, 2) array
         Force of the ground on the toe at equal steps of the crank angle from 0 [N]; (0, 2) without one.
+    load_sigma : float
+        Standard deviation of its size, as a fraction of it.
     """
 
     stamp_ns: int
@@ -482,6 +484,7 @@ class IdentifiedLeg:
     compliance: float = 0.0
     damping: float = COUPLING_DAMPING
     load: Floats = attrs.field(factory=lambda: np.zeros((0, 2)), eq=attrs.cmp_using(eq=np.array_equal))
+    load_sigma: float = 0.0
 
 
 @attrs.frozen(eq=False)

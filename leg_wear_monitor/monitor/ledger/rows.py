@@ -205,8 +205,9 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
             add(db, "commissioning", values)
         case CommissionedTorque():
             add(db, "torque_commissioning", _baseline_values(event))
-        case IdentifiedLeg(stamp_ns, names, mass, length, friction, compliance, damping, load):
-            leg = LegParameters(np.array(mass), np.array(length), friction, compliance, damping, load)
+        case IdentifiedLeg(stamp_ns, names, mass, length, friction, compliance, damping, load, load_sigma):
+            bodies = np.array(mass), np.array(length)
+            leg = LegParameters(*bodies, friction, compliance, damping, load, load_sigma)
             add(db, "identified_leg", {"stamp_ns": stamp_ns, **_leg_values(names, leg)})
         case SimulatedReference():
             _write_reference(db, event)
@@ -254,6 +255,7 @@ def _leg_values(names: tuple[str, ...], leg: LegParameters) -> dict[str, Any]:
         "compliance_rad_per_nm": leg.compliance,
         "damping_ratio": leg.damping,
         "load_n": _blob(leg.load),
+        "load_sigma": leg.load_sigma,
     }
 
 
@@ -350,7 +352,7 @@ def read_commissioned_torques(db: sqlite3.Connection) -> list[CommissionedTorque
     return found
 
 
-_LEG = "stamp_ns, bodies, mass, length, friction, compliance_rad_per_nm, damping_ratio, load_n"
+_LEG = "stamp_ns, bodies, mass, length, friction, compliance_rad_per_nm, damping_ratio, load_n, load_sigma"
 
 
 def read_identified_leg(db: sqlite3.Connection) -> IdentifiedLeg | None:
@@ -359,8 +361,9 @@ def read_identified_leg(db: sqlite3.Connection) -> IdentifiedLeg | None:
     if row is None:
         return None
     names, leg = _leg_of(*row[1:])
-    mass, length = tuple(leg.mass.tolist()), tuple(leg.length.tolist())
-    return IdentifiedLeg(row[0], names, mass, length, leg.friction, leg.compliance, leg.damping, leg.load)
+    bodies = tuple(leg.mass.tolist()), tuple(leg.length.tolist())
+    drive = leg.compliance, leg.damping
+    return IdentifiedLeg(row[0], names, *bodies, leg.friction, *drive, leg.load, leg.load_sigma)
 
 
 def read_simulated_references(db: sqlite3.Connection) -> list[SimulatedReference]:
@@ -372,7 +375,7 @@ def read_simulated_references(db: sqlite3.Connection) -> list[SimulatedReference
         f"SELECT {_LEG}, is_whole, speed_radps, legs, ripple_rad, clearance_m, expected_torque_nm, torque_nm "
         "FROM torque_reference ORDER BY id DESC"
     )
-    return [SimulatedReference(row[0], *_reference_of(row[1:8], *row[8:])) for row in rows]
+    return [SimulatedReference(row[0], *_reference_of(row[1:9], *row[9:])) for row in rows]
 
 
 def _reference_of(
@@ -392,11 +395,18 @@ def _reference_of(
 
 
 def _leg_of(
-    bodies: str, mass: bytes, length: bytes, friction: float, compliance: float, damping: float, load: bytes
+    bodies: str,
+    mass: bytes,
+    length: bytes,
+    friction: float,
+    compliance: float,
+    damping: float,
+    load: bytes,
+    load_sigma: float,
 ) -> tuple[tuple[str, ...], LegParameters]:
     """Names of the bodies and parameters of the leg, of the values of `_leg_values`."""
     force = _floats(load).reshape(-1, 2)
-    leg = LegParameters(_floats(mass), _floats(length), friction, compliance, damping, force)
+    leg = LegParameters(_floats(mass), _floats(length), friction, compliance, damping, force, load_sigma)
     return tuple(bodies.split("\n")), leg
 
 

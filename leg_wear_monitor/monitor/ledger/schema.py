@@ -135,11 +135,12 @@ CREATE TABLE torque_commissioning (
 -- the leg that the drive torque shows; the last row is in force. bodies: a line each, with factors on masses
 -- and lengths of the mechanism file (float64, little endian); the factor on its friction; the compliance
 -- between the measured crank angle and the crank, 0 if it is rigid, and the damping of the crank on it over
--- the critical one; the force of the ground on the toe (n, 2) [N] at equal steps of the crank angle from 0
+-- the critical one; the force of the ground on the toe (n, 2) [N] at equal steps of the crank angle from 0,
+-- and the standard deviation of its size as a fraction of it
 CREATE TABLE identified_leg (
     id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, bodies TEXT NOT NULL, mass BLOB NOT NULL,
     length BLOB NOT NULL, friction REAL NOT NULL, compliance_rad_per_nm REAL NOT NULL,
-    damping_ratio REAL NOT NULL, load_n BLOB NOT NULL
+    damping_ratio REAL NOT NULL, load_n BLOB NOT NULL, load_sigma REAL NOT NULL
 ) STRICT;
 
 -- torque references that were simulated for this leg, one for each cadence (is_whole 1), and one whose
@@ -150,7 +151,8 @@ CREATE TABLE identified_leg (
 CREATE TABLE torque_reference (
     id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, bodies TEXT NOT NULL, mass BLOB NOT NULL,
     length BLOB NOT NULL, friction REAL NOT NULL, compliance_rad_per_nm REAL NOT NULL,
-    damping_ratio REAL NOT NULL, load_n BLOB NOT NULL, is_whole INTEGER NOT NULL, speed_radps REAL NOT NULL,
+    damping_ratio REAL NOT NULL, load_n BLOB NOT NULL, load_sigma REAL NOT NULL,
+    is_whole INTEGER NOT NULL, speed_radps REAL NOT NULL,
     legs INTEGER NOT NULL, ripple_rad BLOB NOT NULL, clearance_m BLOB NOT NULL,
     expected_torque_nm BLOB NOT NULL, torque_nm BLOB NOT NULL
 ) STRICT;

@@ -29,6 +29,7 @@ def references(leg):
     short = attrs.evolve(shipped, torque_nm=tuple(torque[:2] for torque in shipped.torque_nm))
     bodies = len(leg.bodies)
     identified = LegParameters(np.linspace(0.96, 1.04, bodies), np.full(bodies, 1.001), 1.4, 1.0e-3, 0.07)
+    identified = attrs.evolve(identified, load=np.ones((128, 2)), load_sigma=0.2)
     profile = CrankProfile(-0.95 * TURN, np.linspace(0.0, 0.01, 8), np.zeros(8))
     return short, attrs.evolve(short, parameters=identified, profile=profile)
 
@@ -44,6 +45,7 @@ def test_references_come_back_as_they_were(leg, references, written) -> None:
     again = read_references(written, leg)
     for one, same in zip(references, again, strict=True):
         assert one.parameters == same.parameters
+        assert one.parameters.load_sigma == same.parameters.load_sigma
         assert attrs.astuple(one.profile)[0] == same.profile.speed
         np.testing.assert_array_equal(one.profile.cosine, same.profile.cosine)
         np.testing.assert_array_equal(one.clearance_m, same.clearance_m)

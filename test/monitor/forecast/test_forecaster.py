@@ -8,6 +8,7 @@ from leg_wear_monitor import LegWearError, WearMonitor
 from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.forecast.forecast import Answer
 from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
+from leg_wear_monitor.monitor.forecast.measurement import ModelError
 from leg_wear_monitor.monitor.forecast.wear_coefficients import MeasuredClearance
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
@@ -44,6 +45,30 @@ def test_a_forecast_is_renewed_once_growth_is_known_and_then_once_a_minute(forec
     # sooner than if growth stayed as it is: it rises as clearances open
     assert 1.2e7 < told[-1].joints[0].cycles.p50 < 1.45e7
     assert told[-1].leg.cycles.p50 < told[-1].joints[0].cycles.p50
+
+
+@pytest.mark.plain
+def test_a_load_that_is_not_sure_widens_growth_and_life_and_a_sure_one_changes_nothing(leg):
+    settings = Forecasting(wear_coefficient_sigma=0.01, load_sigma=0.0, clearance_sigma_m=1e-9)
+
+    def known_with(sigma):
+        """Errors of growth, and logarithms of p90 over p10 of lives, with a load of this sigma."""
+        forecaster = Forecaster(leg, settings, (), [0] * 5)
+        model = None if sigma is None else ModelError(*np.zeros((2, 5)), np.full(5, sigma))
+        for second in range(1, 60):
+            forecaster.after(cycle(second), np.zeros(5), LIMITS, lambda: True)
+        found = forecaster.renewed(np.zeros(5), LIMITS, True, model=model)
+        growth = [(one.growth_m, one.growth_error_m) for one in forecaster.state.basis.conditions]
+        return np.array(growth), np.log([one.cycles.p90 / one.cycles.p10 for one in found.joints])
+
+    (growth, life), (sure, same), (unsure, wider) = (known_with(sigma) for sigma in (None, 0.0, 0.2))
+    np.testing.assert_array_equal(sure, growth)
+    np.testing.assert_array_equal(same, life)
+    by_load_m = 0.3 * 0.2 * growth[:, 0]  # all of it is of impacts: ideal motion makes no growth here
+    np.testing.assert_allclose(unsure[:, 1], np.hypot(growth[:, 1], by_load_m))
+    # of A, the first, whose life hardly depends on the others
+    assert wider[0] ** 2 - life[0] ** 2 == pytest.approx((2.0 * 1.2816 * 0.06) ** 2, rel=0.1)
+    assert (wider > life).all()
 
 
 @pytest.mark.plain

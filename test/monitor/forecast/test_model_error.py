@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.mechanism.person import PERSON_TOLERANCE, with_person
+from leg_wear_monitor.mechanism.person import PERSON_TOLERANCE, on_the_ground, with_person
 from leg_wear_monitor.monitor.forecast.measurement import ModelError, model_error
 from leg_wear_monitor.twin.reference import MASS_TOLERANCE
 
@@ -53,14 +53,34 @@ def test_where_a_person_makes_all_of_the_force_growth_is_as_uncertain_as_the_per
 
 
 def test_what_impacts_make_is_less_sure():
-    model = ModelError(np.array([1.0e-11]), np.array([0.6]))
+    model = ModelError(np.array([1.0e-11]), np.array([0.6]), np.zeros(1))
     even, more, all_of_it = (model.relative(0, growth_m) for growth_m in (1.0e-11, 2.0e-11, 1.0e-6))
     assert even == pytest.approx(0.6 * MASS_TOLERANCE)
     assert even < more < all_of_it < 3.0 * even
 
 
 def test_no_growth_has_no_error_by_impacts():
-    assert ModelError(np.array([1.0e-11]), np.array([0.6])).relative(0, 0.0) == 0.6 * MASS_TOLERANCE
+    model = ModelError(np.array([1.0e-11]), np.array([0.6]), np.zeros(1))
+    assert model.relative(0, 0.0) == 0.6 * MASS_TOLERANCE
+
+
+@pytest.mark.parametrize(("peak_n", "simulated"), [(300.0, (2.6, 6.0, 4.2)), (600.0, (4.6, 7.9, 6.1))])
+def test_a_load_whose_size_is_not_sure_widens_growth_by_its_sensitivity(peak_n, simulated) -> None:
+    """Of A, B and G, ideal motion makes most: 10 % of load are so many % of simulated growth (appendix)."""
+    leg = on_the_ground(load_mechanism("bionic_leg"), peak_n)
+    known, unsure = (model_error(leg, leg.drive.speed, load_sigma=sigma) for sigma in (0.0, 0.1))
+    assert not known.load.any()
+    for k, percent in enumerate(simulated):
+        growth_m = known.ideal_m[k]
+        assert unsure.by_load(k, growth_m) == pytest.approx(0.01 * percent, rel=0.4)
+        alone, both = (one.relative(k, growth_m) for one in (known, unsure))
+        assert both**2 == pytest.approx(alone**2 + unsure.by_load(k, growth_m) ** 2)
+        assert unsure.by_load(k, 3.0 * growth_m) < unsure.by_load(k, growth_m)  # what impacts make
+
+
+def test_of_a_leg_in_the_air_no_load_is_unsure() -> None:
+    found = model_error(load_mechanism("bionic_leg"), 6.0)
+    assert not found.load.any()
 
 
 def test_what_a_heavy_joint_grows_by_is_that_of_its_ideal_motion():

@@ -14,6 +14,7 @@ from leg_wear_monitor.twin.reference import LegParameters
 
 pytestmark = pytest.mark.plain
 
+LOAD_N = np.outer(np.arange(128.0), [0.1, 1.0])
 EVENT = VerdictEvent(
     stamp_ns=7,
     state="inspect",
@@ -42,13 +43,21 @@ def test_an_identified_leg_is_read_as_written_and_the_last_is_in_force(open_ledg
     for stamp_ns, mass in ((5, 1.1), (7, 0.9)):
         ledger.note(
             IdentifiedLeg(
-                stamp_ns, ("thigh", "foot"), (mass, 1.02), (0.998, 1.001), 2.0 * mass, 0.5 * mass, 0.1 * mass
+                stamp_ns,
+                ("thigh", "foot"),
+                (mass, 1.02),
+                (0.998, 1.001),
+                2.0 * mass,
+                0.5 * mass,
+                0.1 * mass,
+                mass * LOAD_N,
+                0.2 * mass,
             )
         )
     ledger.keep(entry_at(1), closed=True)
     ledger.close()
     assert open_ledger().parameters == IdentifiedLeg(
-        7, ("thigh", "foot"), (0.9, 1.02), (0.998, 1.001), 1.8, 0.45, 0.1 * 0.9
+        7, ("thigh", "foot"), (0.9, 1.02), (0.998, 1.001), 1.8, 0.45, 0.1 * 0.9, 0.9 * LOAD_N, 0.2 * 0.9
     )
 
 
@@ -58,7 +67,7 @@ def test_a_simulated_reference_is_read_as_written_and_the_last_is_in_force(open_
     other = attrs.evolve(
         shipped,
         profile=attrs.evolve(shipped.profile, sine=np.linspace(0.0, 0.01, len(shipped.profile.sine))),
-        parameters=LegParameters(factors, 2.0 - factors, 1.7, 2.0e-3, 0.08),
+        parameters=LegParameters(factors, 2.0 - factors, 1.7, 2.0e-3, 0.08, LOAD_N, 0.2),
     )
     ledger = open_ledger()
     assert ledger.references == []
@@ -69,6 +78,7 @@ def test_a_simulated_reference_is_read_as_written_and_the_last_is_in_force(open_
     (found,) = open_ledger().references  # of the same cadence
     assert (found.stamp_ns, found.bodies) == (7, tuple(leg.bodies))
     assert found.reference.parameters == other.parameters
+    assert found.reference.parameters.load_sigma == other.parameters.load_sigma
     assert found.reference.profile.departure(other.profile) == 0.0
     np.testing.assert_array_equal(found.reference.clearance_m, other.clearance_m)
     for one, same in zip(found.reference.torque_nm, other.torque_nm, strict=True):

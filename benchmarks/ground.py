@@ -18,6 +18,7 @@ import one_core  # noqa: F401, before numpy
 # isort: split
 import attrs
 import numpy as np
+from diagnosis import LEGS as DIAGNOSED
 from diagnosis import NEW, RATE, kept
 from disturbed import MASSES, drawn, watched
 from drives import Drive, cycles_of, summary, when
@@ -97,25 +98,48 @@ def worn(leg: Mechanism, walk: Walk, parameters: LegParameters | None, shape: st
     return np.mean(cycles[20 : 20 + COUNTED], axis=0) / walk.archard_j[20 : 20 + COUNTED].mean(axis=0)
 
 
+def masses_off(leg: Mechanism, lengths: dict[str, float] | None = None, friction: float = 1.0) -> Mechanism:
+    """A leg with masses 4 % off, and other lengths or friction in its joints."""
+    mass = np.array([MASSES.get(body, 1.0) for body in leg.bodies])
+    length = np.array([(lengths or {}).get(body, 1.0) for body in leg.bodies])
+    return LegParameters(mass, length, friction).applied(leg)
+
+
+def with_law(leg: Mechanism, law: str) -> Mechanism:
+    """A leg with masses 4 % off and another law of contact in its joints."""
+    clearances = {joint: attrs.evolve(one, normal_law=law) for joint, one in leg.clearances.items()}
+    return masses_off(attrs.evolve(leg, clearances=clearances))
+
+
+LEGS = {
+    "masses": masses_off,
+    "friction 0.5": functools.partial(masses_off, friction=0.5),
+    "friction 2": functools.partial(masses_off, friction=2.0),
+    "lengths": functools.partial(masses_off, lengths=DIAGNOSED["c"].lengths),  # drawn within 1 %
+    "winkler": functools.partial(with_law, law="winkler"),
+}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--keep", type=Path)
     parser.add_argument("--hours", type=float, default=4.0)
     parser.add_argument("--peak", type=float, action="append")
     parser.add_argument("--shape", default="treadmill")
+    parser.add_argument("--drive", action="append", choices=sorted(DRIVES))
+    parser.add_argument("--leg", default="masses", choices=sorted(LEGS))
     options = parser.parse_args()
     leg = load_mechanism("bionic_leg")
-    mass = np.array([MASSES.get(body, 1.0) for body in leg.bodies])
-    real = LegParameters(mass, np.ones(len(mass))).applied(leg)
+    real = LEGS[options.leg](leg)
     size, config = torque_size(build_linkage(leg), TURN), MonitorConfig(load=Load(model=GROUND))
-    sensor = TorqueSensor(0.005, 1.0, size)
+    sensor, other = TorqueSensor(0.005, 1.0, size), f" {options.leg}" if options.leg != "masses" else ""
 
     @functools.cache
     def walk(peak_n: float, joint: str = "", size_mm: float = 0.3) -> Walk:
         clearance = np.where(np.array(leg.clearance_joints) == joint, 1e-3 * size_mm, NEW)
         load = LoadConfig(ground_n=peak_n, shape=options.shape)
         file = (
-            options.keep / f"{joint or 'new'} {size_mm:.2f} {peak_n:.0f} {options.shape}.pkl"
+            options.keep / f"{joint or 'new'} {size_mm:.2f} {peak_n:.0f} {options.shape}{other}.pkl"
             if options.keep
             else None
         )
@@ -123,7 +147,8 @@ def main() -> None:
         return kept(file, lambda: walked(real, clearance, cycles + 3, load, round(1000 * size_mm)))
 
     for peak_n in options.peak or PEAKS_N:
-        for name, drive in DRIVES.items():
+        for name in options.drive or DRIVES:
+            drive = DRIVES[name]
             cycles = cycles_of(walk(peak_n).rows, drive, sensor, 5)[0]
             one, found = watched(leg, size, list(cycles[:BEFORE]), config=config, periods=4)
             state = one.state

@@ -68,7 +68,7 @@ class Processing:
             if self._encoders:
                 self._encoders.ended(statistics)
             if self._torque:
-                self._torque.ended(statistics, self._parts.is_torque_wrong)
+                self._torque.ended(statistics, self._parts.is_torque_wrong, statistics.load_peak_n)
             cycles.append(self._report(statistics))
             self._parts.state.has_ended = True
             sensor = self._foot_load.ended(statistics) if self._foot_load else None

@@ -310,7 +310,8 @@ class References:
         """
         if state.commissioned is None:
             return
-        is_known = state.load_rounds > 0  # it was sure in the first round; later rounds only improve it
+        # it was sure in the first round, or in an earlier session; later rounds only improve it
+        is_known = state.load_rounds > 0 or reference.parameters.load.size > 0
         state.load, state.load_rounds = self._models.ground_load(state, reference), state.load_rounds + 1
         if self._is_on_ground and (is_known or state.load.is_sure):
             sigma = state.load.peak_sigma_n / max(state.load.peak_n, state.load.peak_sigma_n)

@@ -287,6 +287,10 @@ class TorqueState:
         How often parameters were identified, and the ground's force.
     load : GroundLoad or None
         The force of the ground by the commissioned leg.
+    carried_n : tuple of float
+        Size of the load in the last gait cycles, by the twin.
+    renewed_n : float
+        That under which the leg was commissioned anew; NaN before.
     is_identifying : bool
         Whether the run simulates legs with other parameters.
     has_failed : bool
@@ -318,6 +322,8 @@ class TorqueState:
     rounds: int = 0
     load_rounds: int = 0
     load: GroundLoad | None = None
+    carried_n: tuple[float, ...] = ()
+    renewed_n: float = math.nan
     is_identifying: bool = False
     has_failed: bool = False
 

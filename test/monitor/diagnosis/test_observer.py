@@ -8,7 +8,7 @@ import pytest
 
 from leg_wear_monitor.estimate.cause import Cause
 from leg_wear_monitor.estimate.explanations import body_torques
-from leg_wear_monitor.estimate.signature import CommissionedTorque
+from leg_wear_monitor.estimate.signature import CommissionedTorque, TorqueSensor
 from leg_wear_monitor.mechanism.position import TURN, build_linkage
 from leg_wear_monitor.monitor.config.inputs import Load
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -309,6 +309,35 @@ def test_on_the_ground_references_are_those_of_the_loaded_leg(leg, reference, mo
     assert parameters.load[:, 1].max() == pytest.approx(300.0, rel=0.2)
     assert observer._models.misfit(state) < 2.0
     assert "set load.model" not in observer.diagnosis.reason
+
+
+def test_a_leg_that_carries_another_load_than_its_reference_is_commissioned_anew_once(leg, reference) -> None:
+    """As after a weekend: 300 N in the ledger, 500 N on the foot; 340 N would be the same load."""
+    load = 300.0 * load_shape(build_linkage(leg), GROUND)
+    own = attrs.evolve(reference.parameters, load=load)
+    known = CommissionedTorque(1, NEW, np.zeros((COMMISSIONING_CYCLES, 160)), speed=TURN)
+    observer = TorqueObserver(leg, MonitorConfig(load=Load(model=GROUND)), SIZE_NM, NEW, [known], own)
+    state = observer.state
+    state.reference, state.commissioned = attrs.evolve(reference, parameters=own), known
+    state.sensor = TorqueSensor(1.0 / RATE, 1.0, SIZE_NM)
+
+    def carry(load_n: float) -> None:
+        for i in range(40):
+            cycle = SimpleNamespace(
+                is_steady=True, cadence_rpm=60.0, begin_ns=i * 10**9, stamp_ns=(i + 1) * 10**9
+            )
+            observer.ended(cycle, load_n=load_n)
+            observer.end_period(NEW, DEPTH)
+
+    carry(340.0)
+    assert state.commissioned is known and state.load_rounds == references.LOAD_ROUNDS
+    carry(500.0)
+    assert state.commissioned is None and not state.baselines and state.load_rounds == 0
+    assert state.reference.parameters is own  # in force until the next
+    # the fit finds 300 N again, whatever the twin says
+    state.commissioned, state.load_rounds = known, references.LOAD_ROUNDS
+    carry(500.0)
+    assert state.commissioned is known
 
 
 def test_a_joint_that_is_repaired_without_a_word_is_reported(leg, reference) -> None:

@@ -191,9 +191,11 @@ class TorqueObserver(KeepsSamples):
         whole = [one for one in references if one.is_whole]
         is_drive_known = not math.isnan(figures.stiffness_nm_per_rad)
         # references of a measured load, too, are simulated under the mean one that the torque shows
-        is_on_ground = config.load.model in (GROUND, MEASURED) and mechanism.toe is not None
+        self._is_on_ground = config.load.model in (GROUND, MEASURED) and mechanism.toe is not None
         self._up = upwards(mechanism)
-        self._references = References(mechanism, self._models, whole, part, is_drive_known, is_on_ground)
+        self._references = References(
+            mechanism, self._models, whole, part, is_drive_known, self._is_on_ground
+        )
         self._evidence = Evidence(self._models)
         counted_m = np.asarray(counted_m, float).copy()
         if parameters is None:  # those that files and unfinished references were made with
@@ -436,7 +438,9 @@ class TorqueObserver(KeepsSamples):
         Once for each load: what the twin finds, or a sensor, may differ from the force of the reference.
         """
         state = self.state
-        known = state.reference.parameters.load if state.reference else np.zeros((0, 2))
+        known = (
+            state.reference.parameters.load if state.reference and self._is_on_ground else np.zeros((0, 2))
+        )
         if not known.size or state.load_rounds < LOAD_ROUNDS or len(state.carried_n) < UNLIKE_CYCLES:
             return
         peak_n, now_n = float((known @ self._up).max()), float(np.mean(state.carried_n))

@@ -168,7 +168,7 @@ class Card:
 
 def belief(summary: ReplaySummary) -> Fragment:
     """The cards."""
-    cards = [_input(summary), _torque(summary), _cadence(summary), _model(summary)]
+    cards = [_input(summary), _torque(summary), _cadence(summary), *_foot_load(summary), _model(summary)]
     return Fragment(render("replay/belief.html", cards=cards))
 
 
@@ -216,6 +216,16 @@ def _cadence(summary: ReplaySummary) -> Card:
     if not summary.gait.believable_cycles:
         answer = "no"
     return Card("Cadence", answer, (f"{cadence:.3g} rpm, commanded {commanded:.3g} rpm.",))
+
+
+def _foot_load(summary: ReplaySummary) -> list[Card]:
+    """What the foot carries; nothing where no load is known."""
+    load = summary.load
+    if load.peak_n is None:
+        return []
+    source = "measured" if load.source == "measured" else "estimated from the drive torque"
+    sigma = f" ± {load.peak_sigma_n:.0f}" if load.peak_sigma_n is not None else ""
+    return [Card("Foot load", "yes", _sentences([f"{source}: {load.peak_n:.0f}{sigma} N at its peak"]))]
 
 
 def _model(summary: ReplaySummary) -> Card:

@@ -15,7 +15,7 @@ from leg_wear_monitor.playback.result import ReplayLeg, WornDepth
 from leg_wear_monitor.report.page import page_html, template_text
 from leg_wear_monitor.report.replay.joint_rows import joint_rows, joint_views
 from leg_wear_monitor.report.replay.page import replay_page
-from leg_wear_monitor.state import AlarmChange, Figure, Level, State
+from leg_wear_monitor.state import AlarmChange, Figure, FootLoad, Level, State
 
 pytestmark = pytest.mark.plain
 
@@ -55,6 +55,15 @@ def test_the_first_screen_has_verdict_joints_belief_and_alarms():
     for words in ("INSPECT", "joint A", "why", "Do", "do", "Are these values valid?", "clearance A"):
         assert words in text
     assert "Clearance over time" not in text
+
+
+def test_the_first_screen_has_the_load_of_a_leg_that_carries_one():
+    load = FootLoad(source="estimated", peak_n=289.4, peak_sigma_n=70.2, cycles=50)
+    text = visible(page_of(attrs.evolve(made_up_summary(), load=load)))
+    assert "Estimated from the drive torque: 289 ± 70 N at its peak." in text
+    measured = attrs.evolve(load, source="measured", peak_sigma_n=None)
+    assert "Measured: 289 N at its peak." in visible(page_of(attrs.evolve(made_up_summary(), load=measured)))
+    assert "Foot load" not in visible(page_of(attrs.evolve(made_up_summary(), load=FootLoad())))
 
 
 def test_the_joint_that_the_verdict_names_has_the_first_row():

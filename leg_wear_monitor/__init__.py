@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from leg_wear_monitor.files import share_directory
     from leg_wear_monitor.fleet.overview import FleetOverview, LegOverview
     from leg_wear_monitor.fleet.update import Fleet
-    from leg_wear_monitor.life.design import BushingChoices, Design, DutyPart, design, read_duty
+    from leg_wear_monitor.life.design import BushingChoices, Design, design
+    from leg_wear_monitor.life.joint_loads import DutyPart, read_duty
     from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
     from leg_wear_monitor.life.result import Duty, Life
     from leg_wear_monitor.mechanism.loader import load_mechanism
@@ -52,7 +53,7 @@ _HOME = {
     "Design": "life.design",
     "Drive": "mechanism.sourced",
     "Duty": "life.result",
-    "DutyPart": "life.design",
+    "DutyPart": "life.joint_loads",
     "EnergyBalance": "dynamics.result",
     "Fleet": "fleet.update",
     "FleetOverview": "fleet.overview",
@@ -86,7 +87,7 @@ _HOME = {
     "on_the_ground": "mechanism.person",
     "open_ledger": "monitor.ledger.ledger",
     "plot": "report.plot",
-    "read_duty": "life.design",
+    "read_duty": "life.joint_loads",
     "replay": "playback.replay",
     "share_directory": "files",
     "simulate": "dynamics.simulation",

@@ -37,7 +37,8 @@ from leg_wear_monitor.bags.table_layout import (
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.messages.cdr import Clocks, Decoder, mark_zero_stamps, names_in, without_interface
+from leg_wear_monitor.messages.cdr import Clocks, Decoder, mark_zero_stamps
+from leg_wear_monitor.messages.names import names_in, without_interface
 from leg_wear_monitor.messages.streams import JOINT_STATE
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin import CRANK

@@ -12,7 +12,8 @@ from leg_wear_monitor.bags.findings import Budget, Finding, RecordingError, Seve
 from leg_wear_monitor.bags.mcap_layout import Channel
 from leg_wear_monitor.estimate.torque_model import Series, series
 from leg_wear_monitor.messages import outputs
-from leg_wear_monitor.messages.cdr import Decoder, names_in
+from leg_wear_monitor.messages.cdr import Decoder
+from leg_wear_monitor.messages.names import names_in
 from leg_wear_monitor.messages.streams import INTERFACES, JOINT_STATE, STREAMS, WRENCH_STAMPED, Stream
 from leg_wear_monitor.monitor.config.inputs import DriveTorque
 from leg_wear_monitor.monitor.config.settings import MonitorConfig

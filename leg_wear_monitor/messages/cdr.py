@@ -6,13 +6,11 @@ A message is four bytes of encapsulation and a body; members are aligned relativ
 """
 
 import math
-import struct
 
 import numpy as np
 from numpy.typing import NDArray
 
 from leg_wear_monitor.compiled.kernel import entry, kernel
-from leg_wear_monitor.errors import printable
 from leg_wear_monitor.messages.streams import CONTACT as CONTACT_SWITCH
 from leg_wear_monitor.messages.streams import (
     FLOAT64,
@@ -500,59 +498,3 @@ class Clocks:
             f"{name}: header stamps span {span / 1e9:.6g} s, log times {span_log / 1e9:.6g} s; header stamps "
             "are used, unless --time selects others"
         )
-
-
-# Names in a message, for reports on what is not in it.
-
-
-_MOST_NAMED = 20
-
-
-def names_in(raw: bytes) -> list[str]:
-    """Joint names in a sensor_msgs/JointState message that has been decoded successfully."""
-    return _texts(raw, *_after_header(raw))[0]
-
-
-def without_interface(raw: bytes, joint: str, interface: str) -> str:
-    """Report on a control_msgs/DynamicJointState message, decoded successfully, that lacks an interface."""
-    at, order = _after_header(raw)
-    joints, at = _texts(raw, at, order)
-    if joint not in joints:
-        return f"no joint is named {joint!r}; there are {_listed(joints)}"
-    _, at = _count(raw, at, order)
-    for _ in range(joints.index(joint)):
-        _, at = _texts(raw, at, order)
-        number, at = _count(raw, at, order)
-        at += (ENCAPSULATION - at) % 8 + 8 * number if number else 0
-    there = _listed(_texts(raw, at, order)[0])
-    return f"{joint} has no interface {interface!r}, it has {there}; set drive_torque.interface"
-
-
-def _listed(names: list[str]) -> str:
-    shown = ", ".join(printable(name, 100) for name in sorted(set(names))[:_MOST_NAMED]) or "none"
-    return f"{shown} and more" if len(set(names)) > _MOST_NAMED else shown
-
-
-def _after_header(raw: bytes) -> tuple[int, str]:
-    """Position behind a message's std_msgs/Header, and its byte order."""
-    order = "<" if raw[1] else ">"
-    return _text(raw, ENCAPSULATION + 8, order)[1], order
-
-
-def _texts(raw: bytes, at: int, order: str) -> tuple[list[str], int]:
-    count, at = _count(raw, at, order)
-    found = []
-    for _ in range(count):
-        content, at = _text(raw, at, order)
-        found.append(content.rstrip(b"\0").decode("utf-8", "replace"))
-    return found, at
-
-
-def _count(raw: bytes, at: int, order: str) -> tuple[int, int]:
-    at += -at % 4
-    return struct.unpack_from(f"{order}I", raw, at)[0], at + 4
-
-
-def _text(raw: bytes, at: int, order: str) -> tuple[bytes, int]:
-    size, at = _count(raw, at, order)
-    return raw[at : at + size], at + size

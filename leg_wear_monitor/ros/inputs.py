@@ -17,7 +17,8 @@ from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
 from leg_wear_monitor.errors import printable
-from leg_wear_monitor.messages.cdr import ENCAPSULATION, MESSAGE, Decoder, names_in, without_interface
+from leg_wear_monitor.messages.cdr import ENCAPSULATION, MESSAGE, Decoder
+from leg_wear_monitor.messages.names import names_in, without_interface
 from leg_wear_monitor.messages.streams import INTERFACES, JOINT_STATE, WRENCH_STAMPED, Stream, streams_read
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.ros.generated_type import generated_class

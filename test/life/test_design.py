@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.life.design import BushingChoices, JointLoads, candidate, joint_loads, read_duty
+from leg_wear_monitor.life.design import BushingChoices, candidate
+from leg_wear_monitor.life.joint_loads import JointLoads, joint_loads, read_duty
 from leg_wear_monitor.mechanism.materials import load_material
 
 LEG = lw.load_mechanism("bionic_leg")

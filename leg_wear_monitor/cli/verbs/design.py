@@ -102,8 +102,9 @@ def design(
     lives of all pairs and sizes, by wear or by the maker's formula, and which of the maker's limits are
     exceeded. Check a choice with the verb life.
     """
-    from leg_wear_monitor.life.design import BushingChoices, read_duty
+    from leg_wear_monitor.life.design import BushingChoices
     from leg_wear_monitor.life.design import design as of_leg
+    from leg_wear_monitor.life.joint_loads import read_duty
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.mechanism.materials import materials as shipped
 

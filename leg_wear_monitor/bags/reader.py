@@ -22,7 +22,7 @@ from leg_wear_monitor.bags.bag import (
     open_sources,
     roles,
 )
-from leg_wear_monitor.bags.findings import DEFAULT_MB, Budget, Finding, RecordingError, Severity
+from leg_wear_monitor.bags.findings import DEFAULT_MB, Budget, Clocks, Finding, RecordingError, Severity
 from leg_wear_monitor.bags.mcap_file import Piece
 from leg_wear_monitor.bags.table_file import TableFile
 from leg_wear_monitor.bags.table_layout import (
@@ -37,7 +37,7 @@ from leg_wear_monitor.bags.table_layout import (
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.messages.cdr import Clocks, Decoder, mark_zero_stamps
+from leg_wear_monitor.messages.cdr import Decoder, mark_zero_stamps
 from leg_wear_monitor.messages.names import names_in, without_interface
 from leg_wear_monitor.messages.streams import JOINT_STATE
 from leg_wear_monitor.monitor.config.settings import MonitorConfig

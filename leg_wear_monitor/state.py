@@ -9,7 +9,7 @@ from typing import Any
 
 import attrs
 
-from leg_wear_monitor.configuration.strict import part_document
+from leg_wear_monitor.configuration import part_document
 from leg_wear_monitor.files import finite_or_none, json_text
 from leg_wear_monitor.shown import Shown
 

@@ -3,8 +3,10 @@
 What is imported here imports neither numpy nor numba.
 """
 
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping
+from enum import Enum
 from typing import Any
 
 import attrs
@@ -182,3 +184,21 @@ def choice(names: tuple[str, ...], doc: str, *, default: str) -> Any:
         return None if value in names else f"{value!r} is not one of {', '.join(names)}"
 
     return described(doc, default=default, check=fault, metadata={"names": names})
+
+
+# Back to plain data, as JSON has it.
+
+
+def part_document(part: Any) -> Any:
+    """Fields of a part, or a plain value; null for what is not known."""
+    if attrs.has(type(part)):
+        return part_document(attrs.asdict(part, recurse=False))
+    if isinstance(part, dict):
+        return {name: part_document(value) for name, value in part.items()}
+    if isinstance(part, tuple | list):
+        return [part_document(value) for value in part]
+    if hasattr(part, "tolist"):  # an array, without the time to import numpy
+        return part_document(part.tolist())
+    if isinstance(part, Enum):
+        return part.name if isinstance(part, int) else part.value  # as configuration.strict reads them
+    return None if isinstance(part, float) and not math.isfinite(part) else part

@@ -457,21 +457,3 @@ def _read(path: Path, source: str, kind: type) -> Any:
     except FileNotFoundError as error:
         raise ConfigError(source, "", f"cannot be read: {error.strerror}") from error
     return structure(document, kind, source, "")
-
-
-# Back to plain data, as JSON has it.
-
-
-def part_document(part: Any) -> Any:
-    """Fields of a part, or a plain value; null for what is not known."""
-    if attrs.has(type(part)):
-        return part_document(attrs.asdict(part, recurse=False))
-    if isinstance(part, dict):
-        return {name: part_document(value) for name, value in part.items()}
-    if isinstance(part, tuple | list):
-        return [part_document(value) for value in part]
-    if isinstance(part, np.ndarray):
-        return part_document(part.tolist())
-    if isinstance(part, Enum):
-        return part.name if isinstance(part, int) else part.value  # as configuration.strict reads them
-    return None if isinstance(part, float) and not math.isfinite(part) else part

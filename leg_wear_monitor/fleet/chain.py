@@ -12,7 +12,7 @@ import attrs
 from leg_wear_monitor.bags.bag import find_files
 from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.bags.reader import Recording
-from leg_wear_monitor.configuration.strict import part_document
+from leg_wear_monitor.configuration import part_document
 from leg_wear_monitor.errors import LegWearError, printable
 from leg_wear_monitor.files import write_whole
 from leg_wear_monitor.fleet.description import FleetLeg

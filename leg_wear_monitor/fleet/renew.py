@@ -10,7 +10,8 @@ from typing import Any
 
 import attrs
 
-from leg_wear_monitor.configuration.strict import part_document, structure
+from leg_wear_monitor.configuration import part_document
+from leg_wear_monitor.configuration.strict import structure
 from leg_wear_monitor.errors import ConfigError, LegWearError
 from leg_wear_monitor.files import json_text, write_whole
 from leg_wear_monitor.fleet.description import FleetLeg

@@ -1,10 +1,9 @@
 """Kernels compiled ahead of their first use: by ``cache --fill``, before the tests, in a container."""
 
 import itertools
-import multiprocessing
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import AbstractContextManager, suppress
+from importlib.util import find_spec
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.files import share_directory
@@ -13,6 +12,7 @@ from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.sensors import readings
 from leg_wear_monitor.messages.cdr import Decoder
 from leg_wear_monitor.messages.streams import STREAMS
+from leg_wear_monitor.workers import Job, run_here, run_in_processes
 
 SETS = ("clearance", "full", "gait", "monitor")
 """Sets of kernels that are then there, as commands name them."""
@@ -44,21 +44,25 @@ def _reading() -> None:
             next(recording.blocks())
 
 
-_JOBS: tuple[Callable[[], None], ...] = (_simulation, _monitor, _reading)
+_JOBS = tuple(Job(job.__name__, job, ()) for job in (_simulation, _monitor, _reading))
 
 
 def compile_all(progress: AbstractContextManager[Callable[[float], None]]) -> None:
-    """Compile what simulations, monitor, synthetic leg and replays need, in two processes.
+    """Compile what simulations, monitor, synthetic leg and replays need: in two processes, if loky is there.
 
     Parameters
     ----------
     progress : context manager
         Gives a function that takes the fraction done.
     """
-    # a process that starts anew would import from the current directory; forked, before there is a thread
-    with ProcessPoolExecutor(2, multiprocessing.get_context("fork")) as pool:
-        jobs = [pool.submit(job) for job in _JOBS]
-        with progress as show:
-            for number, job in enumerate(as_completed(jobs), 1):
-                job.result()
-                show(number / len(jobs))
+    with progress as show:
+        finished: list[str] = []
+
+        def done(job: Job, _result: None) -> None:
+            finished.append(job.key)
+            show(len(finished) / len(_JOBS))
+
+        if find_spec("loky"):
+            run_in_processes(_JOBS, 2, done)
+        else:
+            run_here(_JOBS, done)

@@ -9,6 +9,7 @@ import pytest
 from leg_wear_monitor.cli import kernels
 from leg_wear_monitor.cli.common import compilation, is_compiled
 from leg_wear_monitor.compiled import cache, kernel
+from leg_wear_monitor.workers import run_here
 
 pytestmark = pytest.mark.plain
 
@@ -62,7 +63,8 @@ def test_nothing_is_removed_where_no_place_is_safe(run, monkeypatch):
 
 
 def test_what_was_filled_is_not_compiled_again(run, place, monkeypatch):
-    monkeypatch.setattr(kernels, "_JOBS", (nothing, nothing))
+    monkeypatch.setattr(kernels, "_JOBS", tuple(kernels.Job(name, nothing, ()) for name in "ab"))
+    monkeypatch.setattr(kernels, "run_in_processes", lambda jobs, _, done: run_here(jobs, done))
     result = run("cache", "--fill")
     assert result.exit_code == 0
     assert result.stdout.startswith(f"place: {place}\ntotal: ")
@@ -73,7 +75,7 @@ def test_what_was_filled_is_not_compiled_again(run, place, monkeypatch):
 @pytest.mark.slow
 def test_after_a_fill_nothing_is_compiled(run, place):
     assert run("cache", "--fill").exit_code == 0
-    line = "import leg_wear_monitor.cli.kernels as kernels; [job() for job in kernels._JOBS]"
+    line = "import leg_wear_monitor.cli.kernels as kernels; [job.run() for job in kernels._JOBS]"
     before = sorted(file for file in place.rglob("*.nbc"))
     subprocess.run([sys.executable, "-c", line], check=True, cwd=Path(__file__).parents[2])
     assert before and sorted(file for file in place.rglob("*.nbc")) == before

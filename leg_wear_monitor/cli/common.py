@@ -93,6 +93,16 @@ speed_option: Option = click.option(
     help="Crank speed, negative for clockwise.  [default: the mechanism's own]",
 )
 
+limit_option: Option = click.option(
+    "--limit-m",
+    type=float,
+    default=6.0e-4,
+    show_default=True,
+    callback=bounded("m", above=0.0),
+    metavar="M",
+    help="Mean radial clearance at which a joint's life ends.",
+)
+
 config_option: Option = click.option(
     "--config",
     type=click.Path(path_type=Path),

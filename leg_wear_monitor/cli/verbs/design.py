@@ -14,6 +14,7 @@ from leg_wear_monitor.cli.common import (
     clearances_option,
     compilation,
     json_option,
+    limit_option,
     options_named,
     out_option,
     progress_bar,
@@ -57,15 +58,7 @@ def _numbers(ctx: click.Context, param: click.Parameter, value: str) -> tuple[fl
     metavar="H",
     help="Hours of walking that each joint should last.",
 )
-@click.option(
-    "--limit-m",
-    type=float,
-    default=6.0e-4,
-    show_default=True,
-    callback=bounded("m", above=0.0),
-    metavar="M",
-    help="Mean radial clearance at which a joint's life ends.",
-)
+@limit_option
 @click.option(
     "--materials", metavar="NAME,...", help="Pairs to try.  [default: all that come with the package]"
 )

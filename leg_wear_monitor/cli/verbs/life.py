@@ -14,6 +14,7 @@ from leg_wear_monitor.cli.common import (
     clearances_option,
     compilation,
     json_option,
+    limit_option,
     mechanism_option,
     options_named,
     out_option,
@@ -41,15 +42,7 @@ _TABLE_ROWS = 12  # most rows of the printed table, spread over the life
 @mechanism_option
 @clearances_option("A,B")
 @speed_option
-@click.option(
-    "--limit-m",
-    type=float,
-    default=6.0e-4,
-    show_default=True,
-    callback=bounded("m", above=0.0),
-    metavar="M",
-    help="Mean radial clearance at which a joint's life ends.",
-)
+@limit_option
 @click.option(
     "--horizon-cycles",
     type=float,

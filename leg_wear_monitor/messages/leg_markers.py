@@ -252,11 +252,8 @@ class LegMarkers:
         self._now = attrs.evolve(self._now, levels=self._levels(alarms), verdict=_words(verdict))
 
     def _at(self, samples: SampleReports, i: int) -> Iterator[Outgoing]:
-        angle, stamp_ns, drawing = (
-            float(samples.crank_angle_rad[i]),
-            int(samples.stamp_ns[i]),
-            self._scene.drawing,
-        )
+        angle, stamp_ns = float(samples.crank_angle_rad[i]), int(samples.stamp_ns[i])
+        drawing = self._scene.drawing
         if math.isnan(angle):
             yield self.no_data(stamp_ns)
             return

@@ -93,6 +93,11 @@ class StopRecorder:
         for kept in self._kept:
             self._write(*kept)
 
+    def flush(self) -> None:
+        """Bring what is written to the disk."""
+        if self._writer is not None:
+            self._writer.flush()
+
     def close(self) -> None:
         """Finish the file that is being written."""
         writer, self._writer = self._writer, None
@@ -160,7 +165,7 @@ class BlackBox:
 
     def write(self, topic: str, log_time_ns: int, raw: bytes) -> None:
         """Record a message."""
-        self._keep(topic, log_time_ns, raw)
+        self._with_stops(lambda stops: stops.keep(topic, log_time_ns, raw))
         if self._writer is None:
             return
         try:
@@ -171,7 +176,7 @@ class BlackBox:
 
     def write_many(self, topic: str, log_time_ns: int, rows: NDArray[np.uint8]) -> None:
         """Record messages of equal length, (n, bytes)."""
-        self._keep(topic, log_time_ns, rows)
+        self._with_stops(lambda stops: stops.keep(topic, log_time_ns, rows))
         if self._writer is None:
             return
         try:
@@ -183,14 +188,11 @@ class BlackBox:
 
     def stop(self, now_ns: int) -> None:
         """Write the seconds around a STOP, where that is asked for."""
-        if self._stops is not None:
-            try:
-                self._stops.stop(now_ns)
-            except LegWearError as error:
-                self._fail_stops(error)
+        self._with_stops(lambda stops: stops.stop(now_ns))
 
     def flush(self) -> None:
         """Write buffered messages to the disk."""
+        self._with_stops(StopRecorder.flush)
         if self._writer is not None:
             try:
                 self._writer.flush()
@@ -199,11 +201,7 @@ class BlackBox:
 
     def close(self) -> None:
         """Finish the files."""
-        if self._stops is not None:
-            try:
-                self._stops.close()
-            except LegWearError as error:
-                self._fail_stops(error)
+        self._with_stops(StopRecorder.close)
         if self._writer is not None:
             try:
                 self._writer.close()
@@ -211,16 +209,13 @@ class BlackBox:
                 self._fail(error)
             self._writer = None
 
-    def _keep(self, topic: str, log_time_ns: int, raw: bytes | NDArray[np.uint8]) -> None:
+    def _with_stops(self, use: Callable[[StopRecorder], None]) -> None:
+        """Use the recorder of stops, if there is one; a disk failure ends it, and not the monitor."""
         if self._stops is not None:
             try:
-                self._stops.keep(topic, log_time_ns, raw)
+                use(self._stops)
             except LegWearError as error:
-                self._fail_stops(error)
-
-    def _fail_stops(self, error: LegWearError) -> None:
-        """Keep nothing more for a STOP: a disk failure must not stop the monitor."""
-        self.fault, self._stops = str(error), None
+                self.fault, self._stops = str(error), None
 
     def _fail(self, error: LegWearError) -> None:
         """Stop recording: written data stay readable, and a disk failure must not stop the monitor."""

@@ -260,6 +260,19 @@ def test_the_seconds_around_a_stop_are_kept(tmp_path: Path) -> None:
         assert [data for topic, data in found if topic == "/b"][:2] == [b"one", b"two"]
 
 
+def test_what_is_kept_of_a_stop_is_on_the_disk_after_a_flush(tmp_path: Path) -> None:
+    """A robot is often switched off within these ten seconds."""
+    box = BlackBox("", str(tmp_path))
+    box.add_topic("/a", "sensor_msgs/msg/JointState", SENSOR_DATA)
+    box.write("/a", SECOND, b"before the stop")
+    box.stop(SECOND)
+    (file,) = tmp_path.iterdir()
+    before = file.stat().st_size
+    box.flush()
+    assert file.stat().st_size > before
+    box.close()
+
+
 def test_a_clock_that_is_set_back_fills_no_memory(tmp_path: Path) -> None:
     box = BlackBox("", str(tmp_path))
     box.add_topic("/a", "sensor_msgs/msg/JointState", SENSOR_DATA)

@@ -18,6 +18,13 @@ from leg_wear_monitor.studies.execution import STUDIES
 
 pytestmark = NEEDS_CHROMIUM
 
+OF_MANY_LEGS = "legs"
+"""The study that keeps statistics of hundreds of legs, and of none the course of a gait cycle.
+
+Its page has the leg and, of enough legs, a picture of each claim that lengths or masses decide; a cycle to
+look at is on the pages of the other studies.
+"""
+
 TRY = """
 function look(frame) {
   const page = frame.contentDocument, root = page.documentElement;
@@ -84,7 +91,7 @@ def seen(request, drawn, tmp_path_factory):
 
 def test_figures_and_tables_are_there_and_fit(seen):
     for at, found in seen.items():
-        assert found["images"] >= 5, at
+        assert found["images"] >= (1 if at[0] == OF_MANY_LEGS else 5), at
         assert found["tables"] >= 1, at
         assert found["findings"] >= 2, at
         assert (found["broken"], found["unnamed"], found["tiny"], found["small"]) == (0, 0, 0, 0), at
@@ -94,6 +101,9 @@ def test_figures_and_tables_are_there_and_fit(seen):
 def test_the_slider_moves_the_leg(seen, study):
     for (name, width), found in seen.items():
         slider, joints = found["slider"], list(study(name).mechanism.joints)
+        if name == OF_MANY_LEGS:
+            assert slider is None
+            continue
         assert slider["moved"], (name, width)
         assert (slider["frame"], slider["angle"]) == ("200", "141°")
         assert sorted(slider["letters"]) == sorted(joints)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
     from leg_wear_monitor.monitor.reports import CycleReport, JointReport
     from leg_wear_monitor.playback.summary import ReplayResult
-    from leg_wear_monitor.state import Verdict
+    from leg_wear_monitor.state import LegState
     from leg_wear_monitor.wear import Surfaces
 
 
@@ -222,7 +222,7 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
 
     console = Console(highlight=False)
     monitor, verdict = result.monitor, result.monitor.verdict.verdict
-    _print_verdict(console, verdict, monitor.mechanism.joint_words)
+    _print_verdict(console, monitor.state, monitor.mechanism.joint_words)
     console.print(
         f"\n[bold]{monitor.config.hardware}[/bold]: {monitor.mechanism.name}, "
         f"clearance joints {', '.join(monitor.clearance_joints)}; "
@@ -266,14 +266,17 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
     console.print(ADVICE, soft_wrap=True)
 
 
-def _print_verdict(console: Console, verdict: "Verdict", joint_words: Callable[[str], str]) -> None:
+def _print_verdict(console: Console, state: "LegState", joint_words: Callable[[str], str]) -> None:
     """State, joints and reason; what a person does next, and the page on it; which values are not valid."""
     from leg_wear_monitor.monitor.alarms import time_words
+    from leg_wear_monitor.monitor.verdict.decision import decision_of
     from leg_wear_monitor.monitor.verdict.verdict import guide_to
 
+    verdict = state.verdict
     whose = f" joint {', '.join(map(joint_words, verdict.joints))}" if verdict.joints else ""
     console.print(f"\n[bold]{verdict.state.words.upper()}{whose}[/bold]: {verdict.why}", soft_wrap=True)
-    console.print(f"to do      {verdict.do}", soft_wrap=True)
+    for title, text in (("to do", verdict.do), *decision_of(state, joint_words).notes):
+        console.print(f"{title.lower():<10} {text}", soft_wrap=True, markup=False)
     page = share_directory() / guide_to(verdict)
     console.print(f"code       {verdict.fault_code}, see {page}", soft_wrap=True)
     if verdict.not_valid:

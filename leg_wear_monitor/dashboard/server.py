@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from http import HTTPStatus
+from pathlib import Path
 from typing import Any
 
 import attrs
@@ -19,8 +20,7 @@ from tornado.web import Application, HTTPError, RequestHandler
 
 from leg_wear_monitor.dashboard.source import Content, Source
 from leg_wear_monitor.errors import LegWearError, printable
-from leg_wear_monitor.files import share_directory
-from leg_wear_monitor.monitor.alarms import CODES_OF_GUIDES, FOLDER
+from leg_wear_monitor.report.guide import document_page, document_path
 
 # Keeps the content of a source, renews it while somebody looks, and hands each viewer what has changed.
 
@@ -117,6 +117,11 @@ class Hub:
     async def leg_page(self, name: str) -> str | None:
         """The page of a leg of a fleet; None if there is none."""
         page: str | None = await self._work(partial(self._source.leg_page, name))
+        return page
+
+    async def document(self, path: Path) -> tuple[str, str]:
+        """A document as a page, and its policy."""
+        page: tuple[str, str] = await self._work(partial(document_page, path))
         return page
 
     async def message(self, viewer: Viewer) -> str:
@@ -343,7 +348,7 @@ def application(hub: Hub, host: str) -> Application:
         [
             (r"/", _Page, common),
             (r"/events", _Events, common),
-            (r"/guides/([a-z_]+)\.md", _Guide, common),
+            (r"/docs/([A-Za-z0-9_/]+\.md)", _Document, common),
             (r"/legs/([^/]+)/report\.html", _Leg, common),
         ],
         default_handler_class=_Nothing,
@@ -409,15 +414,15 @@ class _Page(_Reading):
     head = get
 
 
-class _Guide(_Reading):
-    """A guide that comes with the package, as text."""
+class _Document(_Reading):
+    """A document that comes with the package; its links lead to others."""
 
-    def get(self, name: str) -> None:
-        page = share_directory() / FOLDER / f"{name}.md"
-        if name not in CODES_OF_GUIDES or not page.is_file():
+    async def get(self, name: str) -> None:
+        path = document_path(name)
+        if path is None:
             raise HTTPError(HTTPStatus.NOT_FOUND)
-        self.set_header("Content-Type", "text/plain; charset=utf-8")
-        self.finish(page.read_bytes())
+        html, policy = await self._hub.document(path)
+        await self.show(html, f"{policy}; base-uri 'none'; form-action 'none'")
 
     head = get
 

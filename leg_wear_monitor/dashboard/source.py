@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Protocol
 
 import attrs
@@ -213,7 +213,9 @@ _MOST_EVIDENCE = 6
 
 def verdict_region(view: ReplaySummary) -> str:
     """State, reason, action, evidence and what is not valid; its guide is one of the server's pages."""
-    banner = verdict_banner(view, f"/guides/{PurePosixPath(guide_to(view.verdict)).name}")
+    banner = verdict_banner(
+        view, f"/{guide_to(view.verdict)}", "/docs/explanation/validity.md#how-sure-a-verdict-is"
+    )
     return banner_markup(with_evidence(banner, view.verdict.evidence))
 
 

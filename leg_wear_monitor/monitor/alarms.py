@@ -314,7 +314,8 @@ FOLDER = "docs/howto/verdict"
 START = "index"
 
 CODES_OF_GUIDES = {
-    START: ("NONE", "ALARM"),
+    START: ("ALARM",),
+    "healthy": ("NONE",),
     "joint_at_limit": ("CLEARANCE", "CLEARANCE_SEEN", "CLEARANCE_BELIEVED", "PART_REPLACED"),
     "clearance_changed": (
         "CLEARANCE_CHANGED",

@@ -16,6 +16,7 @@ import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.alarms import raised_words, time_words
+from leg_wear_monitor.monitor.verdict.decision import HOW_SURE, decision_of, figures_of, joints_in_words
 from leg_wear_monitor.monitor.verdict.situation import COUNTED, OF_A_JOINT
 from leg_wear_monitor.playback.result import ReplaySummary
 from leg_wear_monitor.state import Figure, LegAlarm, Level, State, Verdict
@@ -317,6 +318,8 @@ class Banner:
         Class of its colour: ``fine``, ``careful`` or ``bad``.
     guide : str
         Address of the page that says what to do; empty without one.
+    links : mapping of str to pair of str
+        Text and address of a link behind some of the notes, by their titles.
     """
 
     symbol: str
@@ -326,6 +329,7 @@ class Banner:
     notes: Sequence[tuple[str, str]] = ()
     severity: str
     guide: str = ""
+    links: Mapping[str, tuple[str, str]] = attrs.field(factory=dict)
 
 
 @attrs.frozen(kw_only=True)
@@ -464,8 +468,7 @@ def reason(verdict: Verdict) -> str:
 
 def joints_words(summary: ReplaySummary) -> str:
     """The joints of the verdict with their labels, such as ``joint G (knee)``; empty without any."""
-    joints = ", ".join(map(summary.leg.joint_words, summary.verdict.joints))
-    return f"joint {joints}" if joints else ""
+    return joints_in_words(summary.verdict.joints, summary.leg.joint_words)
 
 
 def since_words(summary: ReplaySummary, stamp_ns: int) -> str:
@@ -500,18 +503,21 @@ STATE_LOOKS = {
 }
 
 
-def verdict_banner(summary: ReplaySummary, guide: str) -> Banner:
-    """State as symbol and word, joints, reason, action, code, begin, and the values that are not valid.
+def verdict_banner(summary: ReplaySummary, guide: str, certainty: str) -> Banner:
+    """State as symbol and word, joints, reason, the decision, code, begin, and what is not valid.
 
     Parameters
     ----------
     summary : ReplaySummary
     guide : str
         Address of the verdict's guide.
+    certainty : str
+        Address of what its certainty was measured on.
     """
     verdict = summary.verdict
     symbol, severity = STATE_LOOKS[verdict.state]
-    notes = [("Do", verdict.do), ("Code", verdict.fault_code)]
+    decision = decision_of(summary, summary.leg.joint_words)
+    notes = [("Do", verdict.do), *decision.notes, ("Code", verdict.fault_code)]
     if verdict.since_ns:
         notes.append(("Since", since_words(summary, verdict.since_ns)))
     if verdict.not_valid:
@@ -525,6 +531,7 @@ def verdict_banner(summary: ReplaySummary, guide: str) -> Banner:
         notes=notes,
         severity=severity,
         guide=guide,
+        links={HOW_SURE: ("measured on what", certainty)} if figures_of(summary) else {},
     )
 
 

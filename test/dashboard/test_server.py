@@ -1,6 +1,7 @@
 """The server: reads only, answers to its own names only, the same for all who look, and ends well."""
 
 import logging
+import re
 import socket
 import threading
 from contextlib import ExitStack, suppress
@@ -61,6 +62,19 @@ def test_there_is_no_other_path(leg, served, path):
     code, _, text = served(leg).ask(path)
     assert code == 404
     assert text == "404 Not Found\n"
+
+
+def test_the_guide_of_the_verdict_is_a_page_that_leads_on(leg, served):
+    dashboard = served(leg)
+    _, _, page = dashboard.ask()
+    guide = re.search(r'href="(/docs/howto/verdict/[a-z_]+\.md)"', page)[1]
+    code, headers, html = dashboard.ask(guide)
+    assert code == 200 and "script-src" not in headers["Content-Security-Policy"]
+    assert headers["Content-Type"].startswith("text/html")
+    assert '<a href="../measure_clearance.md">' in html
+    assert dashboard.ask("/docs/howto/measure_clearance.md")[0] == 200
+    for path in ("/docs/nowhere.md", "/docs/howto/../../setup.md", "/docs//etc/passwd.md", "/docs/conf.py"):
+        assert dashboard.ask(path)[0] == 404, path
 
 
 @pytest.mark.parametrize("path", ["/", "/events", "/legs/a/report.html"])
@@ -137,7 +151,7 @@ def test_connections_that_ask_nothing_are_capped_and_sent_away(leg, served, monk
 
 @pytest.mark.parametrize(
     "request_",
-    [b"GET /legs/%ff%fe/report.html HTTP/1.1", b"GET /guides/%ff.md HTTP/1.1", b"\xff\xfe / HTTP/1.1",
+    [b"GET /legs/%ff%fe/report.html HTTP/1.1", b"GET /docs/%ff.md HTTP/1.1", b"\xff\xfe / HTTP/1.1",
      b"GET /?\x1b[2J=%ff HTTP/1.1", b"GET / HTTP/9", b"x" * 20_000,
      b"POST / HTTP/1.1\r\nContent-Length: -1", b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked",
      b"GET / HTTP/1.1\r\nContent-Length: 99999999"],

@@ -55,9 +55,14 @@ def level_of(verdict: Verdict) -> Level:
     return Level.ERROR
 
 
+def code_of_rule(verdict: Verdict) -> str:
+    """The verdict's code without its joints: that of the rule, such as ``CLEARANCE_SEEN``."""
+    return verdict.fault_code.removesuffix("".join(f"_{joint}" for joint in verdict.joints))
+
+
 def guide_to(verdict: Verdict) -> str:
     """Page that says what to do about a verdict's reason, as a path below the share directory."""
-    return guide_of(verdict.fault_code.removesuffix("".join(f"_{joint}" for joint in verdict.joints)))
+    return guide_of(code_of_rule(verdict))
 
 
 def verdict_of(findings: Sequence[Finding]) -> Verdict:

@@ -7,6 +7,7 @@ import attrs
 
 from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.monitor.alarms import time_words
+from leg_wear_monitor.monitor.verdict.decision import decision_of, figures_of
 from leg_wear_monitor.monitor.verdict.verdict import guide_to
 from leg_wear_monitor.playback.result import (
     Place,
@@ -16,6 +17,7 @@ from leg_wear_monitor.playback.result import (
     ReplayStatus,
     ReplaySummary,
 )
+from leg_wear_monitor.report.guide import enclosed
 from leg_wear_monitor.report.page import (
     NOT_VALID,
     Fragment,
@@ -388,17 +390,53 @@ def replay_page(summary: ReplaySummary) -> Page:
         sections += [clearance_section(summary), *encoder_sections(summary), forecast_section(summary)]
         sections += [force_section(summary), wear_section(summary)]
     sections += [change_section(summary), health_section(summary), recording_section(recording)]
+    guides, sure = guide_sections(summary), certainty_section(summary)
     return Page(
         title=f"Joint wear of {monitor.hardware_id}",
         summary=f"{monitor.mechanism}: {duration(recording.duration_s)} from "
         f"{time_words(recording.begin_ns)}, {summary.cycles} gait cycles",
-        sections=sections,
+        sections=[*sections[:3], *guides, sure, *sections[3:]],
         versions=summary.made_with,
-        banner=verdict_banner(summary, (share_directory() / guide_to(summary.verdict)).as_uri()),
-        styles=[template_text("uplot/uPlot.min.css"), template_text("replay/replay.css")],
+        banner=verdict_banner(summary, f"#{guides[0].anchor}", f"#{sure.anchor}"),
+        styles=[
+            template_text("uplot/uPlot.min.css"),
+            template_text("replay/replay.css"),
+            template_text("guide.css"),
+        ],
         libraries=[template_text("uplot/uPlot.iife.min.js"), template_text("replay/charts.js")],
         has_dark=True,
     )
+
+
+_MEASURE = "docs/howto/measure_clearance.md"
+
+
+def guide_sections(summary: ReplaySummary) -> list[Section]:
+    """What to do step by step, folded; beside the guide of the verdict, how a clearance is measured.
+
+    They are in the page, since it may be read where the package is not installed.
+    """
+    guides = [enclosed(share_directory() / name) for name in (guide_to(summary.verdict), _MEASURE)]
+    return [
+        Section(
+            f"Guide: {guide.title}", [Fragment(f'<div class="guide">{guide.markup}</div>')], is_folded=True
+        )
+        for guide in guides
+    ]
+
+
+def certainty_section(summary: ReplaySummary) -> Section:
+    """What the verdict's certainty was measured on."""
+    rows = [(each.counted, each.words, each.where, each.date, each.source) for each in figures_of(summary)]
+    table = Table(
+        caption="How often such a verdict is right, where the truth is known",
+        head=("cases", "", "measured on", "date", "page of the package"),
+        rows=rows,
+        note="Nothing was measured on a real leg.",
+        is_text=True,
+    )
+    unknown = Text(decision_of(summary, summary.leg.joint_words).certainty)
+    return Section("How sure is the verdict?", [table if rows else unknown], is_folded=True)
 
 
 def _joints(summary: ReplaySummary) -> Section:

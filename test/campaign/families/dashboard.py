@@ -27,7 +27,7 @@ SHORT, LONG = 12, 600
 
 _CONFIG = MonitorConfig(hardware_id="left")
 _DESCRIPTORS = 400  # of the server; twice as many connections are opened
-_PATHS = ("/", "/events", "/legs/{}/report.html", "/guides/{}.md", "/{}", "//{}", "*", "http://evil/{}")
+_PATHS = ("/", "/events", "/legs/{}/report.html", "/docs/{}.md", "/{}", "//{}", "*", "http://evil/{}")
 _HEADS = ("Host: localhost", "Host: evil", "Host: \xff", "Connection: keep-alive", "Content-Length: {}",
           "Transfer-Encoding: chunked", "Expect: 100-continue", "Sec-Fetch-Site: cross-site", "{}: {}",
           "Content-Encoding: gzip", "Range: bytes=0-{}", "X: " + 20_000 * "x")  # fmt: skip

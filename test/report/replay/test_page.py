@@ -10,7 +10,6 @@ import pytest
 from html_reader import read
 from made_up_summary import made_up_summary
 
-from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.playback.result import ReplayLeg, WornDepth
 from leg_wear_monitor.report.page import page_html, template_text
 from leg_wear_monitor.report.replay.joint_rows import joint_rows, joint_views
@@ -76,8 +75,30 @@ def test_the_joint_that_the_verdict_names_has_the_first_row():
 def test_the_banner_leads_from_the_code_to_its_guide():
     page = page_of(made_up_summary())
     assert "CLEARANCE_CHANGED_A" in visible(page)
-    (guide,) = (link["href"] for link in page.of("a") if link["href"].startswith("file:"))
-    assert guide == (share_directory() / "docs/howto/verdict/clearance_changed.md").as_uri()
+    guide = next(link["href"] for link in page.of("a") if link["href"].startswith("#guide"))
+    assert guide == "#guide-a-clearance-differs-from-the-counted-one"
+    assert [place for place in page.of("details") if place.get("id") == guide[1:]]
+    inside = " ".join(
+        text
+        for places, text in page.places
+        if any(tag == "div" and classes == "guide" for tag, classes in places)
+    )
+    assert "Rock the named joint by hand" in inside and "radial clearance" in inside
+
+
+def test_nothing_in_the_page_leads_to_a_file_that_may_not_be_there():
+    page = page_of(made_up_summary())
+    hrefs = [link["href"] for link in page.of("a") if "download" not in link]
+    assert hrefs and all(href.startswith(("#", "https://")) for href in hrefs)
+    anchors = {place.get("id") for tag in ("section", "details", "h2") for place in page.of(tag)}
+    assert {href[1:] for href in hrefs if href.startswith("#")} <= anchors
+
+
+def test_the_certainty_leads_to_what_it_was_measured_on():
+    page = page_of(made_up_summary())
+    assert "99 of 100 such findings are right on simulated legs" in visible(page)
+    assert any(link["href"] == "#how-sure-is-the-verdict" for link in page.of("a"))
+    assert "577 of 580" in " ".join(page.texts)
 
 
 @pytest.mark.parametrize("state", State)

@@ -173,6 +173,14 @@
     drawAll();
   });
 
+  function unfold() {  // what a link leads to is open
+    const there = location.hash && document.getElementById(location.hash.slice(1));
+    if (there && there.matches("details")) there.open = true;
+  }
+  window.addEventListener("hashchange", unfold);
+  document.addEventListener("click", (event) => { if (event.target.closest('a[href^="#"]')) setTimeout(unfold); });
+  unfold();
+
   const folded = Array.from(document.querySelectorAll("details"));
   folded.forEach((details) => details.addEventListener("toggle", drawAll));
   window.addEventListener("resize", () => resize(0));

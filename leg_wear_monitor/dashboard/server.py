@@ -1,9 +1,7 @@
 """The web server: one page and its events, for reading only."""
 
 import asyncio
-import ipaddress
 import json
-import re
 import resource
 import socket
 from collections.abc import Callable, Mapping, Sequence
@@ -18,6 +16,7 @@ from tornado.httpserver import HTTPServer
 from tornado.iostream import IOStream, StreamClosedError
 from tornado.web import Application, HTTPError, RequestHandler
 
+from leg_wear_monitor.dashboard.hosts import is_allowed, own_names
 from leg_wear_monitor.dashboard.source import Content, Source
 from leg_wear_monitor.errors import LegWearError, printable
 from leg_wear_monitor.report.guide import document_page, document_path
@@ -161,60 +160,6 @@ class Hub:
 
     async def _work(self, work: Any) -> Any:
         return await asyncio.get_running_loop().run_in_executor(self._worker, work)
-
-
-# Which names a request may call this server by: a page of another site must not reach it under its own name.
-#
-# Another site can let its name point to this machine (DNS rebinding), and its page then reads what this
-# server sends. An address cannot be turned around like this, nor can this machine's own names.
-
-
-_HOST = re.compile(r"\[(?P<six>[0-9a-fA-F:.]+)\](:\d{1,5})?|(?P<name>[A-Za-z0-9._-]{1,253}?)\.?(:\d{1,5})?")
-
-
-def is_local(host: str) -> bool:
-    """Whether a server bound to a host can be reached from this machine only."""
-    return host == "localhost" or _is_loopback(host)
-
-
-def own_names(host: str) -> frozenset[str]:
-    """Names that may be asked for, beside addresses, if a server is bound to a host."""
-    if is_local(host):
-        return frozenset({"localhost"})
-    own = {"localhost", host.lower(), socket.gethostname().lower(), f"{socket.gethostname().lower()}.local"}
-    return frozenset(own)
-
-
-def is_allowed(header: str, host: str, names: frozenset[str]) -> bool:
-    """Whether the Host header of a request names this server.
-
-    Parameters
-    ----------
-    header : str
-    host : str
-        What the server is bound to.
-    names : frozenset of str
-        As `own_names` returned them.
-    """
-    found = _HOST.fullmatch(header)
-    if found is None:
-        return False
-    asked = (found["six"] or found["name"]).lower()
-    if asked in names:
-        return True
-    return _is_loopback(asked) if is_local(host) else _is_address(asked)
-
-
-def _is_address(text: str) -> bool:
-    try:
-        ipaddress.ip_address(text)
-    except ValueError:
-        return False
-    return True
-
-
-def _is_loopback(text: str) -> bool:
-    return _is_address(text) and ipaddress.ip_address(text).is_loopback
 
 
 MOST_CONNECTIONS = 300  # of the viewers of a hub, and what their browsers keep open beside

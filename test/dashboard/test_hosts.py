@@ -4,7 +4,7 @@ import socket
 
 import pytest
 
-from leg_wear_monitor.dashboard.server import is_allowed, is_local, own_names
+from leg_wear_monitor.dashboard.hosts import is_allowed, is_local, own_names
 
 pytestmark = pytest.mark.plain
 

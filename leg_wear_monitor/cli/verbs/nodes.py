@@ -355,7 +355,8 @@ def _setup(config: Path, node: str) -> "LegSetup":
 
 def _serve(source: "Source", place: "Place") -> None:
     """Serve until a signal."""
-    from leg_wear_monitor.dashboard.server import Hub, is_local, serve
+    from leg_wear_monitor.dashboard.hosts import is_local
+    from leg_wear_monitor.dashboard.server import Hub, serve
 
     def ready(ended: asyncio.Event) -> None:
         loop = asyncio.get_running_loop()

@@ -1,0 +1,56 @@
+"""Which names a request may call the server by: another site must not reach it under a name of its own.
+
+Another site can let its name point to this machine (DNS rebinding), and its page then reads what this
+server sends. An address cannot be turned around like this, nor can this machine's own names.
+"""
+
+import ipaddress
+import re
+import socket
+
+_HOST = re.compile(r"\[(?P<six>[0-9a-fA-F:.]+)\](:\d{1,5})?|(?P<name>[A-Za-z0-9._-]{1,253}?)\.?(:\d{1,5})?")
+
+
+def is_local(host: str) -> bool:
+    """Whether a server bound to a host can be reached from this machine only."""
+    return host == "localhost" or _is_loopback(host)
+
+
+def own_names(host: str) -> frozenset[str]:
+    """Names that may be asked for, beside addresses, if a server is bound to a host."""
+    if is_local(host):
+        return frozenset({"localhost"})
+    own = {"localhost", host.lower(), socket.gethostname().lower(), f"{socket.gethostname().lower()}.local"}
+    return frozenset(own)
+
+
+def is_allowed(header: str, host: str, names: frozenset[str]) -> bool:
+    """Whether the Host header of a request names this server.
+
+    Parameters
+    ----------
+    header : str
+    host : str
+        What the server is bound to.
+    names : frozenset of str
+        As `own_names` returned them.
+    """
+    found = _HOST.fullmatch(header)
+    if found is None:
+        return False
+    asked = (found["six"] or found["name"]).lower()
+    if asked in names:
+        return True
+    return _is_loopback(asked) if is_local(host) else _is_address(asked)
+
+
+def _is_address(text: str) -> bool:
+    try:
+        ipaddress.ip_address(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _is_loopback(text: str) -> bool:
+    return _is_address(text) and ipaddress.ip_address(text).is_loopback

@@ -41,7 +41,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.person import FORE_AFT, PHASES, Stance, nominal_stance, stance_template
 from leg_wear_monitor.mechanism.position import TURN, Linkage, build_linkage, one_cycle, point_motion
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.twin.load import at_points, load_shape, load_signature
+from leg_wear_monitor.twin.load import at_points, load_shape, load_signatures
 from leg_wear_monitor.twin.reference import MASS_TOLERANCE
 from leg_wear_monitor.twin.torque_reference import TorqueReference
 
@@ -133,7 +133,7 @@ class _Leg:
         toe = linkage.mechanism.toe
         if toe is None:
             raise RuntimeError("a mechanism without a toe does not stand")
-        self._stance, self._sensor, self._friction = nominal_stance(linkage), sensor, friction
+        self._stance, self._friction = nominal_stance(linkage), friction
         self.near_n = 0.0  # about the size: shapes differ in proportion to it
         _, velocity, _ = point_motion(one_cycle(linkage, POINTS, 1.0), linkage, *toe)
         self._lever, profile = -velocity, reference.profile
@@ -143,9 +143,10 @@ class _Leg:
         former = reference.parameters.load
         self._own = own - (self._lever * at_points(former)).sum(axis=1) if former.size else own
         self._torques = functools.lru_cache(maxsize=3)(self._torques_of)
-        self._step_s, self._direction = TURN / abs(profile.speed) / POINTS, math.copysign(1.0, profile.speed)
-        each = [signature_of_torque(one, sensor.phases)[: sensor.phases] for one in np.eye(POINTS)]
-        self._phases = np.array(each).T
+        self._direction = math.copysign(1.0, profile.speed)
+        # of the torque after its friction, all that the sensor shows is linear: (points, phases)
+        linear, step_s = attrs.evolve(sensor.channel, load_friction=0.0), TURN / abs(profile.speed) / POINTS
+        self._seen = linear.received(np.eye(POINTS), step_s, self._direction) @ _phase_means(sensor.phases)
 
     def stance(self, x: Floats) -> Stance:
         """When the foot stands."""
@@ -160,10 +161,12 @@ class _Leg:
         return np.outer(size[0] @ vertical, self._stance.up) + np.outer(size[1] @ along, self._stance.back)
 
     def _sizes(self, x: Floats) -> Floats:
-        """Sizes (2, 1 + harmonics) of the vertical and of the fore-aft shapes [N]."""
-        template = _UNIT_N * x[0] * np.array([1.0, FORE_AFT + _FORE_AFT * x[3]])
-        more = self.near_n * (_USUAL + _SHAPES * x[5:].reshape(2, -1))
-        return np.column_stack([template, more])
+        """Sizes (..., 2, 1 + harmonics) of the vertical and of the fore-aft shapes [N]."""
+        template = (
+            _UNIT_N * x[..., :1] * np.stack([np.ones_like(x[..., 3]), FORE_AFT + _FORE_AFT * x[..., 3]], -1)
+        )
+        more = self.near_n * (_USUAL + _SHAPES * x[..., 5:].reshape(*x.shape[:-1], 2, -1))
+        return np.concatenate([template[..., None], more], axis=-1)
 
     def _torques_of(self, begin: float, end: float) -> tuple[Floats, Floats]:
         """Torques (1 + harmonics, points) of the shapes, by newton [N m/N]; the same for most differences."""
@@ -176,13 +179,22 @@ class _Leg:
         mean, sigma = self._friction
         return mean + sigma * float(x[4])
 
-    def mean(self, x: Floats) -> Floats:
-        """Mean torque (phases,) of each phase, as the sensor shows it [N m]."""
-        (up, back), size = self._torques(float(x[1]), float(x[2])), self._sizes(x)
-        torque = self._own + size[0] @ up + size[1] @ back
-        channel = attrs.evolve(self._sensor.channel, load_friction=self.load_friction(x))
-        received = channel.received(torque, self._step_s, self._direction)
-        return np.asarray(self._phases @ received)
+    def means(self, x: Floats) -> Floats:
+        """Mean torques (n, phases) of each phase, as the sensor shows them [N m], for parameters (n, p)."""
+        torque, sizes = np.tile(self._own, (len(x), 1)), self._sizes(x)
+        for stance in np.unique(x[:, 1:3], axis=0):  # few, for most differences
+            alike = (x[:, 1:3] == stance).all(axis=1)
+            up, back = self._torques(float(stance[0]), float(stance[1]))
+            torque[alike] += sizes[alike, 0] @ up + sizes[alike, 1] @ back
+        mean, sigma = self._friction
+        friction = mean + sigma * x[:, 4:5]
+        return np.asarray((torque + self._direction * friction * np.abs(torque)) @ self._seen)
+
+
+@functools.cache
+def _phase_means(phases: int) -> Floats:
+    """Means (points, phases) of each phase of a gait cycle, of torques at the points of the tables."""
+    return np.array([signature_of_torque(one, phases)[:phases] for one in np.eye(POINTS)])
 
 
 def _shapes(stance: Stance, points: int) -> tuple[Floats, Floats]:
@@ -229,13 +241,13 @@ def ground_load(
         covariance += spread**2 * np.outer(one.column[:phases], one.column[:phases])
     weight = np.linalg.inv(np.linalg.cholesky(covariance))
 
-    def residual(x: Floats) -> Floats:
-        return np.concatenate([weight @ (leg.mean(x) - measured[:phases]), x[1:]])
+    def residuals(x: Floats) -> Floats:
+        return np.hstack([(leg.means(x) - measured[:phases]) @ weight.T, x[:, 1:]])
 
     def at(x: Floats) -> Point:
-        now = residual(x)
+        now = residuals(x[None])[0]
         steps = _STEP * np.eye(len(x))
-        return Point(now, lambda: np.array([residual(x + one) - now for one in steps]).T / _STEP)
+        return Point(now, lambda: (residuals(x + steps) - now).T / _STEP)
 
     number = 5 + 2 * _HARMONICS
     low, high = np.full(number, -_FURTHEST), np.full(number, _FURTHEST)
@@ -348,8 +360,9 @@ def _loads(linkage: Linkage, reference: TorqueReference, sensor: TorqueSensor) -
         usual += [(np.outer(one, stance.back), _FORE_AFT_CHANGE * peak_n) for one in waves]
     speed, found = reference.profile.speed, []
     channel = attrs.evolve(sensor.channel, load_friction=0.0)
-    for force, spread in usual:
-        torque = load_signature(linkage, force)[:-1]
+    for torque, (_, spread) in zip(
+        load_signatures(linkage, [force for force, _ in usual]), usual, strict=True
+    ):
         received = channel.received(torque, TURN / abs(speed) / len(torque), float(np.sign(speed)))
         found.append(Nuisance(Cause.LOAD, "", signature_of_torque(received, sensor.phases), spread))
     return found

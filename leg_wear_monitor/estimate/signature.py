@@ -44,11 +44,11 @@ class Channel:
         return self.delay_s + self.time_constant_s
 
     def received(self, torque: Floats, step_s: float, direction: float) -> Floats:
-        """Torque (n,) in equal steps of time [s] behind the drive; taken as periodic.
+        """Torques (..., n) in equal steps of time [s] behind the drive; taken as periodic.
 
         Parameters
         ----------
-        torque : (n,) array
+        torque : (..., n) array
             Of the leg [N m].
         step_s : float
         direction : float
@@ -58,9 +58,10 @@ class Channel:
             torque = torque + direction * self.load_friction * np.abs(torque)
         if self.delay_s == 0.0 and self.time_constant_s == 0.0:
             return torque
-        omega = TURN * np.fft.rfftfreq(len(torque), step_s)
+        points = torque.shape[-1]
+        omega = TURN * np.fft.rfftfreq(points, step_s)
         response = np.exp(-1j * omega * self.delay_s) / (1.0 + 1j * omega * self.time_constant_s)
-        return np.asarray(np.fft.irfft(np.fft.rfft(torque) * response, len(torque)))
+        return np.asarray(np.fft.irfft(np.fft.rfft(torque) * response, points))
 
 
 DIRECT = Channel()

@@ -309,6 +309,11 @@ class AlarmEvaluation:
     guard : InputGuard
     periods : int
         Evaluation periods in that duration.
+
+    Attributes
+    ----------
+    is_late : bool
+        Whether samples may be missing because this program was late, not the sender.
     """
 
     def __init__(
@@ -325,6 +330,7 @@ class AlarmEvaluation:
         self.config = config
         self.board = AlarmBoard(config, twin.clearance_joints, twin.torque_size_nm)
         self.state = AlarmEvaluationState(twin.intake)
+        self.is_late = False
 
     def configure(self, config: MonitorConfig) -> None:
         """Use other limits from now on."""
@@ -471,7 +477,7 @@ class AlarmEvaluation:
 
     def _evaluate_input(self, skipped: int) -> tuple[AlarmList, ...]:
         state, intake, config = self.state, self._twin.intake, self.config
-        is_whole = skipped == state.skipped == state.skipped_before
+        is_whole = skipped == state.skipped == state.skipped_before and not self.is_late
         health = input_health(state.before, intake, state.torque, is_whole)
         rate = alarm_specs.FOOT_LOAD_RATE
         read = (*alarm_specs.INPUT, rate) if rate.name() in self.board.alarms else alarm_specs.INPUT

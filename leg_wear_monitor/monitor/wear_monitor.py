@@ -119,6 +119,18 @@ class WearMonitor:
         if self._torque:
             self._torque.warm_up()
 
+    def go_live(self) -> None:
+        """Keep up with samples as they are taken: never wait for a reference that threads simulate.
+
+        On a machine that is too busy a reference comes into force later than in a replay.
+        """
+        if self._torque:
+            self._torque.go_live()
+
+    def note_late(self, is_late: bool) -> None:
+        """Note whether samples may be missing because this program was late: their rate is then unknown."""
+        self._evaluation.is_late = is_late
+
     def update(self, samples: Samples) -> Reports:
         """Process a block of samples.
 

@@ -72,6 +72,11 @@ class Silence:
             if used[name] != kind.used:
                 kind.used, kind.steady_ns, kind.wall_ns = used[name], steady_ns, wall_ns
 
+    def excuse(self, late_ns: int) -> None:
+        """Do not count a time in which the node did not take what came."""
+        for kind in self._kinds.values():
+            kind.steady_ns += late_ns
+
     def silent_s(self, name: str, steady_ns: int) -> float:
         """Time since the last used sample of a kind, or since the start [s]; 0 if none is expected."""
         kind = self._kinds.get(name)
@@ -249,6 +254,7 @@ class ClockMonitor:
 
 # Above this delay, topics with one message per sample are not published, so that the monitor can catch up.
 COARSE_FROM_S = 0.25
+LATE_NS = 1_000_000_000  # between two turns of the node
 
 
 @attrs.define
@@ -261,14 +267,43 @@ class Load:
         Waiting time of the oldest message: present, and maximum since the last report [s].
     unpublished : int
         Samples whose torque and forces were not published in order to catch up.
-    shed_reported : int
-        Messages shed up to the last report.
+    lost, lost_before : int
+        Messages that were lost on the way while the node was late, and in all.
+    dropped_reported : int
+        Messages dropped up to the last report.
     """
 
     delay_s: float = 0.0
     worst_delay_s: float = 0.0
     unpublished: int = 0
-    shed_reported: int = 0
+    lost: int = 0
+    lost_before: int = 0
+    dropped_reported: int = 0
+    _turn_ns: int = 0
+    _late_until_ns: int = 0
+
+    def late_ns(self, now_ns: int) -> int:
+        """By how much the node is late with a turn at a time of the monotonic clock [ns]; 0 if it is not.
+
+        A turn comes every 10 ms. What came meanwhile waits in the middleware, which holds some seconds of it.
+        """
+        passed_ns, self._turn_ns = now_ns - (self._turn_ns or now_ns), now_ns
+        if passed_ns < LATE_NS:
+            return 0
+        # it catches up as fast as samples come, at least
+        self._late_until_ns = now_ns + 2 * passed_ns + LATE_NS
+        self.worst_delay_s = max(self.worst_delay_s, 1.0e-9 * passed_ns)
+        return passed_ns
+
+    def is_late(self, now_ns: int) -> bool:
+        """Whether the node may still be late, or was when what it takes now had come."""
+        return now_ns < self._late_until_ns
+
+    def note_lost(self, lost: int, now_ns: int) -> None:
+        """Record how many messages were lost on the way so far; they are ours while the node is late."""
+        if self.is_late(now_ns):
+            self.lost += lost - self.lost_before
+        self.lost_before = lost
 
     def note(self, delay_s: float) -> bool:
         """Record a delay; return whether it is too long to publish every sample."""
@@ -278,9 +313,9 @@ class Load:
 
 def load_status(load: Load, inbox: Inbox) -> Status:
     """Status of the load; starts a new reporting interval."""
-    shed = inbox.shed - load.shed_reported
+    dropped = inbox.shed + load.lost
     level, message, code = Level.OK, "keeps up", alarms.NO_FAULT
-    if shed:
+    if dropped > load.dropped_reported:
         level, message = Level.ERROR, "overloaded: samples were dropped and their wear is not counted"
         code = alarms.SAMPLES_DROPPED
     elif load.worst_delay_s > COARSE_FROM_S:
@@ -291,9 +326,9 @@ def load_status(load: Load, inbox: Inbox) -> Status:
         "waiting": float(len(inbox)),
         "worst_delay_s": load.worst_delay_s,
         "unpublished_samples": float(load.unpublished),
-        "shed_messages": float(inbox.shed),
+        "shed_messages": float(dropped),
     }
-    load.worst_delay_s, load.shed_reported = load.delay_s, inbox.shed
+    load.worst_delay_s, load.dropped_reported = load.delay_s, dropped
     return Status("load", level, message, values, code)
 
 

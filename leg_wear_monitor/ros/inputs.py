@@ -340,7 +340,9 @@ def _listed(names: Iterable[str]) -> str:
 # Subscriptions of the monitor: serialized messages, and the middleware's events about them.
 
 
-DEPTH = 2000  # messages: two seconds at 1 kHz, more than the longest evaluation between two of them takes
+# messages while the node is late: Fast DDS holds 5000 of them by default, five seconds at 1 kHz, and tells
+# how many more were lost; with a depth below that it would not tell
+DEPTH = 10_000
 
 
 @attrs.define

@@ -194,6 +194,7 @@ class MonitorNode(ClosingNode):
     def _open(self, parameters: Parameters[MonitorConfig]) -> None:
         """Open the ledger and set up everything else; close the ledger if that fails."""
         self._monitor = open_monitor(load_mechanism(parameters.config.mechanism), parameters.config)
+        self._monitor.go_live()
         # until `close`: a signal may arrive before the caller of the constructor holds this node
         self._in_order = ExitStack()
         self._in_order.enter_context(closed_at_the_end(self._monitor.close))
@@ -275,15 +276,22 @@ class MonitorNode(ClosingNode):
         logger.error(line) if is_error else logger.warning(line)
 
     def _receive(self, topic: InputTopic, raw: bytes) -> None:
-        topic.heard_ns, topic.heard_wall_ns = time.monotonic_ns(), time.time_ns()
+        topic.heard_ns, topic.heard_wall_ns = self._turn(), time.time_ns()
         self._inbox.add(topic.stream.code, raw, topic.heard_wall_ns)
         if self._due.completes(topic.stream, raw, topic.heard_wall_ns, topic.heard_ns):
             self._work()
 
     def _work_in_time(self) -> None:
         """Process messages that wait too long, or all while no report is due at a known stamp."""
-        if self._due.is_late(time.monotonic_ns()):
+        if self._due.is_late(self._turn()):
             self._work()
+
+    def _turn(self) -> int:
+        """Now [ns], on a monotonic clock; what was silent while the node was late was not."""
+        now_ns = time.monotonic_ns()
+        if late_ns := self._load.late_ns(now_ns):
+            self._supervision.excuse(late_ns)
+        return now_ns
 
     def _work(self) -> None:
         """Process received messages, a bounded number at a time."""
@@ -297,6 +305,7 @@ class MonitorNode(ClosingNode):
                 self._black_box.write(names[arrival.kind], arrival.log_time_ns, arrival.raw)
         samples = self._inbox.decoded(arrivals)
         self._epochs.check(samples)
+        self._monitor.note_late(self._load.is_late(time.monotonic_ns()))
         reports = self._monitor.update(samples)
         self._supervision.note(arrivals, samples)
         self._publish(reports, coarse)
@@ -334,7 +343,8 @@ class MonitorNode(ClosingNode):
         self._outlets.send(outputs.STATE, time.time_ns(), self._messages.state(report))
 
     def _diagnose(self) -> None:
-        now_ns = time.time_ns()
+        now_ns, turn_ns = time.time_ns(), self._turn()
+        self._load.note_lost(sum(topic.lost for topic in self._supervision.inputs), turn_ns)
         if self._supervision.check():
             self._send_state()
         status = (

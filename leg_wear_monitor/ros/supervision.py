@@ -174,6 +174,12 @@ class Supervision:
         """Whether usable crank samples are arriving."""
         return self._silence.level(KINDS[CRANK].name, time.monotonic_ns()) is Level.OK
 
+    def excuse(self, late_ns: int) -> None:
+        """Do not take a time in which the node was late [ns] for a silence of its inputs."""
+        self._silence.excuse(late_ns)
+        for topic in self.inputs:
+            topic.heard_ns += late_ns if topic.heard_ns else 0
+
     def note(self, arrivals: Sequence[Arrival], samples: Samples) -> None:
         """Record processed messages and their samples."""
         self._names.note(arrivals, samples, time.monotonic_ns())

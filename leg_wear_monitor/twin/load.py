@@ -6,7 +6,7 @@ The tables are linear in the load. The first part writes a measured force into t
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -368,10 +368,17 @@ def load_signature(linkage: Linkage, force: Floats | None = None) -> Floats:
     toe = linkage.mechanism.toe
     if toe is None:
         return np.zeros(POINTS + 1)
-    force = load_shape(linkage) if force is None else force
-    _, velocity, _ = point_motion(one_cycle(linkage, POINTS, 1.0), linkage, *toe)
-    signature = -(at_points(force) * velocity).sum(axis=1)
+    (signature,) = load_signatures(linkage, [load_shape(linkage) if force is None else force])
     return np.append(signature, signature[0])
+
+
+def load_signatures(linkage: Linkage, forces: Sequence[Floats]) -> list[Floats]:
+    """Drive torques (POINTS,) [N m/N] for some forces (PHASES, 2) on the toe of a mechanism that has one."""
+    toe = linkage.mechanism.toe
+    if toe is None:
+        raise RuntimeError("a mechanism without a toe carries no load")
+    _, velocity, _ = point_motion(one_cycle(linkage, POINTS, 1.0), linkage, *toe)
+    return [-(at_points(force) * velocity).sum(axis=1) for force in forces]
 
 
 def at_points(force: Floats) -> Floats:

@@ -118,7 +118,15 @@ class TorqueReferenceRun:
     mechanism : Mechanism
     cycles : int, optional
         Gait cycles of each wider leg; default: CYCLES.
+
+    Attributes
+    ----------
+    may_be_late : bool
+        Whether `advance` never waits, since the leg walks on meanwhile: what is not simulated where it is due
+        then comes later.
     """
+
+    may_be_late = False
 
     def __init__(self, mechanism: Mechanism, cycles: int | None = None) -> None:
         self._mechanism, self._cycles = mechanism, cycles
@@ -150,6 +158,11 @@ class TorqueReferenceRun:
     def progress(self) -> float:
         """Fraction of the gait cycles that are done; 0 where nothing was begun."""
         return min(1.0, PACE * self._periods / max(1, self._cost(self._legs)))
+
+    @property
+    def is_late(self) -> bool:
+        """Whether all of it is due, and not all is simulated."""
+        return self.is_busy and self._cost(self._legs) <= PACE * self._periods
 
     @property
     def cycles_left(self) -> float:
@@ -216,7 +229,7 @@ class TorqueReferenceRun:
     @property
     def part(self) -> TorqueReference | None:
         """The legs of a reference that are due so far; None where none is, or all are."""
-        self._take(waits=True)
+        self._take(waits=not self.may_be_late)
         return self._so_far() if self._done and self.is_busy else None
 
     def begin_identification(
@@ -243,8 +256,8 @@ class TorqueReferenceRun:
             return None
         self._periods += 1
         is_due = self._cost(self._legs) <= PACE * self._periods
-        self._take(waits or is_due, hurries=is_due and not waits)
-        if not is_due:
+        self._take(waits or (is_due and not self.may_be_late), hurries=is_due and not waits)
+        if not is_due or (self.is_busy and not self._ahead[0].done()):
             return None
         if self.is_busy:  # a leg could not be simulated
             self._begin((), self._depth, self._profile)

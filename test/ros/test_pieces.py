@@ -126,6 +126,21 @@ def test_falling_behind_is_told_and_then_over() -> None:
     assert load_status(load, box).level is Level.OK
 
 
+def test_what_is_lost_while_the_node_is_late_was_dropped_by_it() -> None:
+    box, load, second = inbox(), Load(), 1_000_000_000
+    assert load.late_ns(5 * second) == 0  # the first turn
+    load.note_lost(3, 5 * second)
+    assert load_status(load, box).level is Level.OK
+    assert load.late_ns(9 * second) == 4 * second
+    load.note_lost(10, 9 * second)
+    told = load_status(load, box)
+    assert (told.level, told.values["shed_messages"], told.values["worst_delay_s"]) == (Level.ERROR, 7.0, 4.0)
+    assert load.is_late(17 * second)
+    assert not load.is_late(18 * second)
+    load.note_lost(20, 18 * second)
+    assert load_status(load, box).level is Level.OK
+
+
 def topic(**fields) -> InputTopic:
     publishers = Publishers(("/driver",))
     known = {"publishers": publishers, "heard_ns": 10 * SECOND, "heard_wall_ns": START_NS}

@@ -2,6 +2,7 @@
 
 import math
 import sqlite3
+import threading
 import time
 from contextlib import closing
 from pathlib import Path
@@ -24,6 +25,7 @@ from leg_wear_monitor.messages.streams import JOINT_STATE
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.reports import AlarmList, Status
+from leg_wear_monitor.ros import inputs
 from leg_wear_monitor.ros.health import ClockMonitor, NodeAlarms, Silence, both_clocks
 from leg_wear_monitor.ros.inputs import CrankNames, Inbox
 from leg_wear_monitor.ros.supervision import AlarmLog, StatusLog
@@ -305,6 +307,39 @@ def test_silence_reaches_statuses_alarms_markers_and_log_and_ends_by_itself(
     changes = history(ledger)
     for name in ("input_silence crank", "input_silence torque", "input_gaps"):
         assert [level for alarm, level in changes if alarm == name] == [2, 0], name
+
+
+def test_what_is_missing_because_the_node_was_late_is_no_fault_of_the_sender(
+    stage, walk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The middleware keeps the newest messages only; a node that was late had an alarm of their rate."""
+    monkeypatch.setattr(inputs, "DEPTH", 20)
+    monitor, legs = stage.monitor(diagnostics__period_s=0.1), stage.legs()
+    alarms = stage.listen(f"{ME}/alarms", DiagnosticArray)
+    diagnostics = stage.listen("/diagnostics", DiagnosticArray)
+    legs.play(walk, monitor, end_s=2.5)
+    busy, free, update = threading.Event(), threading.Event(), monitor.node._monitor.update
+
+    def once(samples):
+        monitor.node._monitor.update = update
+        busy.set()
+        free.wait()
+        return update(samples)
+
+    monitor.node._monitor.update = once
+    legs.play(walk, begin_s=2.5, end_s=2.6)
+    stage.wait_for(busy.is_set, "the node to be busy")
+    began = time.monotonic()
+    legs.play(walk, begin_s=2.6, end_s=4.5)
+    stage.wait_for(lambda: time.monotonic() - began > 1.5, "the node to be late")
+    free.set()
+    legs.play(walk, monitor, begin_s=4.5)
+    stage.wait_for(
+        lambda: any("overloaded" in words([one], "load") for one in diagnostics), "the load of the node"
+    )
+    raised = {one.name.split(": ")[1] for message in alarms for one in message.status if one.level != b"\0"}
+    assert not {"input_rate crank", "input_rate torque", "input_gaps"} & raised
+    assert monitor.node.monitor.lost.unmonitored_s > 1.5  # the samples are missing, and that is counted
 
 
 def history(ledger: Path) -> list[tuple[str, int]]:

@@ -280,6 +280,8 @@ def next_step(state: TorqueState, references: References, config: MonitorConfig)
     is_unlike = state.reference is not None and _is_unlike(state)
     last = state.waiting[-1:] if is_unlike or state.reference is None else state.cycles[-1:]
     cycle_s = TURN / abs(last[0].profile.speed) if last else commanded_s
+    if references.is_late:
+        return f"{_simulated(state, references, is_unlike)} later than in a replay: this machine is too busy"
     if references.is_busy:
         left_s = references.cycles_left * commanded_s
         then = "; a reference with them follows" if state.is_identifying else ""

@@ -213,6 +213,10 @@ class TorqueObserver(KeepsSamples):
             load_rounds=LOAD_ROUNDS if is_known else 0,
         )
 
+    def go_live(self) -> None:
+        """Never wait for what is simulated."""
+        self._references.may_be_late = True
+
     def warm_up(self) -> None:
         """Compute before the first sample what depends on the mechanism alone."""
         self._models.warm_up()

@@ -209,11 +209,18 @@ class References:
     is_on_ground : bool
         Whether the leg walks on the ground; then the force is identified.
 
+    Attributes
+    ----------
+    may_be_late : bool
+        Whether nothing waits for what is simulated, see `TorqueReferenceRun`.
+
     Raises
     ------
     ConfigError
         If a reference that comes with the package cannot be read.
     """
+
+    may_be_late = False
 
     def __init__(
         self,
@@ -238,6 +245,11 @@ class References:
     def percent(self) -> int:
         """Progress of the simulation [%]."""
         return math.floor(100.0 * self._run.progress) if self._run is not None else 0
+
+    @property
+    def is_late(self) -> bool:
+        """Whether what is simulated is due, and not there: the machine is too slow."""
+        return self._run is not None and self._run.is_late
 
     def is_for(self, profile: CrankProfile) -> bool:
         """Whether the running simulation is for this motion of the crank."""
@@ -382,6 +394,7 @@ class References:
         """The run, created when first needed."""
         if self._run is None:
             self._run = TorqueReferenceRun(self._mechanism)
+            self._run.may_be_late = self.may_be_late
         return self._run
 
     def _begin(

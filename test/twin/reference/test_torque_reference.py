@@ -172,6 +172,31 @@ def test_threads_that_are_behind_get_help(leg, short, whole) -> None:
         np.testing.assert_array_equal(torque, same)
 
 
+def test_a_live_run_never_waits(leg, short, whole) -> None:
+    """A node whose machine was busy waited 54 s for its threads, and its middleware lost what came."""
+    run, stuck, found = TorqueReferenceRun(leg), Event(), None
+    run.may_be_late = True
+    for pool in (run._pool, run._urgent):
+        for _ in range(run._threads):
+            pool.submit(stuck.wait)
+    try:
+        run.begin(NEW, UNWORN, STEADY)
+        while not run.is_late:
+            assert run.advance() is None
+        for _ in range(3):
+            assert run.advance() is None
+        assert run.part is None
+        assert (run.progress, run.cycles_left) == (1.0, 0.0)
+    finally:
+        stuck.set()
+    while found is None:
+        found = run.advance()
+        time.sleep(0.001)
+    assert not run.is_late
+    for torque, same in zip(whole.torque_nm, found.torque_nm, strict=True):
+        np.testing.assert_array_equal(torque, same)
+
+
 def test_what_advance_returns_does_not_depend_on_how_long_the_thread_takes(leg, short) -> None:
     quick, slow = TorqueReferenceRun(leg), TorqueReferenceRun(leg)
     for run in (quick, slow):

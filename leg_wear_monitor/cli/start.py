@@ -13,6 +13,8 @@ from leg_wear_monitor.errors import interrupt, leave
 
 _NODES = ("monitor", "gait-publisher", "gait_publisher")
 
+LOADING = "{name}: loading libraries; the node's first message follows in seconds"
+
 _BLAS = "OPENBLAS_NUM_THREADS"
 
 
@@ -43,6 +45,8 @@ def _start(node: str | None = None) -> None:
         if is_node:  # `ros.running.run` follows
             for number in (signal.SIGINT, signal.SIGTERM):
                 signal.signal(number, _leave_node)  # there is nothing yet to put in order
+            if not {"-h", "--help"} & set(sys.argv):
+                print(LOADING.format(name=node or sys.argv[1]), flush=True)
         else:
             signal.signal(signal.SIGINT, interrupt)
         # before numpy is imported: a second thread on the small matrices here takes ten times the time

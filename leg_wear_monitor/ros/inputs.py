@@ -8,12 +8,10 @@ from typing import Any, NamedTuple
 
 import attrs
 import numpy as np
-from geometry_msgs.msg import WrenchStamped
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_policy_name_from_kind
 from rclpy.qos_overriding_options import QoSOverridingOptions
-from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
 from leg_wear_monitor.errors import printable
@@ -441,7 +439,8 @@ def _subscribe(
 
 
 _AXES = "xyz"
-_OF_A_BLOCK = 4  # messages that are read whole, so that this costs little
+_TORQUE = (struct.Struct(">3d"), struct.Struct("<3d"))  # the end of a wrench, by the byte order's bit
+_OF_A_BLOCK = 4  # messages that are read, so that this costs little
 _KEPT = 400
 _LEAST = 40
 _SWINGS = 0.3  # RMS of a drive's torque, as a fraction of the predicted one
@@ -471,8 +470,7 @@ class WrenchAxis:
             if one.kind == WRENCH_STAMPED and fault == NO_FAULT
         ]
         for raw in wrenches[-_OF_A_BLOCK:]:
-            torque = deserialize_message(raw, WrenchStamped).wrench.torque
-            self._torques.append((torque.x, torque.y, torque.z))
+            self._torques.append(_TORQUE[raw[1] & 1].unpack_from(raw, len(raw) - _TORQUE[0].size))
         del self._torques[:-_KEPT]
 
     def report(self) -> str:

@@ -31,7 +31,7 @@ from leg_wear_monitor.ros.health import Load, load_status, recording_status
 from leg_wear_monitor.ros.inputs import Due, Inbox, InputTopic, subscribe
 from leg_wear_monitor.ros.measure import MeasureRequest, measured, offer_measure
 from leg_wear_monitor.ros.outputs import BlackBox, MarkerTopic, Outlets
-from leg_wear_monitor.ros.running import ClosingNode, Parameters, repeated, run, spin
+from leg_wear_monitor.ros.running import ClosingNode, Parameters, release_memory, repeated, run, spin
 from leg_wear_monitor.ros.supervision import Supervision
 from leg_wear_monitor.state import Level, State
 from leg_wear_monitor.twin.sample import NO_FAULT, Samples
@@ -175,6 +175,7 @@ def undone(joint: str, wear: JointWear) -> str:
 NO_COMMANDS = "It publishes no commands and must not be part of a safety function."
 
 _WORK_S = 0.01  # period at which messages are processed while no report is due at a known stamp
+_RELEASE_S = 60.0  # period at which free memory is given back
 _AT_ONCE = 500  # messages at once, so that services and parameters are also served
 _HELD = 20_000  # capacity in messages: ten seconds at 1 kHz on both topics
 _A_SAMPLE = (outputs.TORQUE, outputs.MEASURED_TORQUE, outputs.IMPACTS)
@@ -188,7 +189,9 @@ class MonitorNode(ClosingNode):
         self.get_logger().info(f"{ADVICE} {NO_COMMANDS}")
         namespace = self.get_namespace().strip("/")
         parameters = Parameters(self, MonitorConfig, empty={"hardware_id": namespace or "leg"})
-        with advance_beside():
+        log = self.get_logger()
+        log.info("preparing; the first start compiles numerical kernels, half a minute on two processors")
+        with repeated(lambda passed_s: log.info(f"preparing: {passed_s:.0f} s")), advance_beside():
             self._open(parameters)
 
     def _open(self, parameters: Parameters[MonitorConfig]) -> None:
@@ -236,6 +239,7 @@ class MonitorNode(ClosingNode):
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(_WORK_S, self._work_in_time, clock=steady)
         self.create_timer(config.diagnostics.period_s, self._diagnose, clock=steady)
+        self.create_timer(_RELEASE_S, release_memory, clock=steady)
         joints, leg = ", ".join(self._monitor.clearance_joints), self._monitor.mechanism.name
         self.get_logger().info(f"monitoring joints {joints} of {leg}")
         for doubt in acceleration_doubts(config):
@@ -258,12 +262,11 @@ class MonitorNode(ClosingNode):
 
     def _compile(self, decoder: Decoder) -> None:
         """Compile the kernels before the first sample."""
-        log = self.get_logger()
-        log.info("preparing; the first start compiles numerical kernels, half a minute on two processors")
-        with repeated(lambda passed_s: log.info(f"preparing: {passed_s:.0f} s")):
-            self._monitor.warm_up()
+        self.get_logger().info("preparing: the leg is set up")
+        self._monitor.warm_up()
         for stream in STREAMS:
             decoder.one(b"", stream.code)
+        release_memory()
 
     # --- inputs ---
 

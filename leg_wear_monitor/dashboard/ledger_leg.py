@@ -54,6 +54,8 @@ class LedgerLeg:
         If the ledger is not one of this leg.
     """
 
+    motion = None
+
     def __init__(
         self, path: Path, config: MonitorConfig, mechanism: Mechanism, clock: Callable[[], float]
     ) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from leg_wear_monitor.configuration.strict import structure
 from leg_wear_monitor.dashboard import source as region
+from leg_wear_monitor.dashboard.motion import MotionFeed, motion_region
 from leg_wear_monitor.dashboard.source import (
     NOTHING_KNOWN,
     Content,
@@ -223,6 +224,8 @@ class LiveLeg:
         self._heard_s: float | None = None
         self._is_new = True
         self._drawn: tuple[float, str] = (-math.inf, "")
+        self._moving = ""
+        self.motion = MotionFeed()
 
     # --- what the monitor says ---
 
@@ -230,6 +233,14 @@ class LiveLeg:
         """The leg's parameters, or why they are not known."""
         with self._lock:
             self._setup, self._why_unknown, self._is_new = setup, printable(why_not), True
+            if setup is not None and setup.mechanism is not None:
+                self._moving = motion_region(setup.mechanism, setup.monitor.limits.torque_mismatch)
+
+    def take_motion(self, text: str) -> None:
+        """A message of ``~/motion``."""
+        with self._lock:
+            clearances = self._state.clearances
+        self.motion.add(text, f"{self._node}/motion", clearances)
 
     def take_diagnostics(self, stamp_ns: int, statuses: Iterable[ReplayStatus]) -> None:
         """A message of ``/diagnostics``; those of other nodes are left out."""
@@ -288,6 +299,7 @@ class LiveLeg:
         regions = {
             region.VERDICT: region.verdict_region(view),
             region.JOINTS: region.joints_region(view, why_unknown),
+            **({region.MOTION: self._moving} if self._moving else {}),
             region.ALARMS: region.alarms_region(view),
             region.BELIEF: region.belief_region(view),
             region.TRENDS: self._trends_region(view),

@@ -1,14 +1,10 @@
 """The web server: one page and its events, for reading only."""
 
 import asyncio
-import json
 import resource
 import socket
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from functools import partial
+from collections.abc import Callable, Sequence
 from http import HTTPStatus
-from pathlib import Path
 from typing import Any
 
 import attrs
@@ -17,155 +13,15 @@ from tornado.iostream import IOStream, StreamClosedError
 from tornado.web import Application, HTTPError, RequestHandler
 
 from leg_wear_monitor.dashboard.hosts import is_allowed, own_names
-from leg_wear_monitor.dashboard.source import Content, Source
+from leg_wear_monitor.dashboard.hub import MOST_VIEWERS, Hub
 from leg_wear_monitor.errors import LegWearError, printable
-from leg_wear_monitor.report.guide import document_page, document_path
-
-# Keeps the content of a source, renews it while somebody looks, and hands each viewer what has changed.
-
-
-MOST_VIEWERS = 100
-
-_TICK_S = 0.5  # a human does not see more; each tick is one rendering, however many look
-_TICKS_A_WORD = 2  # a word every second, also if nothing has changed: so a viewer knows that it is connected
-
-
-@attrs.define(eq=False)
-class Viewer:
-    """Somebody who looks: what he was given last, by region, and the bell that wakes him."""
-
-    given: dict[str, int] = attrs.Factory(dict)
-    bell: asyncio.Event = attrs.Factory(asyncio.Event)
-
-
-class Hub:
-    """One content for all viewers.
-
-    Parameters
-    ----------
-    source : Source
-    """
-
-    def __init__(self, source: Source) -> None:
-        self._source = source
-        self._content: Content | None = None
-        self._numbers: dict[str, int] = {}  # of each region: counts up when it changes
-        self._lock = asyncio.Lock()
-        self._worker = ThreadPoolExecutor(1, thread_name_prefix="dashboard")
-        self._viewers: set[Viewer] = set()
-        self._sent: dict[tuple[tuple[str, int], ...], str] = {}  # messages of this tick, by what is given
-        self.is_closing = False
-
-    @property
-    def viewers(self) -> int:
-        """How many look."""
-        return len(self._viewers)
-
-    def join(self) -> Viewer | None:
-        """A viewer more; None if there are too many."""
-        if len(self._viewers) >= MOST_VIEWERS or self.is_closing:
-            return None
-        viewer = Viewer()
-        viewer.bell.set()
-        self._viewers.add(viewer)
-        return viewer
-
-    def leave(self, viewer: Viewer) -> None:
-        """A viewer less."""
-        self._viewers.discard(viewer)
-
-    async def run(self) -> None:
-        """Renew the content while somebody looks, until `close`."""
-        ticks = 0
-        while not self.is_closing:
-            await asyncio.sleep(_TICK_S)
-            ticks += 1
-            if not self._viewers:
-                continue
-            has_changed = await self._renew()
-            if has_changed or ticks % _TICKS_A_WORD == 0:
-                self._sent.clear()
-                self._ring()
-
-    def close(self) -> None:
-        """Send the viewers away; `run` ends after its tick."""
-        self.is_closing = True
-        self._ring()
-
-    def finish(self) -> None:
-        """End the worker, when nobody asks any more."""
-        self._worker.shutdown(wait=False)
-
-    def _ring(self) -> None:
-        for viewer in self._viewers:
-            viewer.bell.set()
-
-    async def content(self) -> Content:
-        """The present content.
-
-        Raises
-        ------
-        LegWearError
-            If it cannot be shown.
-        """
-        await self._renew()
-        if self._content is None:
-            raise RuntimeError("a source without content")
-        return self._content
-
-    async def leg_page(self, name: str) -> str | None:
-        """The page of a leg of a fleet; None if there is none."""
-        page: str | None = await self._work(partial(self._source.leg_page, name))
-        return page
-
-    async def document(self, path: Path) -> tuple[str, str]:
-        """A document as a page, and its policy."""
-        page: tuple[str, str] = await self._work(partial(document_page, path))
-        return page
-
-    async def message(self, viewer: Viewer) -> str:
-        """What a viewer does not have yet, as one server-sent event."""
-        if self._content is None:
-            await self._renew()
-        key = tuple(sorted(viewer.given.items()))
-        if key not in self._sent:
-            self._sent[key] = self._event(viewer.given)
-        viewer.given = dict(self._numbers)
-        return self._sent[key]
-
-    def _event(self, given: Mapping[str, int]) -> str:
-        content, freshness = self._content, self._source.freshness()
-        regions = content.regions if content else {}
-        changed = {name: text for name, text in regions.items() if given.get(name) != self._numbers[name]}
-        state = {
-            **attrs.asdict(freshness),
-            "page": content.page if content else "",
-            "words": attrs.asdict(content.words) if content else {},
-            "regions": changed,
-        }
-        return f"event: state\ndata: {json.dumps(state, allow_nan=False)}\n\n"
-
-    async def _renew(self) -> bool:
-        """Whether the content is another one."""
-        async with self._lock:
-            if not await self._work(self._source.renew) and self._content is not None:
-                return False
-            before, self._content = self._content, await self._work(self._source.content)
-        regions = before.regions if before else {}
-        for name, markup in self._content.regions.items():
-            if regions.get(name) != markup:
-                self._numbers[name] = self._numbers.get(name, 0) + 1
-        self._sent.clear()
-        return True
-
-    async def _work(self, work: Any) -> Any:
-        return await asyncio.get_running_loop().run_in_executor(self._worker, work)
-
+from leg_wear_monitor.report.guide import document_path
 
 MOST_CONNECTIONS = 300  # of the viewers of a hub, and what their browsers keep open beside
 
 _WRITE_S = 20.0  # a viewer that takes nothing for so long is sent away
 _IDLE_S = 20.0  # so is a connection without a whole request for so long; a browser just makes a new one
+_FRAME_S, _QUIET_S = 0.05, 5.0  # of the moving leg: 20 frames a second
 _REQUEST_BYTES = 16_384
 _HEADERS = {
     "Cache-Control": "no-store",
@@ -293,6 +149,7 @@ def application(hub: Hub, host: str) -> Application:
         [
             (r"/", _Page, common),
             (r"/events", _Events, common),
+            (r"/motion", _Motion, common),
             (r"/docs/([A-Za-z0-9_/]+\.md)", _Document, common),
             (r"/legs/([^/]+)/report\.html", _Leg, common),
         ],
@@ -407,6 +264,37 @@ class _Events(_Reading):
         """Wake up, to end."""
         if hasattr(self, "_bell"):
             self._bell.set()
+
+
+class _Motion(_Reading):
+    """Frames of the moving leg, as they come."""
+
+    async def get(self) -> None:
+        feed = self._hub.motion
+        if feed is None:
+            raise HTTPError(HTTPStatus.NOT_FOUND)
+        if feed.viewers >= MOST_VIEWERS:
+            raise HTTPError(HTTPStatus.SERVICE_UNAVAILABLE)
+        self.set_header("Content-Type", "text/event-stream; charset=utf-8")
+        feed.viewers += 1
+        number, quiet_s = 0, 0.0
+        try:
+            await asyncio.wait_for(self.flush(), _WRITE_S)
+            while not self._hub.is_closing and not self.request.connection.stream.closed():  # type: ignore[union-attr]
+                frames = feed.after(number)
+                quiet_s = 0.0 if frames else quiet_s + _FRAME_S
+                if frames or quiet_s >= _QUIET_S:  # a word from time to time finds out who is gone
+                    self.write("".join(f"event: frame\ndata: {text}\n\n" for _, text in frames) or ":\n\n")
+                    await asyncio.wait_for(self.flush(), _WRITE_S)
+                    number, quiet_s = frames[-1][0] if frames else number, 0.0
+                await asyncio.sleep(_FRAME_S)
+        except (StreamClosedError, TimeoutError):
+            self.request.connection.stream.close()  # type: ignore[union-attr]
+        finally:
+            feed.viewers -= 1
+
+    def head(self) -> None:
+        self.set_header("Content-Type", "text/event-stream; charset=utf-8")
 
 
 class _Nothing(_Reading):

@@ -2,16 +2,15 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
 
 import attrs
 import numpy as np
 
-from leg_wear_monitor.errors import ConfigError, LegWearError, printable
-from leg_wear_monitor.fleet.description import fleet_directory, load_fleet
-from leg_wear_monitor.fleet.overview import FILE, FleetOverview, described, load_overview
+from leg_wear_monitor.dashboard.motion import MotionFeed
+from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms import ADVICE
@@ -28,11 +27,8 @@ from leg_wear_monitor.playback.result import (
     ReplayRecording,
     ReplayStatus,
     ReplaySummary,
-    summary_of,
 )
 from leg_wear_monitor.playback.summary import leg_shape, settings_of
-from leg_wear_monitor.report.fleet_page import fleet_page
-from leg_wear_monitor.report.fleet_standing import Day
 from leg_wear_monitor.report.page import (
     STATE_LOOKS,
     Banner,
@@ -43,7 +39,6 @@ from leg_wear_monitor.report.page import (
     Text,
     alarm_line,
     not_valid,
-    page_html,
     render,
     template_text,
     verdict_banner,
@@ -56,7 +51,7 @@ from leg_wear_monitor.report.replay.charts import (
     openings_chart,
 )
 from leg_wear_monitor.report.replay.joint_rows import joint_rows, joint_views
-from leg_wear_monitor.report.replay.page import belief, leg_drawing, replay_page
+from leg_wear_monitor.report.replay.page import belief, leg_drawing
 from leg_wear_monitor.state import Evidence, Figure, LegState, Level, State, Verdict
 
 # What is known of a leg at one instant, in the shape of a replay's summary: so the page has its words.
@@ -95,6 +90,8 @@ class LegSetup:
     shape : ReplayLeg
     limits_m, new_m : dict of str to float
         Limit of each joint's mean clearance, and its clearance when new.
+    mechanism : Mechanism or None
+        None until the leg is known.
     report_s : float
         Time between two reports of the monitor on itself.
     """
@@ -103,6 +100,7 @@ class LegSetup:
     shape: ReplayLeg
     limits_m: dict[str, float]
     new_m: dict[str, float]
+    mechanism: Mechanism | None = None
     report_s: float = 1.0
 
     @property
@@ -120,6 +118,7 @@ def leg_setup(config: MonitorConfig, mechanism: Mechanism) -> LegSetup:
         shape=leg_shape(mechanism),
         limits_m=dict(zip(joints, limits, strict=True)),
         new_m={joint: float(mechanism.clearances[joint].radial_clearance) for joint in joints},
+        mechanism=mechanism,
         report_s=config.diagnostics.period_s,
     )
 
@@ -197,10 +196,12 @@ def over_time(view: ReplaySummary) -> ReplaySummary:
 # Regions of the page: markup of what is known of a leg, each replaced by itself when it changes.
 
 
-VERDICT, JOINTS, ALARMS, BELIEF, TRENDS, STATUS = "verdict", "joints", "alarms", "belief", "trends", "status"
+VERDICT, MOTION, JOINTS, ALARMS = "verdict", "motion", "joints", "alarms"
+BELIEF, TRENDS, STATUS = "belief", "trends", "status"
 
 TITLES = {
     JOINTS: "Joints",
+    MOTION: "The leg now",
     ALARMS: "Alarms",
     BELIEF: "Are these values valid?",
     TRENDS: "Trends",
@@ -403,6 +404,10 @@ class Source(Protocol):
     def leg_page(self, name: str) -> str | None:
         """The page of a leg of a fleet; None if there is none."""
 
+    @property
+    def motion(self) -> MotionFeed | None:
+        """Frames of the moving leg; None where nothing moves."""
+
 
 @attrs.frozen(kw_only=True)
 class LegPage:
@@ -432,11 +437,16 @@ class LegPage:
                 template_text("uplot/uPlot.min.css"),
                 template_text("replay/replay.css"),
                 template_text("dashboard/dashboard.css"),
+                template_text("leg_slider.css"),
+                template_text("torque_phase.css"),
             ],
             libraries=[
                 template_text("uplot/uPlot.iife.min.js"),
                 template_text("replay/charts.js"),
+                template_text("leg_slider.js"),
+                template_text("torque_phase.js"),
                 template_text(SCRIPT),
+                template_text("dashboard/motion.js"),
             ],
             has_dark=True,
         )
@@ -469,97 +479,3 @@ def _identity(page: Page) -> str:
     """The same for pages with the same scripts and styles."""
     parts = (page.style, *page.scripts)
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
-
-
-# A fleet as its last update left it: the page of the fleet, and those of its legs.
-
-
-FRESH_DAYS = 7.0
-OLD_AFTER_S = FRESH_DAYS * 86_400.0
-
-_SUMMARY = "summary.json"
-_AGAIN_S = 3600.0  # the page says which legs are outdated, and that changes by itself
-
-
-class FleetSource:
-    """A source that reads the overview of a fleet again when it has changed.
-
-    Parameters
-    ----------
-    description : pathlib.Path
-    clock : callable
-        Seconds since 1970.
-    versions : mapping of str to str
-        Versions of the software, by name.
-
-    Raises
-    ------
-    ConfigError
-        If the description or the overview is unusable.
-    """
-
-    def __init__(self, description: Path, clock: Callable[[], float], versions: Mapping[str, str]) -> None:
-        self._description, self._clock, self._versions = description, clock, versions
-        self._home = fleet_directory(description)
-        self._fault = ""
-        self._overview = self._read()
-        self._stamps, self._made_s = self._stamps_now(), -_AGAIN_S
-
-    def _read(self) -> FleetOverview:
-        return described(load_overview(self._home), load_fleet(self._description))
-
-    def _stamps_now(self) -> Stamps:
-        return stamps_of(self._description, self._home / FILE)
-
-    def renew(self) -> bool:
-        """Read description and overview again if one of them has changed."""
-        stamps = self._stamps_now()
-        if stamps != self._stamps:
-            self._stamps = stamps
-            try:
-                self._overview, self._fault = self._read(), ""
-            except LegWearError as error:  # the page of before stays, and says so
-                self._fault = str(error)
-                return False
-            return True
-        return self._clock() - self._made_s >= _AGAIN_S
-
-    def content(self) -> Content:
-        """The page of the fleet."""
-        self._made_s = self._clock()
-        day = Day(now_ns=round(1.0e9 * self._made_s), fresh_days=FRESH_DAYS)
-        pages = {leg.id for leg in self._overview.legs if self._summary_of(leg.id).is_file()}
-        page = fleet_page(self._overview, day, pages, self._versions)
-        page = attrs.evolve(
-            page,
-            libraries=[*page.libraries, template_text(SCRIPT)],
-            styles=[*page.styles, template_text("dashboard/dashboard.css")],
-        )
-        state = page.banner.word.lower() if page.banner else ""
-        words = Words(title=f"{state} – fleet", state=state, heading=page.title, summary=page.summary)
-        identity = hashlib.sha256(page_html(page).encode()).hexdigest()[:16]
-        live = live_settings(identity, words, self.freshness(), "Updated ")
-        page = attrs.evolve(page, live=live)
-        return Content(page=identity, html=page_html(page), regions={}, words=words, policy=page.policy)
-
-    def freshness(self) -> Freshness:
-        """Since when the fleet was not updated."""
-        if self._fault:
-            return unreadable(self._fault, OLD_AFTER_S)
-        _, (written_ns, _) = self._stamps
-        age_s = max(0.0, self._clock() - 1.0e-9 * written_ns)
-        return Freshness(age_s, "the fleet was not updated; run leg-wear-monitor fleet update", OLD_AFTER_S)
-
-    def leg_page(self, name: str) -> str | None:
-        """The page of a leg of the description, by its exact id; no other name leads to a file."""
-        if name not in {leg.id for leg in self._overview.legs}:
-            return None
-        source = self._summary_of(name)
-        try:
-            record = json.loads(source.read_bytes())
-            return page_html(replay_page(summary_of(record, str(source))))
-        except (OSError, ValueError, ConfigError):  # of an earlier version, or damaged: as if there was none
-            return None
-
-    def _summary_of(self, leg: str) -> Path:
-        return self._home / "legs" / leg / _SUMMARY

@@ -372,6 +372,7 @@ def leg_data(reach: Reach) -> dict[str, Any]:
             if dead is not None and dead.is_in_line and not reach.open_joint
         ],
         "said": {},
+        "live": False,
         "first": 0,
         "digits": 1,
         "skip": 1,

@@ -30,7 +30,7 @@ from leg_wear_monitor.monitor.wear_monitor import WearMonitor, open_monitor
 from leg_wear_monitor.ros.health import Load, load_status, recording_status
 from leg_wear_monitor.ros.inputs import Due, Inbox, InputTopic, subscribe
 from leg_wear_monitor.ros.measure import MeasureRequest, measured, offer_measure
-from leg_wear_monitor.ros.outputs import BlackBox, MarkerTopic, Outlets
+from leg_wear_monitor.ros.outputs import BlackBox, MarkerTopic, MotionTopic, Outlets
 from leg_wear_monitor.ros.running import ClosingNode, Parameters, release_memory, repeated, run, spin
 from leg_wear_monitor.ros.supervision import Supervision
 from leg_wear_monitor.state import Level, State
@@ -230,6 +230,7 @@ class MonitorNode(ClosingNode):
         self._serve()
         self._supervision = Supervision(self, self._monitor, config)
         self._markers = MarkerTopic(self, self._outlets, self._monitor, lambda: self._supervision.is_current)
+        self._motion = MotionTopic(self, self._monitor.clearance_joints)
         self._send_state()
         self._inputs = subscribe(self, config, self._receive)
         self._supervision.inputs = [topic for topic, _ in self._inputs]
@@ -319,6 +320,7 @@ class MonitorNode(ClosingNode):
     def _publish(self, reports: Reports, coarse: bool) -> None:
         now_ns = time.time_ns()
         self._markers.publish(reports)
+        self._motion.publish(reports.samples)
         reports = attrs.evolve(
             reports,
             alarms=tuple(map(self._supervision.alarms, reports.alarms)),

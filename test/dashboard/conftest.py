@@ -80,7 +80,8 @@ def states_of(answer):
 def served():
     """Serve a source in a thread; all are ended with the test."""
     pytest.importorskip("tornado")
-    from leg_wear_monitor.dashboard.server import Hub, listen, serve
+    from leg_wear_monitor.dashboard.hub import Hub
+    from leg_wear_monitor.dashboard.server import listen, serve
 
     running = []
 

@@ -4,7 +4,7 @@ import pytest
 from made_up_fleet import made_up_fleet, made_up_leg
 from made_up_summary import made_up_summary
 
-from leg_wear_monitor.dashboard.source import FleetSource
+from leg_wear_monitor.dashboard.fleet_source import FleetSource
 from leg_wear_monitor.errors import ConfigError
 
 pytestmark = pytest.mark.plain

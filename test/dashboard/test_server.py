@@ -11,7 +11,7 @@ from heard_leg import walk
 
 pytest.importorskip("tornado")
 
-from leg_wear_monitor.dashboard import server as hubs
+from leg_wear_monitor.dashboard import hub as hubs
 from leg_wear_monitor.dashboard import server as servers
 from leg_wear_monitor.dashboard.server import listen
 from leg_wear_monitor.errors import LegWearError

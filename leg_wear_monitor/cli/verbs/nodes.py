@@ -323,7 +323,7 @@ def _source(
         yield LedgerLeg(ledger, settings, leg, time.time)
     elif fleet:
         from leg_wear_monitor.cli.main import version
-        from leg_wear_monitor.dashboard.source import FleetSource
+        from leg_wear_monitor.dashboard.fleet_source import FleetSource
 
         yield FleetSource(fleet, time.time, {"leg_wear_monitor": version()})
     else:
@@ -356,7 +356,8 @@ def _setup(config: Path, node: str) -> "LegSetup":
 def _serve(source: "Source", place: "Place") -> None:
     """Serve until a signal."""
     from leg_wear_monitor.dashboard.hosts import is_local
-    from leg_wear_monitor.dashboard.server import Hub, serve
+    from leg_wear_monitor.dashboard.hub import Hub
+    from leg_wear_monitor.dashboard.server import serve
 
     def ready(ended: asyncio.Event) -> None:
         loop = asyncio.get_running_loop()

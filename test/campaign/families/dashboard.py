@@ -15,8 +15,8 @@ import tornado  # noqa: F401 - without it, the family is left out
 
 from campaign.case import Case, Outcome
 from leg_wear_monitor.dashboard import server
+from leg_wear_monitor.dashboard.hub import Hub
 from leg_wear_monitor.dashboard.ledger_leg import LedgerLeg
-from leg_wear_monitor.dashboard.server import Hub
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.settings import MonitorConfig

@@ -1,0 +1,157 @@
+"""Keeps the content of a source, renews it while somebody looks, and hands each viewer what has changed."""
+
+import asyncio
+import json
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from leg_wear_monitor.dashboard.motion import MotionFeed
+from leg_wear_monitor.dashboard.source import Content, Source
+from leg_wear_monitor.report.guide import document_page
+
+MOST_VIEWERS = 100
+
+_TICK_S = 0.5  # a human does not see more; each tick is one rendering, however many look
+_TICKS_A_WORD = 2  # a word every second, also if nothing has changed: so a viewer knows that it is connected
+
+
+@attrs.define(eq=False)
+class Viewer:
+    """Somebody who looks: what he was given last, by region, and the bell that wakes him."""
+
+    given: dict[str, int] = attrs.Factory(dict)
+    bell: asyncio.Event = attrs.Factory(asyncio.Event)
+
+
+class Hub:
+    """One content for all viewers.
+
+    Parameters
+    ----------
+    source : Source
+    """
+
+    def __init__(self, source: Source) -> None:
+        self._source = source
+        self._content: Content | None = None
+        self._numbers: dict[str, int] = {}  # of each region: counts up when it changes
+        self._lock = asyncio.Lock()
+        self._worker = ThreadPoolExecutor(1, thread_name_prefix="dashboard")
+        self._viewers: set[Viewer] = set()
+        self._sent: dict[tuple[tuple[str, int], ...], str] = {}  # messages of this tick, by what is given
+        self.is_closing = False
+
+    @property
+    def motion(self) -> MotionFeed | None:
+        """Frames of the moving leg; None where nothing moves."""
+        return self._source.motion
+
+    @property
+    def viewers(self) -> int:
+        """How many look."""
+        return len(self._viewers)
+
+    def join(self) -> Viewer | None:
+        """A viewer more; None if there are too many."""
+        if len(self._viewers) >= MOST_VIEWERS or self.is_closing:
+            return None
+        viewer = Viewer()
+        viewer.bell.set()
+        self._viewers.add(viewer)
+        return viewer
+
+    def leave(self, viewer: Viewer) -> None:
+        """A viewer less."""
+        self._viewers.discard(viewer)
+
+    async def run(self) -> None:
+        """Renew the content while somebody looks, until `close`."""
+        ticks = 0
+        while not self.is_closing:
+            await asyncio.sleep(_TICK_S)
+            ticks += 1
+            if not self._viewers:
+                continue
+            has_changed = await self._renew()
+            if has_changed or ticks % _TICKS_A_WORD == 0:
+                self._sent.clear()
+                self._ring()
+
+    def close(self) -> None:
+        """Send the viewers away; `run` ends after its tick."""
+        self.is_closing = True
+        self._ring()
+
+    def finish(self) -> None:
+        """End the worker, when nobody asks any more."""
+        self._worker.shutdown(wait=False)
+
+    def _ring(self) -> None:
+        for viewer in self._viewers:
+            viewer.bell.set()
+
+    async def content(self) -> Content:
+        """The present content.
+
+        Raises
+        ------
+        LegWearError
+            If it cannot be shown.
+        """
+        await self._renew()
+        if self._content is None:
+            raise RuntimeError("a source without content")
+        return self._content
+
+    async def leg_page(self, name: str) -> str | None:
+        """The page of a leg of a fleet; None if there is none."""
+        page: str | None = await self._work(partial(self._source.leg_page, name))
+        return page
+
+    async def document(self, path: Path) -> tuple[str, str]:
+        """A document as a page, and its policy."""
+        page: tuple[str, str] = await self._work(partial(document_page, path))
+        return page
+
+    async def message(self, viewer: Viewer) -> str:
+        """What a viewer does not have yet, as one server-sent event."""
+        if self._content is None:
+            await self._renew()
+        key = tuple(sorted(viewer.given.items()))
+        if key not in self._sent:
+            self._sent[key] = self._event(viewer.given)
+        viewer.given = dict(self._numbers)
+        return self._sent[key]
+
+    def _event(self, given: Mapping[str, int]) -> str:
+        content, freshness = self._content, self._source.freshness()
+        regions = content.regions if content else {}
+        changed = {name: text for name, text in regions.items() if given.get(name) != self._numbers[name]}
+        state = {
+            **attrs.asdict(freshness),
+            "page": content.page if content else "",
+            "words": attrs.asdict(content.words) if content else {},
+            "regions": changed,
+        }
+        return f"event: state\ndata: {json.dumps(state, allow_nan=False)}\n\n"
+
+    async def _renew(self) -> bool:
+        """Whether the content is another one."""
+        async with self._lock:
+            if not await self._work(self._source.renew) and self._content is not None:
+                return False
+            before, self._content = self._content, await self._work(self._source.content)
+        regions = before.regions if before else {}
+        for name, markup in self._content.regions.items():
+            if regions.get(name) != markup:
+                self._numbers[name] = self._numbers.get(name, 0) + 1
+        self._sent.clear()
+        return True
+
+    async def _work(self, work: Any) -> Any:
+        return await asyncio.get_running_loop().run_in_executor(self._worker, work)

@@ -1,0 +1,48 @@
+"use strict";
+// Moves the leg as frames come from the server; a hidden tab, a paused picture and one behind an edge ask for none.
+(function () {
+  const cycles = [], still = matchMedia("(prefers-reduced-motion: reduce)");
+  let source = null, playing = !still.matches, isSeen = true;
+
+  const leg = () => document.getElementById("leg-slider");
+  const chart = () => document.querySelector(".torque-phase");
+
+  function take(event) {
+    const frame = JSON.parse(event.data), there = leg(), figure = chart();
+    if (there && there.live) there.live(frame);
+    if (frame.torque && figure) {
+      cycles.push(frame.torque);
+      if (cycles.length > torquePhase.most) cycles.shift();
+      torquePhase.draw(figure.querySelector("svg"), cycles, Number(figure.dataset.limit));
+    }
+  }
+
+  function update() {
+    const button = leg() && leg().querySelector(".play"), isWanted = Boolean(button) && playing && isSeen && !document.hidden;
+    if (button) {
+      button.textContent = playing ? "Pause" : "Play";
+      button.setAttribute("aria-pressed", String(playing));
+    }
+    if (isWanted && !source) {
+      source = new EventSource("motion");
+      source.addEventListener("frame", take);
+    } else if (!isWanted && source) {
+      source.close();
+      source = null;
+    }
+  }
+
+  function begin() {
+    const there = leg(), button = there && there.querySelector(".play");
+    if (!button || button.dataset.ready) return;
+    button.dataset.ready = "1";
+    button.addEventListener("click", () => { playing = !playing; update(); });
+    new IntersectionObserver((entries) => { isSeen = entries[entries.length - 1].isIntersecting; update(); }).observe(there);
+    update();
+  }
+
+  document.addEventListener("visibilitychange", update);
+  document.addEventListener("replaced", begin);
+  window.addEventListener("pagehide", () => { if (source) source.close(); source = null; });
+  begin();
+})();

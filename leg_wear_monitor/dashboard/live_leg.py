@@ -27,7 +27,7 @@ from leg_wear_monitor.dashboard.source import (
 from leg_wear_monitor.errors import ConfigError, printable
 from leg_wear_monitor.files import finite_or_none, or_nan
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.playback.history import CYCLE_COLUMNS, SUMMARY_COLUMNS
+from leg_wear_monitor.playback.history import CYCLE_COLUMNS, SEEN_COLUMNS, SUMMARY_COLUMNS
 from leg_wear_monitor.playback.result import ReplayHistory, ReplayStatus, ReplaySummary
 from leg_wear_monitor.state import SCHEMA_VERSION, LegState, Level
 
@@ -158,7 +158,7 @@ class Trends:
         columns: dict[str, Any] = {name: _column(row.leg.get(name) for row in rows) for name in CYCLE_COLUMNS}
         columns |= {
             name: {joint: _column(row.joints.get(name, {}).get(joint) for row in rows) for joint in joints}
-            for name in (*SUMMARY_COLUMNS.values(), "seen_m")
+            for name in (*SUMMARY_COLUMNS.values(), *SEEN_COLUMNS)
         }
         stamps = np.array([row.stamp_ns for row in rows], np.int64)
         return ReplayHistory(stamp_ns=stamps, **columns)
@@ -282,8 +282,8 @@ class LiveLeg:
                 leg |= {column: values.get(name) for column, name in columns.items()}
         joints = self._state.clearances
         counted = {joint: each.counted_m for joint, each in joints.items()}
-        seen = {joint: each.seen_m for joint, each in joints.items()}
-        return Row(stamp_ns, leg, {"counted_m": counted, "seen_m": seen, "peak_force_n": self._peaks_n})
+        seen = {name: {joint: getattr(each, name) for joint, each in joints.items()} for name in SEEN_COLUMNS}
+        return Row(stamp_ns, leg, {"counted_m": counted, **seen, "peak_force_n": self._peaks_n})
 
     # --- what the page shows ---
 

@@ -11,7 +11,6 @@ import numpy as np
 
 from leg_wear_monitor.dashboard.motion import MotionFeed
 from leg_wear_monitor.errors import printable
-from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms import ADVICE
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -32,27 +31,20 @@ from leg_wear_monitor.playback.summary import leg_shape, settings_of
 from leg_wear_monitor.report.page import (
     STATE_LOOKS,
     Banner,
-    Chart,
     Page,
     Part,
     Table,
     Text,
     alarm_line,
-    not_valid,
     render,
     template_text,
     verdict_banner,
 )
-from leg_wear_monitor.report.replay.charts import (
-    estimates_chart,
-    force_chart,
-    has_estimates,
-    health_chart,
-    openings_chart,
-)
+from leg_wear_monitor.report.replay.charts import health_chart
 from leg_wear_monitor.report.replay.joint_rows import joint_rows, joint_views
+from leg_wear_monitor.report.replay.joint_trends import joint_trends
 from leg_wear_monitor.report.replay.page import belief, leg_drawing
-from leg_wear_monitor.state import Evidence, Figure, LegState, Level, State, Verdict
+from leg_wear_monitor.state import Evidence, LegState, Level, State, Verdict
 
 # What is known of a leg at one instant, in the shape of a replay's summary: so the page has its words.
 
@@ -272,29 +264,14 @@ def status_region(view: ReplaySummary) -> str:
 
 
 def trends_region(view: ReplaySummary, caption: str) -> str:
-    """Charts of what is known over time; of what the verdict does not believe, why not."""
+    """Charts of the joint that the reader chooses, and folded those of input and torque."""
     timed = over_time(view)
     if len(timed.history.stamp_ns) < 2:
         return _parts([Text("There is nothing to draw yet.")])
-    parts: list[Part] = [Text(caption)]
-    if np.isfinite(timed.history.cadence_rpm).any():
-        parts.append(health_chart(timed))
-    if has_estimates(timed):
-        parts.append(estimates_chart(timed))
-    if _is_known(timed.history.counted_m):
-        parts += _unless_doubted(timed, Figure.CLEARANCES, "Counted clearances", openings_chart(timed))
-    if _is_known(timed.history.peak_force_n):
-        parts += _unless_doubted(timed, Figure.IMPACT_FORCES, "Impact forces", force_chart(timed))
-    return _parts(parts)
-
-
-def _is_known(columns: Mapping[str, Floats]) -> bool:
-    return any(np.isfinite(values).any() for values in columns.values())
-
-
-def _unless_doubted(view: ReplaySummary, figure: Figure, name: str, chart: Chart) -> list[Part]:
-    doubt = not_valid(view.verdict, figure)
-    return [Text(f"{name}: {doubt}", is_not_valid=True)] if doubt else [chart]
+    named = sorted(view.monitor.clearance_joints, key=lambda joint: joint not in view.verdict.joints)
+    joints = [(joint, view.leg.joint_words(joint), joint_trends(timed, joint)) for joint in named]
+    leg = [health_chart(timed)] if np.isfinite(timed.history.cadence_rpm).any() else []
+    return render("dashboard/trends.html", caption=caption, joints=joints, leg=leg)
 
 
 def _parts(parts: Sequence[Part]) -> str:
@@ -447,6 +424,7 @@ class LegPage:
                 template_text("torque_phase.js"),
                 template_text(SCRIPT),
                 template_text("dashboard/motion.js"),
+                template_text("dashboard/trends.js"),
             ],
             has_dark=True,
         )

@@ -79,10 +79,20 @@ class JointReport:
     @property
     def seen_m(self) -> float | None:
         """Clearance that encoders or the drive torque show, the surer one; None if neither shows it."""
+        return self._surest[1] if self._surest else None
+
+    @property
+    def seen_sigma_m(self) -> float | None:
+        """Standard deviation of this clearance; None without one."""
+        return self._surest[0] if self._surest else None
+
+    @property
+    def _surest(self) -> tuple[float, float] | None:
+        """Standard deviation and clearance of the surer estimate."""
         found = [] if self.shown is None else [(self.shown.sigma_m, self.shown.clearance_m)]
         if self.seen is not None and self.seen.observation is ClearanceObservation.SEEN:
             found.append((self.seen.sigma_m, self.seen.clearance_m))
-        return min(found)[1] if found else None
+        return min(found, default=None)
 
     @property
     def judged_clearance_m(self) -> float:

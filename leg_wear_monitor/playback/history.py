@@ -36,6 +36,9 @@ JOINT_COLUMNS = (
 SUMMARY_COLUMNS = {name: name.replace("clearance_", "counted_") for name in JOINT_COLUMNS}
 """Names of these columns in a summary, whose one clearance of a joint is the believed one."""
 
+SEEN_COLUMNS = ("seen_m", "seen_sigma_m")
+"""What encoders or the drive torque show best of a joint."""
+
 CYCLE_COLUMNS = (
     "cycle",
     "cadence_rpm",
@@ -89,7 +92,7 @@ class History:
         self._cycles.extend(float(getattr(report, name)) for name in CYCLE_COLUMNS)
         for joint in report.joints:
             self._joints.extend(_number(joint, name) for name in JOINT_COLUMNS)
-            self._seen.append(_number(joint, "seen_m"))
+            self._seen.extend(_number(joint, name) for name in SEEN_COLUMNS)
 
     def add_alarms(self, alarms: AlarmList) -> None:
         """Add the alarms of a list that have changed."""
@@ -112,10 +115,10 @@ class History:
         table = np.array(self._cycles).reshape(len(self), len(CYCLE_COLUMNS))
         return table[:, CYCLE_COLUMNS.index(name)]
 
-    @property
-    def seen_m(self) -> Floats:
-        """What encoders or the drive torque show best, shape (cycles, clearance joints); NaN without it."""
-        return np.array(self._seen).reshape(len(self), len(self.clearance_joints))
+    def seen_column(self, name: str) -> Floats:
+        """One of `SEEN_COLUMNS`, shape (cycles, clearance joints); NaN where nothing is shown."""
+        table = np.array(self._seen).reshape(len(self), len(self.clearance_joints), len(SEEN_COLUMNS))
+        return table[:, :, SEEN_COLUMNS.index(name)]
 
     def joint_column(self, name: str) -> Floats:
         """One of `JOINT_COLUMNS`, shape (cycles, clearance joints); NaN where it is unknown."""

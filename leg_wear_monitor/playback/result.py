@@ -413,6 +413,8 @@ class ReplayHistory:
     seen_m : dict of str to (n,) array
         Mean radial clearance that encoders or the drive torque show, the surer one; empty in a file of an
         older version.
+    seen_sigma_m : dict of str to (n,) array
+        Its standard deviation; empty in a file of an older version.
     lowest : dict of str to (n,) array
         Of cadence, torques, mismatch, load and friction, by their names: the smallest value in each group;
         empty if each group is one gait cycle.
@@ -438,6 +440,7 @@ class ReplayHistory:
     mean_force_n: dict[str, Floats]
     impacts: dict[str, Floats]
     seen_m: dict[str, Floats] = attrs.Factory(dict)
+    seen_sigma_m: dict[str, Floats] = attrs.Factory(dict)
     lowest: dict[str, Floats] = attrs.Factory(dict)
     highest: dict[str, Floats] = attrs.Factory(dict)
 

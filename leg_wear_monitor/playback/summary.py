@@ -25,7 +25,7 @@ from leg_wear_monitor.monitor.ledger.entry import VerdictEvent
 from leg_wear_monitor.monitor.leg_state import leg_alarm
 from leg_wear_monitor.monitor.reports import JointReport, Status
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
-from leg_wear_monitor.playback.history import CYCLE_COLUMNS, SUMMARY_COLUMNS, History
+from leg_wear_monitor.playback.history import CYCLE_COLUMNS, SEEN_COLUMNS, SUMMARY_COLUMNS, History
 from leg_wear_monitor.playback.result import (
     EncoderEvidence,
     LegJoint,
@@ -361,8 +361,9 @@ def _history(history: History) -> ReplayHistory:
     for name, shown in SUMMARY_COLUMNS.items():
         thinned = _thinned(name, history.joint_column(name), last)
         columns[shown] = {joint: thinned[:, k] for k, joint in enumerate(history.clearance_joints)}
-    seen_m = history.seen_m[last]
-    columns["seen_m"] = {joint: seen_m[:, k] for k, joint in enumerate(history.clearance_joints)}
+    for name in SEEN_COLUMNS:
+        seen = history.seen_column(name)[last]
+        columns[name] = {joint: seen[:, k] for k, joint in enumerate(history.clearance_joints)}
     if len(history) > len(last):
         begins = _begins(last)
         for name, reduced in (("lowest", np.fmin), ("highest", np.fmax)):  # of those that are known

@@ -37,7 +37,7 @@ class Series:
     colour : str
         CSS variable of the page.
     style : str
-        ``line``, ``dashed``, ``points`` or ``steps``.
+        ``line``, ``dashed``, ``points``, ``steps``, or ``edge`` of a band, which has no line.
     width : float
         Of a line [CSS pixels].
     """
@@ -67,6 +67,8 @@ class Panel:
         Ends of the y axis; those of the values if None.
     height : int
         [CSS pixels].
+    bands : sequence of pair of int
+        Numbers of the series above and below an area that is filled in the colour of the first.
     lanes : sequence of str
         Words for the values 0, 1, … of each series, which is then drawn in a lane of its own.
     """
@@ -76,6 +78,7 @@ class Panel:
     low: float | None = None
     high: float | None = None
     height: int = 170
+    bands: Sequence[tuple[int, int]] = ()
     lanes: Sequence[str] = ()
 
 
@@ -144,7 +147,8 @@ def _settings(panel: Panel) -> dict[str, Any]:
         for each in panel.series
     ]
     ends = {"low": panel.low, "high": panel.high, "height": panel.height, "lanes": list(panel.lanes)}
-    return {"title": panel.title, "series": series, **ends}
+    bands = [list(band) for band in panel.bands]
+    return {"title": panel.title, "series": series, "bands": bands, **ends}
 
 
 # Parts of a page: text, pictures, tables, listings, and markup that a template has made.

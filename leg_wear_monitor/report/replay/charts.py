@@ -42,8 +42,8 @@ def openings_chart(summary: ReplaySummary) -> Chart:
         name="clearances",
         alt="Opening of each joint's clearance over time",
         caption="Mean radial clearance of each joint, minus its value after the first gait cycle.",
-        x=_time(summary),
-        ends=_ends(summary),
+        x=time_series(summary),
+        ends=ends_of(summary),
         panels=[Panel(title="Opening of the clearances", series=series, height=260)],
         group=_GROUP,
     )
@@ -68,8 +68,8 @@ def estimates_chart(summary: ReplaySummary) -> Chart:
         alt="Clearances that encoders or the drive torque show, over time",
         caption="Mean radial clearance of each joint as encoders or the drive torque show it, whatever is "
         "counted; nothing is drawn while they show none.",
-        x=_time(summary),
-        ends=_ends(summary),
+        x=time_series(summary),
+        ends=ends_of(summary),
         panels=[Panel(title="Clearances by estimate", series=series, low=0.0, height=260)],
         group=_GROUP,
     )
@@ -96,8 +96,8 @@ def force_chart(summary: ReplaySummary) -> Chart:
         alt="Peak and mean contact force of each joint over time",
         caption="Contact force in each gait cycle, on the same axis for all joints. Peaks are of a heavy "
         "tail; their scatter does not mean that the joint changes.",
-        x=_time(summary),
-        ends=_ends(summary),
+        x=time_series(summary),
+        ends=ends_of(summary),
         panels=[Panel(title=each.title, series=each.series, low=0.0, high=high or 1.0, height=each.height)
                 for each in panels],
         group=_GROUP,
@@ -147,8 +147,8 @@ def health_chart(summary: ReplaySummary) -> Chart:
         alt="Cadence, drive torque, mismatch, load and friction over time",
         caption="Cadence with the commanded one dashed; measured and predicted drive torque; the fraction "
         "that load, friction and lag do not explain, with its limit dashed; load and friction as estimated.",
-        x=_time(summary),
-        ends=_ends(summary),
+        x=time_series(summary),
+        ends=ends_of(summary),
         panels=[_with_range(panel, history) for panel in panels if _is_known(panel)],
         group=_GROUP,
     )
@@ -197,7 +197,7 @@ def alarm_chart(summary: ReplaySummary, changes: Sequence[AlarmChange]) -> Chart
         alt="Levels of alarms over time",
         caption="Level of each alarm over time: 0 is OK, 1 WARN, 2 ERROR.",
         x=Series(name="time", unit=unit, values=time),
-        ends=_ends(summary),
+        ends=ends_of(summary),
         panels=[
             Panel(title="Alarms", series=series, height=80 + 34 * len(series), lanes=("OK", "WARN", "ERROR"))
         ],
@@ -214,12 +214,13 @@ def _levels(stamps: Iterable[int], changes: Sequence[AlarmChange], name: str) ->
     return np.array(levels)
 
 
-def _time(summary: ReplaySummary) -> Series:
+def time_series(summary: ReplaySummary) -> Series:
+    """The x axis of all charts over time."""
     time, unit = time_of(summary, summary.history.stamp_ns)
     return Series(name="time", unit=unit, values=time)
 
 
-def _ends(summary: ReplaySummary) -> tuple[float, float]:
+def ends_of(summary: ReplaySummary) -> tuple[float, float]:
     """Those of the recording, for all charts over time."""
     stamps = np.array([summary.recording.begin_ns, summary.recording.end_ns], np.int64)
     begin, end = time_of(summary, stamps)[0].tolist()

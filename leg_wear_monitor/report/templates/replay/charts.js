@@ -22,10 +22,11 @@
   function seriesOf(panel) {
     return panel.series.map((series, k) => {
       const points = series.style === "points", steps = series.style === "steps";
-      const drawn = { label: series.name, stroke: () => colour(series.colour), width: points ? 0 : series.width };
+      const isEdge = series.style === "edge";
+      const drawn = { label: series.name, stroke: () => colour(series.colour), width: points || isEdge ? 0 : series.width };
       if (series.style === "dashed") drawn.dash = [6, 4];
       if (points) drawn.paths = () => null;
-      drawn.points = { show: points ? true : undefined, size: points ? 9 : 5 };
+      drawn.points = { show: points ? true : isEdge ? false : undefined, size: points ? 9 : 5 };
       if (steps) {
         drawn.paths = uPlot.paths.stepped({ align: 1 });
         drawn.points.show = false;
@@ -87,6 +88,7 @@
       cursor: { sync: { key: chart.group }, drag: { x: true, y: false } },
       scales: { x: { time: false, range: (_, low, high) => [low, high] }, y: { range: rangeOf(panel) } },
       series: [{ label: chart.x, value: (_, value) => (value === null ? "–" : short(value)) }].concat(seriesOf(panel)),
+      bands: panel.bands.map((band) => ({ series: band.map((k) => k + 1), fill: () => colour(panel.series[band[0]].colour) + "40" })),
       axes: [
         { stroke: () => colour("--ink"), grid: { stroke: () => colour("--pale"), width: 1 }, ticks: { show: false }, size: 34 },
         yAxis(panel, width < NARROW)
@@ -180,6 +182,8 @@
   window.addEventListener("hashchange", unfold);
   document.addEventListener("click", (event) => { if (event.target.closest('a[href^="#"]')) setTimeout(unfold); });
   unfold();
+
+  document.addEventListener("shown", drawAll);  // what was hidden
 
   const folded = Array.from(document.querySelectorAll("details"));
   folded.forEach((details) => details.addEventListener("toggle", drawAll));

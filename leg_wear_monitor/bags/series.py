@@ -13,7 +13,7 @@ from leg_wear_monitor.bags.mcap_layout import Channel
 from leg_wear_monitor.estimate.torque_model import Series, series
 from leg_wear_monitor.messages import outputs
 from leg_wear_monitor.messages.cdr import Decoder
-from leg_wear_monitor.messages.names import names_in
+from leg_wear_monitor.messages.names import interfaces_in, names_in
 from leg_wear_monitor.messages.streams import INTERFACES, JOINT_STATE, STREAMS, WRENCH_STAMPED, Stream
 from leg_wear_monitor.monitor.config.inputs import DriveTorque
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -23,7 +23,9 @@ from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, ZERO_STAMP, Sa
 # The series: each joint is a candidate for the crank, each torque one for the drive torque.
 
 
-WRENCH, FLOAT64, EFFORT = "wrench", "float64", "effort"
+WRENCH, FLOAT64, EFFORT, INTERFACE = "wrench", "float64", "effort", "interface"
+# of a joint's interfaces those that are no torque, and the one that joint_states has, too
+_NO_TORQUE = ("position", "velocity", "acceleration", "effort")
 
 
 @attrs.frozen
@@ -44,12 +46,15 @@ class TorqueSource:
         Value of `drive_torque.source`.
     topic : str
     component : str
-        Axis of a wrench (x, y, z), joint of an effort; empty for a Float64.
+        Axis of a wrench (x, y, z), joint of an effort or of an interface; empty for a Float64.
+    interface : str
+        Name of an interface; empty for others.
     """
 
     source: str
     topic: str
     component: str = ""
+    interface: str = ""
 
     @property
     def label(self) -> str:
@@ -58,6 +63,8 @@ class TorqueSource:
             return f"wrench, axis {self.component}, of {self.topic}"
         if self.source == EFFORT:
             return f"effort of {self.component} in {self.topic}"
+        if self.source == INTERFACE:
+            return f"{self.interface} of {self.component} in {self.topic}"
         return f"Float64 of {self.topic}"
 
 
@@ -191,7 +198,7 @@ def _stream(
         return None
     for stream in STREAMS:
         topic = chosen.get(stream.kind, drive_torque)
-        if stream.type == (channel.type or known) and not stream.load_source and stream.code != INTERFACES:
+        if stream.type == (channel.type or known) and not stream.load_source:
             return stream if topic in (None, channel.topic, channel.topic.lstrip("/")) else None
     return None
 
@@ -230,6 +237,11 @@ def _decoded_series(
             if np.isfinite(samples["torque_nm"]).any():
                 found.append((TorqueSource(EFFORT, topic, joint), samples, "torque_nm"))
         return found
+    if code == INTERFACES:
+        for joint, interface in _interfaces(data, messages):
+            samples = _decoder(INTERFACE, joint=joint, interface=interface).many(data, messages)
+            found.append((TorqueSource(INTERFACE, topic, joint, interface), samples, "torque_nm"))
+        return found
     if code == WRENCH_STAMPED:
         return [
             (TorqueSource(WRENCH, topic, axis), _decoder(WRENCH, axis).many(data, messages), "torque_nm")
@@ -238,22 +250,37 @@ def _decoded_series(
     return [(TorqueSource(FLOAT64, topic), _decoder(FLOAT64).many(data, messages), "torque_nm")]
 
 
-def _decoder(source: str, axis: str = "z", joint: str = _NO_JOINT) -> Decoder:
+def _decoder(source: str, axis: str = "z", joint: str = _NO_JOINT, interface: str = "effort") -> Decoder:
     """Decoder of one torque source and of one joint as the crank."""
-    return Decoder(MonitorConfig(crank_joint=joint, drive_torque=DriveTorque(source=source, axis=axis)))
+    torque = DriveTorque(source=source, axis=axis, interface=interface)
+    return Decoder(MonitorConfig(crank_joint=joint, drive_torque=torque))
 
 
 def _joint_names(data: NDArray[np.uint8], messages: NDArray[np.void]) -> list[str]:
-    """Names of the joints in the first messages without a fault.
+    """Names of the joints in the first sound messages."""
+    names: dict[str, None] = {}
+    for raw in _first_sound(EFFORT, data, messages):
+        names |= dict.fromkeys(names_in(raw)[:_MOST_JOINTS])
+    return [name for name in names if name][:_MOST_JOINTS]
+
+
+def _interfaces(data: NDArray[np.uint8], messages: NDArray[np.void]) -> list[tuple[str, str]]:
+    """Joints and interfaces in the first sound messages that may be a torque."""
+    pairs: dict[tuple[str, str], None] = {}
+    for raw in _first_sound(INTERFACE, data, messages):
+        for joint, names in list(interfaces_in(raw).items())[:_MOST_JOINTS]:
+            pairs |= dict.fromkeys((joint, name) for name in names if name and name not in _NO_TORQUE)
+    return list(pairs)[:_MOST_JOINTS]
+
+
+def _first_sound(source: str, data: NDArray[np.uint8], messages: NDArray[np.void]) -> list[bytes]:
+    """The first messages without a fault.
 
     A decoder for a joint that no message has reports only sound messages as MISSING_JOINT.
     """
-    faults = _decoder(EFFORT).many(data, messages)["fault"]
+    faults = _decoder(source).many(data, messages)["fault"]
     sound = np.flatnonzero(faults == MISSING_JOINT)[:_NAMING_MESSAGES]
-    names: dict[str, None] = {}
-    for message in messages[sound]:
-        names |= dict.fromkeys(names_in(data[message["begin"] : message["end"]].tobytes())[:_MOST_JOINTS])
-    return [name for name in names if name][:_MOST_JOINTS]
+    return [data[one["begin"] : one["end"]].tobytes() for one in messages[sound]]
 
 
 def _signals(collected: dict[JointName | TorqueSource, _SeriesParts]) -> Signals:

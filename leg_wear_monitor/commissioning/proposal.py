@@ -7,7 +7,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from leg_wear_monitor.bags.series import WRENCH
+from leg_wear_monitor.bags.series import INTERFACE, WRENCH
 from leg_wear_monitor.commissioning.evidence import (
     LowPass,
     Sampling,
@@ -322,6 +322,8 @@ def _torque(found: Found) -> Iterator[Item]:
     )
     if torque.source == WRENCH:
         yield Item(name="drive_torque.axis", value=torque.component)
+    if torque.source == INTERFACE:
+        yield Item(name="drive_torque.interface", value=torque.interface)
     yield Item(
         name="drive_torque.sign",
         value=one.torque_sign,

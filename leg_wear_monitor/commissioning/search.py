@@ -7,7 +7,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.bags.series import EFFORT, JointName, TorqueSource
+from leg_wear_monitor.bags.series import EFFORT, INTERFACE, JointName, TorqueSource
 from leg_wear_monitor.estimate.torque_fit import Fit, fit, repeating, too_alike
 from leg_wear_monitor.estimate.torque_model import (
     JointMotion,
@@ -144,6 +144,8 @@ def candidates(
         for torque, series in torques.items():
             if torque.source == EFFORT and (torque.topic, torque.component) != (joint.topic, joint.joint):
                 continue  # the monitor takes the crank's own effort
+            if torque.source == INTERFACE and torque.component != joint.joint:
+                continue
             pair = paired(motion, series)
             steady = steady_stretch(pair)
             found = sorted(scan(steady, model, _PEAKS), key=lambda start: -start.explained)

@@ -13,19 +13,27 @@ def names_in(raw: bytes) -> list[str]:
     return _texts(raw, *_after_header(raw))[0]
 
 
-def without_interface(raw: bytes, joint: str, interface: str) -> str:
-    """Report on a control_msgs/DynamicJointState message, decoded successfully, that lacks an interface."""
+def interfaces_in(raw: bytes) -> dict[str, list[str]]:
+    """Interfaces of each joint in a control_msgs/DynamicJointState message, decoded successfully."""
     at, order = _after_header(raw)
     joints, at = _texts(raw, at, order)
-    if joint not in joints:
-        return f"no joint is named {joint!r}; there are {_listed(joints)}"
     _, at = _count(raw, at, order)
-    for _ in range(joints.index(joint)):
-        _, at = _texts(raw, at, order)
+    found: dict[str, list[str]] = {}
+    for joint in joints:
+        names, at = _texts(raw, at, order)
+        found.setdefault(joint, names)
         number, at = _count(raw, at, order)
         at += (ENCAPSULATION - at) % 8 + 8 * number if number else 0
-    there = _listed(_texts(raw, at, order)[0])
-    return f"{joint} has no interface {interface!r}, it has {there}; set drive_torque.interface"
+    return found
+
+
+def without_interface(raw: bytes, joint: str, interface: str) -> str:
+    """Report on a control_msgs/DynamicJointState message, decoded successfully, that lacks an interface."""
+    there = interfaces_in(raw)
+    if joint not in there:
+        return f"no joint is named {joint!r}; there are {_listed(list(there))}"
+    has = _listed(there[joint])
+    return f"{joint} has no interface {interface!r}, it has {has}; set drive_torque.interface"
 
 
 def _listed(names: list[str]) -> str:

@@ -10,7 +10,7 @@ import pytest
 from leg_wear_monitor import Mechanism, MonitorConfig
 from leg_wear_monitor.bags.mcap_writer import McapWriter
 from leg_wear_monitor.bags.reader import Recording
-from leg_wear_monitor.bags.series import EFFORT, FLOAT64, WRENCH
+from leg_wear_monitor.bags.series import EFFORT, FLOAT64, INTERFACE, WRENCH
 from leg_wear_monitor.estimate.torque_model import TorqueModel, torque_model
 from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.mechanism.arrays import Floats
@@ -122,6 +122,14 @@ def record() -> Callable[[Path, Robot, Walk], Path]:
                 head = np.broadcast_to(np.array([0, 1, 0, 0], np.uint8), (n, 4))
                 channel = writer.channel("/motor/torque", FLOAT64_TYPE)
                 writer.write_many(channel, stamps, np.concatenate([head, raw], axis=1))
+            if robot.source == INTERFACE:
+                warm = np.full(n, 40.0) + 0.01 * walk.time_s
+                crank = {"position": position, "motor_current": torque, "temperature": warm}
+                states = {"crank": crank, "hip": {"motor_current": noise[1]}}
+                rows = encode.dynamic_joint_states(stamps, states)
+                writer.write_many(
+                    writer.channel("/dynamic_joint_states", encode.DYNAMIC_JOINT_STATE), stamps, rows
+                )
         return path
 
     return write

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import LegWearError, Mechanism, MonitorConfig, simulate
-from leg_wear_monitor.bags.series import EFFORT, FLOAT64, WRENCH, JointName, Signals, TorqueSource
+from leg_wear_monitor.bags.series import EFFORT, FLOAT64, INTERFACE, WRENCH, JointName, Signals, TorqueSource
 from leg_wear_monitor.commissioning.commission import commission, propose
 from leg_wear_monitor.commissioning.result import CommissioningResult
 from leg_wear_monitor.estimate.torque_model import Series, TorqueModel
@@ -65,6 +65,17 @@ def check(robot: Robot, result: CommissioningResult, seconds: float) -> None:
         return
     assert crank.gear_ratio == robot.gear_ratio
     assert angle_between(crank.offset_rad, robot.offset_rad) < PHASE_RAD
+
+
+def test_the_current_of_ros2_control_is_found_as_the_torque(
+    walked: Walk, record: Callable[[Path, Robot, Walk], Path], tmp_path: Path
+) -> None:
+    """Another joint's current, a temperature and a wrench of noise are beside it."""
+    robot = Robot(source=INTERFACE, torque_sign=-1, scale=4.448, offset_rad=1.0)
+    result = commission(record(tmp_path / "robot.mcap", robot, walked))
+    check(robot, result, 10.0)
+    assert result.config is not None
+    assert result.config.drive_torque.interface == "motor_current"
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 10))])

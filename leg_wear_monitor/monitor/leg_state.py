@@ -9,6 +9,7 @@ from leg_wear_monitor.monitor.alarm_specs import CLEARANCE
 from leg_wear_monitor.monitor.alarms import Alarm, state_of
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast, Quantiles
+from leg_wear_monitor.monitor.judgement import joint_situations
 from leg_wear_monitor.monitor.parts import Parts
 from leg_wear_monitor.monitor.reports import CycleReport
 from leg_wear_monitor.monitor.verdict.situation import JointSituation, believed, joint_status
@@ -34,10 +35,9 @@ _TURN = 2.0 * math.pi
 def leg_state(parts: Parts, findings: Sequence[Finding]) -> LegState:
     """State of the leg now, with the verdict of some findings."""
     last, verdict, diagnosis = parts.state.last, verdict_of(findings), parts.diagnosis
-    explained, intake = parts.state.mismatch.explanation, parts.twin.intake
-    alarms = parts.evaluation.board.alarms
+    explained, alarms = parts.state.mismatch.explanation, parts.evaluation.board.alarms
     return LegState(
-        stamp_ns=intake.followed_stamp_ns or intake.newest_stamp_ns,
+        stamp_ns=parts.twin.intake.stamp_ns,
         life_cycles=parts.accounting.state.cycles,
         verdict=verdict,
         clearances={
@@ -47,7 +47,7 @@ def leg_state(parts: Parts, findings: Sequence[Finding]) -> LegState:
                 findings,
                 parts.mechanism.clearances[joint.joint].radial_clearance,
             )
-            for joint in parts.judge.joints(parts.state)
+            for joint in joint_situations(parts, diagnosis)
         },
         drive=_drive(last, diagnosis, explained),
         load=_load(parts.foot_load.load if parts.foot_load else FootLoad(), diagnosis),

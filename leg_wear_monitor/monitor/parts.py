@@ -1,43 +1,92 @@
-"""The parts of a monitor: their construction, their common state, and its snapshots."""
+"""The parts of a monitor: their construction, the state that is common to them, and its snapshots."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import attrs
 import numpy as np
 
+from leg_wear_monitor.compiled.kernel import Records
 from leg_wear_monitor.estimate.torque_model import torque_model
+from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials import bushing_of
 from leg_wear_monitor.mechanism.person import with_toe_force
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.accounting import Accounting
+from leg_wear_monitor.monitor.accounting import Accounting, AccountingState
+from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.fitting import fitted, twin_settings
 from leg_wear_monitor.monitor.config.inputs import AT_START
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.crank_zero import CrankZero
-from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
+from leg_wear_monitor.monitor.crank_zero import CrankZero, CrankZeroSnapshot
+from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver, TorqueObserverSnapshot
 from leg_wear_monitor.monitor.diagnosis.reference_file import read_references
 from leg_wear_monitor.monitor.diagnosis.state import Body, Diagnosis, DiagnosisState
-from leg_wear_monitor.monitor.encoders import EncoderObserver
-from leg_wear_monitor.monitor.evaluation import A_CYCLE, AlarmEvaluation, EvaluationPeriods
-from leg_wear_monitor.monitor.foot_load import FootLoadCheck
-from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
+from leg_wear_monitor.monitor.encoders import EncoderObserver, EncoderSnapshot
+from leg_wear_monitor.monitor.evaluation import (
+    A_CYCLE,
+    AlarmEvaluation,
+    AlarmEvaluationState,
+    EvaluationPeriods,
+)
+from leg_wear_monitor.monitor.foot_load import FootLoadCheck, FootLoadState
+from leg_wear_monitor.monitor.forecast.forecaster import Forecaster, ForecastState
 from leg_wear_monitor.monitor.forecast.measurement import GrowthWindow, ModelError, model_error
-from leg_wear_monitor.monitor.gait_evidence import TorqueRecord
+from leg_wear_monitor.monitor.gait_evidence import NO_MISMATCH, MismatchWindow, TorqueRecord
 from leg_wear_monitor.monitor.inputs import InputGuard
-from leg_wear_monitor.monitor.judgement import Judge, MonitorSnapshot, MonitorState
 from leg_wear_monitor.monitor.ledger.entry import Measurement, SimulatedReference
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
-from leg_wear_monitor.twin.digital_twin import DigitalTwin
+from leg_wear_monitor.monitor.reports import CycleReport
+from leg_wear_monitor.monitor.verdict.verdict import Finding
+from leg_wear_monitor.twin.digital_twin import DigitalTwin, TwinSnapshot
 from leg_wear_monitor.twin.reference import LegParameters
 from leg_wear_monitor.twin.sample import GROUND, NO_LOAD, SamplingSettings
+from leg_wear_monitor.twin.statistics import Event
 from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 WRONG_TORQUE = "the received drive torque is wrong; see the status `torque`"
 ACCELERATED = "wear is accelerated: clearances grow within the gait cycles that are compared"
 
 
+# The changing state of a monitor, without its ledger.
+
+
+@attrs.define
+class MonitorState:
+    """State beside twin, alarms and accounting; every value is immutable.
+
+    ``findings`` are those of the last evaluation period; empty before the first. ``has_ended``: whether a
+    gait cycle has ended since the last state of the leg was reported.
+    """
+
+    growth: tuple[GrowthWindow, ...]
+    torque: TorqueRecord
+    last: CycleReport | None = None
+    happened: tuple[Event, ...] = ()
+    findings: tuple[Finding, ...] = ()
+    mismatch: MismatchWindow = NO_MISMATCH
+    has_ended: bool = False
+
+
+@attrs.frozen(eq=False)
+class MonitorSnapshot:
+    """Snapshot of a monitor without its ledger."""
+
+    twin: TwinSnapshot
+    state: MonitorState
+    accounting: AccountingState
+    evaluation: AlarmEvaluationState
+    forecast: ForecastState
+    alarms: dict[str, Alarm]
+    evaluation_periods: Records
+    guard: Records
+    encoders: EncoderSnapshot | None = None
+    torque: TorqueObserverSnapshot | None = None
+    crank_zero: CrankZeroSnapshot | None = None
+    foot_load: FootLoadState | None = None
+
+
 class Parts:
-    """Parts of a monitor.
+    """Parts of a monitor, and its state.
 
     Parameters
     ----------
@@ -103,19 +152,11 @@ class Parts:
         self.torque = self._torque_observer(ledger) if is_diagnosed else None
         if self.torque and self.torque.state.parameters and self.config.diagnosis.correct:
             self.twin.set_parameters(self.torque.state.parameters)
-        self.judge = Judge(
-            self.twin,
-            self.evaluation,
-            self.encoders,
-            self.forecaster,
-            self.accounting,
-            lambda: self.diagnosis,
-            lambda: self.crank_zero.cause if self.crank_zero else "",
-        )
         if ledger and ledger.entry:
             self.evaluation.board.restore(ledger.entry.alarms)
         self._of_leg = self.twin.parameters, self._model_error()
         self.evaluation_periods = EvaluationPeriods(cycle_ns // periods)
+        self._fresh_m = [self.mechanism.clearances[joint].radial_clearance for joint in self.clearance_joints]
         kept = TorqueRecord.of(self.accounting.state.commissioned)
         self.state = MonitorState(tuple(GrowthWindow() for _ in self.clearance_joints), kept)
 
@@ -164,6 +205,20 @@ class Parts:
         sigma = own.load_sigma if self.config.load.model == GROUND else 0.0
         leg = with_toe_force(self.mechanism, own.load) if own.load.size else self.mechanism
         return model_error(leg, speed, self.config.wear_acceleration, sigma)
+
+    def worn_m(self, clearance_m: Floats) -> Floats:
+        """Wear of each part at some mean clearances [m]."""
+        return np.asarray(clearance_m - self._fresh_m)
+
+    def grows_anew(self, joints: Sequence[str]) -> None:
+        """Discard the growth of some joints: what was counted of it is of another leg."""
+        each = zip(self.clearance_joints, self.state.growth, strict=True)
+        self.state.growth = tuple(GrowthWindow() if name in joints else window for name, window in each)
+
+    @property
+    def without_zero(self) -> str:
+        """Why nothing is monitored while the crank's zero is not known; empty if it is."""
+        return self.crank_zero.cause if self.crank_zero else ""
 
     @property
     def measured(self) -> tuple[Measurement | None, ...]:

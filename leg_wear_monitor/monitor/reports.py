@@ -496,6 +496,5 @@ def _joint_report(
 
 def _shown(k: int, diagnosis: Diagnosis | None) -> KnownClearance | None:
     """The clearance of joint k that the drive torque shows."""
-    if diagnosis is None or not diagnosis.clearance_m or not math.isfinite(diagnosis.clearance_m[k]):
-        return None
-    return KnownClearance("torque", diagnosis.clearance_m[k], diagnosis.sigma_m[k])
+    found = diagnosis.of_joint(k) if diagnosis else None
+    return KnownClearance("torque", *found) if found else None

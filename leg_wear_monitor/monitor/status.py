@@ -1,11 +1,10 @@
 """The monitor's own state, as /diagnostics shows it: stable names, numbers only as values."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 
 import attrs
 
-from leg_wear_monitor.estimate.cause import TorqueExplanation
 from leg_wear_monitor.files import or_nan
 from leg_wear_monitor.mechanism.materials import BushingLoad
 from leg_wear_monitor.monitor import alarm_specs
@@ -24,15 +23,14 @@ from leg_wear_monitor.monitor.alarms import (
 from leg_wear_monitor.monitor.angle_regression import ClearanceObservation
 from leg_wear_monitor.monitor.crank_walk import LEAST_TURNS
 from leg_wear_monitor.monitor.crank_zero import CrankZero
-from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
 from leg_wear_monitor.monitor.encoders import EncoderObserver, faults
 from leg_wear_monitor.monitor.evaluation import AlarmEvaluation
 from leg_wear_monitor.monitor.foot_load import FootLoadCheck
 from leg_wear_monitor.monitor.forecast.forecast import UNKNOWN, answer_words, lifetime_values
-from leg_wear_monitor.monitor.gait_evidence import TorqueRecord
 from leg_wear_monitor.monitor.inputs import InputHealth
 from leg_wear_monitor.monitor.ledger.entry import Measurement
-from leg_wear_monitor.monitor.reports import CycleReport, Status
+from leg_wear_monitor.monitor.parts import Parts
+from leg_wear_monitor.monitor.reports import CycleReport, Status, VerdictReport
 from leg_wear_monitor.monitor.torque_status import diagnosis_status, torque_status
 from leg_wear_monitor.monitor.verdict.situation import believed_words, sampled_words
 from leg_wear_monitor.monitor.verdict.verdict import (
@@ -45,8 +43,7 @@ from leg_wear_monitor.monitor.verdict.verdict import (
 )
 from leg_wear_monitor.state import JointClearance, Level, State, Verdict
 from leg_wear_monitor.twin import KINDS, LOAD
-from leg_wear_monitor.twin.digital_twin import DigitalTwin
-from leg_wear_monitor.twin.statistics import Event, Sampling, Tracking
+from leg_wear_monitor.twin.statistics import Sampling, Tracking
 
 # Status of the crank's zero.
 
@@ -71,52 +68,40 @@ def zero_status(crank_zero: CrankZero) -> Status:
     return Status("crank zero", Level.OK, f"crank angle at joint position 0: {found}", values)
 
 
-_NO_CLEARANCES: Mapping[str, JointClearance] = {}
 _INPUT = tuple(spec.name() for spec in alarm_specs.OF_INPUT)
 
 
-def statuses(
-    twin: DigitalTwin,
-    evaluation: AlarmEvaluation,
-    accounting: Accounting,
-    last: CycleReport | None,
-    happened: Sequence[Event],
-    record: TorqueRecord,
-    verdict: Verdict,
-    diagnosis: Diagnosis,
-    encoders: EncoderObserver | None = None,
-    explained: TorqueExplanation | None = None,
-    crank_zero: CrankZero | None = None,
-    measured: Sequence[Measurement | None] = (),
-    clearances: Mapping[str, JointClearance] = _NO_CLEARANCES,
-    findings: Sequence[Finding] = (),
-    foot_load: FootLoadCheck | None = None,
-) -> tuple[Status, ...]:
-    """All statuses, verdict first, then gait, inputs, joints, alarms and ledger; last, a sampled replay."""
-    sampling = twin.sampling
-    joints = [_joint(k, name, twin, evaluation, last) for k, name in enumerate(twin.clearance_joints)]
-    joints = [_with_measured(*each) for each in zip(joints, measured or (None,) * len(joints), strict=True)]
-    joints = [
-        _as_judged(joint, clearances.get(name), [each for each in findings if name in each.joints])
-        for joint, name in zip(joints, twin.clearance_joints, strict=True)
-    ]
+def statuses(parts: Parts, report: VerdictReport) -> tuple[Status, ...]:
+    """All statuses, verdict first, then gait, inputs, joints, alarms and ledger; last, a sampled replay.
+
+    Parameters
+    ----------
+    parts : Parts
+    report : VerdictReport
+        The verdict now, with the state of the leg.
+    """
+    clearances = report.state.clearances
+    joints = []
+    for k, name in enumerate(parts.clearance_joints):
+        joint = _with_measured(_joint(parts, k, name), parts.measured[k])
+        joints.append(_as_judged(joint, clearances[name], [f for f in report.findings if name in f.joints]))
     return (
-        verdict_status(verdict),
-        _gait(twin, evaluation, accounting, last, happened, crank_zero.cause if crank_zero else ""),
-        *((zero_status(crank_zero),) if crank_zero else ()),
-        _input(twin, evaluation, accounting),
-        torque_status(evaluation, last, record, explained),
-        *((_foot_load(foot_load, evaluation),) if foot_load else ()),
-        diagnosis_status(twin.clearance_joints, diagnosis),
+        verdict_status(report.verdict),
+        _gait(parts),
+        *((zero_status(parts.crank_zero),) if parts.crank_zero else ()),
+        _input(parts),
+        torque_status(parts),
+        *((_foot_load(parts.foot_load, parts.evaluation),) if parts.foot_load else ()),
+        diagnosis_status(parts.clearance_joints, parts.diagnosis),
         *joints,
-        *((_encoders(encoders, evaluation, last),) if encoders else ()),
-        _alarms(evaluation),
-        _ledger(accounting),
-        *((_sampling(sampling, twin.clearance_joints, accounting),) if sampling else ()),
+        *((_encoders(parts.encoders, parts),) if parts.encoders else ()),
+        _alarms(parts.evaluation),
+        _ledger(parts.accounting),
+        *((_sampling(parts.twin.sampling, parts),) if parts.twin.sampling else ()),
     )
 
 
-def _sampling(sampling: Sampling, joints: Sequence[str], accounting: Accounting) -> Status:
+def _sampling(sampling: Sampling, parts: Parts) -> Status:
     """A sampled replay: what was followed, and the standard errors of the counted clearances."""
     values = {
         "fraction": sampling.fraction,
@@ -124,8 +109,8 @@ def _sampling(sampling: Sampling, joints: Sequence[str], accounting: Accounting)
         "estimated_cycles": sampling.estimated_cycles,
         "blocks": float(sampling.blocks),
     }
-    sigmas = accounting.sampling_sigma_m.tolist()
-    values |= {f"{joint}_sigma_m": sigma for joint, sigma in zip(joints, sigmas, strict=True)}
+    sigmas = zip(parts.clearance_joints, parts.accounting.sampling_sigma_m.tolist(), strict=True)
+    values |= {f"{joint}_sigma_m": sigma for joint, sigma in sigmas}
     return Status("sampling", Level.OK, sampled_words(sampling), values)
 
 
@@ -141,50 +126,44 @@ def verdict_status(verdict: Verdict) -> Status:
     return Status("verdict", level_of(verdict), verdict.words, values, verdict.fault_code)
 
 
-def _gait(
-    twin: DigitalTwin,
-    evaluation: AlarmEvaluation,
-    accounting: Accounting,
-    last: CycleReport | None,
-    happened: Sequence[Event],
-    without_zero: str,
-) -> Status:
-    tracking = twin.tracking
-    cadence = evaluation.board.alarms[alarm_specs.CADENCE.name()]
+def _gait(parts: Parts) -> Status:
+    tracking, happened, last = parts.twin.tracking, parts.state.happened, parts.state.last
+    cadence = parts.evaluation.board.alarms[alarm_specs.CADENCE.name()]
     message, level, code = tracking.name.lower().replace("_", " "), cadence.level, code_of(cadence)
-    if evaluation.guard.cause:
+    if parts.guard.cause:
         message, level, code = "not monitored: see input", Level.ERROR, NOT_FOLLOWED
-    elif without_zero:
+    elif parts.without_zero:
         message, level, code = "not monitored: see crank zero", max(level, Level.WARN), CRANK_ZERO
     elif happened and tracking in (Tracking.STARTING, Tracking.OUT_OF_STEP):
         message += f", last {happened[-1].what.value.replace('_', ' ')}"
-    if evaluation.config.wear_acceleration != 1.0:
+    if parts.config.wear_acceleration != 1.0:
         message += "; wear is accelerated, this is a demonstration"
     values = {
-        "cadence_rpm": twin.speed_radps * 30.0 / math.pi,
-        "commanded_rpm": evaluation.config.cadence.commanded_rpm,
-        "wear_acceleration": evaluation.config.wear_acceleration,
-        **accounting.totals,
+        "cadence_rpm": parts.twin.speed_radps * 30.0 / math.pi,
+        "commanded_rpm": parts.config.cadence.commanded_rpm,
+        "wear_acceleration": parts.config.wear_acceleration,
+        **parts.accounting.totals,
         "cycle_moving_s": last.moving_s if last else math.nan,
     }
     return Status("gait", level, message, values, code)
 
 
-def _input(twin: DigitalTwin, evaluation: AlarmEvaluation, accounting: Accounting) -> Status:
-    counts = attrs.asdict(twin.intake)
+def _input(parts: Parts) -> Status:
+    evaluation, guard = parts.evaluation, parts.guard
+    counts = attrs.asdict(parts.twin.intake)
     faulty, used = counts.pop("faulty"), counts.pop("used")
     for stamp in ("newest_stamp_ns", "followed_stamp_ns"):
         counts.pop(stamp)
     values = _health_values(evaluation.state.health) if evaluation.state.health else {}
     values |= {"received": counts.pop("received")} | {f"{name}_used": count for name, count in used.items()}
-    values |= counts | {"already_counted": accounting.state.skipped}
-    values |= {"conflicting": evaluation.guard.conflicting, "implausible": evaluation.guard.implausible}
+    values |= counts | {"already_counted": parts.accounting.state.skipped}
+    values |= {"conflicting": guard.conflicting, "implausible": guard.implausible}
     values |= {f"faulty_{name}": count for name, count in faulty.items()}
     level, code = evaluation.board.level(*_INPUT), _code(evaluation, _INPUT)
     bad = [name for name in _INPUT if evaluation.board.alarms[name].level is not Level.OK]
     messages = [*evaluation.causes, *([f"see: {', '.join(bad)}"] if bad else [])]
     message = "; ".join(messages) or "in order"
-    if evaluation.guard.cause:
+    if guard.cause:
         level, code = Level.ERROR, NOT_FOLLOWED
     return Status("input", level, message, {name: float(value) for name, value in values.items()}, code)
 
@@ -200,9 +179,8 @@ def _health_values(health: InputHealth) -> dict[str, float]:
     return {"duration_s": values.pop("duration_s"), **rates, **values}
 
 
-def _joint(
-    k: int, name: str, twin: DigitalTwin, evaluation: AlarmEvaluation, last: CycleReport | None
-) -> Status:
+def _joint(parts: Parts, k: int, name: str) -> Status:
+    twin, evaluation, last = parts.twin, parts.evaluation, parts.state.last
     names = [spec.name(name) for spec in alarm_specs.JOINT]
     level, code = evaluation.board.level(*names), _code(evaluation, names)
     values = {
@@ -242,10 +220,10 @@ def _with_measured(joint: Status, measured: Measurement | None) -> Status:
     return attrs.evolve(joint, message=f"{joint.message}; {words}", values=joint.values | values)
 
 
-def _as_judged(joint: Status, known: JointClearance | None, findings: Sequence[Finding]) -> Status:
+def _as_judged(joint: Status, known: JointClearance, findings: Sequence[Finding]) -> Status:
     """A joint's status with its believed clearance, and with what the verdict's findings say of it."""
     values, message = joint.values, joint.message
-    if known is not None and known.believed_m is not None:
+    if known.believed_m is not None:
         values = {"believed_m": known.believed_m, f"believed_by_{known.believed_by}": 1.0, **values}
         if known.believed_sigma_m is not None:
             values["believed_sigma_m"] = known.believed_sigma_m
@@ -267,11 +245,11 @@ def _load_values(load: BushingLoad) -> dict[str, float]:
     return {name: value for name, value in values.items() if isinstance(value, float)}
 
 
-def _encoders(encoders: EncoderObserver, evaluation: AlarmEvaluation, last: CycleReport | None) -> Status:
+def _encoders(encoders: EncoderObserver, parts: Parts) -> Status:
     """Further encoders: their faults, their errors, and the clearances estimated from them."""
-    settings, state = evaluation.config.encoders, encoders.state
+    settings, state, last = parts.config.encoders, encoders.state, parts.state.last
     kinds = {spec.kind for spec in alarm_specs.ENCODERS}
-    departures = [alarm for alarm in evaluation.board.alarms.values() if alarm.kind in kinds]
+    departures = [alarm for alarm in parts.evaluation.board.alarms.values() if alarm.kind in kinds]
     level, code = max(alarm.level for alarm in departures), worst_code(departures)
     values = {"cycles": float(encoders.cycles)}
     for i, name in enumerate(settings.names):

@@ -8,9 +8,8 @@ from leg_wear_monitor.estimate.signature import DIRECT
 from leg_wear_monitor.monitor import alarm_specs
 from leg_wear_monitor.monitor.alarms import CAUSES_OF_ALARMS, DIAGNOSIS, worst_code
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState, NotUsed
-from leg_wear_monitor.monitor.evaluation import AlarmEvaluation
-from leg_wear_monitor.monitor.gait_evidence import TorqueRecord
-from leg_wear_monitor.monitor.reports import CycleReport, Status
+from leg_wear_monitor.monitor.parts import Parts
+from leg_wear_monitor.monitor.reports import Status
 from leg_wear_monitor.monitor.torque_checks import offset_error_rad
 from leg_wear_monitor.monitor.verdict.verdict import EVIDENCE, CauseWords, diagnosis_words, with_unit
 from leg_wear_monitor.state import Level
@@ -20,13 +19,10 @@ _TORQUE = tuple(spec.name() for spec in alarm_specs.TORQUE)
 _CODES = {name.upper(): cause.fault_code for name, cause in CAUSES_OF_ALARMS.items()}
 
 
-def torque_status(
-    evaluation: AlarmEvaluation,
-    last: CycleReport | None,
-    record: TorqueRecord,
-    explained: TorqueExplanation | None,
-) -> Status:
+def torque_status(parts: Parts) -> Status:
     """Comparison of measured and predicted torque, and what explains a mismatch."""
+    evaluation, last, record = parts.evaluation, parts.state.last, parts.state.torque
+    explained = parts.state.mismatch.explanation
     level = evaluation.board.level(*_TORQUE)
     code = worst_code(evaluation.board.alarms[name] for name in _TORQUE)
     code = _CODES.get(code, code)
@@ -53,15 +49,15 @@ def torque_status(
     for why in NotCompared:
         values[f"not_compared_{why.value}_cycles"] = float(record.not_compared.get(why.value, 0))
     raised = {name for name in _TORQUE if evaluation.board.alarms[name].level is not Level.OK}
-    config, messages = evaluation.config, []
+    messages = []
     speed = explained.speed_radps if explained else last.cadence_rpm * math.pi / 30.0
-    words = CauseWords(config.crank, config.drive_torque, speed)
+    words = CauseWords(parts.config.crank, parts.config.drive_torque, speed)
     if alarm_specs.MISMATCH.name() in raised:
         causes = f": {words.explanation(explained)}" if explained else ""
         messages = [f"the measured torque differs from the predicted one{causes}"]
         values |= _explained_values(explained) if explained else {}
         code = explained.named[0].cause.fault_code if explained and explained.named else code
-    if explained is None or not explained.is_input_fault:  # those are estimates for the torque as received
+    if not parts.is_torque_wrong:  # those are estimates for the torque as received
         present = evaluation.present_causes(last, record)
         messages += map(words.cause, present.values())
         past = [name for name in CAUSES_OF_ALARMS if name in raised and name not in present]

@@ -2,29 +2,41 @@
 
 from collections.abc import Iterable
 
-import attrs
 import numpy as np
 from numpy.typing import NDArray
 
 from leg_wear_monitor.errors import LegWearError, closed_at_the_end
+from leg_wear_monitor.estimate.mismatch import explanation
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarm_specs import MISMATCH
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.fitting import check_limits
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.corrections import clearance_estimates, observe_torque
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
 from leg_wear_monitor.monitor.evaluation import EvaluationPeriods
 from leg_wear_monitor.monitor.forecast.forecast import ForecastBasis
-from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult
-from leg_wear_monitor.monitor.gait_evidence import NO_MISMATCH
-from leg_wear_monitor.monitor.judgement import MonitorSnapshot
+from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult, extended
+from leg_wear_monitor.monitor.judgement import (
+    evaluate_clearances,
+    is_forecast_valid,
+    update_verdict,
+    verdict_report,
+)
 from leg_wear_monitor.monitor.ledger.entry import AlarmEvent, Audit, JointWear, Measurement, WalkedLoad
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import Ledger, open_ledger
 from leg_wear_monitor.monitor.leg_state import leg_state
-from leg_wear_monitor.monitor.parts import Parts
-from leg_wear_monitor.monitor.processing import Processing
+from leg_wear_monitor.monitor.operators import (
+    Acknowledged,
+    acknowledge,
+    measure,
+    renew_forecast,
+    reset_wear,
+    undo_reset,
+)
+from leg_wear_monitor.monitor.parts import MonitorSnapshot, Parts
 from leg_wear_monitor.monitor.reports import (
     AlarmList,
     CycleReport,
@@ -33,16 +45,18 @@ from leg_wear_monitor.monitor.reports import (
     SampleReports,
     Status,
     VerdictReport,
+    cycle_report,
+    latest,
     lost,
-    with_forecast,
 )
-from leg_wear_monitor.monitor.resets import Acknowledged, last_reset, named_for_clearance, rested_on
 from leg_wear_monitor.monitor.status import statuses
-from leg_wear_monitor.monitor.verdict.situation import SOURCES, is_held_by_estimate
+from leg_wear_monitor.monitor.verdict.situation import is_held_by_estimate
 from leg_wear_monitor.monitor.verdict.verdict import Finding
-from leg_wear_monitor.state import LegState, Level
+from leg_wear_monitor.state import LegState
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples, SamplingSettings
-from leg_wear_monitor.twin.statistics import Sampling, joined
+from leg_wear_monitor.twin.statistics import CycleStatistics, Sampling, joined
+
+_KEPT_EVENTS = 1
 
 
 class WearMonitor:
@@ -97,11 +111,8 @@ class WearMonitor:
         sampling: SamplingSettings | None = None,
     ) -> None:
         self._parts = parts = Parts(mechanism, config or MonitorConfig(), ledger, sampling)
-        self._processing = Processing(parts)
         self.mechanism, self.clearance_joints = parts.mechanism, parts.clearance_joints
-        self._twin, self._guard, self._accounting = parts.twin, parts.guard, parts.accounting
-        self._evaluation, self._forecaster = parts.evaluation, parts.forecaster
-        self._encoders, self._torque = parts.encoders, parts.torque
+        self._twin, self._accounting, self._board = parts.twin, parts.accounting, parts.evaluation.board
         self.reports_states = True
 
     @property
@@ -111,13 +122,11 @@ class WearMonitor:
 
     def warm_up(self) -> None:
         """Compile all kernels that `update` needs, before the first sample; takes about a minute once."""
-        self._guard.warm_up()
-        if self._parts.crank_zero:
-            self._parts.crank_zero.warm_up()
+        parts = self._parts
         list(EvaluationPeriods(1).pieces(np.zeros(1, GAIT_SAMPLE)))
-        self._twin.warm_up()
-        if self._torque:
-            self._torque.warm_up()
+        for part in (parts.guard, parts.crank_zero, parts.twin, parts.torque):
+            if part:
+                part.warm_up()
 
     def go_live(self) -> None:
         """Keep up with samples as they are taken: never wait for a reference that threads simulate.
@@ -144,23 +153,142 @@ class WearMonitor:
         Reports
             They end before the newest sample by the tracker's lag.
         """
+        parts = self._parts
         sampled: list[SampleReports] = []
         cycles: list[CycleReport] = []
         changes: list[AlarmList] = []
         verdicts: list[VerdictReport] = []
         states: list[VerdictReport] = []
-        for piece, ends_period in self._parts.evaluation_periods.pieces(samples):
-            reports, ended = self._processing.take(piece, changes, ends_period)
-            sampled.append(reports)
-            cycles += ended
+        for piece, ends_period in parts.evaluation_periods.pieces(samples):
+            # the twin follows the samples; each gait cycle that ends is reported and its alarms evaluated
+            followed, ended = self._follow(self._received(piece, ends_period))
+            sampled.append(followed)
+            for statistics in ended:
+                cycles.append(self._end_cycle(statistics, changes))
+            # the verdict, and what measurements of the gait say of the leg, at the ends of periods alone
             if ends_period:
-                changed, is_new = self._processing.end_period(changes)
+                before = len(changes)
+                changed = self._end_period(changes)
                 verdicts += changed
+                is_new = bool(changed) or parts.state.has_ended or len(changes) > before
+                parts.state.has_ended = False
                 if is_new and self.reports_states:
-                    states.append(self._state_report(self._parts.state.findings))
-            self._accounting.keep_if_due(self._evaluation.board.alarms.values())
+                    states.append(self._state_report(parts.state.findings))
+            self._accounting.keep_if_due(self._board.alarms.values())
         samples_ = joined(sampled, len(self.clearance_joints))
         return Reports(samples_, tuple(cycles), tuple(changes), self.lost, tuple(verdicts), tuple(states))
+
+    def _received(self, piece: Samples, ends_period: bool) -> Samples:
+        """Samples that are believed: not counted before, of one source, with a known zero of the crank."""
+        parts = self._parts
+        piece = parts.guard.checked(self._accounting.not_counted(piece))
+        if parts.crank_zero:
+            piece = parts.crank_zero.passed(piece, ends_period)
+            self._accounting.state.without_zero_s = parts.crank_zero.unmonitored_s
+        return piece
+
+    def _follow(self, piece: Samples) -> tuple[SampleReports, tuple[CycleStatistics, ...]]:
+        """Pass samples to the twin and to the observers; what was followed, and the cycles that ended."""
+        parts = self._parts
+        update = self._twin.update(piece)
+        for observer in (parts.evaluation, parts.encoders, parts.torque, parts.foot_load):
+            if observer:
+                observer.add_samples(piece)
+        self._accounting.followed(update.samples)
+        parts.state.happened = (*parts.state.happened, *update.events)[-_KEPT_EVENTS:]
+        return update.samples, update.cycles
+
+    def _end_cycle(self, statistics: CycleStatistics, changes: list[AlarmList]) -> CycleReport:
+        """Report a gait cycle, and evaluate its alarms and its torque."""
+        parts = self._parts
+        if parts.encoders:
+            parts.encoders.ended(statistics)
+        if parts.torque:
+            parts.torque.ended(statistics, parts.is_torque_wrong, statistics.load_peak_n)
+        report = self._report(statistics)
+        parts.state.has_ended = True
+        sensor = parts.foot_load.ended(statistics) if parts.foot_load else None
+        if parts.foot_load and sensor is not None:
+            self._twin.freeze_load(*parts.foot_load.freezes(sensor))
+        self._take_changes(parts.evaluation.end_cycle(report, parts.state.torque, sensor), changes)
+        if statistics.is_followed:
+            self._explain_mismatch(statistics)
+            self._keep_torque(statistics, report)
+        return report
+
+    def _report(self, statistics: CycleStatistics) -> CycleReport:
+        """Report of a gait cycle, with growth, estimates and forecast."""
+        parts, state = self._parts, self._parts.state
+        self._accounting.ended(statistics)
+        if statistics.is_followed:
+            state.growth = tuple(
+                extended(window, float(growth), statistics.moving_s, self.config.growth.window_cycles)
+                for window, growth in zip(state.growth, statistics.growth_mean_m, strict=True)
+            )
+        estimates = clearance_estimates(parts, statistics)
+        sigma_m = self._accounting.sampling_sigma_m
+        forecast = parts.forecaster.after(
+            statistics,
+            parts.worn_m(statistics.clearance_mean_m),  # the twin itself may be ahead
+            self.clearance_limits_m,
+            lambda: is_forecast_valid(parts, state.findings),
+            sigma_m,
+            parts.model_error,
+        )
+        report = cycle_report(
+            statistics,
+            self._accounting.state.cycles,
+            parts.bushings,
+            state.growth,
+            parts.model_error,
+            forecast,
+            estimates,
+            parts.measured,
+            sigma_m.tolist(),
+            parts.diagnosis,
+        )
+        state.last = latest(report, state.last)
+        self._accounting.note_clearances(report)
+        return report
+
+    def _explain_mismatch(self, statistics: CycleStatistics) -> None:
+        """Look for causes of a torque mismatch after a gait cycle."""
+        parts, allowed = self._parts, self._parts.evaluation.allowed_torque
+        was_wrong, alarm = parts.is_torque_wrong, self._board.alarms[MISMATCH.name()]
+        parts.state.mismatch = parts.state.mismatch.with_cycle(
+            statistics, alarm, lambda cycles: explanation(self.mechanism, cycles, allowed)
+        )
+        if parts.torque and parts.is_torque_wrong and not was_wrong:
+            # the alarm rose some gait cycles after the torque became wrong
+            before = self.config.alarms.on_delay_cycles + 1
+            first = parts.state.mismatch.cycles[0]
+            parts.torque.withdraw(first.begin_ns - before * (first.stamp_ns - first.begin_ns))
+
+    def _keep_torque(self, statistics: CycleStatistics, report: CycleReport) -> None:
+        """Record the torque of a gait cycle if it is as predicted."""
+        evaluation, state = self._parts.evaluation, self._parts.state
+        is_sound, why = evaluation.is_torque_sound(report), evaluation.why_not_compared(statistics)
+        state.torque = state.torque.with_cycle(statistics, report, is_sound, why)
+        self._accounting.state.commissioned = state.torque.totals
+
+    def _end_period(self, changes: list[AlarmList]) -> tuple[VerdictReport, ...]:
+        """Evaluate the input, what encoders and torque show, and the verdict; its change, if there is one."""
+        parts = self._parts
+        self._take_changes(parts.evaluation.end_period(self._accounting.state.skipped), changes)
+        if parts.encoders:
+            new = parts.encoders.end_period(self._twin.clearance_mean_m, self._twin.depth)
+            if new:
+                self._accounting.note(new)
+        observe_torque(parts)
+        self._take_changes(evaluate_clearances(parts), changes)
+        return update_verdict(parts)
+
+    def _take_changes(self, changed: tuple[AlarmList, ...], changes: list[AlarmList]) -> None:
+        """Add changes of alarms to the reports and to the ledger; a sampled replay follows what comes."""
+        for change in changed:
+            self._twin.pull_block()
+            changes.append(change)
+            self._accounting.note_alarms(change)
 
     def pause(self, pause_s: float) -> None:
         """Mark a pause between the previous and the next samples, which is not a fault of the input.
@@ -170,7 +298,7 @@ class WearMonitor:
         pause_s : float
             From the newest stamp to the next.
         """
-        self._evaluation.pause()
+        self._parts.evaluation.pause()
         self._accounting.pause(pause_s)
 
     @property
@@ -181,12 +309,12 @@ class WearMonitor:
     @property
     def alarms(self) -> AlarmList:
         """State of all alarms."""
-        return AlarmList(self._twin.intake.followed_stamp_ns, tuple(self._evaluation.board.alarms.values()))
+        return AlarmList(self._twin.intake.followed_stamp_ns, tuple(self._board.alarms.values()))
 
     @property
     def verdict(self) -> VerdictReport:
         """The verdict now; `update` reports its changes at the ends of evaluation periods."""
-        return self._parts.judge.report(self._parts.state)
+        return verdict_report(self._parts)
 
     @property
     def state_report(self) -> VerdictReport:
@@ -215,7 +343,7 @@ class WearMonitor:
     @property
     def clearance_limits_m(self) -> tuple[float, ...]:
         """Limit of the mean clearance of each clearance joint."""
-        return self._evaluation.board.clearance_limits_m
+        return self._board.clearance_limits_m
 
     @property
     def diagnosis(self) -> Diagnosis:
@@ -230,7 +358,7 @@ class WearMonitor:
             self._twin.intake,
             accounting.skipped,
             self._accounting.unmonitored_s,
-            self._guard,
+            self._parts.guard,
             accounting.pauses,
         )
 
@@ -247,7 +375,7 @@ class WearMonitor:
     @property
     def measurements(self) -> tuple[Measurement, ...]:
         """Measured clearances, those of the ledger first."""
-        return self._forecaster.measurements
+        return self._parts.forecaster.measurements
 
     @property
     def walked(self) -> tuple[WalkedLoad, ...]:
@@ -283,31 +411,14 @@ class WearMonitor:
     def begin_epoch(self, stamp_ns: int, who: str) -> None:
         """Begin an epoch: the clock of the samples has restarted, and the following samples are counted."""
         self._accounting.begin_epoch()
-        if self._torque:
-            self._torque.begin_epoch()
+        if self._parts.torque:
+            self._parts.torque.begin_epoch()
         self._accounting.note(Audit(stamp_ns, who, "new_epoch"))
         self._parts.keep()
 
     def status(self) -> tuple[Status, ...]:
         """Statuses for /diagnostics; their names and order are constant."""
-        state, found = self._parts.state, self.state_report
-        return statuses(
-            self._twin,
-            self._evaluation,
-            self._accounting,
-            state.last,
-            state.happened,
-            state.torque,
-            found.verdict,
-            self.diagnosis,
-            self._encoders,
-            state.mismatch.explanation,
-            self._parts.crank_zero,
-            self._parts.measured,
-            found.state.clearances,
-            found.findings,
-            self._parts.foot_load,
-        )
+        return statuses(self._parts, self.state_report)
 
     def snapshot(self) -> MonitorSnapshot:
         """A copy of the whole state, except for the ledger's."""
@@ -327,11 +438,10 @@ class WearMonitor:
         """
         check_limits(config, self.mechanism)
         self._parts.config = config
-        self._evaluation.configure(config)
-        if self._encoders:
-            self._encoders.config = config
-        if self._torque:
-            self._torque.config = config
+        self._parts.evaluation.configure(config)
+        for observer in (self._parts.encoders, self._parts.torque):
+            if observer:
+                observer.config = config
 
     def acknowledge(self, stamp_ns: int) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
         """Acknowledge all alarms, and the interruption of the previous run.
@@ -341,13 +451,7 @@ class WearMonitor:
         cleared, kept : tuple of Alarm
             Alarms that had returned to normal, and alarms that stay until they do.
         """
-        cleared, kept = self._evaluation.board.acknowledge()
-        self._accounting.state.cut_off_s = None
-        self._accounting.note_alarms(AlarmList(stamp_ns, self.alarms.alarms))
-        self._parts.judge.changed(self._parts.state)
-        if cleared or kept:
-            self._parts.keep()
-        return cleared, kept
+        return acknowledge(self._parts, stamp_ns)
 
     def note_alarms(self, stamp_ns: int, alarms: Iterable[Alarm]) -> None:
         """Store changed alarms that are not of this monitor in the ledger, such as those of its node."""
@@ -373,20 +477,7 @@ class WearMonitor:
         LegWearError
             For a joint without clearance.
         """
-        board, state = self._evaluation.board, self._parts.state
-        was = self._accounting.replace(joint, stamp_ns)
-        gone = rested_on(board.alarms.values(), joint, named_for_clearance(state.findings))
-        board.clear(gone)
-        if MISMATCH.name() in gone:
-            state.mismatch = NO_MISMATCH
-        self._processing.part_changed(joint, stamp_ns)
-        self.renew_forecast()
-        self._accounting.note(Audit(stamp_ns, who, "reset_wear", was))
-        self._accounting.note_alarms(AlarmList(stamp_ns, self.alarms.alarms))
-        self._parts.judge.changed(state)
-        self._parts.keep()
-        kept = tuple(alarm.name for alarm in self.alarms.alarms if alarm.level is not Level.OK)
-        return Acknowledged(gone, kept)
+        return reset_wear(self._parts, joint, stamp_ns, who)
 
     def undo_reset(self, joint: str, stamp_ns: int, who: str) -> JointWear:
         """Undo the last `reset_wear` of a joint whose part was not replaced.
@@ -401,13 +492,7 @@ class WearMonitor:
         LegWearError
             For a joint without clearance, or if the ledger has no reset to undo.
         """
-        reset = last_reset(self._accounting.ledger, joint, self._accounting.wear_of(joint))
-        since = self._accounting.put_back(joint, reset.before)
-        self._processing.part_changed(joint, reset.before.replaced_ns)
-        self.renew_forecast()
-        self._accounting.note(Audit(stamp_ns, who, "undo_reset", since, undoes=reset.id))
-        self._parts.keep()
-        return self._accounting.wear_of(joint)
+        return undo_reset(self._parts, joint, stamp_ns, who)
 
     def measure(
         self, joint: str, clearance_m: float, sigma_m: float, stamp_ns: int, who: str, accept: bool = False
@@ -432,34 +517,7 @@ class WearMonitor:
         LegWearError
             For a joint without clearance, or impossible values.
         """
-        joint = self.mechanism.clearance_joint(joint)
-        wear, shown = self._accounting.wear_of(joint), self._parts.judge.shown(self._parts.state, joint)
-        kept_ns = self._accounting.ledger.kept_ns if self._accounting.ledger else 0
-        found = self._forecaster.measured(
-            wear,
-            clearance_m=clearance_m,
-            sigma_m=sigma_m,
-            stamp_ns=stamp_ns,
-            who=who,
-            kept_ns=kept_ns,
-            accept=accept,
-        )
-        if shown:
-            found = attrs.evolve(
-                found,
-                shown_m=shown.clearance_m,
-                shown_sigma_m=shown.sigma_m,
-                shown_by=SOURCES[shown.by],
-            )
-        self._accounting.note(found.measurement)
-        if self._encoders:
-            self._encoders.state.updated_ns = 0  # the next estimate updates the forecast again
-        self.renew_forecast()
-        for change in self._processing.measured(joint):
-            self._accounting.note_alarms(change)
-        self._parts.judge.changed(self._parts.state)
-        self._parts.keep()
-        return found
+        return measure(self._parts, joint, clearance_m, sigma_m, stamp_ns, who, accept)
 
     def end_recording(self) -> None:
         """Count the wear up to the last sample, which a sampled replay does at the end of a gait cycle."""
@@ -468,7 +526,7 @@ class WearMonitor:
     @property
     def forecast_basis(self) -> ForecastBasis | None:
         """What the last forecast rests on; None before the first."""
-        return self._forecaster.state.basis
+        return self._parts.forecaster.state.basis
 
     def renew_forecast(self) -> CycleReport | None:
         """Renew the forecast now; otherwise it may be a minute old.
@@ -478,22 +536,7 @@ class WearMonitor:
         CycleReport or None
             The last gait cycle with the new forecast; None before the first.
         """
-        last = self._parts.state.last
-        if last is None:
-            return None
-        fresh = [self.mechanism.clearances[joint].radial_clearance for joint in self.clearance_joints]
-        worn_m = np.asarray(self._twin.clearance_mean_m - fresh)
-        limits = self._evaluation.board.clearance_limits_m
-        sigma_m = self._accounting.sampling_sigma_m
-        forecast = self._forecaster.renewed(
-            worn_m,
-            limits,
-            self._parts.judge.is_forecast_valid(self.verdict.findings),
-            sigma_m,
-            self._parts.model_error,
-        )
-        self._parts.state.last = with_forecast(last, forecast, self._parts.measured, sigma_m.tolist())
-        return self._parts.state.last
+        return renew_forecast(self._parts)
 
     def save(self) -> None:
         """Write an entry into the ledger now.
@@ -521,7 +564,7 @@ class WearMonitor:
         if ledger is None:
             return
         if self._parts.state.findings:
-            is_noted = bool(self._parts.judge.changed(self._parts.state))
+            is_noted = bool(update_verdict(self._parts))
             if not is_noted and any(map(is_held_by_estimate, self.alarms.alarms)):
                 self._accounting.note_verdict(self.verdict)  # the ledger's verdict names the last estimate
         kept = self._parts.keep(closed=True)

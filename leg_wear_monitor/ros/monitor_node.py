@@ -24,8 +24,8 @@ from leg_wear_monitor.monitor.alarms import ADVICE, ALREADY_COUNTED, Alarm
 from leg_wear_monitor.monitor.config.fitting import acceleration_doubts, check_limits
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.ledger.entry import JointWear
+from leg_wear_monitor.monitor.operators import wear_words
 from leg_wear_monitor.monitor.reports import Reports, Status
-from leg_wear_monitor.monitor.resets import wear_words
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor, open_monitor
 from leg_wear_monitor.ros.health import Load, load_status, recording_status
 from leg_wear_monitor.ros.inputs import Due, Inbox, InputTopic, subscribe

@@ -346,6 +346,11 @@ class Intake:
     newest_stamp_ns: int
     followed_stamp_ns: int
 
+    @property
+    def stamp_ns(self) -> int:
+        """Stamp to which the leg was advanced, before that the youngest one; 0 before the first."""
+        return self.followed_stamp_ns or self.newest_stamp_ns
+
 
 def joined(parts: Sequence[SampleStatistics], clearance_joints: int) -> SampleStatistics:
     """Concatenation of sample statistics."""

@@ -143,7 +143,7 @@ def acknowledge(
         check_alone(config=config, ledger=ledger, dry_run=dry_run)
         click.echo(trigger(node, "acknowledge_alarms", wait_s))
         return 0
-    from leg_wear_monitor.monitor.resets import acknowledge_in
+    from leg_wear_monitor.monitor.operators import acknowledge_in
 
     settings, leg = leg_of(config, ledger)
     with opened(settings, dry_run) as kept:
@@ -191,7 +191,7 @@ def reset(
 
 def _reset_in(joint: str, config: Path | None, ledger: Path | None, undo: bool, dry_run: bool) -> None:
     """Enter it into a ledger, and print what came of it."""
-    from leg_wear_monitor.monitor.resets import reset_in, undo_in, wear_words
+    from leg_wear_monitor.monitor.operators import reset_in, undo_in, wear_words
 
     settings, leg = leg_of(config, ledger)
     joint, now_ns, who = leg.clearance_joint(joint), time.time_ns(), getpass.getuser()
@@ -316,7 +316,7 @@ def _measured(
     from leg_wear_monitor.monitor.forecast.measurement import measure as evaluate
     from leg_wear_monitor.monitor.forecast.wear_coefficients import prior_source
     from leg_wear_monitor.monitor.ledger.entry import new_part
-    from leg_wear_monitor.monitor.resets import overrule_in, shown_in
+    from leg_wear_monitor.monitor.operators import overrule_in, shown_in
     from leg_wear_monitor.monitor.verdict.situation import SOURCES
 
     settings, leg = leg_of(config, ledger)

@@ -196,6 +196,12 @@ class Diagnosis:
     load: GroundLoad | None = None
     compliance: float = 0.0
 
+    def of_joint(self, k: int) -> tuple[float, float] | None:
+        """Clearance of joint k, and its standard deviation; None where it is not observable."""
+        if not self.clearance_m or not math.isfinite(self.clearance_m[k]):
+            return None
+        return self.clearance_m[k], self.sigma_m[k]
+
 
 WINDOW_CYCLES = 60  # that are kept at a cadence, and that clearances are estimated from
 UNUSED_CYCLES = 20  # in a row, after which a result is not one of the leg as it walks now

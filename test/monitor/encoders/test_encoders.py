@@ -61,7 +61,7 @@ def read(leg, gait, reference):
 
 def quick(monitor):
     """With the reference that encoders obey: of so few cycles, any other is not like it."""
-    run = monitor._encoders._reference
+    run = monitor._parts.encoders._reference
     run._cycles, begin = REFERENCE_CYCLES, run.begin
     run.begin = lambda *_: begin(FRESH, np.zeros((5, 2, 720)))
     return monitor
@@ -177,12 +177,12 @@ def test_a_restored_monitor_goes_on_bit_for_bit(new_watch, read):
     """In the middle of a simulated reference, too."""
     monitor = new_watch()
     monitor.update(read(2.5))
-    assert monitor._encoders._reference.is_busy
+    assert monitor._parts.encoders._reference.is_busy
     middle, rest = monitor.snapshot(), read(4.0, 2.5)
-    first = said(monitor, [monitor.update(rest)]), monitor._encoders.snapshot()
+    first = said(monitor, [monitor.update(rest)]), monitor._parts.encoders.snapshot()
     monitor.restore(middle)
     assert said(monitor, [monitor.update(rest)]) == first[0]
-    again = monitor._encoders.snapshot().regression.reference
+    again = monitor._parts.encoders.snapshot().regression.reference
     np.testing.assert_array_equal(again.columns, first[1].regression.reference.columns)
 
 
@@ -198,7 +198,7 @@ def test_an_encoder_that_says_nothing_is_told_and_the_others_go_on(new_watch, re
     assert status(monitor).message.startswith(f"knee {words}")
     counted = {status(monitor).values[f"knee_{what}"] for what in ("absent", "no_angle")}
     assert counted == {0.0, float(len(samples))}
-    assert monitor._encoders.state.present == (True, False, True)
+    assert monitor._parts.encoders.state.present == (True, False, True)
     assert len(monitor.status()[1].values) > 0 and monitor.lost.unmonitored_s < 0.2
 
 

@@ -114,7 +114,7 @@ def test_a_torque_that_is_wrong_as_received_is_named_and_shows_nothing_of_the_le
     assert (
         monitor.diagnosis.clearance_m == () and "received drive torque is wrong" in monitor.diagnosis.reason
     )
-    assert len(monitor._torque.state.cycles) <= 4  # gait cycles until it is known; none is commissioned
+    assert len(monitor._parts.torque.state.cycles) <= 4  # gait cycles until it is known; none is commissioned
     if offset_rad:
         assert status.values["crank_angle_ahead_rad"] == pytest.approx(-offset_rad, abs=0.01)
         assert "cannot be distinguished" in status.message

@@ -1,6 +1,6 @@
-"""What operators do after a repair: resets of a joint, their undoing, acknowledgements.
+"""What operators do: parts replaced and put back, clearances measured, alarms acknowledged.
 
-A monitor does it in its own state. Without a monitor, the entry of a ledger is changed in the same way.
+First in a monitor, then in a ledger that no monitor uses, whose entry is changed in the same way.
 """
 
 import json
@@ -16,7 +16,16 @@ from leg_wear_monitor.monitor.accounting import verdict_event
 from leg_wear_monitor.monitor.alarms import Alarm, acknowledged
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
-from leg_wear_monitor.monitor.forecast.measurement import last_measured
+from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult, last_measured
+from leg_wear_monitor.monitor.gait_evidence import NO_MISMATCH
+from leg_wear_monitor.monitor.judgement import (
+    evaluate_clearances,
+    is_forecast_valid,
+    joint_situations,
+    shown,
+    update_verdict,
+    verdict_report,
+)
 from leg_wear_monitor.monitor.ledger.entry import (
     AlarmEvent,
     Audit,
@@ -27,12 +36,14 @@ from leg_wear_monitor.monitor.ledger.entry import (
     one_part,
 )
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
-from leg_wear_monitor.monitor.reports import VerdictReport
+from leg_wear_monitor.monitor.parts import Parts
+from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, VerdictReport, with_forecast
 from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.situation import (
     COUNTED,
     OF_A_JOINT,
     SEEN,
+    SOURCES,
     JointSituation,
     KnownClearance,
     Situation,
@@ -122,6 +133,139 @@ class Acknowledged:
         return (
             f"cleared: {', '.join(self.cleared) or 'none'}; still present: {', '.join(self.kept) or 'none'}"
         )
+
+
+# In a monitor.
+
+
+def acknowledge(parts: Parts, stamp_ns: int) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
+    """See `WearMonitor.acknowledge`."""
+    cleared, kept = parts.evaluation.board.acknowledge()
+    parts.accounting.state.cut_off_s = None
+    _note_alarms(parts, stamp_ns)
+    update_verdict(parts)
+    if cleared or kept:
+        parts.keep()
+    return cleared, kept
+
+
+def reset_wear(parts: Parts, joint: str, stamp_ns: int, who: str) -> Acknowledged:
+    """See `WearMonitor.reset_wear`."""
+    board, state = parts.evaluation.board, parts.state
+    was = parts.accounting.replace(joint, stamp_ns)
+    gone = rested_on(board.alarms.values(), joint, named_for_clearance(state.findings))
+    board.clear(gone)
+    if alarm_specs.MISMATCH.name() in gone:
+        state.mismatch = NO_MISMATCH
+    _part_changed(parts, joint, stamp_ns)
+    parts.accounting.note(Audit(stamp_ns, who, "reset_wear", was))
+    _note_alarms(parts, stamp_ns)
+    update_verdict(parts)
+    parts.keep()
+    kept = tuple(alarm.name for alarm in board.alarms.values() if alarm.level is not Level.OK)
+    return Acknowledged(gone, kept)
+
+
+def undo_reset(parts: Parts, joint: str, stamp_ns: int, who: str) -> JointWear:
+    """See `WearMonitor.undo_reset`."""
+    accounting = parts.accounting
+    reset = last_reset(accounting.ledger, joint, accounting.wear_of(joint))
+    since = accounting.put_back(joint, reset.before)
+    _part_changed(parts, joint, reset.before.replaced_ns)
+    accounting.note(Audit(stamp_ns, who, "undo_reset", since, undoes=reset.id))
+    parts.keep()
+    return accounting.wear_of(joint)
+
+
+def measure(
+    parts: Parts, joint: str, clearance_m: float, sigma_m: float, stamp_ns: int, who: str, accept: bool
+) -> MeasurementResult:
+    """See `WearMonitor.measure`."""
+    accounting, joint = parts.accounting, parts.mechanism.clearance_joint(joint)
+    wear, best = accounting.wear_of(joint), shown(parts, _situation(parts, joint))
+    found = parts.forecaster.measured(
+        wear,
+        clearance_m=clearance_m,
+        sigma_m=sigma_m,
+        stamp_ns=stamp_ns,
+        who=who,
+        kept_ns=accounting.ledger.kept_ns if accounting.ledger else 0,
+        accept=accept,
+    )
+    if best:
+        found = attrs.evolve(
+            found, shown_m=best.clearance_m, shown_sigma_m=best.sigma_m, shown_by=SOURCES[best.by]
+        )
+    accounting.note(found.measurement)
+    if parts.encoders:
+        parts.encoders.state.updated_ns = 0  # the next estimate updates the forecast again
+    renew_forecast(parts)
+    for change in _compared(parts, joint):
+        accounting.note_alarms(change)
+    update_verdict(parts)
+    parts.keep()
+    return found
+
+
+def renew_forecast(parts: Parts) -> CycleReport | None:
+    """See `WearMonitor.renew_forecast`."""
+    last = parts.state.last
+    if last is None:
+        return None
+    sigma_m = parts.accounting.sampling_sigma_m
+    forecast = parts.forecaster.renewed(
+        parts.worn_m(parts.twin.clearance_mean_m),
+        parts.evaluation.board.clearance_limits_m,
+        is_forecast_valid(parts, verdict_report(parts).findings),
+        sigma_m,
+        parts.model_error,
+    )
+    parts.state.last = with_forecast(last, forecast, parts.measured, sigma_m.tolist())
+    return parts.state.last
+
+
+def _situation(parts: Parts, joint: str) -> JointSituation:
+    return next(each for each in joint_situations(parts) if each.joint == joint)
+
+
+def _note_alarms(parts: Parts, stamp_ns: int) -> None:
+    parts.accounting.note_alarms(AlarmList(stamp_ns, tuple(parts.evaluation.board.alarms.values())))
+
+
+def _compared(parts: Parts, joint: str) -> tuple[AlarmList, ...]:
+    """Compare a new measurement with the limit; it ends an alarm of the clearance that it contradicts."""
+    changes, board, name = (
+        evaluate_clearances(parts),
+        parts.evaluation.board,
+        alarm_specs.CLEARANCE.name(joint),
+    )
+    own, before = _situation(parts, joint), board.alarms[name]
+    if own.measured is None or before.cause in ("", COUNTED) or before.level is Level.OK:
+        return changes
+    if is_surely_below(own.limit_m, own.measured.clearance_m, own.measured.sigma_m):
+        board.acknowledge_one(name)
+        changes = (*changes, AlarmList(parts.twin.intake.stamp_ns, tuple(board.alarms.values())))
+    return changes
+
+
+def _part_changed(parts: Parts, joint: str, replaced_ns: int) -> None:
+    """Discard the growth and the estimates of the former part, and renew the forecast."""
+    parts.grows_anew([joint])
+    parts.forecaster.replaced(joint, replaced_ns)
+    last = parts.state.last
+    if last:  # what was estimated is of the former part
+        joints = [
+            attrs.evolve(each, seen=None, shown=None) if each.joint == joint else each for each in last.joints
+        ]
+        parts.state.last = attrs.evolve(last, joints=tuple(joints))
+    if parts.encoders:
+        parts.encoders.replaced()
+    if parts.torque:
+        parts.torque.replaced(parts.twin.clearance_mean_m)
+    renew_forecast(parts)
+
+
+# In a ledger that no monitor uses.
 
 
 def reset_in(

@@ -9,7 +9,7 @@ from leg_wear_monitor.bags.findings import Severity
 from leg_wear_monitor.mechanism.materials import BushingLoad
 from leg_wear_monitor.monitor.angle_regression import ClearanceObservation
 from leg_wear_monitor.monitor.config.settings import Limits
-from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, Quantiles
+from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, LegForecast, Quantiles
 from leg_wear_monitor.monitor.forecast.wear_coefficients import CoefficientPrior
 from leg_wear_monitor.monitor.ledger.entry import Measurement, WalkedLoad
 from leg_wear_monitor.monitor.reports import Lost
@@ -17,7 +17,6 @@ from leg_wear_monitor.playback.history import CYCLE_COLUMNS, SUMMARY_COLUMNS
 from leg_wear_monitor.playback.result import (
     EncoderEvidence,
     LegJoint,
-    LegLife,
     ReplayFinding,
     ReplayGait,
     ReplayHistory,
@@ -133,7 +132,7 @@ def made_up_summary() -> ReplaySummary:
         cycles=2,
         gait=ReplayGait(believable_cycles=2, doubtful_cycles=0, missing="", is_counted=False),
         joints={"A": joint, "B": attrs.evolve(joint, forecast=None, encoders=None, peak_force_n=math.inf)},
-        forecast=LegLife(
+        forecast=LegForecast(
             answer=Answer.PARTLY_KNOWN, cycles=LIFE, hours=LIFE, days=LIFE, first_probability={"A": 1.0},
             simulated_lives=0, first="A",
         ),

@@ -77,6 +77,29 @@ def options_named() -> Iterator[None]:
 
 Option = Callable[[Callable[..., Any]], Callable[..., Any]]
 
+
+def number_option(
+    name: str,
+    metavar: str,
+    text: str,
+    unit: str = "",
+    *,
+    above: float | None = None,
+    at_least: float | None = None,
+    default: float | None = None,
+) -> Option:
+    """Option with a finite number within bounds; see `bounded`."""
+    check = bounded(unit, above=above, at_least=at_least)
+    shown: dict[str, Any] = {} if default is None else {"default": default, "show_default": True}
+    return click.option(name, type=float, callback=check, metavar=metavar, help=text, **shown)
+
+
+def path_option(name: str, metavar: str, text: str, *, required: bool = False, **of_path: bool) -> Option:
+    """Option with a path, such as a file that has to exist."""
+    kind = click.Path(path_type=Path, **of_path)
+    return click.option(name, type=kind, metavar=metavar, required=required, help=text)
+
+
 mechanism_option: Option = click.option(
     "--mechanism",
     metavar="FILE",
@@ -85,36 +108,24 @@ mechanism_option: Option = click.option(
     help="A mechanism file, or the name of one that comes with the package.",
 )
 
-speed_option: Option = click.option(
-    "--speed-rpm",
-    type=float,
-    callback=bounded("rpm"),
-    metavar="RPM",
-    help="Crank speed, negative for clockwise.  [default: the mechanism's own]",
+speed_option: Option = number_option(
+    "--speed-rpm", "RPM", "Crank speed, negative for clockwise.  [default: the mechanism's own]", "rpm"
 )
 
-limit_option: Option = click.option(
-    "--limit-m",
-    type=float,
-    default=6.0e-4,
-    show_default=True,
-    callback=bounded("m", above=0.0),
-    metavar="M",
-    help="Mean radial clearance at which a joint's life ends.",
+limit_option: Option = number_option(
+    "--limit-m", "M", "Mean radial clearance at which a joint's life ends.", "m", above=0.0, default=6.0e-4
 )
 
-config_option: Option = click.option(
-    "--config",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="Parameter file of the node.  [default: the one that comes with the package]",
+config_option: Option = path_option(
+    "--config", "FILE", "Parameter file of the node.  [default: the one that comes with the package]"
 )
 
-ledger_option: Option = click.option(
+ledger_option: Option = path_option(
     "--ledger",
-    type=click.Path(path_type=Path, dir_okay=False, exists=True),
-    metavar="FILE",
-    help="Ledger to write into.  [default: the one in the parameters]",
+    "FILE",
+    "Ledger to write into.  [default: the one in the parameters]",
+    dir_okay=False,
+    exists=True,
 )
 
 node_option: Option = click.option(
@@ -165,7 +176,7 @@ def json_option(what: str) -> Option:
 
 def out_option(text: str) -> Option:
     """``--out DIR``."""
-    return click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help=text)
+    return path_option("--out", "DIR", text)
 
 
 def with_clearance_joints(leg: "Mechanism", names: str | None) -> "Mechanism":
@@ -304,6 +315,22 @@ def write_json(path: Path | None, text: str) -> list[Path]:
         return []
     write_file(path, text.encode())
     return [path]
+
+
+def say(json_file: Path | None, lines: Iterable[str], written: Iterable[Path]) -> None:
+    """Print a result and what was written, unless ``--json`` has stdout for itself."""
+    if json_file != STDOUT:
+        for line in (*lines, *(f"written: {path}" for path in written)):
+            click.echo(line)
+
+
+@contextmanager
+def bags_installed() -> Iterator[None]:
+    """Name the extra that lacks where a library for recordings is not installed."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        raise LegWearError(f"{error.name} is not installed; pip install 'leg_wear_monitor[bags]'") from error
 
 
 def write_file(path: Path, content: bytes) -> None:

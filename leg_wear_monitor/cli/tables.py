@@ -1,7 +1,7 @@
 """Results as tables on a terminal."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,6 +24,27 @@ if TYPE_CHECKING:
     from leg_wear_monitor.playback.summary import ReplayResult
     from leg_wear_monitor.state import LegState
     from leg_wear_monitor.wear import Surfaces
+
+
+# Tables, numbers.
+
+
+def plain_table(columns: Iterable[str], *left: int) -> Table:
+    """A table without lines, whose columns of these numbers, from 1 on, are of words."""
+    table = Table(box=None, pad_edge=False, padding=(0, 1), header_style="bold")
+    for number, column in enumerate(columns, start=1):
+        table.add_column(column, justify="left" if number in left else "right")
+    return table
+
+
+def figure(value: float) -> str:
+    """Three significant digits, without exponent as far as that is readable."""
+    size = abs(value)
+    if size < 1.0e-9:  # rounding
+        return "0"
+    if not 1.0e-4 <= size < 1.0e7:
+        return f"{value:.2e}"
+    return f"{value:.{max(0, 2 - math.floor(math.log10(size)))}f}"
 
 
 # A simulation's statistics as text: 80 columns, on a terminal and in a pipe.
@@ -60,13 +81,10 @@ def print_result(result: "SimulationResult", wall_s: float) -> None:
 
 def joint_table(result: "SimulationResult") -> Table:
     """Forces of every joint; contact and wear of the clearance joints."""
-    table = Table(box=None, pad_edge=False, padding=(0, 1), header_style="bold")
-    table.add_column("\njoint")
-    columns = ["mean\nN", "p99\nN", "max\nN"]
+    columns = ["\njoint", "mean\nN", "p99\nN", "max\nN"]
     if any(joint.has_clearance for joint in result.joints.values()):
         columns += ["contact\n%", "Archard\nJ/cycle", "bushing\npm/cycle", "journal\npm/cycle", "zone\ndeg"]
-    for column in columns:
-        table.add_column(column, justify="right")
+    table = plain_table(columns, 1)
     for name, joint in result.joints.items():
         forces = (joint.mean_force_n, joint.p99_force_n, joint.max_force_n)
         table.add_row(name, *map(figure, forces), *_wear_cells(joint))
@@ -75,7 +93,6 @@ def joint_table(result: "SimulationResult") -> Table:
 
 def _error_table(errors: dict[str, float], joints: list[str]) -> Table:
     """Standard errors of the table of joints, in its units."""
-    table = Table(box=None, pad_edge=False, padding=(0, 1), header_style="bold")
     columns = {
         "mean\nN": ("mean_force_n", 1.0), "p99\nN": ("p99_force_n", 1.0),
         "contact\n%": ("contact_fraction", 1e2),
@@ -83,8 +100,7 @@ def _error_table(errors: dict[str, float], joints: list[str]) -> Table:
         "bushing\npm/cycle": ("wear_depth_m_per_cycle.bushing_max", 1e12),
         "journal\npm/cycle": ("wear_depth_m_per_cycle.journal_max", 1e12),
     }  # fmt: skip
-    for column in ("\njoint", *columns):
-        table.add_column(column, justify="right" if column in columns else "left")
+    table = plain_table(("\njoint", *columns), 1)
     for joint in joints:
         found = [(errors.get(f"joints.{joint}.{name}"), scale) for name, scale in columns.values()]
         table.add_row(joint, *("" if error is None else figure(scale * error) for error, scale in found))
@@ -191,16 +207,6 @@ def _opened(surfaces: "Surfaces", names: tuple[str, ...]) -> str:
     return ", ".join(f"{name} {figure(depth.mean())} ({figure(depth.max())})" for name, depth in parts)
 
 
-def figure(value: float) -> str:
-    """Three significant digits, without exponent as far as that is readable."""
-    size = abs(value)
-    if size < 1.0e-9:  # rounding
-        return "0"
-    if not 1.0e-4 <= size < 1.0e7:
-        return f"{value:.2e}"
-    return f"{value:.{max(0, 2 - math.floor(math.log10(size)))}f}"
-
-
 # A replay's statistics as text.
 
 
@@ -288,7 +294,7 @@ def _print_verdict(console: Console, state: "LegState", joint_words: Callable[[s
 def _joints(result: "ReplayResult") -> Table:
     """Counted clearance, growth and peak force."""
     columns = ("\njoint", "counted clearance\nmm", "growth\npm/cycle", "±\npm/cycle", "peak\nN")
-    table = _table(columns, 1)
+    table = plain_table(columns, 1)
     peaks = np.fmax.reduce(result.history.joint_column("peak_force_n"))
     last = result.history.last
     for joint, peak in zip(last.joints if last else (), peaks, strict=True):
@@ -306,7 +312,7 @@ def _believed(result: "ReplayResult") -> Table:
     """Clearance of each joint by what is believed of it, while the counted ones are not valid."""
     from leg_wear_monitor.monitor.verdict.situation import SOURCES
 
-    table = _table(("\njoint", "clearance\nmm", "±\nmm", "\naccording to"), 1, 4)
+    table = plain_table(("\njoint", "clearance\nmm", "±\nmm", "\naccording to"), 1, 4)
     for joint, one in result.monitor.state.clearances.items():
         name = result.monitor.mechanism.joint_words(joint)
         if one.believed_m is None or one.believed_by is None:
@@ -314,14 +320,6 @@ def _believed(result: "ReplayResult") -> Table:
             continue
         sigma = "-" if one.believed_sigma_m is None else f"{1.0e3 * one.believed_sigma_m:.3f}"
         table.add_row(name, f"{1.0e3 * one.believed_m:.3f}", sigma, SOURCES[one.believed_by])
-    return table
-
-
-def _table(columns: tuple[str, ...], *left: int) -> Table:
-    """A table whose columns of these numbers are of words."""
-    table = Table(box=None, pad_edge=False, padding=(0, 1), header_style="bold")
-    for number, column in enumerate(columns, start=1):
-        table.add_column(column, justify="left" if number in left else "right")
     return table
 
 

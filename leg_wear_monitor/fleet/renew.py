@@ -43,7 +43,6 @@ from leg_wear_monitor.playback.summary import (
     joint_forecast,
     ledger_verdict,
     leg_forecast,
-    leg_life,
 )
 from leg_wear_monitor.state import JointClearance, Verdict
 
@@ -326,7 +325,7 @@ def _renew(leg: FleetLeg, directory: LegDirectory) -> None:
         },
         clearances=clearances,
         life=life,
-        forecast=leg_life(leg_forecast(told.leg, verdict)),
+        forecast=leg_forecast(told.leg, verdict),
         measurements=forecaster.measurements,
     )
     write_whole(directory.summary, summary.to_json().encode())

@@ -87,11 +87,8 @@ def _take_parameters(parts: Parts, found: LegParameters | None) -> None:
         return
     parts.twin.set_parameters(found)
     parts.twin.pull_block()
-    names = tuple(parts.mechanism.bodies)
-    factors = tuple(found.mass.tolist()), tuple(found.length.tolist()), found.friction
-    drive = found.compliance, found.damping
     stamp_ns = parts.twin.intake.followed_stamp_ns
-    parts.accounting.note(IdentifiedLeg(stamp_ns, names, *factors, *drive, found.load, found.load_sigma))
+    parts.accounting.note(IdentifiedLeg(stamp_ns, tuple(parts.mechanism.bodies), found))
     parts.grows_anew(parts.clearance_joints)
     parts.keep()
 

@@ -174,22 +174,15 @@ class Parts:
         )
 
     def _known_parameters(self, ledger: Ledger | None) -> LegParameters | None:
-        """Masses, lengths and friction of the ledger, in the order of the mechanism."""
+        """Parameters of the leg in the ledger, in the order of the mechanism."""
         known = ledger.parameters if ledger else None
-        if known is None:
-            return None
-        order = [known.names.index(name) for name in self.mechanism.bodies]
-        bodies = np.array(known.mass)[order], np.array(known.length)[order]
-        own = LegParameters(*bodies, known.friction, known.compliance, known.damping, known.load)
-        return attrs.evolve(own, load_sigma=known.load_sigma)
+        return known.parameters.of_bodies(known.bodies, self.mechanism) if known else None
 
     def _known_references(self, ledger: Ledger | None) -> list[TorqueReference]:
         """Torque references of the ledger, their parameters in the order of the mechanism."""
         known = []
         for kept in ledger.references if ledger else ():
-            order = [kept.bodies.index(name) for name in self.mechanism.bodies]
-            own = kept.reference.parameters
-            parameters = attrs.evolve(own, mass=own.mass[order], length=own.length[order])
+            parameters = kept.reference.parameters.of_bodies(kept.bodies, self.mechanism)
             known.append(attrs.evolve(kept.reference, parameters=parameters))
         return known
 

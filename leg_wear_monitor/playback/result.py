@@ -15,7 +15,7 @@ from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.materials import BushingLoad
 from leg_wear_monitor.monitor.angle_regression import ClearanceObservation
 from leg_wear_monitor.monitor.config.settings import Limits
-from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, Quantiles
+from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
 from leg_wear_monitor.monitor.ledger.entry import Measurement, WalkedLoad
 from leg_wear_monitor.monitor.reports import Lost
 from leg_wear_monitor.shown import Drawable
@@ -150,37 +150,6 @@ class ReplayJoint:
     impacts: int
     load: BushingLoad | None = None
     sampling_sigma_m: float = 0.0
-
-
-@attrs.frozen(kw_only=True)
-class LegLife:
-    """The leg's remaining life: until the first of its joints reaches its limit.
-
-    Attributes
-    ----------
-    answer : Answer
-        What can be said of it.
-    cycles : Quantiles or None
-        Gait cycles; None unless known.
-    hours : Quantiles or None
-        Hours of walking; None unless known.
-    days : Quantiles or None
-        Days at the usual duty; None unless known.
-    first_probability : dict of str to float
-        Probability that this joint is the first; empty unless known.
-    simulated_lives : int
-        Number of simulated lives, which show the effect of joints on each other.
-    first : str or None
-        The joint that is most likely the first.
-    """
-
-    answer: Answer
-    cycles: Quantiles | None
-    hours: Quantiles | None
-    days: Quantiles | None
-    first_probability: dict[str, float]
-    simulated_lives: int
-    first: str | None
 
 
 @attrs.frozen(kw_only=True)
@@ -519,7 +488,7 @@ class ReplaySummary(LegState, Drawable):
         Whether the motion was a gait of this leg.
     joints : dict of str to ReplayJoint
         Clearance joints; empty without one gait cycle that fits this leg, like ``clearances`` and ``life``.
-    forecast : LegLife or None
+    forecast : LegForecast or None
         Remaining life of the leg.
     measurements : tuple of Measurement
         Clearances measured by hand, from the ledger.
@@ -549,7 +518,7 @@ class ReplaySummary(LegState, Drawable):
     cycles: int
     gait: ReplayGait
     joints: dict[str, ReplayJoint]
-    forecast: LegLife | None
+    forecast: LegForecast | None
     measurements: tuple[Measurement, ...]
     walked: tuple[WalkedLoad, ...] = ()
     status: tuple[ReplayStatus, ...]

@@ -29,7 +29,6 @@ from leg_wear_monitor.playback.history import CYCLE_COLUMNS, SEEN_COLUMNS, SUMMA
 from leg_wear_monitor.playback.result import (
     EncoderEvidence,
     LegJoint,
-    LegLife,
     Place,
     ReplayFinding,
     ReplayGait,
@@ -64,7 +63,7 @@ def leg_forecast(told: LegForecast | None, verdict: Verdict) -> LegForecast | No
     """The leg's forecast; without its remaining life if the verdict does not believe that."""
     if told is None or Figure.FORECAST not in verdict.not_valid:
         return told
-    return attrs.evolve(told, cycles=None, hours=None, days=None, first_probability={})
+    return attrs.evolve(told, cycles=None, hours=None, days=None, first_probability={}, first=None)
 
 
 def ledger_verdict(event: VerdictEvent) -> Verdict:
@@ -208,7 +207,7 @@ def summary(
         cycles=len(result.history),
         gait=_gait(result),
         joints=_joints(result, verdict) if is_known else {},
-        forecast=leg_life(told),
+        forecast=told,
         measurements=tuple(monitor.measurements),
         walked=monitor.walked,
         status=tuple(map(_status, monitor.status())),
@@ -336,13 +335,6 @@ def _by_encoders(seen: ClearanceEstimate) -> EncoderEvidence:
         believed=seen.believed,
         is_other=seen.is_other,
     )
-
-
-def leg_life(told: LegForecast | None) -> LegLife | None:
-    """The leg's end of life: the first joint to reach its limit."""
-    if told is None:
-        return None
-    return LegLife(**attrs.asdict(told, recurse=False), first=told.first)
 
 
 def _changes(result: ReplayResult) -> tuple[AlarmChange, ...]:

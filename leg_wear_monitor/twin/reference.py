@@ -184,6 +184,11 @@ class LegParameters:
         """Those of the leg without a load."""
         return attrs.evolve(self, load=np.zeros((0, 2)))
 
+    def of_bodies(self, names: Sequence[str], mechanism: Mechanism) -> "LegParameters":
+        """These, of bodies in this order, in the order of the mechanism."""
+        order = [names.index(name) for name in mechanism.bodies]
+        return attrs.evolve(self, mass=self.mass[order], length=self.length[order])
+
     def applied(self, mechanism: Mechanism) -> Mechanism:
         """The mechanism with these factors; the compliance is none of it."""
         bodies = {}

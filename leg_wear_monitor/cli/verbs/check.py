@@ -3,17 +3,18 @@
 import platform
 import shutil
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from functools import partial
 from importlib import metadata
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import click
 
 from leg_wear_monitor.cli.common import (
-    STDOUT,
+    bags_installed,
     check_directory,
     check_outputs,
     compilation,
@@ -21,6 +22,7 @@ from leg_wear_monitor.cli.common import (
     json_option,
     mark_compiled,
     progress_bar,
+    say,
     sourced_lines,
     warn_of,
     write_json,
@@ -34,6 +36,9 @@ if TYPE_CHECKING:
     from leg_wear_monitor.mechanism.materials import Material
     from leg_wear_monitor.mechanism.sourced import Drive
     from leg_wear_monitor.monitor.config.sections import DriveParameters
+
+
+_Sourced = TypeVar("_Sourced", "Drive", "Material")
 
 
 # ``leg-wear-monitor check``: what is wrong with a configuration or an installation.
@@ -132,11 +137,9 @@ def _is_table(name: str) -> bool:
 
 def _table(name: str, parameters: str | None) -> str:
     """Read a table, and say what was understood of it."""
-    try:
+    with bags_installed():
         from leg_wear_monitor.bags.findings import Severity
         from leg_wear_monitor.bags.reader import understood
-    except ModuleNotFoundError as error:
-        raise LegWearError(f"{error.name} is not installed; pip install 'leg_wear_monitor[bags]'") from error
     from leg_wear_monitor.monitor.config.parameters import load_config
 
     lines, findings = understood(Path(name), load_config(parameters))
@@ -256,16 +259,18 @@ def drives(name: str | None, json_file: Path | None) -> None:
     """
     from leg_wear_monitor.mechanism import sourced
 
-    check_outputs(json_file, None)
     known = [sourced.load_drive(each) for each in ([name] if name is not None else sourced.drives())]
-    document = {"schema_version": 1, "drives": [drive.to_dict() for drive in known]}
+    _told("drives", known, _drive_listed if name is None else _drive_in_full, json_file)
+
+
+def _told(
+    kind: str, known: Sequence[_Sourced], lines: Callable[[_Sourced], list[str]], json_file: Path | None
+) -> None:
+    """Print and write what files of the package say."""
+    check_outputs(json_file, None)
+    document = {"schema_version": 1, kind: [one.to_dict() for one in known]}
     written = write_json(json_file, json_text(document))
-    if json_file != STDOUT:
-        for drive in known:
-            for line in _drive_listed(drive) if name is None else _drive_in_full(drive):
-                click.echo(line)
-        for path in written:
-            click.echo(f"written: {path}")
+    say(json_file, chain.from_iterable(map(lines, known)), written)
 
 
 def _drive_listed(drive: "Drive") -> list[str]:
@@ -293,17 +298,9 @@ def materials(name: str | None, json_file: Path | None) -> None:
     """
     from leg_wear_monitor.mechanism import materials as loader
 
-    check_outputs(json_file, None)
     names = [name] if name is not None else loader.materials()
     pairs = [loader.load_material(each) for each in names]
-    document = {"schema_version": 1, "materials": [pair.to_dict() for pair in pairs]}
-    written = write_json(json_file, json_text(document))
-    if json_file != STDOUT:
-        for pair in pairs:
-            for line in _listed(pair) if name is None else _in_full(pair):
-                click.echo(line)
-        for path in written:
-            click.echo(f"written: {path}")
+    _told("materials", pairs, _listed if name is None else _in_full, json_file)
 
 
 def _listed(pair: "Material") -> list[str]:

@@ -10,17 +10,21 @@ import click
 
 from leg_wear_monitor.cli.common import (
     STDOUT,
+    bags_installed,
     bounded,
     check_file,
     clearances_option,
     compilation,
     config_option,
     json_option,
+    number_option,
+    path_option,
     progress_bar,
+    say,
     write_file,
     write_json,
 )
-from leg_wear_monitor.errors import ConfigError, LegWearError
+from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.monitor.config.tables import ANGLES, COUNTS, DATE, STAMPS
 
 if TYPE_CHECKING:
@@ -41,26 +45,25 @@ WITH_FINDINGS = 1
 @click.argument(
     "recordings", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="RECORDING..."
 )
-@click.option(
+@path_option(
     "--config",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="Parameter file that names the mechanism; parameters that are not measured are kept.  "
+    "FILE",
+    "Parameter file that names the mechanism; parameters that are not measured are kept.  "
     "[default: the one that comes with the package]",
 )
-@click.option(
+@path_option(
     "--out",
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="FILE",
-    help="Write the proposed parameters, such as monitor.yaml; nothing is written if a choice is not "
+    "FILE",
+    "Write the proposed parameters, such as monitor.yaml; nothing is written if a choice is not "
     "certain, and a file that exists is kept unless everything is determined and fits.",
+    dir_okay=False,
 )
-@click.option(
+@path_option(
     "--reference",
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="FILE",
-    help="Simulate a torque reference of the leg under the recorded motion of its crank, about a minute, and "
+    "FILE",
+    "Simulate a torque reference of the leg under the recorded motion of its crank, about a minute, and "
     "write it, such as leg.reference.npz; the proposed parameters name it.",
+    dir_okay=False,
 )
 @click.option("--joint-states", metavar="TOPIC", help="Topic of the crank.  [default: all are tried]")
 @click.option("--drive-torque", metavar="TOPIC", help="Topic of the torque.  [default: all are tried]")
@@ -103,9 +106,7 @@ def commission(
         else:
             write_file(out, result.to_yaml().encode())
             written.append(out)
-    if json_file != STDOUT:
-        for path in written:
-            click.echo(f"written: {path}")
+    say(json_file, (), written)
     return 0 if result.is_sure else WITH_FINDINGS
 
 
@@ -124,10 +125,8 @@ def _write_reference(file: Path, config: "MonitorConfig", made: "TorqueReference
 def _run(
     recordings: tuple[Path, ...], path: Path | None, reference: Path | None, topics: dict[str, str | None]
 ) -> "CommissioningResult":
-    try:
+    with bags_installed():
         from leg_wear_monitor.commissioning.commission import commission as propose
-    except ModuleNotFoundError as error:
-        raise LegWearError(f"{error.name} is not installed; pip install 'leg_wear_monitor[bags]'") from error
     with compilation("commissioning", "monitor"), progress_bar("commissioning") as progress:
         result = propose(recordings, path, **topics, reference=reference, progress=progress)
     for fault in result.faults:
@@ -150,12 +149,12 @@ def _run(
     metavar="RPM",
     help="Cadence, negative for clockwise; may be given several times.  [default: the commanded one]",
 )
-@click.option(
+@path_option(
     "--out",
+    "FILE",
+    "File to write, such as leg.reference.npz, for the parameter diagnosis.reference.",
+    dir_okay=False,
     required=True,
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="FILE",
-    help="File to write, such as leg.reference.npz, for the parameter diagnosis.reference.",
 )
 def reference(mechanism: str | None, config: Path | None, cadences: tuple[float, ...], out: Path) -> None:
     """Simulate the torque reference of a leg, which the diagnosis compares with.
@@ -220,18 +219,16 @@ def reference(mechanism: str | None, config: Path | None, cadences: tuple[float,
     type=click.Choice([*ANGLES, COUNTS]),
     help="Unit of the angle in a table; counts are those of --counts-per-turn.  [default: that of --config]",
 )
-@click.option(
+@number_option(
     "--counts-per-turn",
-    type=float,
-    callback=bounded("", above=0.0),
-    metavar="N",
-    help="Counts of the encoder per turn of the joint.  [default: found from the values]",
+    "N",
+    "Counts of the encoder per turn of the joint.  [default: found from the values]",
+    above=0.0,
 )
-@click.option(
+@path_option(
     "--config",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="Parameter file with the column of the time and the units of a table.  "
+    "FILE",
+    "Parameter file with the column of the time and the units of a table.  "
     "[default: the one that comes with the package]",
 )
 @click.option(
@@ -351,11 +348,9 @@ def _play(
     loads: tuple[str, ...],
     counts_per_turn: float | None,
 ) -> tuple["Play", bool]:
-    try:
+    with bags_installed():
         from leg_wear_monitor.bags.findings import Severity
         from leg_wear_monitor.play.measurement import measure_play, read_rocked
-    except ModuleNotFoundError as error:
-        raise LegWearError(f"{error.name} is not installed; pip install 'leg_wear_monitor[bags]'") from error
     with compilation("play"), progress_bar("reading") as progress:
         read = read_rocked(recording, settings, joint, loads, progress)
     for finding in read.findings:
@@ -389,9 +384,6 @@ def _written(
     from leg_wear_monitor.play.fit import PlayMeasurement
 
     result = PlayMeasurement(plays=tuple(plays), clearances=found)
-    if json_file != STDOUT:
-        for line in lines(result, leg.name if leg else "", encoder):
-            click.echo(line)
-    for path in write_json(json_file, result.to_json()):
-        click.echo(f"written: {path}")
+    printed = lines(result, leg.name if leg else "", encoder)
+    say(json_file, printed, write_json(json_file, result.to_json()))
     return 0 if result.is_sure else WITH_FINDINGS

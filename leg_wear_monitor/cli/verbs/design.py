@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING
 import click
 
 from leg_wear_monitor.cli.common import (
-    STDOUT,
-    bounded,
     check_outputs,
     clearances_option,
     compilation,
     json_option,
     limit_option,
+    number_option,
     options_named,
     out_option,
     progress_bar,
+    say,
     with_clearance_joints,
     write_directory,
     write_json,
@@ -49,14 +49,8 @@ def _numbers(ctx: click.Context, param: click.Parameter, value: str) -> tuple[fl
     help="Hours a day at each peak of the ground's vertical force on the toe [N], such as 0:2,300:5; or a "
     "YAML file with duty: [{load_n, hours_per_day, speed_rpm}, ...].",
 )
-@click.option(
-    "--hours",
-    type=float,
-    default=1000.0,
-    show_default=True,
-    callback=bounded("h", above=0.0),
-    metavar="H",
-    help="Hours of walking that each joint should last.",
+@number_option(
+    "--hours", "H", "Hours of walking that each joint should last.", "h", above=0.0, default=1000.0
 )
 @limit_option
 @click.option(
@@ -120,9 +114,7 @@ def design(
         page = page_html(design_page(leg, result, choices)).encode()
         files = {"design.html": page, "design.json": result.to_json().encode(), "design.csv": _csv(result)}
         written += write_directory(out, files)
-    if json_file != STDOUT:
-        for line in [*lines(result, choices), *(f"written: {path}" for path in written)]:
-            click.echo(line)
+    say(json_file, lines(result, choices), written)
 
 
 def lines(result: "Design", choices: "BushingChoices") -> list[str]:

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from leg_wear_monitor.cli.common import (
-    STDOUT,
-    bounded,
     check_outputs,
     clearances_option,
     compilation,
     json_option,
     limit_option,
     mechanism_option,
+    number_option,
     options_named,
     out_option,
     progress_bar,
+    say,
     speed_option,
     warn_of,
     with_clearance_joints,
@@ -43,37 +43,15 @@ _TABLE_ROWS = 12  # most rows of the printed table, spread over the life
 @clearances_option("A,B")
 @speed_option
 @limit_option
-@click.option(
-    "--horizon-cycles",
-    type=float,
-    default=1.0e9,
-    show_default=True,
-    callback=bounded(above=0.0),
-    metavar="N",
-    help="Largest number of gait cycles.",
-)
-@click.option(
-    "--wear-factor",
-    type=float,
-    default=1.0,
-    show_default=True,
-    callback=bounded(above=0.0),
-    metavar="X",
-    help="Factor on all wear coefficients.",
-)
+@number_option("--horizon-cycles", "N", "Largest number of gait cycles.", above=0.0, default=1.0e9)
+@number_option("--wear-factor", "X", "Factor on all wear coefficients.", above=0.0, default=1.0)
 @click.option(
     "--duty",
     metavar="N:H,...",
     help="Hours a day at each peak of the ground's vertical force on the toe [N], such as 0:2,300:5,600:1. "
     "[default: the mechanism's own loads]",
 )
-@click.option(
-    "--opens-m",
-    type=float,
-    callback=bounded("m", above=0.0),
-    metavar="M",
-    help="Deepest change of a surface in a jump.  [default: 3e-05]",
-)
+@number_option("--opens-m", "M", "Deepest change of a surface in a jump.  [default: 3e-05]", "m", above=0.0)
 @click.option(
     "--legs", type=click.IntRange(min=1), metavar="N", help="Number of legs averaged.  [default: 2]"
 )
@@ -118,11 +96,8 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
 
         files = {"life.json": text.encode(), "life.png": life_picture(result)}
         written += write_directory(out, files)
-    if json_file != STDOUT:
-        printed = [*lines(result, options["limit_m"], _without_coefficient(leg)), *_regimes(leg, result)]
-        printed += _load_remarks(leg, result)
-        for line in [*printed, *(f"written: {path}" for path in written)]:
-            click.echo(line)
+    printed = [*lines(result, options["limit_m"], _without_coefficient(leg)), *_regimes(leg, result)]
+    say(json_file, [*printed, *_load_remarks(leg, result)], written)
 
 
 def _lives(leg: "Mechanism", lives: int, opens_m: float | None, duty: str | None, **options: Any) -> "Lives":

@@ -22,6 +22,7 @@ from leg_wear_monitor.cli.common import (
     is_compiled,
     need_rclpy,
     node_verb,
+    path_option,
 )
 from leg_wear_monitor.cli.start import main as program
 from leg_wear_monitor.errors import LegWearError, closed_at_the_end
@@ -256,17 +257,15 @@ _NODE = "/leg_wear_monitor"
     metavar="[NAME]",
     help=f"Full name of a running monitor, such as /left/leg_wear_monitor.  [default: {_NODE}]",
 )
-@click.option(
+@path_option(
     "--ledger",
-    type=click.Path(path_type=Path, dir_okay=False, exists=True),
-    metavar="FILE",
-    help="A ledger instead, which a monitor may be writing meanwhile.",
+    "FILE",
+    "A ledger instead, which a monitor may be writing meanwhile.",
+    dir_okay=False,
+    exists=True,
 )
-@click.option(
-    "--fleet",
-    type=click.Path(path_type=Path, dir_okay=False, exists=True),
-    metavar="FLEET.yaml",
-    help="A fleet instead, as the last fleet update left it.",
+@path_option(
+    "--fleet", "FLEET.yaml", "A fleet instead, as the last fleet update left it.", dir_okay=False, exists=True
 )
 @config_option
 @click.option(

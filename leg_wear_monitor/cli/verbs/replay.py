@@ -14,20 +14,23 @@ from leg_wear_monitor.cli.common import (
     PAGE,
     STDOUT,
     SUMMARY,
+    bags_installed,
     check_outputs,
     compilation,
     config_option,
     json_option,
     out_option,
     page_of,
+    path_option,
     progress_bar,
     sample_option,
+    say,
     warn_of,
     write_directory,
     write_json,
 )
 from leg_wear_monitor.cli.main import version
-from leg_wear_monitor.errors import ConfigError, LegWearError, closed_at_the_end
+from leg_wear_monitor.errors import ConfigError, closed_at_the_end
 from leg_wear_monitor.monitor.alarm_specs import INPUT_KINDS, KINDS
 
 if TYPE_CHECKING:
@@ -79,11 +82,11 @@ _MOST_LINES = 20
     help="Memory limit of reading, temporary files included.",
 )
 @sample_option
-@click.option(
+@path_option(
     "--ledger",
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="FILE",
-    help="Ledger to continue or to begin; the one in the parameters is never touched.",
+    "FILE",
+    "Ledger to continue or to begin; the one in the parameters is never touched.",
+    dir_okay=False,
 )
 @click.option("--allow-partial", is_flag=True, help="Exit with 0 even if parts of the recording are lost.")
 @click.option(
@@ -128,8 +131,7 @@ def replay(
         from leg_wear_monitor.cli.tables import print_replay
 
         print_replay(result, wall_s)
-        for path in written:
-            click.echo(f"written: {path}")
+    say(json_file, (), written)
     if is_report_there and result.monitor.is_all_counted:
         click.echo(f"warning: {out}: nothing was counted, so the earlier report stays as it is", err=True)
     failed = (result.is_partial and not allow_partial) or is_raised(result, fail_on)
@@ -149,11 +151,9 @@ def _run(
     **options: Any,
 ) -> tuple["ReplayResult", float]:
     """The result, and the time [s] it took once all was compiled."""
-    try:
+    with bags_installed():
         from leg_wear_monitor.dynamics.clearance.stepper import advance_beside
         from leg_wear_monitor.playback.replay import replay as run
-    except ModuleNotFoundError as error:
-        raise LegWearError(f"{error.name} is not installed; pip install 'leg_wear_monitor[bags]'") from error
     began, took = [0.0], [0.0]
 
     def ready(monitor: Any) -> None:

@@ -10,7 +10,6 @@ import click
 
 from leg_wear_monitor.cli.common import (
     STDOUT,
-    bounded,
     check_directory,
     check_file,
     check_outputs,
@@ -18,9 +17,12 @@ from leg_wear_monitor.cli.common import (
     compilation,
     json_option,
     mechanism_option,
+    number_option,
     options_named,
     out_option,
+    path_option,
     progress_bar,
+    say,
     speed_option,
     warn_of,
     workers_option,
@@ -50,19 +52,8 @@ FAULTS_FOUND = 1
 @click.command(short_help="Run one of the parameter studies of the paper.")
 @click.argument("name", type=click.Choice(NAMES), metavar="NAME")
 @click.option("--mechanism", metavar="FILE", help="Another leg than that of the study file.")
-@click.option(
-    "--config",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="Study file.  [default: config/studies/NAME.yaml of the package]",
-)
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    required=True,
-    help="Data and page.",
-)
+@path_option("--config", "FILE", "Study file.  [default: config/studies/NAME.yaml of the package]")
+@path_option("--out", "DIR", "Data and page.", required=True)
 @workers_option
 @click.option(
     "--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers compute instead, tcp://HOST:PORT."
@@ -155,24 +146,18 @@ _Stamp = tuple[int, int, int]
 
 @click.command(short_help="Draw a mechanism, working or not.")
 @click.argument("mechanism", metavar="MECHANISM")
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="A file .html, .svg or .urdf.  [default: MECHANISM.html in this directory]",
-)
+@path_option("--out", "FILE", "A file .html, .svg or .urdf.  [default: MECHANISM.html in this directory]")
 @click.option(
     "--urdf",
     is_flag=True,
     help="Write MECHANISM.urdf in place of a picture: a tree of its links with the loops cut, for RViz.",
 )
 @click.option("--forces", is_flag=True, help="Draw the forces in the joints, without clearance (.html).")
-@click.option(
+@number_option(
     "--crank-angle",
-    type=float,
-    callback=bounded("deg"),
-    metavar="DEG",
-    help="Position to draw, or to show first.  [default: 0, or the one that shows what is wrong]",
+    "DEG",
+    "Position to draw, or to show first.  [default: 0, or the one that shows what is wrong]",
+    "deg",
 )
 @click.option("--watch", is_flag=True, help="Draw again whenever the mechanism file is saved, until Ctrl-C.")
 def draw(
@@ -323,34 +308,14 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
 @click.command(short_help="Simulate the leg offline, ideal or with clearances.")
 @mechanism_option
 @clearances_option("A,B|none")
-@click.option(
-    "--clearance-m",
-    type=float,
-    callback=bounded("m", above=0.0),
-    metavar="M",
-    help="Radial clearance in metres.  [default: the mechanism's own]",
+@number_option(
+    "--clearance-m", "M", "Radial clearance in metres.  [default: the mechanism's own]", "m", above=0.0
 )
 @speed_option
-@click.option(
-    "--cycles",
-    type=float,
-    callback=bounded(above=0.0),
-    metavar="N",
-    help="Gait cycles to count.  [default: 5]",
-)
-@click.option(
-    "--duration",
-    type=float,
-    callback=bounded("s", above=0.0),
-    metavar="S",
-    help="Time to count, in seconds, instead of cycles.",
-)
-@click.option(
-    "--skip-cycles",
-    type=float,
-    callback=bounded(at_least=0.0),
-    metavar="N",
-    help="Gait cycles before counting.  [default: 1; 0 with --duration]",
+@number_option("--cycles", "N", "Gait cycles to count.  [default: 5]", above=0.0)
+@number_option("--duration", "S", "Time to count, in seconds, instead of cycles.", "s", above=0.0)
+@number_option(
+    "--skip-cycles", "N", "Gait cycles before counting.  [default: 1; 0 with --duration]", at_least=0.0
 )
 @click.option(
     "--model", type=click.Choice(MODELS), help=f"Formulation of the motion.  [default: {DEFAULT_MODEL}]"
@@ -401,8 +366,7 @@ def simulate(mechanism: str, json_file: Path | None, out: Path | None, **options
         from leg_wear_monitor.cli.tables import print_result
 
         print_result(result, wall_s)
-        for path in written:
-            click.echo(f"written: {path}")
+    say(json_file, (), written)
 
 
 def _keywords(clearances: str | None, wear: str, duration: float | None, **options: Any) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from leg_wear_monitor.cli.common import (
     ledger_option,
     need_rclpy,
     node_option,
+    number_option,
     trigger,
     wait_option,
 )
@@ -218,13 +219,7 @@ WITH_FINDINGS = 1
 @click.command(short_help="Enter a measured clearance, which updates the forecast.")
 @click.argument("joint", required=False)
 @click.argument("mm", type=float, required=False, callback=bounded("mm", above=0.0))
-@click.option(
-    "--sigma",
-    type=float,
-    callback=bounded("mm", above=0.0),
-    metavar="MM",
-    help="Standard deviation of the measurement.",
-)
+@number_option("--sigma", "MM", "Standard deviation of the measurement.", "mm", above=0.0)
 @config_option
 @ledger_option
 @click.option("--accept", is_flag=True, help="Use it even if it contradicts the model.")

@@ -296,12 +296,19 @@ class LegForecast:
     Attributes
     ----------
     answer : Answer
-    cycles, hours, days : Quantiles or None
-        As those of a joint.
+        What can be said of it.
+    cycles : Quantiles or None
+        Gait cycles; None unless known.
+    hours : Quantiles or None
+        Hours of walking; None unless known.
+    days : Quantiles or None
+        Days at the usual duty; None unless known.
     first_probability : dict of str to float
-        With which each joint is the first; empty unless known.
+        Probability that this joint is the first; empty unless known.
     simulated_lives : int
-        That tell how joints act upon each other; 0: growth is supposed to stay as it is.
+        Number of simulated lives, which show the effect of joints on each other.
+    first : str or None
+        The joint that is most likely the first.
     """
 
     answer: Answer
@@ -310,10 +317,10 @@ class LegForecast:
     days: Quantiles | None
     first_probability: dict[str, float]
     simulated_lives: int
+    first: str | None = attrs.field()
 
-    @property
-    def first(self) -> str | None:
-        """The joint that is most likely the first; None if that is not known."""
+    @first.default
+    def _first(self) -> str | None:
         return max(self.first_probability, key=lambda j: self.first_probability[j], default=None)
 
 
@@ -457,7 +464,14 @@ def forecast(
     if life["cycles"] is not None:
         fraction = np.bincount(ends.argmin(axis=0), minlength=len(now)) / MEMBERS
         first = {each.joint: float(p) for each, p in zip(now, fraction, strict=True)}
-    leg = LegForecast(answer=answer, **life, first_probability=first, simulated_lives=law.lives)
+    leg = LegForecast(
+        answer=answer,
+        cycles=life["cycles"],
+        hours=life["hours"],
+        days=life["days"],
+        first_probability=first,
+        simulated_lives=law.lives,
+    )
     return Forecast(joints=joints, leg=leg)
 
 

@@ -14,7 +14,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.twin.reference import COUPLING_DAMPING
+from leg_wear_monitor.twin.reference import LegParameters
 from leg_wear_monitor.twin.torque_reference import TorqueReference
 from leg_wear_monitor.wear import SECTORS
 
@@ -459,32 +459,19 @@ class Commissioned:
 
 @attrs.frozen
 class IdentifiedLeg:
-    """Masses, lengths and friction of a leg, as factors on those of its mechanism file, and its drive.
+    """Parameters that the drive torque shows of a leg.
 
     Attributes
     ----------
     stamp_ns : int
-    names : tuple of str
-    mass, length : tuple of float
-    friction : float
-        In all joints.
-    compliance, damping : float
-        Between the measured crank angle and the crank [rad/(N m)]; of the critical damping.
-    load : (n, 2) array
-        Force of the ground on the toe at equal steps of the crank angle from 0 [N]; (0, 2) without one.
-    load_sigma : float
-        Standard deviation of its size, as a fraction of it.
+    bodies : tuple of str
+        Names of the bodies, in the order of the parameters.
+    parameters : LegParameters
     """
 
     stamp_ns: int
-    names: tuple[str, ...]
-    mass: tuple[float, ...]
-    length: tuple[float, ...]
-    friction: float
-    compliance: float = 0.0
-    damping: float = COUPLING_DAMPING
-    load: Floats = attrs.field(factory=lambda: np.zeros((0, 2)), eq=attrs.cmp_using(eq=np.array_equal))
-    load_sigma: float = 0.0
+    bodies: tuple[str, ...]
+    parameters: LegParameters
 
 
 @attrs.frozen(eq=False)

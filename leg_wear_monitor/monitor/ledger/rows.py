@@ -205,10 +205,8 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
             add(db, "commissioning", values)
         case CommissionedTorque():
             add(db, "torque_commissioning", _baseline_values(event))
-        case IdentifiedLeg(stamp_ns, names, mass, length, friction, compliance, damping, load, load_sigma):
-            bodies = np.array(mass), np.array(length)
-            leg = LegParameters(*bodies, friction, compliance, damping, load, load_sigma)
-            add(db, "identified_leg", {"stamp_ns": stamp_ns, **_leg_values(names, leg)})
+        case IdentifiedLeg(stamp_ns, bodies, parameters):
+            add(db, "identified_leg", {"stamp_ns": stamp_ns, **_leg_values(bodies, parameters)})
         case SimulatedReference():
             _write_reference(db, event)
         case _:
@@ -358,12 +356,7 @@ _LEG = "stamp_ns, bodies, mass, length, friction, compliance_rad_per_nm, damping
 def read_identified_leg(db: sqlite3.Connection) -> IdentifiedLeg | None:
     """Masses, lengths, friction and drive of the leg, None if they were not identified."""
     row = db.execute(f"SELECT {_LEG} FROM identified_leg ORDER BY id DESC LIMIT 1").fetchone()
-    if row is None:
-        return None
-    names, leg = _leg_of(*row[1:])
-    bodies = tuple(leg.mass.tolist()), tuple(leg.length.tolist())
-    drive = leg.compliance, leg.damping
-    return IdentifiedLeg(row[0], names, *bodies, leg.friction, *drive, leg.load, leg.load_sigma)
+    return IdentifiedLeg(row[0], *_leg_of(*row[1:])) if row else None
 
 
 def read_simulated_references(db: sqlite3.Connection) -> list[SimulatedReference]:

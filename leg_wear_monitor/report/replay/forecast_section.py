@@ -6,10 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.monitor.forecast.forecast import JointForecast, bases, three_digits
+from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast, bases, three_digits
 from leg_wear_monitor.monitor.forecast.measurement import validity
 from leg_wear_monitor.monitor.ledger.entry import Measurement
-from leg_wear_monitor.playback.result import LegLife, ReplaySummary
+from leg_wear_monitor.playback.result import ReplaySummary
 from leg_wear_monitor.report.figure import length_unit
 from leg_wear_monitor.report.page import Chart, Panel, Part, Section, Series, Table, Text, not_valid
 from leg_wear_monitor.state import Figure
@@ -75,7 +75,7 @@ def leg_sentence(summary: ReplaySummary) -> list[str]:
     ]
 
 
-def _life(leg: LegLife, fraction: str) -> str:
+def _life(leg: LegForecast, fraction: str) -> str:
     days = f" or {three_digits(getattr(leg.days, fraction))} days" if leg.days else ""
     return f"{three_digits(getattr(leg.hours, fraction))} hours of walking{days}"
 
@@ -123,7 +123,7 @@ def _clearance(told: JointForecast) -> str:
     return f"{1.0e3 * may_be.p10:.4f} to {1.0e3 * may_be.p90:.4f}"
 
 
-def _lasts(told: JointForecast | LegLife) -> tuple[str, ...]:
+def _lasts(told: JointForecast | LegForecast) -> tuple[str, ...]:
     return tuple(
         three_digits(getattr(unit, fraction)) if unit else "-"
         for unit in (told.hours, told.days)
@@ -131,7 +131,7 @@ def _lasts(told: JointForecast | LegLife) -> tuple[str, ...]:
     )
 
 
-def _first(leg: LegLife | None, joint: str) -> str:
+def _first(leg: LegForecast | None, joint: str) -> str:
     known = leg is not None and joint in leg.first_probability
     return f"{100.0 * leg.first_probability[joint]:.0f}" if known and leg else "-"
 

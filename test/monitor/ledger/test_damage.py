@@ -51,7 +51,7 @@ def full(open_ledger, entry_at):
     torque = np.ones((2, 1, POINTS), np.float16)
     reference = TorqueReference(CrankProfile.steady(6.0), np.full((2, 5), 3e-4), tuple(torque), LEG)
     ledger.note(SimulatedReference(1, ("thigh",), reference))
-    ledger.note(IdentifiedLeg(1, ("thigh",), (1.02,), (0.999,), 1.5))
+    ledger.note(IdentifiedLeg(1, ("thigh",), LegParameters(np.array([1.02]), np.array([0.999]), 1.5)))
     texts = ("state", "fault_code", "joints", "why", "to_do", "evidence", "not_valid")
     ledger.note(VerdictEvent(stamp_ns=4, since_ns=3, **dict.fromkeys(texts, "[]")))
     ledger.keep(entry_at(2), closed=True)

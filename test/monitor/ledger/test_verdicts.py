@@ -45,20 +45,23 @@ def test_an_identified_leg_is_read_as_written_and_the_last_is_in_force(open_ledg
             IdentifiedLeg(
                 stamp_ns,
                 ("thigh", "foot"),
-                (mass, 1.02),
-                (0.998, 1.001),
-                2.0 * mass,
-                0.5 * mass,
-                0.1 * mass,
-                mass * LOAD_N,
-                0.2 * mass,
+                LegParameters(
+                    np.array([mass, 1.02]),
+                    np.array([0.998, 1.001]),
+                    2.0 * mass,
+                    0.5 * mass,
+                    0.1 * mass,
+                    mass * LOAD_N,
+                    0.2 * mass,
+                ),
             )
         )
     ledger.keep(entry_at(1), closed=True)
     ledger.close()
-    assert open_ledger().parameters == IdentifiedLeg(
-        7, ("thigh", "foot"), (0.9, 1.02), (0.998, 1.001), 1.8, 0.45, 0.1 * 0.9, 0.9 * LOAD_N, 0.2 * 0.9
-    )
+    bodies = np.array([0.9, 1.02]), np.array([0.998, 1.001])
+    found, leg = open_ledger().parameters, LegParameters(*bodies, 1.8, 0.45, 0.1 * 0.9, 0.9 * LOAD_N)
+    assert found == IdentifiedLeg(7, ("thigh", "foot"), leg)
+    assert found.parameters.load_sigma == 0.2 * 0.9
 
 
 def test_a_simulated_reference_is_read_as_written_and_the_last_is_in_force(open_ledger, entry_at, leg):

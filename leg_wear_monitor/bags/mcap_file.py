@@ -13,22 +13,6 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.bags import mcap_layout
 from leg_wear_monitor.bags.findings import Budget, DamageError, Finding, RecordingError, Severity
-from leg_wear_monitor.bags.mcap_layout import (
-    COUNTS,
-    HEAD,
-    MAGIC,
-    RECORD_HEAD,
-    Channel,
-    Layout,
-    Segment,
-    by_index,
-    channels_of,
-    check,
-    chunk_head,
-    definitions,
-    expand,
-    expand_part,
-)
 from leg_wear_monitor.messages.cdr import MESSAGE
 
 # The scan of a file without a usable index, from the first to the last readable record. Its result is a
@@ -43,7 +27,7 @@ _MOST_DEFINITIONS = 4096  # schemas and channels read from one segment
 _ALL_IGNORED = np.full(2**16, mcap_layout.IGNORED, np.uint8)
 
 
-def by_scan(file: IO[bytes], size: int, budget: Budget) -> Layout:
+def by_scan(file: IO[bytes], size: int, budget: Budget) -> mcap_layout.Layout:
     """Layout of a file by its records; each chunk is decompressed to find its channels and log times.
 
     Parameters
@@ -56,7 +40,7 @@ def by_scan(file: IO[bytes], size: int, budget: Budget) -> Layout:
     scan = _Scan(file, size, budget)
     scan.run()
     layout = scan.layout
-    layout.channels = channels_of(scan.definitions.values())
+    layout.channels = mcap_layout.channels_of(scan.definitions.values())
     layout.segments.sort(key=lambda segment: (segment.start_ns, segment.at))
     return layout
 
@@ -65,9 +49,9 @@ class _Scan:
     """State and results of a scan."""
 
     def __init__(self, file: IO[bytes], size: int, budget: Budget) -> None:
-        self.file, self.size, self.at = file, size, len(MAGIC)
+        self.file, self.size, self.at = file, size, len(mcap_layout.MAGIC)
         self.budget = budget
-        self.layout = Layout([], {})
+        self.layout = mcap_layout.Layout([], {})
         self.definitions: dict[tuple[type, int], Any] = {}  # chunks may repeat them
         self.definition_bytes = 0
 
@@ -75,11 +59,11 @@ class _Scan:
         """Read record by record until the data section ends or the records become unreadable."""
         while True:
             self.file.seek(self.at)
-            head = self.file.read(RECORD_HEAD)
-            if len(head) < RECORD_HEAD:
+            head = self.file.read(mcap_layout.RECORD_HEAD)
+            if len(head) < mcap_layout.RECORD_HEAD:
                 self._ends_early(len(head))
                 return
-            opcode, length = HEAD.unpack(head)
+            opcode, length = mcap_layout.HEAD.unpack(head)
             if opcode == mcap_layout.DATA_END and length == 4:
                 self.layout.data_end = self.at
                 self.layout.data_crc = int.from_bytes(self.file.read(4), "little")
@@ -92,10 +76,10 @@ class _Scan:
 
     def _step(self, opcode: int, length: int) -> bool:
         """Process one record, or the messages outside of chunks from here on; False ends the scan."""
-        end = self.at + RECORD_HEAD + length
+        end = self.at + mcap_layout.RECORD_HEAD + length
         if opcode == mcap_layout.CHUNK:
             try:
-                segment = chunk_head(self.file, self.at, self.size)
+                segment = mcap_layout.chunk_head(self.file, self.at, self.size)
             except DamageError as error:
                 self._report_loss(str(error))
                 return False
@@ -121,17 +105,17 @@ class _Scan:
     def _add_messages(self, end: int) -> int:
         """Add the messages outside of chunks from here on as one segment; return the offset of its end."""
         window = min(max(end - self.at, _WINDOW), self.size - self.at)
-        self._add_segment(Segment(self.at, self.at, window, window))
+        self._add_segment(mcap_layout.Segment(self.at, self.at, window, window))
         return self.at + self.layout.segments[-1].stored
 
-    def _add_segment(self, segment: Segment) -> None:
+    def _add_segment(self, segment: mcap_layout.Segment) -> None:
         """Add a segment with the log times that it contains, and its definitions."""
         try:
             data = content(self.file, segment, self.budget)
         except DamageError:
             self.layout.segments.append(segment)  # the reader reports the damage
             return
-        counts, positions = np.zeros(1, COUNTS), np.zeros(_MOST_DEFINITIONS, np.int64)
+        counts, positions = np.zeros(1, mcap_layout.COUNTS), np.zeros(_MOST_DEFINITIONS, np.int64)
         mcap_layout.walk(np.frombuffer(data, np.uint8), _ALL_IGNORED, np.zeros(0, MESSAGE), positions, counts)
         self._add_definitions(data, positions[: int(counts["definitions"][0])].tolist())
         if counts["last_log_time_ns"][0] >= 0:
@@ -144,7 +128,7 @@ class _Scan:
 
     def _add_definitions(self, data: bytes, positions: list[int]) -> None:
         """Store schemas and channels while memory permits; of each number, the last one."""
-        for record in definitions(data, positions):
+        for record in mcap_layout.definitions(data, positions):
             self.definition_bytes += len(record.data) if isinstance(record, Schema) else len(record.topic)
             if self.definition_bytes <= self.budget.part_limit // 4:
                 self.definitions[type(record), record.id] = record
@@ -163,7 +147,7 @@ class _Scan:
         )
 
 
-def content(file: IO[bytes], segment: Segment, budget: Budget) -> bytes:
+def content(file: IO[bytes], segment: mcap_layout.Segment, budget: Budget) -> bytes:
     """Records of a segment, without verification of its checksum; the readable part of a truncated one.
 
     Raises
@@ -175,8 +159,8 @@ def content(file: IO[bytes], segment: Segment, budget: Budget) -> bytes:
     file.seek(segment.data_at)
     data = file.read(segment.stored)
     if segment.cut:
-        return expand_part(data, segment.compression, segment.size)
-    return expand(data, segment.compression, segment.size)
+        return mcap_layout.expand_part(data, segment.compression, segment.size)
+    return mcap_layout.expand(data, segment.compression, segment.size)
 
 
 # The reader of one MCAP file: its topics, and its messages in pieces in order of log time.
@@ -250,7 +234,7 @@ class McapFile:
         self.without_checksum = 0
         self._read = 0
         self._check_magic()
-        indexed = by_index(file, self.size, budget)
+        indexed = mcap_layout.by_index(file, self.size, budget)
         self.layout = indexed or by_scan(file, self.size, budget)
         self.is_indexed = indexed is not None
         for text in self.layout.losses:
@@ -260,7 +244,7 @@ class McapFile:
         self._check_data()
 
     @property
-    def channels(self) -> dict[int, Channel]:
+    def channels(self) -> dict[int, mcap_layout.Channel]:
         """Channels of the file by channel number."""
         return self.layout.channels
 
@@ -280,7 +264,7 @@ class McapFile:
             yield Due(segment.start_ns, partial(self._piece, segment, roles))
         self._report_missing(types, self._read)
 
-    def _piece(self, segment: Segment, roles: NDArray[np.uint8]) -> Piece | None:
+    def _piece(self, segment: mcap_layout.Segment, roles: NDArray[np.uint8]) -> Piece | None:
         """Messages of a segment; None if it is damaged."""
         try:
             data = np.frombuffer(self._verified_content(segment), np.uint8)
@@ -291,12 +275,12 @@ class McapFile:
         self._read += len(messages)
         return Piece(segment.start_ns, data, messages, segment.stored)
 
-    def _verified_content(self, segment: Segment) -> bytes:
+    def _verified_content(self, segment: mcap_layout.Segment) -> bytes:
         """Records of a segment, whose head must agree with the index and whose checksum with the data."""
         if segment.data_at == segment.at:  # messages outside of chunks
             self.without_checksum += 1
             return content(self.file, segment, self.budget)
-        head = chunk_head(self.file, segment.at, self.size)
+        head = mcap_layout.chunk_head(self.file, segment.at, self.size)
         if (head.data_at, head.stored, head.size, head.compression) != (
             segment.data_at,
             segment.stored,
@@ -306,15 +290,15 @@ class McapFile:
             raise DamageError("differs from the index")
         data = content(self.file, segment, self.budget)
         if not segment.cut:
-            check(data, head.crc)
+            mcap_layout.check(data, head.crc)
         self.without_checksum += not head.crc or segment.cut
         return data
 
     def _messages(
-        self, segment: Segment, data: NDArray[np.uint8], roles: NDArray[np.uint8]
+        self, segment: mcap_layout.Segment, data: NDArray[np.uint8], roles: NDArray[np.uint8]
     ) -> NDArray[np.void]:
         """Messages of requested channels in a segment: counted first, then read."""
-        counts = np.zeros(1, COUNTS)
+        counts = np.zeros(1, mcap_layout.COUNTS)
         mcap_layout.walk(data, roles, _NO_MESSAGES, _NO_POSITIONS, counts)
         wanted = int(counts["wanted"][0])
         self.budget.check(segment.stored + len(data) + _BYTES_PER_MESSAGE * wanted)
@@ -350,12 +334,14 @@ class McapFile:
     def _check_magic(self) -> None:
         """Check that the file is an MCAP file."""
         self.file.seek(0)
-        start = self.file.read(len(MAGIC))
+        start = self.file.read(len(mcap_layout.MAGIC))
         if not self.size:
             raise RecordingError(str(self.path), "", "is empty, expected an MCAP file")
-        if start != MAGIC:
+        if start != mcap_layout.MAGIC:
             raise RecordingError(
-                str(self.path), "", f"begins with {start!r}, expected {MAGIC!r}: is not an MCAP file"
+                str(self.path),
+                "",
+                f"begins with {start!r}, expected {mcap_layout.MAGIC!r}: is not an MCAP file",
             )
 
     def _check_data(self) -> None:

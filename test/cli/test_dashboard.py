@@ -63,7 +63,7 @@ def test_without_ros_a_node_is_one_line(run, complaints, monkeypatch):
     def without():
         raise LegWearError("rclpy: no module")
 
-    monkeypatch.setattr(nodes, "need_rclpy", without)
+    monkeypatch.setattr(nodes.common, "need_rclpy", without)
     result = run("dashboard", "--node", "/left/leg_wear_monitor")
     assert (result.exit_code, complaints(result)) == (2, ["error: rclpy: no module"])
 

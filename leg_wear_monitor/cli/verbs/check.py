@@ -13,20 +13,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import click
 
-from leg_wear_monitor.cli.common import (
-    bags_installed,
-    check_directory,
-    check_outputs,
-    compilation,
-    is_compiled,
-    json_option,
-    mark_compiled,
-    progress_bar,
-    say,
-    sourced_lines,
-    warn_of,
-    write_json,
-)
+from leg_wear_monitor.cli import common
 from leg_wear_monitor.cli.main import version
 from leg_wear_monitor.cli.verbs.study import DEFAULT_MODEL
 from leg_wear_monitor.errors import ConfigWarning, LegWearError
@@ -118,8 +105,8 @@ def _kernels() -> str:
     place = cache_directory()
     if place is None:
         return "compiled at every start: no place for compiled code is private"
-    check_directory("NUMBA_CACHE_DIR", place)
-    state = "compiled" if is_compiled(DEFAULT_MODEL) else "to be compiled by the first simulation"
+    common.check_directory("NUMBA_CACHE_DIR", place)
+    state = "compiled" if common.is_compiled(DEFAULT_MODEL) else "to be compiled by the first simulation"
     return f"{state}, in {place}"
 
 
@@ -137,7 +124,7 @@ def _is_table(name: str) -> bool:
 
 def _table(name: str, parameters: str | None) -> str:
     """Read a table, and say what was understood of it."""
-    with bags_installed():
+    with common.bags_installed():
         from leg_wear_monitor.bags.findings import Severity
         from leg_wear_monitor.bags.reader import understood
     from leg_wear_monitor.monitor.config.parameters import load_config
@@ -166,14 +153,13 @@ def _file(name: str) -> str:
 
 def _fleet(path: str) -> str:
     """Read the description of a fleet and the begins of its recordings, and say what was understood."""
-    from leg_wear_monitor.cli.common import progress_bar
     from leg_wear_monitor.fleet.description import load_fleet
     from leg_wear_monitor.fleet.update import understood
 
     fleet = load_fleet(path)
     for file in dict.fromkeys(leg.config_file for leg in fleet.legs if leg.config_file):
         click.echo(f"{file.name:<13} {_parameters(str(file))}")
-    with progress_bar("looking at the recordings") as progress:
+    with common.progress_bar("looking at the recordings") as progress:
         pairs = list(understood(fleet, progress))
     for fault in (fault for _, fault in pairs if fault):
         warnings.warn(f"{path}: {fault}", ConfigWarning, stacklevel=2)
@@ -189,7 +175,7 @@ def _parameters(path: str) -> str:
     config = load_config(path)
     leg = fitted(load_mechanism(config.mechanism), config, path)
     twin_settings(config, path)
-    warn_of(path, parameter_doubts(config, leg))
+    common.warn_of(path, parameter_doubts(config, leg))
     text = (
         f"parameters of the monitor: {config.mechanism}, clearance joints {', '.join(leg.clearance_joints)}, "
         f"{config.cadence.commanded_rpm:g} rpm, hardware {config.hardware}"
@@ -228,12 +214,12 @@ def _mechanism(name: str) -> str:
     from leg_wear_monitor.mechanism.plausible import doubts
 
     leg = load_mechanism(name)
-    with compilation("mechanism", how_long="a few seconds"):
+    with common.compilation("mechanism", how_long="a few seconds"):
         from leg_wear_monitor.contact.arrays import conformity_doubts
         from leg_wear_monitor.dynamics.simulation import prepare
 
         linkage = prepare(leg).linkage
-    warn_of(leg.source, (*doubts(leg), *conformity_doubts(linkage)))
+    common.warn_of(leg.source, (*doubts(leg), *conformity_doubts(linkage)))
     clearance_joints = (
         f"clearance joints {', '.join(leg.clearance_joints)}"
         if leg.clearance_joints
@@ -251,7 +237,7 @@ def _mechanism(name: str) -> str:
 
 @click.command(short_help="List drives by name, with the sources of their figures.")
 @click.argument("name", required=False)
-@json_option("the drives")
+@common.json_option("the drives")
 def drives(name: str | None, json_file: Path | None) -> None:
     """List the drives that the parameter drive.type can name, or print one of them with all its sources.
 
@@ -267,10 +253,10 @@ def _told(
     kind: str, known: Sequence[_Sourced], lines: Callable[[_Sourced], list[str]], json_file: Path | None
 ) -> None:
     """Print and write what files of the package say."""
-    check_outputs(json_file, None)
+    common.check_outputs(json_file, None)
     document = {"schema_version": 1, kind: [one.to_dict() for one in known]}
-    written = write_json(json_file, json_text(document))
-    say(json_file, chain.from_iterable(map(lines, known)), written)
+    written = common.write_json(json_file, json_text(document))
+    common.say(json_file, chain.from_iterable(map(lines, known)), written)
 
 
 def _drive_listed(drive: "Drive") -> list[str]:
@@ -282,7 +268,7 @@ def _drive_listed(drive: "Drive") -> list[str]:
 def _drive_in_full(drive: "Drive") -> list[str]:
     """A drive with every number, its conditions and its source."""
     head = [f"{drive.name}: {drive.title}", f"torques and speeds are those of the {drive.shaft} shaft"]
-    return [*head, *sourced_lines(drive.values()), *([f"note: {drive.notes}"] if drive.notes else [])]
+    return [*head, *common.sourced_lines(drive.values()), *([f"note: {drive.notes}"] if drive.notes else [])]
 
 
 # ``leg-wear-monitor materials``: material pairs of joints, with their sources.
@@ -290,7 +276,7 @@ def _drive_in_full(drive: "Drive") -> list[str]:
 
 @click.command(short_help="List the material pairs of joints, with their sources.")
 @click.argument("name", required=False)
-@json_option("the pairs")
+@common.json_option("the pairs")
 def materials(name: str | None, json_file: Path | None) -> None:
     """List the material pairs that a joint can name, or print one of them with all its sources.
 
@@ -320,7 +306,7 @@ def _in_full(pair: "Material") -> list[str]:
         f"{pair.name}: {pair.title}",
         f"bushing: {pair.bushing.material}; journal: {pair.journal.material}; lubricant: {pair.lubricant}",
         f"regime: {pair.regime}",
-        *sourced_lines(pair.values()),
+        *common.sourced_lines(pair.values()),
     ]
     if pair.wear_coefficients is None:
         lines.append(
@@ -360,8 +346,8 @@ def cache(fill: bool, clear: bool) -> None:
     if fill:
         from leg_wear_monitor.cli import kernels
 
-        kernels.compile_all(progress_bar("compiling numerical kernels (once per installation)"))
-        mark_compiled(kernels.SETS)
+        kernels.compile_all(common.progress_bar("compiling numerical kernels (once per installation)"))
+        common.mark_compiled(kernels.SETS)
     kept = kept_directories(here.parent)
     click.echo(f"place: {here.parent}")
     if clear:

@@ -8,22 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from leg_wear_monitor.cli.common import (
-    STDOUT,
-    bags_installed,
-    bounded,
-    check_file,
-    clearances_option,
-    compilation,
-    config_option,
-    json_option,
-    number_option,
-    path_option,
-    progress_bar,
-    say,
-    write_file,
-    write_json,
-)
+from leg_wear_monitor.cli import common
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.monitor.config.tables import ANGLES, COUNTS, DATE, STAMPS
 
@@ -45,20 +30,20 @@ WITH_FINDINGS = 1
 @click.argument(
     "recordings", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="RECORDING..."
 )
-@path_option(
+@common.path_option(
     "--config",
     "FILE",
     "Parameter file that names the mechanism; parameters that are not measured are kept.  "
     "[default: the one that comes with the package]",
 )
-@path_option(
+@common.path_option(
     "--out",
     "FILE",
     "Write the proposed parameters, such as monitor.yaml; nothing is written if a choice is not "
     "certain, and a file that exists is kept unless everything is determined and fits.",
     dir_okay=False,
 )
-@path_option(
+@common.path_option(
     "--reference",
     "FILE",
     "Simulate a torque reference of the leg under the recorded motion of its crank, about a minute, and "
@@ -68,7 +53,7 @@ WITH_FINDINGS = 1
 @click.option("--joint-states", metavar="TOPIC", help="Topic of the crank.  [default: all are tried]")
 @click.option("--drive-torque", metavar="TOPIC", help="Topic of the torque.  [default: all are tried]")
 @click.option("--crank-joint", metavar="NAME", help="The crank's name.  [default: all joints are tried]")
-@json_option("the result")
+@common.json_option("the result")
 def commission(
     recordings: tuple[Path, ...],
     config: Path | None,
@@ -88,15 +73,15 @@ def commission(
     fit.
     """
     for option, path in (("--out", out), ("--reference", reference), ("--json", json_file)):
-        if path is not None and path != STDOUT:
-            check_file(option, path)
+        if path is not None and path != common.STDOUT:
+            common.check_file(option, path)
     topics = {"joint_states": joint_states, "drive_torque": drive_torque, "crank_joint": crank_joint}
     result = _run(recordings, config, reference, topics)
-    if json_file != STDOUT:
+    if json_file != common.STDOUT:
         from leg_wear_monitor.cli.pages import print_commissioning
 
         print_commissioning(result)
-    written = write_json(json_file, result.to_json() if json_file is not None else "")
+    written = common.write_json(json_file, result.to_json() if json_file is not None else "")
     if reference is not None and result.reference is not None and result.config is not None:
         _write_reference(reference, result.config, result.reference)
         written.append(reference)
@@ -104,9 +89,9 @@ def commission(
         if out.exists() and not result.is_sure:
             click.echo(f"not written: {out} exists, and the proposal is not certain in all", err=True)
         else:
-            write_file(out, result.to_yaml().encode())
+            common.write_file(out, result.to_yaml().encode())
             written.append(out)
-    say(json_file, (), written)
+    common.say(json_file, (), written)
     return 0 if result.is_sure else WITH_FINDINGS
 
 
@@ -119,15 +104,15 @@ def _write_reference(file: Path, config: "MonitorConfig", made: "TorqueReference
 
     content = BytesIO()
     write_references(content, fitted(load_mechanism(config.mechanism), config), [made])
-    write_file(file, content.getvalue())
+    common.write_file(file, content.getvalue())
 
 
 def _run(
     recordings: tuple[Path, ...], path: Path | None, reference: Path | None, topics: dict[str, str | None]
 ) -> "CommissioningResult":
-    with bags_installed():
+    with common.bags_installed():
         from leg_wear_monitor.commissioning.commission import commission as propose
-    with compilation("commissioning", "monitor"), progress_bar("commissioning") as progress:
+    with common.compilation("commissioning", "monitor"), common.progress_bar("commissioning") as progress:
         result = propose(recordings, path, **topics, reference=reference, progress=progress)
     for fault in result.faults:
         click.echo(f"warning: {fault}", err=True)
@@ -139,17 +124,17 @@ def _run(
 
 @click.command(short_help="Simulate a torque reference beforehand.")
 @click.argument("mechanism", required=False)
-@config_option
+@common.config_option
 @click.option(
     "--cadence",
     "cadences",
     type=float,
     multiple=True,
-    callback=lambda ctx, param, values: tuple(bounded("rpm")(ctx, param, one) for one in values),
+    callback=lambda ctx, param, values: tuple(common.bounded("rpm")(ctx, param, one) for one in values),
     metavar="RPM",
     help="Cadence, negative for clockwise; may be given several times.  [default: the commanded one]",
 )
-@path_option(
+@common.path_option(
     "--out",
     "FILE",
     "File to write, such as leg.reference.npz, for the parameter diagnosis.reference.",
@@ -163,7 +148,7 @@ def reference(mechanism: str | None, config: Path | None, cadences: tuple[float,
     parameter file. The crank turns steadily, the leg is new. A leg whose diagnosis.reference names the file
     needs no simulation while it walks at this cadence.
     """
-    check_file("--out", out)
+    common.check_file("--out", out)
     import attrs
 
     from leg_wear_monitor.mechanism.loader import load_mechanism
@@ -179,14 +164,17 @@ def reference(mechanism: str | None, config: Path | None, cadences: tuple[float,
         config_from(values_of(settings) | {"cadence.commanded_rpm": cadence}, "--cadence")
     leg = fitted(load_mechanism(settings.mechanism), settings)
     began = time.perf_counter()
-    with compilation("monitor", how_long="about a minute"), progress_bar("simulating") as progress:
+    with (
+        common.compilation("monitor", how_long="about a minute"),
+        common.progress_bar("simulating") as progress,
+    ):
         made = simulated_references(leg, cadences, progress)
     for cadence, one in zip(cadences, made, strict=True):
         cycles = len(one.torque_nm[-1])
         click.echo(f"{leg.name} at {cadence:g} rpm: {len(one.torque_nm)} legs, {cycles} gait cycles each")
     file = BytesIO()
     write_references(file, leg, made)
-    write_file(out, file.getvalue())
+    common.write_file(out, file.getvalue())
     click.echo(f"written: {out}, after {time.perf_counter() - began:.3g} s")
 
 
@@ -219,13 +207,13 @@ def reference(mechanism: str | None, config: Path | None, cadences: tuple[float,
     type=click.Choice([*ANGLES, COUNTS]),
     help="Unit of the angle in a table; counts are those of --counts-per-turn.  [default: that of --config]",
 )
-@number_option(
+@common.number_option(
     "--counts-per-turn",
     "N",
     "Counts of the encoder per turn of the joint.  [default: found from the values]",
     above=0.0,
 )
-@path_option(
+@common.path_option(
     "--config",
     "FILE",
     "Parameter file with the column of the time and the units of a table.  "
@@ -247,8 +235,8 @@ def reference(mechanism: str | None, config: Path | None, cadences: tuple[float,
     metavar="DEG",
     help="Crank angle of the mechanism in a recording; once for each, in their order.",
 )
-@clearances_option("A,B")
-@json_option("the result")
+@common.clearances_option("A,B")
+@common.json_option("the result")
 def play(
     recordings: tuple[Path, ...],
     mechanism: str | None,
@@ -265,8 +253,8 @@ def play(
     postures, the command tells which joints have the clearance. Exit code 1 if the result is doubtful, if
     joints are not told apart, or if a part of a recording is lost.
     """
-    if json_file is not None and json_file != STDOUT:
-        check_file("--json", json_file)
+    if json_file is not None and json_file != common.STDOUT:
+        common.check_file("--json", json_file)
     if mechanism is None and (encoder or crank_angles or clearances):
         raise click.UsageError("--encoder, --crank-angle and --clearances need --mechanism")
     if mechanism is not None and len(crank_angles) != len(recordings):
@@ -348,10 +336,10 @@ def _play(
     loads: tuple[str, ...],
     counts_per_turn: float | None,
 ) -> tuple["Play", bool]:
-    with bags_installed():
+    with common.bags_installed():
         from leg_wear_monitor.bags.findings import Severity
         from leg_wear_monitor.play.measurement import measure_play, read_rocked
-    with compilation("play"), progress_bar("reading") as progress:
+    with common.compilation("play"), common.progress_bar("reading") as progress:
         read = read_rocked(recording, settings, joint, loads, progress)
     for finding in read.findings:
         click.echo(finding.line, err=True)
@@ -366,7 +354,7 @@ def _clearances(leg: "Mechanism", encoder: str, plays: list["Play"]) -> "Clearan
     from leg_wear_monitor.play.fit import clearances_of
 
     angles = [play.crank_angle_rad or 0.0 for play in plays]
-    with compilation("mechanism"):
+    with common.compilation("mechanism"):
         return clearances_of(
             leg, encoder, angles, [play.play_rad for play in plays], [play.sigma_rad for play in plays]
         )
@@ -385,5 +373,5 @@ def _written(
 
     result = PlayMeasurement(plays=tuple(plays), clearances=found)
     printed = lines(result, leg.name if leg else "", encoder)
-    say(json_file, printed, write_json(json_file, result.to_json()))
+    common.say(json_file, printed, common.write_json(json_file, result.to_json()))
     return 0 if result.is_sure else WITH_FINDINGS

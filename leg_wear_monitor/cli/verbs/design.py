@@ -7,21 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from leg_wear_monitor.cli.common import (
-    check_outputs,
-    clearances_option,
-    compilation,
-    json_option,
-    limit_option,
-    number_option,
-    options_named,
-    out_option,
-    progress_bar,
-    say,
-    with_clearance_joints,
-    write_directory,
-    write_json,
-)
+from leg_wear_monitor.cli import common
 
 if TYPE_CHECKING:
     from leg_wear_monitor.life.design import BushingChoices, Design
@@ -40,7 +26,7 @@ def _numbers(ctx: click.Context, param: click.Parameter, value: str) -> tuple[fl
 
 @click.command(short_help="Find bushings with which each joint lasts the hours wanted.")
 @click.argument("mechanism", default="bionic_leg")
-@clearances_option("A,B")
+@common.clearances_option("A,B")
 @click.option(
     "--duty",
     default="0:8",
@@ -49,10 +35,10 @@ def _numbers(ctx: click.Context, param: click.Parameter, value: str) -> tuple[fl
     help="Hours a day at each peak of the ground's vertical force on the toe [N], such as 0:2,300:5; or a "
     "YAML file with duty: [{load_n, hours_per_day, speed_rpm}, ...].",
 )
-@number_option(
+@common.number_option(
     "--hours", "H", "Hours of walking that each joint should last.", "h", above=0.0, default=1000.0
 )
-@limit_option
+@common.limit_option
 @click.option(
     "--materials", metavar="NAME,...", help="Pairs to try.  [default: all that come with the package]"
 )
@@ -68,8 +54,8 @@ def _numbers(ctx: click.Context, param: click.Parameter, value: str) -> tuple[fl
     "--clearances-um", default="25,50,100", show_default=True, callback=_numbers, metavar="UM,...",
     help="Radial clearances when new to try.",
 )  # fmt: skip
-@json_option("the design")
-@out_option("Write design.html, design.json and design.csv with all candidates.")
+@common.json_option("the design")
+@common.out_option("Write design.html, design.json and design.csv with all candidates.")
 def design(
     mechanism: str,
     clearances: str | None,
@@ -95,7 +81,7 @@ def design(
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.mechanism.materials import materials as shipped
 
-    leg = with_clearance_joints(load_mechanism(mechanism), clearances)
+    leg = common.with_clearance_joints(load_mechanism(mechanism), clearances)
     names = tuple(shipped()) if materials is None else tuple(one.strip() for one in materials.split(","))
     choices = BushingChoices(
         materials=names,
@@ -103,18 +89,18 @@ def design(
         widths_m=tuple(1.0e-3 * one for one in widths_mm),
         clearances_m=tuple(1.0e-6 * one for one in clearances_um),
     )
-    check_outputs(json_file, out)
-    with options_named(), compilation("clearance"), progress_bar("design") as progress:
+    common.check_outputs(json_file, out)
+    with common.options_named(), common.compilation("clearance"), common.progress_bar("design") as progress:
         result = of_leg(leg, read_duty(duty), choices, hours=hours, limit_m=limit_m, progress=progress)
-    written = write_json(json_file, result.to_json())
+    written = common.write_json(json_file, result.to_json())
     if out is not None:
         from leg_wear_monitor.report.design_page import design_page
         from leg_wear_monitor.report.page import page_html
 
         page = page_html(design_page(leg, result, choices)).encode()
         files = {"design.html": page, "design.json": result.to_json().encode(), "design.csv": _csv(result)}
-        written += write_directory(out, files)
-    say(json_file, lines(result, choices), written)
+        written += common.write_directory(out, files)
+    common.say(json_file, lines(result, choices), written)
 
 
 def lines(result: "Design", choices: "BushingChoices") -> list[str]:

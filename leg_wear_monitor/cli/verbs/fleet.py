@@ -6,14 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from leg_wear_monitor.cli.common import (
-    check_directory,
-    compilation,
-    out_option,
-    progress_bar,
-    sample_option,
-    workers_option,
-)
+from leg_wear_monitor.cli import common
 
 if TYPE_CHECKING:
     from leg_wear_monitor.fleet.chain import Chain
@@ -32,12 +25,12 @@ def fleet() -> None:
 
 @fleet.command(short_help="Count the recordings that are not counted yet.")
 @click.argument("description", type=click.Path(path_type=Path), metavar="FLEET.yaml")
-@out_option("Directory of the fleet.  [default: out of the description, or fleet beside it]")
-@workers_option
+@common.out_option("Directory of the fleet.  [default: out of the description, or fleet beside it]")
+@common.workers_option
 @click.option(
     "--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers count instead, tcp://HOST:PORT."
 )
-@sample_option
+@common.sample_option
 @click.option("--follow", is_flag=True, help="Go on with new recordings as they are completed, until ^C.")
 @click.option(
     "--every-s",
@@ -67,7 +60,7 @@ def update(
 
     legs = load_fleet(description)
     out = out or legs.out
-    check_directory("--out", out)
+    common.check_directory("--out", out)
 
     def count(now: "FleetDescription") -> "FleetUpdate":
         return _update(now, out, workers, scheduler, sample)
@@ -82,14 +75,14 @@ def update(
 
 @fleet.command(short_help="Write the tables of a fleet as CSV and Parquet files.")
 @click.argument("path", type=click.Path(path_type=Path), metavar="DIR|FLEET.yaml")
-@out_option("Directory of the tables.  [default: tables in the directory of the fleet]")
+@common.out_option("Directory of the tables.  [default: tables in the directory of the fleet]")
 def export(path: Path, out: Path | None) -> None:
     """Write verdicts, cycles, recordings and lives, each as a CSV and a Parquet file."""
     from leg_wear_monitor.fleet.update import Fleet
 
     found = Fleet(path)
     out = out or found.path / "tables"
-    check_directory("--out", out)
+    common.check_directory("--out", out)
     for file in found.export(out):
         click.echo(f"written: {file}")
 
@@ -101,7 +94,7 @@ def _update(
 
     from leg_wear_monitor.fleet.update import update_fleet
 
-    with progress_bar("updating the fleet") as progress:
+    with common.progress_bar("updating the fleet") as progress:
         return update_fleet(
             legs,
             out,
@@ -163,7 +156,7 @@ def _compile(chains: Sequence["Chain"]) -> None:
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.monitor.wear_monitor import open_monitor
 
-    with compilation("monitor", how_long="about a minute"), advance_beside():
+    with common.compilation("monitor", how_long="about a minute"), advance_beside():
         config: Any = chains[0].leg.config
         open_monitor(load_mechanism(config.mechanism), config, at_end=True).warm_up()
 
@@ -191,7 +184,7 @@ def _print_counts(done: "FleetUpdate", out: Path) -> None:
 
 @fleet.command(short_help="Write the page of the fleet, and a page for each leg.")
 @click.argument("description", type=click.Path(path_type=Path), metavar="FLEET.yaml")
-@out_option("Directory of the fleet.  [default: out of the description, or fleet beside it]")
+@common.out_option("Directory of the fleet.  [default: out of the description, or fleet beside it]")
 @click.option(
     "--fresh-days",
     type=click.FloatRange(min=0.0, min_open=True, max=3650.0),
@@ -200,7 +193,7 @@ def _print_counts(done: "FleetUpdate", out: Path) -> None:
     show_default=True,
     help="Age of its last recording up to which a leg counts as monitored.",
 )
-@workers_option
+@common.workers_option
 def report(description: Path, out: Path | None, fresh_days: float, workers: int | None) -> int:
     """Write DIR/report.html from what the last update found, and legs/ID/report.html for each leg.
 
@@ -213,7 +206,7 @@ def report(description: Path, out: Path | None, fresh_days: float, workers: int 
     from leg_wear_monitor.fleet.description import fleet_directory
 
     out = out or fleet_directory(description)
-    check_directory("--out", out)
+    common.check_directory("--out", out)
     written = write_pages(description, out, fresh_days, workers or os.cpu_count() or 1)
     for fault in written.faults[:_MOST_LINES]:
         click.echo(f"warning: no page of its own: {fault}", err=True)

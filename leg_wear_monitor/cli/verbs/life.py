@@ -7,24 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from leg_wear_monitor.cli.common import (
-    check_outputs,
-    clearances_option,
-    compilation,
-    json_option,
-    limit_option,
-    mechanism_option,
-    number_option,
-    options_named,
-    out_option,
-    progress_bar,
-    say,
-    speed_option,
-    warn_of,
-    with_clearance_joints,
-    write_directory,
-    write_json,
-)
+from leg_wear_monitor.cli import common
 from leg_wear_monitor.files import json_text
 
 if TYPE_CHECKING:
@@ -39,19 +22,21 @@ _TABLE_ROWS = 12  # most rows of the printed table, spread over the life
 
 
 @click.command(short_help="Simulate the wear of a leg over its life, by cycle jumps.")
-@mechanism_option
-@clearances_option("A,B")
-@speed_option
-@limit_option
-@number_option("--horizon-cycles", "N", "Largest number of gait cycles.", above=0.0, default=1.0e9)
-@number_option("--wear-factor", "X", "Factor on all wear coefficients.", above=0.0, default=1.0)
+@common.mechanism_option
+@common.clearances_option("A,B")
+@common.speed_option
+@common.limit_option
+@common.number_option("--horizon-cycles", "N", "Largest number of gait cycles.", above=0.0, default=1.0e9)
+@common.number_option("--wear-factor", "X", "Factor on all wear coefficients.", above=0.0, default=1.0)
 @click.option(
     "--duty",
     metavar="N:H,...",
     help="Hours a day at each peak of the ground's vertical force on the toe [N], such as 0:2,300:5,600:1. "
     "[default: the mechanism's own loads]",
 )
-@number_option("--opens-m", "M", "Deepest change of a surface in a jump.  [default: 3e-05]", "m", above=0.0)
+@common.number_option(
+    "--opens-m", "M", "Deepest change of a surface in a jump.  [default: 3e-05]", "m", above=0.0
+)
 @click.option(
     "--legs", type=click.IntRange(min=1), metavar="N", help="Number of legs averaged.  [default: 2]"
 )
@@ -70,8 +55,8 @@ _TABLE_ROWS = 12  # most rows of the printed table, spread over the life
     help="Number of lives for --json; lives after the first have different wear coefficients, from which the "
     "forecast finds the effect of joints on each other.",
 )
-@json_option("the life")
-@out_option("Write life.json and life.png.")
+@common.json_option("the life")
+@common.out_option("Write life.json and life.png.")
 def life(mechanism: str, json_file: Path | None, out: Path | None, **options: Any) -> None:
     """Simulate the wear of a leg from new until a clearance reaches its limit.
 
@@ -82,22 +67,22 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
     from leg_wear_monitor.mechanism.plausible import doubts
 
     names = options.pop("clearances")
-    leg = with_clearance_joints(load_mechanism(mechanism), names)
-    check_outputs(json_file, out)
-    with options_named():
+    leg = common.with_clearance_joints(load_mechanism(mechanism), names)
+    common.check_outputs(json_file, out)
+    with common.options_named():
         lives = _lives(leg, **options)
     # only after success: the message of a failure names the doubts itself
-    warn_of(leg.source, doubts(leg))
+    common.warn_of(leg.source, doubts(leg))
     result = lives[0][1]
     text = json_text(_document(leg, lives, options["limit_m"]))
-    written = write_json(json_file, text)
+    written = common.write_json(json_file, text)
     if out is not None:
         from leg_wear_monitor.report.figure import life_picture
 
         files = {"life.json": text.encode(), "life.png": life_picture(result)}
-        written += write_directory(out, files)
+        written += common.write_directory(out, files)
     printed = [*lines(result, options["limit_m"], _without_coefficient(leg)), *_regimes(leg, result)]
-    say(json_file, [*printed, *_load_remarks(leg, result)], written)
+    common.say(json_file, [*printed, *_load_remarks(leg, result)], written)
 
 
 def _lives(leg: "Mechanism", lives: int, opens_m: float | None, duty: str | None, **options: Any) -> "Lives":
@@ -123,7 +108,7 @@ def _lives(leg: "Mechanism", lives: int, opens_m: float | None, duty: str | None
     sizes = np.array([[joint.radial_clearance, joint.bushing_radius] for joint in joints])
     clearance_m, radius_m = sizes.reshape(-1, 2).T
     check_life(leg.clearance_joints, clearance_m, radius_m, options["limit_m"], settings.jump)
-    with compilation("clearance"), progress_bar("life") as progress:
+    with common.compilation("clearance"), common.progress_bar("life") as progress:
         return list(simulate_lives(leg, settings, lives, progress=progress, duty=loads, **options))
 
 

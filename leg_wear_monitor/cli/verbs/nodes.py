@@ -15,15 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from leg_wear_monitor.cli.common import (
-    check_directory,
-    compilation,
-    config_option,
-    is_compiled,
-    need_rclpy,
-    node_verb,
-    path_option,
-)
+from leg_wear_monitor.cli import common
 from leg_wear_monitor.cli.start import main as program
 from leg_wear_monitor.errors import LegWearError, closed_at_the_end
 from leg_wear_monitor.files import share_directory
@@ -37,7 +29,7 @@ if TYPE_CHECKING:
 # ``leg-wear-monitor monitor``: the node that follows a real leg.
 
 
-monitor = node_verb(
+monitor = common.node_verb(
     "monitor",
     "monitor_node",
     "Run the monitor as a ROS 2 node.",
@@ -52,7 +44,7 @@ monitor = node_verb(
 # ``leg-wear-monitor gait-publisher``: the synthetic leg as a node.
 
 
-gait_publisher = node_verb(
+gait_publisher = common.node_verb(
     "gait-publisher",
     "gait_publisher",
     "Run the synthetic leg as a ROS 2 node.",
@@ -91,8 +83,8 @@ def demo(out: Path) -> int:
     impacts raise an alarm; the demonstration acknowledges it. Then the recording goes through the same
     monitor again.
     """
-    need_rclpy()
-    check_directory("--out", out)
+    common.need_rclpy()
+    common.check_directory("--out", out)
     out.mkdir(parents=True, exist_ok=True)
     _compile(out)
     demo_listener = _listen(out)
@@ -109,7 +101,7 @@ def _compile(out: Path) -> None:
     """Compile what the nodes need: the monitor's kernels here, the motion and the leg in processes beside."""
     from leg_wear_monitor.workers import python_command  # numba: not for --help
 
-    if is_compiled("monitor") and is_compiled("gait"):
+    if common.is_compiled("monitor") and common.is_compiled("gait"):
         return
     from leg_wear_monitor.dynamics.clearance.stepper import advance_beside
     from leg_wear_monitor.mechanism.loader import load_mechanism
@@ -117,7 +109,7 @@ def _compile(out: Path) -> None:
 
     log_path = out / "compilation.log"
     with (
-        compilation("monitor", "gait", how_long="about a minute"),
+        common.compilation("monitor", "gait", how_long="about a minute"),
         log_path.open("wb") as log,
         # a group of its own: Ctrl-C reaches it by us, once
         subprocess.Popen(python_command(compile_leg), stdout=log, stderr=log, start_new_session=True) as leg,
@@ -257,17 +249,17 @@ _NODE = "/leg_wear_monitor"
     metavar="[NAME]",
     help=f"Full name of a running monitor, such as /left/leg_wear_monitor.  [default: {_NODE}]",
 )
-@path_option(
+@common.path_option(
     "--ledger",
     "FILE",
     "A ledger instead, which a monitor may be writing meanwhile.",
     dir_okay=False,
     exists=True,
 )
-@path_option(
+@common.path_option(
     "--fleet", "FLEET.yaml", "A fleet instead, as the last fleet update left it.", dir_okay=False, exists=True
 )
-@config_option
+@common.config_option
 @click.option(
     "--host",
     default="127.0.0.1",
@@ -332,7 +324,7 @@ def _source(
 
 @contextmanager
 def _live(node: str, config: Path | None) -> Iterator["Source"]:
-    need_rclpy()
+    common.need_rclpy()
     from leg_wear_monitor.dashboard.live_leg import LiveLeg
     from leg_wear_monitor.ros.listeners import full_name, listening, topics_of
 

@@ -10,25 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from leg_wear_monitor.cli.common import (
-    PAGE,
-    STDOUT,
-    SUMMARY,
-    bags_installed,
-    check_outputs,
-    compilation,
-    config_option,
-    json_option,
-    out_option,
-    page_of,
-    path_option,
-    progress_bar,
-    sample_option,
-    say,
-    warn_of,
-    write_directory,
-    write_json,
-)
+from leg_wear_monitor.cli import common
 from leg_wear_monitor.cli.main import version
 from leg_wear_monitor.errors import ConfigError, closed_at_the_end
 from leg_wear_monitor.monitor.alarm_specs import INPUT_KINDS, KINDS
@@ -52,8 +34,8 @@ _MOST_LINES = 20
 
 @click.command(short_help="Replay a recording through the monitor.")
 @click.argument("bags", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="BAG...")
-@out_option("Write reports.mcap (for rosbag2 and Foxglove), summary.json and report.html.")
-@config_option
+@common.out_option("Write reports.mcap (for rosbag2 and Foxglove), summary.json and report.html.")
+@common.config_option
 @click.option(
     "--time",
     "time_source",
@@ -81,8 +63,8 @@ _MOST_LINES = 20
     metavar="MB",
     help="Memory limit of reading, temporary files included.",
 )
-@sample_option
-@path_option(
+@common.sample_option
+@common.path_option(
     "--ledger",
     "FILE",
     "Ledger to continue or to begin; the one in the parameters is never touched.",
@@ -98,7 +80,7 @@ _MOST_LINES = 20
     "'warning' (any alarm), 'input' (any alarm of the input), or a kind of alarm: "
     f"{', '.join(KINDS)}. May be repeated.",
 )
-@json_option("the summary")
+@common.json_option("the summary")
 def replay(
     bags: tuple[Path, ...],
     out: Path | None,
@@ -112,13 +94,13 @@ def replay(
     Several paths are one recording. Exits with 1 if parts of it were lost, if no gait cycle in it fits this
     leg, if all of it is in the ledger already, or if the verdict is or an alarm was one of --fail-on.
     """
-    check_outputs(json_file, out)
+    common.check_outputs(json_file, out)
     written: list[Path] = []
 
     def write(result: "ReplayResult", wall_s: float) -> None:
         written.extend(_write(result, wall_s, out, json_file))
 
-    is_report_there = out is not None and (out / SUMMARY).exists()
+    is_report_there = out is not None and (out / common.SUMMARY).exists()
     result, wall_s = _run(bags, out, write, **options)
     for finding in result.findings[:_MOST_LINES]:
         click.echo(finding.line, err=True)
@@ -127,11 +109,11 @@ def replay(
     if result.is_unusable:
         missing = result.evidence.missing()
         click.echo(f"warning: no gait cycle fits this leg, so no forces are given: {missing}", err=True)
-    if json_file != STDOUT:
+    if json_file != common.STDOUT:
         from leg_wear_monitor.cli.tables import print_replay
 
         print_replay(result, wall_s)
-    say(json_file, (), written)
+    common.say(json_file, (), written)
     if is_report_there and result.monitor.is_all_counted:
         click.echo(f"warning: {out}: nothing was counted, so the earlier report stays as it is", err=True)
     failed = (result.is_partial and not allow_partial) or is_raised(result, fail_on)
@@ -151,13 +133,13 @@ def _run(
     **options: Any,
 ) -> tuple["ReplayResult", float]:
     """The result, and the time [s] it took once all was compiled."""
-    with bags_installed():
+    with common.bags_installed():
         from leg_wear_monitor.dynamics.clearance.stepper import advance_beside
         from leg_wear_monitor.playback.replay import replay as run
     began, took = [0.0], [0.0]
 
     def ready(monitor: Any) -> None:
-        with compilation("monitor", how_long="about a minute"), closed_at_the_end(monitor.abandon):
+        with common.compilation("monitor", how_long="about a minute"), closed_at_the_end(monitor.abandon):
             monitor.warm_up()
         began[0] = time.perf_counter()
 
@@ -165,7 +147,7 @@ def _run(
         took[0] = time.perf_counter() - began[0]
         write(result, took[0])
 
-    with progress_bar("replaying") as progress, advance_beside():
+    with common.progress_bar("replaying") as progress, advance_beside():
         result = run(
             bags,
             _config(config, crank_joint, node),
@@ -187,7 +169,7 @@ def _config(path: Path | None, crank_joint: str | None, node: str | None) -> "Mo
     from leg_wear_monitor.monitor.config.parameters import load_config
 
     config = load_config(path, node)
-    warn_of(str(path or "parameters"), acceleration_doubts(config))
+    common.warn_of(str(path or "parameters"), acceleration_doubts(config))
     return config if crank_joint is None else attrs.evolve(config, crank_joint=crank_joint)
 
 
@@ -219,10 +201,10 @@ def _write(result: "ReplayResult", wall_s: float, out: Path | None, json_file: P
     summary = result.summary(wall_s, made_with={"leg_wear_monitor": version()})
     text = summary.to_json()
     written: list[Path] = []
-    if out is not None and not (result.monitor.is_all_counted and (out / SUMMARY).exists()):
-        files = {SUMMARY: text.encode(), PAGE: page_of(summary)}
-        written = [out / REPORTS_FILE, *write_directory(out, files)]
-    return written + write_json(json_file, text)
+    if out is not None and not (result.monitor.is_all_counted and (out / common.SUMMARY).exists()):
+        files = {common.SUMMARY: text.encode(), common.PAGE: common.page_of(summary)}
+        written = [out / REPORTS_FILE, *common.write_directory(out, files)]
+    return written + common.write_json(json_file, text)
 
 
 # ``leg-wear-monitor report``: the page of a run again, from its data.
@@ -238,7 +220,7 @@ _MISMADE = (
 @click.argument("directory", type=click.Path(path_type=Path), metavar="DIR")
 def report(directory: Path) -> int:
     """Draw the page of a study or a replay again from the data in DIR; nothing is computed."""
-    if (directory / SUMMARY).is_file():
+    if (directory / common.SUMMARY).is_file():
         return _replay(directory)
     if not (directory / "study.json").is_file():
         raise ConfigError(
@@ -255,11 +237,11 @@ def report(directory: Path) -> int:
 def _replay(directory: Path) -> int:
     from leg_wear_monitor.playback.result import summary_of
 
-    source = directory / SUMMARY
+    source = directory / common.SUMMARY
     with _as_one_line(source, "replay"):
         record = json.loads(source.read_text(encoding="utf-8"), parse_constant=_refuse)
-        page = page_of(summary_of(record, str(source)))
-    for path in write_directory(directory, {PAGE: page}):
+        page = common.page_of(summary_of(record, str(source)))
+    for path in common.write_directory(directory, {common.PAGE: page}):
         click.echo(f"written: {path}")
     return 0
 

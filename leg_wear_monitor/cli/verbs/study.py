@@ -8,28 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from leg_wear_monitor.cli.common import (
-    STDOUT,
-    check_directory,
-    check_file,
-    check_outputs,
-    clearances_option,
-    compilation,
-    json_option,
-    mechanism_option,
-    number_option,
-    options_named,
-    out_option,
-    path_option,
-    progress_bar,
-    say,
-    speed_option,
-    warn_of,
-    workers_option,
-    write_directory,
-    write_file,
-    write_json,
-)
+from leg_wear_monitor.cli import common
 from leg_wear_monitor.errors import ConfigError, LegWearError, printable
 from leg_wear_monitor.mechanism import NORMAL_LAWS
 
@@ -52,9 +31,9 @@ FAULTS_FOUND = 1
 @click.command(short_help="Run one of the parameter studies of the paper.")
 @click.argument("name", type=click.Choice(NAMES), metavar="NAME")
 @click.option("--mechanism", metavar="FILE", help="Another leg than that of the study file.")
-@path_option("--config", "FILE", "Study file.  [default: config/studies/NAME.yaml of the package]")
-@path_option("--out", "DIR", "Data and page.", required=True)
-@workers_option
+@common.path_option("--config", "FILE", "Study file.  [default: config/studies/NAME.yaml of the package]")
+@common.path_option("--out", "DIR", "Data and page.", required=True)
+@common.workers_option
 @click.option(
     "--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers compute instead, tcp://HOST:PORT."
 )
@@ -78,7 +57,7 @@ def study(
     settings = load_settings(name, config)
     if mechanism is not None:
         settings = attrs.evolve(settings, mechanism=mechanism)
-    check_directory("--out", out)
+    common.check_directory("--out", out)
     computed, total = _compute(name, settings, out, workers, scheduler)
     click.echo(f"points: {total}, {computed} computed now")
     return write_study_page(out)
@@ -95,10 +74,10 @@ def _compute(
     from leg_wear_monitor.studies.execution import run_study
 
     leg = load_mechanism(settings.mechanism)
-    with compilation("clearance"), motion_beside():  # once, and not in every worker at the same time
+    with common.compilation("clearance"), motion_beside():  # once, and not in every worker at the same time
         if leg.clearances:
             simulate(leg, clearances=[next(iter(leg.clearances))], cycles=1.0 / 256.0, skip_cycles=0.0)
-    with progress_bar(f"study {name}") as progress:
+    with common.progress_bar(f"study {name}") as progress:
         computed = run_study(
             name,
             settings,
@@ -112,7 +91,6 @@ def _compute(
 
 def write_study_page(path: Path) -> int:
     """Draw the page of a study from the data in its directory; 1 if something is missing there."""
-    from leg_wear_monitor.cli.common import write_directory
     from leg_wear_monitor.files import json_text
     from leg_wear_monitor.report.page import page_html
     from leg_wear_monitor.report.study.page import study_page
@@ -122,7 +100,7 @@ def write_study_page(path: Path) -> int:
     contents = {"report.html": page_html(study_page(results)).encode()}
     if results.of("leg"):
         contents["claims.json"] = json_text(results.claims().to_dict()).encode()
-    for file in write_directory(path, contents):
+    for file in common.write_directory(path, contents):
         click.echo(f"written: {file}")
     for label, fault in results.faults:
         click.echo(f"warning: point {label}: {fault}", err=True)
@@ -146,14 +124,16 @@ _Stamp = tuple[int, int, int]
 
 @click.command(short_help="Draw a mechanism, working or not.")
 @click.argument("mechanism", metavar="MECHANISM")
-@path_option("--out", "FILE", "A file .html, .svg or .urdf.  [default: MECHANISM.html in this directory]")
+@common.path_option(
+    "--out", "FILE", "A file .html, .svg or .urdf.  [default: MECHANISM.html in this directory]"
+)
 @click.option(
     "--urdf",
     is_flag=True,
     help="Write MECHANISM.urdf in place of a picture: a tree of its links with the loops cut, for RViz.",
 )
 @click.option("--forces", is_flag=True, help="Draw the forces in the joints, without clearance (.html).")
-@number_option(
+@common.number_option(
     "--crank-angle",
     "DEG",
     "Position to draw, or to show first.  [default: 0, or the one that shows what is wrong]",
@@ -188,7 +168,7 @@ def _check_target(path: Path) -> None:
     """Make sure that a drawing can be written, and that it replaces none but a drawing."""
     if path.suffix.lower() not in _SUFFIXES:
         raise ConfigError("--out", str(path), f"expected a file that ends in {' or '.join(_SUFFIXES)}")
-    check_file("--out", path)
+    common.check_file("--out", path)
     if path.is_file():
         with path.open("rb") as file:
             is_ours = _OURS in file.read(4096)
@@ -203,12 +183,12 @@ def _describe(mechanism: str, target: Path) -> int:
     from leg_wear_monitor.mechanism.loader import load_mechanism
 
     leg = load_mechanism(mechanism)
-    with compilation("mechanism", how_long="a few seconds"):
+    with common.compilation("mechanism", how_long="a few seconds"):
         from leg_wear_monitor.mechanism.urdf import urdf
 
         text = urdf(leg)
     head, _, robot = text.partition("\n")
-    write_file(target, f"{head}\n<!-- made by {_OURS.decode()} -->\n{robot}".encode())
+    common.write_file(target, f"{head}\n<!-- made by {_OURS.decode()} -->\n{robot}".encode())
     click.echo(f"written: {target}: {printable(leg.name)}")
     return 0
 
@@ -219,13 +199,13 @@ def _draw(mechanism: str, target: Path, forces: bool, crank_angle: float | None,
 
     leg = load_mechanism(mechanism)
     angle = None if crank_angle is None else math.radians(crank_angle)
-    with compilation("mechanism", how_long="a few seconds"):
+    with common.compilation("mechanism", how_long="a few seconds"):
         from leg_wear_monitor.report.drawing import drawing_of
 
         drawing = drawing_of(leg, angle, forces)
         content = _content(drawing, target, watch)
     was_there = target.exists()
-    write_file(target, content)
+    common.write_file(target, content)
     how = "replaced" if was_there else "written"
     click.echo(f"{how}: {target}: {printable(leg.name)}: {printable(drawing.headline)}")
     for finding in drawing.findings:
@@ -306,15 +286,15 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
 
 
 @click.command(short_help="Simulate the leg offline, ideal or with clearances.")
-@mechanism_option
-@clearances_option("A,B|none")
-@number_option(
+@common.mechanism_option
+@common.clearances_option("A,B|none")
+@common.number_option(
     "--clearance-m", "M", "Radial clearance in metres.  [default: the mechanism's own]", "m", above=0.0
 )
-@speed_option
-@number_option("--cycles", "N", "Gait cycles to count.  [default: 5]", above=0.0)
-@number_option("--duration", "S", "Time to count, in seconds, instead of cycles.", "s", above=0.0)
-@number_option(
+@common.speed_option
+@common.number_option("--cycles", "N", "Gait cycles to count.  [default: 5]", above=0.0)
+@common.number_option("--duration", "S", "Time to count, in seconds, instead of cycles.", "s", above=0.0)
+@common.number_option(
     "--skip-cycles", "N", "Gait cycles before counting.  [default: 1; 0 with --duration]", at_least=0.0
 )
 @click.option(
@@ -347,8 +327,8 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
     metavar="N",
     help="Resolution of model clearance: intervals of time per gait cycle.  [default: 2048]",
 )
-@json_option("the result")
-@out_option("Write result.json and pictures of the leg and its worn bushings.")
+@common.json_option("the result")
+@common.out_option("Write result.json and pictures of the leg and its worn bushings.")
 def simulate(mechanism: str, json_file: Path | None, out: Path | None, **options: Any) -> None:
     """Simulate the motion of the leg, ideal or with clearances, and report forces and wear."""
     if options["cycles"] is not None and options["duration"] is not None:
@@ -357,16 +337,16 @@ def simulate(mechanism: str, json_file: Path | None, out: Path | None, **options
     from leg_wear_monitor.mechanism.plausible import doubts
 
     leg = load_mechanism(mechanism)
-    check_outputs(json_file, out)
-    with options_named():
+    common.check_outputs(json_file, out)
+    with common.options_named():
         result, wall_s = _run(leg, _keywords(**options))
-    warn_of(leg.source, doubts(leg))  # what fails names them itself, in its one line
+    common.warn_of(leg.source, doubts(leg))  # what fails names them itself, in its one line
     written = _write(leg, result, wall_s, json_file, out)
-    if json_file != STDOUT:
+    if json_file != common.STDOUT:
         from leg_wear_monitor.cli.tables import print_result
 
         print_result(result, wall_s)
-    say(json_file, (), written)
+    common.say(json_file, (), written)
 
 
 def _keywords(clearances: str | None, wear: str, duration: float | None, **options: Any) -> dict[str, Any]:
@@ -393,9 +373,9 @@ def _run(leg: "Mechanism", keywords: dict[str, Any]) -> tuple["SimulationResult"
     clearance_joints = keywords.get("clearances", leg.clearance_joints)
     model = keywords.get("model") or default_model(leg)
     kernels = model if clearance_joints else "ideal"
-    with compilation(kernels), motion_beside() if kernels == "clearance" else nullcontext():
+    with common.compilation(kernels), motion_beside() if kernels == "clearance" else nullcontext():
         simulate(leg, **short)
-    with progress_bar("simulating") as progress:
+    with common.progress_bar("simulating") as progress:
         began = time.perf_counter()
         result = simulate(leg, **keywords, progress=progress)
         return result, time.perf_counter() - began
@@ -416,5 +396,5 @@ def _write(
     if out is not None:
         from leg_wear_monitor.report.leg_picture import pictures
 
-        written += write_directory(out, {**pictures(leg, result), "result.json": text.encode()})
-    return written + write_json(json_file, text)
+        written += common.write_directory(out, {**pictures(leg, result), "result.json": text.encode()})
+    return written + common.write_json(json_file, text)

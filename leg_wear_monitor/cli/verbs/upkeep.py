@@ -10,17 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from leg_wear_monitor.cli.common import (
-    bounded,
-    check_alone,
-    config_option,
-    ledger_option,
-    need_rclpy,
-    node_option,
-    number_option,
-    trigger,
-    wait_option,
-)
+from leg_wear_monitor.cli import common
 from leg_wear_monitor.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -127,10 +117,10 @@ def _date(stamp_ns: int) -> str:
 
 
 @click.command(short_help="Acknowledge the alarms.")
-@config_option
-@ledger_option
-@node_option
-@wait_option
+@common.config_option
+@common.ledger_option
+@common.node_option
+@common.wait_option
 @click.option("--dry-run", is_flag=True, help="Print the result and write nothing.")
 def acknowledge(
     config: Path | None, ledger: Path | None, node: str | None, wait_s: float, dry_run: bool
@@ -141,8 +131,8 @@ def acknowledge(
     monitor locks its ledger: name it with --node, or stop it first.
     """
     if node is not None:
-        check_alone(config=config, ledger=ledger, dry_run=dry_run)
-        click.echo(trigger(node, "acknowledge_alarms", wait_s))
+        common.check_alone(config=config, ledger=ledger, dry_run=dry_run)
+        click.echo(common.trigger(node, "acknowledge_alarms", wait_s))
         return 0
     from leg_wear_monitor.monitor.operators import acknowledge_in
 
@@ -159,10 +149,10 @@ def acknowledge(
 
 @click.command(short_help="Enter a replaced part.")
 @click.argument("joint")
-@config_option
-@ledger_option
-@node_option
-@wait_option
+@common.config_option
+@common.ledger_option
+@common.node_option
+@common.wait_option
 @click.option("--undo", is_flag=True, help="Undo the last reset: the part was not replaced.")
 @click.option("--dry-run", is_flag=True, help="Print the result and write nothing.")
 def reset(
@@ -180,9 +170,9 @@ def reset(
     are acknowledged and clear. A running monitor locks its ledger: name it with --node, or stop it first.
     """
     if node is not None:
-        check_alone(config=config, ledger=ledger, dry_run=dry_run)
+        common.check_alone(config=config, ledger=ledger, dry_run=dry_run)
         service = f"{'undo_reset' if undo else 'reset_wear'}/{joint}"
-        click.echo(trigger(node, service, wait_s, times=1 if undo else 2))  # a reset is confirmed
+        click.echo(common.trigger(node, service, wait_s, times=1 if undo else 2))  # a reset is confirmed
         return 0
     _reset_in(joint, config, ledger, undo, dry_run)
     if dry_run:
@@ -218,14 +208,14 @@ WITH_FINDINGS = 1
 
 @click.command(short_help="Enter a measured clearance, which updates the forecast.")
 @click.argument("joint", required=False)
-@click.argument("mm", type=float, required=False, callback=bounded("mm", above=0.0))
-@number_option("--sigma", "MM", "Standard deviation of the measurement.", "mm", above=0.0)
-@config_option
-@ledger_option
+@click.argument("mm", type=float, required=False, callback=common.bounded("mm", above=0.0))
+@common.number_option("--sigma", "MM", "Standard deviation of the measurement.", "mm", above=0.0)
+@common.config_option
+@common.ledger_option
 @click.option("--accept", is_flag=True, help="Use it even if it contradicts the model.")
 @click.option("--dry-run", is_flag=True, help="Print the result and write nothing.")
-@node_option
-@wait_option
+@common.node_option
+@common.wait_option
 @click.option("--list", "listed", is_flag=True, help="Print the ledger's measurements with their numbers.")
 @click.option(
     "--withdraw",
@@ -286,7 +276,7 @@ def _check_alone(
 
 def _on_node(node: str, joint: str, clearance_m: float, sigma_m: float, accept: bool, wait_s: float) -> int:
     """Enter it into a running monitor, which says the same as the verb does with a ledger."""
-    need_rclpy()
+    common.need_rclpy()
     from leg_wear_monitor.monitor.forecast.measurement import asks_to_act
     from leg_wear_monitor.ros.measure import measure_on
 

@@ -11,17 +11,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.bags.bag import (
-    TABLES,
-    BagFile,
-    Recordable,
-    Source,
-    assign,
-    find_files,
-    listed,
-    open_sources,
-    roles,
-)
+from leg_wear_monitor.bags import bag
 from leg_wear_monitor.bags.findings import DEFAULT_MB, Budget, Clocks, Finding, RecordingError, Severity
 from leg_wear_monitor.bags.mcap_file import Piece
 from leg_wear_monitor.bags.table_file import TableFile
@@ -55,7 +45,7 @@ _ADVICE = "are these two legs? Give one leg at a time, or select its topic with 
 
 
 def check_topics(
-    sources: Iterable[Source], topics: dict[str, str], joint_states: str | None
+    sources: Iterable[bag.Source], topics: dict[str, str], joint_states: str | None
 ) -> list[Finding]:
     """Check that each file has the crank's topic, or has no other topic that could be a crank's.
 
@@ -79,7 +69,7 @@ def check_topics(
             continue
         others = [other for other in recorded if other.endswith("/joint_states")]
         if others and joint_states is None:
-            text = f"has {listed(others)}, where other files have {listed([topic])}: {_ADVICE}"
+            text = f"has {bag.listed(others)}, where other files have {bag.listed([topic])}: {_ADVICE}"
             raise RecordingError(str(source.bag_file.path), "joint_states", text)
         text = f"has no topic {topic}: no crank is read from it"
         findings.append(Finding(source.bag_file.path, text, Severity.NOTE))
@@ -218,7 +208,9 @@ class JointNames:
                 findings.append(Finding(path, text))
             if not counts.missing:
                 continue
-            text = f"is not among the joints of {counts.missing} messages, they have {listed(counts.names)}"
+            text = (
+                f"is not among the joints of {counts.missing} messages, they have {bag.listed(counts.names)}"
+            )
             if not counts.found:
                 remedy = "set the crank with --crank-joint (crank_joint in the parameters)"
                 if found:
@@ -347,7 +339,7 @@ class Recording:
 
     def __init__(
         self,
-        paths: Iterable[Recordable],
+        paths: Iterable[bag.Recordable],
         config: MonitorConfig,
         *,
         joint_states: str | None = None,
@@ -364,12 +356,12 @@ class Recording:
         self._budget = Budget(memory_mb)
         self._joints = JointNames(config.crank_joint, config.drive_torque.interface)
         self._one_leg = OneLeg()
-        bag_files, self._findings = find_files(paths)
+        bag_files, self._findings = bag.find_files(paths)
         with ExitStack() as stack:
-            self._sources, lost = open_sources(bag_files, config, self._budget, stack)
+            self._sources, lost = bag.open_sources(bag_files, config, self._budget, stack)
             given = {"joint_states": joint_states, "drive_torque": drive_torque, "foot_load": foot_load}
             given["dynamic_joint_states"] = drive_torque
-            self.topics, missing = assign(self._sources, roles(config, given))
+            self.topics, missing = bag.assign(self._sources, bag.roles(config, given))
             self._findings += lost + missing + check_topics(self._sources, self.topics, joint_states)
             self._close = stack.pop_all()
         recordings = [source.bag_file.recording for source in self._sources]
@@ -455,13 +447,13 @@ class Recording:
         if not any(finding.text == text for finding in self._findings):
             self._findings.append(Finding(path, text))
 
-    def _samples(self, bag_file: BagFile, piece: Piece) -> Samples:
+    def _samples(self, bag_file: bag.BagFile, piece: Piece) -> Samples:
         """Decode a piece, and stamp its samples with the selected time."""
         samples = self._decoder.many(piece.data, piece.messages)
         self._joints.add_samples(bag_file.path, piece.data, piece.messages, samples)
         if len(self._sources) > 1:
             self._one_leg.add_samples(bag_file.path, samples)
-        if bag_file.storage not in TABLES:  # which have one clock only
+        if bag_file.storage not in bag.TABLES:  # which have one clock only
             self._clocks.compare(samples, piece.messages)
         if self.time != "header":
             samples["fault"][samples["fault"] == ZERO_STAMP] = NO_FAULT
@@ -502,9 +494,9 @@ def understood(path: Path, config: MonitorConfig) -> tuple[list[str], list[Findi
     RecordingError
         If the table cannot be read.
     """
-    files, findings = find_files([path])
+    files, findings = bag.find_files([path])
     with ExitStack() as stack:
-        (source,), _ = open_sources(files, config, Budget(), stack)
+        (source,), _ = bag.open_sources(files, config, Budget(), stack)
         table = source.file
         if not isinstance(table, TableFile):
             raise TypeError(f"{path} is no table")

@@ -10,18 +10,8 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from leg_wear_monitor.bags import table_layout
 from leg_wear_monitor.bags.findings import Budget, Finding, RecordingError
-from leg_wear_monitor.bags.table_layout import (
-    MOST_NS,
-    STAMP,
-    Clock,
-    Column,
-    LostLines,
-    Rows,
-    columns_of,
-    dates,
-    places,
-)
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -134,8 +124,8 @@ class CsvFile:
         self._path, self._file, self._findings = path, file, findings
         self.size = file.seek(0, 2)
         self._block = min(_BLOCK, budget.part_limit // _OF_A_BYTE)
-        self._config, self._clock = config.input, Clock.of(config.input)
-        self._lost = LostLines(path, findings)
+        self._config, self._clock = config.input, table_layout.Clock.of(config.input)
+        self._lost = table_layout.LostLines(path, findings)
         if not self.size:
             raise RecordingError(str(path), "", "is empty, expected a line with the names of the columns")
         first = next(blocks(path, file, self._block, []), None)
@@ -145,10 +135,10 @@ class CsvFile:
         names = self._names(first.texts[0])
         self._has_header = not all(map(is_number, names))
         self.names = names if self._has_header else [str(k + 1) for k in range(len(names))]
-        self._columns = columns_of(config)
-        self._places = places(str(path), self.names, self._columns)
+        self._columns = table_layout.columns_of(config)
+        self._places = table_layout.places(str(path), self.names, self._columns)
 
-    def parts(self) -> Iterator[Rows]:
+    def parts(self) -> Iterator[table_layout.Rows]:
         """All sound rows, block by block."""
         for lines in blocks(self._path, self._file, self._block, self._findings):
             rows, numbers = self._rows(lines)
@@ -182,7 +172,7 @@ class CsvFile:
         except csv.Error:
             return [text]
 
-    def _converted(self, rows: list[_Row], line: NDArray[np.int64], stored: int) -> Rows:
+    def _converted(self, rows: list[_Row], line: NDArray[np.int64], stored: int) -> table_layout.Rows:
         """Rows in SI units; those that cannot be read are reported."""
         rows, line = self._complete(rows, line)
         sound = np.ones(len(rows), bool)
@@ -190,14 +180,14 @@ class CsvFile:
         stamps = self._regular(line)
         for column, place in zip(self._columns, self._places, strict=True):
             texts = [row[place] for row in rows]
-            if column.key == STAMP:
+            if column.key == table_layout.STAMP:
                 stamps = self._stamps(column, texts, line, sound)
                 continue
             found, is_there, bad = _numbers(texts)
             self._report(column, texts, line, bad & sound)
             sound &= ~bad
             values[column.key], measured[column.key] = column.to_si(found), is_there
-        every = Rows(line, stamps, values, measured, stored)
+        every = table_layout.Rows(line, stamps, values, measured, stored)
         return every if sound.all() else every.part(sound)
 
     def _complete(self, rows: list[_Row], line: NDArray[np.int64]) -> tuple[list[_Row], NDArray[np.int64]]:
@@ -221,11 +211,11 @@ class CsvFile:
         return np.asarray(passed + self._config.start_ns)
 
     def _stamps(
-        self, column: Column, texts: list[str], line: NDArray[np.int64], sound: NDArray[np.bool_]
+        self, column: table_layout.Column, texts: list[str], line: NDArray[np.int64], sound: NDArray[np.bool_]
     ) -> NDArray[np.int64]:
         """Stamps of rows; a row without a time is not sound."""
         if self._config.units.stamp == DATE:
-            stamps, good = dates(texts)
+            stamps, good = table_layout.dates(texts)
         else:
             times, is_there, _ = _numbers(texts)
             stamps, good = self._clock.of_texts(texts, times)
@@ -235,7 +225,7 @@ class CsvFile:
         return stamps
 
     def _report(
-        self, column: Column, texts: list[str], line: NDArray[np.int64], bad: NDArray[np.bool_]
+        self, column: table_layout.Column, texts: list[str], line: NDArray[np.int64], bad: NDArray[np.bool_]
     ) -> None:
         for k in np.flatnonzero(bad):
             self._lost.add(int(line[k]), f"column {column.name!r}: {_fault(column, texts[k])}")
@@ -260,10 +250,10 @@ def _numbers(texts: list[str]) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bo
     return found, np.ones(len(texts), bool), np.zeros(len(texts), bool)
 
 
-def _fault(column: Column, text: str) -> str:
+def _fault(column: table_layout.Column, text: str) -> str:
     """What is wrong with a cell."""
     shown, unit = printable(text.strip(), 60), column.unit
-    if column.key == STAMP and unit == DATE:
+    if column.key == table_layout.STAMP and unit == DATE:
         return f"{shown!r} is no date and time in UTC, expected one such as 2026-03-01 09:00:00.001"
     if not shown:
         return f"empty, expected a time in {unit}"
@@ -272,7 +262,7 @@ def _fault(column: Column, text: str) -> str:
     if is_number(text):
         return f"{shown} {unit} is no time from 1902 to 2038; another unit (input.units.stamp)?"
     hint = "; a decimal comma?" if is_number(text.replace(",", ".", 1)) else ""
-    if column.key == STAMP and dates([text])[1][0]:
+    if column.key == table_layout.STAMP and table_layout.dates([text])[1][0]:
         hint = f"; a date ({column.parameter.replace('columns', 'units')}: {DATE})?"
     return f"{shown!r} is not a number, expected one in {unit}{hint}"
 
@@ -283,7 +273,7 @@ def _fault(column: Column, text: str) -> str:
 NUMBERS, TIMES = "iuf", "iufM"
 
 
-def check_kind(source: str, column: Column, kind: str, shown: str, table: TableInput) -> None:
+def check_kind(source: str, column: table_layout.Column, kind: str, shown: str, table: TableInput) -> None:
     """Check that a column has numbers, or the time dates.
 
     Parameters
@@ -301,25 +291,25 @@ def check_kind(source: str, column: Column, kind: str, shown: str, table: TableI
     ------
     RecordingError
     """
-    expected = "numbers or dates" if column.key == STAMP else "numbers"
-    if kind not in (TIMES if column.key == STAMP else NUMBERS):
+    expected = "numbers or dates" if column.key == table_layout.STAMP else "numbers"
+    if kind not in (TIMES if column.key == table_layout.STAMP else NUMBERS):
         fault = f"column {column.name!r} is of type {shown}, expected {expected}"
         raise RecordingError(source, column.parameter, fault)
-    if column.key == STAMP and (table.units.stamp == DATE) != (kind == "M"):
+    if column.key == table_layout.STAMP and (table.units.stamp == DATE) != (kind == "M"):
         found = "dates" if kind == "M" else "numbers"
         fault = f"{table.units.stamp!r} does not fit column {column.name!r}, which has {found}"
         raise RecordingError(source, "input.units.stamp", fault)
 
 
 def rows_of(
-    columns: Sequence[Column],
+    columns: Sequence[table_layout.Column],
     arrays: Mapping[str, NDArray[np.generic]],
     measured: Mapping[str, NDArray[np.bool_]],
     first: int,
     stored: int,
     table: TableInput,
-    lost: LostLines,
-) -> Rows:
+    lost: table_layout.LostLines,
+) -> table_layout.Rows:
     """Rows in SI units; a row without a time is reported.
 
     Parameters
@@ -335,22 +325,24 @@ def rows_of(
     lost : LostLines
     """
     row = first + np.arange(len(next(iter(arrays.values()))), dtype=np.int64)
-    if STAMP in arrays:
-        stamps, good = _stamps(arrays[STAMP], table)
-        good &= measured[STAMP]
+    if table_layout.STAMP in arrays:
+        stamps, good = _stamps(arrays[table_layout.STAMP], table)
+        good &= measured[table_layout.STAMP]
     else:
         stamps = table.start_ns + np.rint(row * (1.0e9 / table.rate_hz)).astype(np.int64)
         good = np.ones(len(row), bool)
-    values = {one.key: one.to_si(arrays[one.key].astype(float)) for one in columns if one.key != STAMP}
-    there = {one.key: measured[one.key] for one in columns if one.key != STAMP}
-    rows = Rows(row + 1, stamps, values, there, stored)
+    values = {
+        one.key: one.to_si(arrays[one.key].astype(float)) for one in columns if one.key != table_layout.STAMP
+    }
+    there = {one.key: measured[one.key] for one in columns if one.key != table_layout.STAMP}
+    rows = table_layout.Rows(row + 1, stamps, values, there, stored)
     if good.all():
         return rows
     bad = np.flatnonzero(~good)
     shown = bad[: lost.left]
     for k in shown:
-        time, unit = arrays[STAMP][k], table.units.stamp
-        is_there = measured[STAMP][k] and not (isinstance(time, np.floating) and np.isnan(time))
+        time, unit = arrays[table_layout.STAMP][k], table.units.stamp
+        is_there = measured[table_layout.STAMP][k] and not (isinstance(time, np.floating) and np.isnan(time))
         fault = f"{time} {unit} is no time from 1902 to 2038" if is_there else "has no time"
         lost.add(int(row[k]) + 1, fault)
     lost.count += len(bad) - len(shown)
@@ -360,9 +352,9 @@ def rows_of(
 def _stamps(times: NDArray[np.generic], table: TableInput) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Stamps [ns] of times, and whether each can be one."""
     if times.dtype.kind != "M":
-        return Clock.of(table).of_numbers(times)  # type: ignore[arg-type]
+        return table_layout.Clock.of(table).of_numbers(times)  # type: ignore[arg-type]
     seconds = times.astype("datetime64[s]").astype(np.int64)  # of any year: nanoseconds would overflow
-    good = np.abs(seconds) <= MOST_NS // 10**9
+    good = np.abs(seconds) <= table_layout.MOST_NS // 10**9
     stamps = np.where(good, times, np.datetime64(0, "ns")).astype("datetime64[ns]").astype(np.int64)
     return stamps, np.asarray(good & ~np.isnat(times))
 
@@ -393,11 +385,11 @@ class Frame:
     """
 
     def __init__(self, path: Path, table: Any, config: MonitorConfig, findings: list[Finding]) -> None:
-        self._config, self._lost = config.input, LostLines(path, findings, "row")
-        self._columns = columns_of(config)
+        self._config, self._lost = config.input, table_layout.LostLines(path, findings, "row")
+        self._columns = table_layout.columns_of(config)
         content = table if isinstance(table, Mapping) else _named(table)
         self.names = [str(name) for name in content]
-        places(str(path), self.names, self._columns)
+        table_layout.places(str(path), self.names, self._columns)
         self._arrays = {one.key: self._array(path, one, content[one.name]) for one in self._columns}
         lengths = {one.name: len(self._arrays[one.key]) for one in self._columns}
         self._rows = next(iter(lengths.values()))
@@ -406,7 +398,7 @@ class Frame:
             raise RecordingError(str(path), "", f"has columns of different lengths: {told}")
         self.size = sum(array.nbytes for array in self._arrays.values())
 
-    def parts(self) -> Iterator[Rows]:
+    def parts(self) -> Iterator[table_layout.Rows]:
         """All sound rows, block by block."""
         for begin in range(0, self._rows, _ROWS):
             chosen = {key: array[begin : begin + _ROWS] for key, array in self._arrays.items()}
@@ -422,7 +414,7 @@ class Frame:
             yield rows_of(self._columns, chosen, there, begin, stored, self._config, self._lost)
         self._lost.close()
 
-    def _array(self, path: Path, column: Column, values: Any) -> NDArray[np.generic]:
+    def _array(self, path: Path, column: table_layout.Column, values: Any) -> NDArray[np.generic]:
         """A column as an array of numbers or dates."""
         array = np.asarray(values.to_numpy() if hasattr(values, "to_numpy") else values)
         if array.dtype.kind == "O":  # what pandas has beside missing values, and dates of a time zone

@@ -10,6 +10,7 @@ import numpy as np
 from leg_wear_monitor.bags.bag import Recordable, listed_recordings
 from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.bags.series import EFFORT, FLOAT64, JointName, Signals, TorqueSource, read_signals
+from leg_wear_monitor.commissioning import proposal
 from leg_wear_monitor.commissioning.detection import LEAST_CYCLES, Walk, walk_of, with_detections
 from leg_wear_monitor.commissioning.evidence import (
     LIMIT,
@@ -25,15 +26,6 @@ from leg_wear_monitor.commissioning.evidence import (
     separates_lag,
     timing_of,
     with_load,
-)
-from leg_wear_monitor.commissioning.proposal import (
-    Found,
-    changes,
-    gear,
-    gear_error,
-    items,
-    offset_rad,
-    settled,
 )
 from leg_wear_monitor.commissioning.result import CommissioningResult
 from leg_wear_monitor.commissioning.search import Choice, candidates, choose
@@ -71,13 +63,13 @@ _DECLARED_ERROR = 0.3  # by which a drive differs from another one of its kind, 
 _AT_ZERO_RAD = 0.02
 
 
-def not_told(found: Found) -> tuple[str, ...]:
+def not_told(found: proposal.Found) -> tuple[str, ...]:
     """Parameters that the recording does not determine, and why."""
     told = list(found.doubts)
     if not found.sampling.value:
         told.append(f"drive_torque.sampling: {found.sampling.why}")
     told += _lag(found)
-    ratio, is_exact = gear(found)
+    ratio, is_exact = proposal.gear(found)
     if not is_exact:
         error = found.fit.sigma["ratio"] / abs(found.fit.ratio)
         away = error * abs(float(found.fit.crank()[1].mean())) * 3600.0
@@ -96,7 +88,7 @@ def not_told(found: Found) -> tuple[str, ...]:
     return tuple(told)
 
 
-def findings(found: Found, load: Load | None, mechanism: Mechanism) -> tuple[str, ...]:
+def findings(found: proposal.Found, load: Load | None, mechanism: Mechanism) -> tuple[str, ...]:
     """What does not fit, or cannot be used as it is."""
     return tuple(
         text
@@ -114,12 +106,12 @@ def findings(found: Found, load: Load | None, mechanism: Mechanism) -> tuple[str
     )
 
 
-def notes(found: Found) -> tuple[str, ...]:
+def notes(found: proposal.Found) -> tuple[str, ...]:
     """What is worth knowing."""
     return tuple(_notes(found))
 
 
-def _lag(found: Found) -> Iterator[str]:
+def _lag(found: proposal.Found) -> Iterator[str]:
     timing, most = found.timing, found.base.drive_torque.max_lag_s
     if math.isfinite(timing.declared_s):
         return
@@ -137,7 +129,7 @@ def _lag(found: Found) -> Iterator[str]:
         )
 
 
-def _otherwise(found: Found) -> Iterator[str]:
+def _otherwise(found: proposal.Found) -> Iterator[str]:
     """Declared figures of the drive that the recording contradicts."""
     declared = found.declared
     pairs = (
@@ -161,7 +153,7 @@ def _load(load: Load | None) -> str:
     )
 
 
-def _drives(found: Found) -> str:
+def _drives(found: proposal.Found) -> str:
     one = found.fit
     friction, sigma = found.friction_nm
     size = float(one.predicted.std()) / abs(one.gain)
@@ -171,7 +163,7 @@ def _drives(found: Found) -> str:
     return ""
 
 
-def _late(found: Found) -> str:
+def _late(found: proposal.Found) -> str:
     late, most = found.timing.late_s, largest_lag_s(found.base)
     if not abs(late) - _SURE * found.timing.error_s > most:
         return ""
@@ -181,8 +173,8 @@ def _late(found: Found) -> str:
     )
 
 
-def _anew(found: Found) -> str:
-    offsets = [offset_rad(found, number) for number in sorted(found.fit.offset_rad)]
+def _anew(found: proposal.Found) -> str:
+    offsets = [proposal.offset_rad(found, number) for number in sorted(found.fit.offset_rad)]
     apart = max(abs((each - offsets[0] + math.pi) % TURN - math.pi) for each in offsets)
     if apart < _ANEW_RAD:
         return ""
@@ -193,11 +185,11 @@ def _anew(found: Found) -> str:
     )
 
 
-def _position(found: Found) -> str:
+def _position(found: proposal.Found) -> str:
     measured = found.fit.gear_ratio
-    if abs(measured / _IN_DEGREES - 1.0) < 2.0 * gear_error(found.fit):
+    if abs(measured / _IN_DEGREES - 1.0) < 2.0 * proposal.gear_error(found.fit):
         return "the joint's position looks like degrees; ROS expects radians: gear ratio 57.2958"
-    if found.motion.is_wrapped and gear(found)[0] != 1.0:
+    if found.motion.is_wrapped and proposal.gear(found)[0] != 1.0:
         return (
             f"the joint's position is wrapped to a turn, but its gear ratio is {measured:.6g}: the monitor "
             "needs a continuous position"
@@ -205,10 +197,10 @@ def _position(found: Found) -> str:
     return ""
 
 
-def _notes(found: Found) -> Iterator[str]:
+def _notes(found: proposal.Found) -> Iterator[str]:
     yield from found.choice.also
     yield from _otherwise(found)
-    ratio = gear(found)[0]
+    ratio = proposal.gear(found)[0]
     if ratio != 1.0 and len(found.fit.offset_rad) == 1:
         is_zero = bool(abs(found.motion.first_rad[-1]) < _AT_ZERO_RAD)
         seems = "its first reading is 0" if is_zero else "motor encoders often do"
@@ -320,7 +312,7 @@ def commission(
 
 
 def _fastest(
-    found: Found, walk: Walk, recordings: Sequence[Recordable], topics: tuple[str | None, str | None]
+    found: proposal.Found, walk: Walk, recordings: Sequence[Recordable], topics: tuple[str | None, str | None]
 ) -> Walk:
     """The walk at the highest cadence that was recorded: the faster, the stronger are the impacts."""
     usual = walk.config.cadence.commanded_rpm
@@ -374,7 +366,7 @@ def _found(
     crank_joint: str | None,
     progress: Callable[[float], None],
     model: TorqueModel,
-) -> tuple[Found, Load | None]:
+) -> tuple[proposal.Found, Load | None]:
     """The best choice of joint, torque and gear, and the load that its fit has."""
     motions = _cranks(signals.joints, crank_joint)
     torques = _torques(signals.torques)
@@ -388,11 +380,11 @@ def _found(
     return _final(choice, motions[choice.best.joint], model, base)
 
 
-def _result(facts: Found, load: Load | None, mechanism: Mechanism) -> CommissioningResult:
-    told = items(facts)
+def _result(facts: proposal.Found, load: Load | None, mechanism: Mechanism) -> CommissioningResult:
+    told = proposal.items(facts)
     proposed = None
     if not facts.doubts:
-        proposed = config_from({**values_of(facts.base), **changes(told)}, "commission")
+        proposed = config_from({**values_of(facts.base), **proposal.changes(told)}, "commission")
     return CommissioningResult(
         items=tuple(told),
         not_told=not_told(facts),
@@ -409,7 +401,7 @@ def _final(
     model: TorqueModel,
     base: MonitorConfig,
     low_pass: LowPass | None = None,
-) -> tuple[Found, Load | None]:
+) -> tuple[proposal.Found, Load | None]:
     """The chosen fit again, with the terms that the recording can tell, and the lag that it is late by."""
     one, declared = choice.best.fit, drive_figures(base.drive)
     low_pass_s, low_pass_sigma_s = low_pass_time(low_pass, declared)
@@ -421,8 +413,8 @@ def _final(
     used = sampling.value or base.drive_torque.sampling
     timing = timing_of(again, used, bool(sampling.value), declared.lag_s)
     timing = attrs.evolve(timing, low_pass_s=low_pass_s, low_pass_sigma_s=low_pass_sigma_s)
-    found = Found(choice, again, motion, sampling, timing, declared, base, low_pass)
-    return settled(found, model), load
+    found = proposal.Found(choice, again, motion, sampling, timing, declared, base, low_pass)
+    return proposal.settled(found, model), load
 
 
 def _cranks(joints: dict[JointName, Series], wanted: str | None) -> dict[JointName, JointMotion]:

@@ -5,16 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.mechanism.spec import (
-    GROUND,
-    Drive,
-    Mechanism,
-    PhaseLoad,
-    PrismaticJoint,
-    SpeedDrive,
-    TorqueDrive,
-    Vector,
-)
+from leg_wear_monitor.mechanism import spec
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
@@ -61,21 +52,21 @@ class MechanismArrays(NamedTuple):
     drive_feed: Floats
 
 
-def body_names(mechanism: Mechanism) -> list[str]:
+def body_names(mechanism: spec.Mechanism) -> list[str]:
     """Names of the bodies in the order of the arrays, the ground first."""
-    return [GROUND, *mechanism.bodies]
+    return [spec.GROUND, *mechanism.bodies]
 
 
-def point_from_com(mechanism: Mechanism, body: str, point: str) -> Vector:
+def point_from_com(mechanism: spec.Mechanism, body: str, point: str) -> spec.Vector:
     """Position (2,) [m] of a point relative to its body's centre of mass, in the body's frame."""
     x, y = mechanism.points_of(body)[point]
-    if body == GROUND:
+    if body == spec.GROUND:
         return x, y
     com = mechanism.bodies[body].com
     return x - com[0], y - com[1]
 
 
-def compile_arrays(mechanism: Mechanism) -> MechanismArrays:
+def compile_arrays(mechanism: spec.Mechanism) -> MechanismArrays:
     """Arrays of a mechanism, in the order of its file."""
     index = {name: i for i, name in enumerate(body_names(mechanism))}
     mass = np.zeros((len(index), 3))
@@ -107,12 +98,12 @@ def compile_arrays(mechanism: Mechanism) -> MechanismArrays:
     )
 
 
-def _drive(drive: Drive) -> dict[str, np.ndarray]:
+def _drive(drive: spec.Drive) -> dict[str, np.ndarray]:
     """Arrays of the drive; a constant torque is a controller without gains, a speed drive needs neither."""
     gains, phase, feed = (0.0, 0.0, np.inf), [0.0], [0.0]
-    if isinstance(drive, TorqueDrive):
+    if isinstance(drive, spec.TorqueDrive):
         feed = [drive.torque]
-    elif not isinstance(drive, SpeedDrive):
+    elif not isinstance(drive, spec.SpeedDrive):
         track = drive.track
         gains = (track.kp_nm_per_rad, track.kd_nm_s_per_rad, track.max_torque_nm or np.inf)
         phase, feed = list(track.feed_forward_phase), list(track.feed_forward_nm)
@@ -123,21 +114,21 @@ def _drive(drive: Drive) -> dict[str, np.ndarray]:
     }
 
 
-def _joint_shapes(mechanism: Mechanism) -> tuple[Ints, Floats, Floats]:
+def _joint_shapes(mechanism: spec.Mechanism) -> tuple[Ints, Floats, Floats]:
     """Kind of each joint; for a prismatic one, the guide's unit normal and the relative angle [rad]."""
     kind = np.zeros(len(mechanism.joints), dtype=np.int64)
     normal = np.zeros((len(mechanism.joints), 2))
     angle = np.zeros(len(mechanism.joints))
-    poses = {GROUND: (0.0, 0.0, 0.0), **mechanism.assembly.poses}
+    poses = {spec.GROUND: (0.0, 0.0, 0.0), **mechanism.assembly.poses}
     for i, joint in enumerate(mechanism.joints.values()):
-        if isinstance(joint, PrismaticJoint):
+        if isinstance(joint, spec.PrismaticJoint):
             kind[i] = PRISMATIC
             normal[i] = np.array([-joint.axis[1], joint.axis[0]]) / np.hypot(*joint.axis)
             angle[i] = poses[joint.slider][2] - poses[joint.guide][2]
     return kind, normal, angle
 
 
-def _springs(mechanism: Mechanism, index: dict[str, int]) -> dict[str, np.ndarray]:
+def _springs(mechanism: spec.Mechanism, index: dict[str, int]) -> dict[str, np.ndarray]:
     springs = mechanism.springs.values()
     return {
         "spring_body": np.array([[index[b] for b in s.bodies] for s in springs], dtype=np.int64).reshape(
@@ -153,14 +144,16 @@ def _springs(mechanism: Mechanism, index: dict[str, int]) -> dict[str, np.ndarra
     }
 
 
-def _loads(mechanism: Mechanism, index: dict[str, int]) -> dict[str, np.ndarray]:
+def _loads(mechanism: spec.Mechanism, index: dict[str, int]) -> dict[str, np.ndarray]:
     """Arrays of the loads: tables over the phase, closed periodically, padded with their last entry."""
     loads = list(mechanism.loads.values())
-    length = 2 + max((len(load.phase) if isinstance(load, PhaseLoad) else 1 for load in loads), default=0)
+    length = 2 + max(
+        (len(load.phase) if isinstance(load, spec.PhaseLoad) else 1 for load in loads), default=0
+    )
     phases, forces = np.zeros((len(loads), length)), np.zeros((len(loads), length, 2))
     for i, load in enumerate(loads):
-        phase = np.array(load.phase if isinstance(load, PhaseLoad) else [0.0])
-        force = np.array(load.force if isinstance(load, PhaseLoad) else [load.force])
+        phase = np.array(load.phase if isinstance(load, spec.PhaseLoad) else [0.0])
+        force = np.array(load.force if isinstance(load, spec.PhaseLoad) else [load.force])
         phases[i] = phase[0] + 1.0
         phases[i, : len(phase) + 1] = phase[-1] - 1.0, *phase
         forces[i] = force[0]
@@ -174,7 +167,7 @@ def _loads(mechanism: Mechanism, index: dict[str, int]) -> dict[str, np.ndarray]
     }
 
 
-def com_poses(mechanism: Mechanism) -> Floats:
+def com_poses(mechanism: spec.Mechanism) -> Floats:
     """Coordinates q (n, 3) of the assembly: centre of mass [m] and angle [rad] of each body, ground 0."""
     q = np.zeros((len(mechanism.bodies) + 1, 3))
     for i, (name, body) in enumerate(mechanism.bodies.items(), start=1):

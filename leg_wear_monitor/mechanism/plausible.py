@@ -14,41 +14,33 @@ import attrs
 
 from leg_wear_monitor.configuration import Doubt
 from leg_wear_monitor.configuration import doubts as unusual
+from leg_wear_monitor.mechanism import spec
 from leg_wear_monitor.mechanism.materials import lacks_wear, spread_of
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.mechanism.spec import (
-    Body,
-    Clearance,
-    Mechanism,
-    PhaseLoad,
-    SpeedDrive,
-    TorqueDrive,
-    Vector,
-)
 
 _USUAL_LENGTH = 5.0e-3, 5.0  # m, of the largest link
 _LEAST_SPREAD = 0.3  # of ln k: repeats of one careful test scatter by 0.1 to 0.3, parts by more
 _ROUND = 1.0e-3  # rpm: a converted speed in rad/s is within this of a whole number of rpm
 
 
-def doubts(mechanism: Mechanism) -> tuple[Doubt, ...]:
+def doubts(mechanism: spec.Mechanism) -> tuple[Doubt, ...]:
     """All doubtful values of a mechanism, the most significant first."""
     parts = (_lengths, _angles, _speed, _masses, _gravity, _joints, _loads)
     return tuple(doubt for part in parts for doubt in part(mechanism))
 
 
-def suspects(mechanism: Mechanism) -> str:
+def suspects(mechanism: spec.Mechanism) -> str:
     """End of an error message about a mechanism that cannot move: its doubtful values; empty without any."""
     found = [str(doubt) for doubt in doubts(mechanism)]
     return f"; look at {'; '.join(found)}" if found else ""
 
 
-def span(points: dict[str, Vector]) -> float:
+def span(points: dict[str, spec.Vector]) -> float:
     """Longest distance between two points [m], 0 without two."""
     return max((math.dist(a, b) for a in points.values() for b in points.values()), default=0.0)
 
 
-def largest_link(mechanism: Mechanism) -> tuple[str, float]:
+def largest_link(mechanism: spec.Mechanism) -> tuple[str, float]:
     """The body with the longest distance between two of its points, and that distance [m]."""
     spans = {name: span(body.points) for name, body in mechanism.bodies.items()}
     name = max(spans, key=lambda body: spans[body])
@@ -59,7 +51,7 @@ def _beyond(value: float, least: float, most: float) -> bool:
     return not least <= abs(value) <= most
 
 
-def _lengths(mechanism: Mechanism) -> Iterator[Doubt]:
+def _lengths(mechanism: spec.Mechanism) -> Iterator[Doubt]:
     name, length = largest_link(mechanism)
     if _beyond(length, *_USUAL_LENGTH):
         slip = "mm for m" if length > 5.0 else "km for m"
@@ -73,7 +65,7 @@ def _lengths(mechanism: Mechanism) -> Iterator[Doubt]:
             yield Doubt(f"bodies.{name}.com", f"{away:g} m away from a link that is far shorter; mm for m?")
 
 
-def _angles(mechanism: Mechanism) -> Iterator[Doubt]:
+def _angles(mechanism: spec.Mechanism) -> Iterator[Doubt]:
     angles = {"crank_angle": mechanism.assembly.crank_angle}
     angles |= {body: pose[2] for body, pose in mechanism.assembly.poses.items()}
     name = max(angles, key=lambda each: abs(angles[each]))  # where one is in degrees, all are
@@ -82,13 +74,13 @@ def _angles(mechanism: Mechanism) -> Iterator[Doubt]:
         yield Doubt(f"assembly.{name}", f"{angles[name]:g} rad is {turns:.3g} turns; degrees for rad?")
 
 
-def _speed(mechanism: Mechanism) -> Iterator[Doubt]:
+def _speed(mechanism: spec.Mechanism) -> Iterator[Doubt]:
     drive = mechanism.drive
-    if isinstance(drive, TorqueDrive):
+    if isinstance(drive, spec.TorqueDrive):
         yield from unusual(drive, "drive.")
         return
-    key, speed = "drive.speed", drive.speed if isinstance(drive, SpeedDrive) else drive.track.speed_radps
-    if not isinstance(drive, SpeedDrive):
+    key, speed = "drive.speed", drive.speed if isinstance(drive, spec.SpeedDrive) else drive.track.speed_radps
+    if not isinstance(drive, spec.SpeedDrive):
         key = "drive.track.speed_radps"
     rpm = 60.0 * speed / TURN
     # a speed that was converted is a whole number of rpm; one that is a whole number of rad/s may be rpm
@@ -99,7 +91,7 @@ def _speed(mechanism: Mechanism) -> Iterator[Doubt]:
         yield Doubt(key, f"{speed:g} rad/s is {rpm:.3g} rpm, usual are 0.1 to 30000 rpm")
 
 
-def _masses(mechanism: Mechanism) -> Iterator[Doubt]:
+def _masses(mechanism: spec.Mechanism) -> Iterator[Doubt]:
     heaviest = max(mechanism.bodies, key=lambda name: mechanism.bodies[name].mass)
     yield from unusual(mechanism.bodies[heaviest], f"bodies.{heaviest}.")
     length = largest_link(mechanism)[1]
@@ -108,7 +100,7 @@ def _masses(mechanism: Mechanism) -> Iterator[Doubt]:
         yield from islice(each, 1)
 
 
-def _inertia(name: str, body: Body, length: float) -> Iterator[Doubt]:
+def _inertia(name: str, body: spec.Body, length: float) -> Iterator[Doubt]:
     """Doubt about an inertia whose radius of gyration is above 10 or below 0.001 times the largest link."""
     gyration = math.sqrt(body.inertia / body.mass)
     if _beyond(gyration, 1.0e-3 * length, 10.0 * length):
@@ -120,13 +112,13 @@ def _inertia(name: str, body: Body, length: float) -> Iterator[Doubt]:
         )
 
 
-def _gravity(mechanism: Mechanism) -> Iterator[Doubt]:
+def _gravity(mechanism: spec.Mechanism) -> Iterator[Doubt]:
     pull = math.hypot(*mechanism.gravity)
     if pull > 30.0:
         yield Doubt("gravity", f"{pull:g} m/s^2, on earth it is 9.81 m/s^2; mm/s^2 for m/s^2?")
 
 
-def _joints(mechanism: Mechanism) -> Iterator[Doubt]:
+def _joints(mechanism: spec.Mechanism) -> Iterator[Doubt]:
     """Doubts about clearance settings, each with all joints concerned: most come from the defaults."""
     concerned: dict[Doubt, list[str]] = {}
     for joint, clearance in mechanism.clearances.items():
@@ -136,7 +128,7 @@ def _joints(mechanism: Mechanism) -> Iterator[Doubt]:
         yield attrs.evolve(doubt, key=f"clearances ({', '.join(joints)}): {doubt.key}")
 
 
-def _clearance(c: Clearance) -> Iterator[Doubt]:
+def _clearance(c: spec.Clearance) -> Iterator[Doubt]:
     yield from unusual(c)
     ratio = c.radial_clearance / c.bushing_radius
     if _beyond(ratio, 1.0e-5, 0.25):
@@ -154,9 +146,9 @@ def _clearance(c: Clearance) -> Iterator[Doubt]:
         yield Doubt("material", fault)
 
 
-def _loads(mechanism: Mechanism) -> Iterator[Doubt]:
+def _loads(mechanism: spec.Mechanism) -> Iterator[Doubt]:
     for name, load in mechanism.loads.items():
-        forces = load.force if isinstance(load, PhaseLoad) else (load.force,)
+        forces = load.force if isinstance(load, spec.PhaseLoad) else (load.force,)
         force = max((math.hypot(*each) for each in forces), default=0.0)
         if force > 1.0e5:
             yield Doubt(f"loads.{name}.force", f"{force:g} N, usual are below 1e5 N; mN for N?")

@@ -6,15 +6,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.estimate.torque_fit import (
-    PHASES,
-    Fit,
-    Terms,
-    explained_by_phase,
-    fit,
-    repeating,
-    too_alike,
-)
+from leg_wear_monitor.estimate import torque_fit
 from leg_wear_monitor.estimate.torque_model import (
     PHASE_ERROR_RAD,
     Pair,
@@ -213,19 +205,19 @@ def zero_of(walk: Walk, model: TorqueModel, sampling: str) -> Zero | str:
     )
 
 
-def _fits(pair: Pair, turns: int, model: TorqueModel, lag_s: float) -> list[Fit]:
+def _fits(pair: Pair, turns: int, model: TorqueModel, lag_s: float) -> list[torque_fit.Fit]:
     """Fits near the phases that explain most, with the configured sign, the best first."""
     start = Start(ratio=1.0, offset_rad=0.0, torque_sign=1, explained=0.0, recording=0, lag_s=lag_s)
     middle = float(np.median(pair.position_rad))
-    terms = Terms(ratio=False, load=bool(model.load.any()))  # the foot may be on the ground
+    terms = torque_fit.Terms(ratio=False, load=bool(model.load.any()))  # the foot may be on the ground
     few = pair.part(slice(None, None, max(1, len(pair.torque) // (_SCANNED * turns))))
     starts = [
         attrs.evolve(start, offset_rad=phase - middle)
-        for phase in _peaks(explained_by_phase(few, model, start, middle))
+        for phase in _peaks(torque_fit.explained_by_phase(few, model, start, middle))
     ]
-    fits = [fit(pair, model, one, terms) for one in starts]
+    fits = [torque_fit.fit(pair, model, one, terms) for one in starts]
     fits = sorted((one for one in fits if one.gain > 0.0), key=lambda one: one.mismatch)
-    return [fit(pair, model, one.refined, terms, with_errors=True) for one in fits[:1]] + fits[1:]
+    return [torque_fit.fit(pair, model, one.refined, terms, with_errors=True) for one in fits[:1]] + fits[1:]
 
 
 def _peaks(explained: Floats) -> list[float]:
@@ -233,22 +225,22 @@ def _peaks(explained: Floats) -> list[float]:
     is_peak = (explained > np.roll(explained, 1)) & (explained >= np.roll(explained, -1)) & (explained > 0.0)
     peaks = np.flatnonzero(is_peak)
     best = peaks[np.argsort(-explained[peaks], kind="stable")][:_STARTS]
-    return [float(phase) for phase in best * (TURN / PHASES)]
+    return [float(phase) for phase in best * (TURN / torque_fit.PHASES)]
 
 
-def _angle(one: Fit) -> float:
+def _angle(one: torque_fit.Fit) -> float:
     """Crank angle at joint position 0 [rad]."""
     return one.offset_rad[0]
 
 
-def _doubt(best: Fit, rivals: list[Fit]) -> str:
+def _doubt(best: torque_fit.Fit, rivals: list[torque_fit.Fit]) -> str:
     """Why the best fit need not be the truth; empty if it is."""
-    if best.mismatch > _UNLIKE or repeating(best) > _ANOTHER_LEG:
+    if best.mismatch > _UNLIKE or torque_fit.repeating(best) > _ANOTHER_LEG:
         return (
             f"the drive torque is not that of this leg at any crank angle, {100.0 * best.mismatch:.0f} % of "
             "its RMS stay unexplained"
         )
-    if rivals and too_alike(best, rivals[0]):
+    if rivals and torque_fit.too_alike(best, rivals[0]):
         return (
             f"{_angle(best):.2f} and {_angle(rivals[0]):.2f} rad explain the drive torque nearly alike "
             f"(mismatch {best.mismatch:.2f} and {rivals[0].mismatch:.2f})"

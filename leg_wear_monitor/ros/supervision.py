@@ -18,18 +18,7 @@ from leg_wear_monitor.monitor.status import verdict_status
 from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.situation import Situation
 from leg_wear_monitor.monitor.verdict.verdict import Finding, dated
-from leg_wear_monitor.ros.health import (
-    AHEAD,
-    QUANTITIES,
-    SILENCE,
-    ClockMonitor,
-    NodeAlarms,
-    Silence,
-    both_clocks,
-    sources_alarm,
-    topics_status,
-    utc,
-)
+from leg_wear_monitor.ros import health
 from leg_wear_monitor.ros.inputs import (
     Arrival,
     CrankNames,
@@ -91,7 +80,7 @@ def line_of(alarm: Alarm, before: Level, stamp_ns: int) -> str:
     latched = ", shown until it is acknowledged" if alarm.level > alarm.present else ""
     value = "unknown" if math.isnan(alarm.value) else f"{_plain(alarm.value)}{unit}"
     limit = "" if math.isnan(alarm.limit) else f", limit {_plain(alarm.limit)}{unit}"
-    time = f", at {utc(stamp_ns)}" if stamp_ns > 0 else ""
+    time = f", at {health.utc(stamp_ns)}" if stamp_ns > 0 else ""
     return (
         f"alarm {alarm.name} {verb} from {before.name} to {alarm.present.name}: {value}{limit}{time}{latched}"
     )
@@ -156,14 +145,14 @@ class Supervision:
             KINDS[stream.kind].name
             for stream in streams_read(config.drive_torque.source, config.foot_load.source)
         )
-        self._silence = Silence(kinds, self._started_ns, time.time_ns())
+        self._silence = health.Silence(kinds, self._started_ns, time.time_ns())
         self._names = CrankNames(config.crank_joint)
         torque = config.drive_torque
         self._interfaces = InterfaceNames(config.crank_joint, torque.interface)
         predicted_nm = monitor.predicted_torque_nm / abs(torque.scale * torque.gear_ratio)
         self._axis = WrenchAxis(torque.axis, predicted_nm)
         self._ahead_s = dict.fromkeys(kinds, 0.0)
-        self._alarms, self._clock = NodeAlarms(kinds), ClockMonitor()
+        self._alarms, self._clock = health.NodeAlarms(kinds), health.ClockMonitor()
         self._alarm_log, self._status_log = AlarmLog(node.get_logger()), StatusLog(node.get_logger())
         self._several_since: dict[str, int] = {}
         self._most_ahead_s, self._other_axis = 0.0, ""
@@ -212,7 +201,7 @@ class Supervision:
         own, monitors = self._alarms.raised, report.findings
         if self._other_axis:
             monitors = tuple(map(self._with_axis, monitors))
-        found = findings(Situation(alarms=own, quantities=QUANTITIES)) if own else ()
+        found = findings(Situation(alarms=own, quantities=health.QUANTITIES)) if own else ()
         if not found and monitors == report.findings:
             return report
         return attrs.evolve(report, findings=(*monitors, *dated(found, (), report.stamp_ns)))
@@ -246,8 +235,8 @@ class Supervision:
         values = self._check_topics(now_ns)
         for kind in self._silence.kinds:
             is_silent = self._silence.level(kind, now_ns) is Level.ERROR
-            values[f"{SILENCE} {kind}"] = self._silence.silent_s(kind, now_ns) if is_silent else 0.0
-            values[f"{AHEAD} {kind}"] = self._ahead_s[kind]
+            values[f"{health.SILENCE} {kind}"] = self._silence.silent_s(kind, now_ns) if is_silent else 0.0
+            values[f"{health.AHEAD} {kind}"] = self._ahead_s[kind]
         self._most_ahead_s = max(self._ahead_s.values())
         self._ahead_s = dict.fromkeys(self._ahead_s, 0.0)
         changed = self._alarms.evaluate(values, stamp_ns)
@@ -267,14 +256,14 @@ class Supervision:
             elif topic.stream.code == INTERFACES:
                 topic.without_crank = self._interfaces.report()
             topic.sources = self._sources(topic, now_ns)
-            values[sources_alarm(KINDS[topic.stream.kind].name).name] = float(topic.sources)
+            values[health.sources_alarm(KINDS[topic.stream.kind].name).name] = float(topic.sources)
         return values
 
     def statuses(self, statuses: Iterable[Status]) -> tuple[Status, ...]:
         """Add the statuses of topics and clock, and mark statuses without current data."""
         now_ns, ros_ns = time.monotonic_ns(), self._now_ns()
         is_simulated = bool(self._node.get_parameter("use_sim_time").value)
-        topics = topics_status(self.inputs, now_ns, self._started_ns)
+        topics = health.topics_status(self.inputs, now_ns, self._started_ns)
         for topic in self.inputs:
             topic.lost_reported = topic.lost
         clock = self._clock.status(ros_ns, now_ns, is_simulated, self._most_ahead_s)
@@ -283,7 +272,7 @@ class Supervision:
         given[verdict.name] = verdict
         # the given clock status has already been logged at its source
         self._status_log.note((*(one for name, one in given.items() if name != clock.name), topics, clock))
-        given[clock.name] = both_clocks(given[clock.name], clock) if clock.name in given else clock
+        given[clock.name] = health.both_clocks(given[clock.name], clock) if clock.name in given else clock
         return self._silence.marked((*given.values(), topics), now_ns)
 
     def _sources(self, topic: InputTopic, now_ns: int) -> int:

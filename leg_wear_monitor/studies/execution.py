@@ -20,18 +20,7 @@ from leg_wear_monitor.configuration.strict import structure
 from leg_wear_monitor.errors import ConfigError, ConfigWarning
 from leg_wear_monitor.files import json_text, share_directory, write_whole
 from leg_wear_monitor.mechanism.loader import is_file_name, load_mechanism, read_yaml, shipped_mechanisms
-from leg_wear_monitor.studies.kinds import (
-    Chaos,
-    Laws,
-    Legs,
-    Load,
-    Location,
-    Lubrication,
-    Multi,
-    Size,
-    Speed,
-    Wear,
-)
+from leg_wear_monitor.studies import kinds
 from leg_wear_monitor.studies.leg_tasks import TASKS, compute
 from leg_wear_monitor.studies.life_tasks import check_points
 from leg_wear_monitor.studies.plan import Arrays, Point, Study, code_digest
@@ -41,16 +30,16 @@ from leg_wear_monitor.workers import Job, run_here, run_in_processes, run_on_clu
 
 
 STUDIES: dict[str, type[Study]] = {
-    "size": Size,
-    "speed": Speed,
-    "location": Location,
-    "wear": Wear,
-    "multi": Multi,
-    "chaos": Chaos,
-    "laws": Laws,
-    "lubrication": Lubrication,
-    "load": Load,
-    "legs": Legs,
+    "size": kinds.Size,
+    "speed": kinds.Speed,
+    "location": kinds.Location,
+    "wear": kinds.Wear,
+    "multi": kinds.Multi,
+    "chaos": kinds.Chaos,
+    "laws": kinds.Laws,
+    "lubrication": kinds.Lubrication,
+    "load": kinds.Load,
+    "legs": kinds.Legs,
 }
 
 

@@ -11,26 +11,10 @@ from leg_wear_monitor.dynamics.result import JointResult
 from leg_wear_monitor.dynamics.run import BEGIN, IMPACTS, SPEED, RunStatistics, new_run_statistics
 from leg_wear_monitor.dynamics.statistics import drive_torque, joint_statistics
 from leg_wear_monitor.errors import AssemblyError, SimulationError
+from leg_wear_monitor.mechanism import position
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.position import (
-    TURN,
-    Linkage,
-    assemble,
-    build_linkage,
-    jacobians,
-    one_cycle,
-    point_motion,
-)
 from leg_wear_monitor.mechanism.spec import GROUND, Mechanism
-from leg_wear_monitor.studies.life_tasks import (
-    SAMPLES,
-    ObservedLeg,
-    ensemble,
-    lyapunov_exponent,
-    observed_legs,
-    poincare_section,
-    wear_life,
-)
+from leg_wear_monitor.studies import life_tasks
 from leg_wear_monitor.studies.plan import Arrays, code_digest
 from leg_wear_monitor.twin.reference import LegParameters
 from leg_wear_monitor.wear import BUSHING, wear_zone
@@ -81,7 +65,7 @@ def draw_leg(mechanism: Mechanism, settings: dict[str, Any]) -> DrawnLeg:
 def rejection(leg: Mechanism, file_leg: Mechanism) -> str:
     """Why a leg is none that walks: `OPEN`, `DEAD_POINT`, `TRANSMISSION` or `STEP`; empty if it walks."""
     try:
-        assemble(build_linkage(leg))
+        position.assemble(position.build_linkage(leg))
     except AssemblyError:
         return OPEN
     try:
@@ -100,14 +84,14 @@ def _walk(leg: Mechanism) -> tuple[float, Floats]:
 
     A leg without a toe has the step 1 m, 1 m.
     """
-    linkage = build_linkage(leg)
-    motion = one_cycle(linkage, _POINTS, 1.0)
-    by_closure = np.linalg.inv(jacobians(linkage, motion.q))
+    linkage = position.build_linkage(leg)
+    motion = position.one_cycle(linkage, _POINTS, 1.0)
+    by_closure = np.linalg.inv(position.jacobians(linkage, motion.q))
     closures = np.arange(by_closure.shape[2]) != linkage.rows.drive_row
     turn = float(np.abs(by_closure[:, 2::3][:, :, closures]).max())
     if leg.toe is None:
         return turn, np.ones(2)
-    return turn, np.asarray(np.ptp(point_motion(motion, linkage, *leg.toe)[0], axis=0))
+    return turn, np.asarray(np.ptp(position.point_motion(motion, linkage, *leg.toe)[0], axis=0))
 
 
 # Response of the leg to clearance: errors, forces, wear and curves of a cycle over an ensemble.
@@ -147,7 +131,7 @@ def run_ensemble(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
     SimulationError
         If the motion diverges.
     """
-    legs = observed_legs(ensemble(mechanism, settings))
+    legs = life_tasks.observed_legs(life_tasks.ensemble(mechanism, settings))
     members = [_follow(leg, settings) for leg in legs]
     linkage, clearance_joints = legs[0].setup.linkage, legs[0].setup.clearance_joints
     result = {name: np.array([member[name] for member in members]) for name in members[0] if name != "curves"}
@@ -162,13 +146,13 @@ def run_ensemble(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
     return result
 
 
-def _follow(leg: ObservedLeg, settings: dict[str, Any]) -> dict[str, Any]:
+def _follow(leg: life_tasks.ObservedLeg, settings: dict[str, Any]) -> dict[str, Any]:
     """Statistics and curves of one run, by the names of `run_ensemble` without the axis r."""
     setup = leg.setup
     joints, clearance_joints = len(setup.linkage.mechanism.joints), list(setup.contacts.joint)
-    leg.advance(settings["skip_cycles"] * SAMPLES, new_run_statistics(joints))
+    leg.advance(settings["skip_cycles"] * life_tasks.SAMPLES, new_run_statistics(joints))
     statistics, depth = new_run_statistics(joints), setup.surfaces.depth.copy()
-    shift = round(leg.stepper.crank_angle / TURN * SAMPLES) % SAMPLES
+    shift = round(leg.stepper.crank_angle / position.TURN * life_tasks.SAMPLES) % life_tasks.SAMPLES
     largest: list[Floats] = []
     peaks: list[Floats] = []
     impacts = [statistics.impacts.copy()]
@@ -177,7 +161,7 @@ def _follow(leg: ObservedLeg, settings: dict[str, Any]) -> dict[str, Any]:
         if cycle < settings["traced_cycles"]:
             cycles.append(_curves(list(leg.moments(statistics)), shift))
         else:
-            leg.advance(SAMPLES, statistics)
+            leg.advance(life_tasks.SAMPLES, statistics)
         largest.append(statistics.response.copy())
         peaks.append(statistics.peak.copy())
         impacts.append(statistics.impacts.copy())
@@ -252,15 +236,15 @@ def _by_run(curve: Floats, runs: int) -> Floats:
     return np.asarray(runs * whole - (runs - 1) * np.array(without))
 
 
-def _ideal(linkage: Linkage, speed: float) -> Arrays:
+def _ideal(linkage: position.Linkage, speed: float) -> Arrays:
     """Curves (s, ...) of the ideal linkage at the same samples."""
-    motion = one_cycle(linkage, SAMPLES, speed)
+    motion = position.one_cycle(linkage, life_tasks.SAMPLES, speed)
     result: Arrays = {
         "ideal_drive_torque_nm": motion.drive_torque,
         "ideal_joint_force_n": np.linalg.norm(motion.joint_force, axis=2),
     }
     if linkage.mechanism.toe is not None:
-        path = point_motion(motion, linkage, *linkage.mechanism.toe)
+        path = position.point_motion(motion, linkage, *linkage.mechanism.toe)
         result |= {f"ideal_{name}": part for name, part in zip(ERRORS, path, strict=False)}
     return result
 
@@ -343,9 +327,9 @@ def _of_runs(arrays: Arrays) -> Arrays:
 TASKS: dict[str, Callable[[Mechanism, dict[str, Any]], Arrays]] = {
     "response": run_ensemble,
     "leg": drawn_leg_response,
-    "life": wear_life,
-    "section": poincare_section,
-    "exponent": lyapunov_exponent,
+    "life": life_tasks.wear_life,
+    "section": life_tasks.poincare_section,
+    "exponent": life_tasks.lyapunov_exponent,
 }
 
 

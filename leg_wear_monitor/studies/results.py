@@ -12,6 +12,7 @@ from leg_wear_monitor.files import data_frame
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.loader import parse_mechanism, read_yaml
 from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.studies import plan
 from leg_wear_monitor.studies.execution import (
     MANIFEST,
     MECHANISM,
@@ -20,20 +21,6 @@ from leg_wear_monitor.studies.execution import (
     read_manifest,
 )
 from leg_wear_monitor.studies.paper import CLAIMS, Claim, Effect
-from leg_wear_monitor.studies.plan import (
-    RANGES,
-    Arrays,
-    Point,
-    Spread,
-    Study,
-    clearance_joints_of,
-    depth_per_cycle,
-    joint_force,
-    largest_error,
-    of_clearance_joints,
-    peak_force,
-    spread,
-)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -146,7 +133,7 @@ class LegClaims:
         }
 
 
-def evaluate(found: Sequence[tuple[Point, Arrays]]) -> LegClaims:
+def evaluate(found: Sequence[tuple[plan.Point, plan.Arrays]]) -> LegClaims:
     """Evaluate the claims on the results of a study ``legs``; requires scipy."""
     rejected = Counter(str(arrays["rejected"]) for _, arrays in found if str(arrays["rejected"]))
     walking = [(point, arrays) for point, arrays in found if not str(arrays["rejected"])]
@@ -186,7 +173,7 @@ def _interval(states: Sequence[str]) -> tuple[float, float]:
     return float(interval.low), float(interval.high)
 
 
-def _factors(drawn: Sequence[Arrays]) -> dict[str, Floats]:
+def _factors(drawn: Sequence[plan.Arrays]) -> dict[str, Floats]:
     """Factors of the legs, by what they multiply."""
     if not drawn:
         return {}
@@ -244,7 +231,7 @@ def _values(effects: Sequence[Effect]) -> Floats:
 
 
 Columns = dict[str, list[Any]]
-_Found = Sequence[tuple[Point, Arrays]]
+_Found = Sequence[tuple[plan.Point, plan.Arrays]]
 
 _FORCES = ("mean_force_n", "rms_force_n", "p99_force_n")
 _OF_CONTACT = (
@@ -263,19 +250,19 @@ def point_columns(found: _Found) -> Columns:
     """
     columns: Columns = {
         "point": [point.label for point, _ in found],
-        "clearance_joints": [", ".join(clearance_joints_of(arrays)) for _, arrays in found],
+        "clearance_joints": [", ".join(plan.clearance_joints_of(arrays)) for _, arrays in found],
         "clearance_m": [point.clearance_m for point, _ in found],
         "speed_rpm": [point.speed_rpm for point, _ in found],
     }
-    for name, ideal in RANGES.items():
-        errors = [largest_error(arrays, name) if ideal in arrays else None for _, arrays in found]
+    for name, ideal in plan.RANGES.items():
+        errors = [plan.largest_error(arrays, name) if ideal in arrays else None for _, arrays in found]
         columns |= _means(name, errors)
-    return columns | _means("rms_torque_nm", [spread(arrays["rms_torque_nm"]) for _, arrays in found])
+    return columns | _means("rms_torque_nm", [plan.spread(arrays["rms_torque_nm"]) for _, arrays in found])
 
 
 def joint_columns(found: _Found) -> Columns:
     """One row a point and clearance joint: forces, impacts, contact, and wear of the bushing."""
-    rows = [(point, arrays, joint) for point, arrays in found for joint in clearance_joints_of(arrays)]
+    rows = [(point, arrays, joint) for point, arrays in found for joint in plan.clearance_joints_of(arrays)]
     columns: Columns = {
         "point": [point.label for point, _, _ in rows],
         "joint": [joint for _, _, joint in rows],
@@ -289,16 +276,16 @@ def joint_columns(found: _Found) -> Columns:
     return columns
 
 
-def _statistics(arrays: Arrays, joint: str) -> Iterator[tuple[str, Spread]]:
-    yield "peak_force_n", peak_force(arrays, joint)
+def _statistics(arrays: plan.Arrays, joint: str) -> Iterator[tuple[str, plan.Spread]]:
+    yield "peak_force_n", plan.peak_force(arrays, joint)
     for name in _FORCES:
-        yield name, joint_force(arrays, name, joint)
+        yield name, plan.joint_force(arrays, name, joint)
     for name in _OF_CONTACT:
-        yield name, of_clearance_joints(arrays, name, joint)
-    yield "wear_depth_m_per_cycle", depth_per_cycle(arrays, joint)
+        yield name, plan.of_clearance_joints(arrays, name, joint)
+    yield "wear_depth_m_per_cycle", plan.depth_per_cycle(arrays, joint)
 
 
-def _means(name: str, values: Sequence[Spread | None]) -> Columns:
+def _means(name: str, values: Sequence[plan.Spread | None]) -> Columns:
     return {
         f"{name}.mean": [None if value is None else value.mean for value in values],
         f"{name}.deviation": [None if value is None else value.deviation for value in values],
@@ -321,13 +308,13 @@ class StudyResults:
     """
 
     study: str
-    settings: Study
+    settings: plan.Study
     mechanism: Mechanism
-    points: tuple[Point, ...]
-    arrays: tuple[Arrays, ...]
+    points: tuple[plan.Point, ...]
+    arrays: tuple[plan.Arrays, ...]
     versions: dict[str, str]
 
-    def of(self, task: str) -> list[tuple[Point, Arrays]]:
+    def of(self, task: str) -> list[tuple[plan.Point, plan.Arrays]]:
         """Points of a task that have a result, and their results."""
         pairs = zip(self.points, self.arrays, strict=True)
         return [
@@ -385,7 +372,8 @@ def load_results(path: Path) -> StudyResults:
         settings=parse_settings(manifest["study"], manifest["settings"], f"{path / MANIFEST}: settings"),
         mechanism=parse_mechanism(read_yaml(path / MECHANISM, source), source),
         points=tuple(
-            Point(label=entry["label"], task=entry["task"], settings=entry["settings"]) for entry in entries
+            plan.Point(label=entry["label"], task=entry["task"], settings=entry["settings"])
+            for entry in entries
         ),
         arrays=tuple(
             directory.read(entry["key"], entry["task"], entry["settings"])

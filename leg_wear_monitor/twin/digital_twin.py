@@ -28,6 +28,7 @@ from leg_wear_monitor.errors import ConfigError, LegWearError
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, check_cycle
 from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.twin import statistics
 from leg_wear_monitor.twin.cycle import torque_profile, tracked_cycle
 from leg_wear_monitor.twin.follower import FollowerSnapshot, LegFollower
 from leg_wear_monitor.twin.follower_state import COUNTED, SETTLING, TRACKED
@@ -41,19 +42,6 @@ from leg_wear_monitor.twin.sampling import (
     condition_of,
     measured_load,
 )
-from leg_wear_monitor.twin.statistics import (
-    CycleStatistics,
-    Event,
-    Intake,
-    SampleStatistics,
-    Sampling,
-    Steps,
-    TorqueProfile,
-    Tracking,
-    TwinEventKind,
-    TwinUpdate,
-    joined,
-)
 from leg_wear_monitor.twin.tracker import CrankTracker, TrackerSnapshot
 
 # A leg that follows blocks of gait cycles only, and whose other cycles wear as those do.
@@ -66,12 +54,12 @@ from leg_wear_monitor.twin.tracker import CrankTracker, TrackerSnapshot
 _LOAD_STEP = 0.1
 
 _LEAVES = (
-    TwinEventKind.LOST_IN_GAP,
-    TwinEventKind.LOST_BY_OUTLIERS,
-    TwinEventKind.LOST_BY_OVERFLOW,
-    TwinEventKind.BACKWARD_JUMP,
+    statistics.TwinEventKind.LOST_IN_GAP,
+    statistics.TwinEventKind.LOST_BY_OUTLIERS,
+    statistics.TwinEventKind.LOST_BY_OVERFLOW,
+    statistics.TwinEventKind.BACKWARD_JUMP,
 )
-_PULLS = (TwinEventKind.MOVING, TwinEventKind.REVERSED)
+_PULLS = (statistics.TwinEventKind.MOVING, statistics.TwinEventKind.REVERSED)
 
 
 class SampledFollower(LegFollower):
@@ -93,10 +81,10 @@ class SampledFollower(LegFollower):
         self._sampled = SampledState(SamplingPlan(sampling), WearEstimate(depth.shape), depth.copy())
 
     @property
-    def sampling(self) -> Sampling:
+    def sampling(self) -> statistics.Sampling:
         """What was followed, and the variance of what was not."""
         own = self._sampled
-        return Sampling(
+        return statistics.Sampling(
             fraction=self._fraction,
             followed_cycles=own.followed,
             estimated_cycles=own.wear.estimated_cycles,
@@ -137,7 +125,7 @@ class SampledFollower(LegFollower):
         if snapshot.sampled is not None:
             self._sampled = copy.deepcopy(snapshot.sampled)
 
-    def _start(self, steps: Steps, i: int) -> Event:
+    def _start(self, steps: statistics.Steps, i: int) -> statistics.Event:
         self._give_up_cycle()  # after a failure
         event = super()._start(steps, i)
         own, motion = self._sampled, self.state.motion
@@ -145,7 +133,7 @@ class SampledFollower(LegFollower):
         own.depth, own.moved_ns = self._setup.surfaces.depth.copy(), int(motion.moving_ns)
         return event
 
-    def _happened(self, what: TwinEventKind) -> None:
+    def _happened(self, what: statistics.TwinEventKind) -> None:
         if what in _LEAVES:
             self._give_up_cycle()
         elif what in _PULLS:
@@ -158,7 +146,7 @@ class SampledFollower(LegFollower):
             self._estimate_part(int(motion.moving_ns) - own.moved_ns)
         motion.counts = COUNTED
 
-    def _end_cycle(self, stamp: int, cycles: list[CycleStatistics]) -> None:
+    def _end_cycle(self, stamp: int, cycles: list[statistics.CycleStatistics]) -> None:
         motion, own = self.state.motion, self._sampled
         was_followed, is_whole = motion.counts != TRACKED, bool(motion.cycle_is_whole)
         moved_ns = int(motion.moving_ns - (motion.piece_end_ns - stamp))
@@ -176,7 +164,7 @@ class SampledFollower(LegFollower):
         self._plan_next(condition, stamp, was_followed)
         own.depth, own.moved_ns = self._setup.surfaces.depth.copy(), moved_ns
 
-    def _end_counted(self, stamp: int, cycles: list[CycleStatistics]) -> Condition | None:
+    def _end_counted(self, stamp: int, cycles: list[statistics.CycleStatistics]) -> Condition | None:
         """End a gait cycle that was followed; returns its condition if it is a whole one."""
         own, number = self._sampled, len(cycles)
         super()._end_cycle(stamp, cycles)
@@ -189,7 +177,9 @@ class SampledFollower(LegFollower):
             own.add(condition, cycle.growth_mean_m, self._setup.surfaces.depth - own.depth)
         return condition
 
-    def _end_estimated(self, stamp: int, moved_s: float, cycles: list[CycleStatistics]) -> Condition:
+    def _end_estimated(
+        self, stamp: int, moved_s: float, cycles: list[statistics.CycleStatistics]
+    ) -> Condition:
         """End a whole gait cycle that does not count by itself; returns its condition."""
         motion = self.state.motion
         motion.cycles += 1
@@ -251,7 +241,7 @@ class SampledFollower(LegFollower):
         self.estimate.wait(own.passed)
         motion.counts = SETTLING if own.plan.is_settling else COUNTED
 
-    def _condition(self, cadence_rpm: float, profile: TorqueProfile) -> Condition:
+    def _condition(self, cadence_rpm: float, profile: statistics.TorqueProfile) -> Condition:
         load = measured_load(profile) / self._load_step_n
         return condition_of(cadence_rpm, load, self._sampled.condition)
 
@@ -314,7 +304,7 @@ class DigitalTwin:
         )
         self._tracker = CrankTracker(self.settings.tracker)
         self.wear_acceleration = self.settings.wear_acceleration
-        self._intake: Intake | None = None
+        self._intake: statistics.Intake | None = None
 
     @property
     def wear_acceleration(self) -> float:
@@ -354,7 +344,7 @@ class DigitalTwin:
         return self._follower.torque_size_nm
 
     @property
-    def sampling(self) -> Sampling | None:
+    def sampling(self) -> statistics.Sampling | None:
         """State of a sampled replay; None where all gait cycles are followed."""
         return self._follower.sampling if isinstance(self._follower, SampledFollower) else None
 
@@ -369,9 +359,9 @@ class DigitalTwin:
             self._follower.end_recording()
 
     @property
-    def tracking(self) -> Tracking:
+    def tracking(self) -> statistics.Tracking:
         """State of the crank tracking."""
-        return Tracking(int(self._tracker.state.clock.tracking))
+        return statistics.Tracking(int(self._tracker.state.clock.tracking))
 
     @property
     def speed_radps(self) -> float:
@@ -384,7 +374,7 @@ class DigitalTwin:
         return self._tracker.due_stamp_ns
 
     @property
-    def intake(self) -> Intake:
+    def intake(self) -> statistics.Intake:
         """Counts of samples and times since the twin was created."""
         if self._intake is None:  # it is asked for several times between two updates
             self._intake = intake(self._tracker.records, self._follower.records, self.settings.kinds)
@@ -468,16 +458,18 @@ class DigitalTwin:
         self.update(gait_samples(stamps, crank_angle_rad=angle))
         self.restore(now)
 
-    def update(self, samples: Samples) -> TwinUpdate:
+    def update(self, samples: Samples) -> statistics.TwinUpdate:
         """Process a block (n,) of `GAIT_SAMPLE` in order of arrival, as far as the lag allows."""
-        evaluated: list[SampleStatistics] = []
-        cycles: list[CycleStatistics] = []
-        events: list[Event] = []
+        evaluated: list[statistics.SampleStatistics] = []
+        cycles: list[statistics.CycleStatistics] = []
+        events: list[statistics.Event] = []
         self._intake = None
         for steps, n in self._tracker.update(samples):
             if n:
                 evaluated.append(self._follower.follow(steps, n, cycles, events))
-        return TwinUpdate(joined(evaluated, len(self.clearance_joints)), tuple(cycles), tuple(events))
+        return statistics.TwinUpdate(
+            statistics.joined(evaluated, len(self.clearance_joints)), tuple(cycles), tuple(events)
+        )
 
     def snapshot(self) -> TwinSnapshot:
         """A copy of the whole state."""

@@ -7,52 +7,16 @@ from typing import NamedTuple
 import numpy as np
 
 from leg_wear_monitor.compiled.kernel import Record, Records, compile_for, new_records, record_of
+from leg_wear_monitor.dynamics import run
 from leg_wear_monitor.dynamics.clearance.contact import contact_laws
 from leg_wear_monitor.dynamics.clearance.stepper import INTERVALS, ClearanceStepper
 from leg_wear_monitor.dynamics.clearance.stepper import Snapshot as StepperSnapshot
 from leg_wear_monitor.dynamics.clearance.tables import POINTS
-from leg_wear_monitor.dynamics.run import (
-    DONE,
-    INVALID_DRIVE,
-    PUSHED_THROUGH,
-    STEP_TOO_SMALL,
-    TORQUE,
-    Setup,
-    new_run_statistics,
-    steady_drive,
-)
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.person import heavier_person_torque
 from leg_wear_monitor.mechanism.position import TURN, Linkage
+from leg_wear_monitor.twin import cycle, follower_state
 from leg_wear_monitor.twin import statistics as step_codes
-from leg_wear_monitor.twin.cycle import (
-    CYCLES,
-    INSTANT_CYCLES,
-    LEAST_CYCLES,
-    LEAST_SAMPLES,
-    LoadEstimate,
-    RepeatingResidual,
-    averages_by_phase,
-    behind_low_pass,
-    clear_run_statistics,
-    clearances,
-    cycle_statistics,
-    find,
-    torque_profile,
-    torque_statistics,
-)
-from leg_wear_monitor.twin.follower_state import (
-    EVALUATED,
-    FINE_PHASES,
-    FRICTION,
-    LAG,
-    LOAD,
-    LOAD_FRICTION,
-    PHASES,
-    TORQUE_SENSOR,
-    FollowerState,
-    leg_state,
-)
 from leg_wear_monitor.twin.following import CYCLE, LEFT, NEEDS_START, REPORTED, follow
 from leg_wear_monitor.twin.leg_simulation import drive_coupling
 from leg_wear_monitor.twin.load import FootLoad, force_of, set_force, shape_torque, torque_size
@@ -88,9 +52,9 @@ _EVENT_KINDS = {
     step_codes.REVERSED: TwinEventKind.REVERSED,
 }
 _FAILURES = {
-    STEP_TOO_SMALL: TwinEventKind.STEP_TOO_SMALL,
-    PUSHED_THROUGH: TwinEventKind.PUSHED_THROUGH,
-    INVALID_DRIVE: TwinEventKind.INVALID_DRIVE,
+    run.STEP_TOO_SMALL: TwinEventKind.STEP_TOO_SMALL,
+    run.PUSHED_THROUGH: TwinEventKind.PUSHED_THROUGH,
+    run.INVALID_DRIVE: TwinEventKind.INVALID_DRIVE,
 }
 
 
@@ -130,7 +94,7 @@ class LegFollower:
         RMS of the ideal drive torque at the commanded speed.
     """
 
-    def __init__(self, setup: Setup, settings: TwinSettings) -> None:
+    def __init__(self, setup: run.Setup, settings: TwinSettings) -> None:
         is_measured = settings.load_model == MEASURED
         # beside a measured load, the estimated one is what the torque shows more
         self._setup, self._acts = setup, settings.estimate_load and not is_measured
@@ -139,22 +103,26 @@ class LegFollower:
         # a whole number of nanoseconds, so that the stepper's time does not drift from the stamps
         interval = round(1.0e9 * TURN / abs(setup.speed) / INTERVALS) * 1.0e-9
         self._stepper = ClearanceStepper(setup, interval, tables=self._load.tables)
-        self._leg: FollowerState = leg_state(len(setup.clearance_joints))
+        self._leg: follower_state.FollowerState = follower_state.leg_state(len(setup.clearance_joints))
         self.records = self._leg.records
         self.state: Record = record_of(self.records)
-        self.statistics = new_run_statistics(len(setup.linkage.mechanism.joints))
+        self.statistics = run.new_run_statistics(len(setup.linkage.mechanism.joints))
         self._loads = settings.loads_n
         # a load that nobody declared is a push, or the ground's in stance, whatever explains the torque
         self._is_load_known = is_measured or settings.load_model == GROUND or settings.load_shape != STANCE
         self._shape_torque = shape_torque(setup.linkage)
-        self.estimate = LoadEstimate(self._loads[1], self._loads[0])
+        self.estimate = cycle.LoadEstimate(self._loads[1], self._loads[0])
         self._cutoff, self._declared_lag_s = TURN * settings.torque_bandwidth_hz, settings.torque_lag_s
         self.torque_size_nm = max(torque_size(setup.linkage, setup.speed), _LEAST_TORQUE_NM)
         self._instants = settings.torque_sampling == INSTANT
-        kept = (INSTANT_CYCLES, INSTANT_CYCLES) if self._instants else (CYCLES, LEAST_CYCLES)
-        self._repeating = RepeatingResidual(*kept)
+        kept = (
+            (cycle.INSTANT_CYCLES, cycle.INSTANT_CYCLES)
+            if self._instants
+            else (cycle.CYCLES, cycle.LEAST_CYCLES)
+        )
+        self._repeating = cycle.RepeatingResidual(*kept)
         self._tolerated_nm = self._of_person() if setup.linkage.mechanism.person_kg else None
-        self._sensor = new_records(1, TORQUE_SENSOR)
+        self._sensor = new_records(1, follower_state.TORQUE_SENSOR)
         self._sensor[0] = self._cutoff, self.torque_size_nm, self._instants, 0.0, 0.0
         self._before = self.clearances
 
@@ -170,7 +138,7 @@ class LegFollower:
     @property
     def clearances(self) -> Floats:
         """Mean and largest radial clearance (2, k) [m]."""
-        return clearances(self._setup.contacts, self._setup.surfaces.depth)
+        return cycle.clearances(self._setup.contacts, self._setup.surfaces.depth)
 
     def take_surfaces(self, depth: Floats) -> None:
         """Set wear depths (k, 2, N) [m]; for changed joints, the growth of the cycle counts from there.
@@ -233,17 +201,19 @@ class LegFollower:
                 events.append(Event(int(steps["begin_ns"][i]), _EVENT_KINDS[int(steps["detail"][i])]))
                 self._happened(events[-1].what)
                 i += 1
-            elif reason != DONE:
+            elif reason != run.DONE:
                 joint = self._setup.clearance_joints[k] if k >= 0 else None
                 events.append(Event(int(self.state.motion.failed_at_ns), _FAILURES[reason], joint))
-        stamp, kind, angle, torque, measured = (evaluated[name][:m] for name in EVALUATED.names or ())
+        stamp, kind, angle, torque, measured = (
+            evaluated[name][:m] for name in follower_state.EVALUATED.names or ()
+        )
         at = eccentricities[:m].reshape(m, forces.shape[1], 2)
         return SampleStatistics(stamp, kind, angle, torque, forces[:m], measured, at)
 
     def _room(self, n: int) -> tuple[Records, Floats, Floats]:
         """Room for n samples: `EVALUATED`, contact forces (n, k) [N], and eccentricities (n, 2 k) [m]."""
         joints = len(self._setup.clearance_joints)
-        return new_records(n, EVALUATED), np.zeros((n, joints)), np.zeros((n, 2 * joints))
+        return new_records(n, follower_state.EVALUATED), np.zeros((n, joints)), np.zeros((n, 2 * joints))
 
     def compile(self, steps: Steps) -> None:
         """Compile what follows steps, but for the motion itself; the leg stays where it is."""
@@ -269,7 +239,7 @@ class LegFollower:
         motion.whole_cycles = motion.cycle_before_ns = 0
         motion.runs, motion.turns_before, self.state.low_pass.stage = 1, step["turns"], 0
         self._leg.polynomial[:] = 0.0, angle, speed, 0.0, 0.0, 0.0, 0.0
-        clear_run_statistics(self.statistics)
+        cycle.clear_run_statistics(self.statistics)
         return Event(stamp, TwinEventKind.ACQUIRED)
 
     def _happened(self, what: TwinEventKind) -> None:
@@ -289,20 +259,20 @@ class LegFollower:
         stepper, depth = self._stepper, self._setup.surfaces.depth
         intervals = round(_RUN_IN_S / stepper.model.interval)
         worn, time = depth.copy(), intervals * stepper.model.interval
-        polynomial = steady_drive(angle - speed * time, speed)
+        polynomial = run.steady_drive(angle - speed * time, speed)
         stepper.init(polynomial[1], speed)
         reached = stepper.advance(polynomial, 0.9 * time, self.statistics)[0]
-        clear_run_statistics(self.statistics)
-        if reached == DONE:
+        cycle.clear_run_statistics(self.statistics)
+        if reached == run.DONE:
             reached = stepper.advance(polynomial, time, self.statistics)[0]
         depth[:] = worn
         stepper.drop_pending_wear()
-        if reached != DONE:  # continue from centred journals; the next step reports the failure
+        if reached != run.DONE:  # continue from centred journals; the next step reports the failure
             stepper.init(angle, speed)
             self._leg.force[:] = 0.0
             return 0
         self._leg.force[:] = stepper.last_force
-        self.state.torque.mean_before = self.statistics.drive_integral[TORQUE] / self.statistics.time[0]
+        self.state.torque.mean_before = self.statistics.drive_integral[run.TORQUE] / self.statistics.time[0]
         return round(1.0e9 * time)
 
     def _end_cycle(self, stamp: int, cycles: list[CycleStatistics]) -> None:
@@ -315,7 +285,7 @@ class LegFollower:
             motion.whole_cycles += 1
             motion.cycle_before_ns = stamp - motion.cycle_begin_ns
             cycles.append(
-                cycle_statistics(
+                cycle.cycle_statistics(
                     self.state, stamp, self._setup.contacts, depth, self._before, self.statistics, torque,
                     profile, not_compared, load_peak_n,
                 )
@@ -329,13 +299,13 @@ class LegFollower:
         self.state.push.peak_n = self.state.load.largest
         for part in ("sums", "load"):
             self.records[part] = 0
-        clear_run_statistics(self.statistics)
+        cycle.clear_run_statistics(self.statistics)
         self._before = self.clearances
 
     def _why_not_compared(self, stamp: int) -> NotCompared | None:
         """Why the torque of the gait cycle that ends at a stamp [ns] is not compared; None if it is."""
         motion = self.state.motion
-        if self.state.sums.number < LEAST_SAMPLES:
+        if self.state.sums.number < cycle.LEAST_SAMPLES:
             return NotCompared.SAMPLES
         if motion.whole_cycles == 0:
             return NotCompared.FIRST
@@ -352,8 +322,8 @@ class LegFollower:
         independent = max(0.25 * self._cutoff * self.statistics.time[0], 1.0)
         sums = self.state.sums
         acting_n = self.estimate.acting
-        profile = torque_profile(sums, acting_n)
-        found = find(sums, sums.number / independent, self.estimate.room)
+        profile = cycle.torque_profile(sums, acting_n)
+        found = cycle.find(sums, sums.number / independent, self.estimate.room)
         if found is not None:
             self.estimate.take(found, self._acts)
             self._load.set(self.estimate.acting)
@@ -362,7 +332,7 @@ class LegFollower:
             self._repeating.take(sums.by_phase if self._instants else self._by_phase(profile, acting_n))
             if not self._is_load_known:
                 self._choose_shape(acting_n)
-        torque = torque_statistics(sums, found, self.estimate, self._unexplained_nm)
+        torque = cycle.torque_statistics(sums, found, self.estimate, self._unexplained_nm)
         return torque, profile
 
     def _choose_shape(self, acting_n: float) -> None:
@@ -381,8 +351,8 @@ class LegFollower:
 
     def _by_phases(self, torque: Floats) -> Floats:
         """A torque (n,) over a turn at the commanded speed, by the phases of the residual."""
-        phases = PHASES if self._instants else FINE_PHASES
-        return behind_low_pass(torque, phases, self._cutoff, self._setup.speed, self._instants)
+        phases = follower_state.PHASES if self._instants else follower_state.FINE_PHASES
+        return cycle.behind_low_pass(torque, phases, self._cutoff, self._setup.speed, self._instants)
 
     def _of_person(self) -> Floats:
         """Torque that the person may be heavier by, by the phases of the residual."""
@@ -400,7 +370,7 @@ class LegFollower:
 
     def _set_friction(self) -> None:
         """Predict torques behind the friction of the drive as estimated, as far as friction can be that."""
-        constant, under_load = self.estimate.values[[FRICTION, LOAD_FRICTION]]
+        constant, under_load = self.estimate.values[[follower_state.FRICTION, follower_state.LOAD_FRICTION]]
         most_nm = _LARGEST_FRICTION * self.torque_size_nm
         self._sensor["friction"] = min(max(float(constant), 0.0), most_nm)
         self._sensor["load_friction"] = under_load
@@ -408,9 +378,9 @@ class LegFollower:
     def _by_phase(self, profile: TorqueProfile, acting_n: float) -> Floats:
         """Residual (6, n) of the gait cycle that ends, of a sensor that averages."""
         direction = 1 if self.state.motion.cut_rises else -1
-        lag_s = self._declared_lag_s, float(self.estimate.values[LAG])
+        lag_s = self._declared_lag_s, float(self.estimate.values[follower_state.LAG])
         duration_s = float(self.statistics.time[0])
-        return averages_by_phase(profile, acting_n, lag_s, direction, duration_s, self._cutoff)
+        return cycle.averages_by_phase(profile, acting_n, lag_s, direction, duration_s, self._cutoff)
 
     @property
     def _unexplained_nm(self) -> float:
@@ -418,7 +388,7 @@ class LegFollower:
         # the residual of averages is from the torque without a load, that of instants is not
         loads = (-math.inf, math.inf) if self._instants else self._loads
         rms_nm, _ = self._repeating.rms_nm(loads, tolerated_nm=self._tolerated_nm)
-        return self._beyond_shape(rms_nm, self._load.shape, float(self.estimate.values[LOAD]))
+        return self._beyond_shape(rms_nm, self._load.shape, float(self.estimate.values[follower_state.LOAD]))
 
     def snapshot(self) -> FollowerSnapshot:
         """A copy of the whole state, surfaces included."""

@@ -13,16 +13,7 @@ from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Clearance, Mechanism, SpeedDrive
 from leg_wear_monitor.monitor.config.sections import drive_figures
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.twin.sample import (
-    CONTACT,
-    GROUND,
-    MEASURED,
-    NO_LOAD,
-    NONE,
-    STANCE,
-    TrackerSettings,
-    TwinSettings,
-)
+from leg_wear_monitor.twin import sample
 
 _KEYS = {"radial_clearance": "clearances_m", "wear_coefficient": "wear_coefficients_per_pa"}
 
@@ -49,7 +40,7 @@ def fitted(mechanism: Mechanism, config: MonitorConfig, source: str = "parameter
         raise ConfigError(
             source, "mechanism", f"{config.mechanism!r} is driven by a torque, expected one with drive.speed"
         )
-    if config.load.model != NONE and mechanism.toe is None:
+    if config.load.model != sample.NONE and mechanism.toe is None:
         fault = f"{config.load.model!r} needs a point called toe in {mechanism.source}, which has none"
         raise ConfigError(source, "load.model", fault)
     clearance_joints = config.clearance_joints or mechanism.clearance_joints
@@ -93,7 +84,7 @@ def check_limits(config: MonitorConfig, mechanism: Mechanism, source: str = "par
             raise ConfigError(source, key, fault)
 
 
-def twin_settings(config: MonitorConfig, source: str = "parameters") -> TwinSettings:
+def twin_settings(config: MonitorConfig, source: str = "parameters") -> sample.TwinSettings:
     """Settings of the twin from a configuration.
 
     Raises
@@ -108,11 +99,11 @@ def twin_settings(config: MonitorConfig, source: str = "parameters") -> TwinSett
             "tracker.reorder_window_s",
             f"{tracker.reorder_window_s!r} s is not below tracker.gap_limit_s, {tracker.gap_limit_s!r} s",
         )
-    if config.load.model == MEASURED and config.foot_load.source in (NO_LOAD, CONTACT):
-        fault = f"{MEASURED!r} needs forces, and foot_load.source is {config.foot_load.source!r}"
+    if config.load.model == sample.MEASURED and config.foot_load.source in (sample.NO_LOAD, sample.CONTACT):
+        fault = f"{sample.MEASURED!r} needs forces, and foot_load.source is {config.foot_load.source!r}"
         raise ConfigError(source, "load.model", fault)
-    return TwinSettings(
-        tracker=TrackerSettings(
+    return sample.TwinSettings(
+        tracker=sample.TrackerSettings(
             commanded_speed_radps=TURN * (cadence.commanded_rpm / 60.0),
             bandwidth_hz=tracker.bandwidth_hz,
             lag_s=tracker.lag_s,
@@ -127,7 +118,7 @@ def twin_settings(config: MonitorConfig, source: str = "parameters") -> TwinSett
         load_source=config.foot_load.source,
         load_frame=config.foot_load.frame,
         load_model=config.load.model,
-        load_shape=GROUND if config.load.model == GROUND else STANCE,
+        load_shape=sample.GROUND if config.load.model == sample.GROUND else sample.STANCE,
     )
 
 

@@ -6,19 +6,7 @@ from typing import Any
 import attrs
 
 from leg_wear_monitor.configuration import FieldError, choice, described, quantity
-from leg_wear_monitor.twin.sample import (
-    AVERAGE,
-    ENCODERS,
-    FOOT_FRAME,
-    GROUND_FRAME,
-    LOAD_FRAMES,
-    LOAD_MODELS,
-    LOAD_SOURCES,
-    NO_LOAD,
-    NONE,
-    SAMPLINGS,
-    WRENCH,
-)
+from leg_wear_monitor.twin import sample
 
 LIVE = {"live": True}  # may change while the monitor runs
 
@@ -87,8 +75,8 @@ def _named(name: str) -> str | None:
 
 
 def _few_and_different(names: tuple[str, ...]) -> str | None:
-    if len(names) > ENCODERS:
-        return f"{list(names)} are {len(names)}, expected at most {ENCODERS}"
+    if len(names) > sample.ENCODERS:
+        return f"{list(names)} are {len(names)}, expected at most {sample.ENCODERS}"
     return None if len(set(names)) == len(names) and all(names) else f"{list(names)} are not different names"
 
 
@@ -158,9 +146,9 @@ class DriveTorque:
         check=_named,
     )
     sampling: str = choice(
-        SAMPLINGS,
+        sample.SAMPLINGS,
         "what a torque sample is: the average since the one before, or the torque at its instant",
-        default=AVERAGE,
+        default=sample.AVERAGE,
     )
     axis: str = choice(("x", "y", "z"), "component of the wrench about the drive's axis", default="z")
     sign: int = _sign("1 if a positive torque drives the crank in its positive direction, else -1")
@@ -211,14 +199,14 @@ class FootLoad:
     """From a message on foot_load to the force of the ground on the toe: sign * scale * value."""
 
     source: str = choice(
-        LOAD_SOURCES,
+        sample.LOAD_SOURCES,
         "none, or what is on foot_load: WrenchStamped, Float64 (the vertical force), or contact, a Bool",
-        default=NO_LOAD,
+        default=sample.NO_LOAD,
     )
     frame: str = choice(
-        LOAD_FRAMES,
+        sample.LOAD_FRAMES,
         "axes of the wrench: x and y of the mechanism (ground), or of the body with the toe (foot)",
-        default=GROUND_FRAME,
+        default=sample.GROUND_FRAME,
     )
     sign: int = _sign("1 if a force is positive that pushes the foot along the axis or up, else -1")
     scale: float = quantity(
@@ -226,8 +214,8 @@ class FootLoad:
     )
 
     def __attrs_post_init__(self) -> None:
-        if self.frame == FOOT_FRAME and self.source not in (NO_LOAD, WRENCH):
-            fault = f"{self.frame!r} needs a force with a direction, foot_load.source {WRENCH!r}"
+        if self.frame == sample.FOOT_FRAME and self.source not in (sample.NO_LOAD, sample.WRENCH):
+            fault = f"{self.frame!r} needs a force with a direction, foot_load.source {sample.WRENCH!r}"
             raise FieldError("frame", fault)
 
 
@@ -236,9 +224,9 @@ class Load:
     """The load that the foot carries in the model."""
 
     model: str = choice(
-        LOAD_MODELS,
+        sample.LOAD_MODELS,
         "load at the foot: none; ground, estimated as a person's in stance; measured, that of foot_load",
-        default=NONE,
+        default=sample.NONE,
     )
     person_kg: float = quantity(
         "kg",

@@ -11,27 +11,11 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
+from leg_wear_monitor.estimate import leg_model, signature
 from leg_wear_monitor.estimate.channel import leg_behind_coupling, with_channel_of
 from leg_wear_monitor.estimate.explanations import Explainer, body_torques
 from leg_wear_monitor.estimate.ground_load import GroundLoad, ground_load, nuisances
-from leg_wear_monitor.estimate.leg_model import (
-    FAR_FROM_FILE,
-    UNLIKE_FILE,
-    ChangeDetector,
-    explainer_of,
-    identified_leg,
-    leg_of_ideal_torque,
-    misfit,
-)
-from leg_wear_monitor.estimate.signature import (
-    DIRECT,
-    UNDECLARED,
-    CommissionedTorque,
-    DriveFigures,
-    TorqueSensor,
-    signature_model,
-    with_noise_of,
-)
+from leg_wear_monitor.estimate.leg_model import misfit
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
@@ -74,12 +58,12 @@ class _ModelsOfState:
     """Models of one reference, sensor and baseline; the last three are computed when first used."""
 
     reference: TorqueReference
-    sensor: TorqueSensor
-    commissioned: CommissionedTorque | None
+    sensor: signature.TorqueSensor
+    commissioned: signature.CommissionedTorque | None
     explainer: Explainer
     misfit: float | None = None
     counted_m: Floats | None = None
-    detector: ChangeDetector | None = None
+    detector: leg_model.ChangeDetector | None = None
 
 
 class LegModels:
@@ -92,7 +76,7 @@ class LegModels:
         Declared values of the drive.
     """
 
-    def __init__(self, mechanism: Mechanism, figures: DriveFigures = UNDECLARED) -> None:
+    def __init__(self, mechanism: Mechanism, figures: signature.DriveFigures = signature.UNDECLARED) -> None:
         self._mechanism, self._figures = mechanism, figures
         self._kept: list[_ModelsOfState] = []
 
@@ -104,12 +88,12 @@ class LegModels:
         """Possible explanations of the measured torque: other clearances and other causes."""
         return self._of(state).explainer
 
-    def detector(self, state: TorqueState, config: MonitorConfig) -> ChangeDetector:
+    def detector(self, state: TorqueState, config: MonitorConfig) -> leg_model.ChangeDetector:
         """Tests for a change of the counted clearances."""
         own = self._of(state)
         if own.detector is None or own.counted_m is not state.counted_m:
             cycles = 60.0 * abs(config.cadence.commanded_rpm) * config.diagnosis.false_alarm_hours
-            own.detector = ChangeDetector(own.explainer, state.counted_m, cycles)
+            own.detector = leg_model.ChangeDetector(own.explainer, state.counted_m, cycles)
             own.counted_m = state.counted_m
         return own.detector
 
@@ -127,20 +111,22 @@ class LegModels:
         return own.misfit
 
     def channel(
-        self, reference: TorqueReference, sensor: TorqueSensor, known: CommissionedTorque
-    ) -> TorqueSensor:
+        self, reference: TorqueReference, sensor: signature.TorqueSensor, known: signature.CommissionedTorque
+    ) -> signature.TorqueSensor:
         """The sensor with the noise and the channel of a commissioned leg.
 
         Other lengths than expected move the impacts, as a delay does. A channel that explains the impacts of
         such a leg fits the mean torque much worse: it is refused, and the leg is to be identified.
         """
-        columns = nuisances(self._mechanism, reference, attrs.evolve(sensor, channel=DIRECT))
+        columns = nuisances(self._mechanism, reference, attrs.evolve(sensor, channel=signature.DIRECT))
         found = with_channel_of(reference, sensor, known.mean, columns, self._figures)
-        plain = with_noise_of(reference, attrs.evolve(sensor, channel=DIRECT), known.mean)
+        plain = signature.with_noise_of(reference, attrs.evolve(sensor, channel=signature.DIRECT), known.mean)
         if found == plain:
             return plain
         with_channel, without = (
-            misfit(signature_model(reference, one), nuisances(self._mechanism, reference, one), known)
+            misfit(
+                signature.signature_model(reference, one), nuisances(self._mechanism, reference, one), known
+            )
             for one in (found, plain)
         )
         return plain if with_channel > _CHANNEL_MISFIT_FACTOR * without else found
@@ -162,7 +148,7 @@ class LegModels:
     def is_of_file(self, state: TorqueState) -> bool:
         """Whether the commissioned leg is that of the mechanism file, or of the identified parameters."""
         is_loaded = state.reference is not None and state.reference.parameters.load.size > 0
-        return self.misfit(state) < (_UNLIKE_ON_GROUND if is_loaded else UNLIKE_FILE)
+        return self.misfit(state) < (_UNLIKE_ON_GROUND if is_loaded else leg_model.UNLIKE_FILE)
 
     def _of(self, state: TorqueState) -> _ModelsOfState:
         """Models of a state: kept ones if its reference, sensor and baseline are the same, or new ones."""
@@ -173,7 +159,7 @@ class LegModels:
             if one.reference is reference and one.commissioned is known and one.sensor == sensor:
                 return one
         made = _ModelsOfState(
-            reference, sensor, known, explainer_of(self._mechanism, reference, sensor, known)
+            reference, sensor, known, leg_model.explainer_of(self._mechanism, reference, sensor, known)
         )
         self._kept = [made, *self._kept][:_MOST_KEPT]
         return made
@@ -350,8 +336,8 @@ class References:
                 state.parameters = found
                 self._begin(found, clearance_m, depth, profile)
                 return
-        if is_first and not start.compliance and self._models.misfit(state) >= FAR_FROM_FILE:
-            ideal = leg_of_ideal_torque(self._mechanism, model, known, profile.speed, start.load)
+        if is_first and not start.compliance and self._models.misfit(state) >= leg_model.FAR_FROM_FILE:
+            ideal = leg_model.leg_of_ideal_torque(self._mechanism, model, known, profile.speed, start.load)
             start = attrs.evolve(ideal, load_sigma=start.load_sigma)
         state.is_identifying = True
         part = self._unfinished(start, profile, clearance_m, is_of_parameters=True)
@@ -432,7 +418,9 @@ class References:
                 self._begin(state.parameters, counted_m, depth, legs.profile)
         elif state.commissioned is not None:
             explainer = self._models.explainer(state)
-            state.parameters = identified_leg(legs, explainer.model, explainer.nuisances, state.commissioned)
+            state.parameters = leg_model.identified_leg(
+                legs, explainer.model, explainer.nuisances, state.commissioned
+            )
             self._begin(state.parameters, counted_m, depth, legs.profile)
 
     def _install(self, state: TorqueState, reference: TorqueReference) -> None:

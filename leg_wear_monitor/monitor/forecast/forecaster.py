@@ -15,6 +15,7 @@ from leg_wear_monitor.life.result import SCHEMA_VERSION
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.sections import Forecasting
+from leg_wear_monitor.monitor.forecast import measurement
 from leg_wear_monitor.monitor.forecast.forecast import (
     Forecast,
     ForecastBasis,
@@ -24,18 +25,6 @@ from leg_wear_monitor.monitor.forecast.forecast import (
     fitted_law,
     forecast,
     no_law,
-)
-from leg_wear_monitor.monitor.forecast.measurement import (
-    CONTRADICTS,
-    GrowthRate,
-    GrowthWindow,
-    MeasurementResult,
-    ModelError,
-    extended,
-    growth_rate,
-    last_measured,
-    measure,
-    observations_of,
 )
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     CoefficientEstimate,
@@ -191,7 +180,7 @@ class ForecastState:
         Of the last forecast that was made.
     """
 
-    growth: tuple[GrowthWindow, ...]
+    growth: tuple[measurement.GrowthWindow, ...]
     coefficient_estimates: tuple[CoefficientEstimate, ...]
     last: Forecast | None = None
     stamp_ns: int = 0
@@ -239,7 +228,7 @@ class Forecaster:
             self._estimate(k, when) for k, when in zip(range(len(self._fresh_m)), replaced_ns, strict=True)
         )
         self.state = ForecastState(
-            tuple(GrowthWindow() for _ in self._clearance_joints),
+            tuple(measurement.GrowthWindow() for _ in self._clearance_joints),
             coefficient_estimates,
             observed=(None,) * len(self._clearance_joints),
         )
@@ -251,7 +240,7 @@ class Forecaster:
         limits_m: Sequence[float],
         is_valid: Callable[[], bool],
         sampling_sigma_m: Floats | None = None,
-        model: ModelError | None = None,
+        model: measurement.ModelError | None = None,
     ) -> Forecast:
         """Forecast after a gait cycle: a new one if it is due, else the last.
 
@@ -272,13 +261,13 @@ class Forecaster:
         state = self.state
         if statistics.is_followed:
             state.growth = tuple(
-                extended(window, float(growth), statistics.moving_s, self._settings.window_cycles)
+                measurement.extended(window, float(growth), statistics.moving_s, self._settings.window_cycles)
                 for window, growth in zip(state.growth, statistics.growth_mean_m, strict=True)
             )
         is_recent = 0 <= statistics.stamp_ns - state.stamp_ns < RENEWED_NS
         if state.last is not None and is_recent and not statistics.is_followed:
             return state.last
-        rates = [growth_rate(window) for window in state.growth]
+        rates = [measurement.growth_rate(window) for window in state.growth]
         if state.last is None or not is_recent or _known(rates) > state.known:
             state.stamp_ns = statistics.stamp_ns
             return self.renewed(wear_m, limits_m, is_valid(), sampling_sigma_m, model)
@@ -290,14 +279,14 @@ class Forecaster:
         limits_m: Sequence[float],
         is_valid: bool,
         sampling_sigma_m: Floats | None = None,
-        model: ModelError | None = None,
+        model: measurement.ModelError | None = None,
     ) -> Forecast:
         """A new forecast from the present state; parameters as in `after`."""
-        rates = [growth_rate(window) for window in self.state.growth]
+        rates = [measurement.growth_rate(window) for window in self.state.growth]
         self.state.known = _known(rates)
         if sampling_sigma_m is None:
             sampling_sigma_m = np.zeros(len(wear_m))
-        model = model or ModelError.none(len(wear_m))
+        model = model or measurement.ModelError.none(len(wear_m))
         self.state.last = self._forecast(rates, model, wear_m, sampling_sigma_m, limits_m, is_valid)
         return self.state.last
 
@@ -313,12 +302,12 @@ class Forecaster:
     def last_measured(self, replaced_ns: Sequence[int]) -> tuple[Measurement | None, ...]:
         """Last measurement of each joint's present part, None without one."""
         parts = zip(self._clearance_joints, replaced_ns, strict=True)
-        return tuple(last_measured(self._measurements, joint, when) for joint, when in parts)
+        return tuple(measurement.last_measured(self._measurements, joint, when) for joint, when in parts)
 
     def replaced(self, joint: str, replaced_ns: int) -> None:
         """Reset the estimate of a joint whose part changed to what is known of this part."""
         k, state = self._clearance_joints.index(joint), self.state
-        state.growth = (*state.growth[:k], GrowthWindow(), *state.growth[k + 1 :])
+        state.growth = (*state.growth[:k], measurement.GrowthWindow(), *state.growth[k + 1 :])
         self._update_coefficients(k, self._estimate(k, replaced_ns))
         self._observe(k, None)
 
@@ -337,10 +326,10 @@ class Forecaster:
         who: str,
         kept_ns: int = 0,
         accept: bool = False,
-    ) -> MeasurementResult:
+    ) -> measurement.MeasurementResult:
         """Update with a measured clearance; parameters as in `measure`."""
         k = self._clearance_joints.index(wear.name)
-        found = measure(
+        found = measurement.measure(
             self._settings,
             self._clearances[k],
             wear,
@@ -377,7 +366,7 @@ class Forecaster:
         """
         estimate = self._estimate(k, replaced_ns)
         below = estimate.probability_below(observation)
-        is_plausible = CONTRADICTS <= below <= 1.0 - CONTRADICTS
+        is_plausible = measurement.CONTRADICTS <= below <= 1.0 - measurement.CONTRADICTS
         self._update_coefficients(
             k, self._estimate(k, replaced_ns, observation) if is_plausible else estimate
         )
@@ -401,7 +390,7 @@ class Forecaster:
     def _estimate(self, k: int, replaced_ns: int, *further: MeasuredClearance) -> CoefficientEstimate:
         """Estimate for a part, from its prior, the measurements that count, and further ones."""
         joint = self._clearance_joints[k]
-        observations = observations_of(self._measurements, joint, replaced_ns)
+        observations = measurement.observations_of(self._measurements, joint, replaced_ns)
         return estimate_coefficient(
             self._settings,
             self._fresh_m[k],
@@ -425,8 +414,8 @@ class Forecaster:
 
     def _forecast(
         self,
-        rates: Sequence[GrowthRate | None],
-        model: ModelError,
+        rates: Sequence[measurement.GrowthRate | None],
+        model: measurement.ModelError,
         wear_m: Floats,
         sampling_sigma_m: Floats,
         limits_m: Sequence[float],
@@ -464,5 +453,5 @@ class Forecaster:
         )
 
 
-def _known(rates: Sequence[GrowthRate | None]) -> int:
+def _known(rates: Sequence[measurement.GrowthRate | None]) -> int:
     return sum(rate is not None for rate in rates)

@@ -12,17 +12,8 @@ from pathlib import Path
 from urllib.parse import quote
 
 from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.monitor.ledger import schema
 from leg_wear_monitor.monitor.ledger.entry import Binding
-from leg_wear_monitor.monitor.ledger.schema import (
-    APPLICATION_ID,
-    FORMAT,
-    UNRELEASED_ID,
-    create_tables,
-    definitions,
-    expected_definitions,
-    replace,
-    verify,
-)
 
 MOVE = "move it away to begin with new parts, or put a copy of it back"
 
@@ -58,8 +49,8 @@ def create(path: Path, binding: Binding) -> None:
         with closing(_connect(new, "rw")) as db:
             db.execute(f"PRAGMA page_size = {_PAGE}")
             with transaction(db):
-                create_tables(db)
-                replace(db, "binding", binding.as_texts().items())
+                schema.create_tables(db)
+                schema.replace(db, "binding", binding.as_texts().items())
         new.rename(path)
         _sync_directory(path)
     except (sqlite3.Error, OSError) as error:
@@ -200,21 +191,21 @@ def _check_header(path: Path) -> None:
     if not header.startswith(_MAGIC) or len(header) < _HEADER:
         raise LedgerError(f"{path}: is damaged or not a ledger: it is not an SQLite file; {MOVE}")
     application, found = (int.from_bytes(header[at : at + 4]) for at in (68, 60))
-    if application == UNRELEASED_ID:
+    if application == schema.UNRELEASED_ID:
         raise LedgerError(
             f"{path}: has the unreleased format {found}, this version knows only the released ones, up to "
-            f"{FORMAT}; go on with the version that wrote it, or move it away to begin with new parts"
+            f"{schema.FORMAT}; go on with the version that wrote it, or move it away to begin with new parts"
         )
-    if application != APPLICATION_ID:
+    if application != schema.APPLICATION_ID:
         raise LedgerError(f"{path}: is an SQLite file, but not a ledger; {MOVE}")
-    if found > FORMAT:
+    if found > schema.FORMAT:
         raise LedgerError(
-            f"{path}: has format {found}, this version knows up to {FORMAT}; install a newer one"
+            f"{path}: has format {found}, this version knows up to {schema.FORMAT}; install a newer one"
         )
     log = beside(path, "-wal")
     if _has_content(log):
         raise LedgerError(f"{path}: {log.name} beside it belongs to another ledger; move it away")
-    if found != FORMAT or header[18:20] != _ROLLBACK:
+    if found != schema.FORMAT or header[18:20] != _ROLLBACK:
         raise LedgerError(f"{path}: is damaged: its header is not what was written; {MOVE}")
 
 
@@ -251,12 +242,12 @@ def _begin(db: sqlite3.Connection, path: Path, binding: Binding, writable: bool)
     """Lock a file, and check that it is complete and contains only what was written."""
     try:
         db.execute("BEGIN EXCLUSIVE" if writable else "BEGIN")
-        if definitions(db) != expected_definitions():
+        if schema.definitions(db) != schema.expected_definitions():
             raise LedgerError(f"{path}: is damaged: it has other tables or triggers than a ledger; {MOVE}")
         faults = [fault for (fault,) in db.execute("PRAGMA integrity_check")]
         if faults != ["ok"]:
             raise LedgerError(f"{path}: is damaged: {' '.join(faults[0].split())}; {MOVE}")
-        verify(db)
+        schema.verify(db)
         _check_binding(db, path, binding)
         db.execute("COMMIT")
     except (sqlite3.Error, ValueError, TypeError, OverflowError) as error:

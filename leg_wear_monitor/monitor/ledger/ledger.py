@@ -19,6 +19,7 @@ from leg_wear_monitor.mechanism.arrays import Ints
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.ledger import rows
 from leg_wear_monitor.monitor.ledger.entry import (
     Audit,
     Binding,
@@ -35,23 +36,6 @@ from leg_wear_monitor.monitor.ledger.entry import (
     binding_of,
 )
 from leg_wear_monitor.monitor.ledger.file import MOVE, LedgerError, connect, copy_of, create, transaction
-from leg_wear_monitor.monitor.ledger.rows import (
-    read_commissioned,
-    read_commissioned_torques,
-    read_entry,
-    read_identified_leg,
-    read_last_reset,
-    read_last_run,
-    read_last_verdict,
-    read_loads,
-    read_measurements,
-    read_rows,
-    read_simulated_references,
-    read_spans,
-    write_entry,
-    write_event,
-    write_run,
-)
 
 WHOLE_S = 60.0
 """Longest time in motion between two entries that are written with whole surfaces."""
@@ -133,22 +117,22 @@ class Ledger:
             raise
 
     def _read(self, db: sqlite3.Connection) -> None:
-        self.last_run = read_last_run(db)
+        self.last_run = rows.read_last_run(db)
         self._written_run, self._number = self.last_run.number, self.last_run.number + 1
         self.epoch, self.boot_id = self.last_run.epoch, self.last_run.boot_id
         self.cut_off_s = None if self.last_run.closed else self.last_run.interval_s
         self.loss = "" if self.last_run.closed else INTERRUPTED
-        self.entry = read_entry(db)
+        self.entry = rows.read_entry(db)
         self.kept_ns = self.entry.stamp_ns if self.entry else 0
         self._kept_moving_s = self.entry.moving_s if self.entry else 0.0
-        self._spans = np.array(sorted(set(read_spans(db))), dtype=np.int64).reshape(-1, 3)
-        self.measurements = read_measurements(db)
-        self.corrections = read_rows(db, CorrectedClearance)
-        self.commissioned = read_commissioned(db)
-        self.commissioned_torques = read_commissioned_torques(db)
-        self.parameters = read_identified_leg(db)
-        self.references = read_simulated_references(db)
-        self.loads = read_loads(db)
+        self._spans = np.array(sorted(set(rows.read_spans(db))), dtype=np.int64).reshape(-1, 3)
+        self.measurements = rows.read_measurements(db)
+        self.corrections = rows.read_rows(db, CorrectedClearance)
+        self.commissioned = rows.read_commissioned(db)
+        self.commissioned_torques = rows.read_commissioned_torques(db)
+        self.parameters = rows.read_identified_leg(db)
+        self.references = rows.read_simulated_references(db)
+        self.loads = rows.read_loads(db)
 
     def _begin(self) -> None:
         """Write the begin of this run; for one that is written at its end, check that it can be written."""
@@ -222,7 +206,7 @@ class Ledger:
         LedgerError
             If the ledger cannot be read now.
         """
-        return self._ask(read_last_verdict)
+        return self._ask(rows.read_last_verdict)
 
     def last_reset(self, joint: str) -> Audit | None:
         """The last stored `reset_wear` of a joint that was not undone, None if there is none.
@@ -232,7 +216,7 @@ class Ledger:
         LedgerError
             If the ledger cannot be read now.
         """
-        return self._ask(lambda db: read_last_reset(db, joint))
+        return self._ask(lambda db: rows.read_last_reset(db, joint))
 
     def keep(self, entry: Entry, closed: bool = False, *, whole: bool = True) -> bool:
         """Write an entry and all events since the last; False if that failed, with the reason in `fault`.
@@ -301,11 +285,11 @@ class Ledger:
         """Write a run, an entry and the events in one transaction; False if that failed, see `fault`."""
         try:
             with transaction(db := self._connection()):
-                write_run(db, run)
+                rows.write_run(db, run)
                 if entry is not None:
-                    write_entry(db, run.number, entry, whole)
+                    rows.write_entry(db, run.number, entry, whole)
                 for event in self._events:
-                    write_event(db, event)
+                    rows.write_event(db, event)
         except (sqlite3.Error, OSError, ValueError, LedgerError) as error:
             self.close()  # the next write begins with a fresh connection
             self.fault = " ".join(str(error).split())
@@ -329,7 +313,7 @@ class Ledger:
             raise LedgerError(f"{self.path}: was moved away or replaced while in use; put it back")
         if self._db is None:
             self._db = connect(self.path, self._binding)
-        if read_last_run(self._db).number > self._written_run:
+        if rows.read_last_run(self._db).number > self._written_run:
             raise LedgerError(f"{self.path}: was continued by another monitor meanwhile; end one of them")
         return self._db
 
@@ -398,12 +382,12 @@ def read_ledger(path: Path, binding: Binding) -> LedgerContent:
         with closing(connect(copy, binding)) as db, _damage_told(path):
             last = "id IN (SELECT max(id) FROM forecast GROUP BY joint)"
             return LedgerContent(
-                entry=read_entry(db),
-                verdict=read_last_verdict(db),
-                clearances=read_rows(db, ClearancePoint),
-                forecasts={point.joint: point for point in read_rows(db, ForecastPoint, last)},
-                measurements=read_measurements(db),
-                loads=read_loads(db),
+                entry=rows.read_entry(db),
+                verdict=rows.read_last_verdict(db),
+                clearances=rows.read_rows(db, ClearancePoint),
+                forecasts={point.joint: point for point in rows.read_rows(db, ForecastPoint, last)},
+                measurements=rows.read_measurements(db),
+                loads=rows.read_loads(db),
             )
 
 

@@ -3,17 +3,7 @@
 docs/reference/monitor.md lists them; a test compares the two.
 """
 
-from leg_wear_monitor.monitor.alarms import (
-    ADVICE,
-    ALREADY_COUNTED,
-    CRANK_ZERO,
-    EXCHANGED,
-    FOOT_LOAD_WORDS,
-    SCALE,
-    SIGN,
-    STUCK,
-    ZERO,
-)
+from leg_wear_monitor.monitor import alarms
 from leg_wear_monitor.monitor.verdict import subject_rules
 from leg_wear_monitor.monitor.verdict.situation import (
     EVERYTHING,
@@ -57,11 +47,11 @@ def _cause(code: str, meaning: str, state: State = State.INSPECT, not_valid: tup
 
 
 _FOOT_LOAD = {
-    STUCK: "check the sensor of the foot load",
-    ZERO: "set the sensor's zero while the foot is in the air",
-    SCALE: "correct foot_load.scale: forces are in newtons",
-    EXCHANGED: "exchange the sensors, topics or columns of the two feet",
-    SIGN: "correct foot_load.sign",
+    alarms.STUCK: "check the sensor of the foot load",
+    alarms.ZERO: "set the sensor's zero while the foot is in the air",
+    alarms.SCALE: "correct foot_load.scale: forces are in newtons",
+    alarms.EXCHANGED: "exchange the sensors, topics or columns of the two feet",
+    alarms.SIGN: "correct foot_load.sign",
 }
 
 
@@ -71,7 +61,7 @@ def _foot_load(kind: str) -> Rule:
         code=kind.upper(),
         state=State.INSPECT,
         hits=raised(kind, least=Level.ERROR),
-        why=f"{FOOT_LOAD_WORDS[kind]} (the {{quantity}} is {{value}}, limit {{limit}}){{past}}",
+        why=f"{alarms.FOOT_LOAD_WORDS[kind]} (the {{quantity}} is {{value}}, limit {{limit}}){{past}}",
         do=f"{_FOOT_LOAD[kind]}; {_ACKNOWLEDGE}",
         not_valid=OF_THE_MODEL,
     )
@@ -165,7 +155,7 @@ RULES = (
         do=f"{_ROCK}; plan its replacement; {_ACKNOWLEDGE}",
     ),
     Rule(
-        code=ALREADY_COUNTED,
+        code=alarms.ALREADY_COUNTED,
         state=State.NOT_MONITORED,
         hits=subject_rules.all_counted,
         why="everything that was received is in the ledger already: nothing was counted",
@@ -174,7 +164,7 @@ RULES = (
         not_valid=OF_THE_GAIT,
     ),
     Rule(
-        code=CRANK_ZERO,
+        code=alarms.CRANK_ZERO,
         state=State.NOT_MONITORED,
         hits=subject_rules.without_zero,
         why="{cause}",
@@ -286,7 +276,7 @@ RULES = (
         state=State.HEALTHY,
         hits=subject_rules.nothing_found,
         why="no alarm is raised, and {observed}",
-        do=f"nothing now. {ADVICE}",
+        do=f"nothing now. {alarms.ADVICE}",
     ),
 )
 """In the order of precedence among equal states."""

@@ -18,7 +18,7 @@ from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.forecast.forecast import Forecast, GrowthLaw, JointCondition, forecast
 from leg_wear_monitor.monitor.forecast.forecaster import law_of
-from leg_wear_monitor.monitor.forecast.wear_coefficients import MeasuredClearance, estimate_coefficient
+from leg_wear_monitor.monitor.forecast.wear_coefficients import ClearanceAtWear, estimate_coefficient
 
 FRESH_M, MEASURED_M, GROWTH_NOISE = 3.0e-4, 5.0e-6, 0.03
 STEPS = 100  # of a joint's way to its limit, in the truth by a law
@@ -103,7 +103,7 @@ def case_of(life: HiddenLife, now: float, twin: HiddenLife, joints: str, random:
     return Case(state, clearance, (life.ends() - now) / later)
 
 
-def told(case: Case, law: GrowthLaw, measured: dict[int, MeasuredClearance]) -> Forecast:
+def told(case: Case, law: GrowthLaw, measured: dict[int, ClearanceAtWear]) -> Forecast:
     coefficient_estimates = [
         estimate_coefficient(SETTINGS, FRESH_M, [measured[k]] if k in measured else [])
         for k in range(len(case.now))
@@ -115,7 +115,7 @@ def evaluated(case: Case, law: GrowthLaw, random: np.random.Generator) -> np.nda
     """p10, p50 and p90 over truth: (without, one, all) x (joints and the leg) x 3."""
     noise = MEASURED_M * random.standard_normal(len(case.now))
     observations = {
-        k: MeasuredClearance(float(case.clearance_m[k] + noise[k]), MEASURED_M, each.wear_m)
+        k: ClearanceAtWear(float(case.clearance_m[k] + noise[k]), MEASURED_M, each.wear_m)
         for k, each in enumerate(case.now)
     }
     without = told(case, law, {})

@@ -6,7 +6,7 @@ from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate, Clearan
 from leg_wear_monitor.monitor.diagnosis.observer import Correction, TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.state import TorqueState
 from leg_wear_monitor.monitor.forecast.forecaster import RENEWED_NS
-from leg_wear_monitor.monitor.forecast.wear_coefficients import MeasuredClearance
+from leg_wear_monitor.monitor.forecast.wear_coefficients import ClearanceAtWear
 from leg_wear_monitor.monitor.ledger.entry import Audit, CorrectedClearance, IdentifiedLeg, SimulatedReference
 from leg_wear_monitor.monitor.parts import Parts
 from leg_wear_monitor.twin.reference import LegParameters
@@ -30,7 +30,7 @@ def clearance_estimates(parts: Parts, statistics: CycleStatistics) -> tuple[Clea
         state.believed = tuple(
             is_seen[k]
             and parts.forecaster.use_estimate(
-                k, MeasuredClearance(one.clearance_m, one.sigma_m, float(worn_m[k])), replaced_ns[k]
+                k, ClearanceAtWear(one.clearance_m, one.sigma_m, float(worn_m[k])), replaced_ns[k]
             )
             for k, one in enumerate(estimates)
         )

@@ -6,13 +6,12 @@ from collections.abc import Sequence
 import attrs
 
 from leg_wear_monitor.monitor import alarm_specs
-from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate, ClearanceObservation
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
 from leg_wear_monitor.monitor.encoders import faults
 from leg_wear_monitor.monitor.gait_evidence import doubts
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.parts import Parts
-from leg_wear_monitor.monitor.reports import AlarmList, JointReport, VerdictReport
+from leg_wear_monitor.monitor.reports import AlarmList, VerdictReport, shown_by_torque
 from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.situation import (
     JointSituation,
@@ -20,6 +19,7 @@ from leg_wear_monitor.monitor.verdict.situation import (
     Situation,
     alarm_value,
     at_limit_by_estimate,
+    surest,
     with_sampling,
 )
 from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, Finding, dated, has_changed, verdict_of
@@ -75,8 +75,7 @@ def evaluate_clearances(parts: Parts) -> tuple[AlarmList, ...]:
 def shown(parts: Parts, joint: JointSituation) -> KnownClearance | None:
     """What encoders or the drive torque show of a joint best, or showed when its alarm was raised."""
     alarm = parts.evaluation.board.alarms[alarm_specs.CLEARANCE.name(joint.joint)]
-    best = min(joint.seen, key=lambda one: one.sigma_m, default=None)
-    return at_limit_by_estimate(joint, alarm) or best
+    return at_limit_by_estimate(joint, alarm) or surest(joint.seen)
 
 
 def situation_of(parts: Parts) -> Situation:
@@ -118,19 +117,14 @@ def joint_situations(parts: Parts, diagnosis: Diagnosis | None = None) -> tuple[
     found = []
     for k, (joint, part) in enumerate(zip(joints, parts.accounting.part_lives, strict=True)):
         report = last.joints[k] if last else None
-        by_encoders = _seen_by_encoders(report)
-        seen = []
-        if by_encoders:
-            seen.append(KnownClearance("encoders", by_encoders.clearance_m, by_encoders.sigma_m))
-        if by_torque := diagnosis.of_joint(k):
-            seen.append(KnownClearance("torque", *by_torque))
+        by_encoders, by_torque = report.by_encoders if report else None, shown_by_torque(k, diagnosis)
         one = JointSituation(
             joint=joint,
             counted_m=counted_m[k],
             limit_m=limits_m[k],
             believed_m=report.forecast.now_m if report and report.forecast else math.nan,
-            seen=tuple(seen),
-            is_used=bool(by_encoders and by_encoders.believed),
+            seen=tuple(one for one in (by_encoders, by_torque) if one),
+            is_used=bool(report and by_encoders and report.seen and report.seen.believed),
             label=parts.mechanism.joints[joint].label,
             load=report.load if report else None,
             replaced_ns=part[0],
@@ -146,11 +140,6 @@ def with_measured(joint: JointSituation, measured: Measurement | None) -> JointS
         return joint
     by = KnownClearance("measured", measured.clearance_m, measured.sigma_m)
     return attrs.evolve(joint, measured=by, is_measurement_used=measured.counts)
-
-
-def _seen_by_encoders(report: JointReport | None) -> ClearanceEstimate | None:
-    seen = report.seen if report else None
-    return seen if seen and seen.observation is ClearanceObservation.SEEN else None
 
 
 def _is_out_of_step(parts: Parts) -> bool:

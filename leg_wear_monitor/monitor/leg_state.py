@@ -12,7 +12,7 @@ from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecas
 from leg_wear_monitor.monitor.judgement import joint_situations
 from leg_wear_monitor.monitor.parts import Parts
 from leg_wear_monitor.monitor.reports import CycleReport
-from leg_wear_monitor.monitor.verdict.situation import JointSituation, believed, joint_status
+from leg_wear_monitor.monitor.verdict.situation import JointSituation, believed, joint_status, surest
 from leg_wear_monitor.monitor.verdict.verdict import Finding, verdict_of
 from leg_wear_monitor.state import (
     Drive,
@@ -94,7 +94,7 @@ def joint_clearance(
     """
     not_valid = {figure for finding in findings for figure in finding.not_valid}
     one = believed(joint, alarm, Figure.CLEARANCES not in not_valid)
-    best = min(joint.seen, key=lambda seen: seen.sigma_m, default=None)
+    best = surest(joint.seen)
     return JointClearance(
         believed_m=one.clearance_m if one else None,
         believed_sigma_m=finite_or_none(one.sigma_m) if one else None,

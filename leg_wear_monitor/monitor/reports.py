@@ -18,7 +18,7 @@ from leg_wear_monitor.monitor.forecast.measurement import (
 )
 from leg_wear_monitor.monitor.inputs import InputGuard, Pauses
 from leg_wear_monitor.monitor.ledger.entry import Measurement
-from leg_wear_monitor.monitor.verdict.situation import KnownClearance, joint_status
+from leg_wear_monitor.monitor.verdict.situation import KnownClearance, joint_status, surest
 from leg_wear_monitor.monitor.verdict.verdict import Finding, verdict_of
 from leg_wear_monitor.state import LegState, Level, Verdict
 from leg_wear_monitor.twin.statistics import CycleStatistics, Intake, SampleStatistics, TorqueStatistics
@@ -77,22 +77,25 @@ class JointReport:
     shown: KnownClearance | None = None
 
     @property
+    def by_encoders(self) -> KnownClearance | None:
+        """Clearance that encoders show; None if they show none."""
+        if self.seen is None or self.seen.observation is not ClearanceObservation.SEEN:
+            return None
+        return KnownClearance("encoders", self.seen.clearance_m, self.seen.sigma_m)
+
+    @property
     def seen_m(self) -> float | None:
         """Clearance that encoders or the drive torque show, the surer one; None if neither shows it."""
-        return self._surest[1] if self._surest else None
+        return self._surest.clearance_m if self._surest else None
 
     @property
     def seen_sigma_m(self) -> float | None:
         """Standard deviation of this clearance; None without one."""
-        return self._surest[0] if self._surest else None
+        return self._surest.sigma_m if self._surest else None
 
     @property
-    def _surest(self) -> tuple[float, float] | None:
-        """Standard deviation and clearance of the surer estimate."""
-        found = [] if self.shown is None else [(self.shown.sigma_m, self.shown.clearance_m)]
-        if self.seen is not None and self.seen.observation is ClearanceObservation.SEEN:
-            found.append((self.seen.sigma_m, self.seen.clearance_m))
-        return min(found, default=None)
+    def _surest(self) -> KnownClearance | None:
+        return surest(one for one in (self.by_encoders, self.shown) if one)
 
     @property
     def judged_clearance_m(self) -> float:
@@ -348,10 +351,10 @@ def cycle_report(
     growth: Sequence[GrowthWindow],
     model: ModelError,
     forecast: Forecast,
-    seen: Sequence[ClearanceEstimate] | None = None,
-    measured: Sequence[Measurement | None] | None = None,
-    sampling_sigma_m: Sequence[float] | None = None,
-    diagnosis: Diagnosis | None = None,
+    seen: Sequence[ClearanceEstimate] | None,
+    measured: Sequence[Measurement | None],
+    sampling_sigma_m: Sequence[float],
+    diagnosis: Diagnosis,
 ) -> CycleReport:
     """Report of a gait cycle.
 
@@ -367,12 +370,13 @@ def cycle_report(
     model : ModelError
         What the growth of each may be off beside its scatter.
     forecast : Forecast
-    seen : sequence of ClearanceEstimate, optional
-    measured : sequence of Measurement or None, optional
+    seen : sequence of ClearanceEstimate or None
+        None without encoders.
+    measured : sequence of Measurement or None
         Last measurement of each joint's part.
-    sampling_sigma_m : sequence of float, optional
-        Standard deviation of each mean clearance, because not all gait cycles were followed; default 0.
-    diagnosis : Diagnosis, optional
+    sampling_sigma_m : sequence of float
+        Standard deviation of each mean clearance, because not all gait cycles were followed.
+    diagnosis : Diagnosis
         Clearances that the drive torque shows.
     """
     torque = statistics.torque
@@ -393,9 +397,9 @@ def cycle_report(
                 model,
                 forecast.joints[k],
                 seen[k] if seen else None,
-                measured[k] if measured else None,
-                float(sampling_sigma_m[k]) if sampling_sigma_m is not None else 0.0,
-                _shown(k, diagnosis),
+                measured[k],
+                float(sampling_sigma_m[k]),
+                shown_by_torque(k, diagnosis),
             )
             for k, (joint, bushing) in enumerate(bushings.items())
         ),
@@ -494,7 +498,7 @@ def _joint_report(
     )
 
 
-def _shown(k: int, diagnosis: Diagnosis | None) -> KnownClearance | None:
+def shown_by_torque(k: int, diagnosis: Diagnosis) -> KnownClearance | None:
     """The clearance of joint k that the drive torque shows."""
-    found = diagnosis.of_joint(k) if diagnosis else None
+    found = diagnosis.of_joint(k)
     return KnownClearance("torque", *found) if found else None

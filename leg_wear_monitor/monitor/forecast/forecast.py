@@ -17,9 +17,9 @@ import numpy as np
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
+    ClearanceAtWear,
     CoefficientEstimate,
     CoefficientPrior,
-    MeasuredClearance,
 )
 
 # Draws of an ensemble: fixed, the same at every call, and spread evenly instead of at random.
@@ -383,7 +383,7 @@ class ForecastBasis:
     ----------
     conditions : tuple of JointCondition
         In the order of the clearance joints.
-    observed : tuple of MeasuredClearance or None
+    observed : tuple of ClearanceAtWear or None
         What encoders showed of each joint, as far as the forecast uses it.
     cycle_s : float
         Time of a gait cycle.
@@ -392,7 +392,7 @@ class ForecastBasis:
     """
 
     conditions: tuple[JointCondition, ...]
-    observed: tuple[MeasuredClearance | None, ...]
+    observed: tuple[ClearanceAtWear | None, ...]
     cycle_s: float
     is_valid: bool
 

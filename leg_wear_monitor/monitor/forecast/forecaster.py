@@ -27,8 +27,8 @@ from leg_wear_monitor.monitor.forecast.forecast import (
     no_law,
 )
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
+    ClearanceAtWear,
     CoefficientEstimate,
-    MeasuredClearance,
     corrections_of,
     estimate_coefficient,
     prior_source,
@@ -174,7 +174,7 @@ class ForecastState:
         Of the last.
     known : int
         Joints whose growth was known then.
-    observed : tuple of MeasuredClearance or None
+    observed : tuple of ClearanceAtWear or None
         What encoders show of each joint, where the estimate uses it.
     basis : ForecastBasis or None
         Of the last forecast that was made.
@@ -185,7 +185,7 @@ class ForecastState:
     last: Forecast | None = None
     stamp_ns: int = 0
     known: int = 0
-    observed: tuple[MeasuredClearance | None, ...] = ()
+    observed: tuple[ClearanceAtWear | None, ...] = ()
     basis: ForecastBasis | None = None
 
 
@@ -347,14 +347,14 @@ class Forecaster:
         self._update_coefficients(k, found.after)
         return found
 
-    def use_estimate(self, k: int, observation: MeasuredClearance, replaced_ns: int) -> bool:
+    def use_estimate(self, k: int, observation: ClearanceAtWear, replaced_ns: int) -> bool:
         """Update with a clearance estimated from encoders, instead of the previous one.
 
         Parameters
         ----------
         k : int
             Of the clearance joint.
-        observation : MeasuredClearance
+        observation : ClearanceAtWear
             Its error does not average out, so only the newest counts.
         replaced_ns : int
             When its part was replaced, 0 if it never was.
@@ -387,7 +387,7 @@ class Forecaster:
                 self.use_estimate(k, observation, replaced_ns[k])
         return self._of(basis)
 
-    def _estimate(self, k: int, replaced_ns: int, *further: MeasuredClearance) -> CoefficientEstimate:
+    def _estimate(self, k: int, replaced_ns: int, *further: ClearanceAtWear) -> CoefficientEstimate:
         """Estimate for a part, from its prior, the measurements that count, and further ones."""
         joint = self._clearance_joints[k]
         observations = measurement.observations_of(self._measurements, joint, replaced_ns)
@@ -399,7 +399,7 @@ class Forecaster:
             corrections_of(self._corrections, joint, replaced_ns),
         )
 
-    def _observe(self, k: int, observation: MeasuredClearance | None) -> None:
+    def _observe(self, k: int, observation: ClearanceAtWear | None) -> None:
         observed = self.state.observed
         self.state.observed = (*observed[:k], observation, *observed[k + 1 :])
 

@@ -14,9 +14,9 @@ from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
 from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
 from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
+    ClearanceAtWear,
     CoefficientEstimate,
     CoefficientPrior,
-    MeasuredClearance,
     corrections_of,
     estimate_coefficient,
 )
@@ -194,10 +194,10 @@ def judged_clearance_m(counted_m: float, measured: Measurement | None, believed_
 
 def observations_of(
     measurements: Sequence[Measurement], joint: str, replaced_ns: int
-) -> list[MeasuredClearance]:
+) -> list[ClearanceAtWear]:
     """Measurements of a joint's present part that count."""
     return [
-        MeasuredClearance(m.clearance_m, math.hypot(m.sigma_m, m.wear_sigma_m), m.wear_m)
+        ClearanceAtWear(m.clearance_m, math.hypot(m.sigma_m, m.wear_sigma_m), m.wear_m)
         for m in measurements
         if m.joint == joint and m.replaced_ns == replaced_ns and m.counts and not m.is_withdrawn
     ]
@@ -257,7 +257,7 @@ def measure(
             raise ConfigError(name, "", fault)
     observations = observations_of(earlier, wear.name, wear.replaced_ns)
     wear_sigma_m = math.sqrt(wear.sampling_m2)
-    observation = MeasuredClearance(clearance_m, math.hypot(sigma_m, wear_sigma_m), wear.mean_m)
+    observation = ClearanceAtWear(clearance_m, math.hypot(sigma_m, wear_sigma_m), wear.mean_m)
     corrected = corrections_of(corrections, wear.name, wear.replaced_ns)
     before = estimate_coefficient(settings, fresh_m, observations, prior, corrected)
     below = before.probability_below(observation)

@@ -195,8 +195,8 @@ def read_priors(path: str) -> LearnedPriors:
 
 
 @attrs.frozen
-class KnownClearance:
-    """A clearance from which on the wear is counted.
+class ClearanceAtWear:
+    """A clearance that is known at some counted wear: of a new part, corrected, or measured.
 
     Attributes
     ----------
@@ -205,7 +205,7 @@ class KnownClearance:
     wear_m : float
         Wear in the twin at that time.
     from_m : float
-        Wear in the twin from which on it holds; below, the one before.
+        Wear in the twin from which on it is counted; below, from the one before.
     """
 
     clearance_m: float
@@ -216,7 +216,7 @@ class KnownClearance:
 
 def known_clearances(
     settings: Forecasting, fresh_m: float, corrections: Sequence[CorrectedClearance] = ()
-) -> list[KnownClearance]:
+) -> list[ClearanceAtWear]:
     """Known clearances of a part, the oldest first.
 
     Parameters
@@ -228,10 +228,10 @@ def known_clearances(
         Of this part, in the order of time.
     """
     return [
-        KnownClearance(fresh_m, settings.clearance_sigma_m),
+        ClearanceAtWear(fresh_m, settings.clearance_sigma_m),
         # a correction opens the joint by far more than what rounding makes of the wear
         *(
-            KnownClearance(c.clearance_m, c.sigma_m, c.wear_m, 0.5 * (c.before_m + c.wear_m))
+            ClearanceAtWear(c.clearance_m, c.sigma_m, c.wear_m, 0.5 * (c.before_m + c.wear_m))
             for c in corrections
         ),
     ]
@@ -252,23 +252,6 @@ _ZOOMS = 12  # each at least halves the grid's extent
 _phi = np.frompyfunc(NormalDist().cdf, 1, 1)
 
 
-@attrs.frozen
-class MeasuredClearance:
-    """A measured clearance.
-
-    Attributes
-    ----------
-    clearance_m, sigma_m : float
-        Mean radial clearance and its standard deviation.
-    wear_m : float
-        Wear in the twin then.
-    """
-
-    clearance_m: float
-    sigma_m: float
-    wear_m: float
-
-
 @attrs.frozen(eq=False)
 class CoefficientEstimate:
     """Estimate for a joint: weights over its factor's logarithm, and its excess given the factor.
@@ -285,7 +268,7 @@ class CoefficientEstimate:
         Measurements in it.
     prior : CoefficientPrior
         What was believed before them.
-    known : KnownClearance
+    known : ClearanceAtWear
         The one from which on wear is counted now; d is the deviation from it.
     """
 
@@ -295,7 +278,7 @@ class CoefficientEstimate:
     excess_sigma_m: float
     observations: int
     prior: CoefficientPrior
-    known: KnownClearance
+    known: ClearanceAtWear
 
     @property
     def mean(self) -> float:
@@ -312,7 +295,7 @@ class CoefficientEstimate:
         reached = np.cumsum(self.weight) - 0.5 * self.weight
         return np.asarray(np.interp(np.asarray(fractions), reached, self.log_factor))
 
-    def probability_below(self, observation: MeasuredClearance) -> float:
+    def probability_below(self, observation: ClearanceAtWear) -> float:
         """Predicted probability that a measurement of this accuracy, now, is smaller than this one."""
         worn = observation.wear_m - self.known.wear_m
         expected = self.known.clearance_m + self.excess_m + np.exp(self.log_factor) * worn
@@ -324,7 +307,7 @@ class CoefficientEstimate:
 def estimate_coefficient(
     settings: Forecasting,
     fresh_m: float,
-    observations: Sequence[MeasuredClearance] = (),
+    observations: Sequence[ClearanceAtWear] = (),
     prior: CoefficientPrior | None = None,
     corrections: Sequence[CorrectedClearance] = (),
 ) -> CoefficientEstimate:
@@ -335,7 +318,7 @@ def estimate_coefficient(
     settings : Forecasting
     fresh_m : float
         Nominal clearance when new.
-    observations : sequence of MeasuredClearance
+    observations : sequence of ClearanceAtWear
     prior : CoefficientPrior, optional
         Without it, the configured or usual spread about the nominal coefficient.
     corrections : sequence of CorrectedClearance
@@ -365,7 +348,7 @@ def estimate_coefficient(
 def measured_factor(
     settings: Forecasting,
     fresh_m: float,
-    observations: Sequence[MeasuredClearance],
+    observations: Sequence[ClearanceAtWear],
     corrections: Sequence[CorrectedClearance] = (),
 ) -> tuple[float, float]:
     """Mean and precision of the factor from the measurements alone; 0 if they have no information.
@@ -381,9 +364,9 @@ def measured_factor(
 def _spans(
     settings: Forecasting,
     fresh_m: float,
-    observations: Sequence[MeasuredClearance],
+    observations: Sequence[ClearanceAtWear],
     corrections: Sequence[CorrectedClearance],
-) -> list[tuple[KnownClearance, list[MeasuredClearance]]]:
+) -> list[tuple[ClearanceAtWear, list[ClearanceAtWear]]]:
     """Known clearances, each with the measurements between it and the next one."""
     known = known_clearances(settings, fresh_m, corrections)
     ends = [*(each.from_m for each in known[1:]), math.inf]
@@ -393,7 +376,7 @@ def _spans(
     ]
 
 
-def _factor_since(known: KnownClearance, observations: Sequence[MeasuredClearance]) -> tuple[float, float]:
+def _factor_since(known: ClearanceAtWear, observations: Sequence[ClearanceAtWear]) -> tuple[float, float]:
     """Factor times its precision, and the precision, from measurements after a known clearance."""
     if not any(observation.wear_m != known.wear_m for observation in observations):
         return 0.0, 0.0

@@ -1,7 +1,7 @@
 """What rules judge: the situation of leg and joints, the believed clearance, and the form of a rule."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import attrs
 
@@ -200,10 +200,14 @@ def judged(joint: JointSituation) -> KnownClearance:
     return max((one for one in found if not math.isnan(one.clearance_m)), key=lambda one: one.clearance_m)
 
 
+def surest(seen: Iterable[KnownClearance]) -> KnownClearance | None:
+    """The estimate with the smallest standard deviation; None without any."""
+    return min(seen, key=lambda one: one.sigma_m, default=None)
+
+
 def surely_at(limit_m: float, seen: Sequence[KnownClearance]) -> KnownClearance | None:
     """The surest of the estimates that are beyond a limit by `SURE_SIGMAS`; None without one."""
-    found = [one for one in seen if one.clearance_m - SURE_SIGMAS * one.sigma_m >= limit_m]
-    return min(found, key=lambda one: one.sigma_m, default=None)
+    return surest(one for one in seen if one.clearance_m - SURE_SIGMAS * one.sigma_m >= limit_m)
 
 
 def is_surely_below(limit_m: float, clearance_m: float, sigma_m: float) -> bool:
@@ -252,11 +256,7 @@ def believed(joint: JointSituation, alarm: Alarm | None, is_counted_leg: bool) -
         return estimate
     if is_counted_leg or known.clearance_m >= joint.limit_m:
         return known
-    if joint.measured is not None:
-        return joint.measured
-    if not joint.seen:
-        return None
-    return min(joint.seen, key=lambda one: one.sigma_m)
+    return joint.measured or surest(joint.seen)
 
 
 def joint_status(joint: str, is_known: bool, findings: Sequence[Finding | Verdict]) -> State:

@@ -77,7 +77,7 @@ def _parameters(path: Path) -> str:
     from leg_wear_monitor.monitor.config.fitting import fitted, parameter_doubts, twin_settings
     from leg_wear_monitor.monitor.config.parameters import PARAMETERS, load_config, values_of
     from leg_wear_monitor.monitor.forecast.wear_coefficients import (
-        MeasuredClearance,
+        ClearanceAtWear,
         estimate_coefficient,
         usual_prior,
     )
@@ -87,7 +87,7 @@ def _parameters(path: Path) -> str:
     settings = twin_settings(config)
     parameter_doubts(config, leg)
     prior = usual_prior(config.forecast, leg.clearances[leg.clearance_joints[0]])
-    observations = [MeasuredClearance(3.5e-4, 1e-5, 4e-5)]
+    observations = [ClearanceAtWear(3.5e-4, 1e-5, 4e-5)]
     coefficient_estimate = estimate_coefficient(config.forecast, 3e-4, observations, prior)
     numbers = [
         settings.tracker.lag,

@@ -11,7 +11,7 @@ from leg_wear_monitor.fleet.learning import learn, pair_of, parts_of
 from leg_wear_monitor.fleet.renew import priors_of, write_learning
 from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
-    MeasuredClearance,
+    ClearanceAtWear,
     estimate_coefficient,
     prior_source,
     usual_prior,
@@ -91,7 +91,7 @@ def test_a_measured_leg_gets_what_all_legs_say_together(fleet, tmp_path):
     written = write_learning(tmp_path, fleet, learn(fleet))
     prior = prior_source(MECHANISM, attrs.evolve(SETTINGS, priors=str(written["leg 0"]))).prior("A", 0)
     assert prior.basis == "2 parts of lot 2026-03"
-    own = MeasuredClearance(NEW_M + 1.8 * 6e-5, 2e-6, 6e-5)
+    own = ClearanceAtWear(NEW_M + 1.8 * 6e-5, 2e-6, 6e-5)
     alone, together = (estimate_coefficient(SETTINGS, NEW_M, [own], each) for each in (None, prior))
     assert together.sigma < alone.sigma
     assert together.prior == prior

@@ -13,8 +13,8 @@ from leg_wear_monitor import ConfigError, load_mechanism
 from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
+    ClearanceAtWear,
     CoefficientPrior,
-    MeasuredClearance,
     estimate_coefficient,
     nominal_per_pa,
     prior_source,
@@ -78,7 +78,7 @@ def test_a_prior_follows_the_nominal_coefficient(learned):
 def test_the_estimate_is_this_prior_times_the_likelihood(mean, sigma, factor, own):
     """Against a sum over a wide and fine grid."""
     exact = attrs.evolve(CONFIGURED, clearance_sigma_m=1e-9)
-    observation = MeasuredClearance(FRESH + factor * 1e-5, own * 1e-5, 1e-5)
+    observation = ClearanceAtWear(FRESH + factor * 1e-5, own * 1e-5, 1e-5)
     found = estimate_coefficient(exact, FRESH, [observation], CoefficientPrior(mean=mean, sigma=sigma))
     u = np.linspace(mean - 12.0 * sigma - 5.0, mean + 12.0 * sigma + 5.0, 200_001)
     density = -0.5 * ((u - mean) / sigma) ** 2 - 0.5 * ((np.exp(u) - factor) / own) ** 2

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from leg_wear_monitor.mechanism.materials import USUAL_SPREAD
 from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.forecast.forecast import Answer, GrowthLaw, JointCondition, forecast, no_law
-from leg_wear_monitor.monitor.forecast.wear_coefficients import MeasuredClearance, estimate_coefficient
+from leg_wear_monitor.monitor.forecast.wear_coefficients import ClearanceAtWear, estimate_coefficient
 
 pytestmark = pytest.mark.plain
 
@@ -24,7 +24,7 @@ Z = statistics.NormalDist().inv_cdf(0.9)
 
 
 def whole(joints, settings=SETTINGS, observations=(), law=None, valid=True):
-    """Forecast of joints; ``observations`` (joint's number, MeasuredClearance)."""
+    """Forecast of joints; ``observations`` (joint's number, ClearanceAtWear)."""
     fresh = np.array([each.fresh_m for each in joints])
     own = [[observation for at, observation in observations if at == k] for k in range(len(joints))]
     coefficient_estimates = [
@@ -66,7 +66,7 @@ def test_all_wear_faster_by_a_factor_is_life_shorter_by_it(factor):
 def test_a_measurement_narrows_and_moves_the_forecast():
     now = attrs.evolve(NOW, wear_m=6e-5)
     before = alone(now)
-    after = alone(now, observations=[MeasuredClearance(3e-4 + 1.5 * 6e-5, 5e-6, 6e-5)])
+    after = alone(now, observations=[ClearanceAtWear(3e-4 + 1.5 * 6e-5, 5e-6, 6e-5)])
     assert after.cycles.p50 < 0.75 * before.cycles.p50
     assert (
         math.log(after.cycles.p90 / after.cycles.p10) < math.log(before.cycles.p90 / before.cycles.p10) / 3.0
@@ -139,7 +139,7 @@ def test_a_measured_joint_tells_of_one_that_it_acts_upon(coupling):
     """A is half as much wider again than the twin has it, and stays so: half of that is in B's past."""
     law = GrowthLaw(np.array([[0.0, 0.0], [coupling, 0.0]]), np.full(2, 3e-4), np.full(2, 1e-3), np.zeros(2))
     worn = attrs.evolve(NOW, wear_m=1e-4, growth_m=0.0)
-    told = whole([worn, B], SURE, [(0, MeasuredClearance(4.5e-4, 1e-8, 1e-4))], law).joints[1].cycles
+    told = whole([worn, B], SURE, [(0, ClearanceAtWear(4.5e-4, 1e-8, 1e-4))], law).joints[1].cycles
     expected = alone(B, SURE, law=no_law(np.array([3e-4]), 0.0)).cycles
     apart = math.log(4.5e-4 / 4e-4)
     assert math.log(expected.p50 / told.p50) == pytest.approx(0.5 * coupling * apart, abs=1e-3)

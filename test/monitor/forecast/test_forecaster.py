@@ -9,7 +9,7 @@ from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.forecast.forecast import Answer
 from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
 from leg_wear_monitor.monitor.forecast.measurement import ModelError
-from leg_wear_monitor.monitor.forecast.wear_coefficients import MeasuredClearance
+from leg_wear_monitor.monitor.forecast.wear_coefficients import ClearanceAtWear
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
 SECOND = 10**9
@@ -97,16 +97,16 @@ def test_what_encoders_show_tightens_the_forecast_and_the_newest_replaces_the_la
         return told.cycles.p90 / told.cycles.p10
 
     before = walked(forecaster, range(1, 80), worn=1e-4)[-1].joints[0]
-    assert forecaster.use_estimate(0, MeasuredClearance(4.2e-4, 2e-5, 1e-4), 0)
+    assert forecaster.use_estimate(0, ClearanceAtWear(4.2e-4, 2e-5, 1e-4), 0)
     after = walked(forecaster, [80], worn=1e-4)[0].joints[0]
     assert after.measurements == 1
     assert spread(after) < 0.5 * spread(before)
     for _ in range(50):  # its error does not average out
-        forecaster.use_estimate(0, MeasuredClearance(4.2e-4, 2e-5, 1e-4), 0)
+        forecaster.use_estimate(0, ClearanceAtWear(4.2e-4, 2e-5, 1e-4), 0)
     again = walked(forecaster, [81], worn=1e-4)[0].joints[0]
     assert again.measurements == 1
     assert spread(again) == pytest.approx(spread(after), rel=1e-3)
-    assert not forecaster.use_estimate(0, MeasuredClearance(9e-4, 2e-5, 1e-6), 0)
+    assert not forecaster.use_estimate(0, ClearanceAtWear(9e-4, 2e-5, 1e-6), 0)
     assert walked(forecaster, [82], worn=1e-4)[0].joints[0].measurements == 0
 
 

@@ -18,7 +18,7 @@ from leg_wear_monitor.monitor.corrections import correct
 from leg_wear_monitor.monitor.diagnosis.observer import Correction
 from leg_wear_monitor.monitor.forecast.forecast import JointCondition, forecast, no_law
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
-    MeasuredClearance,
+    ClearanceAtWear,
     estimate_coefficient,
     measured_factor,
 )
@@ -35,7 +35,7 @@ CORRECTED = CorrectedClearance(
     wear_m=OPENED - FRESH,
     replaced_ns=0,
 )
-EARLY = MeasuredClearance(FRESH + 1.8 * BEFORE, 2e-6, BEFORE)  # 1.8 times the nominal wear
+EARLY = ClearanceAtWear(FRESH + 1.8 * BEFORE, 2e-6, BEFORE)  # 1.8 times the nominal wear
 
 
 def believed(wear_m, observations, corrections=(CORRECTED,)):
@@ -68,7 +68,7 @@ def test_only_the_wear_since_is_multiplied_by_what_was_learned():
 @pytest.mark.plain
 @given(st.floats(0.2, 5.0), st.floats(1e-7, 1e-4))
 def test_what_was_measured_before_teaches_the_same_after_a_correction(factor, sigma):
-    early = [MeasuredClearance(FRESH + factor * wear, sigma, wear) for wear in (0.0, 2e-5, BEFORE)]
+    early = [ClearanceAtWear(FRESH + factor * wear, sigma, wear) for wear in (0.0, 2e-5, BEFORE)]
     assert measured_factor(SETTINGS, FRESH, early, [CORRECTED]) == measured_factor(SETTINGS, FRESH, early)
 
 
@@ -77,10 +77,10 @@ def test_what_was_measured_before_teaches_the_same_after_a_correction(factor, si
 def test_measurements_on_both_sides_of_a_correction_agree_on_the_factor(factor):
     since = 4.0e-5
     late = [
-        MeasuredClearance(OPENED + 3e-5, 2e-6, CORRECTED.wear_m),  # the torque was 0.03 mm off
-        MeasuredClearance(OPENED + 3e-5 + factor * since, 2e-6, CORRECTED.wear_m + since),
+        ClearanceAtWear(OPENED + 3e-5, 2e-6, CORRECTED.wear_m),  # the torque was 0.03 mm off
+        ClearanceAtWear(OPENED + 3e-5 + factor * since, 2e-6, CORRECTED.wear_m + since),
     ]
-    early = [MeasuredClearance(FRESH, 2e-6, 0.0), MeasuredClearance(FRESH + factor * BEFORE, 2e-6, BEFORE)]
+    early = [ClearanceAtWear(FRESH, 2e-6, 0.0), ClearanceAtWear(FRESH + factor * BEFORE, 2e-6, BEFORE)]
     alone = [measured_factor(SETTINGS, FRESH, each, [CORRECTED]) for each in (early, late)]
     together, precision = measured_factor(SETTINGS, FRESH, [*late, *early], [CORRECTED])
     assert together == pytest.approx(factor, rel=0.01)
@@ -90,7 +90,7 @@ def test_measurements_on_both_sides_of_a_correction_agree_on_the_factor(factor):
 @pytest.mark.plain
 def test_two_corrections_each_count_from_themselves():
     again = attrs.evolve(CORRECTED, clearance_m=2e-3, before_m=CORRECTED.wear_m + 1e-5, wear_m=1.7e-3)
-    between = MeasuredClearance(OPENED + 1.8e-5, 2e-6, CORRECTED.wear_m + 1e-5)
+    between = ClearanceAtWear(OPENED + 1.8e-5, 2e-6, CORRECTED.wear_m + 1e-5)
     factor, precision = measured_factor(SETTINGS, FRESH, [EARLY, between], [CORRECTED, again])
     alone = [
         measured_factor(SETTINGS, FRESH, [each], corrections)

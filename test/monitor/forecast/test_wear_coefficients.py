@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from leg_wear_monitor import ConfigError, load_mechanism
 from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.forecast.measurement import measure
-from leg_wear_monitor.monitor.forecast.wear_coefficients import MeasuredClearance, estimate_coefficient
+from leg_wear_monitor.monitor.forecast.wear_coefficients import ClearanceAtWear, estimate_coefficient
 from leg_wear_monitor.monitor.ledger.entry import JointWear
 
 pytestmark = pytest.mark.plain
@@ -46,7 +46,7 @@ def test_an_accurate_measurement_of_much_wear_tells_the_factor(factor):
     exact = attrs.evolve(PRIOR, clearance_sigma_m=1e-7)
     wear = 1e-4
     coefficient_estimate = estimate_coefficient(
-        exact, FRESH, [MeasuredClearance(FRESH + factor * wear, 5e-6, wear)]
+        exact, FRESH, [ClearanceAtWear(FRESH + factor * wear, 5e-6, wear)]
     )
     assert math.exp(coefficient_estimate.mean) == pytest.approx(factor, rel=0.02 / factor + 0.01)
     assert coefficient_estimate.sigma == pytest.approx(5e-6 / (factor * wear), rel=0.2)
@@ -57,8 +57,8 @@ def test_exact_measurements_are_believed_however_far_they_are_from_the_prior(pow
     """Two measurements of one part: their difference is the factor times the wear between them."""
     factor, sigma = 10.0**power, 10.0**sigma_power * 10.0**power * 1e-3
     observations = [
-        MeasuredClearance(FRESH, sigma, 0.0),
-        MeasuredClearance(FRESH + factor * 1e-4, sigma, 1e-4),
+        ClearanceAtWear(FRESH, sigma, 0.0),
+        ClearanceAtWear(FRESH + factor * 1e-4, sigma, 1e-4),
     ]
     coefficient_estimate = estimate_coefficient(
         attrs.evolve(PRIOR, clearance_sigma_m=1e-3), FRESH, observations
@@ -91,7 +91,7 @@ def test_the_belief_is_prior_times_likelihood(mean, own, sigma):
     """Against a plain sum over a grid that is wide and fine, for a measurement that is not exact."""
     prior = attrs.evolve(PRIOR, wear_coefficient_sigma=sigma, clearance_sigma_m=1e-9)
     coefficient_estimate = estimate_coefficient(
-        prior, FRESH, [MeasuredClearance(FRESH + mean * 1e-5, own * 1e-5, 1e-5)]
+        prior, FRESH, [ClearanceAtWear(FRESH + mean * 1e-5, own * 1e-5, 1e-5)]
     )
     u = np.linspace(-12.0 * sigma - 5.0, 12.0 * sigma + 5.0, 200_001)
     log_weight = -0.5 * (u / sigma) ** 2 - 0.5 * ((np.exp(u) - mean) / own) ** 2
@@ -106,7 +106,7 @@ def test_the_belief_is_prior_times_likelihood(mean, own, sigma):
 
 @given(st.permutations(range(4)))
 def test_the_order_of_measurements_does_not_matter(order):
-    observations = [MeasuredClearance(FRESH + 1e-5 * (i + 1), 3e-6 + 1e-6 * i, 0.8e-5 * i) for i in range(4)]
+    observations = [ClearanceAtWear(FRESH + 1e-5 * (i + 1), 3e-6 + 1e-6 * i, 0.8e-5 * i) for i in range(4)]
     one, other = (
         estimate_coefficient(PRIOR, FRESH, observations),
         estimate_coefficient(PRIOR, FRESH, [observations[i] for i in order]),
@@ -115,7 +115,7 @@ def test_the_order_of_measurements_does_not_matter(order):
 
 
 def test_a_new_part_s_measurement_tells_its_clearance_and_nothing_of_the_coefficient():
-    coefficient_estimate = estimate_coefficient(PRIOR, FRESH, [MeasuredClearance(3.05e-4, 5e-6, 0.0)])
+    coefficient_estimate = estimate_coefficient(PRIOR, FRESH, [ClearanceAtWear(3.05e-4, 5e-6, 0.0)])
     assert coefficient_estimate.sigma == pytest.approx(PRIOR.wear_coefficient_sigma, rel=1e-3)
     # equal sigmas: half of what was found, and 1 / sqrt 2 of the spread
     np.testing.assert_allclose(coefficient_estimate.excess_m, 2.5e-6)
@@ -123,9 +123,9 @@ def test_a_new_part_s_measurement_tells_its_clearance_and_nothing_of_the_coeffic
 
 
 def test_a_later_measurement_knows_the_clearance_when_new():
-    alone = estimate_coefficient(PRIOR, FRESH, [MeasuredClearance(3.5e-4, 2e-6, 5e-5)])
+    alone = estimate_coefficient(PRIOR, FRESH, [ClearanceAtWear(3.5e-4, 2e-6, 5e-5)])
     both = estimate_coefficient(
-        PRIOR, FRESH, [MeasuredClearance(3.0e-4, 2e-6, 0.0), MeasuredClearance(3.5e-4, 2e-6, 5e-5)]
+        PRIOR, FRESH, [ClearanceAtWear(3.0e-4, 2e-6, 0.0), ClearanceAtWear(3.5e-4, 2e-6, 5e-5)]
     )
     assert both.sigma < 0.7 * alone.sigma
 
@@ -137,7 +137,7 @@ def test_measurements_that_repeat_the_same_model_are_expected_evenly():
     drawn = FRESH + PRIOR.clearance_sigma_m * random.standard_normal(400)
     drawn += wear * np.exp(PRIOR.wear_coefficient_sigma * random.standard_normal(400))
     drawn += 5e-6 * random.standard_normal(400)
-    below = [coefficient_estimate.probability_below(MeasuredClearance(c, 5e-6, wear)) for c in drawn]
+    below = [coefficient_estimate.probability_below(ClearanceAtWear(c, 5e-6, wear)) for c in drawn]
     assert 0.75 <= np.mean((np.array(below) > 0.1) & (np.array(below) < 0.9)) <= 0.85
     assert np.mean(below) == pytest.approx(0.5, abs=0.05)
 

@@ -106,13 +106,17 @@ class StopRecorder:
             writer.close()
 
     def _write(self, log_time_ns: int, topic: str, raw: bytes | NDArray[np.uint8]) -> None:
-        if self._writer is None:
-            return
-        if isinstance(raw, bytes):
-            self._writer.write(self._channels[topic], log_time_ns, raw)
-        else:
-            stamps = np.full(len(raw), log_time_ns, np.int64)
-            self._writer.write_many(self._channels[topic], stamps, raw)
+        if self._writer is not None:
+            put(self._writer, self._channels[topic], log_time_ns, raw)
+
+
+def put(writer: "McapWriter", channel: int, log_time_ns: int, raw: bytes | NDArray[np.uint8]) -> int:
+    """Write a message, or several of equal length (n, bytes); how many it were."""
+    if isinstance(raw, bytes):
+        writer.write(channel, log_time_ns, raw)
+        return 1
+    writer.write_many(channel, np.full(len(raw), log_time_ns, np.int64), raw)
+    return len(raw)
 
 
 # MCAP recording of all messages the node receives and publishes; its replay reproduces the live run.
@@ -164,28 +168,14 @@ class BlackBox:
         if self._writer is not None:
             self._channels[topic] = self._writer.channel(topic, kind, qos)
 
-    def write(self, topic: str, log_time_ns: int, raw: bytes) -> None:
-        """Record a message."""
+    def write(self, topic: str, log_time_ns: int, raw: bytes | NDArray[np.uint8]) -> None:
+        """Record a message, or several of equal length (n, bytes)."""
         self._with_stops(lambda stops: stops.keep(topic, log_time_ns, raw))
-        if self._writer is None:
-            return
-        try:
-            self._writer.write(self._channels[topic], log_time_ns, raw)
-            self.recorded += 1
-        except LegWearError as error:
-            self._fail(error)
-
-    def write_many(self, topic: str, log_time_ns: int, rows: NDArray[np.uint8]) -> None:
-        """Record messages of equal length, (n, bytes)."""
-        self._with_stops(lambda stops: stops.keep(topic, log_time_ns, rows))
-        if self._writer is None:
-            return
-        try:
-            stamps = np.full(len(rows), log_time_ns, np.int64)
-            self._writer.write_many(self._channels[topic], stamps, rows)
-            self.recorded += len(rows)
-        except LegWearError as error:
-            self._fail(error)
+        if self._writer is not None:
+            try:
+                self.recorded += put(self._writer, self._channels[topic], log_time_ns, raw)
+            except LegWearError as error:
+                self._fail(error)
 
     def stop(self, now_ns: int) -> None:
         """Write the seconds around a STOP, where that is asked for."""
@@ -299,7 +289,7 @@ class Outlets:
 
     def send_many(self, output: Output, now_ns: int, rows: NDArray[np.uint8]) -> None:
         """Record and publish messages of equal length, (n, bytes)."""
-        self._black_box.write_many(self._topics[output], now_ns, rows)
+        self._black_box.write(self._topics[output], now_ns, rows)
         publish = self._publishers[output].publish
         with until_down(self._context):
             for row in rows:

@@ -225,7 +225,7 @@ def test_the_black_box_keeps_bytes_in_their_order(tmp_path: Path) -> None:
     for topic in ("/a", "/b"):
         box.add_topic(topic, "sensor_msgs/msg/JointState", SENSOR_DATA)
     box.write("/a", 1, b"one")
-    box.write_many("/b", 2, np.frombuffer(b"twotri", np.uint8).reshape(2, 3))
+    box.write("/b", 2, np.frombuffer(b"twotri", np.uint8).reshape(2, 3))
     box.flush()
     box.write("/a", 3, b"four")
     box.close()
@@ -260,7 +260,7 @@ def test_the_seconds_around_a_stop_are_kept(tmp_path: Path) -> None:
     for second in range(100):
         box.write("/a", second * SECOND, f"{second}".encode())
         if second in (50, 55, 80):
-            box.write_many("/b", second * SECOND, np.frombuffer(b"onetwo", np.uint8).reshape(2, 3))
+            box.write("/b", second * SECOND, np.frombuffer(b"onetwo", np.uint8).reshape(2, 3))
             box.stop(second * SECOND)
     box.close()
     assert not box.on and box.takes_inputs

@@ -36,7 +36,7 @@ from leg_wear_monitor.twin.reference import (
     cycle_profile,
     mean_profile,
 )
-from leg_wear_monitor.twin.sample import KeepsSamples, Samples, indices_within, newest, of_crank
+from leg_wear_monitor.twin.sample import GAIT_SAMPLE, KeepsSamples, Samples, newest, of_crank, within
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
 # Errors of the encoders: unknown at first, estimated together with the clearances of a leg whose clearances
@@ -136,21 +136,16 @@ def commissioned(errors: EncoderErrors, found: Estimate, present: Sequence[bool]
 
 @attrs.frozen(eq=False)
 class EncoderSamples:
-    """Crank and encoder angles in the order of their arrival, with counts of unusable ones.
+    """Samples of the crank in the order of their arrival, with counts of unusable encoder angles.
 
     Attributes
     ----------
-    stamp_ns : (n,) array of int
-    crank_rad : (n,) array
-    encoder_rad : (n, m) array
-        NaN where absent, infinite where the received value is not an angle.
+    crank : (n,) array of GAIT_SAMPLE
     samples, absent, no_angle : (m,) arrays of int
         Counts since the start.
     """
 
-    stamp_ns: Ints
-    crank_rad: Floats
-    encoder_rad: Floats
+    crank: Samples
     samples: Ints
     absent: Ints
     no_angle: Ints
@@ -160,11 +155,9 @@ class EncoderSamples:
         piece = of_crank(piece)
         if not len(piece):
             return self
-        angles = piece["encoder_rad"][:, : self.encoder_rad.shape[1]]
+        angles = piece["encoder_rad"][:, : len(self.samples)]
         return EncoderSamples(
-            np.concatenate([self.stamp_ns, piece["stamp_ns"]]),
-            np.concatenate([self.crank_rad, piece["crank_angle_rad"]]),
-            np.concatenate([self.encoder_rad, angles]),
+            np.concatenate([self.crank, piece]),
             self.samples + np.isfinite(angles).sum(axis=0),
             self.absent + np.isnan(angles).sum(axis=0),
             self.no_angle + np.isinf(angles).sum(axis=0),
@@ -172,25 +165,13 @@ class EncoderSamples:
 
     def after(self, stamp_ns: int) -> "EncoderSamples":
         """Without the samples before a stamp."""
-        which = newest(self.stamp_ns, stamp_ns)
-        return attrs.evolve(
-            self,
-            stamp_ns=self.stamp_ns[which],
-            crank_rad=self.crank_rad[which],
-            encoder_rad=self.encoder_rad[which],
-        )
+        return attrs.evolve(self, crank=newest(self.crank, stamp_ns))
 
 
 def no_encoder_samples(encoders: int) -> EncoderSamples:
     """Empty samples of a number of encoders."""
     none = np.zeros(encoders, np.int64)
-    return EncoderSamples(np.zeros(0, np.int64), np.zeros(0), np.zeros((0, encoders)), none, none, none)
-
-
-def samples_within(kept: EncoderSamples, begin_ns: int, end_ns: int) -> tuple[Ints, Floats, Floats]:
-    """Stamps (n,) [ns], crank (n,) and encoder angles (n, m) [rad] between two stamps."""
-    which = indices_within(kept.stamp_ns, begin_ns, end_ns)
-    return kept.stamp_ns[which], kept.crank_rad[which], kept.encoder_rad[which]
+    return EncoderSamples(np.zeros(0, GAIT_SAMPLE), none, none, none)
 
 
 # State of the observer (below), and the faults of an encoder.
@@ -369,14 +350,16 @@ class EncoderObserver(KeepsSamples):
         Commissioned or None
             Errors of the encoders, if this period completed their commissioning.
         """
-        state, new = self.state, None
-        for begin_ns, end_ns in state.due:
+        new: list[Commissioned] = []
+
+        def evaluate(begin_ns: int, end_ns: int) -> None:
             self._add_cycle(begin_ns, end_ns)
-            new = self._evaluate(end_ns) or new
-        state.samples = state.samples.after(state.due[-1][1] if state.due else 0)
-        state.due = ()
+            found = self._evaluate(end_ns)
+            new.extend([found] if found else [])
+
+        self.evaluate_due(evaluate)
         self._advance_reference(clearance_m, depth)
-        return new
+        return new[-1] if new else None
 
     def replaced(self) -> None:
         """Forget the estimate after the replacement of a part; the errors of the encoders stay."""
@@ -408,7 +391,9 @@ class EncoderObserver(KeepsSamples):
     def _add_cycle(self, begin_ns: int, end_ns: int) -> None:
         """Add a gait cycle to the regression, unless other encoders are present than before."""
         state = self.state
-        stamp_ns, crank, raw = samples_within(state.samples, begin_ns, end_ns)
+        kept = within(state.samples.crank, begin_ns, end_ns)
+        stamp_ns, crank = kept["stamp_ns"], kept["crank_angle_rad"]
+        raw = kept["encoder_rad"][:, : len(self._settings.names)]
         if len(crank) >= _LEAST_PHASES:
             turned: Floats = np.asarray(np.unwrap(crank, period=TURN), dtype=np.float64)
             since_s = np.asarray(1.0e-9 * (stamp_ns - begin_ns), dtype=np.float64)

@@ -1,7 +1,7 @@
 """Samples, the kinds and settings of inputs, and what is taken in: the seam between sensors and twin."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import attrs
@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from leg_wear_monitor.compiled.kernel import Records, values_of
 from leg_wear_monitor.errors import LegWearError
-from leg_wear_monitor.mechanism.arrays import Ints
 from leg_wear_monitor.twin import CRANK, KINDS, LOAD, TORQUE
 from leg_wear_monitor.twin.statistics import Intake
 
@@ -400,13 +399,25 @@ _MOST = 20_000  # samples of each kind: ten seconds at 2 kHz
 
 
 class KeepsSamples:
-    """Base of an observer that evaluates whole gait cycles; ``state.samples`` is what it keeps."""
+    """Base of an observer that evaluates whole gait cycles.
+
+    ``state.samples`` is what it keeps, ``state.due`` the begins and ends of cycles that are not evaluated.
+    """
 
     state: Any
 
     def add_samples(self, piece: Samples) -> None:
         """Add samples in the order of arrival."""
         self.state.samples = self.state.samples.extended(piece)
+
+    def evaluate_due(self, evaluate: Callable[[int, int], object]) -> bool:
+        """Evaluate the gait cycles that ended, and forget their samples; whether there were any."""
+        state = self.state
+        for begin_ns, end_ns in state.due:
+            evaluate(begin_ns, end_ns)
+        state.samples = state.samples.after(state.due[-1][1] if state.due else 0)
+        ended, state.due = bool(state.due), ()
+        return ended
 
 
 def of_crank(piece: Samples) -> Samples:
@@ -420,12 +431,14 @@ def is_valid(piece: Samples) -> NDArray[np.bool_]:
     return np.asarray((piece["fault"] == NO_FAULT) & (piece["stamp_ns"] > 0))
 
 
-def newest(stamp_ns: Ints, since_ns: int) -> Ints:
-    """Indices of the samples (n,) from a stamp on, of the last ten seconds at 2 kHz at most."""
-    return np.flatnonzero(stamp_ns >= since_ns)[-_MOST:]
+def newest(kept: Samples, since_ns: int) -> Samples:
+    """Samples from a stamp on, of the last ten seconds at 2 kHz at most."""
+    found: Samples = kept[kept["stamp_ns"] >= since_ns][-_MOST:]
+    return found
 
 
-def indices_within(stamp_ns: Ints, begin_ns: int, end_ns: int) -> Ints:
-    """Indices of the samples (n,) from one stamp to another, in order; of equal stamps the first one."""
-    _, first = np.unique(stamp_ns, return_index=True)
-    return np.asarray(first[(stamp_ns[first] >= begin_ns) & (stamp_ns[first] < end_ns)])
+def within(kept: Samples, begin_ns: int, end_ns: int) -> Samples:
+    """Samples from one stamp to another, in order; of equal stamps the first one."""
+    stamp_ns, first = np.unique(kept["stamp_ns"], return_index=True)
+    found: Samples = kept[first[(stamp_ns >= begin_ns) & (stamp_ns < end_ns)]]
+    return found

@@ -29,13 +29,13 @@ from leg_wear_monitor.monitor.diagnosis.references import (
     References,
 )
 from leg_wear_monitor.monitor.diagnosis.state import (
-    NO_TORQUE_SAMPLES,
     UNUSED_CYCLES,
     WINDOW_CYCLES,
     Diagnosis,
     DiagnosisState,
     NotUsed,
     SignedCycle,
+    TorqueSamples,
     TorqueState,
     cycle_torque,
     sensor_period_s,
@@ -277,10 +277,7 @@ class TorqueObserver(KeepsSamples):
         state = self.state
         self._follow_counted(counted_m)
         self._follow_load()
-        for begin_ns, end_ns in state.due:
-            self._evaluate(begin_ns, end_ns)
-        state.samples = state.samples.after(state.due[-1][1] if state.due else 0)
-        ended, state.due = bool(state.due), ()
+        ended = self.evaluate_due(self._evaluate)
         if self._references.advance(state, counted_m, depth):
             self._evidence.review(state, self.config)
         if not ended or not self.config.diagnosis.correct or not self._models.is_of_file(state):
@@ -325,7 +322,7 @@ class TorqueObserver(KeepsSamples):
 
     def begin_epoch(self) -> None:
         """Forget kept samples and gait cycles, because stamps start again."""
-        self.state.samples, self.state.due = NO_TORQUE_SAMPLES, ()
+        self.state.samples, self.state.due = TorqueSamples(), ()
         self._restart(self.state.counted_m)
 
     @property

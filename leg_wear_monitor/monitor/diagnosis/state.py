@@ -12,11 +12,11 @@ from leg_wear_monitor.estimate.cause import Change
 from leg_wear_monitor.estimate.ground_load import GroundLoad
 from leg_wear_monitor.estimate.leg_model import ClearanceFit, DetectorState
 from leg_wear_monitor.estimate.signature import DIRECT, Channel, CommissionedTorque, TorqueSensor, averaged
-from leg_wear_monitor.mechanism.arrays import Floats, Ints
+from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.twin import TORQUE
 from leg_wear_monitor.twin.reference import CrankProfile, LegParameters, cycle_profile, mean_profile
-from leg_wear_monitor.twin.sample import Samples, brings, indices_within, is_valid, newest, of_crank
+from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples, brings, is_valid, newest, of_crank, within
 from leg_wear_monitor.twin.torque_reference import CADENCES, TorqueReference
 
 # Samples of the crank and of the drive torque, kept until their gait cycle ends.
@@ -28,33 +28,21 @@ _LEAST_CRANK_SAMPLES = 40  # in a gait cycle, for its profile
 
 @attrs.frozen(eq=False)
 class TorqueSamples:
-    """Stamps [ns] and crank angles [rad], stamps [ns] and drive torques [N m], in the order of arrival."""
+    """Samples with a crank angle, and samples with a drive torque, in the order of arrival."""
 
-    crank_ns: Ints
-    crank_rad: Floats
-    torque_ns: Ints
-    torque_nm: Floats
+    crank: Samples = attrs.field(factory=lambda: np.zeros(0, GAIT_SAMPLE))
+    torque: Samples = attrs.field(factory=lambda: np.zeros(0, GAIT_SAMPLE))
 
     def extended(self, piece: Samples) -> "TorqueSamples":
         """With the valid ones of a piece."""
-        crank = of_crank(piece)
         torque = piece[is_valid(piece) & brings(piece, TORQUE) & np.isfinite(piece["torque_nm"])]
         return TorqueSamples(
-            np.concatenate([self.crank_ns, crank["stamp_ns"]]),
-            np.concatenate([self.crank_rad, crank["crank_angle_rad"]]),
-            np.concatenate([self.torque_ns, torque["stamp_ns"]]),
-            np.concatenate([self.torque_nm, torque["torque_nm"]]),
+            np.concatenate([self.crank, of_crank(piece)]), np.concatenate([self.torque, torque])
         )
 
     def after(self, stamp_ns: int) -> "TorqueSamples":
         """Those from a stamp on."""
-        crank, torque = newest(self.crank_ns, stamp_ns), newest(self.torque_ns, stamp_ns)
-        return TorqueSamples(
-            self.crank_ns[crank], self.crank_rad[crank], self.torque_ns[torque], self.torque_nm[torque]
-        )
-
-
-NO_TORQUE_SAMPLES = TorqueSamples(np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64), np.zeros(0))
+        return TorqueSamples(newest(self.crank, stamp_ns), newest(self.torque, stamp_ns))
 
 
 class CycleTorque(NamedTuple):
@@ -77,7 +65,7 @@ class CycleTorque(NamedTuple):
 
 def sensor_period_s(kept: TorqueSamples, begin_ns: int, end_ns: int) -> float:
     """Median time between the torque samples of a gait cycle; NaN where there are fewer than three."""
-    stamps, _ = _between(kept.torque_ns, kept.torque_nm, begin_ns, end_ns)
+    stamps = within(kept.torque, begin_ns, end_ns)["stamp_ns"]
     return float(np.median(np.diff(stamps))) * 1.0e-9 if len(stamps) > 2 else float("nan")
 
 
@@ -86,8 +74,9 @@ def cycle_torque(kept: TorqueSamples, begin_ns: int, end_ns: int, sensor: Torque
 
     Samples that come faster than signatures need are averaged.
     """
-    crank_ns, crank = _between(kept.crank_ns, kept.crank_rad, begin_ns, end_ns)
-    torque_ns, torque = _between(kept.torque_ns, kept.torque_nm, begin_ns, end_ns)
+    cranks, torques = within(kept.crank, begin_ns, end_ns), within(kept.torque, begin_ns, end_ns)
+    crank_ns, crank = cranks["stamp_ns"], cranks["crank_angle_rad"]
+    torque_ns, torque = torques["stamp_ns"], torques["torque_nm"]
     if len(crank_ns) < _LEAST_CRANK_SAMPLES or len(torque_ns) < 2 * sensor.together:
         return None
     turned: Floats = np.asarray(np.unwrap(crank, period=TURN), dtype=np.float64)
@@ -106,12 +95,6 @@ def cycle_torque(kept: TorqueSamples, begin_ns: int, end_ns: int, sensor: Torque
     period_ns = 1.0e9 * sensor.period_s
     jitter = float(np.median(np.abs(np.diff(torque_ns) - period_ns))) / period_ns
     return CycleTorque(angle, torque, step, profile, sensor.period_s, late, jitter)
-
-
-def _between(stamps: Ints, values: Floats, begin_ns: int, end_ns: int) -> tuple[Ints, Floats]:
-    """Stamps and values of a time, in order."""
-    which = indices_within(stamps, begin_ns, end_ns)
-    return stamps[which], values[which]
 
 
 # What the measured drive torque shows of the clearances, compared with those that the monitor counts.
@@ -304,7 +287,7 @@ class TorqueState:
     """
 
     counted_m: Floats
-    samples: TorqueSamples = NO_TORQUE_SAMPLES
+    samples: TorqueSamples = TorqueSamples()
     due: tuple[tuple[int, int], ...] = ()
     sensor: TorqueSensor | None = None
     waiting: tuple[SignedCycle, ...] = ()

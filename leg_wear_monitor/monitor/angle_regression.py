@@ -2,7 +2,6 @@
 
 import math
 from enum import Enum
-from typing import NamedTuple
 
 import attrs
 import numpy as np
@@ -122,13 +121,10 @@ _BATCH = 2  # cycles per batch: neighbouring cycles are correlated
 _NO_NEWS = 1.0e6  # times the prior variance: no information
 
 
-class ClearanceRegressionSnapshot(NamedTuple):
-    """All of a `ClearanceRegression`; nothing in it changes."""
-
-    reference: Reference | None
-    before: Estimate | None
-    cycles: tuple[tuple[Floats, Floats], ...]
-    each: tuple[Floats, ...]
+ClearanceRegressionSnapshot = tuple[
+    Reference | None, Estimate | None, tuple[tuple[Floats, Floats], ...], tuple[Floats, ...]
+]
+"""All of a `ClearanceRegression`; nothing in it changes."""
 
 
 class ClearanceRegression:
@@ -257,14 +253,12 @@ class ClearanceRegression:
 
     def snapshot(self) -> ClearanceRegressionSnapshot:
         """The whole state."""
-        return ClearanceRegressionSnapshot(
-            self._reference, self._before, tuple(self._cycles), tuple(self._each)
-        )
+        return self._reference, self._before, tuple(self._cycles), tuple(self._each)
 
     def restore(self, snapshot: ClearanceRegressionSnapshot) -> None:
         """Go back to a snapshot."""
-        self._reference, self._before = snapshot.reference, snapshot.before
-        self._cycles, self._each = list(snapshot.cycles), list(snapshot.each)
+        self._reference, self._before, cycles, each = snapshot
+        self._cycles, self._each = list(cycles), list(each)
 
 
 # Estimate of a joint's clearance from further encoders.

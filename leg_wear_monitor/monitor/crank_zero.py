@@ -6,7 +6,6 @@ the ends of evaluation periods, which do not depend on how samples are cut into 
 """
 
 import math
-from typing import NamedTuple
 
 import attrs
 import numpy as np
@@ -180,11 +179,8 @@ class CrankZeroState:
     before_s: float = 0.0
 
 
-class CrankZeroSnapshot(NamedTuple):
-    """Complete state."""
-
-    state: CrankZeroState
-    restarts: Records
+CrankZeroSnapshot = tuple[CrankZeroState, Records]
+"""Complete state."""
 
 
 class CrankZero:
@@ -257,12 +253,12 @@ class CrankZero:
 
     def snapshot(self) -> CrankZeroSnapshot:
         """A copy of the whole state."""
-        return CrankZeroSnapshot(attrs.evolve(self.state), self._series.copy())
+        return attrs.evolve(self.state), self._series.copy()
 
     def restore(self, snapshot: CrankZeroSnapshot) -> None:
         """Restore a snapshot of a search with the same parameters."""
-        self.state = attrs.evolve(snapshot.state)
-        self._series[:] = snapshot.restarts
+        state, self._series[:] = snapshot
+        self.state = attrs.evolve(state)
 
     def _add(self, samples: Samples, out: list[Samples]) -> None:
         """Add samples without an event."""

@@ -5,7 +5,6 @@ deviation from the angle of the ideal linkage shows clearances, once its own err
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import attrs
 import numpy as np
@@ -264,12 +263,8 @@ _PROFILE_CYCLES = 10  # gait cycles whose crank motion is averaged for a referen
 _CLEARANCE_DEPARTURE_M, _SPEED_DEPARTURE, _LEAST_BETWEEN_REFERENCES = 1.0e-4, 0.015, 100
 
 
-class EncoderSnapshot(NamedTuple):
-    """Whole state of an `EncoderObserver`."""
-
-    state: EncoderState
-    regression: ClearanceRegressionSnapshot
-    reference: ReferenceSnapshot
+EncoderSnapshot = tuple[EncoderState, ClearanceRegressionSnapshot, ReferenceSnapshot]
+"""Whole state of an `EncoderObserver`."""
 
 
 class EncoderObserver(KeepsSamples):
@@ -378,15 +373,15 @@ class EncoderObserver(KeepsSamples):
 
     def snapshot(self) -> EncoderSnapshot:
         """A copy of the whole state."""
-        return EncoderSnapshot(
-            attrs.evolve(self.state), self._clearance_regression.snapshot(), self._reference.snapshot()
-        )
+        regression = self._clearance_regression.snapshot()
+        return attrs.evolve(self.state), regression, self._reference.snapshot()
 
     def restore(self, snapshot: EncoderSnapshot) -> None:
         """Restore a snapshot of the same mechanism and parameters; later results are equal bit for bit."""
-        self.state = attrs.evolve(snapshot.state)
-        self._clearance_regression.restore(snapshot.regression)
-        self._reference.restore(snapshot.reference)
+        state, regression, reference = snapshot
+        self.state = attrs.evolve(state)
+        self._clearance_regression.restore(regression)
+        self._reference.restore(reference)
 
     def _add_cycle(self, begin_ns: int, end_ns: int) -> None:
         """Add a gait cycle to the regression, unless other encoders are present than before."""

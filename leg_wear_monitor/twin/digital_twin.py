@@ -18,7 +18,6 @@ instant.
 """
 
 import copy
-from typing import NamedTuple
 
 import numpy as np
 
@@ -246,13 +245,8 @@ class SampledFollower(LegFollower):
         return condition_of(cadence_rpm, load, self._sampled.condition)
 
 
-class TwinSnapshot(NamedTuple):
-    """Complete state of a twin as plain arrays and numbers."""
-
-    tracker: TrackerSnapshot
-    follower: FollowerSnapshot
-    wear_acceleration: float
-    parameters: LegParameters
+TwinSnapshot = tuple[TrackerSnapshot, FollowerSnapshot, float, LegParameters]
+"""Complete state of a twin: tracker, follower, factor on the wear, parameters of the leg."""
 
 
 class DigitalTwin:
@@ -473,14 +467,14 @@ class DigitalTwin:
 
     def snapshot(self) -> TwinSnapshot:
         """A copy of the whole state."""
-        return TwinSnapshot(
-            self._tracker.snapshot(), self._follower.snapshot(), self.wear_acceleration, self._parameters
-        )
+        tracker, follower = self._tracker.snapshot(), self._follower.snapshot()
+        return tracker, follower, self.wear_acceleration, self._parameters
 
     def restore(self, snapshot: TwinSnapshot) -> None:
         """Restore a snapshot of a twin of the same mechanism and settings."""
+        tracker, follower, acceleration, parameters = snapshot
         self._intake = None
-        self.set_parameters(snapshot.parameters)
-        self._tracker.restore(snapshot.tracker)
-        self._follower.restore(snapshot.follower)
-        self.wear_acceleration = snapshot.wear_acceleration
+        self.set_parameters(parameters)
+        self._tracker.restore(tracker)
+        self._follower.restore(follower)
+        self.wear_acceleration = acceleration

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
 
 from leg_wear_monitor.compiled.kernel import Record, Records, entry, kernel, new_records, record_of
 from leg_wear_monitor.twin import CRANK, KINDS, LOAD, TORQUE
@@ -359,12 +358,8 @@ _CHUNK = 256  # samples per call of the kernel
 _STEPS_A_SAMPLE = 7  # largest number of steps per sample
 
 
-class TrackerSnapshot(NamedTuple):
-    """State of a tracker; the queues contain the waiting samples only."""
-
-    state: Records
-    arrivals: Records
-    queue: Records
+TrackerSnapshot = tuple[Records, Records, Records]
+"""State of a tracker, and its two queues with the waiting samples only."""
 
 
 class CrankTracker:
@@ -424,15 +419,12 @@ class CrankTracker:
     def snapshot(self) -> TrackerSnapshot:
         """A copy of the whole state."""
         clock = self.state.clock
-        return TrackerSnapshot(
-            self.records.copy(),
-            self._arrivals[: clock.waiting].copy(),
-            self._queue[clock.head : clock.tail].copy(),
-        )
+        waiting, queue = self._arrivals[: clock.waiting], self._queue[clock.head : clock.tail]
+        return self.records.copy(), waiting.copy(), queue.copy()
 
     def restore(self, snapshot: TrackerSnapshot) -> None:
         """Restore a snapshot of a tracker of the same settings."""
-        self.records[:] = snapshot.state
+        self.records[:], waiting, queue = snapshot
         clock = self.state.clock
-        self._arrivals[: clock.waiting] = snapshot.arrivals
-        self._queue[clock.head : clock.tail] = snapshot.queue
+        self._arrivals[: clock.waiting] = waiting
+        self._queue[clock.head : clock.tail] = queue

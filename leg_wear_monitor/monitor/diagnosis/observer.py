@@ -143,11 +143,8 @@ _MOVED, _LEAST_LOAD_N = 0.3, 100.0
 _ESTIMATED_M, _ESTIMATED = 1.0e-4, 0.2  # largest standard deviation of an observable clearance; of it
 
 
-class TorqueObserverSnapshot(NamedTuple):
-    """Whole state of a `TorqueObserver`."""
-
-    state: TorqueState
-    reference: TorqueReferenceSnapshot | None
+TorqueObserverSnapshot = tuple[TorqueState, TorqueReferenceSnapshot | None]
+"""Whole state of a `TorqueObserver`."""
 
 
 class TorqueObserver(KeepsSamples):
@@ -378,12 +375,13 @@ class TorqueObserver(KeepsSamples):
 
     def snapshot(self) -> TorqueObserverSnapshot:
         """A copy of the whole state."""
-        return TorqueObserverSnapshot(attrs.evolve(self.state), self._references.snapshot())
+        return attrs.evolve(self.state), self._references.snapshot()
 
     def restore(self, snapshot: TorqueObserverSnapshot) -> None:
         """Restore a snapshot of the same mechanism and parameters; results are then bit for bit the same."""
-        self.state = attrs.evolve(snapshot.state)
-        self._references.restore(snapshot.reference)
+        state, reference = snapshot
+        self.state = attrs.evolve(state)
+        self._references.restore(reference)
 
     @property
     def _kept_cycles(self) -> int:

@@ -114,7 +114,7 @@ def test_the_first_reference_of_a_leg_behind_a_declared_coupling_is_simulated_be
     walk(observer, samples(reference, [0] * 8))
     assert observer.state.reference is None
     assert observer.diagnosis.reason.startswith("the reference for this leg is being simulated")
-    simulated = observer.snapshot().reference
+    simulated = observer.snapshot()[1]
     assert simulated is not None
     assert {one.parameters.compliance for one in simulated.legs} == {1.0e-3}
 

@@ -92,23 +92,11 @@ _NAMING_MESSAGES = 20  # first messages of a piece, whose joint names are read
 _NO_JOINT = "(no joint)"  # name of a crank joint that no message has
 
 
-@attrs.frozen
-class _SelectedChannel:
-    """A channel's topic and stream."""
+_Channel = tuple[str, Stream]
+"""Topic and stream of a channel that is read."""
 
-    topic: str
-    stream: Stream
-
-
-@attrs.define
-class _SeriesParts:
-    """Parts of one series, from successive pieces: stamps [ns], values, indices of the recording."""
-
-    parts: list[tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]] = attrs.Factory(list)
-
-    def series(self, first_ns: int) -> Series:
-        stamps, values, recording = (np.concatenate(column) for column in zip(*self.parts, strict=True))
-        return series(stamps, values, recording, first_ns)
+_Parts = list[tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]]
+"""Parts of one series, from successive pieces: stamps [ns], values, indices of the recording."""
 
 
 def read_signals(
@@ -141,13 +129,13 @@ def read_signals(
     with ExitStack() as stack:
         sources, lost = open_sources(bag_files, config, Budget(), stack)
         selected, skipped = _select(sources, joint_states, drive_torque)
-        if not any(each.stream.kind == CRANK for each in selected):
+        if not any(stream.kind == CRANK for _, stream in selected):
             raise RecordingError(
                 ", ".join(str(one.path) for one in bag_files),
                 "joint_states",
                 "no topic of sensor_msgs/msg/JointState",
             )
-        collected: dict[JointName | TorqueSource, _SeriesParts] = {}
+        collected: dict[JointName | TorqueSource, _Parts] = {}
         read, total = 0, max(1, sum(source.file.size for source in sources))
         for source in sources:
             for due in source.pieces():
@@ -163,13 +151,13 @@ def read_signals(
 
 def _select(
     sources: list[Source], joint_states: str | None, drive_torque: str | None
-) -> tuple[list[_SelectedChannel], list[Finding]]:
+) -> tuple[list[_Channel], list[Finding]]:
     """Channels to be read.
 
     The messages of a source get the number of their channel here, from 1, as their `type`; a reader of one
     channel for each stream has the stream's code there. Channels of the same topic and stream share a number.
     """
-    selected: list[_SelectedChannel] = []
+    selected: list[_Channel] = []
     findings: list[Finding] = []
     for source in sources:
         for number, channel in sorted(source.file.channels.items()):
@@ -182,7 +170,7 @@ def _select(
             except RecordingError as error:
                 findings.append(Finding(path, f"{error.key} {error.fault}: it is not read", Severity.NOTE))
                 continue
-            selected_channel = _SelectedChannel(channel.topic, stream)
+            selected_channel = channel.topic, stream
             if selected_channel not in selected:
                 selected.append(selected_channel)
             if (index := selected.index(selected_channel)) < _MOST_CHANNELS:
@@ -204,8 +192,8 @@ def _stream(
 
 
 def _add_piece(
-    collected: dict[JointName | TorqueSource, _SeriesParts],
-    selected: list[_SelectedChannel],
+    collected: dict[JointName | TorqueSource, _Parts],
+    selected: list[_Channel],
     data: NDArray[np.uint8],
     messages: NDArray[np.void],
     recording: int,
@@ -214,21 +202,21 @@ def _add_piece(
     for number in np.unique(messages["type"]).tolist():
         channel = selected[number - 1]
         chosen = messages[messages["type"] == number]
-        chosen["type"] = channel.stream.code
+        chosen["type"] = channel[1].code
         for name, samples, field in _decoded_series(channel, data, chosen):
             # a message without a stamp is usable at its log time
             is_unstamped = samples["fault"] == ZERO_STAMP
             is_usable = is_unstamped | (samples["fault"] == NO_FAULT)
             stamps = np.where(is_unstamped, chosen["log_time_ns"], samples["stamp_ns"])[is_usable]
-            parts = collected.setdefault(name, _SeriesParts()).parts
+            parts = collected.setdefault(name, [])
             parts.append((stamps, samples[field][is_usable], np.full(len(stamps), recording)))
 
 
 def _decoded_series(
-    channel: _SelectedChannel, data: NDArray[np.uint8], messages: NDArray[np.void]
+    channel: _Channel, data: NDArray[np.uint8], messages: NDArray[np.void]
 ) -> list[tuple[JointName | TorqueSource, Samples, str]]:
     """Samples of each series in a channel's messages, and the field of its values."""
-    topic, code = channel.topic, channel.stream.code
+    topic, code = channel[0], channel[1].code
     found: list[tuple[JointName | TorqueSource, Samples, str]] = []
     if code == JOINT_STATE:
         for joint in _joint_names(data, messages):
@@ -283,12 +271,18 @@ def _first_sound(source: str, data: NDArray[np.uint8], messages: NDArray[np.void
     return [data[one["begin"] : one["end"]].tobytes() for one in messages[sound]]
 
 
-def _signals(collected: dict[JointName | TorqueSource, _SeriesParts]) -> Signals:
+def _signals(collected: dict[JointName | TorqueSource, _Parts]) -> Signals:
     """Series that are not empty, with times since the first stamp of all."""
-    full = {name: each for name, each in collected.items() if sum(len(part[0]) for part in each.parts)}
+    full = {name: parts for name, parts in collected.items() if any(len(part[0]) for part in parts)}
     first_ns = min(
-        (int(part[0].min()) for each in full.values() for part in each.parts if len(part[0])), default=0
+        (int(part[0].min()) for parts in full.values() for part in parts if len(part[0])), default=0
     )
-    joints = {name: each.series(first_ns) for name, each in full.items() if isinstance(name, JointName)}
-    torques = {name: each.series(first_ns) for name, each in full.items() if isinstance(name, TorqueSource)}
+    found = {name: _joined(parts, first_ns) for name, parts in full.items()}
+    joints = {name: one for name, one in found.items() if isinstance(name, JointName)}
+    torques = {name: one for name, one in found.items() if isinstance(name, TorqueSource)}
     return Signals(joints, torques)
+
+
+def _joined(parts: _Parts, first_ns: int) -> Series:
+    stamps, values, recording = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return series(stamps, values, recording, first_ns)

@@ -2,6 +2,8 @@
 
 import attrs
 
+from leg_wear_monitor.estimate.mismatch import explanation
+from leg_wear_monitor.monitor.alarm_specs import MISMATCH
 from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate, ClearanceObservation
 from leg_wear_monitor.monitor.diagnosis.observer import Correction, TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.state import TorqueState
@@ -37,6 +39,21 @@ def clearance_estimates(parts: Parts, statistics: CycleStatistics) -> tuple[Clea
     believed = state.believed or (False,) * len(estimates)
     each = zip(estimates, believed, is_seen, strict=True)
     return tuple(attrs.evolve(one, believed=yes and seen) for one, yes, seen in each)
+
+
+def explain_mismatch(parts: Parts, statistics: CycleStatistics) -> None:
+    """Look for causes of a torque mismatch after a gait cycle; a wrong torque says nothing of the leg."""
+    allowed, was_wrong = parts.evaluation.allowed_torque, parts.is_torque_wrong
+    parts.state.mismatch = parts.state.mismatch.with_cycle(
+        statistics,
+        parts.evaluation.board.alarms[MISMATCH.name()],
+        lambda cycles: explanation(parts.mechanism, cycles, allowed),
+    )
+    if parts.torque and parts.is_torque_wrong and not was_wrong:
+        # the alarm rose some gait cycles after the torque became wrong
+        before = parts.config.alarms.on_delay_cycles + 1
+        first = parts.state.mismatch.cycles[0]
+        parts.torque.withdraw(first.begin_ns - before * (first.stamp_ns - first.begin_ns))
 
 
 def observe_torque(parts: Parts) -> None:

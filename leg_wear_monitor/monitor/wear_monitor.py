@@ -6,14 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from leg_wear_monitor.errors import LegWearError, closed_at_the_end
-from leg_wear_monitor.estimate.mismatch import explanation
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.alarm_specs import MISMATCH
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.fitting import check_limits
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.corrections import clearance_estimates, observe_torque
+from leg_wear_monitor.monitor.corrections import clearance_estimates, explain_mismatch, observe_torque
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
 from leg_wear_monitor.monitor.evaluation import EvaluationPeriods
 from leg_wear_monitor.monitor.forecast.forecast import ForecastBasis
@@ -133,12 +131,12 @@ class WearMonitor:
 
         On a machine that is too busy a reference comes into force later than in a replay.
         """
-        if self._torque:
-            self._torque.go_live()
+        if self._parts.torque:
+            self._parts.torque.go_live()
 
     def note_late(self, is_late: bool) -> None:
         """Note whether samples may be missing because this program was late: their rate is then unknown."""
-        self._evaluation.is_late = is_late
+        self._parts.evaluation.is_late = is_late
 
     def update(self, samples: Samples) -> Reports:
         """Process a block of samples.
@@ -212,7 +210,7 @@ class WearMonitor:
             self._twin.freeze_load(*parts.foot_load.freezes(sensor))
         self._take_changes(parts.evaluation.end_cycle(report, parts.state.torque, sensor), changes)
         if statistics.is_followed:
-            self._explain_mismatch(statistics)
+            explain_mismatch(parts, statistics)
             self._keep_torque(statistics, report)
         return report
 
@@ -250,19 +248,6 @@ class WearMonitor:
         state.last = latest(report, state.last)
         self._accounting.note_clearances(report)
         return report
-
-    def _explain_mismatch(self, statistics: CycleStatistics) -> None:
-        """Look for causes of a torque mismatch after a gait cycle."""
-        parts, allowed = self._parts, self._parts.evaluation.allowed_torque
-        was_wrong, alarm = parts.is_torque_wrong, self._board.alarms[MISMATCH.name()]
-        parts.state.mismatch = parts.state.mismatch.with_cycle(
-            statistics, alarm, lambda cycles: explanation(self.mechanism, cycles, allowed)
-        )
-        if parts.torque and parts.is_torque_wrong and not was_wrong:
-            # the alarm rose some gait cycles after the torque became wrong
-            before = self.config.alarms.on_delay_cycles + 1
-            first = parts.state.mismatch.cycles[0]
-            parts.torque.withdraw(first.begin_ns - before * (first.stamp_ns - first.begin_ns))
 
     def _keep_torque(self, statistics: CycleStatistics, report: CycleReport) -> None:
         """Record the torque of a gait cycle if it is as predicted."""

@@ -378,7 +378,7 @@ class LegAlarms:
 
 
 @attrs.frozen(kw_only=True)
-class LegState:
+class LegState(Shown):
     """All that is known of a leg at one instant.
 
     Attributes

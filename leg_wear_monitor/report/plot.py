@@ -12,14 +12,28 @@ from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.materials import Material
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.verdict.situation import SOURCES
+from leg_wear_monitor.monitor.alarms import ADVICE
+from leg_wear_monitor.monitor.verdict.decision import decision_of
+from leg_wear_monitor.monitor.verdict.situation import SEEN, SOURCES, SURE_SIGMAS
 from leg_wear_monitor.playback.result import ReplaySummary
 from leg_wear_monitor.playback.summary import ReplayResult
 from leg_wear_monitor.report.drawing import draw_drawing, drawing_of, drawing_svg
-from leg_wear_monitor.report.figure import BODY_COLOURS, LEAST_N, SMALL, draw_clearances, draw_openings, tidy
+from leg_wear_monitor.report.figure import (
+    BLUE,
+    BODY_COLOURS,
+    INK,
+    LEAST_N,
+    SMALL,
+    VERMILION,
+    draw_clearances,
+    draw_openings,
+    new_figure,
+    svg,
+    tidy,
+)
 from leg_wear_monitor.report.leg_picture import PATH_POINTS
 from leg_wear_monitor.report.page import Picture, Table, render
-from leg_wear_monitor.state import Figure, Verdict
+from leg_wear_monitor.state import Figure, LegState, Verdict
 
 # A result, or a mechanism, on matplotlib's axes, for a notebook or a script to go on with.
 
@@ -204,8 +218,11 @@ def _life_html(life: Life) -> _Shown:
 
 
 @_shown.register
-def _replay_html(summary: ReplaySummary) -> _Shown:
-    shown = _verdict(summary.verdict)
+def _state_html(state: LegState) -> _Shown:
+    """Of a leg now, and of a replay: verdict and decision, clearances in a table and against their limits."""
+    words = state.leg.joint_words if isinstance(state, ReplaySummary) else str
+    shown, decision = _verdict(state.verdict), decision_of(state, words)
+    lines = (*shown.lines, *(f"{title.lower()}: {text}" for title, text in decision.notes))
     head = ["joint", "clearance [mm]", "according to", "limit [mm]"]
     rows = [
         (
@@ -214,13 +231,41 @@ def _replay_html(summary: ReplaySummary) -> _Shown:
             "" if each.believed_by is None else SOURCES[each.believed_by],
             _number(1.0e3 * each.limit_m),
         )
-        for name, each in summary.clearances.items()
+        for name, each in state.clearances.items()
     ]
     return attrs.evolve(
         shown,
-        lines=(*shown.lines, summary.advice),
+        lines=(*lines, ADVICE),
         table=Table(caption="Clearance joints", head=head, rows=rows),
+        picture=_clearance_picture(state),
     )
+
+
+def _clearance_picture(state: LegState) -> Picture | None:
+    """Believed clearance of each joint with two standard deviations, against its limit; None without any."""
+    known = [(joint, each) for joint, each in state.clearances.items() if each.believed_m is not None]
+    if not known:
+        return None
+    figure = new_figure(5.0, 0.7 + 0.32 * len(known))
+    axes = figure.subplots()
+    for row, (_, each) in enumerate(known):
+        reach = 1.0e3 * SURE_SIGMAS * (each.believed_sigma_m or 0.0)
+        value, limit = 1.0e3 * (each.believed_m or 0.0), 1.0e3 * each.limit_m
+        colour = VERMILION if value >= limit else BLUE
+        axes.errorbar(value, row, xerr=reach, fmt="o", color=colour, capsize=3.0)
+        axes.plot([limit, limit], [row - 0.35, row + 0.35], color=VERMILION, linewidth=2.0)
+        if each.seen_m is not None and each.believed_by not in SEEN:  # an estimate beside it
+            sigma = 1.0e3 * SURE_SIGMAS * (each.seen_sigma_m or 0.0)
+            axes.errorbar(1.0e3 * each.seen_m, row + 0.2, xerr=sigma, fmt="D", ms=3.0, color=INK, capsize=2.0)
+    axes.set_yticks(range(len(known)), [joint for joint, _ in known])
+    axes.set_ylim(len(known) - 0.5, -0.5)
+    axes.set_xlim(0.0, None)
+    axes.set_xlabel(
+        "clearance [mm], two standard deviations; black: estimate beside it; red: limit", fontsize=SMALL
+    )
+    tidy(axes)
+    told = "; ".join(f"{joint} {1.0e3 * (each.believed_m or 0.0):.3g} mm" for joint, each in known)
+    return Picture(image=svg(figure), alt=f"Clearances against their limits: {told}")
 
 
 @_shown.register
@@ -250,7 +295,7 @@ def _material(pair: Material) -> _Shown:
 
 @_shown.register
 def _replay_result_html(result: ReplayResult) -> _Shown:
-    return _replay_html(result.summary())
+    return _state_html(result.summary())
 
 
 def _number(value: float | None) -> str:

@@ -6,6 +6,7 @@ from made_up_summary import made_up_summary
 from matplotlib import pyplot
 
 import leg_wear_monitor as lw
+import leg_wear_monitor.state
 from leg_wear_monitor.mechanism.loader import parse_mechanism
 from leg_wear_monitor.report.plot import notebook_html
 from leg_wear_monitor.state import Figure
@@ -64,6 +65,18 @@ def test_a_replay_is_its_verdict_and_clearances_only_where_valid():
     assert html.count("<td>not valid</td>") == len(unknown)
     for each in summary.clearances.values():
         assert f"<td>{1e3 * each.counted_m:.4g}</td>" not in html
+
+
+def test_a_leg_is_a_picture_of_its_clearances_and_a_decision():
+    state = made_up_summary()
+    leg = lw.state.LegState(**{
+        field.name: getattr(state, field.name) for field in attrs.fields(lw.state.LegState)
+    })  # fmt: skip
+    for shown in (state, leg):
+        html = shown._repr_html_()
+        assert 'src="data:image/svg+xml;base64,' in html and "Clearances against their limits: A" in html
+        assert "how soon: " in html and "how sure: " in html and "<script" not in html
+        assert len(html) < 100_000
 
 
 def test_a_verdict_says_what_is_not_valid_and_a_material_has_its_sources():

@@ -157,8 +157,8 @@ SOON = 100  # gait cycles: until then, a joint twice as wide has to be named
 _USUAL, _AT_LEAST = 0.85, 0.6
 
 _FIRST = 2  # gait cycles that an explanation needs at least
-# log-odds x scatter by sqrt(2 x): with so much on average, nine of ten are SURE_LOG_ODDS and more
-_SURELY = 11.0
+# log-odds x scatter by sqrt(2 x): with so much on average: nine of ten are sure of a change, and of its name
+_SURELY, _SURELY_OF_NAME = 11.0, 18.0
 _QUIETER = 0.25
 
 
@@ -251,7 +251,7 @@ def _named(
         change = change_of(explanations, 1)
         if change is None or not change.is_sure or change.subject != joint:
             continue
-        if min(change.log_odds, change.runner_up_log_odds) >= _SURELY:
+        if change.log_odds >= _SURELY and change.runner_up_log_odds >= _SURELY_OF_NAME:
             return float(cycles), runner_up
     return math.nan, runner_up
 

@@ -6,6 +6,10 @@ from enum import Enum
 import attrs
 
 SURE_LOG_ODDS = 5.0  # 150 to 1
+# against the runner-up: what the model has wrong is common to all phases, and speaks for one joint against
+# another. Under 300 N of load and twice the friction, B had 7 where G was open; right names had 15 and more
+# there, 85 and more in the air (2026-11-25)
+SURE_OF_NAME = 10.0
 
 
 class Cause(Enum):
@@ -97,8 +101,8 @@ class Change(NamedCause):
     @property
     def is_sure(self) -> bool:
         """Whether a clearance has changed, much more probably than anything else."""
-        odds = min(self.log_odds, self.runner_up_log_odds)
-        return self.cause is Cause.CLEARANCE and odds >= SURE_LOG_ODDS
+        is_alone = self.runner_up_log_odds >= SURE_OF_NAME
+        return self.cause is Cause.CLEARANCE and self.log_odds >= SURE_LOG_ODDS and is_alone
 
 
 @attrs.frozen(kw_only=True)

@@ -4,7 +4,7 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.estimate.cause import Cause
+from leg_wear_monitor.estimate.cause import Cause, Change
 from leg_wear_monitor.estimate.explanations import Baseline, Explainer, Misfits, Nuisance, OtherChannel
 from leg_wear_monitor.estimate.ground_load import with_scatter_of
 from leg_wear_monitor.estimate.leg_model import change_of, fit_clearances
@@ -93,6 +93,16 @@ def test_a_heavier_foot_is_a_mass_and_no_clearance(explainer: Explainer) -> None
     change = change_of(found, 5)
     assert change is not None
     assert not change.is_sure  # counted clearances are corrected by clearances alone
+
+
+def test_a_name_is_sure_only_where_no_other_joint_explains_nearly_as_much() -> None:
+    one = Change(
+        cause=Cause.CLEARANCE, subject="B", value=5.3e-4, sigma=5e-5, since_ns=1, counted=3e-4, log_odds=287.0
+    )
+    assert one.is_sure
+    for odds, is_sure in ((7.0, False), (14.8, True)):  # G open behind twice the friction; B open there
+        other = attrs.evolve(one, runner_up="clearance G", runner_up_log_odds=odds)
+        assert other.is_sure is is_sure
 
 
 def test_a_leg_as_counted_has_no_change(explainer: Explainer) -> None:

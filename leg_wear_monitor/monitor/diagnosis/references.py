@@ -46,8 +46,8 @@ NAMED_TO = 5.0
 _CHANNEL_MISFIT_FACTOR = 2.5
 
 
-# misfit up to which a leg on the ground counts as that of its reference: other shapes of the force leave 1.2
-# to 1.5
+# misfit up to which a leg on the ground counts as that of its reference once it was identified: other shapes
+# of the force leave 1.2 to 1.5. Before, twice the friction in the joints left 1.1, and G was taken for B
 _UNLIKE_ON_GROUND = 2.0
 
 _MOST_KEPT = 6  # latest sets of models: of the last cadences, sensors and baselines
@@ -148,7 +148,8 @@ class LegModels:
     def is_of_file(self, state: TorqueState) -> bool:
         """Whether the commissioned leg is that of the mechanism file, or of the identified parameters."""
         is_loaded = state.reference is not None and state.reference.parameters.load.size > 0
-        return self.misfit(state) < (_UNLIKE_ON_GROUND if is_loaded else leg_model.UNLIKE_FILE)
+        is_shape = is_loaded and state.rounds >= ROUNDS
+        return self.misfit(state) < (_UNLIKE_ON_GROUND if is_shape else leg_model.UNLIKE_FILE)
 
     def _of(self, state: TorqueState) -> _ModelsOfState:
         """Models of a state: kept ones if its reference, sensor and baseline are the same, or new ones."""

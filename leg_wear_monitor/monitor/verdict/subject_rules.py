@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 
 import attrs
 
-from leg_wear_monitor.estimate.cause import Cause, Change, NamedCause
+from leg_wear_monitor.estimate.cause import SURE_OF_NAME, Cause, Change, NamedCause
 from leg_wear_monitor.monitor.alarms import CAUSES_OF_ALARMS, Alarm, time_words
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.verdict.situation import (
@@ -26,9 +26,6 @@ from leg_wear_monitor.state import Evidence, Figure, Level, State
 #
 # A torque mismatch is explained while its alarm is raised, further alarms of the torque are limits of single
 # causes, and the diagnosis shows what has changed since the leg was commissioned.
-
-
-CLOSE_ODDS = 3.0  # log odds below which the runner-up is named as well: 20 to 1
 
 
 def found(code: str) -> Callable[[Situation], Sequence[Hit]]:
@@ -118,7 +115,7 @@ def words_of(change: Change, situation: Situation) -> str:
             words += ", less than before: if its part was replaced, reset the joint"
     else:
         words = words_for(situation).cause(_as_told(change, situation))
-    if change.runner_up and change.runner_up_log_odds < CLOSE_ODDS:
+    if change.runner_up and change.runner_up_log_odds < SURE_OF_NAME:
         words += f" (or {change.runner_up})"
     return words
 

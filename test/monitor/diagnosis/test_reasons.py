@@ -2,17 +2,20 @@
 
 import math
 from types import SimpleNamespace
+from unittest import mock
 
 import attrs
 import numpy as np
 import pytest
 
+from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.estimate.ground_load import GroundLoad
 from leg_wear_monitor.estimate.signature import CommissionedTorque, TorqueSensor
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.inputs import Cadence
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.evidence import doubt, missing, next_step
+from leg_wear_monitor.monitor.diagnosis.references import ROUNDS, LegModels
 from leg_wear_monitor.monitor.diagnosis.state import (
     AtCadence,
     Diagnosis,
@@ -29,7 +32,9 @@ NEW = np.full(5, 3.0e-4)
 SENSOR = TorqueSensor(0.005, 1.0, 9.2)
 CONFIG = MonitorConfig(cadence=Cadence(tolerance_rpm=20.0))
 IDLE, BUSY = (
-    SimpleNamespace(is_busy=busy, percent=40, cycles_left=20.0, is_for=lambda _, busy=busy: busy)
+    SimpleNamespace(
+        is_busy=busy, is_late=False, percent=40, cycles_left=20.0, is_for=lambda _, busy=busy: busy
+    )
     for busy in (False, True)
 )
 
@@ -149,3 +154,17 @@ def test_a_force_on_the_foot_that_has_two_sizes_is_not_observable() -> None:
     assert told.endswith("not observable: 40 N and 95 N explain its drive torque as well")
     now.load = attrs.evolve(load, other_n=math.nan)
     assert "not observable" not in doubt(now, on_ground, models)
+
+
+def test_a_leg_on_the_ground_is_identified_before_what_is_left_counts_as_the_shape_of_the_force() -> None:
+    models = LegModels(load_mechanism("bionic_leg"))
+
+    def is_of_file(misfit: float, loaded: bool, rounds: int) -> bool:
+        carried = SimpleNamespace(load=np.zeros((128 if loaded else 0, 2)))
+        now = state(reference=SimpleNamespace(parameters=carried), rounds=rounds)
+        with mock.patch.object(models, "misfit", lambda _: misfit):
+            return models.is_of_file(now)
+
+    assert not is_of_file(1.2, loaded=True, rounds=0) and not is_of_file(1.2, loaded=True, rounds=ROUNDS - 1)
+    assert is_of_file(1.2, loaded=True, rounds=ROUNDS) and not is_of_file(1.2, loaded=False, rounds=ROUNDS)
+    assert is_of_file(0.5, loaded=True, rounds=0) and not is_of_file(3.0, loaded=True, rounds=ROUNDS)

@@ -120,7 +120,7 @@ def test_a_change_is_as_sure_as_on_the_ground_where_the_leg_carries_a_load() -> 
     changed = "CLEARANCE_CHANGED", State.INSPECT, ("G",), tuple(Figure)
     assert "99 of 100 such findings are right on simulated legs" in decided(*changed).certainty
     loaded = decided(*changed, load=FootLoad(source="estimated", peak_n=300.0))
-    assert "38 of 45 such findings" in loaded.certainty and "on the ground" in loaded.certainty
+    assert "56 of 57 such findings" in loaded.certainty and "on the ground" in loaded.certainty
 
 
 def test_what_a_person_measured_is_as_sure_as_the_measurement() -> None:

@@ -24,10 +24,10 @@ from diagnosis import NEW, RATE, kept
 from disturbed import COMMISSIONED, HEALTHY, MASSES, WORN, drawn, signed, walked, watched
 
 from leg_wear_monitor import load_mechanism
+from leg_wear_monitor.estimate import leg_model
 from leg_wear_monitor.estimate.signature import TorqueSensor
 from leg_wear_monitor.mechanism.position import TURN, build_linkage
 from leg_wear_monitor.monitor.diagnosis import references
-from leg_wear_monitor.monitor.diagnosis import references as leg_models
 from leg_wear_monitor.twin.load import torque_size
 from leg_wear_monitor.twin.reference import LegParameters
 
@@ -36,7 +36,7 @@ OPENINGS = (  # and the walk, whose start is another one
     ("G", 0.6, 0), *(("J", 1.0, walk) for walk in range(3)),
 )  # fmt: skip
 WARM = 1200  # gait cycles until a drive is warm
-ROUNDS, UNLIKE_FILE = references.ROUNDS, leg_models.UNLIKE_FILE  # of the monitor
+ROUNDS, UNLIKE_FILE = references.ROUNDS, leg_model.UNLIKE_FILE  # of the monitor
 LEVELS = 11  # of what drifts, between cold and warm
 
 
@@ -136,7 +136,7 @@ def warming(cycles: np.ndarray, order: list[int], begin: int = 0) -> list[np.nda
 def identify(is_wanted: bool) -> None:
     """Whether legs are identified; where they are not, names count as if they were those of the leg."""
     references.ROUNDS = ROUNDS if is_wanted else 0
-    leg_models.UNLIKE_FILE = UNLIKE_FILE if is_wanted else leg_models.NAMED_TO
+    leg_model.UNLIKE_FILE = UNLIKE_FILE if is_wanted else references.NAMED_TO
 
 
 def main() -> None:

@@ -1,6 +1,7 @@
 """The monitor reads a robot on ros2_control, as examples/ros2_control has it; types that no package has."""
 
 import hashlib
+import itertools
 import json
 import math
 import subprocess
@@ -63,14 +64,24 @@ def test_the_leg_on_ros2_control_is_healthy(stage: Any, stand_ins: Any, monkeypa
     for topic in ("joint_states", "dynamic_joint_states", "foot_load"):
         stage.wait_for(lambda topic=topic: stage.node.count_subscribers(topic) > 0, topic)
         stage.wait_for(lambda topic=topic: monitor.node.count_publishers(topic) > 0, topic)
-    sent = 0
-    for number in range(1, 1 + round(SECONDS * stand_ins.UPDATE_HZ)):
-        sent += robot.update(number, START_NS)
-        stage.wait_for(lambda sent=sent: monitor.received >= sent, "a message on its way")
-    stage.wait_for(lambda: monitor.waiting == 0, "the monitor to take what it got")
+    numbers, sent = itertools.count(1), 0
+
+    def status_after(seconds: float) -> dict[str, Any]:
+        nonlocal sent
+        for number in itertools.islice(numbers, round(seconds * stand_ins.UPDATE_HZ)):
+            sent += robot.update(number, START_NS)
+            stage.wait_for(lambda sent=sent: monitor.received >= sent, "a message on its way")
+        stage.wait_for(lambda: monitor.waiting == 0, "the monitor to take what it got")
+        return {one.name: one for one in monitor.node.monitor.status()}
+
+    status = status_after(SECONDS)
+    # a node that was late with a turn, as on a busy machine, does not know rates until it has caught up
+    stage.wait_for(
+        lambda: not math.isnan(status["input"].values["torque_rate_hz"]) or status.update(status_after(1.0)),
+        "the rate of the torque",
+    )
     stage.wait_for(lambda: bool(alarms), "the alarms")
     assert [line.name for message in alarms for line in message.status if line.level[0]] == []
-    status = {one.name: one for one in monitor.node.monitor.status()}
     assert status["input"].values["torque_rate_hz"] == pytest.approx(200.0, rel=0.05)
     assert status["input"].values["foot_load_rate_hz"] == pytest.approx(200.0, rel=0.05)
     assert status["torque"].message == "measured as predicted"

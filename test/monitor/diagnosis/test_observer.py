@@ -6,6 +6,7 @@ import attrs
 import numpy as np
 import pytest
 
+from leg_wear_monitor.estimate import leg_model
 from leg_wear_monitor.estimate.cause import Cause
 from leg_wear_monitor.estimate.explanations import body_torques
 from leg_wear_monitor.estimate.signature import CommissionedTorque, TorqueSensor
@@ -14,7 +15,6 @@ from leg_wear_monitor.monitor.config.inputs import Load
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis import observer as observer_module
 from leg_wear_monitor.monitor.diagnosis import references
-from leg_wear_monitor.monitor.diagnosis import references as leg_models
 from leg_wear_monitor.monitor.diagnosis.evidence import LOCKED_SAMPLES
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
@@ -595,7 +595,7 @@ def test_a_baseline_of_a_sensor_with_another_rate_is_not_used(leg, reference) ->
 
 
 def test_a_commissioned_leg_that_is_not_of_its_file_is_identified(leg, reference, monkeypatch) -> None:
-    monkeypatch.setattr(leg_models, "UNLIKE_FILE", 0.0)  # any leg
+    monkeypatch.setattr(leg_model, "UNLIKE_FILE", 0.0)  # any leg
     observer = observer_of(leg)
     walk(observer, samples(reference, [0] * (COMMISSIONING_CYCLES + 4)))
     assert "its masses, lengths and friction are being simulated" in observer.diagnosis.reason
@@ -609,7 +609,7 @@ def test_a_commissioned_leg_that_is_not_of_its_file_is_identified(leg, reference
 def test_the_reference_of_an_identified_leg_is_used_if_it_explains_the_leg_better(
     leg, reference, monkeypatch
 ) -> None:
-    monkeypatch.setattr(leg_models, "UNLIKE_FILE", 0.0)
+    monkeypatch.setattr(leg_model, "UNLIKE_FILE", 0.0)
     monkeypatch.setattr(references, "ROUNDS", 1)
     monkeypatch.setattr(torque_reference, "CYCLES", 8)
     observer = observer_of(leg)
@@ -622,7 +622,7 @@ def test_the_reference_of_an_identified_leg_is_used_if_it_explains_the_leg_bette
 
 
 def test_nothing_is_corrected_by_a_reference_of_another_leg(leg, reference, monkeypatch) -> None:
-    monkeypatch.setattr(leg_models, "UNLIKE_FILE", 0.0)
+    monkeypatch.setattr(leg_model, "UNLIKE_FILE", 0.0)
     observer = observer_of(leg)
     block = samples(reference, [0] * COMMISSIONING_CYCLES + [leg_number(0, 1.5)] * 25)
     assert walk(observer, block) == []

@@ -18,6 +18,7 @@ from leg_wear_monitor.fleet.chain import Outcome
 from leg_wear_monitor.fleet.description import FleetDescription, FleetLeg
 from leg_wear_monitor.fleet.directory import LegDirectory, Line, used_fraction
 from leg_wear_monitor.monitor.alarms import ADVICE
+from leg_wear_monitor.shown import Shown
 from leg_wear_monitor.state import JointClearance, LifeHours, State, Verdict
 
 # The fleet at a glance, as classes; SI units, None for what is not known.
@@ -167,7 +168,7 @@ UNKNOWN = "unknown"
 
 
 @attrs.frozen(kw_only=True)
-class FleetOverview:
+class FleetOverview(Shown):
     """The fleet; its page contains nothing else.
 
     Attributes

@@ -133,6 +133,10 @@ class AlarmBoard:
             found.append(evaluated(self.alarms[name], value, limit, stamp_ns, cycles, *sources.get(name, ())))
         return self._set(found, stamp_ns)
 
+    def reaches(self, name: str, value: float) -> bool:
+        """Whether a value reaches the limit of WARN of an alarm."""
+        return self._limits[name].reaches(value, Level.WARN)
+
     def _limit(self, name: str, impact_factor: float) -> Limit:
         """Limit of an alarm, with a factor on those of impact forces."""
         is_impact = impact_factor != 1.0 and self.alarms[name].kind == alarm_specs.IMPACT.kind
@@ -475,13 +479,25 @@ class AlarmEvaluation:
             intake, self.state.skipped, self.state.skipped_before, cadence_rpm=self.state.cadence_rpm
         )
 
-    def _evaluate_input(self, skipped: int) -> tuple[AlarmList, ...]:
-        state, intake, config = self.state, self._twin.intake, self.config
-        is_whole = skipped == state.skipped == state.skipped_before and not self.is_late
-        health = input_health(state.before, intake, state.torque, is_whole)
+    def _of_input(self, health: InputHealth) -> dict[str, float]:
+        """Values of the input's alarms, by their names."""
         rate = alarm_specs.FOOT_LOAD_RATE
         read = (*alarm_specs.INPUT, rate) if rate.name() in self.board.alarms else alarm_specs.INPUT
-        values = {spec.name(): spec.value(health) for spec in read}
+        return {spec.name(): spec.value(health) for spec in read}
+
+    def _evaluate_input(self, skipped: int) -> tuple[AlarmList, ...]:
+        state, intake, config = self.state, self._twin.intake, self.config
+        is_whole = skipped == state.skipped == state.skipped_before
+        health = input_health(state.before, intake, state.torque, is_whole)
+        values = self._of_input(health)
+        if self.is_late:
+            # what is missing may be lost by this program; where nothing is, it says what a replay says.
+            # A rate of 0 is of a kind that is not sent
+            unknown = input_health(state.before, intake, state.torque, is_whole=False)
+            without = self._of_input(unknown)
+            over_time = {name: value for name, value in values.items() if math.isnan(without[name])}
+            if any(value and self.board.reaches(name, value) for name, value in over_time.items()):
+                health, values = unknown, without
         if state.cycles == 0 and self._twin.tracking is Tracking.OUT_OF_STEP:
             speed_rpm = self._twin.speed_radps * 30.0 / math.pi
             values[alarm_specs.CADENCE.name()] = abs(speed_rpm - config.cadence.commanded_rpm)

@@ -305,3 +305,22 @@ def test_lag_and_node_interval_are_those_of_the_parameters():
 def test_a_reorder_window_longer_than_a_bridged_gap_is_refused():
     with pytest.raises(ConfigError, match=r"reorder_window_s: 0.2 s is not below tracker.gap_limit_s, 0.1 s"):
         twin_settings(config_from({"tracker.reorder_window_s": 0.2, "tracker.gap_limit_s": 0.1}))
+
+
+def test_a_program_that_is_late_and_lost_nothing_reports_as_one_that_keeps_up(new_monitor, gait):
+    walk, told, rates = gait(8.0), [], []
+    for is_late in (False, True):
+        one = new_monitor()
+        one.note_late(is_late)
+        told.append(said([one.update(walk[:600])]))
+        rates.append(rate_of(one))
+        one.update(walk[600::20])  # most is missing
+        rates.append(rate_of(one))
+        one.note_late(False)
+    assert told[0] == told[1]
+    assert rates[0] == rates[2] > 100.0
+    assert rates[1] < 20.0 and math.isnan(rates[3])
+
+
+def rate_of(monitor):
+    return {one.name: one for one in monitor.status()}["input"].values["crank_rate_hz"]

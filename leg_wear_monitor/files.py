@@ -202,3 +202,27 @@ def data_frame(columns: Mapping[str, Any], index: str | list[str] | None = None)
         raise LegWearError("tables need pandas, which is not installed; pip install pandas") from error
     frame = pd.DataFrame(dict(columns))
     return frame if index is None else frame.set_index(index)
+
+
+def received_json(text: str, source: str, most: int) -> Any:
+    """What a JSON text of a message contains, which anybody may have sent; NaN and infinities are None.
+
+    Parameters
+    ----------
+    text : str
+    source : str
+        Name of the topic, for messages.
+    most : int
+        Characters that it may have.
+
+    Raises
+    ------
+    ConfigError
+        If it is longer, or no JSON.
+    """
+    if len(text) > most:
+        raise ConfigError(source, "", f"has {len(text)} characters, expected {most} at most")
+    try:
+        return json.loads(text, parse_constant=lambda _: None)
+    except (ValueError, RecursionError) as error:
+        raise ConfigError(source, "", "is not JSON") from error

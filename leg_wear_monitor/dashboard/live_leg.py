@@ -1,6 +1,5 @@
 """A leg as a running monitor reports it: takes in its messages, in any order, and gives the page."""
 
-import json
 import math
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -25,7 +24,7 @@ from leg_wear_monitor.dashboard.source import (
     words_of,
 )
 from leg_wear_monitor.errors import ConfigError, printable
-from leg_wear_monitor.files import finite_or_none, or_nan
+from leg_wear_monitor.files import finite_or_none, or_nan, received_json
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, SEEN_COLUMNS, SUMMARY_COLUMNS
 from leg_wear_monitor.playback.result import ReplayHistory, ReplayStatus, ReplaySummary
@@ -84,12 +83,7 @@ def received_state(text: str, source: str) -> LegState:
     ConfigError
         If it is no state, or one of another version.
     """
-    if len(text) > _MOST_CHARACTERS:
-        raise ConfigError(source, "", f"has {len(text)} characters, expected {_MOST_CHARACTERS} at most")
-    try:
-        record = json.loads(text, parse_constant=lambda _: None)
-    except (ValueError, RecursionError) as error:
-        raise ConfigError(source, "", "is not JSON") from error
+    record = received_json(text, source, _MOST_CHARACTERS)
     record = structure(_clean(record), dict[str, Any], source, "")
     version = record.pop("schema_version", None)
     if version != SCHEMA_VERSION:

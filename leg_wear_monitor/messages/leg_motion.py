@@ -13,7 +13,7 @@ import numpy as np
 
 from leg_wear_monitor.configuration.strict import structure
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.files import finite_or_none
+from leg_wear_monitor.files import finite_or_none, received_json
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.messages import encode
 from leg_wear_monitor.messages.streams import SENSOR_DATA, Output
@@ -87,12 +87,7 @@ def received_frame(text: str, source: str) -> MotionFrame:
     ConfigError
         If it is none.
     """
-    if len(text) > _MOST_CHARACTERS:
-        raise ConfigError(source, "", f"has {len(text)} characters, expected {_MOST_CHARACTERS} at most")
-    try:
-        record = json.loads(text, parse_constant=lambda _: None)
-    except (ValueError, RecursionError) as error:
-        raise ConfigError(source, "", "is not JSON") from error
+    record = received_json(text, source, _MOST_CHARACTERS)
     frame: MotionFrame = structure(record, MotionFrame, source, "")
     pairs = all(len(joint.eccentricity_m) == 2 for joint in frame.joints.values())
     phases = frame.torque is None or {len(each) for each in attrs.astuple(frame.torque)} == {PHASES}

@@ -214,6 +214,8 @@ class Drive:
         Friction over the size of the torque that the drive transmits.
     bandwidth_hz : Estimate or None
         Of the first-order low-pass between the leg and the torque; None if none is seen.
+    temperature_c : Estimate or None
+        Temperature of the drive [°C]; None where it is not measured.
     """
 
     scale: Estimate | None = None
@@ -222,6 +224,7 @@ class Drive:
     viscous_nms: Estimate | None = None
     load_friction: Estimate | None = None
     bandwidth_hz: Estimate | None = None
+    temperature_c: Estimate | None = None
 
 
 @attrs.frozen(kw_only=True)

@@ -2,7 +2,7 @@
 
 import heapq
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from itertools import repeat
 from pathlib import Path
@@ -28,8 +28,8 @@ from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.messages.cdr import Decoder, mark_zero_stamps
-from leg_wear_monitor.messages.names import names_in, without_interface
-from leg_wear_monitor.messages.streams import JOINT_STATE
+from leg_wear_monitor.messages.names import is_without, names_in, wanted_interfaces, without_interface
+from leg_wear_monitor.messages.streams import INTERFACES, JOINT_STATE
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, MISSING_JOINT, NO_FAULT, NOT_FINITE, ZERO_STAMP, Samples
@@ -165,12 +165,13 @@ class JointNames:
 
     Parameters
     ----------
-    crank_joint, interface : str
-        The crank, and its interface that is the torque.
+    crank_joint : str
+    interfaces : mapping of str to str
+        As of `wanted_interfaces`.
     """
 
-    def __init__(self, crank_joint: str, interface: str) -> None:
-        self._crank, self._interface = crank_joint, interface
+    def __init__(self, crank_joint: str, interfaces: Mapping[str, str]) -> None:
+        self._crank, self._interfaces = crank_joint, interfaces
         self._files: dict[Path, _Counts] = {}
 
     def add_samples(
@@ -182,12 +183,13 @@ class JointNames:
         counts.found += int(np.count_nonzero(cranks & np.isin(samples["fault"], _NAMED)))
         missing = np.flatnonzero(cranks & (samples["fault"] == MISSING_JOINT))
         counts.missing += len(missing)
-        without = np.flatnonzero(~cranks & (samples["fault"] == MISSING_JOINT))
+        of_interfaces = messages["type"] == INTERFACES
+        without = np.flatnonzero(of_interfaces & is_without(samples, self._interfaces))
         counts.without_interface += len(without)
         if len(without) and not counts.interfaces:
             message = messages[without[0]]
             raw = data[message["begin"] : message["end"]].tobytes()
-            counts.interfaces = without_interface(raw, self._crank, self._interface)
+            counts.interfaces = without_interface(raw, self._crank, self._interfaces)
         if len(missing) and len(counts.names) < _MOST:
             message = messages[missing[0]]
             counts.names |= set(names_in(data[message["begin"] : message["end"]].tobytes())[:_MOST])
@@ -354,7 +356,7 @@ class Recording:
         self._clocks = Clocks()
         self._decoder = Decoder(config)
         self._budget = Budget(memory_mb)
-        self._joints = JointNames(config.crank_joint, config.drive_torque.interface)
+        self._joints = JointNames(config.crank_joint, wanted_interfaces(config))
         self._one_leg = OneLeg()
         bag_files, self._findings = bag.find_files(paths)
         with ExitStack() as stack:

@@ -426,6 +426,8 @@ class CommissionedTorque:
         Of the drive, by these signatures.
     speed : float
         Mean speed of the crank [rad/s]; 0 where it is not known.
+    temperature_c : float
+        Mean temperature of the drive [°C]; NaN where it was not measured.
     """
 
     stamp_ns: int
@@ -434,6 +436,7 @@ class CommissionedTorque:
     sigma_m: Floats = attrs.field()
     channel: Channel = DIRECT
     speed: float = 0.0
+    temperature_c: float = math.nan
 
     @sigma_m.default
     def _as_counted(self) -> Floats:

@@ -242,36 +242,42 @@ def wrench_force(data, begin, end, big, out_force):
 
 
 @kernel
-def dynamic_joint_state(data, begin, end, big, joint, interface):
-    """Read control_msgs/DynamicJointState: fault, stamp [ns], value of an interface of a joint.
+def dynamic_joint_state(data, begin, end, big, joint, interface, further):
+    """Read control_msgs/DynamicJointState: fault, stamp [ns], values of two interfaces of a joint.
 
-    NaN is what joint_state_broadcaster publishes for an interface that has no value yet.
+    NaN is what joint_state_broadcaster publishes for an interface that has no value yet. The second one may
+    be absent: it is then NaN, and no fault.
     """
     origin = begin + ENCAPSULATION
     stamp, at = header(data, origin, end, big)
     count, index, at = names(data, at, end, origin, big, joint)
     n_interfaces, at = counted(data, at, end, origin, big)
     if at < 0 or n_interfaces > (end - at) // 8:
-        return UNDECODABLE, np.int64(0), math.nan
-    is_there, is_short, number = False, False, math.nan
+        return UNDECODABLE, np.int64(0), math.nan, math.nan
+    is_there, is_short, number, beside = False, False, math.nan, math.nan
     for i in range(n_interfaces):
+        own = at
         n_names, found, at = names(data, at, end, origin, big, interface)
         n_values, first, at = numbers(data, at, end, origin, big)
         if at < 0:
-            return UNDECODABLE, np.int64(0), math.nan
+            return UNDECODABLE, np.int64(0), math.nan, math.nan
         if i == index and found >= 0:
             is_there, is_short = True, n_values != n_names
             if not is_short:
                 number = float64(data, first + 8 * found, big)
+                if further.shape[0]:
+                    _, place, _ = names(data, own, end, origin, big, further)
+                    if place >= 0:
+                        beside = float64(data, first + 8 * place, big)
     if not ends(at, end):
-        return UNDECODABLE, np.int64(0), math.nan
+        return UNDECODABLE, np.int64(0), math.nan, math.nan
     if count == 0 or n_interfaces == 0:
-        return EMPTY, stamp, math.nan
+        return EMPTY, stamp, math.nan, math.nan
     if n_interfaces != count or is_short:
-        return WRONG_LENGTH, stamp, math.nan
+        return WRONG_LENGTH, stamp, math.nan, math.nan
     if not is_there:
-        return MISSING_JOINT, stamp, math.nan
-    return NO_FAULT if math.isfinite(number) else NOT_FINITE, stamp, number
+        return MISSING_JOINT, stamp, math.nan, math.nan
+    return NO_FAULT if math.isfinite(number) else NOT_FINITE, stamp, number, beside
 
 
 @kernel
@@ -284,7 +290,9 @@ def bool_message(data, begin, end):
 
 
 @entry
-def decode(data, messages, crank, interface, encoders, ends_at, axis, use_effort, out, out_angles, out_force):
+def decode(
+    data, messages, crank, interface, warmth, encoders, ends_at, axis, use_effort, out, out_angles, out_force
+):
     """Read messages into samples as they are: no sign, no scale, no offset.
 
     Parameters
@@ -295,6 +303,8 @@ def decode(data, messages, crank, interface, encoders, ends_at, axis, use_effort
         Name of the crank's joint, UTF-8.
     interface : (characters,) array of uint8
         Name of the crank's interface that is its torque, UTF-8.
+    warmth : (characters,) array of uint8
+        Name of the crank's interface that is the temperature of its drive, UTF-8; empty: none.
     encoders : (characters,) array of uint8
         Names of the joints with further encoders, one after the other.
     ends_at : (m,) array of int
@@ -315,7 +325,7 @@ def decode(data, messages, crank, interface, encoders, ends_at, axis, use_effort
         begin, end = messages[i]["begin"], messages[i]["end"]
         kind = messages[i]["type"]
         fault, stamp = UNDECODABLE, np.int64(0)
-        position, velocity, torque = math.nan, math.nan, math.nan
+        position, velocity, torque, temperature = math.nan, math.nan, math.nan, math.nan
         force = out_force[i]
         force[0], force[1] = math.nan, math.nan
         # XCDR1, big or little endian; parameter lists and XCDR2 lay out otherwise
@@ -331,7 +341,9 @@ def decode(data, messages, crank, interface, encoders, ends_at, axis, use_effort
                 fault, torque = float64_message(data, begin, end, big)
                 stamp = messages[i]["log_time_ns"]
             elif kind == INTERFACES:
-                fault, stamp, torque = dynamic_joint_state(data, begin, end, big, crank, interface)
+                fault, stamp, torque, temperature = dynamic_joint_state(
+                    data, begin, end, big, crank, interface, warmth
+                )
             elif kind == LOAD_WRENCH:
                 fault, stamp = wrench_force(data, begin, end, big, force)
             elif kind == LOAD_FLOAT64:
@@ -346,6 +358,7 @@ def decode(data, messages, crank, interface, encoders, ends_at, axis, use_effort
         out[i]["crank_angle_rad"] = position
         out[i]["crank_velocity_radps"] = velocity
         out[i]["torque_nm"] = torque
+        out[i]["temperature_c"] = temperature
         first = 0
         for j in range(ends_at.shape[0]):
             out_angles[i, j] = math.nan
@@ -367,7 +380,7 @@ class Decoder:
     Parameters
     ----------
     config : MonitorConfig
-        The decoder uses `crank_joint`, `crank`, `encoders`, `drive_torque` and `foot_load`.
+        The decoder uses `crank_joint`, `crank`, `encoders`, `drive_torque`, `drive` and `foot_load`.
     """
 
     def __init__(self, config: MonitorConfig) -> None:
@@ -378,7 +391,10 @@ class Decoder:
         self._torque_scale = torque.sign * torque.scale * torque.gear_ratio
         self._axis = _AXES[torque.axis]
         self._effort = torque.source == "effort"
-        self._interface = np.frombuffer(torque.interface.encode(), np.uint8)
+        self._interface, self._warmth = (
+            np.frombuffer(name.encode(), np.uint8)
+            for name in (torque.interface, config.drive.temperature_interface)
+        )
         load = config.foot_load
         self._force_scale = 1.0 if load.source == CONTACT else load.sign * load.scale
         names = [name.encode() for name in config.encoders.names]
@@ -402,7 +418,7 @@ class Decoder:
         angles = np.empty((len(messages), len(self._ends)))
         force = np.empty((len(messages), 2))
         out = samples, angles, force
-        names = self._crank, self._interface, self._encoders
+        names = self._crank, self._interface, self._warmth, self._encoders
         decode(data, messages, *names, self._ends, self._axis, self._effort, *out)
         samples["foot_force_n"] = force * self._force_scale
         samples["encoder_rad"] = np.nan

@@ -1,9 +1,15 @@
 """Names in a message, for reports on what is not in it."""
 
 import struct
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
 
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.messages.cdr import ENCAPSULATION
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, Samples
 
 _MOST_NAMED = 20
 
@@ -27,13 +33,40 @@ def interfaces_in(raw: bytes) -> dict[str, list[str]]:
     return found
 
 
-def without_interface(raw: bytes, joint: str, interface: str) -> str:
-    """Report on a control_msgs/DynamicJointState message, decoded successfully, that lacks an interface."""
+def wanted_interfaces(config: MonitorConfig) -> dict[str, str]:
+    """Interfaces of the crank that are read, by the parameters that name them; empty names are not wanted."""
+    return {
+        "drive_torque.interface": config.drive_torque.interface,
+        "drive.temperature_interface": config.drive.temperature_interface,
+    }
+
+
+def is_without(samples: Samples, interfaces: Mapping[str, str]) -> NDArray[np.bool_]:
+    """Which samples (n,) of control_msgs/DynamicJointState messages lack a wanted interface."""
+    absent = samples["fault"] == MISSING_JOINT
+    if interfaces["drive.temperature_interface"]:
+        absent |= (samples["fault"] == NO_FAULT) & np.isnan(samples["temperature_c"])
+    return np.asarray(absent)
+
+
+def without_interface(raw: bytes, joint: str, interfaces: Mapping[str, str]) -> str:
+    """Report on a control_msgs/DynamicJointState message, decoded successfully, that lacks an interface.
+
+    Parameters
+    ----------
+    raw : bytes
+    joint : str
+    interfaces : mapping of str to str
+        Wanted interfaces by the parameters that name them; an empty one is not wanted.
+    """
     there = interfaces_in(raw)
     if joint not in there:
         return f"no joint is named {joint!r}; there are {_listed(list(there))}"
-    has = _listed(there[joint])
-    return f"{joint} has no interface {interface!r}, it has {has}; set drive_torque.interface"
+    absent = {key: name for key, name in interfaces.items() if name and name not in there[joint]}
+    if not absent:
+        return f"{joint} has no value of {' or '.join(filter(None, interfaces.values()))} yet"
+    names, keys = " and ".join(map(repr, absent.values())), " and ".join(absent)
+    return f"{joint} has no interface {names}, it has {_listed(there[joint])}; set {keys}"
 
 
 def _listed(names: list[str]) -> str:

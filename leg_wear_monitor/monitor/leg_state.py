@@ -148,6 +148,7 @@ def _drive(last: CycleReport | None, diagnosis: Diagnosis, explained: TorqueExpl
         coulomb_nm=_estimate(last.friction_nm, last.friction_sigma_nm) if last else None,
         load_friction=_estimate(last.load_friction, last.load_friction_sigma) if last else None,
         bandwidth_hz=Estimate(value=1.0 / (_TURN * pole_s)) if pole_s > 0.0 else None,
+        temperature_c=_estimate(diagnosis.temperature_c, math.nan),
     )
 
 

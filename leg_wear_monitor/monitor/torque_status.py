@@ -51,7 +51,7 @@ def torque_status(parts: Parts) -> Status:
     raised = {name for name in _TORQUE if evaluation.board.alarms[name].level is not Level.OK}
     messages = []
     speed = explained.speed_radps if explained else last.cadence_rpm * math.pi / 30.0
-    words = CauseWords(parts.config.crank, parts.config.drive_torque, speed)
+    words = CauseWords(parts.config.crank, parts.config.drive_torque, speed, parts.diagnosis)
     if alarm_specs.MISMATCH.name() in raised:
         causes = f": {words.explanation(explained)}" if explained else ""
         messages = [f"the measured torque differs from the predicted one{causes}"]
@@ -90,6 +90,8 @@ def diagnosis_status(joints: Sequence[str], diagnosis: Diagnosis) -> Status:
         values["foot_load_sigma_n"] = diagnosis.load.peak_sigma_n
         values["heel_strike_phase"] = diagnosis.load.heel_strike
         values["toe_off_phase"] = diagnosis.load.toe_off
+    if math.isfinite(diagnosis.temperature_c):
+        values["drive_temperature_c"] = diagnosis.temperature_c
     if diagnosis.compliance:
         values["drive_stiffness_nm_per_rad"] = 1.0 / diagnosis.compliance
     if diagnosis.state is DiagnosisState.CHANGED:

@@ -2,7 +2,7 @@
 
 import itertools
 import struct
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import import_module
 from typing import Any, NamedTuple
 
@@ -16,7 +16,7 @@ from rclpy.subscription import Subscription
 
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.messages.cdr import ENCAPSULATION, MESSAGE, Decoder
-from leg_wear_monitor.messages.names import names_in, without_interface
+from leg_wear_monitor.messages.names import is_without, names_in, without_interface
 from leg_wear_monitor.messages.streams import INTERFACES, JOINT_STATE, WRENCH_STAMPED, Stream, streams_read
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.ros.generated_type import generated_class
@@ -234,31 +234,33 @@ def _named(names: Sequence[str]) -> str:
 
 
 class InterfaceNames:
-    """Searches messages for the interface of the crank that is its torque.
+    """Searches messages for the wanted interfaces of the crank.
 
     Parameters
     ----------
-    crank_joint, interface : str
+    crank_joint : str
+    interfaces : mapping of str to str
+        As of `wanted_interfaces`.
     """
 
-    def __init__(self, crank_joint: str, interface: str) -> None:
-        self._crank, self._interface = crank_joint, interface
+    def __init__(self, crank_joint: str, interfaces: Mapping[str, str]) -> None:
+        self._crank, self._interfaces = crank_joint, interfaces
         self._without = b""
 
     def note(self, arrivals: Sequence[Arrival], samples: Samples) -> None:
         """Record messages and the samples decoded from them."""
         of_interfaces = np.array([one.kind == INTERFACES for one in arrivals], bool)
-        without = np.flatnonzero(of_interfaces & (samples["fault"] == MISSING_JOINT))
+        without = np.flatnonzero(of_interfaces & is_without(samples, self._interfaces))
         if of_interfaces.any():
             self._without = arrivals[without[-1]].raw if len(without) else b""
 
     def report(self) -> str:
-        """Report that the last messages lack the interface, and which there are; empty if they have it."""
+        """Report that the last messages lack an interface, and which there are; empty if they have them."""
         if not self._without:
             return ""
         if len(self._without) > _MOST_BYTES:
             return "too many joints to name"
-        return without_interface(self._without, self._crank, self._interface)
+        return without_interface(self._without, self._crank, self._interfaces)
 
 
 # Message classes by the names of their types.

@@ -9,6 +9,7 @@ import attrs
 from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
 
+from leg_wear_monitor.messages.names import wanted_interfaces
 from leg_wear_monitor.messages.streams import INTERFACES, WRENCH_STAMPED, streams_read
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -148,7 +149,7 @@ class Supervision:
         self._silence = health.Silence(kinds, self._started_ns, time.time_ns())
         self._names = CrankNames(config.crank_joint)
         torque = config.drive_torque
-        self._interfaces = InterfaceNames(config.crank_joint, torque.interface)
+        self._interfaces = InterfaceNames(config.crank_joint, wanted_interfaces(config))
         predicted_nm = monitor.predicted_torque_nm / abs(torque.scale * torque.gear_ratio)
         self._axis = WrenchAxis(torque.axis, predicted_nm)
         self._ahead_s = dict.fromkeys(kinds, 0.0)

@@ -31,6 +31,7 @@ GAIT_SAMPLE = np.dtype(
         ("torque_nm", "f8"),
         ("encoder_rad", "f8", (ENCODERS,)),
         ("foot_force_n", "f8", (2,)),
+        ("temperature_c", "f8"),
     ]
 )
 """One sample: stamp of the header, kind, fault, and values, NaN where absent.
@@ -40,7 +41,7 @@ be continuous. A crank sample may also contain a torque (``effort``), and the an
 the order of ``encoders.names``, after their signs: NaN where absent, infinite where the value is no angle. An
 invalid torque or encoder angle is not a fault of the sample. The force of the ground on the foot is along the
 axes of the ground, the second one up, or with ``foot_load.frame: foot`` of the toe's body; a contact switch
-gives (0, 1) or (0, 0).
+gives (0, 1) or (0, 0). The temperature is the drive's, and comes with its torque.
 """
 
 # Faults of a message, found by the conversion. Such a sample is counted and never used.
@@ -70,6 +71,7 @@ def gait_samples(
     torque_nm: ArrayLike = np.nan,
     encoder_rad: ArrayLike = np.nan,
     foot_force_n: ArrayLike = np.nan,
+    temperature_c: ArrayLike = np.nan,
     fault: ArrayLike = NO_FAULT,
 ) -> Samples:
     """A block of samples for `WearMonitor.update`, from arrays in order of arrival.
@@ -90,6 +92,8 @@ def gait_samples(
         Angles of m further encoders [rad], at most 4, in the order of ``encoders.names``.
     foot_force_n : (n, 2) array or float
         Force of the ground on the foot [N].
+    temperature_c : (n,) array or float
+        Temperature of the drive, with its torque [°C].
     fault : (n,) array or int
         0 for a valid sample; others are counted and not used.
 
@@ -127,6 +131,7 @@ def gait_samples(
     block["encoder_rad"] = np.nan
     block["encoder_rad"][:, : angles.shape[-1] if angles.ndim else None] = angles
     block["foot_force_n"] = foot_force_n
+    block["temperature_c"] = temperature_c
     return block
 
 

@@ -22,6 +22,7 @@ from leg_wear_monitor.messages.streams import (
     types,
 )
 from leg_wear_monitor.monitor.config.inputs import Crank, DriveTorque, Encoders, FootLoad
+from leg_wear_monitor.monitor.config.sections import DriveParameters
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin import CRANK, LOAD, TORQUE
 from leg_wear_monitor.twin.sample import (
@@ -135,34 +136,39 @@ def test_a_wrench_is_read_as_the_libraries_read_it(
         assert math.isnan(ours["crank_angle_rad"])
 
 
-INTERFACE = "motor_current"
+INTERFACE, WARMTH = "motor_current", "temperature"
 BY_INTERFACE = MonitorConfig(
-    crank_joint=CRANK_NAME, drive_torque=DriveTorque(source="interface", interface=INTERFACE)
+    crank_joint=CRANK_NAME,
+    drive_torque=DriveTorque(source="interface", interface=INTERFACE),
+    drive=DriveParameters(temperature_interface=WARMTH),
 )
 interface_values = st.one_of(
-    st.lists(st.tuples(st.sampled_from([INTERFACE, "effort", "", "motor"]), numbers), max_size=4).map(
+    st.lists(st.tuples(st.sampled_from([INTERFACE, WARMTH, "effort", "", "motor"]), numbers), max_size=4).map(
         lambda pairs: ([name for name, _ in pairs], [value for _, value in pairs])
     ),
     st.tuples(st.lists(st.just(INTERFACE), max_size=2), st.lists(numbers, max_size=2)),
 )
 
 
-def expected_interface(message: Any) -> tuple[int, float]:
-    """What a DynamicJointState means, told once more in plain words: fault, value of the interface."""
+def expected_interface(message: Any) -> tuple[int, float, float]:
+    """What a DynamicJointState means, told once more in plain words: fault, torque, temperature."""
     names, values = list(message.joint_names), list(message.interface_values)
     if not names or not values:
-        return EMPTY, math.nan
+        return EMPTY, math.nan, math.nan
     if len(names) != len(values):
-        return WRONG_LENGTH, math.nan
+        return WRONG_LENGTH, math.nan, math.nan
     if CRANK_NAME not in names:
-        return MISSING_JOINT, math.nan
+        return MISSING_JOINT, math.nan, math.nan
     there = values[names.index(CRANK_NAME)]
     if INTERFACE not in there.interface_names:
-        return MISSING_JOINT, math.nan
+        return MISSING_JOINT, math.nan, math.nan
     if len(there.interface_names) != len(there.values):
-        return WRONG_LENGTH, math.nan
-    value = float(there.values[list(there.interface_names).index(INTERFACE)])
-    return (NO_FAULT if math.isfinite(value) else NOT_FINITE), value
+        return WRONG_LENGTH, math.nan, math.nan
+    of = dict(
+        zip(reversed(there.interface_names), reversed(there.values), strict=True)
+    )  # the first one counts
+    value = float(of[INTERFACE])
+    return (NO_FAULT if math.isfinite(value) else NOT_FINITE), value, float(of.get(WARMTH, math.nan))
 
 
 @given(
@@ -175,6 +181,7 @@ def expected_interface(message: Any) -> tuple[int, float]:
     cut=st.integers(1, 400),
 )
 @example([CRANK_NAME], [([INTERFACE], [2.5])], True, 9, "", True, 1)
+@example([CRANK_NAME], [([WARMTH, INTERFACE], [41.0, 2.5])], True, 9, "", True, 1)
 @example(["hip", CRANK_NAME], [([], []), ([INTERFACE], [math.nan])], True, 9, "base_link", False, 30)
 def test_an_interface_is_read_as_the_libraries_read_it(
     foreign: Callable[[str, bytes], Any],
@@ -195,11 +202,12 @@ def test_an_interface_is_read_as_the_libraries_read_it(
     raw = bytes(store.serialize_cdr(message, kind, little_endian=little))
     ours = Decoder(BY_INTERFACE).one(raw, INTERFACES)[0]
     for read in (store.deserialize_cdr(raw, kind), foreign(kind, raw)):
-        fault, value = expected_interface(read)
+        fault, value, temperature = expected_interface(read)
         assert FAULTS[ours["fault"]] == FAULTS[fault]
         assert ours["stamp_ns"] == read.header.stamp.sec * 10**9 + read.header.stamp.nanosec == stamp_ns
         assert ours["kind"] == TORQUE
         assert same(ours["torque_nm"], value)
+        assert same(ours["temperature_c"], temperature)
     short = Decoder(BY_INTERFACE).one(raw[: max(0, len(raw) - cut)], INTERFACES)[0]
     assert short["fault"] == UNDECODABLE
     assert math.isnan(short["torque_nm"])

@@ -20,10 +20,13 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
 from leg_wear_monitor.messages import encode
+from leg_wear_monitor.messages.cdr import Decoder
+from leg_wear_monitor.messages.names import wanted_interfaces
 from leg_wear_monitor.messages.streams import definition, types
 from leg_wear_monitor.monitor.config.parameters import load_config
 from leg_wear_monitor.ros import inputs
 from leg_wear_monitor.ros.generated_type import generated_class, type_description
+from leg_wear_monitor.twin.sample import NO_FAULT
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "ros2_control"
 ME = "/leg_wear_monitor"
@@ -52,6 +55,7 @@ def test_the_leg_on_ros2_control_is_healthy(stage: Any, stand_ins: Any, monkeypa
         drive_torque__interface=torque.interface,
         drive_torque__scale=torque.scale,
         drive_torque__gear_ratio=torque.gear_ratio,
+        drive__temperature_interface=given.drive.temperature_interface,
         foot_load__source=load.source,
         foot_load__frame=load.frame,
         load__model=given.load.model,
@@ -85,6 +89,9 @@ def test_the_leg_on_ros2_control_is_healthy(stage: Any, stand_ins: Any, monkeypa
     assert status["input"].values["torque_rate_hz"] == pytest.approx(200.0, rel=0.05)
     assert status["input"].values["foot_load_rate_hz"] == pytest.approx(200.0, rel=0.05)
     assert status["torque"].message == "measured as predicted"
+    # 25 °C at the start, and 60 °C after half an hour
+    assert 25.0 < monitor.node.monitor.state.drive.temperature_c.value < 26.0
+    assert status["diagnosis"].values["drive_temperature_c"] == pytest.approx(25.5, abs=0.5)
     topics = {one.name: one for one in monitor.node._supervision.statuses(())}["topics"]
     assert "expected one" not in topics.message
     for node in robot.nodes:
@@ -107,7 +114,8 @@ def test_joint_states_are_those_of_joint_state_broadcaster(stage: Any, stand_ins
 
 
 def test_an_interface_that_is_not_there_is_reported_with_those_that_are() -> None:
-    names = inputs.InterfaceNames("crank", "motor_current")
+    wanted = {"drive_torque.interface": "motor_current", "drive.temperature_interface": ""}
+    names = inputs.InterfaceNames("crank", wanted)
     box = inputs.Inbox(inputs.Decoder(load_config(EXAMPLE / "monitor.yaml")), 10)
     for joint in ("crank", "hip"):
         raw = encode.dynamic_joint_states([1], {joint: {"effort": 1.0, "position": 2.0}})[0].tobytes()
@@ -120,6 +128,32 @@ def test_an_interface_that_is_not_there_is_reported_with_those_that_are() -> Non
             else "no joint is named 'crank'; there are hip"
         )
         assert names.report() == there
+
+
+def test_a_temperature_that_is_not_there_is_reported() -> None:
+    config = load_config(EXAMPLE / "monitor.yaml")
+    names, box = (
+        inputs.InterfaceNames("leg_crank", wanted_interfaces(config)),
+        inputs.Inbox(Decoder(config), 10),
+    )
+    for there, report in (
+        (
+            {"motor_current": 1.0},
+            "leg_crank has no interface 'motor_temperature', it has motor_current; "
+            "set drive.temperature_interface",
+        ),
+        (
+            {"motor_current": 1.0, "motor_temperature": math.nan},
+            "leg_crank has no value of motor_current or motor_temperature yet",
+        ),
+        ({"motor_current": 1.0, "motor_temperature": 41.0}, ""),
+    ):
+        box.add(inputs.INTERFACES, encode.dynamic_joint_states([1], {"leg_crank": there})[0].tobytes(), 1)
+        arrivals = box.take(1)
+        samples = box.decoded(arrivals)
+        assert samples["fault"][0] == NO_FAULT
+        names.note(arrivals, samples)
+        assert names.report() == report
 
 
 @pytest.mark.parametrize("name", ["control_msgs/msg/DynamicJointState", "sensor_msgs/msg/JointState"])

@@ -11,6 +11,7 @@ from leg_wear_monitor.mechanism.person import with_person
 from leg_wear_monitor.mechanism.plausible import limit_fault
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Clearance, Mechanism, SpeedDrive
+from leg_wear_monitor.monitor.config.inputs import INTERFACE
 from leg_wear_monitor.monitor.config.sections import drive_figures
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin import sample
@@ -36,6 +37,10 @@ def fitted(mechanism: Mechanism, config: MonitorConfig, source: str = "parameter
         there, or a load on a mechanism without a toe.
     """
     drive_figures(config.drive, source)  # a fault of it ends the start, whoever uses the figures
+    warmth, torque = config.drive.temperature_interface, config.drive_torque.source
+    if warmth and torque != INTERFACE:
+        fault = f"{warmth!r} needs drive_torque.source {INTERFACE!r}, which is {torque!r}"
+        raise ConfigError(source, "drive.temperature_interface", fault)
     if not isinstance(mechanism.drive, SpeedDrive):
         raise ConfigError(
             source, "mechanism", f"{config.mechanism!r} is driven by a torque, expected one with drive.speed"

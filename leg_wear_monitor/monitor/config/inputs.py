@@ -10,7 +10,7 @@ from leg_wear_monitor.twin import sample
 
 LIVE = {"live": True}  # may change while the monitor runs
 
-TORQUE_SOURCES = ("wrench", "float64", "effort", "interface")
+TORQUE_SOURCES = WRENCH, FLOAT64, EFFORT, INTERFACE = ("wrench", "float64", "effort", "interface")
 KNOWN, AT_START = ZEROS = ("known", "at_start")
 
 

@@ -55,6 +55,11 @@ class DriveParameters:
     stiffness_nm_per_rad: float = _figure(
         "N m/rad", "stiffness between the measured angle and the crank, at the crank", 1.0e-3, 1.0e12
     )
+    temperature_interface: str = described(
+        "name of the crank's interface in dynamic_joint_states that is the temperature of the drive [°C], as "
+        "temperature; needs drive_torque.source interface; empty: none",
+        default="",
+    )
 
 
 def drive_figures(parameters: DriveParameters, source: str = "parameters") -> DriveFigures:

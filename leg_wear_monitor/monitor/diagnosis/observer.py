@@ -38,6 +38,7 @@ from leg_wear_monitor.monitor.diagnosis.state import (
     TorqueSamples,
     TorqueState,
     cycle_torque,
+    mean_of,
     sensor_period_s,
 )
 from leg_wear_monitor.twin.reference import LegParameters
@@ -91,6 +92,7 @@ def settle(state: TorqueState, correction: Correction, counted_m: Floats) -> Non
         sigma_m,
         before.channel if before else DIRECT,
         state.profile.speed,
+        mean_of(np.array([cycle.temperature_c for cycle in state.cycles])),
     )
     state.settled = (*state.settled, attrs.evolve(change, is_corrected=True))
 
@@ -134,7 +136,7 @@ def signed_cycle(state: TorqueState, begin_ns: int, end_ns: int) -> SignedCycle 
     signature = signatures(first, torque.angle, torque.torque, torque.step, sensor)[0]
     if not np.isfinite(signature).all():
         return NotUsed.GAP
-    return SignedCycle(begin_ns, end_ns, signature, torque.profile, torque.late)
+    return SignedCycle(begin_ns, end_ns, signature, torque.profile, torque.late, torque.temperature_c)
 
 
 # by which a load has moved, of its size: the twin's mean over twenty gait cycles is within 1 % of what the
@@ -338,6 +340,8 @@ class TorqueObserver(KeepsSamples):
                 cycles_not_used=state.not_used,
                 channel=state.sensor.channel if state.sensor else DIRECT,
                 load=load,
+                temperature_c=state.temperature_c,
+                commissioned_c=state.commissioned.temperature_c if state.commissioned else math.nan,
             )
         clearance_m, sigma_m = self._observed(state.fit)
         return Diagnosis(
@@ -351,6 +355,8 @@ class TorqueObserver(KeepsSamples):
             cycles_not_used=state.not_used,
             channel=state.sensor.channel if state.sensor else DIRECT,
             load=load,
+            temperature_c=state.temperature_c,
+            commissioned_c=state.commissioned.temperature_c if state.commissioned else math.nan,
         )
 
     def _observed(self, fit: ClearanceFit) -> tuple[Floats, Floats]:
@@ -420,7 +426,11 @@ class TorqueObserver(KeepsSamples):
         if state.commissioned is not None or state.changes or len(state.cycles) < COMMISSIONING_CYCLES:
             return
         state.commissioned = CommissionedTorque(
-            state.cycles[-1].end_ns, state.counted_m, state.signatures, speed=state.profile.speed
+            state.cycles[-1].end_ns,
+            state.counted_m,
+            state.signatures,
+            speed=state.profile.speed,
+            temperature_c=mean_of(np.array([cycle.temperature_c for cycle in state.cycles])),
         )
         self._evidence.review(state, self.config)
 

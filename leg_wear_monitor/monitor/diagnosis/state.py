@@ -51,7 +51,8 @@ class CycleTorque(NamedTuple):
     ``angle`` (n,) crank angle [rad], ``torque`` (n,) [N m], ``step`` (n,) torque less that of the sample
     before [N m], NaN where that was lost; ``profile`` how the crank turned; ``period_s`` of the sensor;
     ``late`` from the begin to the first sample, in periods of the sensor; ``jitter`` median departure of the
-    times between samples from that period, as a fraction of it.
+    times between samples from that period, as a fraction of it; ``temperature_c`` mean temperature of the
+    drive, NaN where it is not measured.
     """
 
     angle: Floats
@@ -61,12 +62,19 @@ class CycleTorque(NamedTuple):
     period_s: float
     late: float
     jitter: float
+    temperature_c: float
 
 
 def sensor_period_s(kept: TorqueSamples, begin_ns: int, end_ns: int) -> float:
     """Median time between the torque samples of a gait cycle; NaN where there are fewer than three."""
     stamps = within(kept.torque, begin_ns, end_ns)["stamp_ns"]
     return float(np.median(np.diff(stamps))) * 1.0e-9 if len(stamps) > 2 else float("nan")
+
+
+def mean_of(values: Floats) -> float:
+    """Mean of those values (n,) that are finite; NaN without any."""
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else math.nan
 
 
 def cycle_torque(kept: TorqueSamples, begin_ns: int, end_ns: int, sensor: TorqueSensor) -> CycleTorque | None:
@@ -94,7 +102,8 @@ def cycle_torque(kept: TorqueSamples, begin_ns: int, end_ns: int, sensor: Torque
     late = 1.0e-9 * float(torque_ns[0] - begin_ns) / sensor.period_s
     period_ns = 1.0e9 * sensor.period_s
     jitter = float(np.median(np.abs(np.diff(torque_ns) - period_ns))) / period_ns
-    return CycleTorque(angle, torque, step, profile, sensor.period_s, late, jitter)
+    temperature_c = mean_of(torques["temperature_c"])
+    return CycleTorque(angle, torque, step, profile, sensor.period_s, late, jitter, temperature_c)
 
 
 # What the measured drive torque shows of the clearances, compared with those that the monitor counts.
@@ -163,6 +172,9 @@ class Diagnosis:
         Force of the ground by the commissioned gait cycles, if the foot surely carries one.
     compliance : float
         Between the measured crank angle and the crank [rad/(N m)], that the wear is counted with; 0 if rigid.
+    temperature_c, commissioned_c : float
+        Temperature of the drive in the last gait cycles, and in those of the baseline [°C]; NaN where it was
+        not measured.
     """
 
     state: DiagnosisState = DiagnosisState.OFF
@@ -178,6 +190,8 @@ class Diagnosis:
     friction: float = 1.0
     load: GroundLoad | None = None
     compliance: float = 0.0
+    temperature_c: float = math.nan
+    commissioned_c: float = math.nan
 
     def of_joint(self, k: int) -> tuple[float, float] | None:
         """Clearance of joint k, and its standard deviation; None where it is not observable."""
@@ -187,13 +201,15 @@ class Diagnosis:
 
 
 WINDOW_CYCLES = 60  # that are kept at a cadence, and that clearances are estimated from
+LAST_CYCLES = 10  # whose mean temperature is that of the drive now
 UNUSED_CYCLES = 20  # in a row, after which a result is not one of the leg as it walks now
 
 
 class SignedCycle(NamedTuple):
     """A gait cycle: stamps of its begin and end [ns], its signature (F,), and how the crank turned.
 
-    ``late`` is the time from its begin to its first torque sample, in periods of the sensor.
+    ``late`` is the time from its begin to its first torque sample, in periods of the sensor;
+    ``temperature_c`` that of the drive, NaN where it is not measured.
     """
 
     begin_ns: int
@@ -201,6 +217,7 @@ class SignedCycle(NamedTuple):
     signature: Floats
     profile: CrankProfile
     late: float
+    temperature_c: float = math.nan
 
 
 @attrs.frozen(eq=False)
@@ -330,6 +347,12 @@ class TorqueState:
     def profile(self) -> CrankProfile:
         """Mean motion of the crank in the kept cycles, or in those that wait where there are none."""
         return mean_profile([cycle.profile for cycle in self.cycles or self.waiting])
+
+    @property
+    def temperature_c(self) -> float:
+        """Mean temperature of the drive in the last gait cycles; NaN where it is not measured."""
+        cycles = (self.cycles or self.waiting)[-LAST_CYCLES:]
+        return mean_of(np.array([cycle.temperature_c for cycle in cycles], float))
 
     @property
     def is_compared(self) -> bool:

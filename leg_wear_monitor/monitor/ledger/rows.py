@@ -241,6 +241,7 @@ def _baseline_values(baseline: CommissionedTorque) -> dict[str, Any]:
         "time_constant_s": baseline.channel.time_constant_s,
         "load_friction": baseline.channel.load_friction,
         "speed_radps": baseline.speed,
+        "temperature_c": finite_or_none(baseline.temperature_c),
     }
 
 
@@ -334,14 +335,14 @@ def read_commissioned_torques(db: sqlite3.Connection) -> list[CommissionedTorque
     found: list[CommissionedTorque] = []
     for row in db.execute(
         "SELECT stamp_ns, cycles, speed_radps, delay_s, time_constant_s, load_friction, clearance_m, "
-        "signatures, sigma_m FROM torque_commissioning "
+        "signatures, sigma_m, temperature_c FROM torque_commissioning "
         "WHERE stamp_ns > (SELECT coalesce(max(replaced_ns), 0) FROM joint) ORDER BY id DESC"
     ):
         stamp_ns, cycles, speed, delay_s, time_constant_s, load_friction = row[:6]
-        clearance_m, signatures, sigma_m = map(_floats, row[6:])
+        clearance_m, signatures, sigma_m = map(_floats, row[6:9])
         channel = Channel(delay_s=delay_s, time_constant_s=time_constant_s, load_friction=load_friction)
         one = CommissionedTorque(
-            stamp_ns, clearance_m, signatures.reshape(cycles, -1), sigma_m, channel, speed
+            stamp_ns, clearance_m, signatures.reshape(cycles, -1), sigma_m, channel, speed, or_nan(row[9])
         )
         if not any(abs(one.speed - other.speed) <= UNLIKE * abs(other.speed) for other in found):
             found.append(one)

@@ -129,7 +129,7 @@ def doubt(situation: Situation) -> str:
 def words_for(situation: Situation) -> CauseWords:
     """Words for causes, with the parameters and the speed of a situation."""
     speed = situation.explained.speed_radps if situation.explained else situation.cadence_rpm * math.pi / 30.0
-    return CauseWords(situation.crank, situation.drive_torque, speed)
+    return CauseWords(situation.crank, situation.drive_torque, speed, situation.diagnosis)
 
 
 def _as_told(change: Change, situation: Situation) -> NamedCause:

@@ -170,6 +170,8 @@ EVIDENCE = {
 """Name and unit of each cause's value; that of a clearance has the name of its joint."""
 
 _DELAY, _ZERO = "look for a delay of the torque", "check the zero of the torque sensor"
+# grease is stiff in the cold, and a warm motor has less torque
+_WITH_TEMPERATURE = (Cause.FRICTION, Cause.LOAD_FRICTION, Cause.SCALE)
 _COMPARED = {Cause.MASS: ("lighter", "heavier"), Cause.LENGTH: ("shorter", "longer")}
 
 
@@ -182,11 +184,14 @@ class CauseWords:
     crank, torque : Crank, DriveTorque
     speed_radps : float
         Mean speed of the crank; NaN if it is not known.
+    diagnosis : Diagnosis or None
+        With the temperatures of the drive.
     """
 
     crank: Crank
     torque: DriveTorque
     speed_radps: float = math.nan
+    diagnosis: Diagnosis | None = None
 
     def explanation(self, explained: TorqueExplanation) -> str:
         """All alternatives with their values, and what stays unexplained."""
@@ -208,6 +213,9 @@ class CauseWords:
 
     def cause(self, one: NamedCause) -> str:
         """A cause other than a clearance, with its value; the drive torque is *it*."""
+        return self._sentence(one) + (self._temperatures() if one.cause in _WITH_TEMPERATURE else "")
+
+    def _sentence(self, one: NamedCause) -> str:
         size = estimate(abs(one.value), one.sigma, EVIDENCE[one.cause][1])
         match one.cause:
             case Cause.SIGN:
@@ -280,6 +288,15 @@ class CauseWords:
                 "set drive_torque.gear_ratio to 1",
             )
         return "", f"{scale}, or correct drive_torque.gear_ratio"
+
+    def _temperatures(self) -> str:
+        """Temperatures of the drive now and when the leg was commissioned; empty where one is not known."""
+        found = self.diagnosis
+        if found is None or math.isnan(found.temperature_c) or math.isnan(found.commissioned_c):
+            return ""
+        return (
+            f" (the drive is at {found.temperature_c:.0f} °C, and was at {found.commissioned_c:.0f} °C then)"
+        )
 
     def _timing(self, one: NamedCause) -> str:
         """An angle that an offset of the crank explains as well as a lag does."""

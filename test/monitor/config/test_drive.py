@@ -38,7 +38,11 @@ def test_nothing_is_declared_by_default() -> None:
 
 
 def test_the_numbers_have_the_names_of_the_figures() -> None:
-    numbers = {field.name for field in attrs.fields(DriveParameters)} - {"type", "gear_ratio"}
+    numbers = {field.name for field in attrs.fields(DriveParameters)} - {
+        "type",
+        "gear_ratio",
+        "temperature_interface",
+    }
     assert numbers == {field.name for field in attrs.fields(DriveFigures)}
 
 
@@ -118,3 +122,14 @@ def test_a_fault_ends_the_start_of_whatever_reads_the_parameters() -> None:
     config = config_from({"drive.type": "ak80"}, "leg.yaml")
     with pytest.raises(ConfigError, match=r"drive.type: 'ak80': no drive .* did you mean ak80-9\?"):
         fitted(load_mechanism(), config, "leg.yaml")
+
+
+@pytest.mark.parametrize("source", ["wrench", "effort"])
+def test_a_temperature_needs_the_messages_that_have_it(source: str) -> None:
+    given = {"drive.temperature_interface": "temperature", "drive_torque.source": source}
+    fault = rf"leg.yaml: drive.temperature_interface: 'temperature' needs .* 'interface', which is '{source}'"
+    with pytest.raises(ConfigError, match=fault):
+        fitted(load_mechanism("bionic_leg"), config_from(given, "leg.yaml"), "leg.yaml")
+    fitted(
+        load_mechanism("bionic_leg"), config_from({**given, "drive_torque.source": "interface"}, "leg.yaml")
+    )

@@ -119,6 +119,25 @@ def test_the_first_reference_of_a_leg_behind_a_declared_coupling_is_simulated_be
     assert {one.parameters.compliance for one in simulated.legs} == {1.0e-3}
 
 
+def test_the_temperature_of_the_drive_is_that_now_and_that_of_the_baseline(leg, reference) -> None:
+    """A cycle without one, as after a start, takes nothing away; and none at all is not a number."""
+    observer = observer_of(leg)
+    block = samples(reference, [0] * (COMMISSIONING_CYCLES + 12))
+    cycle = (block["stamp_ns"] - START_NS) // 10**9
+    is_torque = block["kind"] == TORQUE
+    block["temperature_c"][is_torque & (cycle > 0)] = 40.0
+    block["temperature_c"][is_torque & (cycle > COMMISSIONING_CYCLES)] = 55.0
+    walk(observer, block, end=3)
+    assert observer.diagnosis.temperature_c == 40.0
+    assert np.isnan(observer.diagnosis.commissioned_c)
+    walk(observer, block, begin=3)
+    assert observer.diagnosis.temperature_c == pytest.approx(55.0)
+    assert observer.diagnosis.commissioned_c == pytest.approx(40.0)
+    bare = observer_of(leg)
+    walk(bare, samples(reference, [0] * 4))
+    assert np.isnan(bare.diagnosis.temperature_c)
+
+
 def test_without_torques_it_reports_so(leg, reference) -> None:
     observer = observer_of(leg)
     block = samples(reference, [0] * 8)

@@ -378,12 +378,14 @@ def test_references_and_baselines_are_kept_for_each_cadence(open_ledger, entry_a
         profile = CrankProfile.steady(speed)
         one = TorqueReference(profile, np.full((2, 5), 3e-4), (few, few[:CYCLES]), leg)
         ledger.note(SimulatedReference(stamp_ns, ("thigh",), one))
-        ledger.note(CommissionedTorque(stamp_ns, np.full(5, 3e-4), np.ones((4, 6)), speed=speed))
+        warm = {"temperature_c": 41.5} if speed == 7.5 else {}  # not measured at the others
+        ledger.note(CommissionedTorque(stamp_ns, np.full(5, 3e-4), np.ones((4, 6)), speed=speed, **warm))
     ledger.keep(entry_at(2), closed=True)
     ledger.close()
     found = open_ledger()
     assert [one.reference.profile.speed for one in found.references] == [4.51, 7.5, 6.0]
     assert [one.speed for one in found.commissioned_torques] == [4.51, 7.5, 6.0]
+    np.testing.assert_equal([one.temperature_c for one in found.commissioned_torques], [np.nan, 41.5, np.nan])
     sigma_m = np.array([0.0, 0.0, 1e-5, 0.0, 0.0])
     found.note(CommissionedTorque(20, np.full(5, 3e-4), np.ones((4, 6)), sigma_m, speed=6.0))
     found.keep(entry_at(3), closed=True)

@@ -564,3 +564,22 @@ def test_a_body_that_is_longer_is_another_mechanism() -> None:
     found = judged(diagnosis=diagnosis(change(Cause.LENGTH, "thigh", value=-0.012, sigma=0.002, counted=0.0)))
     assert (found.state, found.fault_code) == (State.INSPECT, "MECHANISM_CHANGED")
     assert "body thigh is 1.2 % ± 0.2 % shorter" in found.why
+
+
+@pytest.mark.parametrize("now, then", [(-5.0, 41.4), (-5.0, math.nan), (math.nan, 41.4)])
+def test_a_friction_that_comes_with_another_temperature_says_both(now: float, then: float) -> None:
+    """Whoever finds it; and no other cause does."""
+    known = attrs.evolve(diagnosis(change(Cause.FRICTION, value=2.0)), temperature_c=now, commissioned_c=then)
+    alarmed = judged(
+        alarms=(alarm("torque_drift"),),
+        torque_causes={"torque_drift": NamedCause(Cause.FRICTION, 2.0, 0.1)},
+        diagnosis=attrs.evolve(known, changes=(), state=DiagnosisState.AS_COUNTED),
+        cadence_rpm=60.0,
+    )
+    words = " (the drive is at -5 °C, and was at 41 °C then)"
+    for verdict in (judged(diagnosis=known, cadence_rpm=60.0), alarmed):
+        assert verdict.fault_code == "FRICTION_CHANGED"
+        assert (words in verdict.why) == (not math.isnan(now + then))
+        assert ("°C" in verdict.why) == (words in verdict.why)
+    lag = attrs.evolve(known, changes=(change(Cause.LAG, value=0.01, sigma=0.001),))
+    assert "°C" not in judged(diagnosis=lag, cadence_rpm=60.0).why

@@ -1,7 +1,10 @@
 """A person on the leg: the weight of a leg by Winter, and the reaction of the ground on the foot."""
 
+import csv
 import math
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
+from pathlib import Path
 from typing import NamedTuple
 
 import attrs
@@ -119,6 +122,9 @@ _POINTS = 1024
 
 GROUND_LOAD = "ground"  # name of the load in a mechanism
 
+_OF_FORCE = ("crank_angle", "foot_load", "foot_load_along")  # columns of a file with the force on the toe
+_LEAST_ROWS = 11  # after the first one
+
 
 @attrs.frozen
 class Stance:
@@ -194,6 +200,52 @@ def nominal_stance(linkage: Linkage) -> Stance:
     turned = float(np.sign(getattr(mechanism.drive, "speed", 1.0)) or 1.0)
     heel_strike, toe_off = ends if turned > 0.0 else reversed(ends)
     return Stance(heel_strike, toe_off, turned, up, turned * back * across)
+
+
+def read_toe_force(path: Path) -> Floats:
+    """Force of the ground on the toe (PHASES, 2) [N] of a CSV file with one gait cycle.
+
+    Its columns are those of a table that `replay` reads, ``crank_angle`` [rad], ``foot_load`` (up) and, where
+    there is one, ``foot_load_along`` (along x) [N]; between its rows the force is linear.
+
+    Raises
+    ------
+    ConfigError
+        If the file cannot be read, lacks a column, has a value that is no finite number, or has a crank that
+        does not turn in one direction, by at most a turn.
+    """
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            rows = list(csv.DictReader(file))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise ConfigError(str(path), "", f"cannot be read: {reason}") from error
+    angle, up, along = (_column(path, rows, name) for name in _OF_FORCE)
+    way = np.diff(angle)
+    if len(way) < _LEAST_ROWS or not ((way > 0.0).all() or (way < 0.0).all()) or np.ptp(angle) > TURN:
+        fault = f"expected at least {_LEAST_ROWS + 1} rows of one gait cycle, in the order of their angles"
+        raise ConfigError(str(path), _OF_FORCE[0], fault)
+    at = np.arange(PHASES) * (TURN / PHASES)
+    return np.stack([np.interp(at, angle, force, period=TURN) for force in (along, up)], axis=1)
+
+
+def _column(path: Path, rows: Sequence[Mapping[str, str]], name: str) -> Floats:
+    """Column of a table with a toe's force (n,); 0 for the one that need not be there."""
+    if rows and name not in rows[0]:
+        if name == _OF_FORCE[-1]:
+            return np.zeros(len(rows))
+        raise ConfigError(str(path), name, f"there is no such column, the file has {', '.join(rows[0])}")
+    found = np.array([_number(row[name]) for row in rows], float)
+    for i in np.flatnonzero(~np.isfinite(found)).tolist():
+        raise ConfigError(str(path), name, f"row {i + 1}: {rows[i][name]!r} is not a finite number")
+    return found
+
+
+def _number(text: str | None) -> float:
+    try:
+        return float(text or "nan")
+    except ValueError:
+        return math.nan
 
 
 def upwards(mechanism: Mechanism) -> Floats:

@@ -1,11 +1,17 @@
 """`reference` writes a file that a parameter file can name."""
 
+import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from leg_wear_monitor.mechanism.loader import load_mechanism
+from leg_wear_monitor.mechanism.person import nominal_stance
+from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.monitor.diagnosis import reference_file
 from leg_wear_monitor.twin import torque_reference
+from leg_wear_monitor.twin.load import load_signatures
 
 
 def test_references_of_two_cadences_are_written_and_named(run, tmp_path: Path, monkeypatch) -> None:
@@ -27,6 +33,51 @@ def test_references_of_two_cadences_are_written_and_named(run, tmp_path: Path, m
     assert "leg.npz: has torque references of another leg (bionic_leg)" in result.stderr
 
 
+TABLE = "crank_angle,foot_load,foot_load_along\n"
+
+
+def test_a_reference_under_a_load_is_of_a_leg_that_carries_it(run, tmp_path: Path, monkeypatch) -> None:
+    """The table is another discretisation of a force; the torque is that of the force, by virtual work."""
+    monkeypatch.setattr(reference_file, "BEFOREHAND_CYCLES", 2)
+    monkeypatch.setattr(torque_reference, "WIDER", (2.0,))
+    leg = load_mechanism("bionic_leg")
+    linkage = build_linkage(leg)
+    force = 300.0 * nominal_stance(linkage).force(points=360)
+    rows = [f"{math.radians(i)},{up},{along}\n" for i, (along, up) in enumerate(force)]
+    (tmp_path / "stance.csv").write_text(TABLE + "".join(rows))
+    made = {}
+    for name, load in (("air", ()), ("ground", ("--load", "stance.csv"))):
+        assert run("reference", "bionic_leg", *load, "--out", f"{name}.npz").exit_code == 0
+        (made[name],) = reference_file.read_references(tmp_path / f"{name}.npz", leg)
+    assert not made["air"].parameters.load.size
+    known = made["ground"].parameters.load
+    assert known == pytest.approx(300.0 * nominal_stance(linkage).force(), abs=1.5)
+    (expected,) = load_signatures(linkage, [known])
+    air, ground = (made[name].torque_nm[0].astype(float).mean(axis=0) for name in ("air", "ground"))
+    added, of_force = (np.fft.rfft(torque)[:4] / len(torque) for torque in (ground - air, expected))
+    # joints rub more under a force (0.13 of the largest harmonic here), and two steps vary by a tenth each
+    assert np.abs(added - of_force).max() < 0.4 * np.abs(of_force).max()
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("crank_angle,load\n0.1,2\n", "foot_load: there is no such column, the file has crank_angle, load"),
+        (TABLE + "0.1,2,3\n0.2,two,3\n", "stance.csv: foot_load: row 2: 'two' is not a finite number"),
+        (TABLE + "0.1,2\n", "stance.csv: foot_load_along: row 1: None is not a finite number"),
+        (TABLE + "0.1,2,3\n" * 20, "at least 12 rows of one gait cycle, in the order of their angles"),
+        (TABLE + "".join(f"{0.5 * i},2,3\n" for i in range(20)), "rows of one gait cycle"),
+        ("", "expected at least 12 rows"),
+    ],
+)  # fmt: skip
+def test_a_load_that_is_no_gait_cycle_is_refused(run, tmp_path: Path, text: str, fault: str) -> None:
+    (tmp_path / "stance.csv").write_text(text)
+    result = run("reference", "--load", "stance.csv", "--out", "leg.npz")
+    assert result.exit_code == 2
+    assert fault in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+
+
 @pytest.mark.parametrize(
     ("arguments", "fault"),
     [
@@ -35,6 +86,8 @@ def test_references_of_two_cadences_are_written_and_named(run, tmp_path: Path, m
         (["no_leg", "--out", "leg.npz"], "no mechanism of this name"),
         (["--out", "nowhere/leg.npz"], "there is no directory nowhere"),
         ([], "--out"),
+        (["--load", "none.csv", "--out", "leg.npz"], "none.csv: cannot be read: "),
+        (["slider_crank", "--load", "none.csv", "--out", "leg.npz"], "no point is called toe"),
     ],
 )
 def test_bad_command_lines_are_one_line(run, arguments: list[str], fault: str) -> None:

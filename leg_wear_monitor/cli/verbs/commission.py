@@ -135,23 +135,33 @@ def _run(
     help="Cadence, negative for clockwise; may be given several times.  [default: the commanded one]",
 )
 @common.path_option(
+    "--load",
+    "FILE",
+    "CSV file with the mean force of the ground on the toe over one gait cycle: columns crank_angle [rad], "
+    "foot_load (up) and foot_load_along [N].  [default: the leg walks in the air]",
+)
+@common.path_option(
     "--out",
     "FILE",
     "File to write, such as leg.reference.npz, for the parameter diagnosis.reference.",
     dir_okay=False,
     required=True,
 )
-def reference(mechanism: str | None, config: Path | None, cadences: tuple[float, ...], out: Path) -> None:
+def reference(
+    mechanism: str | None, config: Path | None, cadences: tuple[float, ...], load: Path | None, out: Path
+) -> None:
     """Simulate the torque reference of a leg, which the diagnosis compares with.
 
     MECHANISM is a mechanism file, or the name of one that comes with the package; by default, the one of the
     parameter file. The crank turns steadily, the leg is new. A leg whose diagnosis.reference names the file
-    needs no simulation while it walks at this cadence.
+    needs no simulation while it walks at this cadence, with --load under such a force, with load.model ground
+    or measured.
     """
     common.check_file("--out", out)
     import attrs
 
     from leg_wear_monitor.mechanism.loader import load_mechanism
+    from leg_wear_monitor.mechanism.person import read_toe_force
     from leg_wear_monitor.monitor.config.fitting import fitted
     from leg_wear_monitor.monitor.config.parameters import config_from, load_config, values_of
     from leg_wear_monitor.monitor.diagnosis.reference_file import simulated_references, write_references
@@ -163,12 +173,15 @@ def reference(mechanism: str | None, config: Path | None, cadences: tuple[float,
     for cadence in cadences:
         config_from(values_of(settings) | {"cadence.commanded_rpm": cadence}, "--cadence")
     leg = fitted(load_mechanism(settings.mechanism), settings)
+    if load is not None and leg.toe is None:
+        raise ConfigError(leg.source, "bodies", "no point is called toe, on which --load would act")
+    force = read_toe_force(load) if load is not None else None
     began = time.perf_counter()
     with (
         common.compilation("monitor", how_long="about a minute"),
         common.progress_bar("simulating") as progress,
     ):
-        made = simulated_references(leg, cadences, progress)
+        made = simulated_references(leg, cadences, progress, force)
     for cadence, one in zip(cadences, made, strict=True):
         cycles = len(one.torque_nm[-1])
         click.echo(f"{leg.name} at {cadence:g} rpm: {len(one.torque_nm)} legs, {cycles} gait cycles each")

@@ -6,10 +6,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import IO, Any
 
+import attrs
 import numpy as np
 
 from leg_wear_monitor.errors import ConfigError, LegWearError, printable
 from leg_wear_monitor.files import share_directory
+from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.ledger.entry import fingerprint
@@ -33,6 +35,7 @@ def simulated_references(
     mechanism: Mechanism,
     cadences_rpm: Sequence[float],
     progress: Callable[[float], None] = lambda _fraction: None,
+    load: Floats | None = None,
 ) -> tuple[TorqueReference, ...]:
     """References of a new leg whose crank turns steadily, as many cores as there are at once.
 
@@ -44,6 +47,8 @@ def simulated_references(
         A reference each; negative for a crank that turns clockwise.
     progress : callable
         Called with the fraction that is done, 0 to 1.
+    load : (PHASES, 2) array, optional
+        Mean force of the ground on the toe at equal steps of the crank angle from 0 [N].
 
     Raises
     ------
@@ -51,13 +56,14 @@ def simulated_references(
         If the leg cannot be simulated.
     """
     steady = [CrankProfile.steady(cadence / 60.0 * TURN) for cadence in cadences_rpm]
-    return simulated_under(mechanism, steady, progress)
+    return simulated_under(mechanism, steady, progress, load)
 
 
 def simulated_under(
     mechanism: Mechanism,
     profiles: Sequence[CrankProfile],
     progress: Callable[[float], None] = lambda _fraction: None,
+    load: Floats | None = None,
 ) -> tuple[TorqueReference, ...]:
     """References of a new leg under given motions of its crank, as `simulated_references`.
 
@@ -68,9 +74,11 @@ def simulated_under(
     """
     fresh = np.array([mechanism.clearances[one].radial_clearance for one in mechanism.clearance_joints])
     unworn, run = np.zeros((len(fresh), 2, SECTORS)), TorqueReferenceRun(mechanism, BEFOREHAND_CYCLES)
+    leg = LegParameters.none(mechanism)
+    leg = leg if load is None else attrs.evolve(leg, load=load)
     made: list[TorqueReference] = []
     for profile in profiles:
-        run.begin(fresh, unworn, profile)
+        run.begin(fresh, unworn, profile, leg)
         found = run.finish(lambda part: progress((len(made) + part) / len(profiles)))
         if found is None:
             raise LegWearError(f"{mechanism.name}: cannot be simulated at {profile.cadence_rpm:.3g} rpm")

@@ -401,8 +401,7 @@ def check_cycle(linkage: Linkage) -> None:
     AssemblyError
         If there is a dead point; the message contains its crank angle.
     """
-    start = linkage.mechanism.assembly.crank_angle
-    follow(linkage, assemble(linkage), start, start + TURN)
+    _turned(_geometry_of(linkage))
 
 
 @attrs.frozen
@@ -413,8 +412,7 @@ class _Geometry:
     key: bytes
 
 
-def _one_cycle_positions(linkage: Linkage, points: int) -> Floats:
-    """Coordinates q (points, n, 3) over one turn, cached by the linkage's geometry."""
+def _geometry_of(linkage: Linkage) -> _Geometry:
     arrays = linkage.arrays
     shape = (
         arrays.joint_kind,
@@ -426,11 +424,25 @@ def _one_cycle_positions(linkage: Linkage, points: int) -> Floats:
     start = np.append(
         com_poses(linkage.mechanism), [linkage.mechanism.assembly.crank_angle, arrays.drive_body]
     )
-    key = b"".join(array.tobytes() for array in (*shape, start))
-    return _solved_positions(_Geometry(linkage, key), points).copy()
+    return _Geometry(linkage, b"".join(array.tobytes() for array in (*shape, start)))
 
 
-# a twin, studies and tests need the positions of one linkage several times, with other loads and speeds
+def _one_cycle_positions(linkage: Linkage, points: int) -> Floats:
+    """Coordinates q (points, n, 3) over one turn, cached by the linkage's geometry."""
+    return _solved_positions(_geometry_of(linkage), points).copy()
+
+
+# A twin, studies and tests need the turn of one linkage several times, with other loads and speeds.
+
+
+@functools.lru_cache(maxsize=16)
+def _turned(geometry: _Geometry) -> None:
+    """Turn the crank by a full cycle; what fails is not kept."""
+    linkage = geometry.linkage
+    start = linkage.mechanism.assembly.crank_angle
+    follow(linkage, assemble(linkage), start, start + TURN)
+
+
 @functools.lru_cache(maxsize=16)
 def _solved_positions(geometry: _Geometry, points: int) -> Floats:
     return positions(geometry.linkage, _even_angles(points))

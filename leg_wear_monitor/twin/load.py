@@ -14,8 +14,15 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.compiled.kernel import kernel
 from leg_wear_monitor.contact.arrays import ContactArrays
+from leg_wear_monitor.dynamics.clearance.basis import Basis
 from leg_wear_monitor.dynamics.clearance.stepper import LoadedTables, loaded_tables, put_force
-from leg_wear_monitor.dynamics.clearance.tables import COARSER, POINTS, ClearanceTables, build_tables
+from leg_wear_monitor.dynamics.clearance.tables import (
+    COARSER,
+    POINTS,
+    ClearanceTables,
+    build_basis,
+    build_tables,
+)
 from leg_wear_monitor.mechanism.arrays import Floats, body_names
 from leg_wear_monitor.mechanism.person import PHASES, nominal_stance, upwards
 from leg_wear_monitor.mechanism.position import Linkage, one_cycle, point_motion
@@ -266,12 +273,13 @@ class FootLoad:
         is_measured: bool = False,
         is_of_foot: bool = False,
     ) -> None:
-        self.tables = build_tables(linkage, contacts)
+        basis = build_basis(linkage, contacts)
+        self.tables = build_tables(linkage, contacts, basis=basis)
         self.signature = np.zeros(POINTS + 1)
         self._contacts, self.shape, self._load = contacts, shape, 0.0
         self._known = np.zeros((0, 2))
         self._measured = is_measured, is_of_foot
-        self._learn(linkage)
+        self._learn(linkage, basis)
 
     def rebuild(self, linkage: Linkage, known: Floats) -> None:
         """Set the tables, in place, to those of a leg with other masses or lengths, under the same load.
@@ -286,19 +294,20 @@ class FootLoad:
         """
         self._known = known
         load, self._load, measured = self._load, 0.0, force_of(self.rows)
-        new: ClearanceTables = build_tables(linkage, self._contacts)
+        basis = build_basis(linkage, self._contacts)
+        new: ClearanceTables = build_tables(linkage, self._contacts, basis=basis)
         pairs: Iterable[tuple[NDArray[Any], NDArray[Any]]] = zip(self.tables, new, strict=True)
         for own, table in pairs:
             own[...] = table
-        self._learn(linkage)
+        self._learn(linkage, basis)
         self.set(load)
         set_force(self.rows, measured)
 
-    def _learn(self, linkage: Linkage) -> None:
+    def _learn(self, linkage: Linkage, basis: Basis) -> None:
         """Compute the effect of a load on the tables, which must be those without a load."""
         self._linkage = linkage
         self._shaped: dict[str, tuple[Floats, Floats]] = {}
-        self._loaded = loaded_tables(linkage, self._contacts, self.tables)
+        self._loaded = loaded_tables(linkage, self._contacts, self.tables, basis)
         self.rows = load_rows(linkage, self._loaded, *self._measured)
         self.take_shape(self.shape)
 

@@ -36,6 +36,8 @@ class Basis:
         s and its derivative.
     all : (N, 3 b, d + 1) array
         S and s side by side.
+    curvature : (N, 3 b, d, d) array
+        q_ee.
     b_e, c_ee : (N, d, d) arrays
         B_e and c_ee of the Lagrangian.
     gamma : (N, d, d, d) array
@@ -64,10 +66,10 @@ class Basis:
         self.drive = self.x[:, :, linkage.rows.drive_row]
         self.drive_t = motion.a[:, 1:].reshape(n, -1)
         self.all = np.concatenate([self.s, self.drive[:, :, None]], axis=2)
-        self.force, self.load, self.potential = _forces(linkage, motion.q)
         self._take_levers(linkage, contacts)
         self.drag = _drag(linkage.arrays, motion.q, self.all)
         self._curve(linkage, motion.q)
+        self._take_forces(linkage, motion.q)
 
     def with_contacts(self, linkage: Linkage, contacts: ContactArrays) -> "Basis":
         """That of the same linkage and joints with other radii: only the levers of friction differ."""
@@ -75,28 +77,33 @@ class Basis:
         other._take_levers(linkage, contacts)
         return other
 
+    def with_loads(self, linkage: Linkage) -> "Basis":
+        """That of the same linkage and joints under other loads: only the applied forces differ."""
+        other = copy.copy(self)
+        other._take_forces(linkage, self.motion.q)
+        return other
+
     def _take_levers(self, linkage: Linkage, contacts: ContactArrays) -> None:
         levers = _friction_levers(linkage.arrays, contacts)
         self.friction: Floats = np.broadcast_to(levers, (len(self.motion.q), *levers.shape))
 
+    def _nudged(self, q: Floats, j: int) -> tuple[Floats, Floats]:
+        """Coordinates ahead of q (N, n, 3) along column j of S, and behind."""
+        step = _NUDGE * self.s[:, :, j].reshape(len(q), -1, 3)
+        ahead, behind = q.copy(), q.copy()
+        ahead[:, 1:] += step
+        behind[:, 1:] -= step
+        return ahead, behind
+
     def _curve(self, linkage: Linkage, q: Floats) -> None:
-        """Set the quantities of first order in e."""
+        """Set the quantities of first order in e that depend on the masses alone."""
         d = len(self.rows)
         mass, minus_x = self.mass[:, None], -self.x
-        curvature = np.empty((*self.s.shape, d))
-        force_s, load_s = np.zeros((2, *self.s.shape))
+        self.curvature = curvature = np.empty((*self.s.shape, d))
         for j in range(d):
-            step = _NUDGE * self.s[:, :, j].reshape(len(q), -1, 3)
-            ahead, behind = q.copy(), q.copy()
-            ahead[:, 1:] += step
-            behind[:, 1:] -= step
-            blocks = (jacobian_blocks(linkage, ahead) - jacobian_blocks(linkage, behind)) / (2.0 * _NUDGE)
-            slope = dense_jacobian(linkage.rows, blocks, q.shape[1])
+            ahead, behind = (jacobian_blocks(linkage, near) for near in self._nudged(q, j))
+            slope = dense_jacobian(linkage.rows, (ahead - behind) / (2.0 * _NUDGE), q.shape[1])
             curvature[..., j] = minus_x @ (slope @ self.s)
-            if len(linkage.arrays.load_body) or len(linkage.arrays.spring_body):
-                after, before = _forces(linkage, ahead), _forces(linkage, behind)
-                force_s[:, :, j] = (after[0] - before[0]) / (2.0 * _NUDGE)
-                load_s[:, :, j] = (after[1] - before[1]) / (2.0 * _NUDGE)
         momentum = self.mass * self.drive
         self.b_e = np.einsum("nr,nrij->nij", momentum, curvature) + project(self.s, mass * self.s_t)
         self.c_e = 2.0 * np.einsum("nr,nri->ni", momentum, self.s_t)
@@ -104,8 +111,18 @@ class Basis:
         self.gamma = flat.reshape(-1, d, d, d)
         swing = np.einsum("nr,nrij->nij", momentum, derivative(curvature))
         self.c_ee = 2.0 * (project(self.s_t, mass * self.s_t) + swing)
-        self.force_e = np.einsum("nr,nrij->nij", self.force, curvature) + project(self.s, force_s)
-        self.load_e = np.einsum("nr,nrij->nij", self.load, curvature) + project(self.s, load_s)
+
+    def _take_forces(self, linkage: Linkage, q: Floats) -> None:
+        """Set the applied forces, and their derivatives by e."""
+        self.force, self.load, self.potential = _forces(linkage, q)
+        force_s, load_s = np.zeros((2, *self.s.shape))
+        if len(linkage.arrays.load_body) or len(linkage.arrays.spring_body):
+            for j in range(len(self.rows)):
+                after, before = (_forces(linkage, near) for near in self._nudged(q, j))
+                force_s[:, :, j] = (after[0] - before[0]) / (2.0 * _NUDGE)
+                load_s[:, :, j] = (after[1] - before[1]) / (2.0 * _NUDGE)
+        self.force_e = np.einsum("nr,nrij->nij", self.force, self.curvature) + project(self.s, force_s)
+        self.load_e = np.einsum("nr,nrij->nij", self.load, self.curvature) + project(self.s, load_s)
         self.drive_force_e = self._on_crank(self.force, force_s)
         self.drive_load_e = self._on_crank(self.load, load_s)
 

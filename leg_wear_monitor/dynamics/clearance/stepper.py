@@ -12,7 +12,13 @@ import numpy as np
 from leg_wear_monitor.compiled.kernel import compile_for
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.dynamics.clearance.advance import ADVANCE, advance_clearances, observe
-from leg_wear_monitor.dynamics.clearance.basis import is_damped, motion_shapes, stored_shapes, views
+from leg_wear_monitor.dynamics.clearance.basis import (
+    Basis,
+    is_damped,
+    motion_shapes,
+    stored_shapes,
+    views,
+)
 from leg_wear_monitor.dynamics.clearance.contact import (
     A0,
     E0,
@@ -37,7 +43,7 @@ from leg_wear_monitor.dynamics.clearance.model import (
     rigid_coupling,
     state_shapes,
 )
-from leg_wear_monitor.dynamics.clearance.tables import COARSER, ClearanceTables, build_tables
+from leg_wear_monitor.dynamics.clearance.tables import COARSER, ClearanceTables, build_basis, build_tables
 from leg_wear_monitor.dynamics.joint import F_N
 from leg_wear_monitor.dynamics.run import (
     DONE,
@@ -470,7 +476,9 @@ class LoadedTables(NamedTuple):
     by_e: LoadedTable
 
 
-def loaded_tables(linkage: Linkage, contacts: ContactArrays, tables: ClearanceTables) -> LoadedTables:
+def loaded_tables(
+    linkage: Linkage, contacts: ContactArrays, tables: ClearanceTables, basis: Basis | None = None
+) -> LoadedTables:
     """What a force on the toe changes.
 
     Parameters
@@ -480,15 +488,18 @@ def loaded_tables(linkage: Linkage, contacts: ContactArrays, tables: ClearanceTa
     contacts : ContactArrays
     tables : ClearanceTables
         Of this linkage; `put_force` changes them.
+    basis : Basis, optional
+        Of these tables.
     """
     mechanism = linkage.mechanism
-    others = []
+    basis, others = basis or build_basis(linkage, contacts), []
     for push in ((_TRIAL_N, 0.0), (0.0, _TRIAL_N)):
         if mechanism.toe is None:
             break
         trial = ConstantLoad(body=mechanism.toe[0], point=mechanism.toe[1], force=push)
         pushed = attrs.evolve(mechanism, loads={**mechanism.loads, "trial of a toe force": trial})
-        others.append(build_tables(build_linkage(pushed), contacts))
+        loaded = build_linkage(pushed)
+        others.append(build_tables(loaded, contacts, basis=basis.with_loads(loaded)))
     return LoadedTables(*(_loaded(name, tables, others) for name in LoadedTables._fields))
 
 

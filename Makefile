@@ -35,6 +35,8 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 QUICKLY := --quiet --no-compile
 # A sourced ROS installation must not mix with the pinned one; the last is how its wheels mark a set library path.
 unexport PYTHONPATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
+# Images for containers often set it: each process that a test starts would compile numpy and all others anew, for seconds.
+unexport PYTHONDONTWRITEBYTECODE
 
 test: .venv/installed
 	@echo "== 1 of $(STEPS): style, types, layers; kernels are compiled"

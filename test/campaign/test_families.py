@@ -28,7 +28,7 @@ FEW = {
 
 
 # Left to `make test-slow` and `make campaign`: other tests hold their laws in less time
-# (test/monitor/ledger/test_kill.py, test/test_beside.py, test/monitor/inputs/test_bad_input.py, test/bags/,
+# (test/doors/test_kills.py, test/test_beside.py, test/monitor/inputs/test_bad_input.py, test/bags/,
 # test/fleet/, test/dashboard/test_server.py).
 LONG = {"dashboard", "fleets", "floods", "kills", "live_kills", "recordings", "workers"}
 

@@ -77,12 +77,14 @@ def states_of(answer):
 
 
 @pytest.fixture
-def served():
-    """Serve a source in a thread; all are ended with the test."""
+def served(monkeypatch):
+    """Serve a source in a thread, which looks for news often; all are ended with the test."""
     pytest.importorskip("tornado")
+    from leg_wear_monitor.dashboard import hub as hubs
     from leg_wear_monitor.dashboard.hub import Hub
     from leg_wear_monitor.dashboard.server import listen, serve
 
+    monkeypatch.setattr(hubs, "_TICK_S", 0.05)
     running = []
 
     def start(source, host="127.0.0.1"):

@@ -140,11 +140,17 @@ def shown(setup, clock, name, node=NODE):
     return leg.content()
 
 
+@pytest.fixture(scope="module")
+def usual(setup):
+    """What is shown with a plain text."""
+    return shown(setup, lambda: 0.0, "plain")
+
+
 @given(name=NAME)
 @hypothesis_settings(max_examples=25)
-def test_no_markup_of_a_message_gets_through(setup, name):
+def test_no_markup_of_a_message_gets_through(setup, usual, name):
     """With any text in a message, the page has the elements and attributes that it has with a plain one."""
-    usual, found = (shown(setup, lambda: 0.0, each) for each in ("plain", name))
+    found = shown(setup, lambda: 0.0, name)
     assert Skeleton(found.html).found == Skeleton(usual.html).found
     assert found.policy == usual.policy
     for region, markup in found.regions.items():

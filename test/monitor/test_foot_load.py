@@ -1,6 +1,7 @@
 """The sensor of the foot load: what it shows of a leg in full coordinates, and each of its faults by name."""
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import pytest
@@ -37,9 +38,18 @@ def walk() -> Samples:
     return samples(list(readings(SyntheticLeg(config), config)), START)
 
 
-def monitored(walk: Samples, **parameters: object) -> lw.WearMonitor:
-    config = config_from(MEASURED | parameters)
+@cache
+def as_new(model: str, source: str) -> tuple[lw.WearMonitor, object]:
+    """A monitor, whose tables take time, and its state before the first sample."""
+    config = config_from(MEASURED | {"load.model": model, "foot_load.source": source})
     monitor = lw.WearMonitor(lw.load_mechanism("bionic_leg"), config)
+    return monitor, monitor.snapshot()
+
+
+def monitored(walk: Samples, model: str = "measured", source: str = "wrench") -> lw.WearMonitor:
+    """A monitor after the walk; the same one for each model and source."""
+    monitor, new = as_new(model, source)
+    monitor.restore(new)
     for block in np.array_split(walk, 7):
         monitor.update(block)
     return monitor
@@ -67,7 +77,7 @@ def test_a_healthy_leg_on_the_ground_is_healthy(walk):
 
 def test_without_the_sensor_the_torque_shows_a_stance_and_no_mismatch(walk):
     """Until a load that nobody declared could be a stance, this healthy leg had the alarm of a mismatch."""
-    monitor = monitored(walk, **{"load.model": "none"})
+    monitor = monitored(walk, "none")
     assert not [one.name for one in monitor.alarms.alarms if one.level]
     (torque,) = (one.values for one in monitor.status() if one.name == "torque")
     # steps scatter by 10 %, and the load is known from some ten of them
@@ -107,7 +117,7 @@ def other_foot(t, force):
 )
 @pytest.mark.parametrize("model", ["measured", "none"])
 def test_each_fault_of_the_sensor_is_named(walk, change, alarm, model):
-    monitor = monitored(changed(change, walk), **{"load.model": model})
+    monitor = monitored(changed(change, walk), model)
     assert raised(monitor) - {"input_rate foot_load", "input_gaps foot_load"} == {alarm}
     found = {finding.code: finding for finding in monitor.verdict.findings}
     assert FOOT_LOAD_WORDS[alarm] in found[alarm.upper()].why
@@ -122,7 +132,8 @@ def test_a_wrong_load_does_not_wear(walk):
     """
     knee_n = []
     for change in (lambda t, force: 10.0 * force, held):
-        monitor = lw.WearMonitor(lw.load_mechanism("bionic_leg"), config_from(MEASURED))
+        monitor, new = as_new("measured", "wrench")
+        monitor.restore(new)
         cycles = monitor.update(changed(change, walk)).cycles
         knee_n.append(np.mean([one.joints[2].mean_force_n for one in cycles[-3:]]))
     assert knee_n[0] == pytest.approx(73.0, rel=0.1)
@@ -146,7 +157,8 @@ def test_missing_samples_are_named_and_the_crank_is_monitored(walk, begin_s, end
 def test_a_contact_switch_gives_heel_strike_and_toe_off(walk):
     monitor = monitored(
         changed(lambda t, force: np.stack([0.0 * t, force[:, 1] > 60.0], axis=1), walk),
-        **{"foot_load.source": "contact", "load.model": "none"},
+        "none",
+        "contact",
     )
     stance = nominal_stance(build_linkage(lw.load_mechanism("bionic_leg")))
     assert not raised(monitor)
@@ -156,7 +168,9 @@ def test_a_contact_switch_gives_heel_strike_and_toe_off(walk):
 
 
 def test_blocks_and_snapshots_change_nothing(walk):
-    one, other = (lw.WearMonitor(lw.load_mechanism("bionic_leg"), config_from(MEASURED)) for _ in range(2))
+    one, _ = as_new("measured", "wrench")
+    one.restore(as_new("measured", "wrench")[1])
+    other = lw.WearMonitor(lw.load_mechanism("bionic_leg"), config_from(MEASURED))
     whole = one.update(walk)
     parts = [other.update(block) for block in np.array_split(walk[:3000], 11)]
     kept = other.snapshot()

@@ -40,6 +40,13 @@ def reference(leg):
     return shipped_references(leg)[0]
 
 
+@pytest.fixture(autouse=True)
+def short(monkeypatch) -> None:
+    """What a test begins to simulate costs little and, as with the usual length, is due after its end."""
+    monkeypatch.setattr(torque_reference, "CYCLES", 1)
+    monkeypatch.setattr(torque_reference, "PACE", 1)
+
+
 def leg_number(joint: int, factor: float) -> int:
     """Leg of the reference with a joint wider by a factor."""
     return 1 + len(WIDER) * joint + WIDER.index(factor)
@@ -311,8 +318,15 @@ def test_a_load_that_nobody_asked_for_is_told_and_not_taken_for_masses(leg, refe
 
 def test_on_the_ground_references_are_those_of_the_loaded_leg(leg, reference, monkeypatch) -> None:
     """The leg walks as a simulated one under the force of the template does."""
-    monkeypatch.setattr(torque_reference, "PACE", 1000)
-    monkeypatch.setattr(torque_reference, "CYCLES", 6)
+    # two rounds do, and of a joint that opens nothing is asked here
+    for where, name, value in (
+        (torque_reference, "PACE", 1000),
+        (torque_reference, "CYCLES", 6),
+        (torque_reference, "WIDER", (1.2, 1.5, 3.0)),
+        (references, "LOAD_ROUNDS", 2),
+        (observer_module, "LOAD_ROUNDS", 2),
+    ):
+        monkeypatch.setattr(where, name, value)
     observer = TorqueObserver(leg, MonitorConfig(load=Load(model=GROUND)), SIZE_NM, NEW)
     load = 300.0 * load_shape(build_linkage(leg), GROUND)
     own = attrs.evolve(reference.parameters, load=load)
@@ -631,6 +645,7 @@ def test_the_reference_of_an_identified_leg_is_used_if_it_explains_the_leg_bette
     monkeypatch.setattr(leg_model, "UNLIKE_FILE", 0.0)
     monkeypatch.setattr(references, "ROUNDS", 1)
     monkeypatch.setattr(torque_reference, "CYCLES", 8)
+    monkeypatch.setattr(torque_reference, "PACE", 6)
     observer = observer_of(leg)
     walk(observer, samples(reference, [0] * 1400))
     assert observer.state.parameters is observer.state.reference.parameters

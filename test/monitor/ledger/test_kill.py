@@ -13,6 +13,8 @@ from contextlib import closing
 from itertools import pairwise
 from pathlib import Path
 
+import pytest
+
 from leg_wear_monitor.monitor.ledger.rows import read_entry, read_loads
 from leg_wear_monitor.monitor.ledger.schema import verify
 
@@ -95,6 +97,7 @@ def kill_often(path, kills, seed):
     return lost_s
 
 
+@pytest.mark.slow  # doors/test_kills.py holds the last entry, test_kept_wear.py its interval
 def test_kills_lose_at_most_the_interval_and_count_nothing_twice(tmp_path):
     from monitor.ledger.walker import walk  # a script does not find it there
 

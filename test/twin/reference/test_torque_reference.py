@@ -7,6 +7,7 @@ import attrs
 import numpy as np
 import pytest
 
+from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.twin import torque_reference
 from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
@@ -14,7 +15,6 @@ from leg_wear_monitor.twin.torque_reference import (
     HEAVIER,
     LONGER,
     ROUGHER,
-    WIDER,
     TorqueReference,
     TorqueReferenceRun,
 )
@@ -22,6 +22,7 @@ from leg_wear_monitor.wear import SECTORS
 
 NEW, UNWORN = np.full(5, 3.0e-4), np.zeros((5, 2, SECTORS))
 STEADY = CrankProfile.steady(TURN)
+WIDER = (1.2, 2.0, 8.0)  # fewer than usual
 
 
 def finished(run: TorqueReferenceRun) -> TorqueReference:
@@ -35,6 +36,7 @@ def shorten(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(torque_reference, "CYCLES", 1)
     patch.setattr(torque_reference, "PACE", 1)
     patch.setattr(torque_reference, "_SETTLING", 0)
+    patch.setattr(torque_reference, "WIDER", WIDER)
 
 
 @pytest.fixture
@@ -53,13 +55,19 @@ def whole(leg) -> TorqueReference:
 
 
 @pytest.fixture(scope="module")
-def identified(leg):
+def small():
+    """A mechanism with few bodies, of which as many are simulated."""
+    return load_mechanism("four_bar")
+
+
+@pytest.fixture(scope="module")
+def identified(small):
     """A short reference of other bodies, and a snapshot of its run amidst a leg with another body."""
-    run = TorqueReferenceRun(leg)
+    run = TorqueReferenceRun(small)
     with pytest.MonkeyPatch.context() as patch:
         shorten(patch)
-        run.begin_identification(NEW, UNWORN, STEADY, LegParameters.none(leg))
-        for _ in range(7):
+        run.begin_identification(NEW[:2], UNWORN[:2], STEADY, LegParameters.none(small))
+        for _ in range(4):
             run.advance()
         snapshot, progress = run.snapshot(), run.progress
         return finished(run), snapshot, progress
@@ -104,40 +112,40 @@ def test_a_part_of_a_reference_goes_on_where_it_ended(leg, whole, short) -> None
         np.testing.assert_array_equal(torque, same)
 
 
-def test_a_part_of_an_identification_goes_on_where_it_ended(leg, identified, short) -> None:
+def test_a_part_of_an_identification_goes_on_where_it_ended(small, identified, short) -> None:
     found, snapshot, progress = identified
-    first, second = (TorqueReferenceRun(leg) for _ in range(2))
+    first, second = (TorqueReferenceRun(small) for _ in range(2))
     first.restore(snapshot)
     part = first.part
     assert part is not None and part.is_of_parameters and len(part.torque_nm) < len(found.torque_nm)
-    second.go_on(part, UNWORN)
+    second.go_on(part, UNWORN[:2])
     assert second.progress == pytest.approx(progress, abs=0.06)
     for torque, same in zip(found.torque_nm, finished(second).torque_nm, strict=True):
         np.testing.assert_array_equal(torque, same)
 
 
-def test_each_body_is_heavier_and_longer_in_turn_and_friction_larger(leg, identified, short) -> None:
-    none, found = LegParameters.none(leg), identified[0]
-    bodies = len(leg.bodies)
+def test_each_body_is_heavier_and_longer_in_turn_and_friction_larger(small, identified, short) -> None:
+    none, found = LegParameters.none(small), identified[0]
+    bodies = len(small.bodies)
     assert len(found.torque_nm) == 2 + 2 * bodies
     assert (found.clearance_m == 3.0e-4).all()
-    # the fourth leg of the heavier ones is that with its fourth body heavier, simulated alone
-    one = np.eye(bodies)[3]
+    # the second leg of the heavier ones is that with its second body heavier, simulated alone
+    one = np.eye(bodies)[1]
     for number, alone in (
-        (4, attrs.evolve(none, mass=none.mass + HEAVIER * one)),
-        (4 + bodies, attrs.evolve(none, length=none.length + LONGER * one)),
+        (2, attrs.evolve(none, mass=none.mass + HEAVIER * one)),
+        (2 + bodies, attrs.evolve(none, length=none.length + LONGER * one)),
         (1 + 2 * bodies, attrs.evolve(none, friction=ROUGHER)),
     ):
-        other = TorqueReferenceRun(alone.applied(leg))
-        other.begin(NEW, UNWORN, STEADY)
+        other = TorqueReferenceRun(alone.applied(small))
+        other.begin(NEW[:2], UNWORN[:2], STEADY)
         while not other.snapshot().done:
             other.advance()
         np.testing.assert_array_equal(other.snapshot().done[0], found.torque_nm[number])
 
 
-def test_a_restored_run_continues_bit_for_bit(leg, identified, short) -> None:
+def test_a_restored_run_continues_bit_for_bit(small, identified, short) -> None:
     found, snapshot, progress = identified
-    other = TorqueReferenceRun(leg)
+    other = TorqueReferenceRun(small)
     other.restore(snapshot)
     assert other.progress == progress
     for one, same in zip(found.torque_nm, finished(other).torque_nm, strict=True):

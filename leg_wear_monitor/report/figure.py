@@ -69,6 +69,18 @@ def tidy(axes: Axes) -> None:
     axes.set_axisbelow(True)
 
 
+def finish(axes: Axes, title: str = "", x: str = "", y: str = "", columns: int = 0) -> None:
+    """Format axes, with a title, labels, and a legend of at most so many columns for several named lines."""
+    tidy(axes)
+    if title:
+        axes.set_title(title, fontsize=SMALL + 1.0, color=INK, fontweight="bold")
+    axes.set_xlabel(x, fontsize=SMALL)
+    axes.set_ylabel(y, fontsize=SMALL)
+    names = axes.get_legend_handles_labels()[1]
+    if columns and len(names) > 1:
+        axes.legend(fontsize=SMALL, frameon=False, ncols=min(columns, len(names)), handletextpad=0.3)
+
+
 # Units in which values are easy to read.
 
 
@@ -252,7 +264,9 @@ def worn_bushings(
             f"{name}\n" + (f"depth × {factor}" if factor else "no wear"), fontsize=USUAL, color=INK
         )
         unrolled = figure.add_subplot(grid[1, k])
-        _draw_unrolled(unrolled, depth * scale, zone)
+        draw_depth(unrolled, scale * depth[None], zone)
+        unrolled.set_xticks((0.0, 90.0, 180.0, 270.0, 360.0))
+        unrolled.set_xlabel("angle in its own body [°]", fontsize=SMALL)
         if k == 0:
             unrolled.set_ylabel(f"depth [{unit}]", fontsize=SMALL)
     _draw_key(figure.add_subplot(grid[2, :]))
@@ -304,18 +318,22 @@ def _factor(value: float) -> str:
     return f"{value:.0f}" if exponent < 3 else f"{value / 10.0**exponent:.1f}·10{power}"
 
 
-def _draw_unrolled(axes: Axes, depth: Floats, zone: tuple[float, float] | None) -> None:
-    n = depth.shape[1]
-    angle = (np.arange(n) + 0.5) * (360.0 / n)
+def draw_depth(axes: Axes, depth: Floats, zone: tuple[float, float] | None) -> None:
+    """Draw the depth (r, 2, N) of bushing and journal in r runs over the angle [deg], and shade the zone.
+
+    Over three turns, so that a zone across 0 is not cut. Of several runs, the least and the greatest are the
+    ends of a band around the mean.
+    """
+    n = depth.shape[2]
+    angle = (np.arange(-n, 2 * n) + 0.5) * (360.0 / n)
     if zone is not None:
         for turn in (0.0, -360.0):
-            left, right = max(0.0, zone[0] + turn), min(360.0, zone[1] + turn)
-            if right > left:
-                axes.axvspan(left, right, color=PALE, alpha=0.6, linewidth=0.0)
-    axes.fill_between(angle, depth[BUSHING], color=BLUE, alpha=0.25, linewidth=0.0)
-    axes.plot(angle, depth[BUSHING], color=BLUE, linewidth=1.2)
-    axes.plot(angle, depth[JOURNAL], color=VERMILION, linewidth=1.2)
+            axes.axvspan(zone[0] + turn, zone[1] + turn, color=PALE, alpha=0.6, linewidth=0.0)
+    for surface, colour in ((BUSHING, BLUE), (JOURNAL, VERMILION)):
+        runs = np.tile(depth[:, surface], 3)
+        low = runs.min(axis=0) if len(runs) > 1 else 0.0
+        axes.fill_between(angle, low, runs.max(axis=0), color=colour, alpha=0.25, linewidth=0.0)
+        axes.plot(angle, runs.mean(axis=0), color=colour, linewidth=1.0)
     tidy(axes)
-    axes.set(xlim=(0.0, 360.0), xticks=(0.0, 90.0, 180.0, 270.0, 360.0))
-    axes.set_ylim(bottom=0.0)
-    axes.set_xlabel("angle in its own body [°]", fontsize=SMALL)
+    axes.set_xlim(0.0, 360.0)
+    axes.set_ylim(0.0, 1.05 * float(depth.max()) or 1.0)

@@ -15,7 +15,7 @@ from leg_wear_monitor.mechanism import position
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import GROUND, Mechanism
 from leg_wear_monitor.studies import life_tasks
-from leg_wear_monitor.studies.plan import Arrays, code_digest
+from leg_wear_monitor.studies.plan import ERRORS, Arrays, code_digest
 from leg_wear_monitor.twin.reference import LegParameters
 from leg_wear_monitor.wear import BUSHING, wear_zone
 
@@ -98,7 +98,6 @@ def _walk(leg: Mechanism) -> tuple[float, Floats]:
 
 
 BAND = (0.05, 0.5, 0.95)  # quantiles of the ensemble's cycles: lower end of the band, median, upper end
-ERRORS = ("toe_position_m", "toe_velocity_mps", "toe_acceleration_mps2", "drive_torque_nm")
 
 _FIGURES = (
     "mean_force_n", "rms_force_n", "p99_force_n",

@@ -12,8 +12,7 @@ import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.studies.kinds import ALL, FOOT, HIP, KNEE, PLACES, RIGID_KNEE, SETS
-from leg_wear_monitor.studies.leg_tasks import ERRORS
-from leg_wear_monitor.studies.plan import Arrays, Names
+from leg_wear_monitor.studies.plan import ERRORS, Arrays, Names
 
 # Effects: how far a claim is from its limit in one leg, with the standard error of that.
 

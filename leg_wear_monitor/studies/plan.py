@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from leg_wear_monitor.configuration import FieldError, described, quantity
-from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.wear import BUSHING, wear_zone
 
@@ -142,6 +141,10 @@ class Point:
         plain = json.dumps([self.task, self.settings], sort_keys=True, allow_nan=False)
         leg = repr(attrs.evolve(mechanism, source=""))
         return hashlib.sha256("\n".join((plain, leg, code_digest())).encode()).hexdigest()[:20]
+
+
+Found = Sequence[tuple[Point, Arrays]]
+"""Points with their results."""
 
 
 @cache
@@ -298,12 +301,10 @@ class OnePlace(Study):
 # Statistics of an ensemble: means with their spread, and comparisons between sets of joints.
 
 
-RANGES = {  # largest errors, and the ideal curve whose range they are compared with
-    "toe_position_m": "ideal_toe_position_m",
-    "toe_velocity_mps": "ideal_toe_velocity_mps",
-    "toe_acceleration_mps2": "ideal_toe_acceleration_mps2",
-    "drive_torque_nm": "ideal_drive_torque_nm",
-}
+ERRORS = ("toe_position_m", "toe_velocity_mps", "toe_acceleration_mps2", "drive_torque_nm")
+"""What is compared with the ideal leg: ``error_<name>``, ``ideal_<name>`` and so on."""
+DEPTH, VOLUME = "wear_depth_m_per_cycle", "archard_integral_j_per_cycle"
+_OF_ALL_JOINTS = ("peak_force_n", "mean_force_n", "rms_force_n", "p99_force_n")
 
 
 class Spread(NamedTuple):
@@ -323,14 +324,13 @@ def spread(values: ArrayLike) -> Spread:
 
 
 def largest_error(arrays: Arrays, name: str) -> Spread:
-    """Spread of the largest error per cycle, over the cycles of all runs; `name` is a key of `RANGES`."""
+    """Spread of the largest error per cycle, over the cycles of all runs; `name` is one of `ERRORS`."""
     return spread(arrays[f"error_{name}"])
 
 
 def fraction_of_range(arrays: Arrays, name: str) -> float:
     """Mean largest error per cycle divided by the range of the ideal curve (larger one of x and y)."""
-    ideal = arrays[RANGES[name]]
-    return largest_error(arrays, name).mean / float(np.ptp(ideal, axis=0).max())
+    return largest_error(arrays, name).mean / float(np.ptp(arrays[f"ideal_{name}"], axis=0).max())
 
 
 def clearance_joints_of(arrays: Arrays) -> list[str]:
@@ -338,38 +338,22 @@ def clearance_joints_of(arrays: Arrays) -> list[str]:
     return [str(name) for name in arrays["clearance_joints"]]
 
 
-def peak_force(arrays: Arrays, joint: str) -> Spread:
-    """Spread of the largest force of a joint per cycle, over the cycles of all runs."""
-    return spread(arrays["peak_force_n"][..., [str(name) for name in arrays["joints"]].index(joint)])
+def of_joint(arrays: Arrays, name: str, joint: str) -> Spread:
+    """Spread of a statistic of a joint over runs, and over their cycles if each of these has one.
 
-
-def joint_force(arrays: Arrays, name: str, joint: str) -> Spread:
-    """``mean_force_n``, ``rms_force_n`` or ``p99_force_n`` of a joint, over runs."""
-    return spread(arrays[name][:, [str(other) for other in arrays["joints"]].index(joint)])
-
-
-def of_clearance_joints(arrays: Arrays, name: str, joint: str) -> Spread:
-    """Spread of an array for one clearance joint (index of the last axis), over all other axes."""
-    return spread(arrays[name][..., clearance_joints_of(arrays).index(joint)])
-
-
-def depth_per_cycle(arrays: Arrays, joint: str) -> Spread:
-    """Spread of the greatest bushing wear depth per cycle [m], over runs."""
-    return spread(
-        arrays["wear_depth_m_per_cycle"][:, clearance_joints_of(arrays).index(joint), BUSHING].max(axis=1)
-    )
-
-
-def mean_profile(arrays: Arrays, joint: str) -> Floats:
-    """Mean wear depth per cycle (N,) [m] of a joint's bushing."""
-    return np.asarray(
-        arrays["wear_depth_m_per_cycle"][:, clearance_joints_of(arrays).index(joint), BUSHING].mean(axis=0)
-    )
+    Forces are known of all joints, other statistics of the clearance joints; of a wear depth, the greatest of
+    the bushing counts.
+    """
+    if name in _OF_ALL_JOINTS:
+        return spread(arrays[name][..., [str(other) for other in arrays["joints"]].index(joint)])
+    k = clearance_joints_of(arrays).index(joint)
+    return spread(arrays[name][:, k, BUSHING].max(axis=1) if name == DEPTH else arrays[name][..., k])
 
 
 def worst_zone(arrays: Arrays, joint: str, fraction: float = 0.9) -> tuple[float, float] | None:
     """Narrowest zone [deg] that contains a fraction of the bushing's mean wear; None without wear."""
-    return wear_zone(mean_profile(arrays, joint), fraction)
+    profiles = arrays[DEPTH][:, clearance_joints_of(arrays).index(joint), BUSHING]
+    return wear_zone(np.asarray(profiles.mean(axis=0)), fraction)
 
 
 def power_law(values: ArrayLike, errors: ArrayLike) -> tuple[float, float]:

@@ -1,7 +1,7 @@
 """What a study found: its settings, and the result of each point, for pages and for Python users."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -231,19 +231,22 @@ def _values(effects: Sequence[Effect]) -> Floats:
 
 
 Columns = dict[str, list[Any]]
-_Found = Sequence[tuple[plan.Point, plan.Arrays]]
 
-_FORCES = ("mean_force_n", "rms_force_n", "p99_force_n")
-_OF_CONTACT = (
+_OF_JOINTS = (
+    "peak_force_n",
+    "mean_force_n",
+    "rms_force_n",
+    "p99_force_n",
     "impacts",
     "impact_speed_mps",
     "contact_fraction",
     "friction_work_j_per_cycle",
-    "archard_integral_j_per_cycle",
+    plan.VOLUME,
+    plan.DEPTH,
 )
 
 
-def point_columns(found: _Found) -> Columns:
+def point_columns(found: plan.Found) -> Columns:
     """One row a point: largest errors of toe and drive in a cycle against the ideal leg, and the torque.
 
     None for the errors of a toe that the leg does not have.
@@ -254,13 +257,14 @@ def point_columns(found: _Found) -> Columns:
         "clearance_m": [point.clearance_m for point, _ in found],
         "speed_rpm": [point.speed_rpm for point, _ in found],
     }
-    for name, ideal in plan.RANGES.items():
-        errors = [plan.largest_error(arrays, name) if ideal in arrays else None for _, arrays in found]
+    for name in plan.ERRORS:
+        is_known = f"ideal_{name}"
+        errors = [plan.largest_error(arrays, name) if is_known in arrays else None for _, arrays in found]
         columns |= _means(name, errors)
     return columns | _means("rms_torque_nm", [plan.spread(arrays["rms_torque_nm"]) for _, arrays in found])
 
 
-def joint_columns(found: _Found) -> Columns:
+def joint_columns(found: plan.Found) -> Columns:
     """One row a point and clearance joint: forces, impacts, contact, and wear of the bushing."""
     rows = [(point, arrays, joint) for point, arrays in found for joint in plan.clearance_joints_of(arrays)]
     columns: Columns = {
@@ -269,20 +273,9 @@ def joint_columns(found: _Found) -> Columns:
         "clearance_m": [point.clearance_m for point, _, _ in rows],
         "speed_rpm": [point.speed_rpm for point, _, _ in rows],
     }
-    statistics = [dict(_statistics(arrays, joint)) for _, arrays, joint in rows]
-    names = ("peak_force_n", *_FORCES, *_OF_CONTACT, "wear_depth_m_per_cycle")
-    for name in names:
-        columns |= _means(name, [each[name] for each in statistics])
+    for name in _OF_JOINTS:
+        columns |= _means(name, [plan.of_joint(arrays, name, joint) for _, arrays, joint in rows])
     return columns
-
-
-def _statistics(arrays: plan.Arrays, joint: str) -> Iterator[tuple[str, plan.Spread]]:
-    yield "peak_force_n", plan.peak_force(arrays, joint)
-    for name in _FORCES:
-        yield name, plan.joint_force(arrays, name, joint)
-    for name in _OF_CONTACT:
-        yield name, plan.of_clearance_joints(arrays, name, joint)
-    yield "wear_depth_m_per_cycle", plan.depth_per_cycle(arrays, joint)
 
 
 def _means(name: str, values: Sequence[plan.Spread | None]) -> Columns:

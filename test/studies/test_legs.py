@@ -10,13 +10,13 @@ from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.cli.verbs.study import write_study_page
 from leg_wear_monitor.errors import AssemblyError, ConfigError
 from leg_wear_monitor.mechanism.position import build_linkage, one_cycle
-from leg_wear_monitor.report.study.wear_page import claim_table, influence_gallery
+from leg_wear_monitor.report.study.page import influence_gallery
+from leg_wear_monitor.report.study.text import claim_table
 from leg_wear_monitor.studies import kinds
 from leg_wear_monitor.studies.execution import run_study
 from leg_wear_monitor.studies.kinds import ALL, FOOT, HIP, PLACES, SETS
 from leg_wear_monitor.studies.leg_tasks import (
     DEAD_POINT,
-    ERRORS,
     OPEN,
     STEP,
     TRANSMISSION,
@@ -26,11 +26,11 @@ from leg_wear_monitor.studies.leg_tasks import (
 )
 from leg_wear_monitor.studies.paper import CLAIMS, Effect, difference, greatest, least, log_ratio
 from leg_wear_monitor.studies.plan import (
+    ERRORS,
     Point,
     clearance_joints_of,
-    depth_per_cycle,
     largest_error,
-    peak_force,
+    of_joint,
 )
 from leg_wear_monitor.studies.results import FAILS, HOLDS, UNDECIDED, decide, evaluate, holm, load_results
 
@@ -72,8 +72,10 @@ def test_the_leg_with_factors_one_has_the_numbers_of_the_study_location(results,
             )
         for k, joint in enumerate(clearance_joints_of(arrays)):
             depth, peak = leg[f"set{i}_wear_depth_m_per_cycle"][:, k], leg[f"set{i}_peak_force_n"][:, k]
-            assert depth.mean() == pytest.approx(depth_per_cycle(arrays, joint).mean, rel=1e-12)
-            assert peak.mean() == pytest.approx(peak_force(arrays, joint).mean, rel=1e-12)
+            assert depth.mean() == pytest.approx(
+                of_joint(arrays, "wear_depth_m_per_cycle", joint).mean, rel=1e-12
+            )
+            assert peak.mean() == pytest.approx(of_joint(arrays, "peak_force_n", joint).mean, rel=1e-12)
 
 
 def test_a_leg_depends_on_its_seed_and_number_alone(results):

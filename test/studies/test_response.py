@@ -9,9 +9,9 @@ from leg_wear_monitor.dynamics.full_run import FullRun
 from leg_wear_monitor.dynamics.run import TORQUE_ERROR, new_run_statistics, steady_drive
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.studies.leg_tasks import ERRORS, run_ensemble
+from leg_wear_monitor.studies.leg_tasks import run_ensemble
 from leg_wear_monitor.studies.life_tasks import SAMPLES, ensemble, observed_legs, start_angles
-from leg_wear_monitor.studies.plan import RANGES, fraction_of_range
+from leg_wear_monitor.studies.plan import ERRORS, fraction_of_range
 from leg_wear_monitor.wear import BUSHING
 
 PLACE = {
@@ -34,7 +34,7 @@ def test_without_clearance_the_curves_are_the_ideal_ones():
     errors, forces = [], []
     for clearance in (1.0e-5, 1.0e-6, 1.0e-7):
         arrays = run_ensemble(load_mechanism(), PLACE | SHORT | {"clearance_m": clearance})
-        errors.append([fraction_of_range(arrays, name) for name in RANGES])
+        errors.append([fraction_of_range(arrays, name) for name in ERRORS])
         force = np.linalg.norm(arrays["example_contact_force_n"][:, 0], axis=1)
         ideal = arrays["ideal_joint_force_n"][:, 6]
         forces.append(np.sqrt(np.mean((force - ideal) ** 2) / np.mean(ideal**2)))

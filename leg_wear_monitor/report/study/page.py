@@ -1,176 +1,93 @@
-"""HTML page of a study, from the results in its directory."""
+"""HTML page of a study, from the results in its directory: one template, and what is each study's own."""
 
 import io
-from collections.abc import Callable
+import textwrap
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import attrs
+import numpy as np
 from ruamel.yaml import YAML
 
-from leg_wear_monitor.report.page import Page, Section, Sentences
-from leg_wear_monitor.report.study import findings
-from leg_wear_monitor.report.study.chaos_page import chaos, estimates_of, exponent_table, foretold
-from leg_wear_monitor.report.study.sections import (
-    Sections,
-    asked,
-    conclude,
-    curves,
-    cycle,
-    ends_and_middle,
-    tables,
-    wear,
+from leg_wear_monitor.mechanism.position import build_linkage, one_cycle
+from leg_wear_monitor.mechanism.reach import Reach
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.report.figure import (
+    BLUE,
+    GREEN,
+    INK,
+    PAPER,
+    VERMILION,
+    finish,
+    new_figure,
+    png,
 )
-from leg_wear_monitor.report.study.text import (
-    PICO,
-    Labelled,
+from leg_wear_monitor.report.leg_picture import leg_data, leg_picture
+from leg_wear_monitor.report.page import (
+    Gallery,
+    Live,
+    Page,
+    Picture,
+    Section,
+    Sentences,
+    Table,
+    Text,
+    render,
+    template_text,
+)
+from leg_wear_monitor.report.study import findings
+from leg_wear_monitor.report.study.chaos import (
+    chaos_sections,
+    chaos_sentences,
+    estimates_of,
+    foretold,
+)
+from leg_wear_monitor.report.study.figures import (
     Panel,
     compare_gallery,
-    joined,
-    number,
+    curve_galleries,
+    exponent_panel,
+    life_gallery,
+    panel_of_joints,
+    panels_of,
     trend_gallery,
-    with_spread,
-    zone_text,
+    wear_gallery,
 )
-from leg_wear_monitor.report.study.wear_page import legs, life, life_table, lubrication
+from leg_wear_monitor.report.study.text import (
+    END,
+    MILLIONTH,
+    claim_table,
+    error_table,
+    exponent_table,
+    force_table,
+    joined,
+    life_table,
+    wear_table,
+)
 from leg_wear_monitor.studies.execution import STUDIES
-from leg_wear_monitor.studies.life_tasks import Estimate
-from leg_wear_monitor.studies.plan import (
-    Arrays,
-    Spread,
-    Sweep,
-    clearance_joints_of,
-    depth_per_cycle,
-    joint_force,
-    of_clearance_joints,
-    spread,
-    worst_zone,
-)
-from leg_wear_monitor.studies.results import StudyResults
+from leg_wear_monitor.studies.plan import DEPTH, VOLUME, Arrays, Found, Sweep, clearance_joints_of, spread
+from leg_wear_monitor.studies.results import FAILS, HOLDS, UNDECIDED, LegClaims, StudyResults
 
-# HTML page of the study of the ground's load.
-
-
-_HEAD = "load"
-_MILLION = 1.0e-6
-
-
-def load(results: StudyResults, labelled: Labelled) -> Sections:
-    """Sections of the load study's page."""
-    lives = [(point.label, arrays) for point, arrays in results.of("life")]
-    exponents = [(point.label, arrays) for point, arrays in results.of("exponent")]
-    estimates = estimates_of(exponents)
-    sentences = [*_order(labelled), *_change(labelled), *_zones(labelled)]
-    sentences += [_of_a_life(label, arrays) for label, arrays in lives]
-    sentences += [foretold(label, one) for (label, _), one in zip(exponents, estimates, strict=True)]
-    chosen = ends_and_middle(results.of("response"))
-    shown = [(point.label, arrays) for point, arrays in chosen]
-    more = [*_joint_panels(labelled), _life_panel(labelled, lives)]
-    more.append(_exponent_panel(labelled, dict(zip(dict(exponents), estimates, strict=True))))
-    values = [float(point.settings["ground_n"]) for point, _ in results.of("response")]
-    gallery = trend_gallery(values, "vertical force, peak [N]", [arrays for _, arrays in labelled], more)
-    gallery = attrs.evolve(gallery, caption=f"{gallery.caption} Exponents: bars of two standard errors.")
-    table = tables(labelled, _HEAD)
-    further = [exponent_table(exponents, estimates, _HEAD)] if exponents else []
-    further += [life_table(lives, _HEAD)] if lives else []
-    return [
-        asked(results),
-        conclude(sentences + findings.regular_where(labelled)),
-        Section("Over the load", [gallery]),
-        cycle(results, chosen),
-        curves(shown),
-        wear(results, shown),
-        Section(table.title, [*table.parts, *further]),
-    ]
-
-
-def _order(labelled: Labelled) -> list[str]:
-    """The joints by worn depth under each load."""
-    texts = []
-    for label, arrays in labelled:
-        depth = {joint: depth_per_cycle(arrays, joint) for joint in clearance_joints_of(arrays)}
-        ranked = sorted(depth, key=lambda joint: -depth[joint].mean)
-        texts.append(f"{label}: {' > '.join(ranked)}")
-    return [f"Joints by the greatest wear depth of a cycle, at {'; '.join(texts)}."]
-
-
-def _change(labelled: Labelled) -> list[str]:
-    """Force and wear of each joint under the largest load, against the least one."""
-    (first, before), (last, after) = labelled[0], labelled[-1]
-    sentences = []
-    for joint in clearance_joints_of(before):
-        force = [joint_force(each, "mean_force_n", joint) for each in (before, after)]
-        depth = [depth_per_cycle(each, joint) for each in (before, after)]
-        volume = [
-            of_clearance_joints(each, "archard_integral_j_per_cycle", joint) for each in (before, after)
-        ]
-        grown = [number(two.mean / one.mean) for one, two in (force, volume, depth)]
-        sentences.append(
-            f"Joint {joint}, from {first} to {last}: mean force {with_spread(force[0])} to "
-            f"{with_spread(force[1])} N (× {grown[0]}), worn volume × {grown[1]}, greatest depth "
-            f"{with_spread(depth[0], PICO)} to {with_spread(depth[1], PICO)} pm a cycle (× {grown[2]})."
-        )
-    return sentences
-
-
-def _zones(labelled: Labelled) -> list[str]:
-    """Where half of each joint's wear is, under each load."""
-    return [
-        f"Joint {joint}, zone that holds half of the bushing's wear: "
-        + "; ".join(f"{label} {zone_text(worst_zone(arrays, joint, 0.5))}" for label, arrays in labelled)
-        + "."
-        for joint in clearance_joints_of(labelled[0][1])
-    ]
-
-
-def _of_a_life(label: str, arrays: Arrays) -> str:
-    """Which joint opens first, when, and how far the others are by then."""
-    mean, names = arrays["clearance_mean_m"], clearance_joints_of(arrays)
-    opened = 1.0e3 * (mean[:, -1] - mean[:, 0]).mean(axis=0)
-    first = int(opened.argmax())
-    others = [f"{name} {number(opened[k])}" for k, name in enumerate(names) if k != first]
-    rest = f"; by then the others by {joined(others)} mm" if others else ""
-    cycles = with_spread(spread(arrays["cycles"][:, -1]), _MILLION)
-    return f"{label}: {names[first]} opens by {number(opened[first])} mm in {cycles} million cycles{rest}."
-
-
-def _joint_panels(labelled: Labelled) -> list[Panel]:
-    names = clearance_joints_of(labelled[0][1])
-    force: dict[str, list[Spread | None]] = {
-        name: [joint_force(arrays, "mean_force_n", name) for _, arrays in labelled] for name in names
-    }
-    volume: dict[str, list[Spread | None]] = {
-        name: [of_clearance_joints(arrays, "archard_integral_j_per_cycle", name) for _, arrays in labelled]
-        for name in names
-    }
-    return [Panel("mean force [N]", force, 1.0), Panel("∫ F |v| dt [J a cycle]", volume, 1.0)]
-
-
-def _life_panel(labelled: Labelled, lives: Labelled) -> Panel:
-    cycles = {label: spread(arrays["cycles"][:, -1]) for label, arrays in lives}
-    line = [cycles.get(label) for label, _ in labelled]
-    return Panel("life of the joint that opens first [million cycles]", {"": line}, _MILLION)
-
-
-def _exponent_panel(labelled: Labelled, estimates: dict[str, Estimate]) -> Panel:
-    """Bars of two standard errors."""
-    line: list[Spread | None] = []
-    for label, _ in labelled:
-        one = estimates.get(label)
-        around = (one.value - 2.0 * one.error, one.value + 2.0 * one.error) if one else None
-        line.append(Spread(one.value, one.error, *around) if one and around else None)
-    return Panel("largest Lyapunov exponent [1/cycle]", {"": line}, 1.0)
+CLEARANCE_FRACTION = 0.3  # drawn clearance, as a fraction of the bushing's radius
+_MOST_SHOWN = 6  # points whose curves and surfaces are drawn; of more, the first, the middle and the last
+_ALT = "The leg at the chosen crank angle, with the contact forces in its clearance joints"
 
 
 def study_page(results: StudyResults) -> Page:
     """The page of a study.
 
-    Raises
-    ------
-    KeyError
-        If this version does not know the study.
+    Parameters
+    ----------
+    results : StudyResults
+        Results; points may be missing.
+
+    Returns
+    -------
+    Page
+        Without any result, only the missing points are listed.
     """
-    labelled = [(point.label, arrays) for point, arrays in results.of("response")]
     study = STUDIES[results.study]
-    sections = _sections(study.sweep, results, labelled) if labelled or results.of("leg") else []
+    sections = _sections(results) if results.of("response") or results.of("leg") else []
     buffer = io.StringIO()
     YAML().dump(attrs.asdict(results.settings), buffer)
     return Page(
@@ -182,7 +99,7 @@ def study_page(results: StudyResults) -> Page:
     )
 
 
-def _notice(results: StudyResults) -> Sections:
+def _notice(results: StudyResults) -> list[Section]:
     """Section on missing points: those that failed and those not computed yet; empty if none."""
     lines = [f"{label}: {fault}" for label, fault in results.faults]
     if results.missing:
@@ -190,79 +107,231 @@ def _notice(results: StudyResults) -> Sections:
     return [Section("Missing points", [Sentences(lines)])] if lines else []
 
 
-def _sections(sweep: Sweep | None, results: StudyResults, labelled: Labelled) -> Sections:
-    return _PAGES[results.study](results, labelled) if sweep is None else _swept(sweep, results, labelled)
+class _Own(NamedTuple):
+    """What the page of a study has of its own.
+
+    Attributes
+    ----------
+    sentences : list of str
+        Conclusions.
+    sections : list of Section
+        Pictures below them.
+    head : str
+        Title of the first column of the tables.
+    tables : list of Table
+        Further ones.
+    """
+
+    sentences: list[str]
+    sections: list[Section]
+    head: str = "clearance joints"
+    tables: Sequence[Table] = ()
 
 
-def _swept(sweep: Sweep, results: StudyResults, labelled: Labelled) -> Sections:
-    values = [sweep.value(point) for point, _ in results.of("response")]
-    chosen = ends_and_middle(results.of("response"))
-    shown = [(point.label, arrays) for point, arrays in chosen]
-    sentences = [
-        *findings.disturbance(labelled),
-        *findings.growth(values, labelled, sweep.quantity),
-        *findings.regular_where(labelled),
-    ]
-    arrays = [each for _, each in labelled]
+def _sections(results: StudyResults) -> list[Section]:
+    """The template: question, conclusions, own pictures, a cycle, curves, wear and tables of the points."""
+    found, sweep = results.of("response"), STUDIES[results.study].sweep
+    own = _swept(sweep, found) if sweep else _PAGES[results.study](results, found)
+    sections = [_asked(results), Section("Conclusions", [Sentences(own.sentences)]), *own.sections]
+    if not found:
+        return sections
+    shown = found if len(found) <= _MOST_SHOWN else [found[0], found[len(found) // 2], found[-1]]
+    what = "Wear of a million cycles of new joints, as a million times the mean wear of a cycle"
+    worn = wear_gallery(results.mechanism, shown, what, lambda arrays: 1.0e6 * arrays[DEPTH])
+    tables = [table(found, own.head) for table in (error_table, force_table, wear_table)]
     return [
-        asked(results),
-        conclude(sentences),
-        Section(f"Over the {sweep.quantity}", [trend_gallery(values, sweep.axis, arrays)]),
-        cycle(results, chosen),
-        curves(shown),
-        wear(results, shown),
-        tables(labelled, sweep.quantity),
+        *sections,
+        Section("One gait cycle", [leg_slider(results.mechanism, shown)]),
+        Section("Curves of a cycle", curve_galleries(shown)),
+        Section("Wear", [worn]),
+        Section("Tables", [*tables, *own.tables]),
     ]
 
 
-def _compared(results: StudyResults, labelled: Labelled, sentences: list[str], head: str) -> Sections:
-    chosen = results.of("response")
-    shown = labelled if len(labelled) <= 6 else ends_and_middle(list(labelled))
-    return [
-        asked(results),
-        conclude(sentences),
-        Section("Side by side", [compare_gallery(labelled)]),
-        cycle(results, chosen if len(chosen) <= 6 else ends_and_middle(chosen)),
-        curves(shown),
-        wear(results, shown),
-        tables(labelled, head),
-    ]
-
-
-def _location(results: StudyResults, labelled: Labelled) -> Sections:
-    return _compared(
-        results, labelled, findings.disturbance(labelled) + findings.places(labelled), "clearance joints"
+def _asked(results: StudyResults) -> Section:
+    """Section that describes the ensemble and shows the leg."""
+    ensemble = results.settings.ensemble
+    text = (
+        f"Each number is an ensemble of {ensemble.runs} runs that start at different crank angles with "
+        f"their journals in different places; {ensemble.cycles} gait cycles of each are counted, after "
+        f"{ensemble.skip_cycles} that are not. Motion with clearance is chaotic: a single run is an "
+        "example."
     )
+    joints = list(dict.fromkeys(name for point in results.points for name in point.clearance_joints))
+    names = ", ".join(results.mechanism.joints)
+    leg = Picture(
+        image=png(leg_picture(results.mechanism, joints)),
+        alt=f"The leg to scale, joints {names}, clearance in {joined(joints)}, path of its toe",
+        caption=f"The leg to scale. Clearance joints of this study: {joined(joints)}.",
+        wide=True,
+    )
+    return Section("Question", [Text(text), leg])
 
 
-def _multi(results: StudyResults, labelled: Labelled) -> Sections:
-    *parts, (_, whole) = labelled
+def _swept(sweep: Sweep, found: Found) -> _Own:
+    values = [sweep.value(point) for point, _ in found]
     sentences = [
-        *findings.worst_joint(whole),
-        *findings.superposition(parts, whole),
-        *findings.disturbance(labelled),
-        *findings.impacts(labelled[-1:]),
-        *findings.regularity(labelled[-1:]),
-        *findings.zones(labelled[-1:]),
+        *findings.disturbance(found),
+        *findings.growth(values, found, sweep.quantity),
+        *findings.regular_where(found),
     ]
-    return _compared(results, labelled, sentences, "clearance joints")
+    gallery = trend_gallery(panels_of(found), values, sweep.axis)
+    return _Own(sentences, [Section(f"Over the {sweep.quantity}", [gallery])], sweep.quantity)
 
 
-def _laws(results: StudyResults, labelled: Labelled) -> Sections:
-    return _compared(results, labelled, findings.laws(labelled), "law")
+def _compared(found: Found, sentences: list[str], head: str = "clearance joints") -> _Own:
+    gallery = compare_gallery(panels_of(found), [point.label for point, _ in found])
+    return _Own(sentences, [Section("Side by side", [gallery])], head)
 
 
-def _lubrication(results: StudyResults, labelled: Labelled) -> Sections:
-    return _compared(results, labelled, lubrication(labelled) + findings.disturbance(labelled), "lubricant")
+def _location(_results: StudyResults, found: Found) -> _Own:
+    return _compared(found, findings.disturbance(found) + findings.places(found))
 
 
-_PAGES: dict[str, Callable[[StudyResults, Labelled], Sections]] = {
+def _multi(_results: StudyResults, found: Found) -> _Own:
+    *alone, whole = found
+    sentences = [
+        *findings.several_at_once(alone, whole[1]),
+        *findings.disturbance(found),
+        *findings.impacts([whole]),
+        *findings.regularity([whole]),
+        *findings.zones([whole]),
+    ]
+    return _compared(found, sentences)
+
+
+def _laws(_results: StudyResults, found: Found) -> _Own:
+    return _compared(found, findings.laws(found), "law")
+
+
+def _lubrication(_results: StudyResults, found: Found) -> _Own:
+    return _compared(found, findings.lubrication(found) + findings.disturbance(found), "lubricant")
+
+
+def _load(results: StudyResults, found: Found) -> _Own:
+    lives, exponents = results.of("life"), results.of("exponent")
+    cycles = {point.label: spread(arrays["cycles"][:, -1]) for point, arrays in lives}
+    estimates = estimates_of(exponents)
+    by_label = {point.label: one for (point, _), one in zip(exponents, estimates, strict=True)}
+    life = [cycles.get(point.label) for point, _ in found]
+    panels = [
+        *panels_of(found),
+        panel_of_joints(found, "mean_force_n", "mean force [N]"),
+        panel_of_joints(found, VOLUME, "∫ F |v| dt [J a cycle]"),
+        Panel("life of the joint that opens first [million cycles]", {"": life}, MILLIONTH),
+        exponent_panel([by_label.get(point.label) for point, _ in found]),
+    ]
+    values = [float(point.settings["ground_n"]) for point, _ in found]
+    gallery = trend_gallery(panels, values, "vertical force, peak [N]")
+    gallery = attrs.evolve(gallery, caption=f"{gallery.caption} Exponents: bars of two standard errors.")
+    sentences = [
+        *findings.load(found),
+        *findings.lives(lives),
+        *foretold(exponents),
+        *findings.regular_where(found),
+    ]
+    tables = [exponent_table(exponents, estimates, "load")] if exponents else []
+    tables += [life_table(lives, "load")] if lives else []
+    return _Own(sentences, [Section("Over the load", [gallery])], "load", tables)
+
+
+def _wear(results: StudyResults, found: Found) -> _Own:
+    lives = results.of("life")
+    sentences = [*findings.wear(found), *findings.zones(found), *findings.lives(lives)]
+    if not lives:
+        return _Own(sentences, [])
+    what = "Surfaces at the end of the life"
+    worn = wear_gallery(results.mechanism, lives, what, lambda arrays: arrays["depth_m"][:, END])
+    sections = [Section("Over a life", [life_gallery(lives)]), Section("Worn surfaces", [worn])]
+    return _Own(sentences, sections, tables=[life_table(lives, "clearance joints")])
+
+
+def _chaos(results: StudyResults, found: Found) -> _Own:
+    sentences = chaos_sentences(results) + findings.regularity(found)
+    exponents = results.of("exponent")
+    table = [exponent_table(exponents, estimates_of(exponents), "clearance joints")] if exponents else []
+    return _Own(sentences, chaos_sections(results), tables=table)
+
+
+def _legs(results: StudyResults, _found: Found) -> _Own:
+    claims = results.claims()
+    gallery = influence_gallery(claims)
+    decides = [Section("What decides", [gallery])] if gallery.pictures else []
+    return _Own(findings.claims(claims), [Section("Claims", [claim_table(claims)]), *decides])
+
+
+_PAGES: dict[str, Callable[[StudyResults, Found], _Own]] = {
     "location": _location,
     "multi": _multi,
     "laws": _laws,
     "lubrication": _lubrication,
-    "load": load,
-    "wear": life,
-    "chaos": chaos,
-    "legs": legs,
+    "load": _load,
+    "wear": _wear,
+    "chaos": _chaos,
+    "legs": _legs,
 }
+
+
+def influence_gallery(claims: LegClaims) -> Gallery:
+    """Pictures of claims that some factor influences: the measure of the claim over the strongest factor."""
+    pictures = []
+    for result in (one for one in claims.claims if one.influences):
+        first = result.influences[0]
+        factor, values = claims.factors[first.factor], np.array([one.value for one in result.effects])
+        figure = new_figure(4.6, 3.1)
+        axes = figure.subplots()
+        for state, colour, mark in ((HOLDS, BLUE, "o"), (FAILS, VERMILION, "s"), (UNDECIDED, GREEN, "^")):
+            chosen = np.array(result.states) == state
+            axes.plot(
+                factor[chosen], values[chosen], mark, color=colour, markersize=4.5, markeredgewidth=0.0,
+                label=f"{state} ({chosen.sum()})",
+            )  # fmt: skip
+        axes.axhline(0.0, color=INK, linewidth=0.8)
+        if result.file_leg is not None:
+            axes.plot(1.0, result.file_leg.value, "*", color=INK, markersize=13.0, markeredgecolor=PAPER)
+        axes.margins(y=0.2)  # room for the legend
+        title = textwrap.fill(result.claim.text, 52)
+        finish(axes, title, f"factor on the {first.factor}", "measure of the claim", columns=3)
+        alt = f"{result.claim.text}: over the {first.factor}, rank correlation {first.rank_correlation:+.2f}"
+        pictures.append(Picture(image=png(figure), alt=alt))
+    caption = (
+        "A point for each leg; star: the leg of the file. The measure is the logarithm of the ratio that the "
+        "claim says is above 1, or the difference of the fractions (of variance that repeats, of a turn); "
+        "above 0 the claim holds."
+    )
+    return Gallery(pictures=pictures, caption=caption)
+
+
+def leg_slider(mechanism: Mechanism, found: Found) -> Live:
+    """Interactive picture of the leg over a gait cycle: one cycle of an example run of each point."""
+    linkage, speed_rpm = build_linkage(mechanism), found[0][0].speed_rpm
+    frames = len(found[0][1]["example_eccentricity_m"])
+    motion = one_cycle(linkage, frames, speed_rpm * np.pi / 30.0)  # ideal: only its direction matters
+    reach = Reach(linkage, 1, motion.crank_angle, motion.q, turns=True)
+    runs = [_run_data(point.label, arrays, point.clearance_m) for point, arrays in found]
+    longest_n = max(run["largest_n"] for run in runs)
+    data = leg_data(reach) | {"digits": 0, "skip": 2, "runs": runs, "longest_n": longest_n}
+    radius = mechanism.clearances[clearance_joints_of(found[0][1])[0]].bushing_radius
+    factors = [CLEARANCE_FRACTION * radius / point.clearance_m for point, _ in found]
+    low, high = min(factors), max(factors)
+    factor = f"{low:.3g}" if high - low < 1.0e-6 * high else f"{low:.3g} to {high:.3g}"
+    return Live(
+        markup=render("leg_slider.html", data=data, names=[run["label"] for run in runs], alt=_ALT),
+        script=template_text("leg_slider.js"),
+        caption="One gait cycle of one run, an example. The leg is to scale, its bodies in ideal positions: "
+        "clearance moves them by millimetres. Arrows: force of the bushing on the pin; their length grows "
+        f"with the root of the force, up to {longest_n:.0f} N. Circles: each pin in its bushing, the "
+        f"clearance magnified {factor} times, with the path of the pin's centre over the cycle.",
+    )
+
+
+def _run_data(label: str, arrays: Arrays, clearance_m: float) -> dict[str, Any]:
+    """Eccentricities [clearances] and contact forces [N] of an example cycle, with y downwards."""
+    e, force = arrays["example_eccentricity_m"] / clearance_m, arrays["example_contact_force_n"]
+    flip = np.array([1.0, -1.0])
+    pins = {
+        name: {"e": (e[:, k] * flip).round(3).tolist(), "f": (force[:, k] * flip).round(1).tolist()}
+        for k, name in enumerate(clearance_joints_of(arrays))
+    }
+    largest = float(np.linalg.norm(force, axis=-1).max())
+    return {"label": label, "clearance_mm": round(1.0e3 * clearance_m, 4), "pins": pins, "largest_n": largest}

@@ -48,7 +48,8 @@ def test_depth_is_unrolled_over_the_angle_in_a_fitting_unit(surfaces):
     assert unrolled.get_ylabel() == "depth [nm]"
     angle, depth = unrolled.lines[0].get_data()
     assert depth.max() == pytest.approx(4.0)
-    worn = angle[depth > 0.0]
+    worn = angle[(depth > 0.0) & (angle > 0.0) & (angle < 360.0)]  # three turns are drawn, one is shown
+    assert unrolled.get_xlim() == (0.0, 360.0)
     assert (worn[0], worn[-1]) == pytest.approx((50.25, 99.75))
 
 

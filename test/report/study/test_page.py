@@ -56,8 +56,7 @@ def test_conclusions_are_computed_from_the_data(study, unpainted):
 
 
 def test_a_superposition_is_called_one_only_where_it_is(study):
-    parts_of = [(point.label, arrays) for point, arrays in study("multi").of("response")]
-    *alone, (_, whole) = parts_of
+    *alone, (_, whole) = study("multi").of("response")
     summed = {
         **whole,
         **{
@@ -66,9 +65,9 @@ def test_a_superposition_is_called_one_only_where_it_is(study):
             if name.startswith("error_")
         },
     }  # fmt: skip
-    assert findings.superposition(alone, summed)[0].startswith("All at once is the sum of the places alone")
+    assert findings.superposition(alone, summed).startswith("All at once is the sum of the places alone")
     halved = {**summed, "error_toe_velocity_mps": 0.5 * summed["error_toe_velocity_mps"]}
-    assert findings.superposition(alone, halved)[0].startswith("All at once is not the sum")
+    assert findings.superposition(alone, halved).startswith("All at once is not the sum")
 
 
 def test_points_that_failed_or_are_missing_come_first(study, unpainted):

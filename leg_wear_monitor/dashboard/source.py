@@ -35,16 +35,14 @@ from leg_wear_monitor.report.page import (
     Part,
     Table,
     Text,
-    alarm_line,
     render,
     template_text,
     verdict_banner,
 )
-from leg_wear_monitor.report.replay.charts import health_chart
-from leg_wear_monitor.report.replay.joint_rows import joint_rows, joint_views
-from leg_wear_monitor.report.replay.joint_trends import joint_trends
-from leg_wear_monitor.report.replay.page import belief, leg_drawing
-from leg_wear_monitor.state import Evidence, LegState, Level, State, Verdict
+from leg_wear_monitor.report.replay.charts import health_chart, joint_trends
+from leg_wear_monitor.report.replay.joints import joints_and_leg
+from leg_wear_monitor.report.replay.page import belief, raised_alarms
+from leg_wear_monitor.state import Evidence, LegState, State, Verdict
 
 # What is known of a leg at one instant, in the shape of a replay's summary: so the page has its words.
 
@@ -241,20 +239,17 @@ def joints_region(view: ReplaySummary, instead: str = "") -> str:
     """The leg with its joints; a sentence instead of them, where they are not known."""
     if instead:
         return _parts([Text(instead, is_not_valid=True)])
-    views = joint_views(view)
-    drawing, rows = leg_drawing(view, views), joint_rows(view, views)
-    return render("replay/joints_and_leg.html", drawing=drawing.markup, rows=rows.markup)
+    return joints_and_leg(view)
 
 
 def alarms_region(view: ReplaySummary) -> str:
     """Every alarm that is raised."""
-    raised = [alarm_line(view, alarm) for alarm in view.alarms.now if alarm.level is not Level.OK]
-    return render("replay/alarms.html", alarms=raised, advice=view.advice, otherwise="No alarm is raised.")
+    return raised_alarms(view, otherwise="No alarm is raised.")
 
 
 def belief_region(view: ReplaySummary) -> str:
     """Whether input, torque, cadence and model can be believed."""
-    return belief(view).markup
+    return belief(view)
 
 
 def status_region(view: ReplaySummary) -> str:

@@ -1,14 +1,14 @@
-"""Charts of a replay over time: clearances, forces, input, alarms."""
+"""Charts of a replay over time: clearances, forces, input, alarms, a single joint."""
 
-import math
 from collections.abc import Iterable, Sequence
 
 import attrs
 import numpy as np
 
-from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.materials import BushingLoad
-from leg_wear_monitor.playback.result import EncoderEvidence, ReplayHistory, ReplaySummary
+from leg_wear_monitor.monitor.verdict.situation import SURE_SIGMAS
+from leg_wear_monitor.playback.result import ReplaySummary
 from leg_wear_monitor.report.figure import opened, time_of
 from leg_wear_monitor.report.page import (
     NOT_VALID,
@@ -22,39 +22,50 @@ from leg_wear_monitor.report.page import (
     not_valid,
     value,
 )
-from leg_wear_monitor.report.replay.joint_rows import counted_mm
+from leg_wear_monitor.report.replay.joints import counted_mm
 from leg_wear_monitor.state import AlarmChange, Figure
 
-SERIES_COLOURS = 7  # of the style sheet
-_GROUP = "time"
+_COLOURS = 7  # of the style sheet
 _STEADY = 0.1  # of the commanded cadence to either side, less does not fill the picture
 _NEAR = 3.0  # a limit beyond so many times the largest value would only flatten the curve
 
 
-def openings_chart(summary: ReplaySummary) -> Chart:
+def _over_time(
+    summary: ReplaySummary,
+    name: str,
+    words: str,
+    caption: str,
+    panels: Sequence[Panel],
+    stamps_ns: Ints | None = None,
+) -> Chart:
+    """A chart from begin to end of the recording; over the gait cycles if no other stamps are given."""
+    time, unit = time_of(summary, summary.history.stamp_ns if stamps_ns is None else stamps_ns)
+    ends = np.array([summary.recording.begin_ns, summary.recording.end_ns], np.int64)
+    begin, end = time_of(summary, ends)[0].tolist()
+    return Chart(
+        name=name,
+        alt=f"{words} over time",
+        caption=caption,
+        x=Series(name="time", unit=unit, values=time),
+        ends=(begin, max(end, begin + 1.0e-9)),
+        panels=panels,
+        group="time",
+    )
+
+
+def _openings_chart(summary: ReplaySummary) -> Chart:
     """How much each clearance has opened since the first gait cycle."""
     columns, unit = opened(summary)
     series = [
         Series(name=f"opened by {joint}", unit=unit, values=values, colour=_colour(k))
         for k, (joint, values) in enumerate(columns.items())
     ]
-    return Chart(
-        name="clearances",
-        alt="Opening of each joint's clearance over time",
-        caption="Mean radial clearance of each joint, minus its value after the first gait cycle.",
-        x=time_series(summary),
-        ends=ends_of(summary),
-        panels=[Panel(title="Opening of the clearances", series=series, height=260)],
-        group=_GROUP,
-    )
+    caption = "Mean radial clearance of each joint, minus its value after the first gait cycle."
+    panels = [Panel(title="Opening of the clearances", series=series, height=260)]
+    return _over_time(summary, "clearances", "Opening of each joint's clearance", caption, panels)
 
 
-def has_estimates(summary: ReplaySummary) -> bool:
-    """Whether encoders or the drive torque have shown a clearance at any time."""
-    return any(np.isfinite(values).any() for values in summary.history.seen_m.values())
-
-
-def estimates_chart(summary: ReplaySummary) -> Chart:
+def _estimates_chart(summary: ReplaySummary) -> Chart:
     """Clearances that encoders or the drive torque show, with their limit."""
     limits = [each.limit_m for each in summary.clearances.values()]
     series = [
@@ -63,123 +74,86 @@ def estimates_chart(summary: ReplaySummary) -> Chart:
     ]
     if limits:
         series.append(_limit("limit", "mm", 1.0e3 * min(limits), series[0].values))
-    return Chart(
-        name="estimates",
-        alt="Clearances that encoders or the drive torque show, over time",
-        caption="Mean radial clearance of each joint as encoders or the drive torque show it, whatever is "
-        "counted; nothing is drawn while they show none.",
-        x=time_series(summary),
-        ends=ends_of(summary),
-        panels=[Panel(title="Clearances by estimate", series=series, low=0.0, height=260)],
-        group=_GROUP,
+    caption = (
+        "Mean radial clearance of each joint as encoders or the drive torque show it, whatever is "
+        "counted; nothing is drawn while they show none."
     )
+    panels = [Panel(title="Clearances by estimate", series=series, low=0.0, height=260)]
+    words = "Clearances that encoders or the drive torque show,"
+    return _over_time(summary, "estimates", words, caption, panels)
 
 
-def force_chart(summary: ReplaySummary) -> Chart:
+def _force_chart(summary: ReplaySummary) -> Chart:
     """Peak and mean contact force of each joint in each gait cycle, a panel a joint, all on the same axis."""
     history, limits = summary.history, summary.monitor.limits
-    own = limits.joint_impact_force_n
-    greatest = max((_greatest(values) for values in history.peak_force_n.values()), default=0.0)
+    own = limits.joint_impact_force_n or [limits.impact_force_n] * len(history.peak_force_n)
+    greatest = _greatest(*history.peak_force_n.values())
+    shown = [limit for limit in own if limit < _NEAR * greatest]
     panels = []
-    for k, (joint, peak) in enumerate(history.peak_force_n.items()):
-        mean, limit = history.mean_force_n[joint], own[k] if own else limits.impact_force_n
+    for limit, (joint, peak) in zip(own, history.peak_force_n.items(), strict=False):
         series = [
             Series(name=f"peak force {joint}", unit="N", values=peak),
-            Series(name=f"mean force {joint}", unit="N", values=mean, colour="--ink"),
+            Series(name=f"mean force {joint}", unit="N", values=history.mean_force_n[joint], colour="--ink"),
         ]
-        if limit < _NEAR * greatest:
+        if limit in shown:
             series.append(_limit(f"limit {joint}", "N", limit, peak))
-        panels.append(Panel(title=summary.leg.joint_words(joint), series=series, height=150))
-    high = 1.05 * max([greatest, *(_greatest(each.values) for panel in panels for each in panel.series)])
-    return Chart(
-        name="forces",
-        alt="Peak and mean contact force of each joint over time",
-        caption="Contact force in each gait cycle, on the same axis for all joints. Peaks are of a heavy "
-        "tail; their scatter does not mean that the joint changes.",
-        x=time_series(summary),
-        ends=ends_of(summary),
-        panels=[Panel(title=each.title, series=each.series, low=0.0, high=high or 1.0, height=each.height)
-                for each in panels],
-        group=_GROUP,
-    )  # fmt: skip
+        title, high = summary.leg.joint_words(joint), 1.05 * max([greatest, *shown])
+        panels.append(Panel(title=title, series=series, low=0.0, high=high or 1.0, height=150))
+    caption = (
+        "Contact force in each gait cycle, on the same axis for all joints. Peaks are of a heavy "
+        "tail; their scatter does not mean that the joint changes."
+    )
+    return _over_time(summary, "forces", "Peak and mean contact force of each joint", caption, panels)
 
 
 def health_chart(summary: ReplaySummary) -> Chart:
     """Cadence, the torque and its mismatch, and the load and friction that explain the rest."""
     history, limit = summary.history, summary.monitor.limits.torque_mismatch
-    cadence, mismatch = history.cadence_rpm, history.torque_mismatch
     rpm = summary.monitor.commanded_rpm
-    commanded, steady = np.full_like(cadence, rpm), _STEADY * abs(rpm)
+    steady = _STEADY * abs(rpm)
+
+    def known(name: str, unit: str, column: str, colour: str = "--series-0") -> list[Series]:
+        """A series, with its smallest and largest values where it is thinned."""
+        series = Series(name=name, unit=unit, values=getattr(history, column), colour=colour)
+        ends = (("lowest", history.lowest), ("highest", history.highest))
+        return [
+            series,
+            *(
+                attrs.evolve(series, name=f"{name}, {words}", values=values[column], width=0.7)
+                for words, values in ends
+                if column in values
+            ),
+        ]
+
+    cadence, mismatch = known("cadence", "rpm", "cadence_rpm"), known("mismatch", "", "torque_mismatch")
+    mismatches = [each.values for each in mismatch]
+    torque = known("measured", "N m", "measured_torque_rms_nm")
+    torque += known("predicted", "N m", "predicted_torque_rms_nm", _colour(1))
+    commanded = attrs.evolve(_limit("commanded", "rpm", rpm, history.cadence_rpm), colour="--ink")
     panels = [
         Panel(
             title="Cadence",
-            series=[
-                Series(name="cadence", unit="rpm", values=cadence),
-                Series(name="commanded", unit="rpm", values=commanded, colour="--ink", style="dashed"),
-            ],
-            low=min(_least(cadence), rpm - steady),
-            high=max(_greatest(cadence, rpm), rpm + steady),
+            series=[*cadence, commanded],
+            low=min(rpm - steady, -_greatest(*(-each.values for each in cadence), otherwise=-rpm)),
+            high=max(rpm + steady, _greatest(*(each.values for each in cadence), otherwise=rpm)),
         ),
-        Panel(
-            title="Drive torque, RMS of each gait cycle",
-            series=[
-                Series(name="measured", unit="N m", values=history.measured_torque_rms_nm),
-                Series(
-                    name="predicted", unit="N m", values=history.predicted_torque_rms_nm, colour=_colour(1)
-                ),
-            ],
-            low=0.0,
-        ),
+        Panel(title="Drive torque, RMS of each gait cycle", series=torque, low=0.0),
         Panel(
             title="Fraction of the torque that is not explained",
-            series=[Series(name="mismatch", unit="", values=mismatch), _limit("limit", "", limit, mismatch)],
+            series=[*mismatch, _limit("limit", "", limit, history.torque_mismatch)],
             low=0.0,
-            high=1.1 * max(_greatest(mismatch), limit),
+            high=max(1.1 * max(limit, _greatest(history.torque_mismatch)), _greatest(*mismatches)),
         ),
-        Panel(title="Load at the foot", series=[Series(name="load", unit="N", values=history.load_n)]),
-        Panel(
-            title="Friction of the drive",
-            series=[Series(name="friction", unit="N m", values=history.friction_nm)],
-        ),
+        Panel(title="Load at the foot", series=known("load", "N", "load_n")),
+        Panel(title="Friction of the drive", series=known("friction", "N m", "friction_nm")),
     ]
-    return Chart(
-        name="input",
-        alt="Cadence, drive torque, mismatch, load and friction over time",
-        caption="Cadence with the commanded one dashed; measured and predicted drive torque; the fraction "
-        "that load, friction and lag do not explain, with its limit dashed; load and friction as estimated.",
-        x=time_series(summary),
-        ends=ends_of(summary),
-        panels=[_with_range(panel, history) for panel in panels if _is_known(panel)],
-        group=_GROUP,
+    caption = (
+        "Cadence with the commanded one dashed; measured and predicted drive torque; the fraction "
+        "that load, friction and lag do not explain, with its limit dashed; load and friction as estimated."
     )
-
-
-_COLUMNS = {
-    "cadence": "cadence_rpm",
-    "measured": "measured_torque_rms_nm",
-    "predicted": "predicted_torque_rms_nm",
-    "mismatch": "torque_mismatch",
-    "load": "load_n",
-    "friction": "friction_nm",
-}
-
-
-def _is_known(panel: Panel) -> bool:
-    return bool(np.isfinite(panel.series[0].values).any())
-
-
-def _with_range(panel: Panel, history: ReplayHistory) -> Panel:
-    """A panel with the smallest and the largest values, where its series are thinned."""
-    added = [
-        attrs.evolve(series, name=f"{series.name}, {words}", values=values[_COLUMNS[series.name]], width=0.7)
-        for series in panel.series
-        for words, values in (("lowest", history.lowest), ("highest", history.highest))
-        if _COLUMNS.get(series.name) in values
-    ]
-    ends = [_least(each.values) for each in added], [_greatest(each.values) for each in added]
-    low = None if panel.low is None else min([panel.low, *ends[0]])
-    high = None if panel.high is None else max([panel.high, *ends[1]])
-    return attrs.evolve(panel, series=[*panel.series, *added], low=low, high=high)
+    words = "Cadence, drive torque, mismatch, load and friction"
+    shown = [panel for panel in panels if _is_known(panel.series[0].values)]
+    return _over_time(summary, "input", words, caption, shown)
 
 
 def alarm_chart(summary: ReplaySummary, changes: Sequence[AlarmChange]) -> Chart:
@@ -187,22 +161,14 @@ def alarm_chart(summary: ReplaySummary, changes: Sequence[AlarmChange]) -> Chart
     begin, end = summary.recording.begin_ns, summary.recording.end_ns
     stamps = sorted({begin, end, *(change.stamp_ns for change in changes)})
     names = dict.fromkeys(change.alarm.name for change in changes)
-    time, unit = time_of(summary, np.array(stamps, np.int64))
     series = [
         Series(name=name, unit="", values=_levels(stamps, changes, name), colour="--careful", style="steps")
         for name in names
     ]
-    return Chart(
-        name="alarms",
-        alt="Levels of alarms over time",
-        caption="Level of each alarm over time: 0 is OK, 1 WARN, 2 ERROR.",
-        x=Series(name="time", unit=unit, values=time),
-        ends=ends_of(summary),
-        panels=[
-            Panel(title="Alarms", series=series, height=80 + 34 * len(series), lanes=("OK", "WARN", "ERROR"))
-        ],
-        group=_GROUP,
-    )
+    height, lanes = 80 + 34 * len(series), ("OK", "WARN", "ERROR")
+    panels = [Panel(title="Alarms", series=series, height=height, lanes=lanes)]
+    caption = "Level of each alarm over time: 0 is OK, 1 WARN, 2 ERROR."
+    return _over_time(summary, "alarms", "Levels of alarms", caption, panels, np.array(stamps, np.int64))
 
 
 def _levels(stamps: Iterable[int], changes: Sequence[AlarmChange], name: str) -> Floats:
@@ -214,34 +180,83 @@ def _levels(stamps: Iterable[int], changes: Sequence[AlarmChange], name: str) ->
     return np.array(levels)
 
 
-def time_series(summary: ReplaySummary) -> Series:
-    """The x axis of all charts over time."""
-    time, unit = time_of(summary, summary.history.stamp_ns)
-    return Series(name="time", unit=unit, values=time)
-
-
-def ends_of(summary: ReplaySummary) -> tuple[float, float]:
-    """Those of the recording, for all charts over time."""
-    stamps = np.array([summary.recording.begin_ns, summary.recording.end_ns], np.int64)
-    begin, end = time_of(summary, stamps)[0].tolist()
-    return begin, max(end, begin + 1.0e-9)
-
-
-def _limit(name: str, unit: str, limit: float, beside: Floats) -> Series:
+def _limit(name: str, unit: str, limit: float, beside: Floats | Ints) -> Series:
     return Series(name=name, unit=unit, values=np.full(len(beside), limit), colour="--bad", style="dashed")
 
 
 def _colour(k: int) -> str:
-    return f"--series-{k % SERIES_COLOURS}"
+    return f"--series-{k % _COLOURS}"
 
 
-def _greatest(values: Floats, otherwise: float = 0.0) -> float:
-    known = values[np.isfinite(values)]
-    return float(known.max()) if len(known) else otherwise
+def _is_known(values: Floats) -> bool:
+    return bool(np.isfinite(values).any())
 
 
-def _least(values: Floats) -> float:
-    return -_greatest(-values, -math.inf)
+def _greatest(*columns: Floats, otherwise: float = 0.0) -> float:
+    """The largest value that is known."""
+    return max((float(values[np.isfinite(values)].max()) for values in columns if _is_known(values)),
+               default=otherwise)  # fmt: skip
+
+
+# A joint over time: its clearance as counted and as estimated, with an interval, and its contact forces.
+
+
+def joint_trends(summary: ReplaySummary, joint: str) -> list[Part]:
+    """Chart of what is known of a joint over time, and why something is not shown; empty if nothing is."""
+    panels: list[Panel] = []
+    doubts: list[Part] = []
+    for name, figure, panel in (
+        ("Counted clearance", Figure.CLEARANCES, _clearance_panel(summary, joint)),
+        ("Contact forces", Figure.IMPACT_FORCES, _force_panel(summary, joint)),
+    ):
+        if doubt := not_valid(summary.verdict, figure):
+            doubts.append(Text(f"{name}: {doubt}", is_not_valid=True))
+        if panel.series:
+            panels.append(panel)
+    if not panels:
+        return doubts
+    caption = (
+        "Mean radial clearance; the band is the estimate by encoders or the drive torque ± two "
+        "standard deviations. Contact force in each gait cycle: peaks are of a heavy tail."
+    )
+    words = f"Joint {summary.leg.joint_words(joint)}"
+    return [_over_time(summary, f"joint_{joint}", words, caption, panels), *doubts]
+
+
+def _clearance_panel(summary: ReplaySummary, joint: str) -> Panel:
+    history, known = summary.history, summary.clearances.get(joint)
+    series: list[Series] = []
+    seen_mm = 1.0e3 * history.seen_m.get(joint, np.array([]))
+    if _is_known(seen_mm):
+        reach = SURE_SIGMAS * 1.0e3 * history.seen_sigma_m.get(joint, np.full_like(seen_mm, np.nan))
+        high, low = seen_mm + reach, np.maximum(seen_mm - reach, 0.0)
+        series += [
+            Series(name="estimate, high", unit="mm", values=high, style="edge"),
+            Series(name="estimate, low", unit="mm", values=low, style="edge"),
+            Series(name="estimate", unit="mm", values=seen_mm, width=2.0),
+        ]
+    bands = [(0, 1)] if series else []
+    counted_m = history.counted_m.get(joint, np.array([]))
+    if _is_known(counted_m) and Figure.CLEARANCES not in summary.verdict.not_valid:
+        series.append(Series(name="counted", unit="mm", values=1.0e3 * counted_m, colour="--ink"))
+    if series and known:
+        series.append(_limit("limit", "mm", 1.0e3 * known.limit_m, history.stamp_ns))
+    title = f"Clearance of joint {summary.leg.joint_words(joint)}"
+    return Panel(title=title, series=series, low=0.0, height=230, bands=bands)
+
+
+def _force_panel(summary: ReplaySummary, joint: str) -> Panel:
+    forces = (
+        ("peak force", "--series-1", summary.history.peak_force_n),
+        ("mean force", "--ink", summary.history.mean_force_n),
+    )
+    series = [
+        Series(name=name, unit="N", values=columns[joint], colour=colour)
+        for name, colour, columns in forces
+        if joint in columns and _is_known(columns[joint])
+    ]
+    is_valid = Figure.IMPACT_FORCES not in summary.verdict.not_valid
+    return Panel(title="Contact force", series=series if is_valid else [], low=0.0, height=150)
 
 
 # Clearances over time and at the end, as counted and as further encoders show them.
@@ -253,38 +268,31 @@ _TITLE = "Clearance over time"
 def clearance_section(summary: ReplaySummary) -> Section:
     """Clearances by estimate, and the counted ones where they are valid."""
     doubt = not_valid(summary.verdict, Figure.CLEARANCES)
-    seen = [estimates_chart(summary)] if has_estimates(summary) else []
+    is_seen = any(map(_is_known, summary.history.seen_m.values()))
+    seen = [_estimates_chart(summary)] if is_seen else []
     if doubt:
         text = Text(f"Counted clearances: {doubt}.", is_not_valid=True)
         return Section(_TITLE, [*seen, text], is_folded=True)
-    return Section(_TITLE, [openings_chart(summary), *seen, _table(summary)], is_folded=True)
+    return Section(_TITLE, [_openings_chart(summary), *seen, _table(summary)], is_folded=True)
 
 
 def _table(summary: ReplaySummary) -> Table:
     has_growth = Figure.GROWTH not in summary.verdict.not_valid
+    head = ["joint", "counted clearance [mm]", "opened [nm]"]
     is_sampled = any(joint.sampling_sigma_m for joint in summary.joints.values())
+    if is_sampled:
+        head.append("standard error of sampling [nm]")
     rows = []
     for name, joint in summary.joints.items():
-        growth = (
-            value(1.0e12, joint.growth_m_per_cycle),
-            value(1.0e12, joint.growth_error_m_per_cycle),
-        )
-        rows.append(
-            (
-                summary.leg.joint_words(name),
-                counted_mm(summary, name),
-                value(1.0e9, joint.opened_m),
-                *((value(1.0e9, joint.sampling_sigma_m),) if is_sampled else ()),
-                *(growth if has_growth else (NOT_VALID, NOT_VALID)),
-            )
-        )
+        row = [summary.leg.joint_words(name), counted_mm(summary, name), value(1.0e9, joint.opened_m)]
+        if is_sampled:
+            row.append(value(1.0e9, joint.sampling_sigma_m))
+        for growth in (joint.growth_m_per_cycle, joint.growth_error_m_per_cycle):
+            row.append(value(1.0e12, growth) if has_growth else NOT_VALID)
+        rows.append(tuple(row))
     return Table(
         caption="Clearances at the end",
-        head=(
-            *("joint", "counted clearance [mm]", "opened [nm]"),
-            *(("standard error of sampling [nm]",) if is_sampled else ()),
-            *("growth [pm/cycle]", "± [pm/cycle]"),
-        ),
+        head=[*head, "growth [pm/cycle]", "± [pm/cycle]"],
         rows=rows,
         note="Counted: the clearance when new plus the wear counted by the model since, in its "
         "significant digits. ± is one standard deviation of the growth: gait cycles of a chaotic "
@@ -308,17 +316,18 @@ def clearance_sentences(summary: ReplaySummary) -> list[str]:
 def encoder_sections(summary: ReplaySummary) -> list[Section]:
     """Clearances as further encoders show them, if there are such."""
     is_counted_leg = Figure.CLEARANCES not in summary.verdict.not_valid
-    rows = [
-        (
-            summary.leg.joint_words(name),
-            _millimetres(summary.clearances[name].counted_m) if is_counted_leg else NOT_VALID,
-            _millimetres(_estimated(summary.clearances[name].counted_m, joint.encoders)),
-            _millimetres(joint.encoders.sigma_m),
-            "other than counted" if joint.encoders.is_other else joint.encoders.observation.value,
-        )
-        for name, joint in summary.joints.items()
-        if joint.encoders
-    ]
+    rows = []
+    for name, joint in summary.joints.items():
+        if shown := joint.encoders:
+            counted_m = summary.clearances[name].counted_m
+            estimated = None if shown.departure_m is None else counted_m + shown.departure_m
+            rows.append((
+                summary.leg.joint_words(name),
+                _millimetres(counted_m) if is_counted_leg else NOT_VALID,
+                _millimetres(estimated),
+                _millimetres(shown.sigma_m),
+                "other than counted" if shown.is_other else shown.observation.value,
+            ))  # fmt: skip
     if not rows:
         return []
     title = "Clearances estimated from encoders"
@@ -330,10 +339,6 @@ def encoder_sections(summary: ReplaySummary) -> list[Section]:
         "further encoders over the last gait cycles; the standard deviation includes the model error.",
     )
     return [Section(title, [table], is_folded=True)]
-
-
-def _estimated(counted_m: float, shown: EncoderEvidence) -> float | None:
-    return None if shown.departure_m is None else counted_m + shown.departure_m
 
 
 def _millimetres(metres: float | None) -> str:
@@ -358,7 +363,7 @@ def force_section(summary: ReplaySummary) -> Section:
         for name, joint in summary.joints.items()
     ]
     table = Table(caption="Contact forces", head=("joint", "peak [N]", "mean [N]", "impacts"), rows=rows)
-    return Section("Impact forces", [force_chart(summary), table, *_loads(summary)], is_folded=True)
+    return Section("Impact forces", [_force_chart(summary), table, *_loads(summary)], is_folded=True)
 
 
 def _loads(summary: ReplaySummary) -> list[Part]:

@@ -1,20 +1,24 @@
 """The page of a replay, from its summary: a first screen that answers, and the rest folded below it."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import NamedTuple
 
 import attrs
 
-from leg_wear_monitor.monitor.alarms import time_words
+from leg_wear_monitor.files import share_directory
+from leg_wear_monitor.monitor.alarms import raised_words, time_words
+from leg_wear_monitor.monitor.verdict.decision import decision_of, figures_of
+from leg_wear_monitor.monitor.verdict.situation import COUNTED, OF_A_JOINT
+from leg_wear_monitor.monitor.verdict.verdict import guide_to
 from leg_wear_monitor.playback.result import (
-    Place,
     ReplayGait,
-    ReplayLeg,
     ReplayRecording,
     ReplayStatus,
     ReplaySummary,
 )
+from leg_wear_monitor.report.guide import enclosed
 from leg_wear_monitor.report.page import (
+    LEVEL_LOOKS,
     NOT_VALID,
     Fragment,
     Page,
@@ -23,11 +27,11 @@ from leg_wear_monitor.report.page import (
     Sentences,
     Table,
     Text,
-    alarm_doubt,
-    alarm_line,
     duration,
+    not_valid,
     reason,
     render,
+    since_words,
     template_text,
     value,
     verdict_banner,
@@ -40,22 +44,53 @@ from leg_wear_monitor.report.replay.charts import (
     force_section,
     health_chart,
 )
-from leg_wear_monitor.report.replay.decision_sections import certainty_section, guide_sections
 from leg_wear_monitor.report.replay.forecast_section import forecast_section, wear_section
-from leg_wear_monitor.report.replay.joint_rows import JointView, joint_rows, joint_views
-from leg_wear_monitor.state import AlarmChange, Figure, Level
+from leg_wear_monitor.report.replay.joints import joints_and_leg
+from leg_wear_monitor.state import AlarmChange, Figure, LegAlarm, Level
 
 # Alarms: those that are raised at the end, and all changes over time.
 
 
 MOST_ROWS = 50
 _MOST_DRAWN = 1000  # changes in the chart
+_FIGURES = {
+    "impact_force": Figure.IMPACT_FORCES,
+    "clearance": Figure.CLEARANCES,
+    "growth": Figure.GROWTH,
+    "remaining_life": Figure.FORECAST,
+}
 
 
-def raised_section(summary: ReplaySummary) -> Section:
-    """Every alarm that is raised at the end; never folded."""
-    raised = [alarm_line(summary, alarm) for alarm in summary.alarms.now if alarm.level is not Level.OK]
-    return Section("Alarms", [Fragment(render("replay/alarms.html", alarms=raised, advice=summary.advice))])
+def raised_alarms(summary: ReplaySummary, otherwise: str) -> str:
+    """Markup of every alarm that is raised; a sentence without any."""
+    raised = [_raised(summary, alarm) for alarm in summary.alarms.now if alarm.level is not Level.OK]
+    return render("replay/alarms.html", alarms=raised, advice=summary.advice, otherwise=otherwise)
+
+
+def _raised(summary: ReplaySummary, alarm: LegAlarm) -> dict[str, str]:
+    """A raised alarm in words, without a value that the verdict does not believe."""
+    symbol, look = LEVEL_LOOKS[alarm.level]
+    kind, _, subject = alarm.name.partition(" ")
+    name = f"{kind} {summary.leg.joint_words(subject)}" if kind in OF_A_JOINT else alarm.name
+    words = raised_words(alarm.state, alarm.worst, alarm.limit, alarm.unit, alarm.raised_ns)
+    doubt = _alarm_doubt(summary, alarm)
+    return {
+        "symbol": symbol,
+        "look": look,
+        "title": f"{alarm.level.name} {name}",
+        "words": alarm.state if doubt else words.rpartition(", since ")[0],
+        "doubt": doubt,
+        "since": f"since {since_words(summary, alarm.raised_ns)}",
+    }
+
+
+def _alarm_doubt(summary: ReplaySummary, alarm: LegAlarm) -> str:
+    """Why the value of an alarm does not hold; empty if it does: that of an estimate does."""
+    kind, _, subject = alarm.name.partition(" ")
+    figure, clearance = _FIGURES.get(kind), summary.clearances.get(subject)
+    if figure is Figure.CLEARANCES and clearance and clearance.believed_by not in (None, COUNTED):
+        return ""
+    return not_valid(summary.verdict, figure) if figure else ""
 
 
 def change_section(summary: ReplaySummary) -> Section:
@@ -75,7 +110,7 @@ def change_section(summary: ReplaySummary) -> Section:
 
 def _row(summary: ReplaySummary, change: AlarmChange) -> tuple[str, ...]:
     alarm = change.alarm
-    is_valid = not alarm_doubt(summary, alarm)
+    is_valid = not _alarm_doubt(summary, alarm)
     return (
         f"{(change.stamp_ns - summary.recording.begin_ns) / 1.0e9:.2f}",
         alarm.name,
@@ -91,19 +126,9 @@ def _row(summary: ReplaySummary, change: AlarmChange) -> tuple[str, ...]:
 
 def health_section(summary: ReplaySummary) -> Section:
     """Chart and tables."""
-    lost = {**attrs.asdict(summary.lost), **summary.lost.faulty}
-    rows = [
-        (name.replace("_", " "), value(1.0, number))
-        for name, number in lost.items()
-        if not isinstance(number, dict)
-    ]
     parts: list[Part] = [health_chart(summary)] if summary.cycles else []
     if summary.sampling:
-        sampled = [
-            (name.replace("_", " "), value(1.0, number))
-            for name, number in attrs.asdict(summary.sampling).items()
-        ]
-        parts.append(Table(caption="Sampled replay", head=("", "number"), rows=sampled))
+        parts.append(_numbers("Sampled replay", attrs.asdict(summary.sampling)))
     if any(load.about_n for load in summary.walked):
         walked = [
             (f"{load.mean_n:.0f} ± {load.sigma_n:.0f}", f"{load.cycles}", duration(load.moving_s))
@@ -111,10 +136,17 @@ def health_section(summary: ReplaySummary) -> Section:
         ]
         head = ("largest vertical force of a gait cycle [N]", "gait cycles", "time")
         parts.append(Table(caption="Walking under foot loads", head=head, rows=walked))
-    parts.append(Table(caption="Unused samples and lost time", head=("", "number"), rows=rows))
+    lost = {**attrs.asdict(summary.lost), **summary.lost.faulty}
+    del lost["faulty"]
+    parts.append(_numbers("Unused samples and lost time", lost))
     status = [(each.name, each.level.name, each.message) for each in summary.status]
     parts.append(Table(caption="State at the end", head=("", "level", "message"), rows=status, is_text=True))
     return Section("Input health", parts, is_folded=True)
+
+
+def _numbers(caption: str, numbers: dict[str, float]) -> Table:
+    rows = [(name.replace("_", " "), value(1.0, number)) for name, number in numbers.items()]
+    return Table(caption=caption, head=("", "number"), rows=rows)
 
 
 def recording_section(recording: ReplayRecording) -> Section:
@@ -138,6 +170,40 @@ def recording_section(recording: ReplayRecording) -> Section:
     return Section("The recording", parts, is_folded=True)
 
 
+# What stands behind the verdict: its guide, and how often such a verdict is right.
+
+
+_MEASURE = "docs/howto/measure_clearance.md"
+
+
+def guide_sections(summary: ReplaySummary) -> list[Section]:
+    """What to do step by step, folded; beside the guide of the verdict, how a clearance is measured.
+
+    They are in the page, since it may be read where the package is not installed.
+    """
+    guides = [enclosed(share_directory() / name) for name in (guide_to(summary.verdict), _MEASURE)]
+    return [
+        Section(
+            f"Guide: {guide.title}", [Fragment(f'<div class="guide">{guide.markup}</div>')], is_folded=True
+        )
+        for guide in guides
+    ]
+
+
+def certainty_section(summary: ReplaySummary) -> Section:
+    """What the verdict's certainty was measured on."""
+    rows = [(each.counted, each.words, each.where, each.date, each.source) for each in figures_of(summary)]
+    table = Table(
+        caption="How often such a verdict is right, where the truth is known",
+        head=("cases", "", "measured on", "date", "page of the package"),
+        rows=rows,
+        note="Nothing was measured on a real leg.",
+        is_text=True,
+    )
+    unknown = Text(decision_of(summary, summary.leg.joint_words).certainty)
+    return Section("How sure is the verdict?", [table if rows else unknown], is_folded=True)
+
+
 # Whether the page's figures can be believed: input, torque, cadence and model, each in a card.
 
 
@@ -146,29 +212,18 @@ _OF_LEVEL = {Level.OK: "yes", Level.WARN: "in part", Level.ERROR: "no"}
 _MOST_SENTENCES = 3
 
 
-@attrs.frozen
-class Card:
+class _Card(NamedTuple):
     """One question: its name, the answer ``yes``, ``in part`` or ``no``, and why."""
 
     name: str
     answer: str
     sentences: tuple[str, ...]
 
-    @property
-    def symbol(self) -> str:
-        """Says what the colour says."""
-        return _LOOKS[self.answer][0]
 
-    @property
-    def look(self) -> str:
-        """Class of its colour."""
-        return _LOOKS[self.answer][1]
-
-
-def belief(summary: ReplaySummary) -> Fragment:
-    """The cards."""
+def belief(summary: ReplaySummary) -> str:
+    """Markup of the cards."""
     cards = [_input(summary), _torque(summary), _cadence(summary), *_foot_load(summary), _model(summary)]
-    return Fragment(render("replay/belief.html", cards=cards))
+    return render("replay/belief.html", cards=cards, looks=_LOOKS)
 
 
 def _status(summary: ReplaySummary, name: str) -> ReplayStatus | None:
@@ -179,7 +234,7 @@ def _worst(*answers: str) -> str:
     return max(answers, key=list(_LOOKS).index)
 
 
-def _input(summary: ReplaySummary) -> Card:
+def _input(summary: ReplaySummary) -> _Card:
     status, answers, sentences = _status(summary, "input"), ["yes"], []
     if status:
         answers.append(_OF_LEVEL[status.level])
@@ -193,44 +248,44 @@ def _input(summary: ReplaySummary) -> Card:
     if summary.lost.unmonitored_s > 1.0:
         answers.append("in part")
         sentences.append(f"{duration(summary.lost.unmonitored_s)} were not monitored")
-    return Card("Input", _worst(*answers), _sentences(sentences))
+    return _Card("Input", _worst(*answers), _sentences(sentences))
 
 
-def _torque(summary: ReplaySummary) -> Card:
+def _torque(summary: ReplaySummary) -> _Card:
     status = _status(summary, "torque")
     if status is None:
-        return Card("Torque", "no", ("Unknown.",))
+        return _Card("Torque", "no", ("Unknown.",))
     is_compared = status.values.get("mismatch") is not None
     answer = _OF_LEVEL[status.level] if is_compared else "no"
-    return Card("Torque", answer, _sentences(status.message.split("; ")))
+    return _Card("Torque", answer, _sentences(status.message.split("; ")))
 
 
-def _cadence(summary: ReplaySummary) -> Card:
+def _cadence(summary: ReplaySummary) -> _Card:
     status, commanded = _status(summary, "gait"), summary.monitor.commanded_rpm
     cadence = status.values.get("cadence_rpm") if status else None
     if status is None or cadence is None:
-        return Card("Cadence", "no", ("Unknown.",))
+        return _Card("Cadence", "no", ("Unknown.",))
     is_other = summary.verdict.fault_code == "CADENCE"
     answer = _worst(_OF_LEVEL[status.level], "in part" if is_other else "yes")
     if not summary.gait.believable_cycles:
         answer = "no"
-    return Card("Cadence", answer, (f"{cadence:.3g} rpm, commanded {commanded:.3g} rpm.",))
+    return _Card("Cadence", answer, (f"{cadence:.3g} rpm, commanded {commanded:.3g} rpm.",))
 
 
-def _foot_load(summary: ReplaySummary) -> list[Card]:
+def _foot_load(summary: ReplaySummary) -> list[_Card]:
     """What the foot carries; nothing where no load is known."""
     load = summary.load
     if load.peak_n is None:
         return []
     source = "measured" if load.source == "measured" else "estimated from the drive torque"
     sigma = f" ± {load.peak_sigma_n:.0f}" if load.peak_sigma_n is not None else ""
-    return [Card("Foot load", "yes", _sentences([f"{source}: {load.peak_n:.0f}{sigma} N at its peak"]))]
+    return [_Card("Foot load", "yes", _sentences([f"{source}: {load.peak_n:.0f}{sigma} N at its peak"]))]
 
 
-def _model(summary: ReplaySummary) -> Card:
+def _model(summary: ReplaySummary) -> _Card:
     invalid = summary.verdict.not_valid
     if not summary.gait.believable_cycles and not summary.gait.is_counted:
-        return Card("Model", "no", _sentences([f"no gait cycle fits this leg: {summary.gait.missing}"]))
+        return _Card("Model", "no", _sentences([f"no gait cycle fits this leg: {summary.gait.missing}"]))
     sentences, answer = [], "yes"
     if invalid:
         answer = "no" if Figure.CLEARANCES in invalid else "in part"
@@ -246,7 +301,7 @@ def _model(summary: ReplaySummary) -> Card:
         answer = _worst(answer, "in part")
         factor = summary.monitor.wear_acceleration
         sentences.append(f"all wear is multiplied by {factor:g}: a demonstration, not a measurement")
-    return Card("Model", answer, _sentences(sentences))
+    return _Card("Model", answer, _sentences(sentences))
 
 
 def _explained(summary: ReplaySummary) -> str:
@@ -263,126 +318,12 @@ def _sentences(parts: Sequence[str]) -> tuple[str, ...]:
     return tuple(f"{part[:1].upper()}{part[1:]}." for part in parts if part)
 
 
-# The leg as an inline drawing, its clearance joints marked by how much of their limit is used.
-
-
-_WIDTH, _LABELS = 400.0, 176.0  # of the drawing, and of the column of labels at its right
-_MARGIN = 20.0
-_TALLEST = 400.0
-_LABEL_HEIGHT = 40.0
-_APART = 11.0  # joints at one place are drawn side by side
-_NEAR_M = 1.0e-3
-
-
-@attrs.frozen(kw_only=True)
-class _Mark:
-    """A clearance joint: its place, that of its label, and its words."""
-
-    view: JointView
-    x: float
-    y: float
-    label_x: float
-    label_y: float
-    words: str
-
-
-class _Plane:
-    """From the leg's plane [m], y up, to the drawing's, y down."""
-
-    def __init__(self, leg: ReplayLeg) -> None:
-        places = [place for shape in leg.bodies_m.values() for place in shape]
-        places += [joint.place_m for joint in leg.joints.values()]
-        xs, ys = ([place[k] for place in places] for k in (0, 1))
-        wide, tall = max(xs) - min(xs), max(ys) - min(ys)
-        room = _WIDTH - _LABELS - 2.0 * _MARGIN
-        self._scale = min(room / max(wide, 1.0e-6), (_TALLEST - 2.0 * _MARGIN) / max(tall, 1.0e-6))
-        self._left, self._top = min(xs), max(ys)
-        self.height = max(self._scale * tall + 2.0 * _MARGIN, 160.0)
-
-    def at(self, place: Place) -> Place:
-        x, y = place
-        return (
-            round(_MARGIN + self._scale * (x - self._left), 1),
-            round(_MARGIN + self._scale * (self._top - y), 1),
-        )
-
-
-def leg_drawing(summary: ReplaySummary, views: Sequence[JointView]) -> Fragment:
-    """The drawing; a note instead for a summary without the leg's shape."""
-    leg = summary.leg
-    if not leg.bodies_m or not leg.joints:
-        return Fragment(render("replay/leg.html", drawing=None))
-    plane, shown = _Plane(leg), {view.joint for view in views}
-    marks = _marks(plane, leg, [view for view in views if view.joint in leg.joints])
-    height = max([plane.height, *(mark.label_y + _LABEL_HEIGHT / 2.0 for mark in marks)])
-    drawing: dict[str, Any] = {
-        "width": _WIDTH,
-        "height": height,
-        "bodies": [[plane.at(place) for place in shape] for shape in _largest_first(leg)],
-        "supports": sorted({plane.at(joint.place_m) for joint in leg.joints.values() if joint.is_on_ground}),
-        "ideal": [plane.at(joint.place_m) for name, joint in leg.joints.items() if name not in shown],
-        "marks": marks,
-        "title": f"The leg {summary.monitor.mechanism}: " + "; ".join(_spoken(mark) for mark in marks),
-    }
-    return Fragment(render("replay/leg.html", drawing=drawing))
-
-
-def _largest_first(leg: ReplayLeg) -> list[tuple[Place, ...]]:
-    def size(shape: tuple[Place, ...]) -> float:
-        return sum(max(place[k] for place in shape) - min(place[k] for place in shape) for k in (0, 1))
-
-    return sorted(leg.bodies_m.values(), key=lambda shape: -size(shape))
-
-
-def _marks(plane: _Plane, leg: ReplayLeg, views: Sequence[JointView]) -> list[_Mark]:
-    """Marks with their labels in a column, from the highest joint to the lowest, and not over each other."""
-    placed = [(view, _beside(plane, leg, view, views)) for view in views]
-    placed.sort(key=lambda each: each[1][1])
-    marks, below = [], 0.0
-    room = plane.height - _LABEL_HEIGHT * len(placed)
-    for k, (view, (x, y)) in enumerate(placed):
-        latest = max(0.0, room) + _LABEL_HEIGHT * (k + 0.5)
-        label_y = max(below + _LABEL_HEIGHT / 2.0, min(y, latest))
-        below = label_y + _LABEL_HEIGHT / 2.0
-        label_x = _WIDTH - _LABELS + 14.0
-        marks.append(_Mark(view=view, x=x, y=y, label_x=label_x, label_y=label_y, words=_words(view)))
-    return marks
-
-
-def _beside(plane: _Plane, leg: ReplayLeg, view: JointView, views: Sequence[JointView]) -> Place:
-    """A joint's place; joints that share one stand side by side."""
-    here = leg.joints[view.joint].place_m
-    there = [other.joint for other in views if _is_near(leg.joints[other.joint].place_m, here)]
-    x, y = plane.at(here)
-    return x + _APART * (2.0 * there.index(view.joint) - len(there) + 1.0), y
-
-
-def _is_near(one: Place, other: Place) -> bool:
-    return max(abs(one[0] - other[0]), abs(one[1] - other[1])) < _NEAR_M
-
-
-def _words(view: JointView) -> str:
-    if view.clearance is None or view.shown_m is None:
-        return "not valid" if view.doubt.startswith("not valid") else "not known"
-    if view.used is None:
-        return "not monitored"
-    if view.used >= 1.0:
-        return f"{1.0e3 * view.shown_m:.3g} mm, limit {1.0e3 * view.clearance.limit_m:.3g} mm"
-    if view.look == "over":  # the verdict says so, and is newer than the joint's last report
-        return "at its limit, see the verdict"
-    return f"{100.0 * view.used:.0f} % used"
-
-
-def _spoken(mark: _Mark) -> str:
-    label = f" ({mark.view.label})" if mark.view.label else ""
-    return f"joint {mark.view.joint}{label} {mark.words}"
-
-
 def replay_page(summary: ReplaySummary) -> Page:
     """The page of a replay."""
     recording, monitor = summary.recording, summary.monitor
-    sections = [_joints(summary), Section("Are these values valid?", [belief(summary)])]
-    sections.append(raised_section(summary))
+    sections = [_joints(summary), Section("Are these values valid?", [Fragment(belief(summary))])]
+    raised = raised_alarms(summary, otherwise="No alarm is raised at the end.")
+    sections.append(Section("Alarms", [Fragment(raised)]))
     if summary.gait.believable_cycles:
         sections += [clearance_section(summary), *encoder_sections(summary), forecast_section(summary)]
         sections += [force_section(summary), wear_section(summary)]
@@ -407,11 +348,7 @@ def replay_page(summary: ReplaySummary) -> Page:
 
 def _joints(summary: ReplaySummary) -> Section:
     """The leg's picture beside a row a joint, and what follows for the leg."""
-    views = joint_views(summary)
-    drawing, rows = leg_drawing(summary, views), joint_rows(summary, views)
-    parts: list[Part] = [
-        Fragment(render("replay/joints_and_leg.html", drawing=drawing.markup, rows=rows.markup))
-    ]
+    parts: list[Part] = [Fragment(joints_and_leg(summary))]
     sentences = [*_gait_sentences(summary.gait), *clearance_sentences(summary)]
     if sentences:
         parts.append(Sentences(sentences))

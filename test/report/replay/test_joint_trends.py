@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from made_up_summary import made_up_summary
 
-from leg_wear_monitor.report.replay.joint_trends import joint_trends
+from leg_wear_monitor.report.replay.charts import joint_trends
 from leg_wear_monitor.state import Figure
 
 pytestmark = pytest.mark.plain

@@ -12,7 +12,7 @@ from made_up_summary import made_up_summary
 
 from leg_wear_monitor.playback.result import ReplayLeg, WornDepth
 from leg_wear_monitor.report.page import page_html, template_text
-from leg_wear_monitor.report.replay.joint_rows import joint_rows, joint_views
+from leg_wear_monitor.report.replay.joints import joint_rows, joint_views
 from leg_wear_monitor.report.replay.page import replay_page
 from leg_wear_monitor.state import AlarmChange, Figure, FootLoad, Level, State
 
@@ -169,7 +169,7 @@ def test_a_clearance_measured_by_hand_has_a_mark_on_its_bar():
         for joint, one in summary.clearances.items()
     }
     views = joint_views(attrs.evolve(summary, clearances=clearances))
-    rows = joint_rows(summary, views).markup
+    rows = joint_rows(summary, views)
     assert rows.count('<rect class="seen"') == 1
     assert "bars from 0 to 2.14 mm" in rows
 

@@ -1,0 +1,372 @@
+"""The clearance joints of a replay: a row each, and their marks in a drawing of the leg."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import attrs
+
+from leg_wear_monitor.monitor.forecast.forecast import clearance_mm, three_digits
+from leg_wear_monitor.monitor.verdict.situation import MEASURED, OF_A_JOINT, SEEN, SOURCES
+from leg_wear_monitor.playback.result import Place, ReplaySummary
+from leg_wear_monitor.report.page import LEVEL_LOOKS, STATE_LOOKS, not_valid, render
+from leg_wear_monitor.state import Figure, JointClearance, LegAlarm, Level, LifeHours, State
+
+# A clearance joint as the first screen shows it: only values that are valid.
+
+
+_NEAR = 0.5  # used fraction of the wear allowance from which on a joint is drawn as near its limit
+
+
+@attrs.frozen(kw_only=True)
+class JointView:
+    """A joint.
+
+    Attributes
+    ----------
+    joint, label : str
+        Name, and what people call it; that may be empty.
+    clearance : JointClearance or None
+        None if it is not known.
+    doubt : str
+        Why the counted clearance is not given; empty if it is.
+    used : float or None
+        Fraction of the wear allowance, from the clearance when new to its limit, that is used.
+    look : str
+        ``fine``, ``near``, ``over`` or ``unknown``.
+    alarms : tuple of LegAlarm
+        Those that are raised.
+    """
+
+    joint: str
+    label: str
+    clearance: JointClearance | None
+    doubt: str
+    used: float | None
+    look: str
+    alarms: tuple[LegAlarm, ...]
+
+    @property
+    def counted_m(self) -> float | None:
+        """As counted; None while that is not valid."""
+        return self.clearance.counted_m if self.clearance and not self.doubt else None
+
+    @property
+    def seen(self) -> tuple[float, float, str] | None:
+        """Clearance that encoders or the drive torque show, its standard deviation, and which of them.
+
+        Or that they showed when a latched alarm was raised. An estimate by torque does not rest on the
+        counted clearance, so it is shown while that is not valid.
+        """
+        known = self.clearance
+        if known is None:
+            return None
+        if known.believed_by in SEEN and known.believed_m is not None:
+            return known.believed_m, known.believed_sigma_m or 0.0, SOURCES[str(known.believed_by)]
+        by = " and ".join(SOURCES.get(one, one) for one in known.seen_by)
+        return None if known.seen_m is None else (known.seen_m, known.seen_sigma_m or 0.0, by)
+
+    @property
+    def mark(self) -> tuple[float, float] | None:
+        """The clearance that was measured by hand, or else is seen, and its standard deviation [m]."""
+        known = self.clearance
+        if known is not None and known.believed_m is not None and known.believed_by == MEASURED:
+            return known.believed_m, known.believed_sigma_m or 0.0
+        return self.seen[:2] if self.seen else None
+
+
+def joint_views(summary: ReplaySummary) -> tuple[JointView, ...]:
+    """All clearance joints."""
+    return tuple(_view(summary, joint) for joint in summary.monitor.clearance_joints)
+
+
+def _view(summary: ReplaySummary, joint: str) -> JointView:
+    clearance, doubt = summary.clearances.get(joint), not_valid(summary.verdict, Figure.CLEARANCES)
+    used = _used(clearance) if clearance else None
+    if summary.verdict.state is State.NOT_MONITORED and (used or 0.0) < 1.0:
+        used = None  # a joint that nobody watches is not shown as one that is all right
+    drawn, names = summary.leg.joints.get(joint), {f"{kind} {joint}" for kind in OF_A_JOINT}
+    raised = [alarm for alarm in summary.alarms.now if alarm.level is not Level.OK and alarm.name in names]
+    return JointView(
+        joint=joint,
+        label=drawn.label if drawn else "",
+        clearance=clearance,
+        doubt=doubt or ("" if clearance else "not known: no gait cycle of this leg"),
+        used=used,
+        look=_look(summary, joint, clearance, used),
+        alarms=tuple(raised),
+    )
+
+
+def counted_mm(summary: ReplaySummary, joint: str) -> str:
+    """A joint's counted clearance [mm] in the digits that are known of it."""
+    found = summary.joints.get(joint)
+    counted = summary.clearances[joint].counted_m
+    if found is None or found.forecast is None or found.forecast.clearance_m is None:
+        return f"{1.0e3 * counted:.3f}"
+    may_be = found.forecast.clearance_m
+    return clearance_mm(counted, may_be.p10, may_be.p90)
+
+
+def _used(clearance: JointClearance) -> float | None:
+    """Used fraction of the wear allowance, by the clearance that the verdict rests on."""
+    shown_m, allowance = clearance.believed_m, clearance.limit_m - clearance.new_m
+    if shown_m is None:
+        return None
+    if allowance <= 0.0:
+        return float(shown_m >= clearance.limit_m)
+    return max(0.0, (shown_m - clearance.new_m) / allowance)
+
+
+def _look(summary: ReplaySummary, joint: str, clearance: JointClearance | None, used: float | None) -> str:
+    """Look of a joint: as the verdict says, where it names the joint."""
+    if clearance is None or clearance.believed_m is None or used is None:
+        return "unknown"
+    is_named = joint in summary.verdict.joints
+    if used >= 1.0 or (is_named and summary.verdict.state is State.STOP):
+        return "over"
+    if is_named and summary.verdict.state is State.INSPECT:
+        return "near"
+    warn_m = summary.monitor.limits.warn_fraction * clearance.limit_m
+    return "near" if used >= _NEAR or clearance.believed_m >= warn_m > clearance.new_m else "fine"
+
+
+# A row a joint: clearance against limit, remaining life and alarms, on common axes.
+
+
+_SIGMAS = 2.0  # drawn to either side of a seen clearance
+_MOST_LIMITS = 4.0  # length of the clearance axis, in the greatest limit
+_WIDTH = 100.0  # of a bar
+
+Span = tuple[float, float]  # where a part of a bar begins, and how long it is [% of the bar]
+
+
+def joints_and_leg(summary: ReplaySummary) -> str:
+    """Markup of the leg's picture beside a row a joint."""
+    views = joint_views(summary)
+    drawing, rows = leg_drawing(summary, views), joint_rows(summary, views)
+    return render("replay/joints_and_leg.html", drawing=drawing, rows=rows)
+
+
+def joint_rows(summary: ReplaySummary, views: Sequence[JointView]) -> str:
+    """Markup of the rows as a table: first the joints that the verdict names, then those with alarms."""
+    views = sorted(views, key=lambda view: (view.joint not in summary.verdict.joints, not view.alarms))
+    doubt = not_valid(summary.verdict, Figure.FORECAST)
+    lives = {} if doubt else summary.life
+    leg, most_m = lives.get("leg"), _most_m(views)
+    axis = _life_axis([*(lives.get(view.joint) for view in views), leg])
+    rows = [
+        {
+            "view": view,
+            "clearance": _clearance(view, most_m),
+            "words": _clearance_words(summary, view),
+            "life": _life(lives.get(view.joint), axis)
+            or {"words": doubt or summary.life_answers.get(view.joint, "not known")},
+            "findings": _findings(summary, view),
+        }
+        for view in views
+    ]
+    note = " ".join([_note(views, most_m, axis), *(_holds_for(summary) if axis else [])]).strip()
+    values = {"leg": _life(leg, axis), "first": _first(summary), "note": note, "doubt": doubt}
+    return render("replay/joints.html", rows=rows, **values)
+
+
+def _holds_for(summary: ReplaySummary) -> list[str]:
+    """Regimes that the remaining lives hold for, a sentence each."""
+    priors = [joint.forecast.prior for joint in summary.joints.values() if joint.forecast]
+    regimes = dict.fromkeys(prior.holds_for for prior in priors if prior)
+    return [f"It holds for {', '.join(regimes)}."] if regimes else []
+
+
+def _first(summary: ReplaySummary) -> str:
+    """The joint that is probably the first at its limit; empty if that is not known."""
+    chances = summary.first_probability
+    if not chances:
+        return ""
+    first = max(chances, key=lambda joint: chances[joint])
+    percent = 100.0 * chances[first]
+    return f"{summary.leg.joint_words(first)} first at its limit with {percent:.0f} % probability"
+
+
+def _findings(summary: ReplaySummary, view: JointView) -> list[tuple[str, str, str]]:
+    """Symbol, class and words of the verdict if it names the joint, and of the joint's alarms."""
+    found = [
+        (*LEVEL_LOOKS[alarm.level], f"{alarm.level.name} {alarm.name.partition(' ')[0]}")
+        for alarm in view.alarms
+    ]
+    if view.joint in summary.verdict.joints:
+        found.insert(0, (*STATE_LOOKS[summary.verdict.state], summary.verdict.state.words.upper()))
+    return found
+
+
+def _most_m(views: Sequence[JointView]) -> float:
+    """End of the clearance axis [m]: all limits and marks, unless that is far beyond them."""
+    known = [view for view in views if view.clearance]
+    greatest = max((view.clearance.limit_m for view in known if view.clearance), default=1.0e-3)
+    ends = [view.counted_m or 0.0 for view in known]
+    ends += [view.mark[0] + _SIGMAS * view.mark[1] for view in known if view.mark]
+    return min(max(1.1 * greatest, 1.02 * max(ends, default=0.0)), _MOST_LIMITS * greatest)
+
+
+def _clearance(view: JointView, most_m: float) -> dict[str, Span] | None:
+    """Limit, counted clearance, and the one that is seen with what is sure of it; none where not known."""
+    if view.clearance is None:
+        return None
+    bar = {"limit": _span(view.clearance.limit_m, view.clearance.limit_m, most_m)}
+    if view.counted_m is not None:
+        bar["counted"] = _span(0.0, view.counted_m, most_m)
+    if view.mark is not None:
+        mark_m, reach = view.mark[0], _SIGMAS * view.mark[1]
+        bar["seen"] = _span(mark_m, mark_m, most_m)
+        bar["sure"] = _span(mark_m - reach, mark_m + reach, most_m)
+    return bar
+
+
+def _span(low: float, high: float, most: float) -> Span:
+    begin, end = (_WIDTH * min(max(end / most, 0.0), 1.0) for end in (low, high))
+    return round(begin, 2), round(end - begin, 2)
+
+
+def _clearance_words(summary: ReplaySummary, view: JointView) -> list[tuple[str, str]]:
+    """What is counted and what is seen, each with the class of its words."""
+    if view.clearance is None:
+        return [("not-valid", f"counted {view.doubt}")]
+    seen = []
+    if view.seen:
+        seen_m, sigma = view.seen[0], 1.0e3 * view.seen[1]
+        digits = 2 if sigma >= 0.1 else 3
+        around = f"{1.0e3 * seen_m:.{digits}f} ± {sigma:.{digits}f}"
+        seen.append(("", f"estimated {around} mm by {view.seen[2]}"))
+    if view.clearance.measured_m is not None:
+        sigma = 1.0e3 * (view.clearance.measured_sigma_m or 0.0)
+        seen.append(("", f"measured {1.0e3 * view.clearance.measured_m:.3f} ± {sigma:.3f} mm by hand"))
+    limit = ("", f"limit {1.0e3 * view.clearance.limit_m:.3g} mm")
+    if view.doubt:
+        return [*seen, ("not-valid", f"counted {view.doubt}"), limit]
+    return [("", f"counted {counted_mm(summary, view.joint)} mm"), *seen, limit]
+
+
+def _life_axis(lives: Sequence[LifeHours | None]) -> tuple[int, int] | None:
+    """Decades of hours from which and to which the life axis goes; None without any life."""
+    hours = [max(end, 1.0) for life in lives if life for end in (life.p10_h, life.p90_h)]
+    if not hours:
+        return None
+    low, high = math.floor(math.log10(min(hours))), math.ceil(math.log10(max(hours)))
+    return low, max(high, low + 1)
+
+
+def _life(hours: LifeHours | None, axis: tuple[int, int] | None) -> dict[str, Any] | None:
+    """Bar from p10 to p90 with p50, and these in words."""
+    if hours is None or axis is None:
+        return None
+    low, decades = axis[0], float(axis[1] - axis[0])
+    p10, p50, p90 = (math.log10(max(each, 1.0)) - low for each in attrs.astuple(hours))
+    words = [three_digits(each) for each in attrs.astuple(hours)]
+    return {
+        "range": _span(p10, p90, decades),
+        "median": _span(p50, p50, decades)[0],
+        "words": f"{words[1]} h; {words[0]} to {words[2]} h",
+    }
+
+
+def _note(views: Sequence[JointView], most_m: float, life: tuple[int, int] | None) -> str:
+    """How to read the bars."""
+    if not any(view.clearance for view in views):
+        return ""
+    note = (
+        f"Clearances are radial, all bars from 0 to {1.0e3 * most_m:.3g} mm: blue bar counted, mark the "
+        "estimate or the measurement with two standard deviations, red line limit."
+    )
+    if life:
+        note += (
+            " Remaining life in hours of walking, p50 and p10 to p90, on a logarithmic axis from "
+            f"{10 ** life[0]:,} to {10 ** life[1]:,} h."
+        )
+    return note
+
+
+# The leg as an inline drawing, its clearance joints marked by how much of their limit is used.
+
+
+_DRAWING, _LABELS = 400.0, 176.0  # width of the drawing, and of the column of labels at its right
+_MARGIN, _TALLEST = 20.0, 400.0
+_LABEL_HEIGHT = 40.0
+_APART = 11.0  # joints at one place are drawn side by side
+_NEAR_M = 1.0e-3
+
+
+def leg_drawing(summary: ReplaySummary, views: Sequence[JointView]) -> str:
+    """Markup of the drawing; of a note instead for a summary without the leg's shape."""
+    leg = summary.leg
+    if not leg.bodies_m or not leg.joints:
+        return render("replay/leg.html", drawing=None)
+    places = [place for shape in leg.bodies_m.values() for place in shape]
+    xs, ys = zip(*places, *(joint.place_m for joint in leg.joints.values()), strict=True)
+    wide, tall = max(max(xs) - min(xs), 1.0e-6), max(max(ys) - min(ys), 1.0e-6)
+    scale = min((_DRAWING - _LABELS - 2.0 * _MARGIN) / wide, (_TALLEST - 2.0 * _MARGIN) / tall)
+    height = max(scale * (max(ys) - min(ys)) + 2.0 * _MARGIN, 160.0)
+
+    def at(place: Place) -> Place:
+        """From the leg's plane [m], y up, to the drawing's, y down."""
+        x, y = _MARGIN + scale * (place[0] - min(xs)), _MARGIN + scale * (max(ys) - place[1])
+        return round(x, 1), round(y, 1)
+
+    def beside(view: JointView) -> Place:
+        """A joint's place; joints that share one stand side by side."""
+        here = leg.joints[view.joint].place_m
+        there = [other.joint for other in drawn if _is_near(leg.joints[other.joint].place_m, here)]
+        x, y = at(here)
+        return x + _APART * (2.0 * there.index(view.joint) - len(there) + 1.0), y
+
+    drawn = [view for view in views if view.joint in leg.joints]
+    shown = {view.joint for view in views}
+    marks = _marks([(view, *beside(view)) for view in drawn], height)
+    bodies = sorted(leg.bodies_m.values(), key=_size, reverse=True)
+    drawing = {
+        "width": _DRAWING,
+        "height": max([height, *(mark["label_y"] + _LABEL_HEIGHT / 2.0 for mark in marks)]),
+        "label_x": _DRAWING - _LABELS + 14.0,
+        "bodies": [[at(place) for place in shape] for shape in bodies],
+        "supports": sorted({at(joint.place_m) for joint in leg.joints.values() if joint.is_on_ground}),
+        "ideal": [at(joint.place_m) for name, joint in leg.joints.items() if name not in shown],
+        "marks": marks,
+        "title": f"The leg {summary.monitor.mechanism}: "
+        + "; ".join(f"joint {_labelled(mark['view'])} {mark['words']}" for mark in marks),
+    }
+    return render("replay/leg.html", drawing=drawing)
+
+
+def _marks(placed: Sequence[tuple[JointView, float, float]], height: float) -> list[dict[str, Any]]:
+    """Marks with their labels in a column, from the highest joint to the lowest, and not over each other."""
+    marks, below = [], 0.0
+    room = max(0.0, height - _LABEL_HEIGHT * len(placed))
+    for k, (view, x, y) in enumerate(sorted(placed, key=lambda each: each[2])):
+        label_y = max(below + _LABEL_HEIGHT / 2.0, min(y, room + _LABEL_HEIGHT * (k + 0.5)))
+        below = label_y + _LABEL_HEIGHT / 2.0
+        marks.append({"view": view, "x": x, "y": y, "label_y": label_y, "words": _words(view)})
+    return marks
+
+
+def _size(shape: Sequence[Place]) -> float:
+    return sum(max(place[k] for place in shape) - min(place[k] for place in shape) for k in (0, 1))
+
+
+def _is_near(one: Place, other: Place) -> bool:
+    return max(abs(one[0] - other[0]), abs(one[1] - other[1])) < _NEAR_M
+
+
+def _words(view: JointView) -> str:
+    known = view.clearance
+    if known is None or known.believed_m is None:
+        return "not valid" if view.doubt.startswith("not valid") else "not known"
+    if view.used is None:
+        return "not monitored"
+    if view.used >= 1.0:
+        return f"{1.0e3 * known.believed_m:.3g} mm, limit {1.0e3 * known.limit_m:.3g} mm"
+    if view.look == "over":  # the verdict says so, and is newer than the joint's last report
+        return "at its limit, see the verdict"
+    return f"{100.0 * view.used:.0f} % used"
+
+
+def _labelled(view: JointView) -> str:
+    return f"{view.joint} ({view.label})" if view.label else view.joint

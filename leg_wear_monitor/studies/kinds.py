@@ -11,6 +11,7 @@ from leg_wear_monitor.studies.life_tasks import SAMPLES
 from leg_wear_monitor.studies.plan import (
     Ensemble,
     Names,
+    OneClearance,
     OnePlace,
     Point,
     Settings,
@@ -83,16 +84,13 @@ class Bifurcation:
 
 
 @attrs.frozen(kw_only=True)
-class Chaos(Study):
+class Chaos(OnePlace):
     """Predictability of the motion."""
 
     title = "Predictability of the motion"
     question = "How chaotic is the motion with clearance, and how fast do small errors grow?"
 
-    joints: Names = clearance_joints_field()
     others: tuple[Names, ...] = described("other sets whose exponents are compared", default=())
-    clearance_m: float = clearance_field()
-    speed_rpm: float = speed_field()
     section_cycles: int = count_field("points of a Poincaré map, one a cycle", 2, 1000)
     section_crank_angle_deg: float = quantity(
         "deg", "crank angle of the map", at_least=0.0, at_most=360.0, default=0.0
@@ -102,37 +100,27 @@ class Chaos(Study):
 
     def points(self) -> list[Point]:
         """The response, its Poincaré section, exponents of all sets, sections over clearance and speed."""
-        whole = place(self.joints, self.clearance_m, self.speed_rpm)
-        return [
-            response(set_name(self.joints), whole, self.ensemble),
-            self._section("section", whole, self.section_cycles, PORTRAIT_CYCLES),
-            *(self._exponent(clearance_joints) for clearance_joints in (self.joints, *self.others)),
-            *self._bifurcation(),
+        over = self.bifurcation
+        sections = [self._section("section", self.place(), self.section_cycles, PORTRAIT_CYCLES)]
+        for size in over.clearances_m:
+            where = place(self.joints, size, self.speed_rpm)
+            sections.append(self._section(millimetres(size), where, over.cycles))
+        for speed in over.speeds_rpm:
+            where = place(self.joints, self.clearance_m, speed)
+            sections.append(self._section(f"{speed:g} rpm", where, over.cycles))
+        exponents = [
+            exponent_point(set_name(joints), self.at(joints), self.ensemble, self.exponent)
+            for joints in (self.joints, *self.others)
         ]
-
-    @property
-    def _start(self) -> Settings:
-        return {"perturb_fraction": self.ensemble.perturb_fraction, "seed": self.ensemble.seed}
-
-    def _exponent(self, clearance_joints: Names) -> Point:
-        where = place(clearance_joints, self.clearance_m, self.speed_rpm)
-        return exponent_point(set_name(clearance_joints), where, self.ensemble, self.exponent)
+        return [self.response(set_name(self.joints)), sections[0], *exponents, *sections[1:]]
 
     def _section(self, label: str, where: Settings, cycles: int, portrait_cycles: int = 0) -> Point:
         skipped = self.bifurcation.skip_cycles
-        settings = where | self._start
+        settings = where | {"perturb_fraction": self.ensemble.perturb_fraction, "seed": self.ensemble.seed}
         settings |= {"cycles": cycles, "portrait_cycles": portrait_cycles, "skip_cycles": skipped}
         settings |= {"crank_angle_deg": self.section_crank_angle_deg, "runs": 1}
         cost = (cycles + skipped) * cycle_cost(where)
         return Point(label=label, task="section", settings=settings, cost=cost)
-
-    def _bifurcation(self) -> list[Point]:
-        over = self.bifurcation
-        places = [(millimetres(size), place(self.joints, size, self.speed_rpm)) for size in over.clearances_m]
-        places += [
-            (f"{speed:g} rpm", place(self.joints, self.clearance_m, speed)) for speed in over.speeds_rpm
-        ]
-        return [self._section(label, where, over.cycles) for label, where in places]
 
 
 # Study ``laws``: the laws of normal force and friction against each other.
@@ -184,7 +172,7 @@ SETS: tuple[Names, ...] = (*PLACES, ALL, RIGID_KNEE)  # of every leg: each place
 
 
 @attrs.frozen(kw_only=True)
-class Legs(Study):
+class Legs(OneClearance):
     """The claims of the paper in legs of other lengths and masses."""
 
     title = "Other lengths and masses"
@@ -201,8 +189,6 @@ class Legs(Study):
         "", "masses of bodies are drawn within 1 ± this", at_least=0.0, at_most=0.9, default=0.3
     )
     draw_seed: int = count_field("seed of the lengths and masses", 0, 1)
-    clearance_m: float = clearance_field()
-    speed_rpm: float = speed_field()
 
     def check(self) -> None:
         """Make sure that the claims can be evaluated.
@@ -220,12 +206,11 @@ class Legs(Study):
         return [self._leg(number) for number in range(self.legs + 1)]
 
     def _leg(self, number: int) -> Point:
-        where = place(
-            ALL, self.clearance_m, self.speed_rpm,
-            sets=[list(joints) for joints in SETS], leg=number, draw_seed=self.draw_seed,
+        where = self.at(
+            ALL, sets=[list(joints) for joints in SETS], leg=number, draw_seed=self.draw_seed,
             length_tolerance=self.length_tolerance, mass_tolerance=self.mass_tolerance,
         )  # fmt: skip
-        each = (response("", place(s, self.clearance_m, self.speed_rpm), self.ensemble) for s in SETS)
+        each = (response("", self.at(joints), self.ensemble) for joints in SETS)
         settings = where | attrs.asdict(self.ensemble)
         label = f"leg {number}" if number else "leg of the file"
         return Point(label=label, task="leg", settings=settings, cost=sum(point.cost for point in each))
@@ -235,23 +220,20 @@ class Legs(Study):
 
 
 @attrs.frozen(kw_only=True)
-class Location(Study):
+class Location(OneClearance):
     """Clearance in one place or another."""
 
     title = "Clearance location"
     question = "How do the effects of the same clearance differ between hip, knee and foot?"
 
     sets: tuple[Names, ...] = described("clearance joints of one run, a list of lists", check=check_sets)
-    clearance_m: float = clearance_field()
-    speed_rpm: float = speed_field()
 
     def points(self) -> list[Point]:
         """Response of each set of clearance joints."""
-        return [self._response(clearance_joints) for clearance_joints in self.sets]
+        return [self._response(joints) for joints in self.sets]
 
-    def _response(self, clearance_joints: Names) -> Point:
-        where = place(clearance_joints, self.clearance_m, self.speed_rpm)
-        return response(set_name(clearance_joints), where, self.ensemble)
+    def _response(self, joints: Names) -> Point:
+        return response(set_name(joints), self.at(joints), self.ensemble)
 
 
 # Study ``lubrication``: joints dry, and with oil or grease of several viscosities.
@@ -276,14 +258,11 @@ class Lubrication(OnePlace):
 
     def points(self) -> list[Point]:
         """The dry joints, then each viscosity."""
-        films = [
-            {"viscosity_pa_s": viscosity, "roughness_m": self.roughness_m}
-            for viscosity in self.viscosities_pa_s
-        ]
-        return [
-            self.response("dry"),
-            *(self.response(f"{film['viscosity_pa_s']:g} Pa s", film=film) for film in films),
-        ]
+        points = [self.response("dry")]
+        for viscosity in self.viscosities_pa_s:
+            film = {"viscosity_pa_s": viscosity, "roughness_m": self.roughness_m}
+            points.append(self.response(f"{viscosity:g} Pa s", film=film))
+        return points
 
 
 # Study ``multi``: clearance in several places at once.
@@ -400,11 +379,9 @@ class Wear(Location):
 
     def points(self) -> list[Point]:
         """The response of every set, and its life."""
-        return super().points() + [self._life(clearance_joints) for clearance_joints in self.sets]
-
-    def _life(self, clearance_joints: Names) -> Point:
-        where = place(clearance_joints, self.clearance_m, self.speed_rpm)
-        return life_point(set_name(clearance_joints), where, self.ensemble, self.life)
+        return super().points() + [
+            life_point(set_name(joints), self.at(joints), self.ensemble, self.life) for joints in self.sets
+        ]
 
 
 # Study ``load``: a leg in the air, and under the force of the ground on its foot.

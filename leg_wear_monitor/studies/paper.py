@@ -3,16 +3,15 @@
 The text of the paper was not at hand: the claims are as others who read it handed them on.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import pairwise, product
-from typing import NamedTuple
 
 import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.studies.kinds import ALL, FOOT, HIP, KNEE, PLACES, RIGID_KNEE, SETS
-from leg_wear_monitor.studies.plan import ERRORS, Arrays, Names
+from leg_wear_monitor.studies.plan import DEPTH, ERRORS, Arrays, Names
 
 # Effects: how far a claim is from its limit in one leg, with the standard error of that.
 
@@ -43,17 +42,10 @@ class Effect:
         return float(np.copysign(np.inf, self.value)) if self.value else 0.0
 
 
-class Measured(NamedTuple):
-    """A statistic of a leg: its name in the data, the clearance joints of the runs, and a joint of them."""
-
-    name: str
-    where: Names
-    joint: str = ""
-
-    def of(self, leg: Arrays) -> Floats:
-        """Its value (r,) in every run."""
-        values = leg[f"set{SETS.index(self.where)}_{self.name}"]
-        return np.asarray(values[:, self.where.index(self.joint)] if self.joint else values, dtype=float)
+def of_runs(leg: Arrays, name: str, where: Names, joint: str = "") -> Floats:
+    """A statistic (r,) of a leg in every run with clearance there; of a joint, if it has one."""
+    values = leg[f"set{SETS.index(where)}_{name}"]
+    return np.asarray(values[:, where.index(joint)] if joint else values, dtype=float)
 
 
 def log_ratio(x: Floats, y: Floats, paired: bool) -> Effect:
@@ -87,9 +79,8 @@ Measure = Callable[[Arrays], Effect]
 
 _SUM_WITHIN = 0.1  # deviation up to which the effect of all at once counts as the sum, as on a study's page
 _REGULAR = 0.5  # fraction of a force's variance from which on it counts as regular: most of it repeats
-_TITLES = dict(
-    zip(ERRORS, ("toe displacement", "toe velocity", "toe acceleration", "drive torque"), strict=True)
-)
+_NAMES = ("toe displacement", "toe velocity", "toe acceleration", "drive torque")
+_TITLES = dict(zip(ERRORS, _NAMES, strict=True))
 
 
 @attrs.frozen
@@ -113,30 +104,34 @@ class Claim:
     measure: Measure
 
 
-def _ratio(over: Measured, under: Measured) -> Measure:
-    return lambda leg: log_ratio(over.of(leg), under.of(leg), over.where == under.where)
+_Pair = tuple[Names, str, Names, str]  # clearance joints and joint that are above, and those below
 
 
-def _each(*measures: Measure) -> Measure:
-    return lambda leg: least([measure(leg) for measure in measures])
+def _above(name: str, *pairs: _Pair) -> Measure:
+    """A statistic is greater in the first place than in the second one, in each pair."""
 
+    def measure(leg: Arrays) -> Effect:
+        effects = []
+        for over, above, under, below in pairs:
+            values = of_runs(leg, name, over, above), of_runs(leg, name, under, below)
+            effects.append(log_ratio(*values, over == under))
+        return least(effects)
 
-def _depth(where: Names, joint: str) -> Measured:
-    return Measured("wear_depth_m_per_cycle", where, joint)
+    return measure
 
 
 def _repeats(where: Names, more: str, less: str) -> Measure:
     """Forces of the joints ``more`` repeat more than those of ``less``, on the mean of each group."""
 
     def mean(leg: Arrays, joints: str) -> Floats:
-        each = [Measured("repeats_contact_force", where, joint).of(leg) for joint in joints]
+        each = [of_runs(leg, "repeats_contact_force", where, joint) for joint in joints]
         return np.asarray(np.mean(each, axis=0))
 
     return lambda leg: difference(mean(leg, more), mean(leg, less), True)
 
 
 def _regular(leg: Arrays) -> Effect:
-    repeats = Measured("repeats_contact_force", KNEE, "G").of(leg)
+    repeats = of_runs(leg, "repeats_contact_force", KNEE, "G")
     return difference(repeats, np.full_like(repeats, _REGULAR), True)
 
 
@@ -145,7 +140,7 @@ def _by_derivative(leg: Arrays) -> Effect:
 
     def fraction(where: Names, name: str) -> Floats:
         reach = leg[f"set{SETS.index(where)}_ideal_range_{name}"]
-        return Measured(f"error_{name}", where).of(leg) / reach
+        return of_runs(leg, f"error_{name}", where) / reach
 
     pairs = product(SETS, pairwise(ERRORS[:3]))
     return least([log_ratio(fraction(s, after), fraction(s, before), True) for s, (before, after) in pairs])
@@ -155,165 +150,98 @@ def _apart_from_sum(leg: Arrays) -> Effect:
     """How far errors of all at once are from the sum of the places, in the quantity where it is farthest."""
     effects = []
     for name in ERRORS:
-        total = np.sum([Measured(f"error_{name}", place).of(leg) for place in PLACES], axis=0)
-        ratio = log_ratio(Measured(f"error_{name}", ALL).of(leg), total, False)
+        total = np.sum([of_runs(leg, f"error_{name}", place) for place in PLACES], axis=0)
+        ratio = log_ratio(of_runs(leg, f"error_{name}", ALL), total, False)
         effects.append(Effect(abs(ratio.value) - np.log1p(_SUM_WITHIN), ratio.error))
     return greatest(effects)
 
 
-def _ranked(name: str) -> Claim:
-    hip, knee, foot = (Measured(f"error_{name}", place) for place in PLACES)
-    text = f"the hip disturbs the {_TITLES[name]} most, the foot least"
-    return Claim(f"hip_most_{name}", "one place", text, _each(_ratio(hip, knee), _ratio(knee, foot)))
-
-
-def _more_than_alone(name: str) -> Claim:
-    whole = Measured(f"error_{name}", ALL)
-    measures = [_ratio(whole, Measured(f"error_{name}", place)) for place in PLACES]
-    text = f"the {_TITLES[name]} is disturbed more than by any place alone"
-    return Claim(f"all_more_{name}", "all five", text, _each(*measures))
-
-
-def _zone(where: Names, joint: str) -> Measured:
-    return Measured("zone_deg", where, joint)
-
-
-def _apart(where: Names, joint: str, other_where: Names, other: str, leg: Arrays) -> tuple[Floats, Floats]:
+def _zones(leg: Arrays, one: tuple[Names, str], other: tuple[Names, str]) -> tuple[Floats, Floats]:
     """How far the middles of two zones are from each other, and half of their widths together [turns]."""
-    middles = (
-        Measured("zone_centre_deg", where, joint).of(leg),
-        Measured("zone_centre_deg", other_where, other).of(leg),
-    )
+    middles = of_runs(leg, "zone_centre_deg", *one), of_runs(leg, "zone_centre_deg", *other)
     between = np.abs((middles[0] - middles[1] + 180.0) % 360.0 - 180.0)
-    reach = 0.5 * (_zone(where, joint).of(leg) + _zone(other_where, other).of(leg))
+    reach = 0.5 * (of_runs(leg, "zone_deg", *one) + of_runs(leg, "zone_deg", *other))
     return between / 360.0, reach / 360.0
 
 
 def _stays(leg: Arrays) -> Effect:
     """B's zones, alone and with all five, lie over each other: their middles are nearer than half widths."""
-    between, reach = _apart(HIP, "B", ALL, "B", leg)
+    between, reach = _zones(leg, (HIP, "B"), (ALL, "B"))
     return difference(reach, between, True)
 
 
 def _differ(leg: Arrays) -> Effect:
     """The zones of I and J, both in the frame of the foot, have nothing in common."""
-    between, reach = _apart(FOOT, "I", FOOT, "J", leg)
+    between, reach = _zones(leg, (FOOT, "I"), (FOOT, "J"))
     return difference(between, reach, True)
+
+
+def _ranked(name: str) -> Claim:
+    text = f"the hip disturbs the {_TITLES[name]} most, the foot least"
+    measure = _above(f"error_{name}", (HIP, "", KNEE, ""), (KNEE, "", FOOT, ""))
+    return Claim(f"hip_most_{name}", "one place", text, measure)
+
+
+def _more_than_alone(name: str) -> Claim:
+    text = f"the {_TITLES[name]} is disturbed more than by any place alone"
+    measure = _above(f"error_{name}", *((ALL, "", place, "") for place in PLACES))
+    return Claim(f"all_more_{name}", "all five", text, measure)
 
 
 def _harder(key: str, joints: str, place: Names) -> Claim:
     """Forces with all five above those with the place alone, at each of these joints."""
-    pairs = [(Measured("p99_force_n", where, joint) for where in (ALL, place)) for joint in joints]
-    measures = [_ratio(*pair) for pair in pairs]
     are, names = "are" if len(joints) > 1 else "is", " and ".join(joints)
     alone = {HIP: "hip", KNEE: "knee", FOOT: "foot"}[place]
-    return Claim(key, "all five", f"{names} {are} hit harder than with the {alone} alone", _each(*measures))
+    measure = _above("p99_force_n", *((ALL, joint, place, joint) for joint in joints))
+    return Claim(key, "all five", f"{names} {are} hit harder than with the {alone} alone", measure)
 
 
-def _buffered(name: str, joint: str = "") -> Measure:
-    """A statistic is less with a clearance at G than with a rigid knee, hip and foot alike."""
-    return _ratio(Measured(name, RIGID_KNEE, joint), Measured(name, ALL, joint))
+def _claims() -> Iterator[Claim]:
+    """All claims, in the order of the paper's places: each place alone, then all five at once."""
+    yield Claim("a_shallow", "hip", "A wears less deep than B", _above(DEPTH, (HIP, "B", HIP, "A")))
+    text = "impacts are denser at A than at B"
+    yield Claim("a_denser", "hip", text, _above("impacts", (HIP, "A", HIP, "B")))
+    text = "half of B's wear lies in a narrower zone than that of A"
+    yield Claim("b_zone", "hip", text, _above("zone_deg", (HIP, "A", HIP, "B")))
+    yield Claim("b_chaotic", "hip", "B's force repeats less than A's", _repeats(HIP, "A", "B"))
+    yield Claim("g_regular", "knee", "most of the variance of G's force repeats", _regular)
+    yield Claim("j_deeper", "foot", "J wears deeper than I", _above(DEPTH, (FOOT, "J", FOOT, "I")))
+    yield Claim("j_harder", "foot", "J is hit harder than I", _above("peak_force_n", (FOOT, "J", FOOT, "I")))
+    yield from map(_ranked, ERRORS)
+    text = "velocity is disturbed more than displacement, acceleration more than velocity"
+    yield Claim("by_derivative", "each", text, _by_derivative)
+    yield from map(_more_than_alone, (ERRORS[0], ERRORS[3]))
+    yield Claim("not_the_sum", "all five", "the effect is not the sum of the places alone", _apart_from_sum)
+    deepest = _above(DEPTH, *((ALL, "A", ALL, joint) for joint in "BGIJ"))
+    yield Claim("a_worst", "all five", "A wears deepest", deepest)
+    text = "A wears deeper than with the hip alone"
+    yield Claim("a_worse", "all five", text, _above(DEPTH, (ALL, "A", HIP, "A")))
+    mildest = _above(DEPTH, *((ALL, joint, ALL, "J") for joint in "ABGI"))
+    yield Claim("j_mildest", "all five", "J wears least deep", mildest)
+    text = "J wears less deep than with the foot alone"
+    yield Claim("j_falls", "all five", text, _above(DEPTH, (FOOT, "J", ALL, "J")))
+    text = "G wears less deep than A and B, deeper than I and J"
+    orders = [(joint, "G") for joint in HIP] + [("G", joint) for joint in FOOT]
+    between = _above(DEPTH, *((ALL, above, ALL, below) for above, below in orders))
+    yield Claim("g_between", "all five", text, between)
+    text = "the forces of I and J repeat less than those of A, B and G, on the mean"
+    yield Claim("disorder", "all five", text, _repeats(ALL, "ABG", "IJ"))
+    text = "half of B's wear lies in a narrower zone than that of G, half of G's than that of I"
+    widen = _above("zone_deg", (KNEE, "G", HIP, "B"), (FOOT, "I", KNEE, "G"))
+    yield Claim("zones_widen", "each", text, widen)
+    yield Claim("b_stays", "all five", "B's zone stays where it is with the hip alone", _stays)
+    yield Claim("i_j_differ", "foot", "the zones of I and J have nothing in common", _differ)
+    text = "half of A's wear lies in a wider zone than that of B"
+    yield Claim("a_wide", "all five", text, _above("zone_deg", (ALL, "A", ALL, "B")))
+    yield _harder("a_harder", "A", HIP)
+    yield _harder("b_harder", "B", HIP)
+    yield _harder("g_harder", "G", KNEE)
+    yield _harder("foot_harder", "IJ", FOOT)
+    text = "I and J are hit less hard than with a rigid knee"
+    buffered = _above("p99_force_n", *((RIGID_KNEE, joint, ALL, joint) for joint in FOOT))
+    yield Claim("g_buffers_foot", "all five", text, buffered)
+    text = "the drive torque is disturbed less than with a rigid knee"
+    yield Claim("g_buffers_drive", "all five", text, _above(f"error_{ERRORS[3]}", (RIGID_KNEE, "", ALL, "")))
 
 
-CLAIMS: tuple[Claim, ...] = (
-    Claim("a_shallow", "hip", "A wears less deep than B", _ratio(_depth(HIP, "B"), _depth(HIP, "A"))),
-    Claim(
-        "a_denser",
-        "hip",
-        "impacts are denser at A than at B",
-        _ratio(Measured("impacts", HIP, "A"), Measured("impacts", HIP, "B")),
-    ),
-    Claim(
-        "b_zone",
-        "hip",
-        "half of B's wear lies in a narrower zone than that of A",
-        _ratio(Measured("zone_deg", HIP, "A"), Measured("zone_deg", HIP, "B")),
-    ),
-    Claim("b_chaotic", "hip", "B's force repeats less than A's", _repeats(HIP, "A", "B")),
-    Claim("g_regular", "knee", "most of the variance of G's force repeats", _regular),
-    Claim("j_deeper", "foot", "J wears deeper than I", _ratio(_depth(FOOT, "J"), _depth(FOOT, "I"))),
-    Claim(
-        "j_harder",
-        "foot",
-        "J is hit harder than I",
-        _ratio(Measured("peak_force_n", FOOT, "J"), Measured("peak_force_n", FOOT, "I")),
-    ),
-    *(_ranked(name) for name in ERRORS),
-    Claim(
-        "by_derivative",
-        "each",
-        "velocity is disturbed more than displacement, acceleration more than velocity",
-        _by_derivative,
-    ),
-    *(_more_than_alone(name) for name in (ERRORS[0], ERRORS[3])),
-    Claim("not_the_sum", "all five", "the effect is not the sum of the places alone", _apart_from_sum),
-    Claim(
-        "a_worst",
-        "all five",
-        "A wears deepest",
-        _each(*(_ratio(_depth(ALL, "A"), _depth(ALL, joint)) for joint in "BGIJ")),
-    ),
-    Claim(
-        "a_worse",
-        "all five",
-        "A wears deeper than with the hip alone",
-        _ratio(_depth(ALL, "A"), _depth(HIP, "A")),
-    ),
-    Claim(
-        "j_mildest",
-        "all five",
-        "J wears least deep",
-        _each(*(_ratio(_depth(ALL, joint), _depth(ALL, "J")) for joint in "ABGI")),
-    ),
-    Claim(
-        "j_falls",
-        "all five",
-        "J wears less deep than with the foot alone",
-        _ratio(_depth(FOOT, "J"), _depth(ALL, "J")),
-    ),
-    Claim(
-        "g_between",
-        "all five",
-        "G wears less deep than A and B, deeper than I and J",
-        _each(
-            *(_ratio(_depth(ALL, joint), _depth(ALL, "G")) for joint in HIP),
-            *(_ratio(_depth(ALL, "G"), _depth(ALL, joint)) for joint in FOOT),
-        ),
-    ),
-    Claim(
-        "disorder",
-        "all five",
-        "the forces of I and J repeat less than those of A, B and G, on the mean",
-        _repeats(ALL, "ABG", "IJ"),
-    ),
-    Claim(
-        "zones_widen",
-        "each",
-        "half of B's wear lies in a narrower zone than that of G, half of G's than that of I",
-        _each(_ratio(_zone(KNEE, "G"), _zone(HIP, "B")), _ratio(_zone(FOOT, "I"), _zone(KNEE, "G"))),
-    ),
-    Claim("b_stays", "all five", "B's zone stays where it is with the hip alone", _stays),
-    Claim("i_j_differ", "foot", "the zones of I and J have nothing in common", _differ),
-    Claim(
-        "a_wide",
-        "all five",
-        "half of A's wear lies in a wider zone than that of B",
-        _ratio(_zone(ALL, "A"), _zone(ALL, "B")),
-    ),
-    _harder("a_harder", "A", HIP),
-    _harder("b_harder", "B", HIP),
-    _harder("g_harder", "G", KNEE),
-    _harder("foot_harder", "IJ", FOOT),
-    Claim(
-        "g_buffers_foot",
-        "all five",
-        "I and J are hit less hard than with a rigid knee",
-        _each(*(_buffered("p99_force_n", joint) for joint in FOOT)),
-    ),
-    Claim(
-        "g_buffers_drive",
-        "all five",
-        "the drive torque is disturbed less than with a rigid knee",
-        _buffered(f"error_{ERRORS[3]}"),
-    ),
-)
+CLAIMS = tuple(_claims())

@@ -282,16 +282,26 @@ def response(label: str, where: Settings, ensemble: Ensemble) -> Point:
 
 
 @attrs.frozen(kw_only=True)
-class OnePlace(Study):
-    """Base of studies with one set of clearance joints, one clearance and one speed."""
+class OneClearance(Study):
+    """Base of studies with one clearance and one speed."""
 
-    joints: Names = clearance_joints_field()
     clearance_m: float = clearance_field()
     speed_rpm: float = speed_field()
 
+    def at(self, joints: Names, **more: Any) -> Settings:
+        """Settings of a run with these clearance joints."""
+        return place(joints, self.clearance_m, self.speed_rpm, **more)
+
+
+@attrs.frozen(kw_only=True)
+class OnePlace(OneClearance):
+    """Base of studies with one set of clearance joints, one clearance and one speed."""
+
+    joints: Names = clearance_joints_field()
+
     def place(self, **more: Any) -> Settings:
         """Settings of a run there."""
-        return place(self.joints, self.clearance_m, self.speed_rpm, **more)
+        return self.at(self.joints, **more)
 
     def response(self, label: str, **more: Any) -> Point:
         """Response point there."""

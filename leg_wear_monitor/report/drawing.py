@@ -21,7 +21,7 @@ from leg_wear_monitor.mechanism.spec import GROUND, Mechanism, PrismaticJoint, S
 from leg_wear_monitor.report.figure import INK, SMALL, USUAL, VERMILION, new_figure, plain, svg, tidy
 from leg_wear_monitor.report.leg_picture import draw_leg, leg_data
 from leg_wear_monitor.report.page import (
-    Live,
+    Fragment,
     Page,
     Section,
     Sentences,
@@ -168,7 +168,7 @@ def drawing_html(drawing: Drawing, is_watched: bool = False) -> str:
     return page_html(page)
 
 
-def _live(drawing: Drawing) -> Live:
+def _live(drawing: Drawing) -> Fragment:
     """The interactive picture."""
     reach = drawing.reach
     data = leg_data(reach) | {"first": drawing.shown, "runs": [], "said": _said(reach)}
@@ -177,7 +177,7 @@ def _live(drawing: Drawing) -> Live:
         data |= _force_data(reach.mechanism, drawing.forces_n)
         names = [""]
     words = "The mechanism at the chosen crank angle" if len(reach.q) > 1 else "The mechanism"
-    return Live(
+    return Fragment(
         markup=render("leg_slider.html", data=data, names=names, alt=words),
         script=template_text("leg_slider.js"),
         caption=_caption(drawing, data),
@@ -213,8 +213,8 @@ def _force_data(mechanism: Mechanism, forces_n: np.ndarray) -> dict[str, Any]:
     return {"runs": [{"label": "", "pins": pins}], "longest_n": longest or 1.0}
 
 
-def _reload() -> Live:
-    return Live(markup=render("drawing/reload.html"), script=template_text("drawing/reload.js"))
+def _reload() -> Fragment:
+    return Fragment(markup=render("drawing/reload.html"), script=template_text("drawing/reload.js"))
 
 
 def _lengths(mechanism: Mechanism) -> Table:

@@ -26,7 +26,6 @@ from leg_wear_monitor.report.fleet_standing import (
 from leg_wear_monitor.report.page import (
     Banner,
     Fragment,
-    Live,
     Page,
     Part,
     Section,
@@ -73,10 +72,8 @@ def page_address(name: str) -> str:
 
 def _row(leg: LegOverview, joints: Sequence[str], day: Day, rank: int, has_page: bool) -> dict[str, Any]:
     standing, used, age = day.standing(leg), valid_used(leg), day.age_days(leg)
-    life, health, rise = leg.life.get("leg"), leg.recordings, growth(leg)
-    if leg.is_accelerated:
-        life = None
-    doubt = day.doubt(leg)
+    health, rise, doubt = leg.recordings, growth(leg), day.doubt(leg)
+    life = None if leg.is_accelerated else leg.life.get("leg")
     why = "; ".join(filter(None, [leg.verdict.why if leg.verdict else "", doubt]))
     return {
         "id": leg.id,
@@ -93,7 +90,7 @@ def _row(leg: LegOverview, joints: Sequence[str], day: Day, rank: int, has_page:
         "age": None if age is None else round(age, 2),
         "is_old": bool(doubt),
         "counted": health.counted,
-        "bad": health.partial + health.no_gait + health.unreadable,
+        "bad": _bad_count(health),
         "why": why,
         "code": leg.verdict.fault_code if leg.verdict else "",
     }
@@ -110,6 +107,7 @@ def _cell(used: dict[str, float | None], joint: str) -> list[float] | str | None
 # By when a person should look after a leg.
 
 
+_UNWATCHED = (Standing.NOT_MONITORED, Standing.OUTDATED, Standing.UNKNOWN)
 _LEAST_DAYS = 1.0  # of recordings; from less, hours of walking a day are not known
 _MOST_DAYS = 3650.0
 
@@ -118,7 +116,7 @@ def deadline(leg: LegOverview, standing: Standing, day: Day) -> str:
     """By when a person should look after a leg, in words: by its standing and by the p10 of its life."""
     if standing is Standing.STOP:
         return "now, before it walks again"
-    if standing in (Standing.NOT_MONITORED, Standing.OUTDATED, Standing.UNKNOWN):
+    if standing in _UNWATCHED:
         return "as soon as possible: nobody monitors it meanwhile"
     life = leg.life.get("leg")
     p10 = "" if life is None else f"{hours(life.p10_h)} h of walking{_date(leg, life.p10_h, day)}"
@@ -161,29 +159,17 @@ def joints_section(legs: Sequence[LegOverview], joints: Sequence[str]) -> Sectio
     if not joints:
         return Section("Joints", [Text("No clearance of any leg is known.")])
     used = [valid_used(leg) for leg in legs]
-    return Section(
-        "Joints",
-        [
-            Table(
-                caption="Legs by the part of a joint's clearance, from new to limit, that is used up",
-                head=("joint", *_HEAD, "not valid", "median", "most"),
-                rows=[_joint_row(joint, [each[joint] for each in used if joint in each]) for joint in joints],
-            )
-        ],
-    )
-
-
-def _joint_row(joint: str, used: Sequence[float | None]) -> list[str]:
-    known = [each for each in used if each is not None]
-    bands = [band(each) for each in known]
-    counts = [str(bands.count(number)) for number in range(len(BANDS) + 1)]
-    ends = (statistics.median, max)
-    return [
-        joint,
-        *counts,
-        str(len(used) - len(known)),
-        *(f"{100.0 * end(known):.0f} %" if known else "-" for end in ends),
-    ]
+    rows = []
+    for joint in joints:
+        own = [each[joint] for each in used if joint in each]
+        known = [each for each in own if each is not None]
+        bands = Counter(map(band, known))
+        ends = [f"{100.0 * end(known):.0f} %" if known else "-" for end in (statistics.median, max)]
+        counts = [bands[number] for number in range(len(BANDS) + 1)]
+        rows.append((joint, *map(str, [*counts, len(own) - len(known)]), *ends))
+    caption = "Legs by the part of a joint's clearance, from new to limit, that is used up"
+    head = ("joint", *_HEAD, "not valid", "median", "most")
+    return Section("Joints", [Table(caption=caption, head=head, rows=rows)])
 
 
 # Health of the recordings of a fleet.
@@ -207,12 +193,11 @@ _OUTCOMES = {
 
 def recordings_section(legs: Sequence[LegOverview], day: Day) -> Section:
     """Sums over all recordings, their age, and each one that is not sound by its name."""
-    parts: list[Part] = [Sentences(_sentences(legs, day)), _sums([leg.recordings for leg in legs])]
+    parts: list[Part] = [Sentences(_ages(legs, day)), _sums([leg.recordings for leg in legs])]
     faults = [(leg.id, leg.fault) for leg in legs if leg.fault]
     if faults:
-        parts.append(
-            Table(caption="Legs that were not updated", head=("leg", "why"), rows=faults, is_text=True)
-        )
+        caption = "Legs that were not updated"
+        parts.append(Table(caption=caption, head=("leg", "why"), rows=faults, is_text=True))
     bad = [
         (leg.id, one.file, _OUTCOMES.get(one.outcome, one.outcome), one.why)
         for leg in legs
@@ -220,38 +205,36 @@ def recordings_section(legs: Sequence[LegOverview], day: Day) -> Section:
     ]
     if bad:
         hidden = sum(_bad_count(leg.recordings) for leg in legs) - len(bad[:_MOST_BAD])
-        parts.append(
-            Table(
-                caption="Recordings that are not sound",
-                head=("leg", "recording", "what became of it", "why"),
-                rows=bad[:_MOST_BAD],
-                note=f"{hidden} more are in legs/*/log." if hidden > 0 else "",
-                is_text=True,
-            )
-        )
+        note = f"{hidden} more are in legs/*/log." if hidden > 0 else ""
+        caption, head = "Recordings that are not sound", ("leg", "recording", "what became of it", "why")
+        parts.append(Table(caption=caption, head=head, rows=bad[:_MOST_BAD], note=note, is_text=True))
     return Section("Recordings", parts)
 
 
-def _sentences(legs: Sequence[LegOverview], day: Day) -> list[str]:
+def _ages(legs: Sequence[LegOverview], day: Day) -> list[str]:
     ages = [day.age_days(leg) for leg in legs]
     old = sum(age is not None and age > day.fresh_days for age in ages)
     ahead = sum(age is not None and age < -1.0 for age in ages)
     none = ages.count(None)
-    told = [
+    sentences = [
         f"Legs with a recording of the last {day.fresh_days:g} days: {len(legs) - old - ahead - none}; "
         f"with an older one: {old}; with none: {none}."
     ]
     if ahead:
-        told.append(f"Legs whose last recording is dated in the future: {ahead}.")
-    return told
+        sentences.append(f"Legs whose last recording is dated in the future: {ahead}.")
+    return sentences
 
 
 def _sums(healths: Sequence[RecordingHealth]) -> Table:
-    rows = [(words, str(sum(getattr(health, name) for health in healths))) for name, words in _KINDS]
-    rows.append(("time in them [h]", f"{sum(health.counted_h for health in healths):.4g}"))
-    lost_h = sum(health.unmonitored_s for health in healths) / 3600.0
-    rows.append(("of this not followed [h]", f"{lost_h:.3g}"))
-    rows.append(("gait cycles in them", str(sum(health.cycles for health in healths))))
+    def total(name: str) -> Any:
+        return sum(getattr(health, name) for health in healths)
+
+    rows = [
+        *((words, f"{total(name)}") for name, words in _KINDS),
+        ("time in them [h]", f"{total('counted_h'):.4g}"),
+        ("of this not followed [h]", f"{total('unmonitored_s') / 3600.0:.3g}"),
+        ("gait cycles in them", f"{total('cycles')}"),
+    ]
     return Table(caption="Recordings of all legs", head=("", "number"), rows=rows)
 
 
@@ -263,14 +246,14 @@ def _bad_count(health: RecordingHealth) -> int:
 
 
 _FIRST = 10
-_UNWATCHED = (Standing.NOT_MONITORED, Standing.OUTDATED, Standing.UNKNOWN)
-_GROUPS = (
-    ("must stop", (Standing.STOP,)),
-    ("to look at", (Standing.INSPECT, Standing.WATCH)),
-    ("unmonitored", _UNWATCHED),
-    ("well", (Standing.HEALTHY,)),
-    ("demonstrations", (Standing.DEMONSTRATION,)),
-)
+_DEMONSTRATIONS = "demonstrations"
+_GROUPS = {
+    "must stop": (Standing.STOP,),
+    "to look at": (Standing.INSPECT, Standing.WATCH),
+    "unmonitored": _UNWATCHED,
+    "well": (Standing.HEALTHY,),
+    _DEMONSTRATIONS: (Standing.DEMONSTRATION,),
+}
 _CALM = (Standing.HEALTHY, Standing.DEMONSTRATION)
 
 
@@ -298,7 +281,7 @@ def fleet_page(
                    standings=[each.value for each in reversed(Standing)])  # fmt: skip
     sections = [
         Section("Who needs a person first", [_first(legs, day, pages)]),
-        Section("Legs", [Live(markup=table, script=template_text("fleet/table.js"))]),
+        Section("Legs", [Fragment(markup=table, script=template_text("fleet/table.js"))]),
         joints_section(legs, joints),
         change_section(legs),
         recordings_section(legs, day),
@@ -329,23 +312,17 @@ def first_legs(legs: Sequence[LegOverview], day: Day) -> list[LegOverview]:
 def _banner(overview: FleetOverview, day: Day) -> Banner:
     found = counts(overview.legs, day)
     worst = max((each for each in Standing if found[each]), key=lambda each: each.severity)
-    words, group = next((words, group) for words, group in _GROUPS if worst in group)
-    number = sum(found[each] for each in group)
+    numbers = {words: sum(found[each] for each in group) for words, group in _GROUPS.items()}
+    words = next(words for words, group in _GROUPS.items() if worst in group)
+    told = [f"{number} {each}" for each, number in numbers.items() if number or each != _DEMONSTRATIONS]
+    outdated = f"healthy, but without a recording of the last {day.fresh_days:g} days, or not updated"
     return Banner(
         symbol=worst.symbol,
-        word=f"{number} of {len(overview.legs)} {words}".upper(),
-        text=", ".join(
-            f"{number} {words}"
-            for words, group in _GROUPS
-            if (number := sum(found[each] for each in group)) or Standing.DEMONSTRATION not in group
-        )
-        + ".",
+        word=f"{numbers[words]} of {len(overview.legs)} {words}".upper(),
+        text=f"{', '.join(told)}.",
         notes=[
             ("In detail", ", ".join(f"{found[each]} {each.value}" for each in reversed(Standing))),
-            (
-                "Outdated",
-                f"healthy, but without a recording of the last {day.fresh_days:g} days, or not updated",
-            ),
+            ("Outdated", outdated),
             ("Limits", overview.advice),
         ],
         severity=worst.tone,
@@ -360,25 +337,13 @@ def _first(legs: Sequence[LegOverview], day: Day, pages: Container[str]) -> Part
     return Fragment(render("fleet/first.html", cards=cards, more=asking - len(cards)))
 
 
-def _card(leg: LegOverview, day: Day, has_page: bool) -> dict[str, str]:
+def _card(leg: LegOverview, day: Day, has_page: bool) -> dict[str, Any]:
     verdict, standing, doubt = leg.verdict, day.standing(leg), day.doubt(leg)
+    card = {"leg": leg, "standing": standing, "by": deadline(leg, standing, day)}
+    card["page"] = page_address(leg.id) if has_page else ""
     if verdict is None or standing is Standing.OUTDATED:
-        why, joints, do = doubt, "", "record its gait, then run leg-wear-monitor fleet update"
-        code = ""
-    else:
-        why, joints, do = verdict.why, ", ".join(verdict.joints), verdict.do
-        code = f"{verdict.fault_code}, see {guide_to(verdict)}"
-        why += f"; {doubt}" if doubt else ""
-    return {
-        "name": leg.id,
-        "page": page_address(leg.id) if has_page else "",
-        "lot": leg.lot,
-        "symbol": standing.symbol,
-        "word": standing.value.upper(),
-        "tone": standing.tone,
-        "joints": joints,
-        "why": why,
-        "do": do,
-        "by": deadline(leg, standing, day),
-        "code": code,
-    }
+        do = "record its gait, then run leg-wear-monitor fleet update"
+        return card | {"joints": "", "why": doubt, "do": do, "code": ""}
+    why = f"{verdict.why}; {doubt}" if doubt else verdict.why
+    code = f"{verdict.fault_code}, see {guide_to(verdict)}"
+    return card | {"joints": ", ".join(verdict.joints), "why": why, "do": verdict.do, "code": code}

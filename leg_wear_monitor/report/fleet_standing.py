@@ -159,21 +159,26 @@ def growth(leg: LegOverview) -> tuple[float, str] | None:
 def change_section(legs: Sequence[LegOverview]) -> Section:
     """Legs whose verdict changed, and the joints that wore most, since the update before."""
     changed = [leg for leg in legs if was(leg) and not leg.is_accelerated]
-    worse = [leg for leg in changed if _step(leg) > 0]
-    grown = sorted(
-        ((*rise, leg.id) for leg in legs if (rise := growth(leg)) and rise[0] > 0.0),
-        key=lambda each: (-each[0], each[2]),
-    )
+    worse = sum(_step(leg) > 0 for leg in changed)
+    grown = [(rise, leg.id) for leg in legs if (rise := growth(leg)) and rise[0] > 0.0]
     added = sum(leg.change.recordings for leg in legs)
     sentences = [
         f"Recordings counted since: {added}.",
-        f"Legs with a worse verdict: {len(worse)}; with a better one: {len(changed) - len(worse)}.",
+        f"Legs with a worse verdict: {worse}; with a better one: {len(changed) - worse}.",
     ]
     parts: list[Part] = [Sentences(sentences)]
     if changed:
-        parts.append(_verdicts(sorted(changed, key=lambda leg: (-_step(leg), leg.id))))
+        ranked = sorted(changed, key=lambda leg: (-_step(leg), leg.id))
+        verdicts = [
+            (leg.id, was(leg), State(leg.state).words, leg.verdict.why if leg.verdict else "")
+            for leg in ranked
+        ]
+        parts.append(_table("Legs with another verdict", ("leg", "before", "now", "why"), verdicts))
     if grown:
-        parts.append(_growth(grown))
+        head = ("leg", "joint", "growth [% of the clearance from new to limit]")
+        ranked_rises = sorted(grown, key=lambda each: (-each[0][0], each[1]))
+        rises = [(leg, joint, f"{points:+.2g}") for (points, joint), leg in ranked_rises]
+        parts.append(_table("Largest growth of a clearance", head, rises))
     return Section("What changed since the update before", parts)
 
 
@@ -181,29 +186,8 @@ def _step(leg: LegOverview) -> int:
     return State(leg.state).severity - State(leg.change.state).severity
 
 
-def _verdicts(changed: Sequence[LegOverview]) -> Table:
-    rows = [
-        (leg.id, was(leg), State(leg.state).words, leg.verdict.why if leg.verdict else "") for leg in changed
-    ]
-    return Table(
-        caption="Legs with another verdict",
-        head=("leg", "before", "now", "why"),
-        rows=rows[:_ROWS],
-        note=_more(len(rows), "change"),
-        is_text=True,
-    )
-
-
-def _growth(grown: Sequence[tuple[float, str, str]]) -> Table:
-    rows = [(leg, joint, f"{points:+.2g}") for points, joint, leg in grown]
-    return Table(
-        caption="Largest growth of a clearance",
-        head=("leg", "joint", "growth [% of the clearance from new to limit]"),
-        rows=rows[:_ROWS],
-        note=_more(len(rows), "change"),
-    )
-
-
-def _more(number: int, column: str) -> str:
-    rest = number - _ROWS
-    return f"{rest} more: sort the table of the legs by {column}." if rest > 0 else ""
+def _table(caption: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
+    """The first rows; of texts, if it has a reason."""
+    rest = len(rows) - _ROWS
+    note = f"{rest} more: sort the table of the legs by change." if rest > 0 else ""
+    return Table(caption=caption, head=head, rows=rows[:_ROWS], note=note, is_text="why" in head)

@@ -3,11 +3,10 @@
 import base64
 import re
 from collections.abc import Callable, Iterator, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import pairwise
 from pathlib import Path
 
-import attrs
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
@@ -44,21 +43,16 @@ def document_page(path: Path) -> tuple[str, str]:
         styles=[template_text("replay/replay.css"), template_text("guide.css")],
         has_dark=True,
     )
-    markup = _markup(_linked(tokens, path))
+    markup = _markup(_with_links(tokens, partial(_leads_on, path)))
     return render("guide.html", page=page, markup=markup), page.policy
 
 
-@attrs.frozen
-class Enclosed:
-    """A document to be shown inside a page: its title, and its markup without links that lead out of it."""
-
-    title: str
-    markup: str
-
-
 @lru_cache(maxsize=100)
-def enclosed(path: Path) -> Enclosed:
-    """A document for a page that is a file, and may be anywhere: no link leads to another document."""
+def enclosed(path: Path) -> tuple[str, str]:
+    """Title and markup of a document for a page that is a file, and may be anywhere.
+
+    No link leads to another document.
+    """
     tokens = _tokens(path)
     for token in _every(tokens):
         if token.type in ("heading_open", "heading_close"):
@@ -66,7 +60,7 @@ def enclosed(path: Path) -> Enclosed:
         if token.type == "heading_open":
             token.attrs.pop("id", None)  # a page may enclose several
     body = tokens[3:]  # without its title, which is that of the section
-    return Enclosed(_title(tokens), _markup(_unlinked(body)))
+    return _title(tokens), _markup(_with_links(body, lambda href: href.startswith("https://")))
 
 
 def _tokens(path: Path) -> list[Token]:
@@ -107,25 +101,17 @@ def _every(tokens: Sequence[Token]) -> Iterator[Token]:
         yield from token.children or ()
 
 
-def _linked(tokens: Sequence[Token], path: Path) -> Sequence[Token]:
-    """With links to documents that are there, and to other sites; others become text."""
-
-    def leads_on(href: str) -> bool:
-        target = href.partition("#")[0]
-        if href.startswith(("https://", "#")):
-            return True
-        folder = (share_directory() / FOLDER).resolve()
-        there = (path.parent / target).resolve()
-        return there.is_relative_to(folder) and document_path(str(there.relative_to(folder))) is not None
-
-    return _with_links(tokens, leads_on)
-
-
-def _unlinked(tokens: Sequence[Token]) -> Sequence[Token]:
-    return _with_links(tokens, lambda href: href.startswith("https://"))
+def _leads_on(path: Path, href: str) -> bool:
+    """Whether a link of a document leads to another one that is there, or to another site."""
+    if href.startswith(("https://", "#")):
+        return True
+    folder = (share_directory() / FOLDER).resolve()
+    there = (path.parent / href.partition("#")[0]).resolve()
+    return there.is_relative_to(folder) and document_path(str(there.relative_to(folder))) is not None
 
 
 def _with_links(tokens: Sequence[Token], is_kept: Callable[[str], bool]) -> Sequence[Token]:
+    """With the links that are kept; others become text."""
     for token in tokens:
         kept, is_open = [], False
         for child in token.children or ():

@@ -105,7 +105,6 @@ class Chart:
     ends: tuple[float, float] | None = None
     panels: Sequence[Panel]
     group: str
-    kind: str = attrs.field(default="chart", init=False)
 
     @property
     def columns(self) -> tuple[Series, ...]:
@@ -130,24 +129,12 @@ class Chart:
     @property
     def settings(self) -> dict[str, Any]:
         """What the script needs beside the values, as plain data."""
-        panels = list(map(_settings, self.panels))
+        panels = [attrs.asdict(panel, filter=_is_setting) for panel in self.panels]
         return {"group": self.group, "x": self.x.head, "ends": self.ends, "panels": panels}
 
 
-def _settings(panel: Panel) -> dict[str, Any]:
-    series = [
-        {
-            "name": each.name,
-            "unit": each.unit,
-            "colour": each.colour,
-            "style": each.style,
-            "width": each.width,
-        }
-        for each in panel.series
-    ]
-    ends = {"low": panel.low, "high": panel.high, "height": panel.height, "lanes": list(panel.lanes)}
-    bands = [list(band) for band in panel.bands]
-    return {"title": panel.title, "series": series, "bands": bands, **ends}
+def _is_setting(attribute: "attrs.Attribute[Any]", _value: Any) -> bool:
+    return attribute.name != "values"
 
 
 # Parts of a page: text, pictures, tables, listings, and markup that a template has made.
@@ -173,7 +160,6 @@ class Picture:
     alt: str
     caption: str = ""
     wide: bool = False
-    kind: str = attrs.field(default="picture", init=False)
 
     @property
     def address(self) -> str:
@@ -188,7 +174,6 @@ class Gallery:
 
     pictures: Sequence[Picture]
     caption: str = ""
-    kind: str = attrs.field(default="gallery", init=False)
 
 
 @attrs.frozen(kw_only=True)
@@ -218,7 +203,6 @@ class Table:
     rows: Sequence[Sequence[str]]
     note: str = ""
     is_text: bool = False
-    kind: str = attrs.field(default="table", init=False)
 
     def __attrs_post_init__(self) -> None:
         if any(len(row) != len(self.head) for row in self.rows):
@@ -231,7 +215,6 @@ class Text:
 
     text: str
     is_not_valid: bool = False
-    kind: str = attrs.field(default="text", init=False)
 
 
 @attrs.frozen
@@ -239,46 +222,28 @@ class Sentences:
     """A list of sentences, for instance conclusions."""
 
     sentences: Sequence[str]
-    kind: str = attrs.field(default="sentences", init=False)
 
 
-@attrs.frozen(kw_only=True)
-class Listing:
-    """Preformatted text, for instance the contents of a file."""
-
-    text: str
-    kind: str = attrs.field(default="listing", init=False)
-
-
-@attrs.frozen(kw_only=True)
-class Live:
-    """An interactive element: markup with its data, and a script.
+@attrs.frozen
+class Fragment:
+    """Markup of a template of this package, and what makes it interactive.
 
     Attributes
     ----------
     markup : str
         Trusted HTML, inserted without escaping; the script finds it by its id.
     script : str
-        JavaScript that uses neither modules nor the network.
+        JavaScript that uses neither modules nor the network; nothing if empty.
     caption : str
-        Caption below the element; no caption if empty.
+        Caption below an interactive element; no caption if empty.
     """
 
     markup: str = attrs.field(repr=False)
-    script: str = attrs.field(repr=False)
+    script: str = attrs.field(default="", repr=False)
     caption: str = ""
-    kind: str = attrs.field(default="live", init=False)
 
 
-@attrs.frozen
-class Fragment:
-    """Markup of a template of this package: trusted HTML, inserted without escaping."""
-
-    markup: str = attrs.field(repr=False)
-    kind: str = attrs.field(default="fragment", init=False)
-
-
-Part = Text | Sentences | Picture | Gallery | Table | Listing | Live | Fragment | Chart
+Part = Text | Sentences | Picture | Gallery | Table | Fragment | Chart
 
 
 # A self-contained HTML page: sections of parts, with the configuration and versions.
@@ -319,8 +284,6 @@ class Banner:
         Lines below the text, each with its title.
     severity : str
         Class of its colour: ``fine``, ``careful`` or ``bad``.
-    guide : str
-        Address of the page that says what to do; empty without one.
     links : mapping of str to pair of str
         Text and address of a link behind some of the notes, by their titles.
     """
@@ -331,7 +294,6 @@ class Banner:
     text: str
     notes: Sequence[tuple[str, str]] = ()
     severity: str
-    guide: str = ""
     links: Mapping[str, tuple[str, str]] = attrs.field(factory=dict)
 
 
@@ -375,8 +337,8 @@ class Page:
     def scripts(self) -> tuple[str, ...]:
         """The scripts, each once: the libraries, then those of the interactive parts."""
         parts = (part for section in self.sections for part in section.parts)
-        live = (part.script for part in parts if isinstance(part, Live))
-        return tuple(dict.fromkeys((*self.libraries, *live)))
+        scripts = (part.script for part in parts if isinstance(part, Fragment) and part.script)
+        return tuple(dict.fromkeys((*self.libraries, *scripts)))
 
     @property
     def style(self) -> str:
@@ -527,6 +489,9 @@ def verdict_banner(summary: ReplaySummary, guide: str, certainty: str) -> Banner
     if verdict.not_valid:
         figures = ", ".join(figure.words for figure in verdict.not_valid)
         notes.append(("Not valid", f"{figures}: {reason(verdict)}"))
+    links = {"Do": ("step by step", guide)}
+    if figures_of(summary):
+        links[HOW_SURE] = ("measured on what", certainty)
     return Banner(
         symbol=symbol,
         word=verdict.state.words.upper(),
@@ -534,6 +499,5 @@ def verdict_banner(summary: ReplaySummary, guide: str, certainty: str) -> Banner
         text=verdict.why,
         notes=notes,
         severity=severity,
-        guide=guide,
-        links={HOW_SURE: ("measured on what", certainty)} if figures_of(summary) else {},
+        links=links,
     )

@@ -5,11 +5,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast, bases, three_digits
 from leg_wear_monitor.monitor.forecast.measurement import validity
 from leg_wear_monitor.monitor.ledger.entry import Measurement
-from leg_wear_monitor.playback.result import ReplaySummary
+from leg_wear_monitor.playback.result import ReplaySummary, WornDepth
 from leg_wear_monitor.report.figure import length_unit
 from leg_wear_monitor.report.page import Chart, Panel, Part, Section, Series, Table, Text, not_valid
 from leg_wear_monitor.state import Figure
@@ -23,7 +22,10 @@ def forecast_section(summary: ReplaySummary) -> Section:
     doubt = not_valid(summary.verdict, Figure.FORECAST)
     parts: list[Part] = [Text(sentence) for sentence in leg_sentence(summary)]
     parts.append(Text(doubt, is_not_valid=True) if doubt else _table(summary))
-    parts += [Text(f"The life of {basis}.") for basis in bases(forecasts_of(summary))]
+    parts += [
+        Text(f"The life of {basis}.")
+        for basis in bases({summary.leg.joint_words(name): told for name, told in _forecasts(summary)})
+    ]
     if summary.measurements:
         parts.append(_validity(summary.measurements))
     else:
@@ -31,26 +33,24 @@ def forecast_section(summary: ReplaySummary) -> Section:
     return Section("Forecast", parts, is_folded=True)
 
 
-def forecasts_of(summary: ReplaySummary) -> dict[str, JointForecast]:
-    """Forecasts by the joints' names in words."""
-    found = {summary.leg.joint_words(name): joint.forecast for name, joint in summary.joints.items()}
-    return {name: told for name, told in found.items() if told is not None}
-
-
 def _table(summary: ReplaySummary) -> Table:
-    leg = summary.forecast
-    rows = [
-        (summary.leg.joint_words(name), _clearance(told), *_lasts(told), _first(leg, name), _answer(told))
-        for name, joint in summary.joints.items()
-        if (told := joint.forecast) is not None
-    ]
+    leg, chances = summary.forecast, summary.forecast.first_probability if summary.forecast else {}
+    rows = []
+    for name, told in _forecasts(summary):
+        may_be = told.clearance_m
+        rows.append((
+            summary.leg.joint_words(name),
+            f"{1.0e3 * may_be.p10:.4f} to {1.0e3 * may_be.p90:.4f}" if may_be else "-",
+            *_lasts(told),
+            f"{100.0 * chances[name]:.0f}" if name in chances else "-",
+            told.answer.value + (f"; measured {told.measurements} times" if told.measurements else ""),
+        ))  # fmt: skip
     if leg is not None:
         rows.append(("leg", "", *_lasts(leg), "", leg.answer.value))
     quantiles = [f"{fraction} [{unit}]" for unit in ("h", "days") for fraction in FRACTIONS]
-    head = ("", "clearance [mm]", *quantiles, "first [%]", "")
     return Table(
         caption="Hours of walking, and days of duty, until the limit of the mean clearance",
-        head=head,
+        head=("", "clearance [mm]", *quantiles, "first [%]", ""),
         rows=rows,
         note="p10, p50 and p90 are not exceeded with a probability of 10, 50 and 90 %. "
         f"A day of duty has {summary.monitor.duty_hours_per_day:g} h of walking. "
@@ -59,86 +59,59 @@ def _table(summary: ReplaySummary) -> Table:
     )
 
 
+def _forecasts(summary: ReplaySummary) -> list[tuple[str, JointForecast]]:
+    """Joints of which there is a forecast."""
+    return [(name, joint.forecast) for name, joint in summary.joints.items() if joint.forecast]
+
+
+def _lasts(told: JointForecast | LegForecast) -> list[str]:
+    return [
+        three_digits(getattr(unit, fraction)) if unit else "-"
+        for unit in (told.hours, told.days)
+        for fraction in FRACTIONS
+    ]
+
+
 def leg_sentence(summary: ReplaySummary) -> list[str]:
     """How long the leg lasts, if that is known."""
     leg = summary.forecast
-    if not_valid(summary.verdict, Figure.FORECAST):
+    if leg is None or leg.hours is None or leg.first is None or not_valid(summary.verdict, Figure.FORECAST):
         return []
-    if leg is None or leg.hours is None or leg.first is None:
-        return []
-    p10, p50, p90 = (_life(leg, fraction) for fraction in FRACTIONS)
-    probability = 100.0 * leg.first_probability[leg.first]
-    first = summary.leg.joint_words(leg.first)
+    lasts = []
+    for fraction in FRACTIONS:
+        days = f" or {three_digits(getattr(leg.days, fraction))} days" if leg.days else ""
+        lasts.append(f"{three_digits(getattr(leg.hours, fraction))} hours of walking{days}")
+    first, probability = summary.leg.joint_words(leg.first), 100.0 * leg.first_probability[leg.first]
     return [
-        f"The leg lasts {p50} (p10 {p10}, p90 {p90}); {first} is the first joint at its "
+        f"The leg lasts {lasts[1]} (p10 {lasts[0]}, p90 {lasts[2]}); {first} is the first joint at its "
         f"limit with a probability of {probability:.0f} %."
     ]
 
 
-def _life(leg: LegForecast, fraction: str) -> str:
-    days = f" or {three_digits(getattr(leg.days, fraction))} days" if leg.days else ""
-    return f"{three_digits(getattr(leg.hours, fraction))} hours of walking{days}"
-
-
 def _validity(measurements: Sequence[Measurement]) -> Chart:
     """Each measured clearance in the distribution that was predicted before it."""
-    kept = [each for each in measurements if not each.is_withdrawn]
-    kept.sort(key=lambda each: each.cycles)
-    series = [
-        Series(
-            name=f"{joint} {words}",
-            unit="",
-            values=np.array([_below(each, joint, counts) for each in kept]),
-            colour=colour,
-            style="points",
-        )
-        for joint in dict.fromkeys(each.joint for each in kept)
-        for counts, words, colour in _MEASURED
-        if any(each.joint == joint and each.counts is counts for each in kept)
-    ]
-    low, high = (
-        Series(name=name, unit="", values=np.full(len(kept), end), colour="--ink", style="dashed")
-        for name, end in (("p10", 0.1), ("p90", 0.9))
-    )
+    kept = sorted((each for each in measurements if not each.is_withdrawn), key=lambda each: each.cycles)
+    series = []
+    for joint in dict.fromkeys(each.joint for each in kept):
+        for counts, words, colour in _MEASURED:
+            is_one = [each.joint == joint and each.counts is counts for each in kept]
+            below = np.where(is_one, [each.expected_below for each in kept], math.nan)
+            if any(is_one):
+                name = f"{joint} {words}"
+                series.append(Series(name=name, unit="", values=below, colour=colour, style="points"))
+    for name, end in (("p10", 0.1), ("p90", 0.9)):
+        values = np.full(len(kept), end)
+        series.append(Series(name=name, unit="", values=values, colour="--ink", style="dashed"))
     title = "Predicted probability of a smaller clearance"
+    cycles = np.array([float(each.cycles) for each in kept])
     return Chart(
         name="measurements",
         alt="Each measured clearance in its predicted distribution",
         caption=f"{validity(measurements).words}. In the long run 80 % lie between p10 and p90.",
-        x=Series(name="gait cycles of the part", unit="", values=np.array([float(m.cycles) for m in kept])),
-        panels=[Panel(title=title, series=[*series, low, high], low=-0.02, high=1.02, height=240)],
+        x=Series(name="gait cycles of the part", unit="", values=cycles),
+        panels=[Panel(title=title, series=series, low=-0.02, high=1.02, height=240)],
         group="measurements",
     )
-
-
-def _below(measured: Measurement, joint: str, counts: bool) -> float:
-    is_this = measured.joint == joint and measured.counts is counts
-    return measured.expected_below if is_this else math.nan
-
-
-def _clearance(told: JointForecast) -> str:
-    may_be = told.clearance_m
-    if may_be is None:
-        return "-"
-    return f"{1.0e3 * may_be.p10:.4f} to {1.0e3 * may_be.p90:.4f}"
-
-
-def _lasts(told: JointForecast | LegForecast) -> tuple[str, ...]:
-    return tuple(
-        three_digits(getattr(unit, fraction)) if unit else "-"
-        for unit in (told.hours, told.days)
-        for fraction in FRACTIONS
-    )
-
-
-def _first(leg: LegForecast | None, joint: str) -> str:
-    known = leg is not None and joint in leg.first_probability
-    return f"{100.0 * leg.first_probability[joint]:.0f}" if known and leg else "-"
-
-
-def _answer(told: JointForecast) -> str:
-    measured = f"; measured {told.measurements} times" if told.measurements else ""
-    return f"{told.answer.value}{measured}"
 
 
 # Wear around each bushing and journal, on an axis that shows it in its size.
@@ -158,7 +131,7 @@ def wear_section(summary: ReplaySummary) -> Section:
 
 def _deepest(summary: ReplaySummary) -> str:
     """The deepest wear beside the clearance limit, which tells how much it is."""
-    depths = {name: _greatest(worn.bushing, worn.journal) for name, worn in summary.wear_depth_m.items()}
+    depths = {name: _greatest(worn) for name, worn in summary.wear_depth_m.items()}
     name = max(depths, key=lambda joint: depths[joint], default="")
     if not name or not depths[name]:
         return "No wear is counted."
@@ -172,26 +145,17 @@ def _deepest(summary: ReplaySummary) -> str:
 
 def wear_chart(summary: ReplaySummary) -> Chart:
     """Wear depth of each joint over the angle."""
-    greatest = max(
-        (_greatest(worn.bushing, worn.journal) for worn in summary.wear_depth_m.values()), default=0.0
-    )
-    most = max(1.1 * greatest, _LEAST_M)
+    worn = summary.wear_depth_m
+    most = max(1.1 * max(map(_greatest, worn.values()), default=0.0), _LEAST_M)
     factor, unit = length_unit(most)
-    sectors = max((len(worn.bushing) for worn in summary.wear_depth_m.values()), default=0)
+    sectors = max((len(each.bushing) for each in worn.values()), default=0)
     angle = np.asarray((np.arange(sectors) + 0.5) * (360.0 / max(sectors, 1)), np.float64)
-    panels = [
-        Panel(
-            title=summary.leg.joint_words(name),
-            series=[
-                Series(name=f"bushing {name}", unit=unit, values=factor * worn.bushing),
-                Series(name=f"journal {name}", unit=unit, values=factor * worn.journal, colour="--series-1"),
-            ],
-            low=0.0,
-            high=factor * most,
-            height=150,
-        )
-        for name, worn in summary.wear_depth_m.items()
-    ]
+    panels = []
+    for name, each in worn.items():
+        bushing = Series(name=f"bushing {name}", unit=unit, values=factor * each.bushing)
+        journal = Series(name=f"journal {name}", unit=unit, values=factor * each.journal, colour="--series-1")
+        title, high = summary.leg.joint_words(name), factor * most
+        panels.append(Panel(title=title, series=[bushing, journal], low=0.0, high=high, height=150))
     return Chart(
         name="wear",
         alt="Wear depth around bushing and journal of each joint",
@@ -203,5 +167,5 @@ def wear_chart(summary: ReplaySummary) -> Chart:
     )
 
 
-def _greatest(*depths: Floats) -> float:
-    return max(float(depth.max(initial=0.0)) for depth in depths)
+def _greatest(worn: WornDepth) -> float:
+    return max(float(depth.max(initial=0.0)) for depth in (worn.bushing, worn.journal))

@@ -183,10 +183,8 @@ def guide_sections(summary: ReplaySummary) -> list[Section]:
     """
     guides = [enclosed(share_directory() / name) for name in (guide_to(summary.verdict), _MEASURE)]
     return [
-        Section(
-            f"Guide: {guide.title}", [Fragment(f'<div class="guide">{guide.markup}</div>')], is_folded=True
-        )
-        for guide in guides
+        Section(f"Guide: {title}", [Fragment(f'<div class="guide">{markup}</div>')], is_folded=True)
+        for title, markup in guides
     ]
 
 

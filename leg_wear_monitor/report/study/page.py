@@ -24,8 +24,8 @@ from leg_wear_monitor.report.figure import (
 )
 from leg_wear_monitor.report.leg_picture import leg_data, leg_picture
 from leg_wear_monitor.report.page import (
+    Fragment,
     Gallery,
-    Live,
     Page,
     Picture,
     Section,
@@ -302,7 +302,7 @@ def influence_gallery(claims: LegClaims) -> Gallery:
     return Gallery(pictures=pictures, caption=caption)
 
 
-def leg_slider(mechanism: Mechanism, found: Found) -> Live:
+def leg_slider(mechanism: Mechanism, found: Found) -> Fragment:
     """Interactive picture of the leg over a gait cycle: one cycle of an example run of each point."""
     linkage, speed_rpm = build_linkage(mechanism), found[0][0].speed_rpm
     frames = len(found[0][1]["example_eccentricity_m"])
@@ -315,7 +315,7 @@ def leg_slider(mechanism: Mechanism, found: Found) -> Live:
     factors = [CLEARANCE_FRACTION * radius / point.clearance_m for point, _ in found]
     low, high = min(factors), max(factors)
     factor = f"{low:.3g}" if high - low < 1.0e-6 * high else f"{low:.3g} to {high:.3g}"
-    return Live(
+    return Fragment(
         markup=render("leg_slider.html", data=data, names=[run["label"] for run in runs], alt=_ALT),
         script=template_text("leg_slider.js"),
         caption="One gait cycle of one run, an example. The leg is to scale, its bodies in ideal positions: "

@@ -60,6 +60,7 @@ _MEAN = 0.02  # error of the model in each phase, of the torque's size
 _SPREADS = {Cause.MASS: 0.05, Cause.LENGTH: 0.005, Cause.FRICTION: 5.0, Cause.SCALE: 0.05, Cause.TIMING: 0.02}
 _SURE, _WORSE = 2.0, 3.0  # standard deviations of a load, and a factor on what is left over without it
 _UNIT_N = 100.0
+_STANDS = 0.05  # of the peak of a force, above which the foot stands
 # of the fit, which has several minima: 69 N and a toe-off later by 0.04 left over 2.5, 100 N left over
 # 2.2 (2026-11-25). Sizes, and toe-offs in standard deviations, where it begins
 _STARTS_N, _TOE_OFFS, _ROUNDS = (50.0, 200.0, 600.0), (-2.0, 0.0, 2.0), 4
@@ -105,6 +106,29 @@ class GroundLoad:
     def is_sure(self) -> bool:
         """Whether the foot carries a load, and not only masses, friction or scatter."""
         return self.peak_n > _SURE * self.peak_sigma_n and self.without > _WORSE * max(self.square, 1.0)
+
+
+def stance_phases(up: Floats, speed: float) -> tuple[float, float]:
+    """Heel strike and toe-off of a vertical force, as fractions of a turn of the crank.
+
+    Parameters
+    ----------
+    up : (n,) array
+        At equal steps of the crank angle from 0.
+    speed : float
+        Of the crank, whose sign tells which of the two ends of the force comes first.
+
+    Returns
+    -------
+    (float, float)
+        Where the force rises above and falls below a twentieth of its peak; NaN if it does so more than once.
+    """
+    stands = up > _STANDS * up.max()
+    begin, end = (np.flatnonzero(stands & ~np.roll(stands, step)) for step in (1, -1))
+    if len(begin) != 1:
+        return math.nan, math.nan
+    ends = float(begin[0] / len(up)), float(end[0] / len(up))
+    return ends if speed > 0.0 else (ends[1], ends[0])
 
 
 class _Minimum(NamedTuple):

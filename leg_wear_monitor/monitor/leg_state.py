@@ -3,6 +3,8 @@
 import math
 from collections.abc import Mapping, Sequence
 
+import attrs
+
 from leg_wear_monitor.estimate.cause import Cause, NamedCause, TorqueExplanation
 from leg_wear_monitor.files import finite_or_none
 from leg_wear_monitor.monitor.alarm_specs import CLEARANCE
@@ -160,14 +162,7 @@ def _load(measured: FootLoad, diagnosis: Diagnosis) -> FootLoad:
     """The measured load, or else the one that the drive torque shows."""
     if measured.source != "none" or diagnosis.load is None:
         return measured
-    return FootLoad(
-        source="estimated",
-        peak_n=diagnosis.load.peak_n,
-        peak_sigma_n=diagnosis.load.peak_sigma_n,
-        heel_strike_phase=diagnosis.load.heel_strike % 1.0,
-        toe_off_phase=diagnosis.load.toe_off % 1.0,
-        cycles=diagnosis.cycles,
-    )
+    return attrs.evolve(diagnosis.load, cycles=diagnosis.cycles)
 
 
 def _diagnosis(

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from leg_wear_monitor.estimate.cause import TorqueExplanation
 from leg_wear_monitor.estimate.signature import DIRECT
+from leg_wear_monitor.files import or_nan
 from leg_wear_monitor.monitor import alarm_specs
 from leg_wear_monitor.monitor.alarms import CAUSES_OF_ALARMS, DIAGNOSIS, worst_code
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState, NotUsed
@@ -86,10 +87,10 @@ def diagnosis_status(joints: Sequence[str], diagnosis: Diagnosis) -> Status:
         values["drive_low_pass_s"] = diagnosis.channel.time_constant_s
         values["drive_load_friction"] = diagnosis.channel.load_friction
     if diagnosis.load:
-        values["foot_load_peak_n"] = diagnosis.load.peak_n
-        values["foot_load_sigma_n"] = diagnosis.load.peak_sigma_n
-        values["heel_strike_phase"] = diagnosis.load.heel_strike
-        values["toe_off_phase"] = diagnosis.load.toe_off
+        values["foot_load_peak_n"] = or_nan(diagnosis.load.peak_n)
+        values["foot_load_sigma_n"] = or_nan(diagnosis.load.peak_sigma_n)
+        values["heel_strike_phase"] = or_nan(diagnosis.load.heel_strike_phase)
+        values["toe_off_phase"] = or_nan(diagnosis.load.toe_off_phase)
     if math.isfinite(diagnosis.temperature_c):
         values["drive_temperature_c"] = diagnosis.temperature_c
     if diagnosis.compliance:

@@ -13,6 +13,7 @@ import numpy as np
 
 from leg_wear_monitor.estimate.cause import Cause, Change
 from leg_wear_monitor.estimate.channel import compliance_of
+from leg_wear_monitor.estimate.ground_load import stance_phases
 from leg_wear_monitor.estimate.leg_model import ClearanceFit
 from leg_wear_monitor.estimate.signature import DIRECT, CommissionedTorque, TorqueSensor, signatures
 from leg_wear_monitor.mechanism.arrays import Floats
@@ -41,6 +42,7 @@ from leg_wear_monitor.monitor.diagnosis.state import (
     mean_of,
     sensor_period_s,
 )
+from leg_wear_monitor.state import FootLoad
 from leg_wear_monitor.twin.reference import LegParameters
 from leg_wear_monitor.twin.sample import GROUND, INSTANT, MEASURED, KeepsSamples
 from leg_wear_monitor.twin.statistics import CycleStatistics
@@ -325,12 +327,36 @@ class TorqueObserver(KeepsSamples):
         self._restart(self.state.counted_m)
 
     @property
+    def _load(self) -> FootLoad | None:
+        """Force of the ground by the commissioned gait cycles, or that of the reference; None without any.
+
+        In a run after the one that found it, the reference alone knows it.
+        """
+        found, reference = self.state.load, self.state.reference
+        if found is not None and found.is_sure:
+            peak_n, sigma_n, phases = found.peak_n, found.peak_sigma_n, (found.heel_strike, found.toe_off)
+        elif found is None and self._is_on_ground and reference and reference.parameters.load.size:
+            up = reference.parameters.load @ self._up
+            peak_n, phases = float(up.max()), stance_phases(up, reference.profile.speed)
+            sigma_n = reference.parameters.load_sigma * peak_n
+        else:
+            return None
+        heel_strike, toe_off = (None if math.isnan(phase) else phase % 1.0 for phase in phases)
+        return FootLoad(
+            source="estimated",
+            peak_n=peak_n,
+            peak_sigma_n=sigma_n,
+            heel_strike_phase=heel_strike,
+            toe_off_phase=toe_off,
+        )
+
+    @property
     def diagnosis(self) -> Diagnosis:
         """What the drive torque shows now."""
         state = self.state
         is_old = not state.cycles or (len(state.unused) == UNUSED_CYCLES and not state.changes)
         upcoming = next_step(state, self._references, self.config)
-        load = state.load if state.load and state.load.is_sure else None
+        load = self._load
         if state.fit is None or state.detector is None or is_old:
             return Diagnosis(
                 state=DiagnosisState.WAITING,

@@ -22,6 +22,8 @@ from leg_wear_monitor.wear import SECTORS
 
 FORMAT = 2  # 1, without a number, had one reference of a leg as its file is
 
+_LOAD_SIGMA = 0.05  # of a given force: a mean over some steps, by a sensor
+
 BEFOREHAND_CYCLES = 40  # of each leg: beforehand, there is time for twice as many as while the leg walks
 
 # what reading a damaged archive raises, as a damaged byte may be anywhere in it
@@ -75,7 +77,7 @@ def simulated_under(
     fresh = np.array([mechanism.clearances[one].radial_clearance for one in mechanism.clearance_joints])
     unworn, run = np.zeros((len(fresh), 2, SECTORS)), TorqueReferenceRun(mechanism, BEFOREHAND_CYCLES)
     leg = LegParameters.none(mechanism)
-    leg = leg if load is None else attrs.evolve(leg, load=load)
+    leg = leg if load is None else attrs.evolve(leg, load=load, load_sigma=_LOAD_SIGMA)
     made: list[TorqueReference] = []
     for profile in profiles:
         run.begin(fresh, unworn, profile, leg)

@@ -14,6 +14,7 @@ from leg_wear_monitor.estimate.leg_model import ClearanceFit, DetectorState
 from leg_wear_monitor.estimate.signature import DIRECT, Channel, CommissionedTorque, TorqueSensor, averaged
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.state import FootLoad
 from leg_wear_monitor.twin import TORQUE
 from leg_wear_monitor.twin.reference import CrankProfile, LegParameters, cycle_profile, mean_profile
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples, brings, is_valid, newest, of_crank, within
@@ -168,8 +169,8 @@ class Diagnosis:
         Identified masses and lengths that the wear is counted with; empty while it is counted as in the file.
     friction : float
         Factor on the friction in the joints that the wear is counted with.
-    load : GroundLoad or None
-        Force of the ground by the commissioned gait cycles, if the foot surely carries one.
+    load : FootLoad or None
+        Force of the ground that the foot surely carries.
     compliance : float
         Between the measured crank angle and the crank [rad/(N m)], that the wear is counted with; 0 if rigid.
     temperature_c, commissioned_c : float
@@ -188,7 +189,7 @@ class Diagnosis:
     channel: Channel = DIRECT
     bodies: tuple[Body, ...] = ()
     friction: float = 1.0
-    load: GroundLoad | None = None
+    load: FootLoad | None = None
     compliance: float = 0.0
     temperature_c: float = math.nan
     commissioned_c: float = math.nan

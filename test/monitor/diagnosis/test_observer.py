@@ -10,6 +10,7 @@ from leg_wear_monitor.estimate import leg_model
 from leg_wear_monitor.estimate.cause import Cause
 from leg_wear_monitor.estimate.explanations import body_torques
 from leg_wear_monitor.estimate.signature import CommissionedTorque, TorqueSensor
+from leg_wear_monitor.mechanism.person import nominal_stance
 from leg_wear_monitor.mechanism.position import TURN, build_linkage
 from leg_wear_monitor.monitor.config.inputs import Load
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -143,6 +144,28 @@ def test_the_temperature_of_the_drive_is_that_now_and_that_of_the_baseline(leg, 
     bare = observer_of(leg)
     walk(bare, samples(reference, [0] * 4))
     assert np.isnan(bare.diagnosis.temperature_c)
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_a_force_that_only_the_reference_knows_is_told(leg, reference, direction: float) -> None:
+    """As after a restart, or of a reference that was simulated under a known force."""
+    turned = attrs.evolve(leg, drive=attrs.evolve(leg.drive, speed=direction * TURN))
+    stance = nominal_stance(build_linkage(turned))
+    parameters = attrs.evolve(reference.parameters, load=300.0 * stance.force(), load_sigma=0.1)
+    profile = CrankProfile.steady(direction * TURN)
+    known = attrs.evolve(reference, parameters=parameters, profile=profile)
+    config = attrs.evolve(MonitorConfig(), load=Load(model=GROUND))
+    found = {}
+    for name, given in ((GROUND, config), ("none", MonitorConfig())):
+        observer = TorqueObserver(turned, given, SIZE_NM, NEW, references=[known])
+        observer.state.reference = known
+        found[name] = observer.diagnosis.load
+    assert found["none"] is None
+    assert found[GROUND].peak_n == pytest.approx(300.0, rel=0.01)
+    assert found[GROUND].peak_sigma_n == pytest.approx(30.0, rel=0.01)
+    # to the steps of the table, and a twentieth of the peak
+    assert found[GROUND].heel_strike_phase == pytest.approx(stance.heel_strike % 1.0, abs=0.02)
+    assert found[GROUND].toe_off_phase == pytest.approx(stance.toe_off % 1.0, abs=0.02)
 
 
 def test_without_torques_it_reports_so(leg, reference) -> None:

@@ -18,7 +18,7 @@ from leg_wear_monitor.mechanism.loader import understood
 from leg_wear_monitor.mechanism.position import TURN, ideal_motion
 from leg_wear_monitor.mechanism.reach import POINTS, Reach, dead_words, findings, headline, reach_of
 from leg_wear_monitor.mechanism.spec import GROUND, Mechanism, PrismaticJoint, SpeedDrive, TorqueDrive
-from leg_wear_monitor.report.figure import INK, SMALL, USUAL, VERMILION, new_figure, plain, svg, tidy
+from leg_wear_monitor.report.figure import INK, SMALL, USUAL, VERMILION, finish, new_figure, plain, svg
 from leg_wear_monitor.report.leg_picture import draw_leg, leg_data
 from leg_wear_monitor.report.page import (
     Fragment,
@@ -271,7 +271,6 @@ def drawing_svg(drawing: Drawing) -> bytes:
         else:
             axes = figure.subplots()
         draw_drawing(axes, drawing)
-        tidy(axes)
         return svg(figure, CREATOR)
 
 
@@ -283,8 +282,7 @@ def draw_drawing(axes: Axes, drawing: Drawing) -> None:
     if drawing.findings:
         title += "\n" + "\n".join(plain(line) for line in textwrap.wrap(drawing.headline, 60))
     axes.set_title(title, fontsize=USUAL, color=VERMILION if drawing.findings else INK)
-    axes.set_xlabel("x [m]", fontsize=SMALL)
-    axes.set_ylabel("y [m]", fontsize=SMALL)
+    finish(axes, x="x [m]", y="y [m]")
 
 
 @contextmanager

@@ -121,23 +121,6 @@ def _greatest(values: Floats) -> float:
     return float(known.max()) if len(known) else 0.0
 
 
-# How much each clearance of a replay has opened, on matplotlib's axes.
-
-
-_COLOURS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, INK)
-
-
-def draw_openings(axes: Axes, summary: ReplaySummary) -> str:
-    """Draw how much each clearance has opened since the first gait cycle; gives the unit of the time."""
-    time, time_unit = time_of(summary, summary.history.stamp_ns)
-    columns, unit = opened(summary)
-    for colour, (joint, values) in zip(_COLOURS, columns.items(), strict=False):
-        axes.plot(time, values, color=colour, label=joint, linewidth=1.3)
-    axes.ticklabel_format(useOffset=False)
-    axes.set_ylabel(f"opened by [{unit}]", fontsize=SMALL)
-    return time_unit
-
-
 # Drive torque and joint forces over the crank angle, from a trace.
 
 
@@ -193,11 +176,9 @@ def life_picture(life: Life) -> bytes:
     for k in range(joints):
         peak.plot(life.cycles, 1e-3 * life.peak_force_n[:, k], color=_colour(k))
         _profiles(figure.add_subplot(grid[1, 2 * k : 2 * k + 2]), life, k, _colour(k))
+    finish(clearance, x="gait cycles", y="radial clearance [µm]")
     clearance.legend(fontsize=SMALL, frameon=False)
-    for axes, name in ((clearance, "radial clearance [µm]"), (peak, "peak contact force [kN]")):
-        axes.set_ylabel(name, fontsize=SMALL, color=INK)
-        axes.set_xlabel("gait cycles", fontsize=SMALL, color=INK)
-        tidy(axes)
+    finish(peak, x="gait cycles", y="peak contact force [kN]")
     return png(figure)
 
 

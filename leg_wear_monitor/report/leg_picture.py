@@ -18,13 +18,11 @@ from leg_wear_monitor.mechanism.position import (
     build_linkage,
     carriers,
     corners,
-    ideal_motion,
     is_on_ground,
     one_cycle,
     point_path,
     rotated,
 )
-from leg_wear_monitor.mechanism.position import corners as body_corners
 from leg_wear_monitor.mechanism.reach import DeadPoint, Reach
 from leg_wear_monitor.mechanism.spec import GROUND, Mechanism, PrismaticJoint
 from leg_wear_monitor.report.figure import (
@@ -34,11 +32,11 @@ from leg_wear_monitor.report.figure import (
     SMALL,
     USUAL,
     VERMILION,
+    finish,
     force_traces,
     new_figure,
     plain,
     png,
-    tidy,
     worn_bushings,
 )
 
@@ -56,21 +54,16 @@ def lighter(colour: str, fraction: float) -> tuple[float, float, float]:
     return red, green, blue
 
 
-def draw_body(axes: Axes, corners: Floats, colour: str, layer: float) -> None:
+def draw_body(axes: Axes, outline: Floats, colour: str, layer: float) -> None:
     """Draw a plate or a bar with round ends around the corners (n, 2) [m], a square for one corner."""
-    if len(corners) == 1:  # a slider
-        axes.plot(
-            *corners[0], marker="s", markersize=2.4 * _BAR_WIDTH, color=lighter(colour, 0.55), zorder=layer
-        )
+    if len(outline) == 1:  # a slider
+        fill, side = lighter(colour, 0.55), 2.4 * _BAR_WIDTH
+        axes.plot(*outline[0], marker="s", markersize=side, color=fill, zorder=layer)
         return
     # a dark shape, and on it a lighter one that is narrower by the outline
     for edge, line in ((colour, _BAR_WIDTH + 2.0), (lighter(colour, 0.55), _BAR_WIDTH)):
-        shape = Polygon(
-            corners, closed=len(corners) > 2, facecolor=edge, edgecolor=edge, linewidth=line, zorder=layer
-        )
-        shape.set_joinstyle("round")
-        shape.set_capstyle("round")
-        axes.add_patch(shape)
+        look = {"color": edge, "linewidth": line, "joinstyle": "round", "capstyle": "round"}
+        axes.add_patch(Polygon(outline, closed=len(outline) > 2, zorder=layer, **look))
 
 
 def draw_support(axes: Axes, place: Floats, away: Floats) -> None:
@@ -156,18 +149,14 @@ _PANEL_IN, _LEGEND_IN = 4.4, 1.2  # widths [inch]
 Paths = dict[str, dict[str, Floats]]  # path (N, 2) [m] of each point, by body and point
 
 
-def leg_picture(
-    mechanism: Mechanism, clearance_joints: Collection[str] | None = None, crank_angle_rad: float = 0.0
-) -> Figure:
-    """Figure of the ideal mechanism at one crank angle (left) and over one gait cycle (right), to one scale.
+def leg_picture(mechanism: Mechanism, clearance_joints: Collection[str] | None = None) -> Figure:
+    """Figure of the ideal mechanism at crank angle 0 (left) and over one gait cycle (right), to one scale.
 
     Parameters
     ----------
     mechanism : Mechanism
     clearance_joints : collection of str, optional
         Joints to mark as clearance joints; default: ``mechanism.clearance_joints``.
-    crank_angle_rad : float
-        Crank angle of the left panel [rad].
 
     Returns
     -------
@@ -178,32 +167,21 @@ def leg_picture(
     AssemblyError
         If the mechanism does not close or has a dead point.
     """
-    linkage = build_linkage(mechanism)
-    here = _paths(mechanism, ideal_motion(linkage, [crank_angle_rad], 1.0).q)
-    paths = _paths(mechanism, one_cycle(linkage, PATH_POINTS, 1.0).q)
+    joints = mechanism.clearance_joints if clearance_joints is None else clearance_joints
+    paths = _paths(mechanism, one_cycle(build_linkage(mechanism), PATH_POINTS, 1.0).q)
     low, high = _extent(paths)
     height = (_PANEL_IN - 0.5) * (high[1] - low[1]) / (high[0] - low[0]) + 0.75
     figure = new_figure(2.0 * _PANEL_IN + _LEGEND_IN, float(np.clip(height, 2.8, 6.4)))
     position, cycle_axes, legend = figure.subplots(1, 3, width_ratios=(_PANEL_IN, _PANEL_IN, _LEGEND_IN))
-    _draw_position(
-        position,
-        mechanism,
-        here,
-        paths,
-        mechanism.clearance_joints if clearance_joints is None else clearance_joints,
-    )
+    _draw_position(position, mechanism, paths, 0, joints)
     _draw_cycle(cycle_axes, mechanism, paths)
     _draw_legend(legend, mechanism)
-    position.set_title(
-        f"{plain(mechanism.name)}, crank at {np.rad2deg(crank_angle_rad):.0f}°", fontsize=USUAL, color=INK
-    )
     toe = f", the toe every {_TOE_STEP_DEG}° of the crank" if mechanism.toe else ""
+    position.set_title(f"{plain(mechanism.name)}, crank at 0°", fontsize=USUAL, color=INK)
     cycle_axes.set_title(f"one cycle{toe}", fontsize=USUAL, color=INK)
-    for axes in (position, cycle_axes):
-        tidy(axes)
+    for axes, y in ((position, "y [m]"), (cycle_axes, "")):
+        finish(axes, x="x [m]", y=y)
         axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        axes.set_xlabel("x [m]", fontsize=SMALL)
-    position.set_ylabel("y [m]", fontsize=SMALL)
     return figure
 
 
@@ -212,20 +190,25 @@ def draw_leg(axes: Axes, reach: Reach, shown: int) -> None:
 
     ``shown`` is the number of the position in the reach.
     """
-    mechanism = reach.mechanism
-    paths, here = _paths(mechanism, reach.q), _paths(mechanism, reach.q[shown : shown + 1])
+    mechanism, paths = reach.mechanism, _paths(reach.mechanism, reach.q)
     low, high = _extent(paths)
-    _draw_position(axes, mechanism, here, paths, mechanism.clearance_joints)
+    _draw_position(axes, mechanism, paths, shown, mechanism.clearance_joints)
     _draw_toe_path(axes, mechanism, paths, is_closed=reach.turns)
     for joint in mechanism.joints:
         if reach.is_open(joint):
-            first, last = (here[body][joint][0] for body in carriers(mechanism, joint))
+            first, last = (paths[body][joint][shown] for body in carriers(mechanism, joint))
             draw_gap(axes, (first, last), f"{1e3 * reach.gap_of(joint)[shown]:.3g} mm")
-    for dead, i in ((reach.low, 0), (reach.high, len(reach.q) - 1)):
-        if dead is not None and dead.is_in_line and i == shown and not reach.open_joint:
-            line = np.array([here[mechanism.sides(joint)[1]][joint][0] for joint in dead.joints])
+    for i, dead in _in_line(reach):
+        if i == shown:
+            line = np.array([paths[mechanism.sides(joint)[1]][joint][i] for joint in dead.joints])
             axes.plot(*line.T, "--", color=VERMILION, linewidth=1.8, zorder=19.0)
     axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+
+
+def _in_line(reach: Reach) -> list[tuple[int, DeadPoint]]:
+    """Numbers of the positions in which three joints are in line, with the dead points."""
+    ends = ((0, reach.low), (len(reach.q) - 1, reach.high))
+    return [(i, dead) for i, dead in ends if dead and dead.is_in_line and not reach.open_joint]
 
 
 def _paths(mechanism: Mechanism, q: Floats) -> Paths:
@@ -248,16 +231,12 @@ def _colours(mechanism: Mechanism) -> dict[str, str]:
     return dict(zip(mechanism.bodies, cycle(BODY_COLOURS), strict=False))
 
 
-def _outline_at(paths: Paths, body: str, i: int) -> Floats:
-    """Corners (n, 2) [m] of a body at position i."""
-    return body_corners({name: path[i] for name, path in paths[body].items()})
-
-
 def _draw_position(
-    axes: Axes, mechanism: Mechanism, here: Paths, paths: Paths, clearance_joints: Collection[str]
+    axes: Axes, mechanism: Mechanism, paths: Paths, shown: int, clearance_joints: Collection[str]
 ) -> None:
-    """Draw the mechanism in the single position of ``here``; sliders have their whole path in ``paths``."""
-    shapes = {body: _outline_at(here, body, 0) for body in mechanism.bodies}
+    """Draw the mechanism in one position of its paths, and the whole paths of sliders."""
+    here = {body: {name: path[shown] for name, path in of.items()} for body, of in paths.items()}
+    shapes = {body: corners(here[body]) for body in mechanism.bodies}
     colours = _colours(mechanism)
     largest_first = sorted(shapes, key=lambda name: -float(np.ptp(shapes[name], axis=0).sum()))
     for layer, body in enumerate(largest_first):
@@ -274,21 +253,21 @@ def _draw_position(
                 away = np.array([-1.0, 0.3 * np.sign(away[1])])  # the name beside the support, not on it
         draw_joint(axes, place, {name: name in clearance_joints for name in names}, away)
     for spring in mechanism.springs.values():
-        a, b = (here[body][point][0] for body, point in zip(spring.bodies, spring.points, strict=True))
+        a, b = (here[body][point] for body, point in zip(spring.bodies, spring.points, strict=True))
         draw_spring(axes, (a, b), 15.0)
     if mechanism.toe is not None:
         body, point = mechanism.toe
-        place = here[body][point][0]
+        place = here[body][point]
         axes.plot(*place, "o", color=INK, markersize=4.5, zorder=20.0)
         dx, dy = place - shapes[body].mean(axis=0)
         write_beside(axes, place, "toe", (16.0 if dx > 0.0 else -16.0, 8.0 if dy > 0.0 else -8.0), INK)
 
 
-def _places(mechanism: Mechanism, here: Paths) -> list[tuple[list[str], Floats]]:
+def _places(mechanism: Mechanism, here: Mapping[str, Mapping[str, Floats]]) -> list[tuple[list[str], Floats]]:
     """Groups of joints at one place: their names, and the place (2,) [m]."""
     groups: list[tuple[list[str], Floats]] = []
     for name in mechanism.joints:
-        place = here[carriers(mechanism, name)[1]][name][0]
+        place = here[carriers(mechanism, name)[1]][name]
         near = [names for names, other in groups if np.hypot(*(place - other)) < _ONE_PLACE_M]
         if near:
             near[0].append(name)
@@ -301,26 +280,26 @@ def _draw_cycle(axes: Axes, mechanism: Mechanism, paths: Paths) -> None:
     """Draw outlines of the bodies in positions over a gait cycle, and the path of the toe."""
     for body, colour in _colours(mechanism).items():
         for i in range(0, PATH_POINTS, PATH_POINTS * _BODIES_STEP_DEG // 360):
-            corners = _outline_at(paths, body, i)
-            axes.plot(
-                *np.vstack([corners, corners[:1]]).T,
-                color=lighter(colour, 0.35),
-                marker="s" if len(corners) == 1 else None,
-                linewidth=1.6,
-                alpha=0.7,
-                solid_capstyle="round",
-            )
-    _draw_toe_path(axes, mechanism, paths)
+            outline = corners({name: path[i] for name, path in paths[body].items()})
+            closed, mark = np.vstack([outline, outline[:1]]), "s" if len(outline) == 1 else None
+            look: dict[str, Any] = {
+                "color": lighter(colour, 0.35),
+                "marker": mark,
+                "linewidth": 1.6,
+                "alpha": 0.7,
+            }
+            axes.plot(*closed.T, solid_capstyle="round", **look)
+    _draw_toe_path(axes, mechanism, paths, is_closed=True)
 
 
-def _draw_toe_path(axes: Axes, mechanism: Mechanism, paths: Paths, is_closed: bool = True) -> None:
-    if mechanism.toe is not None:
-        body, point = mechanism.toe
-        path = paths[body][point]
-        if not is_closed:
-            axes.plot(*path.T, color=INK, linewidth=2.0, zorder=20.0)
-            return
-        axes.plot(*np.vstack([path, path[:1]]).T, color=INK, linewidth=2.0, zorder=20.0)
+def _draw_toe_path(axes: Axes, mechanism: Mechanism, paths: Paths, is_closed: bool) -> None:
+    if mechanism.toe is None:
+        return
+    body, point = mechanism.toe
+    path = paths[body][point]
+    line = np.vstack([path, path[:1]]) if is_closed else path
+    axes.plot(*line.T, color=INK, linewidth=2.0, zorder=20.0)
+    if is_closed:
         every = PATH_POINTS * _TOE_STEP_DEG // 360
         axes.plot(*path[::every].T, "o", color=INK, markersize=4.0, zorder=21.0)
 
@@ -366,11 +345,7 @@ def leg_data(reach: Reach) -> dict[str, Any]:
         "toe": [] if mechanism.toe is None else millimetres(reach.path(*mechanism.toe)),
         "angles": np.rad2deg(reach.crank_angle).round(1).tolist(),
         "turns": reach.turns or (bool(reach.open_joint) and len(reach.q) > 1),
-        "marks": [
-            _mark(reach, dead, i)
-            for dead, i in ((reach.low, 0), (reach.high, len(reach.q) - 1))
-            if dead is not None and dead.is_in_line and not reach.open_joint
-        ],
+        "marks": [_mark(reach, dead, i) for i, dead in _in_line(reach)],
         "said": {},
         "live": False,
         "first": 0,
@@ -436,17 +411,12 @@ def millimetres(points: Floats) -> list[list[float]]:
 
 def pictures(mechanism: Mechanism, result: SimulationResult) -> dict[str, bytes | None]:
     """PNG files by file name; None for a figure that needs data which the result does not contain."""
-    files: dict[str, bytes | None] = {
-        "leg.png": png(leg_picture(mechanism, result.clearance_joints)),
-        "wear.png": None,
-        "forces.png": None,
-    }
+    joints = result.clearance_joints
+    files = {"leg.png": png(leg_picture(mechanism, joints)), "wear.png": None, "forces.png": None}
     if result.trace is not None:
-        files["forces.png"] = png(
-            force_traces(result.trace, result.clearance_joints or tuple(mechanism.joints))
-        )
-    if result.surfaces is not None and result.clearance_joints:
-        radii = tuple(mechanism.clearances[name].bushing_radius for name in result.clearance_joints)
+        files["forces.png"] = png(force_traces(result.trace, joints or tuple(mechanism.joints)))
+    if result.surfaces is not None and joints:
+        radii = tuple(mechanism.clearances[name].bushing_radius for name in joints)
         cycles = abs(result.speed_rpm) / 60.0 * result.simulated_s
-        files["wear.png"] = png(worn_bushings(result.surfaces, result.clearance_joints, radii, cycles))
+        files["wear.png"] = png(worn_bushings(result.surfaces, joints, radii, cycles))
     return files

@@ -22,19 +22,26 @@ from leg_wear_monitor.report.drawing import draw_drawing, drawing_of, drawing_sv
 from leg_wear_monitor.report.figure import (
     BLUE,
     BODY_COLOURS,
+    GREEN,
     INK,
     LEAST_N,
+    ORANGE,
+    PURPLE,
+    SKY,
     SMALL,
     VERMILION,
     draw_clearances,
-    draw_openings,
+    finish,
     new_figure,
+    opened,
     svg,
-    tidy,
+    time_of,
 )
 from leg_wear_monitor.report.leg_picture import PATH_POINTS
-from leg_wear_monitor.report.page import Picture, Table, render
+from leg_wear_monitor.report.page import NOT_VALID, Picture, Table, render
 from leg_wear_monitor.state import Figure, LegState, State, Verdict
+
+_COLOURS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, INK)
 
 # A result, or a mechanism, on matplotlib's axes, for a notebook or a script to go on with.
 
@@ -73,19 +80,17 @@ def plot(result: Any, axes: Axes | None = None) -> Axes:
 
 @plot.register
 def _simulation(result: SimulationResult, axes: Axes | None = None) -> Axes:
-    axes = _new() if axes is None else axes
+    axes, across = _new() if axes is None else axes, ""
     if result.trace is None:
         _bars(axes, result)
     else:
-        names = result.clearance_joints or tuple(result.joints)
-        for k, name in enumerate(names):
+        for k, name in enumerate(result.clearance_joints or tuple(result.joints)):
             force = np.maximum(result.trace.force_n[name], LEAST_N)
             colour = BODY_COLOURS[k % len(BODY_COLOURS)]
             axes.plot(result.trace.crank_angle_rad / TURN, force, color=colour, linewidth=0.7, label=name)
         axes.set_yscale("log")
-        axes.set_xlabel("turns of the crank", fontsize=SMALL)
-    axes.set_ylabel("force [N]", fontsize=SMALL)
-    return _finished(axes)
+        across = "turns of the crank"
+    return _finished(axes, across, "force [N]")
 
 
 def _bars(axes: Axes, result: SimulationResult) -> None:
@@ -101,33 +106,30 @@ def _bars(axes: Axes, result: SimulationResult) -> None:
 def _life(result: Life, axes: Axes | None = None) -> Axes:
     axes = _new() if axes is None else axes
     draw_clearances(axes, result)
-    axes.set_xlabel("gait cycles", fontsize=SMALL)
-    axes.set_ylabel("radial clearance [µm]", fontsize=SMALL)
-    return _finished(axes)
+    return _finished(axes, "gait cycles", "radial clearance [µm]")
 
 
 @plot.register
-def _replay(result: ReplaySummary, axes: Axes | None = None) -> Axes:
+def _replay(result: ReplaySummary | ReplayResult, axes: Axes | None = None) -> Axes:
     axes = _new() if axes is None else axes
-    unit = draw_openings(axes, result)
-    if Figure.CLEARANCES in result.verdict.not_valid:
-        for line in axes.get_lines():
-            line.set_linestyle(":")
-        axes.set_title(f"not valid: {Figure.CLEARANCES.words} ({result.verdict.fault_code})", fontsize=SMALL)
-    axes.set_xlabel(f"time since the recording's begin [{unit}]", fontsize=SMALL)
-    return _finished(axes)
-
-
-@plot.register
-def _replay_result(result: ReplayResult, axes: Axes | None = None) -> Axes:
-    return _replay(result.summary(), axes)
+    summary = result.summary() if isinstance(result, ReplayResult) else result
+    time, time_unit = time_of(summary, summary.history.stamp_ns)
+    columns, unit = opened(summary)
+    is_valid = Figure.CLEARANCES not in summary.verdict.not_valid
+    for colour, (joint, values) in zip(_COLOURS, columns.items(), strict=False):
+        axes.plot(time, values, "-" if is_valid else ":", color=colour, label=joint, linewidth=1.3)
+    axes.ticklabel_format(useOffset=False)
+    if not is_valid:
+        words = f"not valid: {Figure.CLEARANCES.words} ({summary.verdict.fault_code})"
+        axes.set_title(words, fontsize=SMALL)
+    return _finished(axes, f"time since the recording's begin [{time_unit}]", f"opened by [{unit}]")
 
 
 @plot.register
 def _mechanism(result: Mechanism, axes: Axes | None = None) -> Axes:
     axes = _new() if axes is None else axes
     draw_drawing(axes, drawing_of(result, points=PATH_POINTS))
-    return _finished(axes)
+    return _finished(axes, axes.get_xlabel(), axes.get_ylabel())
 
 
 def _new() -> Axes:
@@ -138,17 +140,14 @@ def _new() -> Axes:
     return axes
 
 
-def _finished(axes: Axes) -> Axes:
-    tidy(axes)
+def _finished(axes: Axes, x: str, y: str) -> Axes:
+    finish(axes, x=x, y=y)
     if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize=SMALL, frameon=False)
     return axes
 
 
 # What a notebook shows of a result or a mechanism: a line, a small table or picture; no script.
-
-
-_NOT_VALID = "not valid"
 
 
 @attrs.frozen
@@ -204,36 +203,26 @@ def _simulation_html(result: SimulationResult) -> _Shown:
 
 @_shown.register
 def _life_html(life: Life) -> _Shown:
-    head = ["joint", "clearance when new [µm]", "at the end [µm]", "growth at the end [pm/cycle]"]
-    rows = [
-        (
-            name,
-            _number(1.0e6 * life.clearance_m[0, k]),
-            _number(1.0e6 * life.clearance_m[-1, k]),
-            _number(1.0e12 * life.growth_m_per_cycle[-1, k]),
-        )
-        for k, name in enumerate(life.clearance_joints)
-    ]
+    head, rows = ["joint", "clearance when new [µm]", "at the end [µm]", "growth at the end [pm/cycle]"], []
+    for k, name in enumerate(life.clearance_joints):
+        new, end = (_number(1.0e6 * life.clearance_m[at, k]) for at in (0, -1))
+        rows.append((name, new, end, _number(1.0e12 * life.growth_m_per_cycle[-1, k])))
     lines = (f"{life.cycles[-1]:.4g} gait cycles",)
     return _Shown("Life", lines, Table(caption="Clearance joints", head=head, rows=rows))
 
 
 @_shown.register
-def _state_html(state: LegState) -> _Shown:
+def _state_html(state: LegState | ReplayResult) -> _Shown:
     """Of a leg now, and of a replay: verdict and decision, clearances in a table and against their limits."""
+    state = state.summary() if isinstance(state, ReplayResult) else state
     words = state.leg.joint_words if isinstance(state, ReplaySummary) else str
     shown, decision = _verdict(state.verdict), decision_of(state, words)
     lines = (*shown.lines, *(f"{title.lower()}: {text}" for title, text in decision.notes))
-    head = ["joint", "clearance [mm]", "according to", "limit [mm]"]
-    rows = [
-        (
-            name,
-            _NOT_VALID if each.believed_m is None else _number(1.0e3 * each.believed_m),
-            "" if each.believed_by is None else SOURCES[each.believed_by],
-            _number(1.0e3 * each.limit_m),
-        )
-        for name, each in state.clearances.items()
-    ]
+    head, rows = ["joint", "clearance [mm]", "according to", "limit [mm]"], []
+    for name, each in state.clearances.items():
+        believed = NOT_VALID if each.believed_m is None else _number(1.0e3 * each.believed_m)
+        source = "" if each.believed_by is None else SOURCES[each.believed_by]
+        rows.append((name, believed, source, _number(1.0e3 * each.limit_m)))
     return attrs.evolve(
         shown,
         lines=(*lines, ADVICE),
@@ -261,10 +250,7 @@ def _clearance_picture(state: LegState) -> Picture | None:
     axes.set_yticks(range(len(known)), [joint for joint, _ in known])
     axes.set_ylim(len(known) - 0.5, -0.5)
     axes.set_xlim(0.0, None)
-    axes.set_xlabel(
-        "clearance [mm], two standard deviations; black: estimate beside it; red: limit", fontsize=SMALL
-    )
-    tidy(axes)
+    finish(axes, x="clearance [mm], two standard deviations; black: estimate beside it; red: limit")
     told = "; ".join(f"{joint} {1.0e3 * (each.believed_m or 0.0):.3g} mm" for joint, each in known)
     return Picture(image=svg(figure), alt=f"Clearances against their limits: {told}")
 
@@ -305,10 +291,8 @@ def _fleet_picture(fleet: FleetOverview) -> Picture | None:
     severe = [one.state in (State.STOP.value, State.INSPECT.value) for one in worst]
     axes.bar(range(len(used)), used, 0.9, color=[VERMILION if one else BLUE for one in severe])
     axes.axhline(100.0, color=INK, linewidth=0.8, linestyle="--")
-    axes.set_xlabel("legs, the most worn first; red: inspect or stop", fontsize=SMALL)
-    axes.set_ylabel("most worn joint [% of limit]", fontsize=SMALL)
     axes.set_xlim(-0.6, len(used) - 0.4)
-    tidy(axes)
+    finish(axes, x="legs, the most worn first; red: inspect or stop", y="most worn joint [% of limit]")
     told = f"{used[0]:.3g} % in {worst[0].id}, {used[-1]:.3g} % in {worst[-1].id}"
     return Picture(image=svg(figure), alt=f"Most worn joint of {len(used)} legs: {told}")
 
@@ -318,7 +302,7 @@ def _verdict(verdict: Verdict) -> _Shown:
     whose = f" (joint {', '.join(verdict.joints)})" if verdict.joints else ""
     not_valid = ", ".join(figure.words for figure in verdict.not_valid)
     lines = (f"{verdict.why} [{verdict.fault_code}]", f"to do: {verdict.do}")
-    more = (f"{_NOT_VALID}: {not_valid}",) if not_valid else ()
+    more = (f"{NOT_VALID}: {not_valid}",) if not_valid else ()
     return _Shown(f"Verdict: {verdict.state.words}{whose}", (*lines, *more))
 
 
@@ -336,11 +320,6 @@ def _material(pair: Material) -> _Shown:
     return _Shown(
         pair.name, lines, Table(caption="Values with their sources", head=head, rows=rows, is_text=True)
     )
-
-
-@_shown.register
-def _replay_result_html(result: ReplayResult) -> _Shown:
-    return _state_html(result.summary())
 
 
 def _number(value: float | None) -> str:

@@ -23,7 +23,7 @@ from leg_wear_monitor.state import Figure, Level, State, Verdict
 # A chart as data: its series are a CSV file inside the page, which the page's script draws with uPlot.
 
 
-@attrs.frozen(kw_only=True, eq=False)
+@attrs.frozen(eq=False)
 class Series:
     """A column of values.
 
@@ -54,7 +54,7 @@ class Series:
         return f"{self.name} [{self.unit}]" if self.unit else self.name
 
 
-@attrs.frozen(kw_only=True, eq=False)
+@attrs.frozen(eq=False)
 class Panel:
     """Axes with series over the chart's x axis.
 

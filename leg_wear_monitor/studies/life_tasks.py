@@ -85,17 +85,8 @@ class ObservedLeg:
 # Ensembles: legs with equal parameters that differ in the initial positions of crank and journals.
 
 
-def with_friction(mechanism: Mechanism, changes: dict[str, Any]) -> Mechanism:
-    """The mechanism with changed fields of `mechanism.spec.Friction` in all its joints."""
-    clearances = {
-        name: attrs.evolve(own, friction=attrs.evolve(own.friction, **changes))
-        for name, own in mechanism.clearances.items()
-    }
-    return attrs.evolve(mechanism, clearances=clearances)
-
-
-def with_film(mechanism: Mechanism, film: dict[str, float]) -> Mechanism:
-    """The mechanism with a film, fields of `mechanism.spec.Film`, in all its joints.
+def with_contact(mechanism: Mechanism, friction: dict[str, Any], film: dict[str, float]) -> Mechanism:
+    """The mechanism with changed fields of the friction, and with a film, in all its joints.
 
     Raises
     ------
@@ -105,7 +96,8 @@ def with_film(mechanism: Mechanism, film: dict[str, float]) -> Mechanism:
     clearances = {}
     for name, own in mechanism.clearances.items():
         try:
-            clearances[name] = attrs.evolve(own, film=Film(**film))
+            changed = attrs.evolve(own, friction=attrs.evolve(own.friction, **friction))
+            clearances[name] = attrs.evolve(changed, film=Film(**film)) if film else changed
         except FieldError as error:
             where = f"clearances.joints.{name}.{error.key}"
             raise ConfigError(mechanism.source, where, error.fault) from error
@@ -139,10 +131,9 @@ def ensemble(mechanism: Mechanism, settings: dict[str, Any]) -> list[Leg]:
     list of Leg
         One for each run.
     """
-    if settings.get("film"):
-        mechanism = with_film(mechanism, settings["film"])
-    if settings.get("friction"):
-        mechanism = with_friction(mechanism, settings["friction"])
+    friction, film = settings.get("friction", {}), settings.get("film", {})
+    if friction or film:
+        mechanism = with_contact(mechanism, friction, film)
     mechanism = loaded(mechanism, settings)
     clearance_joints, clearance_m = settings["clearance_joints"], settings["clearance_m"]
     smallest = min(c.radial_clearance for c in clearance_settings(mechanism, clearance_joints, clearance_m))

@@ -93,9 +93,7 @@ class ClaimResult:
             "fraction": self.fraction,
             "fraction_interval": list(self.interval),
             "median_effect": float(np.median(_values(self.effects))) if self.effects else None,
-            "file_leg": None
-            if self.file_leg is None
-            else {**attrs.asdict(self.file_leg), "state": self.file_state},
+            "file_leg": self.file_leg and {**attrs.asdict(self.file_leg), "state": self.file_state},
             "decided_by": [attrs.asdict(influence) for influence in self.influences],
         }
 
@@ -189,24 +187,20 @@ def _influences(
     factors: dict[str, Floats], effects: Sequence[tuple[Effect, ...]]
 ) -> list[tuple[Influence, ...]]:
     """For every claim the factors whose rank correlation with its effect is significant among all of them."""
-    from scipy.stats import spearmanr
-
-    pairs = [[_rank(spearmanr, factor, each) for factor in factors.values()] for each in effects]
-    p = holm(np.array([[pair[1] for pair in row] for row in pairs]))
+    pairs = [[_rank(factor, _values(each)) for factor in factors.values()] for each in effects]
+    adjusted = holm(np.array([[p for _, p in row] for row in pairs]))
     chosen = []
-    for row, adjusted in zip(pairs, p, strict=True):
-        known = [
-            Influence(name, rho, float(q))
-            for name, (rho, _), q in zip(factors, row, adjusted, strict=True)
-            if q < 1.0 - CONFIDENCE
-        ]
+    for row, corrected in zip(pairs, adjusted, strict=True):
+        all_of = zip(factors, row, corrected, strict=True)
+        known = [Influence(name, rho, float(p)) for name, (rho, _), p in all_of if p < 1.0 - CONFIDENCE]
         chosen.append(tuple(sorted(known, key=lambda one: -abs(one.rank_correlation))[:MOST_INFLUENCES]))
     return chosen
 
 
-def _rank(spearmanr: Any, factor: Floats, effects: tuple[Effect, ...]) -> tuple[float, float]:
+def _rank(factor: Floats, values: Floats) -> tuple[float, float]:
     """Correlation and p; 0 and 1 where one of them does not vary, or there are less than three legs."""
-    values = _values(effects)
+    from scipy.stats import spearmanr
+
     if len(values) < 3 or np.ptp(values) == 0.0 or np.ptp(factor) == 0.0:
         return 0.0, 1.0
     found = spearmanr(factor, values)
@@ -309,23 +303,22 @@ class StudyResults:
 
     def of(self, task: str) -> list[tuple[plan.Point, plan.Arrays]]:
         """Points of a task that have a result, and their results."""
-        pairs = zip(self.points, self.arrays, strict=True)
-        return [
-            (point, arrays)
-            for point, arrays in pairs
-            if point.task == task and arrays and "fault" not in arrays
-        ]
+        whole = [(point, arrays) for point, arrays in self._pairs if arrays and "fault" not in arrays]
+        return [(point, arrays) for point, arrays in whole if point.task == task]
 
     @property
     def faults(self) -> list[tuple[str, str]]:
         """Label and fault of the points whose motion diverged."""
-        pairs = zip(self.points, self.arrays, strict=True)
-        return [(point.label, str(arrays["fault"])) for point, arrays in pairs if "fault" in arrays]
+        return [(point.label, str(arrays["fault"])) for point, arrays in self._pairs if "fault" in arrays]
 
     @property
     def missing(self) -> list[str]:
         """Labels of the points that have no result yet."""
-        return [point.label for point, arrays in zip(self.points, self.arrays, strict=True) if not arrays]
+        return [point.label for point, arrays in self._pairs if not arrays]
+
+    @property
+    def _pairs(self) -> plan.Found:
+        return list(zip(self.points, self.arrays, strict=True))
 
     def claims(self) -> LegClaims:
         """The paper's claims against the legs of a study ``legs``; requires scipy."""
@@ -359,20 +352,16 @@ def load_results(path: Path) -> StudyResults:
     """
     manifest, directory = read_manifest(path), StudyDirectory(path)
     source = str(path / MECHANISM)
-    entries = manifest["points"]
+    points, arrays = [], []
+    for entry in manifest["points"]:
+        key, task, settings = entry["key"], entry["task"], entry["settings"]
+        points.append(plan.Point(label=entry["label"], task=task, settings=settings))
+        arrays.append(directory.read(key, task, settings) if directory.has(key) else {})
     return StudyResults(
         study=manifest["study"],
         settings=parse_settings(manifest["study"], manifest["settings"], f"{path / MANIFEST}: settings"),
         mechanism=parse_mechanism(read_yaml(path / MECHANISM, source), source),
-        points=tuple(
-            plan.Point(label=entry["label"], task=entry["task"], settings=entry["settings"])
-            for entry in entries
-        ),
-        arrays=tuple(
-            directory.read(entry["key"], entry["task"], entry["settings"])
-            if directory.has(entry["key"])
-            else {}
-            for entry in entries
-        ),
+        points=tuple(points),
+        arrays=tuple(arrays),
         versions=manifest["versions"],
     )

@@ -116,7 +116,3 @@ def test_a_folded_section_and_what_is_not_valid():
 def test_a_row_has_a_cell_for_every_column():
     with pytest.raises(ValueError, match="numbers"):
         Table(caption="numbers", head=("joint", "force"), rows=[["A"]])
-
-
-def test_the_same_page_gives_the_same_text():
-    assert page_html(full_page()) == page_html(full_page())

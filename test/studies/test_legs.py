@@ -212,6 +212,9 @@ def test_several_clearances_are_said_to_make_impacts_stronger_and_ours_contradic
     assert signs == {
         "j_harder": False, "a_harder": False, "b_harder": False, "g_harder": False, "foot_harder": True
     }  # fmt: skip
+    leg[f"set{SETS.index(ALL)}_p99_force_n"][:, ALL.index("I")] = 40.0  # a claim on I and J is one on both
+    (both,) = (claim for claim in CLAIMS if claim.key == "foot_harder")
+    assert both.measure(leg).value < 0.0
 
 
 def test_fractions_count_legs_and_what_decides_is_found():

@@ -55,19 +55,6 @@ def test_periods_of_the_logistic_map(r, period):
 
 
 @pytest.mark.plain
-def test_the_section_of_a_driven_oscillator_is_its_steady_state():
-    """x'' + 2 d x' + x = cos(w t): at t = 0 of each turn x is Re(1 / (1 - w^2 + 2 i d w))."""
-    d, w = 0.1, 1.3
-    response = 1.0 / (1.0 - w**2 + 2j * d * w)
-    frequency = np.sqrt(1.0 - d**2)
-    turns = 2.0 * np.pi / w * np.arange(60)
-    free = np.exp(-d * turns) * np.cos(frequency * turns)
-    points = np.stack([response.real + free, (1j * w * response).real + free], axis=1)
-    assert period_of(points[50:], 3, 1.0e-9) == 1
-    assert period_of(points[:10], 3, 1.0e-9) is None
-
-
-@pytest.mark.plain
 @given(
     period=st.integers(1, 6),
     turns=st.integers(3, 5),

@@ -46,7 +46,7 @@ def _over_time(
         name=name,
         alt=f"{words} over time",
         caption=caption,
-        x=Series(name="time", unit=unit, values=time),
+        x=Series("time", unit, time),
         ends=(begin, max(end, begin + 1.0e-9)),
         panels=panels,
         group="time",
@@ -57,11 +57,11 @@ def _openings_chart(summary: ReplaySummary) -> Chart:
     """How much each clearance has opened since the first gait cycle."""
     columns, unit = opened(summary)
     series = [
-        Series(name=f"opened by {joint}", unit=unit, values=values, colour=_colour(k))
+        Series(f"opened by {joint}", unit, values, _colour(k))
         for k, (joint, values) in enumerate(columns.items())
     ]
     caption = "Mean radial clearance of each joint, minus its value after the first gait cycle."
-    panels = [Panel(title="Opening of the clearances", series=series, height=260)]
+    panels = [Panel("Opening of the clearances", series, height=260)]
     return _over_time(summary, "clearances", "Opening of each joint's clearance", caption, panels)
 
 
@@ -69,7 +69,7 @@ def _estimates_chart(summary: ReplaySummary) -> Chart:
     """Clearances that encoders or the drive torque show, with their limit."""
     limits = [each.limit_m for each in summary.clearances.values()]
     series = [
-        Series(name=f"clearance {joint}", unit="mm", values=1.0e3 * values, colour=_colour(k))
+        Series(f"clearance {joint}", "mm", 1.0e3 * values, _colour(k))
         for k, (joint, values) in enumerate(summary.history.seen_m.items())
     ]
     if limits:
@@ -78,7 +78,7 @@ def _estimates_chart(summary: ReplaySummary) -> Chart:
         "Mean radial clearance of each joint as encoders or the drive torque show it, whatever is "
         "counted; nothing is drawn while they show none."
     )
-    panels = [Panel(title="Clearances by estimate", series=series, low=0.0, height=260)]
+    panels = [Panel("Clearances by estimate", series, low=0.0, height=260)]
     words = "Clearances that encoders or the drive torque show,"
     return _over_time(summary, "estimates", words, caption, panels)
 
@@ -92,13 +92,13 @@ def _force_chart(summary: ReplaySummary) -> Chart:
     panels = []
     for limit, (joint, peak) in zip(own, history.peak_force_n.items(), strict=False):
         series = [
-            Series(name=f"peak force {joint}", unit="N", values=peak),
-            Series(name=f"mean force {joint}", unit="N", values=history.mean_force_n[joint], colour="--ink"),
+            Series(f"peak force {joint}", "N", peak),
+            Series(f"mean force {joint}", "N", history.mean_force_n[joint], "--ink"),
         ]
         if limit in shown:
             series.append(_limit(f"limit {joint}", "N", limit, peak))
         title, high = summary.leg.joint_words(joint), 1.05 * max([greatest, *shown])
-        panels.append(Panel(title=title, series=series, low=0.0, high=high or 1.0, height=150))
+        panels.append(Panel(title, series, low=0.0, high=high or 1.0, height=150))
     caption = (
         "Contact force in each gait cycle, on the same axis for all joints. Peaks are of a heavy "
         "tail; their scatter does not mean that the joint changes."
@@ -114,7 +114,7 @@ def health_chart(summary: ReplaySummary) -> Chart:
 
     def known(name: str, unit: str, column: str, colour: str = "--series-0") -> list[Series]:
         """A series, with its smallest and largest values where it is thinned."""
-        series = Series(name=name, unit=unit, values=getattr(history, column), colour=colour)
+        series = Series(name, unit, getattr(history, column), colour)
         ends = (("lowest", history.lowest), ("highest", history.highest))
         return [
             series,
@@ -132,20 +132,20 @@ def health_chart(summary: ReplaySummary) -> Chart:
     commanded = attrs.evolve(_limit("commanded", "rpm", rpm, history.cadence_rpm), colour="--ink")
     panels = [
         Panel(
-            title="Cadence",
-            series=[*cadence, commanded],
+            "Cadence",
+            [*cadence, commanded],
             low=min(rpm - steady, -_greatest(*(-each.values for each in cadence), otherwise=-rpm)),
             high=max(rpm + steady, _greatest(*(each.values for each in cadence), otherwise=rpm)),
         ),
-        Panel(title="Drive torque, RMS of each gait cycle", series=torque, low=0.0),
+        Panel("Drive torque, RMS of each gait cycle", torque, low=0.0),
         Panel(
-            title="Fraction of the torque that is not explained",
-            series=[*mismatch, _limit("limit", "", limit, history.torque_mismatch)],
+            "Fraction of the torque that is not explained",
+            [*mismatch, _limit("limit", "", limit, history.torque_mismatch)],
             low=0.0,
             high=max(1.1 * max(limit, _greatest(history.torque_mismatch)), _greatest(*mismatches)),
         ),
-        Panel(title="Load at the foot", series=known("load", "N", "load_n")),
-        Panel(title="Friction of the drive", series=known("friction", "N m", "friction_nm")),
+        Panel("Load at the foot", known("load", "N", "load_n")),
+        Panel("Friction of the drive", known("friction", "N m", "friction_nm")),
     ]
     caption = (
         "Cadence with the commanded one dashed; measured and predicted drive torque; the fraction "
@@ -161,12 +161,9 @@ def alarm_chart(summary: ReplaySummary, changes: Sequence[AlarmChange]) -> Chart
     begin, end = summary.recording.begin_ns, summary.recording.end_ns
     stamps = sorted({begin, end, *(change.stamp_ns for change in changes)})
     names = dict.fromkeys(change.alarm.name for change in changes)
-    series = [
-        Series(name=name, unit="", values=_levels(stamps, changes, name), colour="--careful", style="steps")
-        for name in names
-    ]
+    series = [Series(name, "", _levels(stamps, changes, name), "--careful", "steps") for name in names]
     height, lanes = 80 + 34 * len(series), ("OK", "WARN", "ERROR")
-    panels = [Panel(title="Alarms", series=series, height=height, lanes=lanes)]
+    panels = [Panel("Alarms", series, height=height, lanes=lanes)]
     caption = "Level of each alarm over time: 0 is OK, 1 WARN, 2 ERROR."
     return _over_time(summary, "alarms", "Levels of alarms", caption, panels, np.array(stamps, np.int64))
 
@@ -181,7 +178,7 @@ def _levels(stamps: Iterable[int], changes: Sequence[AlarmChange], name: str) ->
 
 
 def _limit(name: str, unit: str, limit: float, beside: Floats | Ints) -> Series:
-    return Series(name=name, unit=unit, values=np.full(len(beside), limit), colour="--bad", style="dashed")
+    return Series(name, unit, np.full(len(beside), limit), "--bad", "dashed")
 
 
 def _colour(k: int) -> str:
@@ -231,18 +228,18 @@ def _clearance_panel(summary: ReplaySummary, joint: str) -> Panel:
         reach = SURE_SIGMAS * 1.0e3 * history.seen_sigma_m.get(joint, np.full_like(seen_mm, np.nan))
         high, low = seen_mm + reach, np.maximum(seen_mm - reach, 0.0)
         series += [
-            Series(name="estimate, high", unit="mm", values=high, style="edge"),
-            Series(name="estimate, low", unit="mm", values=low, style="edge"),
-            Series(name="estimate", unit="mm", values=seen_mm, width=2.0),
+            Series("estimate, high", "mm", high, style="edge"),
+            Series("estimate, low", "mm", low, style="edge"),
+            Series("estimate", "mm", seen_mm, width=2.0),
         ]
     bands = [(0, 1)] if series else []
     counted_m = history.counted_m.get(joint, np.array([]))
     if _is_known(counted_m) and Figure.CLEARANCES not in summary.verdict.not_valid:
-        series.append(Series(name="counted", unit="mm", values=1.0e3 * counted_m, colour="--ink"))
+        series.append(Series("counted", "mm", 1.0e3 * counted_m, "--ink"))
     if series and known:
         series.append(_limit("limit", "mm", 1.0e3 * known.limit_m, history.stamp_ns))
     title = f"Clearance of joint {summary.leg.joint_words(joint)}"
-    return Panel(title=title, series=series, low=0.0, height=230, bands=bands)
+    return Panel(title, series, low=0.0, height=230, bands=bands)
 
 
 def _force_panel(summary: ReplaySummary, joint: str) -> Panel:
@@ -251,12 +248,12 @@ def _force_panel(summary: ReplaySummary, joint: str) -> Panel:
         ("mean force", "--ink", summary.history.mean_force_n),
     )
     series = [
-        Series(name=name, unit="N", values=columns[joint], colour=colour)
+        Series(name, "N", columns[joint], colour)
         for name, colour, columns in forces
         if joint in columns and _is_known(columns[joint])
     ]
     is_valid = Figure.IMPACT_FORCES not in summary.verdict.not_valid
-    return Panel(title="Contact force", series=series if is_valid else [], low=0.0, height=150)
+    return Panel("Contact force", series if is_valid else [], low=0.0, height=150)
 
 
 # Clearances over time and at the end, as counted and as further encoders show them.

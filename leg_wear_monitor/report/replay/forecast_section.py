@@ -98,18 +98,18 @@ def _validity(measurements: Sequence[Measurement]) -> Chart:
             below = np.where(is_one, [each.expected_below for each in kept], math.nan)
             if any(is_one):
                 name = f"{joint} {words}"
-                series.append(Series(name=name, unit="", values=below, colour=colour, style="points"))
+                series.append(Series(name, "", below, colour, "points"))
     for name, end in (("p10", 0.1), ("p90", 0.9)):
         values = np.full(len(kept), end)
-        series.append(Series(name=name, unit="", values=values, colour="--ink", style="dashed"))
+        series.append(Series(name, "", values, "--ink", "dashed"))
     title = "Predicted probability of a smaller clearance"
     cycles = np.array([float(each.cycles) for each in kept])
     return Chart(
         name="measurements",
         alt="Each measured clearance in its predicted distribution",
         caption=f"{validity(measurements).words}. In the long run 80 % lie between p10 and p90.",
-        x=Series(name="gait cycles of the part", unit="", values=cycles),
-        panels=[Panel(title=title, series=series, low=-0.02, high=1.02, height=240)],
+        x=Series("gait cycles of the part", "", cycles),
+        panels=[Panel(title, series, low=-0.02, high=1.02, height=240)],
         group="measurements",
     )
 
@@ -152,16 +152,16 @@ def wear_chart(summary: ReplaySummary) -> Chart:
     angle = np.asarray((np.arange(sectors) + 0.5) * (360.0 / max(sectors, 1)), np.float64)
     panels = []
     for name, each in worn.items():
-        bushing = Series(name=f"bushing {name}", unit=unit, values=factor * each.bushing)
-        journal = Series(name=f"journal {name}", unit=unit, values=factor * each.journal, colour="--series-1")
+        bushing = Series(f"bushing {name}", unit, factor * each.bushing)
+        journal = Series(f"journal {name}", unit, factor * each.journal, "--series-1")
         title, high = summary.leg.joint_words(name), factor * most
-        panels.append(Panel(title=title, series=[bushing, journal], low=0.0, high=high, height=150))
+        panels.append(Panel(title, [bushing, journal], low=0.0, high=high, height=150))
     return Chart(
         name="wear",
         alt="Wear depth around bushing and journal of each joint",
         caption="Depth of the wear by the angle in each body's own frame, from the start of the ledger, or "
         "of the replay if none was continued. All joints on the same axis, which is never shorter than 1 µm.",
-        x=Series(name="angle", unit="deg", values=angle),
+        x=Series("angle", "deg", angle),
         panels=panels,
         group="angle",
     )

@@ -1,12 +1,18 @@
-"""What encoders show, on the page of a replay: a table and a sentence, or nothing at all."""
+"""Charts and tables of a replay: what encoders show, a joint over time, and no value that is not believed."""
 
 import attrs
+import numpy as np
 import pytest
 from made_up_summary import made_up_summary
 
 from leg_wear_monitor.monitor.angle_regression import ClearanceObservation
 from leg_wear_monitor.playback.result import EncoderEvidence
-from leg_wear_monitor.report.replay.charts import clearance_section, clearance_sentences, encoder_sections
+from leg_wear_monitor.report.replay.charts import (
+    clearance_section,
+    clearance_sentences,
+    encoder_sections,
+    joint_trends,
+)
 from leg_wear_monitor.state import Figure
 
 pytestmark = pytest.mark.plain
@@ -63,3 +69,33 @@ def test_growth_alone_may_not_be_valid():
     chart, table = clearance_section(summary_with(Figure.GROWTH)).parts
     assert [row[3:] for row in table.rows] == [("not valid", "not valid")] * 2
     assert chart.columns[1].name == "opened by A"
+
+
+def over_time(*figures):
+    """The summary with an estimate of A in each of its rows."""
+    summary = summary_with(*figures)
+    n = len(summary.history.stamp_ns)
+    estimate = {"seen_m": {"A": np.full(n, 4.0e-4)}, "seen_sigma_m": {"A": np.full(n, 5.0e-5)}}
+    return attrs.evolve(summary, history=attrs.evolve(summary.history, **estimate))
+
+
+def series_of(part):
+    return {series.name: series.values for panel in part.panels for series in panel.series}
+
+
+def test_the_band_is_two_standard_deviations_of_the_estimate():
+    chart = joint_trends(over_time(), "A")[0]
+    found = series_of(chart)
+    assert found["estimate, high"] == pytest.approx(0.5) and found["estimate, low"] == pytest.approx(0.3)
+    assert chart.panels[0].bands == [(0, 1)]
+    assert {"estimate", "counted", "limit", "peak force"} <= set(found)
+
+
+def test_what_the_verdict_does_not_believe_is_said_and_not_drawn():
+    chart, *doubts = joint_trends(over_time(*Figure), "A")
+    assert not {"counted", "peak force", "mean force"} & set(series_of(chart))
+    assert [doubt.text.partition(":")[0] for doubt in doubts] == ["Counted clearance", "Contact forces"]
+
+
+def test_a_joint_of_which_nothing_is_known_has_no_chart():
+    assert joint_trends(over_time(), "Z") == []

@@ -26,7 +26,8 @@ anything = st.tuples(stamps, kinds, faults | st.just(NO_FAULT), numbers, numbers
 
 
 def block(samples):
-    return np.array([(*sample, (np.nan,) * ENCODERS, (np.nan,) * 2) for sample in samples], GAIT_SAMPLE)
+    rest = (np.nan,) * ENCODERS, (np.nan,) * 2, np.nan
+    return np.array([(*sample, *rest) for sample in samples], GAIT_SAMPLE)
 
 
 def worn(monitor):

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from urllib.parse import unquote
@@ -30,9 +31,10 @@ def text_of(file: Path) -> str:
     return (file.parent / included[1]).read_text() if included else text
 
 
-def anchors(text: str) -> set[str]:
-    """Its headings as a forge links to them."""
-    blocks = MarkdownIt().parse(text)
+@cache
+def anchors(file: Path) -> set[str]:
+    """Headings of a page as a forge links to them."""
+    blocks = MarkdownIt().parse(text_of(file))
     heads = [after.content for one, after in pairwise(blocks) if one.type == "heading_open"]
     return {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}
 
@@ -45,7 +47,7 @@ def dead(page: Path) -> list[str]:
             continue
         path, _, anchor = unquote(target).partition("#")
         file = page.parent / path if path else page
-        if not file.exists() or (anchor and anchor not in anchors(text_of(file))):
+        if not file.exists() or (anchor and anchor not in anchors(file.resolve())):
             found.append(target)
     return found
 

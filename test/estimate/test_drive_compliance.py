@@ -23,29 +23,25 @@ CHANNELS = {
 }
 
 
-def signature_of(leg, stiffness, profile, channel) -> np.ndarray:
-    """Mean signature of a leg with other masses, behind a stiffness [N m/rad]; 0 for a rigid drive."""
-    compliance = 1.0 / stiffness if stiffness else 0.0
-    parameters = attrs.evolve(LegParameters.none(leg), mass=np.array(MASS), compliance=compliance)
+@pytest.fixture(scope="module")
+def behind(leg) -> TorqueReference:
+    """A leg with other masses behind 1000 N m/rad, on a crank with ripple."""
+    profile = attrs.evolve(CrankProfile.steady(TURN), sine=np.array([0.0, 0.01, *[0.0] * 6]))
+    parameters = attrs.evolve(LegParameters.none(leg), mass=np.array(MASS), compliance=1.0e-3)
     clearance, unworn = np.full(5, 3.0e-4), np.zeros((5, 2, SECTORS))
     torque = LegSimulation(leg).torque(profile, parameters, clearance, unworn, 8)
     assert torque is not None
-    kept = torque[2:].astype(np.float16)
-    reference = TorqueReference(profile, clearance[None], (kept,), parameters)
-    return simulated_signatures(reference, 0, attrs.evolve(SENSOR, channel=channel)).mean(axis=0)
+    return TorqueReference(profile, clearance[None], (torque[2:].astype(np.float16),), parameters)
 
 
 @pytest.mark.chaotic
 @pytest.mark.parametrize("channel", CHANNELS)
-def test_a_stiffness_is_found_behind_any_channel(leg, channel):
-    """Of 1000 N m/rad on a crank with ripple.
-
-    Found are 1018 to 1032 N m/rad with a sigma of 0.9 (12 moved starts, 2026-11-24); 0.1 of it are half a
+def test_a_stiffness_is_found_behind_any_channel(leg, behind, channel):
+    """Found are 1018 to 1032 N m/rad with a sigma of 0.9 (12 moved starts, 2026-11-24); 0.1 of it are half a
     resonance's width in frequency, from which identification goes on.
     """
-    profile = attrs.evolve(CrankProfile.steady(TURN), sine=np.array([0.0, 0.01, *[0.0] * 6]))
-    mean = signature_of(leg, 1000.0, profile, CHANNELS[channel])
-    found = leg_behind_coupling(leg, SENSOR, profile, mean)
+    mean = simulated_signatures(behind, 0, attrs.evolve(SENSOR, channel=CHANNELS[channel])).mean(axis=0)
+    found = leg_behind_coupling(leg, SENSOR, behind.profile, mean)
     assert found is not None
     assert 1.0 / found.compliance == pytest.approx(1000.0, rel=0.1)
     assert 0.03 < found.damping < 0.07  # 0.05; factors of two change the torque

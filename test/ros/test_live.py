@@ -389,8 +389,8 @@ def test_a_foot_load_is_taken_told_recorded_and_replayed(
         now[0] = 1_700_000_000 * 10**9 + round(1.0e9 * at_s)
 
     recording = tmp_path / "live.mcap"
-    sensor = FootLoadSensorConfig(source=source, silent_from_s=6.0)
-    config = PublisherConfig(duration_s=7.0, load=LoadConfig(ground_n=300.0), foot_load_sensor=sensor)
+    sensor = FootLoadSensorConfig(source=source, silent_from_s=4.0)
+    config = PublisherConfig(duration_s=5.0, load=LoadConfig(ground_n=300.0), foot_load_sensor=sensor)
     values = {"foot_load__source": source, "load__model": model, "diagnosis__enabled": False}
     monitor = stage.monitor(record__path=str(recording), diagnostics__period_s=0.2, **values)
     diagnostics = stage.listen("/diagnostics", DiagnosticArray)
@@ -400,12 +400,12 @@ def test_a_foot_load_is_taken_told_recorded_and_replayed(
     monitor.stop()
     live = monitor.node.monitor
     assert live.state.load.source == "measured"
-    assert live.state.load.cycles >= 4
-    assert live.used["foot_load"] == pytest.approx(1200, abs=3)
+    assert live.state.load.cycles >= 2
+    assert live.used["foot_load"] == pytest.approx(800, abs=3)
     parameters = config_from(dotted(values))
     again = WearMonitor(load_mechanism(parameters.mechanism), parameters)
     lived, replayed = published(recording), replayed_from(recording, again)
     assert again.state.load == live.state.load
-    assert len(replayed["~/clearance_states"]) >= 4
+    assert len(replayed["~/clearance_states"]) >= 2
     for topic in ("~/clearance_states", "~/predicted_torque", "~/impact_forces"):
         assert lived[topic] == replayed[topic]

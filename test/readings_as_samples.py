@@ -19,6 +19,7 @@ def samples(block: Iterable[Reading], start_ns: int) -> Samples:
             *reading[4:7],
             _four(reading.encoder_rad),
             reading.foot_force_n,
+            math.nan,  # a synthetic drive has no temperature
         )
         for reading in block
     ]

@@ -172,7 +172,7 @@ def life_picture(life: Life) -> bytes:
     figure = new_figure(max(7.0, 2.2 * joints), 6.0)
     grid = figure.add_gridspec(2, 2 * joints, height_ratios=(1.2, 1.0))
     clearance, peak = figure.add_subplot(grid[0, :joints]), figure.add_subplot(grid[0, joints:])
-    draw_clearances(clearance, life)
+    draw_life(clearance, life)
     for k in range(joints):
         peak.plot(life.cycles, 1e-3 * life.peak_force_n[:, k], color=_colour(k))
         _profiles(figure.add_subplot(grid[1, 2 * k : 2 * k + 2]), life, k, _colour(k))
@@ -182,11 +182,19 @@ def life_picture(life: Life) -> bytes:
     return png(figure)
 
 
-def draw_clearances(axes: Axes, life: Life) -> None:
+def draw_life(axes: Axes, life: Life) -> None:
     """Mean (and dashed, largest) clearance [µm] of each joint over the gait cycles."""
-    for k, joint in enumerate(life.clearance_joints):
-        axes.plot(life.cycles, 1e6 * life.clearance_m[:, k], color=_colour(k), label=joint)
-        axes.plot(life.cycles, 1e6 * life.clearance_max_m[:, k], color=_colour(k), ls="--", lw=0.7)
+    mean, largest = 1e6 * life.clearance_m, 1e6 * life.clearance_max_m
+    draw_clearances(axes, life.cycles, mean, largest, life.clearance_joints)
+
+
+def draw_clearances(
+    axes: Axes, cycles: Floats, mean: Floats, largest: Floats, names: Sequence[str | None]
+) -> None:
+    """Mean and dashed the largest clearance (n, k) of joints over the gait cycles (n,)."""
+    for k, joint in enumerate(names):
+        axes.plot(cycles, mean[:, k], color=_colour(k), label=joint)
+        axes.plot(cycles, largest[:, k], color=_colour(k), ls="--", lw=0.7)
 
 
 def _colour(k: int) -> str:
@@ -240,10 +248,8 @@ def worn_bushings(
     for k, name in enumerate(names):
         depth, zone = surfaces.depth[k], wear_zone(surfaces.depth[k, BUSHING])
         section = figure.add_subplot(grid[0, k], projection="polar")
-        factor = draw_section(section, depth, zone, radius_m[k])
-        section.set_title(
-            f"{name}\n" + (f"depth × {factor}" if factor else "no wear"), fontsize=USUAL, color=INK
-        )
+        exaggerated = draw_section(section, depth, zone, radius_m[k])
+        section.set_title(f"{name}\n{exaggerated}", fontsize=USUAL, color=INK)
         unrolled = figure.add_subplot(grid[1, k])
         draw_depth(unrolled, scale * depth[None], zone)
         unrolled.set_xticks((0.0, 90.0, 180.0, 270.0, 360.0))
@@ -270,7 +276,7 @@ def draw_section(axes: Axes, depth: Floats, zone: tuple[float, float] | None, ra
     """Draw a section of bushing and journal with exaggerated wear depth (2, N) [m].
 
     ``zone`` [deg] is marked by an arc at the rim; ``radius`` is that of the bushing [m]. Returns the
-    exaggeration factor as text, empty without wear.
+    exaggeration in words.
     """
     n, greatest = depth.shape[1], float(depth.max())
     angle = (np.arange(n + 1) + 0.5) * (TURN / n)
@@ -281,16 +287,15 @@ def draw_section(axes: Axes, depth: Floats, zone: tuple[float, float] | None, ra
     axes.plot(angle, _JOURNAL - drawn[JOURNAL], color=VERMILION, linewidth=1.4)
     if zone is not None:
         arc = np.deg2rad(np.linspace(*zone, 181))
-        axes.plot(
-            arc, np.full(arc.shape, _RIM), color=INK, linewidth=4.0, solid_capstyle="butt", clip_on=False
-        )
+        rim = np.full(arc.shape, _RIM)
+        axes.plot(arc, rim, color=INK, linewidth=4.0, solid_capstyle="butt", clip_on=False)
     axes.set_ylim(0.0, _RIM)
     axes.set_yticks([])
     axes.set_xticks(np.deg2rad([0.0, 90.0, 180.0, 270.0]))
     axes.tick_params(labelsize=SMALL, labelcolor=INK, pad=1.0)
     axes.grid(False)
     axes.spines["polar"].set_visible(False)
-    return _factor(_DEEPEST * radius / greatest) if greatest > 0.0 else ""
+    return f"depth × {_factor(_DEEPEST * radius / greatest)}" if greatest > 0.0 else "no wear"
 
 
 def _factor(value: float) -> str:

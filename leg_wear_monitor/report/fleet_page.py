@@ -81,8 +81,8 @@ def _row(leg: LegOverview, joints: Sequence[str], day: Day, rank: int, has_page:
         "lot": leg.lot,
         "standing": standing.value,
         "rank": rank,
-        "symbol": standing.symbol,
-        "tone": standing.tone,
+        "symbol": standing.look[0],
+        "tone": standing.look[1],
         "used": [_cell(used, joint) for joint in joints],
         "life": [life.p10_h, life.p50_h, life.p90_h] if life else None,
         "was": was(leg),
@@ -317,7 +317,7 @@ def _banner(overview: FleetOverview, day: Day) -> Banner:
     told = [f"{number} {each}" for each, number in numbers.items() if number or each != _DEMONSTRATIONS]
     outdated = f"healthy, but without a recording of the last {day.fresh_days:g} days, or not updated"
     return Banner(
-        symbol=worst.symbol,
+        symbol=worst.look[0],
         word=f"{numbers[words]} of {len(overview.legs)} {words}".upper(),
         text=f"{', '.join(told)}.",
         notes=[
@@ -325,7 +325,7 @@ def _banner(overview: FleetOverview, day: Day) -> Banner:
             ("Outdated", outdated),
             ("Limits", overview.advice),
         ],
-        severity=worst.tone,
+        severity=worst.look[1],
     )
 
 

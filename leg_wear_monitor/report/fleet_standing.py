@@ -7,7 +7,7 @@ import attrs
 
 from leg_wear_monitor.fleet.overview import LegOverview, urgency
 from leg_wear_monitor.monitor.alarms import time_words
-from leg_wear_monitor.report.page import Part, Section, Sentences, Table
+from leg_wear_monitor.report.page import STATE_LOOKS, Part, Section, Sentences, Table
 from leg_wear_monitor.state import Figure, State
 
 # Standing of a leg on the page: its verdict, unless that is too old to be relied on.
@@ -35,16 +35,10 @@ class Standing(Enum):
         return list(Standing).index(self)
 
     @property
-    def symbol(self) -> str:
-        """Symbol beside the word."""
-        return {"HEALTHY": "✓", "WATCH": "◆", "INSPECT": "▲", "STOP": "■"}.get(self.name, "?")
-
-    @property
-    def tone(self) -> str:
-        """Class of its colour."""
-        if self is Standing.HEALTHY:
-            return "fine"
-        return "bad" if self in (Standing.INSPECT, Standing.STOP) else "careful"
+    def look(self) -> tuple[str, str]:
+        """Symbol beside the word, and class of its colour."""
+        state = State.__members__.get(self.name, State.NOT_MONITORED)
+        return STATE_LOOKS[state]
 
 
 @attrs.frozen(kw_only=True)

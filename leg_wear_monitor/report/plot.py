@@ -30,7 +30,7 @@ from leg_wear_monitor.report.figure import (
     SKY,
     SMALL,
     VERMILION,
-    draw_clearances,
+    draw_life,
     finish,
     new_figure,
     opened,
@@ -105,7 +105,7 @@ def _bars(axes: Axes, result: SimulationResult) -> None:
 @plot.register
 def _life(result: Life, axes: Axes | None = None) -> Axes:
     axes = _new() if axes is None else axes
-    draw_clearances(axes, result)
+    draw_life(axes, result)
     return _finished(axes, "gait cycles", "radial clearance [µm]")
 
 

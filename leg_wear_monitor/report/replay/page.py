@@ -1,8 +1,5 @@
 """The page of a replay, from its summary: a first screen that answers, and the rest folded below it."""
 
-from collections.abc import Sequence
-from typing import NamedTuple
-
 import attrs
 
 from leg_wear_monitor.files import share_directory
@@ -205,69 +202,67 @@ def certainty_section(summary: ReplaySummary) -> Section:
 # Whether the page's figures can be believed: input, torque, cadence and model, each in a card.
 
 
-_LOOKS = {"yes": ("✓", "fine"), "in part": ("▲", "careful"), "no": ("■", "bad")}
-_OF_LEVEL = {Level.OK: "yes", Level.WARN: "in part", Level.ERROR: "no"}
+_ANSWERS = {Level.OK: "yes", Level.WARN: "in part", Level.ERROR: "no"}
 _MOST_SENTENCES = 3
 
-
-class _Card(NamedTuple):
-    """One question: its name, the answer ``yes``, ``in part`` or ``no``, and why."""
-
-    name: str
-    answer: str
-    sentences: tuple[str, ...]
+_Card = tuple[str, Level, list[str]]
+"""One question: its name, whether the answer is fine, and why."""
 
 
 def belief(summary: ReplaySummary) -> str:
     """Markup of the cards."""
-    cards = [_input(summary), _torque(summary), _cadence(summary), *_foot_load(summary), _model(summary)]
-    return render("replay/belief.html", cards=cards, looks=_LOOKS)
+    found = [_input(summary), _torque(summary), _cadence(summary), *_foot_load(summary), _model(summary)]
+    cards = [
+        {
+            "name": name,
+            "look": LEVEL_LOOKS[level],
+            "answer": _ANSWERS[level],
+            "sentences": [f"{part[:1].upper()}{part[1:]}." for part in why if part],
+        }
+        for name, level, why in found
+    ]
+    return render("replay/belief.html", cards=cards)
 
 
 def _status(summary: ReplaySummary, name: str) -> ReplayStatus | None:
     return next((status for status in summary.status if status.name == name), None)
 
 
-def _worst(*answers: str) -> str:
-    return max(answers, key=list(_LOOKS).index)
-
-
 def _input(summary: ReplaySummary) -> _Card:
-    status, answers, sentences = _status(summary, "input"), ["yes"], []
+    status, level, why = _status(summary, "input"), Level.OK, []
     if status:
-        answers.append(_OF_LEVEL[status.level])
+        level = status.level
         told = [part for part in status.message.split("; ") if not part.startswith("see: ")]
-        sentences += told[:_MOST_SENTENCES]
+        why += told[:_MOST_SENTENCES]
         if len(told) > _MOST_SENTENCES:
-            sentences.append(f"{len(told) - _MOST_SENTENCES} more below")
+            why.append(f"{len(told) - _MOST_SENTENCES} more below")
     if summary.recording.is_partial:
-        answers.append("in part")
-        sentences.append("the recording is damaged or incomplete: only its readable part is used")
+        level = max(level, Level.WARN)
+        why.append("the recording is damaged or incomplete: only its readable part is used")
     if summary.lost.unmonitored_s > 1.0:
-        answers.append("in part")
-        sentences.append(f"{duration(summary.lost.unmonitored_s)} were not monitored")
-    return _Card("Input", _worst(*answers), _sentences(sentences))
+        level = max(level, Level.WARN)
+        why.append(f"{duration(summary.lost.unmonitored_s)} were not monitored")
+    return "Input", level, why
 
 
 def _torque(summary: ReplaySummary) -> _Card:
     status = _status(summary, "torque")
     if status is None:
-        return _Card("Torque", "no", ("Unknown.",))
+        return "Torque", Level.ERROR, ["unknown"]
     is_compared = status.values.get("mismatch") is not None
-    answer = _OF_LEVEL[status.level] if is_compared else "no"
-    return _Card("Torque", answer, _sentences(status.message.split("; ")))
+    return "Torque", status.level if is_compared else Level.ERROR, status.message.split("; ")
 
 
 def _cadence(summary: ReplaySummary) -> _Card:
     status, commanded = _status(summary, "gait"), summary.monitor.commanded_rpm
     cadence = status.values.get("cadence_rpm") if status else None
     if status is None or cadence is None:
-        return _Card("Cadence", "no", ("Unknown.",))
+        return "Cadence", Level.ERROR, ["unknown"]
     is_other = summary.verdict.fault_code == "CADENCE"
-    answer = _worst(_OF_LEVEL[status.level], "in part" if is_other else "yes")
+    level = max(status.level, Level.WARN if is_other else Level.OK)
     if not summary.gait.believable_cycles:
-        answer = "no"
-    return _Card("Cadence", answer, (f"{cadence:.3g} rpm, commanded {commanded:.3g} rpm.",))
+        level = Level.ERROR
+    return "Cadence", level, [f"{cadence:.3g} rpm, commanded {commanded:.3g} rpm"]
 
 
 def _foot_load(summary: ReplaySummary) -> list[_Card]:
@@ -277,29 +272,27 @@ def _foot_load(summary: ReplaySummary) -> list[_Card]:
         return []
     source = "measured" if load.source == "measured" else "estimated from the drive torque"
     sigma = f" ± {load.peak_sigma_n:.0f}" if load.peak_sigma_n is not None else ""
-    return [_Card("Foot load", "yes", _sentences([f"{source}: {load.peak_n:.0f}{sigma} N at its peak"]))]
+    return [("Foot load", Level.OK, [f"{source}: {load.peak_n:.0f}{sigma} N at its peak"])]
 
 
 def _model(summary: ReplaySummary) -> _Card:
-    invalid = summary.verdict.not_valid
-    if not summary.gait.believable_cycles and not summary.gait.is_counted:
-        return _Card("Model", "no", _sentences([f"no gait cycle fits this leg: {summary.gait.missing}"]))
-    sentences, answer = [], "yes"
+    invalid, gait = summary.verdict.not_valid, summary.gait
+    if not gait.believable_cycles and not gait.is_counted:
+        return "Model", Level.ERROR, [f"no gait cycle fits this leg: {gait.missing}"]
+    level, why = Level.OK, [_explained(summary)]
     if invalid:
-        answer = "no" if Figure.CLEARANCES in invalid else "in part"
-        sentences = [reason(summary.verdict), "not valid: " + ", ".join(each.words for each in invalid)]
-    elif explained := _explained(summary):
-        sentences = [explained]
-    else:
-        answer, sentences = "in part", ["no measurement is compared with it"]
-    if summary.gait.doubtful_cycles:
-        answer = _worst(answer, "in part")
-        sentences.append(f"{summary.gait.doubtful_cycles} gait cycles do not fit this leg")
+        level = Level.ERROR if Figure.CLEARANCES in invalid else Level.WARN
+        why = [reason(summary.verdict), "not valid: " + ", ".join(each.words for each in invalid)]
+    elif not why[0]:
+        level, why = Level.WARN, ["no measurement is compared with it"]
+    if gait.doubtful_cycles:
+        level = max(level, Level.WARN)
+        why.append(f"{gait.doubtful_cycles} gait cycles do not fit this leg")
     if summary.monitor.wear_acceleration != 1.0:
-        answer = _worst(answer, "in part")
+        level = max(level, Level.WARN)
         factor = summary.monitor.wear_acceleration
-        sentences.append(f"all wear is multiplied by {factor:g}: a demonstration, not a measurement")
-    return _Card("Model", answer, _sentences(sentences))
+        why.append(f"all wear is multiplied by {factor:g}: a demonstration, not a measurement")
+    return "Model", level, why
 
 
 def _explained(summary: ReplaySummary) -> str:
@@ -310,10 +303,6 @@ def _explained(summary: ReplaySummary) -> str:
         return ""
     limit = 100.0 * summary.monitor.limits.torque_mismatch
     return f"{100.0 * mismatch:.2g} % of the drive torque is not explained (limit {limit:.3g} %)"
-
-
-def _sentences(parts: Sequence[str]) -> tuple[str, ...]:
-    return tuple(f"{part[:1].upper()}{part[1:]}." for part in parts if part)
 
 
 def replay_page(summary: ReplaySummary) -> Page:

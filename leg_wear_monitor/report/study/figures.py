@@ -19,6 +19,7 @@ from leg_wear_monitor.report.figure import (
     SKY,
     SMALL,
     VERMILION,
+    draw_clearances,
     draw_depth,
     draw_section,
     finish,
@@ -163,7 +164,7 @@ _CAPTION = (
 )
 
 
-class Panel(NamedTuple):
+class Spreads(NamedTuple):
     """Data of one picture: for each name, a spread at each point; None where the point has no value."""
 
     title: str
@@ -171,7 +172,7 @@ class Panel(NamedTuple):
     factor: float = 1.0
 
 
-def panel_of_joints(found: Found, name: str, title: str, factor: float = 1.0) -> Panel:
+def panel_of_joints(found: Found, name: str, title: str, factor: float = 1.0) -> Spreads:
     """A statistic of each clearance joint at each point."""
     joints = dict.fromkeys(name for _, arrays in found for name in clearance_joints_of(arrays))
     lines = {
@@ -181,22 +182,22 @@ def panel_of_joints(found: Found, name: str, title: str, factor: float = 1.0) ->
         ]
         for joint in joints
     }
-    return Panel(title, lines, factor)
+    return Spreads(title, lines, factor)
 
 
-def exponent_panel(estimates: Sequence[Estimate | None]) -> Panel:
+def exponent_panel(estimates: Sequence[Estimate | None]) -> Spreads:
     """Bars of two standard errors."""
     line = [
         one and Spread(one.value, one.error, one.value - 2.0 * one.error, one.value + 2.0 * one.error)
         for one in estimates
     ]
-    return Panel("largest Lyapunov exponent [1/cycle]", {"": line})
+    return Spreads("largest Lyapunov exponent [1/cycle]", {"": line})
 
 
-def panels_of(found: Found) -> list[Panel]:
+def panels_of(found: Found) -> list[Spreads]:
     """Data of the pictures of every study."""
     errors = [
-        Panel(
+        Spreads(
             f"{each.title}, largest error [{each.unit}]",
             {"": [largest_error(arrays, each.name) for _, arrays in found]},
             each.factor,
@@ -211,7 +212,7 @@ def panels_of(found: Found) -> list[Panel]:
     ]
 
 
-def trend_gallery(panels: Sequence[Panel], values: Sequence[float], axis: str) -> Gallery:
+def trend_gallery(panels: Sequence[Spreads], values: Sequence[float], axis: str) -> Gallery:
     """Pictures over a numeric parameter, such as the clearance."""
     pictures = []
     for panel in panels:
@@ -230,7 +231,7 @@ def trend_gallery(panels: Sequence[Panel], values: Sequence[float], axis: str) -
     return Gallery(pictures=pictures, caption=_CAPTION)
 
 
-def compare_gallery(panels: Sequence[Panel], labels: Sequence[str], caption: str = _CAPTION) -> Gallery:
+def compare_gallery(panels: Sequence[Spreads], labels: Sequence[str], caption: str = _CAPTION) -> Gallery:
     """Pictures with a row for each point."""
     pictures = []
     for panel in panels:
@@ -260,7 +261,7 @@ def _bars(spreads: Sequence[Spread], factor: float) -> tuple[list[float], list[l
     return [factor * one.mean for one in spreads], [below, above]
 
 
-def _as_text(panel: Panel, labels: Sequence[str] = ()) -> str:
+def _as_text(panel: Spreads, labels: Sequence[str] = ()) -> str:
     """Alternative text of the picture: the means of all points."""
     texts = []
     for name, spreads in panel.lines.items():
@@ -312,8 +313,8 @@ def _worn(mechanism: Mechanism, title: str, joint: str, depth: Floats) -> Pictur
     figure = new_figure(4.8, 4.6)
     grid = figure.add_gridspec(2, 2, height_ratios=(1.25, 1.0))
     section = figure.add_subplot(grid[0, 0], projection="polar")
-    times = draw_section(section, mean, zone, mechanism.clearances[joint].bushing_radius)
-    section.set_title(f"depth × {times}" if times else "no wear", fontsize=SMALL + 1.0, color=INK)
+    exaggerated = draw_section(section, mean, zone, mechanism.clearances[joint].bushing_radius)
+    section.set_title(exaggerated, fontsize=SMALL + 1.0, color=INK)
     worst, whole = figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, :])
     for axes in (worst, whole):
         draw_depth(axes, factor * depth, zone)
@@ -343,23 +344,17 @@ def life_gallery(lives: Found) -> Gallery:
     """Mean and largest clearance of every joint over the cycles."""
     pictures = []
     for point, arrays in lives:
-        figure, ends = new_figure(_WIDE, 3.0), []
+        figure, joints = new_figure(_WIDE, 3.0), clearance_joints_of(arrays)
         axes = figure.subplots()
-        cycles, mean, largest = (
-            MILLIONTH * arrays["cycles"],
-            1.0e3 * arrays["clearance_mean_m"],
-            1.0e3 * arrays["clearance_max_m"],
-        )
-        for k, ((colour, mark), joint) in enumerate(zip(MARKS, clearance_joints_of(arrays), strict=False)):
-            for run in range(len(cycles)):
-                axes.plot(cycles[run], mean[run, :, k], color=colour, linewidth=1.2, marker=mark,
-                          markevery=(run, 8), markersize=4.0, label=joint if run == 0 else None)  # fmt: skip
-                axes.plot(cycles[run], largest[run, :, k], color=colour, linewidth=0.8, ls=(0, (4, 2)))
-            new, last = mean[:, [0, -1], k].mean(axis=0)
-            ends.append(f"{joint} {new:.3f} to {last:.3f} mm")
+        mean, largest = 1.0e3 * arrays["clearance_mean_m"], 1.0e3 * arrays["clearance_max_m"]
+        for run, cycles in enumerate(MILLIONTH * arrays["cycles"]):
+            names = [None] * len(joints) if run else joints
+            draw_clearances(axes, cycles, mean[run], largest[run], names)
         axes.set_xlim(left=0.0)
         finish(axes, point.label, x="gait cycles [millions]", y="radial clearance [mm]", columns=5)
-        alt = f"Clearances of {point.label} over the life: {', '.join(ends)}"
+        ends = zip(joints, mean[:, 0].mean(axis=0), mean[:, -1].mean(axis=0), strict=True)
+        words = ", ".join(f"{joint} {new:.3f} to {last:.3f} mm" for joint, new, last in ends)
+        alt = f"Clearances of {point.label} over the life: {words}"
         pictures.append(Picture(image=png(figure), alt=alt))
     caption = (
         "Clearances as wear feeds back. Full: mean around the joint; dashed: where it is largest, both "

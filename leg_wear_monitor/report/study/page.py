@@ -43,7 +43,7 @@ from leg_wear_monitor.report.study.chaos import (
     foretold,
 )
 from leg_wear_monitor.report.study.figures import (
-    Panel,
+    Spreads,
     compare_gallery,
     curve_galleries,
     exponent_panel,
@@ -218,7 +218,7 @@ def _load(results: StudyResults, found: Found) -> _Own:
         *panels_of(found),
         panel_of_joints(found, "mean_force_n", "mean force [N]"),
         panel_of_joints(found, VOLUME, "∫ F |v| dt [J a cycle]"),
-        Panel("life of the joint that opens first [million cycles]", {"": life}, MILLIONTH),
+        Spreads("life of the joint that opens first [million cycles]", {"": life}, MILLIONTH),
         exponent_panel([by_label.get(point.label) for point, _ in found]),
     ]
     values = [float(point.settings["ground_n"]) for point, _ in found]

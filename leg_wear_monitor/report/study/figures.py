@@ -1,8 +1,8 @@
 """Figures that several studies share: curves of a cycle, statistics of the points, wear, lives."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -118,12 +118,7 @@ def _force_gallery(found: Found) -> Gallery:
         example = np.linalg.norm(arrays["example_contact_force_n"], axis=-1)
         for k, name in enumerate(clearance_joints_of(arrays)):
             ideal = arrays["ideal_joint_force_n"][:, joints.index(name)]
-            curves = ideal, arrays["band_contact_force_n"][..., k], example[:, k]
-            lines[name] = (
-                np.maximum(curves[0], LEAST_N),
-                np.maximum(curves[1], LEAST_N),
-                np.maximum(curves[2], LEAST_N),
-            )
+            lines[name] = ideal, arrays["band_contact_force_n"][..., k], example[:, k]
         image = _cycle_panels(point.label, lines, 1.05)
         pictures.append(Picture(image=image, alt=f"Contact forces over the crank angle, {point.label}"))
     caption = (
@@ -135,10 +130,11 @@ def _force_gallery(found: Found) -> Gallery:
 def _cycle_panels(
     title: str, lines: Mapping[str, _Line], height: float, limits: tuple[float, float] | None = None
 ) -> bytes:
-    """PNG of panels above each other, by their labels, over the crank angle; without limits, logarithmic."""
+    """PNG of panels above each other, by their labels, over the crank angle; without limits logarithmic."""
     figure = new_figure(_WIDE, height * len(lines) + 0.75)
     panels = list(np.atleast_1d(figure.subplots(len(lines), 1, sharex=True)))
-    for axes, (label, (ideal, band, example)) in zip(panels, lines.items(), strict=True):
+    for axes, (label, line) in zip(panels, lines.items(), strict=True):
+        ideal, band, example = line if limits else (np.maximum(each, LEAST_N) for each in line)
         angle = np.arange(len(example)) * (360.0 / len(example))
         axes.fill_between(angle, band[0], band[-1], color=SKY, alpha=0.45, linewidth=0.0)
         axes.plot(angle, ideal, color=INK, linewidth=1.2, linestyle=(0, (4, 2)))
@@ -218,47 +214,40 @@ def trend_gallery(panels: Sequence[Spreads], values: Sequence[float], axis: str)
     for panel in panels:
         figure = new_figure(_WIDE, 2.9)
         axes = figure.subplots()
-        for (colour, mark), (name, spreads) in zip(MARKS, panel.lines.items(), strict=False):
-            known = [(x, one) for x, one in zip(values, spreads, strict=True) if one]
-            mean, bars = _bars([one for _, one in known], panel.factor)
-            axes.errorbar(
-                [x for x, _ in known], mean, yerr=bars, color=colour, marker=mark, markersize=5.0,
-                linewidth=1.0, elinewidth=1.0, capsize=3.0, label=name or None,
-            )  # fmt: skip
+        for known, mean, bars, look in _lines(panel):
+            axes.errorbar(np.array(values)[known], mean, yerr=bars, linewidth=1.0, elinewidth=1.0, **look)
         axes.set_ylim(bottom=0.0)
         finish(axes, panel.title, x=axis, columns=5)
         pictures.append(Picture(image=png(figure), alt=f"{panel.title} over {axis}: {_as_text(panel)}"))
     return Gallery(pictures=pictures, caption=_CAPTION)
 
 
-def compare_gallery(panels: Sequence[Spreads], labels: Sequence[str], caption: str = _CAPTION) -> Gallery:
+def compare_gallery(panels: Sequence[Spreads], labels: Sequence[str]) -> Gallery:
     """Pictures with a row for each point."""
     pictures = []
     for panel in panels:
-        lines = list(panel.lines.items())
-        figure = new_figure(_WIDE, 0.75 + len(labels) * max(0.24, 0.1 * len(lines)))
+        count = len(panel.lines)
+        figure = new_figure(_WIDE, 0.75 + len(labels) * max(0.24, 0.1 * count))
         axes = figure.subplots()
-        for i, ((colour, mark), (name, spreads)) in enumerate(zip(MARKS, lines, strict=False)):
-            rows = np.arange(len(labels)) + (i - 0.5 * (len(lines) - 1)) * 0.7 / max(len(lines), 1)
-            known = [(row, one) for row, one in zip(rows, spreads, strict=True) if one]
-            mean, bars = _bars([one for _, one in known], panel.factor)
-            axes.errorbar(
-                mean, [row for row, _ in known], xerr=bars, color=colour, marker=mark, markersize=5.0,
-                linestyle="none", elinewidth=1.2, capsize=3.0, label=name or None,
-            )  # fmt: skip
+        for i, (known, mean, bars, look) in enumerate(_lines(panel)):
+            rows = np.array(known) + (i - 0.5 * (count - 1)) * 0.7 / count
+            axes.errorbar(mean, rows, xerr=bars, linestyle="none", elinewidth=1.2, **look)
         axes.set_yticks(np.arange(len(labels)), labels)
         axes.set_ylim(len(labels) - 0.5, -0.5)
         axes.set_xlim(left=min(0.0, axes.get_xlim()[0]) if axes.dataLim.x0 < 0.0 else 0.0)
         finish(axes, panel.title, columns=5)
         pictures.append(Picture(image=png(figure), alt=f"{panel.title}: {_as_text(panel, labels)}"))
-    return Gallery(pictures=pictures, caption=caption)
+    return Gallery(pictures=pictures, caption=_CAPTION)
 
 
-def _bars(spreads: Sequence[Spread], factor: float) -> tuple[list[float], list[list[float]]]:
-    """Means, and the lengths of the bars below and above them."""
-    below = [factor * max(0.0, one.mean - one.low) for one in spreads]
-    above = [factor * max(0.0, one.high - one.mean) for one in spreads]
-    return [factor * one.mean for one in spreads], [below, above]
+def _lines(panel: Spreads) -> Iterator[tuple[list[int], list[float], list[list[float]], dict[str, Any]]]:
+    """Points that are known, their means, lengths of the bars below and above these, and looks of a line."""
+    for (colour, mark), (name, spreads) in zip(MARKS, panel.lines.items(), strict=False):
+        known = {i: one for i, one in enumerate(spreads) if one}
+        below = [panel.factor * max(0.0, one.mean - one.low) for one in known.values()]
+        above = [panel.factor * max(0.0, one.high - one.mean) for one in known.values()]
+        look = {"color": colour, "marker": mark, "label": name or None, "markersize": 5.0, "capsize": 3.0}
+        yield list(known), [panel.factor * one.mean for one in known.values()], [below, above], look
 
 
 def _as_text(panel: Spreads, labels: Sequence[str] = ()) -> str:

@@ -19,10 +19,12 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
     from leg_wear_monitor.configuration import Doubt
-    from leg_wear_monitor.mechanism.sourced import SourcedValue
     from leg_wear_monitor.mechanism.spec import Mechanism
     from leg_wear_monitor.playback.result import ReplaySummary
 
+
+WITH_FINDINGS = 1
+"""Exit code of a verb that is done, with findings that the caller must see."""
 
 # A number on the command line: finite, within bounds, and told with its unit when it is not.
 
@@ -78,6 +80,12 @@ def options_named() -> Iterator[None]:
 Option = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
+def option(name: str, metavar: str, text: str, *own: str, **of_click: Any) -> Option:
+    """Option with a value, whose default is shown; ``own`` is the name of its parameter if it has another."""
+    shown = "default" in of_click
+    return click.option(name, *own, metavar=metavar, help=text, show_default=shown, **of_click)
+
+
 def number_option(
     name: str,
     metavar: str,
@@ -90,22 +98,21 @@ def number_option(
 ) -> Option:
     """Option with a finite number within bounds; see `bounded`."""
     check = bounded(unit, above=above, at_least=at_least)
-    shown: dict[str, Any] = {} if default is None else {"default": default, "show_default": True}
-    return click.option(name, type=float, callback=check, metavar=metavar, help=text, **shown)
+    given = {} if default is None else {"default": default}
+    return option(name, metavar, text, type=float, callback=check, **given)
 
 
 def path_option(name: str, metavar: str, text: str, *, required: bool = False, **of_path: bool) -> Option:
     """Option with a path, such as a file that has to exist."""
     kind = click.Path(path_type=Path, **of_path)
-    return click.option(name, type=kind, metavar=metavar, required=required, help=text)
+    return option(name, metavar, text, type=kind, required=required)
 
 
-mechanism_option: Option = click.option(
+mechanism_option: Option = option(
     "--mechanism",
-    metavar="FILE",
+    "FILE",
+    "A mechanism file, or the name of one that comes with the package.",
     default="bionic_leg",
-    show_default=True,
-    help="A mechanism file, or the name of one that comes with the package.",
 )
 
 speed_option: Option = number_option(
@@ -128,50 +135,59 @@ ledger_option: Option = path_option(
     exists=True,
 )
 
-node_option: Option = click.option(
-    "--node",
-    metavar="NAME",
-    help="Full name of a running monitor to enter it into, such as /left/leg_wear_monitor.",
+node_option: Option = option(
+    "--node", "NAME", "Full name of a running monitor to enter it into, such as /left/leg_wear_monitor."
 )
 
-wait_option: Option = click.option(
+wait_option: Option = option(
     "--wait",
+    "S",
+    "With --node: longest wait for the monitor, and again for its answer.",
     "wait_s",
     type=click.FloatRange(min=0.0, min_open=True),
     default=10.0,
-    show_default=True,
-    metavar="S",
-    help="With --node: longest wait for the monitor, and again for its answer.",
 )
 
-sample_option: Option = click.option(
+sample_option: Option = option(
     "--sample",
-    type=click.FloatRange(0.0, 1.0, min_open=True),
-    metavar="FRACTION",
-    help="Follow this fraction of the gait cycles, track and check the others, and estimate their wear; for "
+    "FRACTION",
+    "Follow this fraction of the gait cycles, track and check the others, and estimate their wear; for "
     "long recordings, where no impact needs to be seen.  [default: all]",
+    type=click.FloatRange(0.0, 1.0, min_open=True),
 )
 
-workers_option: Option = click.option(
-    "--workers", type=click.IntRange(min=1), metavar="N", help="Number of local processes.  [default: cores]"
+workers_option: Option = option(
+    "--workers", "N", "Number of local processes.  [default: cores]", type=click.IntRange(min=1)
+)
+
+dry_run_option: Option = click.option("--dry-run", is_flag=True, help="Print the result and write nothing.")
+
+recordings_argument: Option = click.argument(
+    "recordings", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="RECORDING..."
 )
 
 
 def clearances_option(metavar: str) -> Option:
     """``--clearances``: names of the clearance joints, separated by commas."""
     text = "The clearance joints.  [default: the mechanism's own]"
-    return click.option("--clearances", metavar=metavar, help=text)
+    return option("--clearances", metavar, text)
 
 
 def json_option(what: str) -> Option:
     """``--json FILE`` for an object, such as ``the result``; ``-`` is standard output."""
-    return click.option(
+    return option(
         "--json",
+        "FILE",
+        f"Write {what} as JSON; - for stdout, without other output there.",
         "json_file",
         type=click.Path(allow_dash=True, path_type=Path),
-        metavar="FILE",
-        help=f"Write {what} as JSON; - for stdout, without other output there.",
     )
+
+
+def scheduler_option(does: str) -> Option:
+    """``--scheduler``: what the workers of a Dask cluster do in place of this machine."""
+    text = f"Dask scheduler whose workers {does} instead, tcp://HOST:PORT."
+    return option("--scheduler", "ADDRESS", text)
 
 
 def out_option(text: str) -> Option:
@@ -191,16 +207,6 @@ def with_clearance_joints(leg: "Mechanism", names: str | None) -> "Mechanism":
 # A node as a verb: its arguments are those of ROS, and without ROS there is one line.
 
 
-_Main = Callable[[Sequence[str] | None], int]
-
-
-def node_main(module: str) -> _Main:
-    """Entry point of a node; raises LegWearError without ROS."""
-    need_rclpy()
-    main: _Main = import_module(f"leg_wear_monitor.ros.{module}").main
-    return main
-
-
 def need_rclpy() -> None:
     """Raise LegWearError where ROS is not installed, or not found."""
     try:
@@ -216,6 +222,11 @@ def check_alone(**others: object) -> None:
     if any(others.values()):
         names = ", ".join(f"--{name.replace('_', '-')}" for name in others)
         raise click.UsageError(f"--node cannot be combined with {names}")
+
+
+def joints_words(names: Sequence[str]) -> str:
+    """The clearance joints of a leg."""
+    return f"clearance joints {', '.join(names)}" if names else "no clearance joint"
 
 
 def trigger(node: str, service: str, wait_s: float, times: int = 1) -> str:
@@ -244,7 +255,9 @@ def node_verb(name: str, module: str, summary: str, text: str) -> click.Command:
     )
     @click.argument("arguments", nargs=-1, type=click.UNPROCESSED, metavar="")
     def verb(arguments: tuple[str, ...]) -> int:
-        return node_main(module)([name, *arguments])
+        need_rclpy()
+        main: Callable[[Sequence[str]], int] = import_module(f"leg_wear_monitor.ros.{module}").main
+        return main([name, *arguments])
 
     return verb
 
@@ -256,15 +269,19 @@ SUMMARY, PAGE = "summary.json", "report.html"
 
 STDOUT = Path("-")
 
+_MOST_LINES = 20  # of findings on stderr
 
-def check_file(option: str, path: Path) -> None:
-    """Make sure that a file can be written.
+
+def check_file(option: str, path: Path | None) -> None:
+    """Make sure that a file can be written, if one is asked for.
 
     Raises
     ------
     ConfigError
         Naming the option, the path and why not.
     """
+    if path is None or path == STDOUT:
+        return
     if path.is_dir():
         raise ConfigError(option, str(path), "is a directory, expected a file to write")
     if _is_stream(path):
@@ -300,8 +317,7 @@ def check_outputs(json_file: Path | None, out: Path | None) -> None:
     ConfigError
         Naming the option, the path and why not.
     """
-    if json_file is not None and json_file != STDOUT:
-        check_file("--json", json_file)
+    check_file("--json", json_file)
     if out is not None:
         check_directory("--out", out)
 
@@ -322,6 +338,14 @@ def say(json_file: Path | None, lines: Iterable[str], written: Iterable[Path]) -
     if json_file != STDOUT:
         for line in (*lines, *(f"written: {path}" for path in written)):
             click.echo(line)
+
+
+def print_findings(lines: Sequence[str], rest: str = "") -> None:
+    """Print the first lines on stderr, and how many more there are; ``rest`` says where."""
+    for line in lines[:_MOST_LINES]:
+        click.echo(line, err=True)
+    if len(lines) > _MOST_LINES:
+        click.echo(f"warning: {len(lines) - _MOST_LINES} more findings{rest}", err=True)
 
 
 @contextmanager
@@ -387,17 +411,6 @@ def page_of(summary: "ReplaySummary") -> bytes:
     from leg_wear_monitor.report.replay.page import replay_page
 
     return page_html(replay_page(summary)).encode()
-
-
-# Numbers of a file with their conditions and sources, as text.
-
-
-def sourced_lines(values: "Iterable[tuple[str, SourcedValue]]") -> list[str]:
-    """Two lines for each number: what it is, and where it is from."""
-    lines = []
-    for key, value in values:
-        lines += [f"{key}: {value.text}, {value.conditions}", f"    {value.source}"]
-    return lines
 
 
 # Values that are likely meant in another unit, as warnings: one line each on stderr.

@@ -1,21 +1,20 @@
 """What verbs print and write: proposals, plays, pages of a fleet."""
 
-import json
 import math
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import attrs
 from rich.console import Console
 from rich.table import Table
 
 from leg_wear_monitor.cli.common import PAGE, SUMMARY, page_of, progress_bar, write_directory
 from leg_wear_monitor.cli.main import version
-from leg_wear_monitor.cli.tables import figure
+from leg_wear_monitor.cli.tables import figure, plain_table
 from leg_wear_monitor.errors import ConfigError, printable
 from leg_wear_monitor.fleet.description import load_fleet
+from leg_wear_monitor.fleet.directory import json_object
 from leg_wear_monitor.fleet.overview import described, load_overview
 from leg_wear_monitor.playback.result import summary_of
 from leg_wear_monitor.report.fleet_page import fleet_page
@@ -72,11 +71,7 @@ def _print_joints(console: Console, result: "CommissioningResult") -> None:
 
 
 def _joints(result: "CommissioningResult") -> Table:
-    table = Table(box=None, pad_edge=False, padding=(0, 1), header_style="bold")
-    table.add_column("joint", no_wrap=True)
-    for name in ("clearance", "detected", "named"):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("what else explains it", overflow="fold")
+    table = plain_table(("joint", "clearance", "detected", "named", "what else explains it"), 1, 5)
     for one in result.joints:
         last = len(one.clearances_m) - 1
         for i, clearance_m in enumerate(one.clearances_m):
@@ -95,13 +90,8 @@ def _cycles(number: float) -> str:
 
 
 def _table(result: "CommissioningResult") -> Table:
-    table = Table(box=None, pad_edge=False, padding=(0, 1), header_style="bold")
-    table.add_column("\nparameter", no_wrap=True)
-    table.add_column("\nvalue", overflow="fold", min_width=12)
-    table.add_column("\n±", justify="right", no_wrap=True)
-    table.add_column("mis-\nmatch", justify="right", no_wrap=True)
-    table.add_column("\nrunner-up", overflow="fold", min_width=9)
-    table.add_column("mis-\nmatch", justify="right", no_wrap=True)
+    head = ("\nparameter", "\nvalue", "\n±", "mis-\nmatch", "\nrunner-up", "mis-\nmatch")
+    table = plain_table(head, 1, 2, 5)
     for item in result.items:
         table.add_row(*_cells(item))
     return table
@@ -193,26 +183,7 @@ _WORTH_WORKERS = 8
 """Pages from which on workers, which take a second or two to start, write them sooner than one process."""
 
 
-@attrs.define
-class WrittenPages:
-    """Pages that were written.
-
-    Attributes
-    ----------
-    fleet : pathlib.Path
-        The page of the fleet.
-    legs : int
-        Number of legs whose page was written now; those that are up to date are not written again.
-    faults : list of str
-        Why the page of a leg cannot be made.
-    """
-
-    fleet: Path
-    legs: int = 0
-    faults: list[str] = attrs.Factory(list)
-
-
-def write_pages(description: Path, out: Path, fresh_days: float, workers: int = 1) -> WrittenPages:
+def write_pages(description: Path, out: Path, fresh_days: float, workers: int) -> tuple[int, list[str]]:
     """Write the page of a fleet, and those of its legs that have changed.
 
     Parameters
@@ -224,20 +195,27 @@ def write_pages(description: Path, out: Path, fresh_days: float, workers: int = 
     workers : int
         Number of local processes for the pages of the legs; pages do not depend on it.
 
+    Returns
+    -------
+    changed : int
+        Number of legs whose page was written now; those that are up to date are not written again.
+    faults : list of str
+        Why the page of a leg cannot be made.
+
     Raises
     ------
     ConfigError
         If the description or the overview is unusable, or the disk does not take a page.
     """
     overview = described(load_overview(out), load_fleet(description))
-    written = WrittenPages(out / PAGE)
     homes = [out / "legs" / leg.id for leg in overview.legs]
-    _write_legs([home for home in homes if _is_due(home)], written, workers)
+    due = [home for home in homes if _is_due(home)]
+    faults = _write_legs(due, workers)
     pages = {home.name for home in homes if (home / PAGE).is_file()}
     day = Day(now_ns=time.time_ns(), fresh_days=fresh_days)
     page = fleet_page(overview, day, pages, {"leg_wear_monitor": version()})
     write_directory(out, {PAGE: page_html(page).encode()})
-    return written
+    return len(due) - len(faults), faults
 
 
 def _is_due(home: Path) -> bool:
@@ -246,25 +224,21 @@ def _is_due(home: Path) -> bool:
     return source.is_file() and not (page.is_file() and page.stat().st_mtime_ns > source.stat().st_mtime_ns)
 
 
-def _write_legs(homes: Sequence[Path], written: WrittenPages, workers: int) -> None:
+def _write_legs(homes: Sequence[Path], workers: int) -> list[str]:
+    """Write the pages of legs; why some cannot be made."""
+    done: list[str] = []
     with progress_bar("writing the pages") as progress:
-        done = 0
 
         def take(_job: Job, fault: str) -> None:
-            nonlocal done
-            done += 1
-            progress(done / len(homes))
-            if fault:
-                written.faults.append(fault)
-            else:
-                written.legs += 1
+            done.append(fault)
+            progress(len(done) / len(homes))
 
         jobs = [Job(home.name, write_leg, (home,)) for home in homes]
         if workers > 1 and len(jobs) >= _WORTH_WORKERS:
             run_in_processes(jobs, workers, take)
         else:
             run_here(jobs, take)
-    written.faults.sort()
+    return sorted(filter(None, done))
 
 
 def write_leg(home: Path) -> str:
@@ -274,16 +248,9 @@ def write_leg(home: Path) -> str:
     """
     source = home / SUMMARY
     try:
-        text = page_of(summary_of(_record(source), str(source)))
+        text = page_of(summary_of(json_object(source), str(source)))
     except ConfigError as error:  # of an earlier version, or damaged
         write_directory(home, {PAGE: None})
         return str(error)
     write_directory(home, {PAGE: text})
     return ""
-
-
-def _record(source: Path) -> object:
-    try:
-        return json.loads(source.read_bytes())
-    except ValueError as error:
-        raise ConfigError(str(source), "", "is damaged: it is not JSON") from error

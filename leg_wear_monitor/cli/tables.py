@@ -8,6 +8,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from leg_wear_monitor.cli.common import joints_words
 from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.monitor.alarms import ADVICE
 
@@ -30,10 +31,16 @@ if TYPE_CHECKING:
 
 
 def plain_table(columns: Iterable[str], *left: int) -> Table:
-    """A table without lines, whose columns of these numbers, from 1 on, are of words."""
+    """A table without lines, whose columns of these numbers, from 1 on, are of words.
+
+    Where it is too wide, words after the first column are folded, down to twelve characters.
+    """
     table = Table(box=None, pad_edge=False, padding=(0, 1), header_style="bold")
     for number, column in enumerate(columns, start=1):
-        table.add_column(column, justify="left" if number in left else "right")
+        if number in left and number > 1:
+            table.add_column(column, overflow="fold", min_width=12)
+        else:
+            table.add_column(column, justify="left" if number in left else "right", no_wrap=True)
     return table
 
 
@@ -50,11 +57,7 @@ def figure(value: float) -> str:
 # A simulation's statistics as text: 80 columns, on a terminal and in a pipe.
 
 
-_MODELS = {
-    "ideal": "ideal joints",
-    "full": "full coordinates",
-    "clearance": "clearance coordinates",
-}
+_MODELS = {"ideal": "ideal joints", "full": "full coordinates", "clearance": "clearance coordinates"}
 
 
 def print_result(result: "SimulationResult", wall_s: float) -> None:
@@ -121,13 +124,9 @@ def _wear_cells(joint: "JointResult") -> list[str]:
 
 
 def _settings(result: "SimulationResult") -> str:
-    clearance_joints = (
-        f"clearance joints {', '.join(result.clearance_joints)}"
-        if result.clearance_joints
-        else "no clearance joint"
-    )
     model = _MODELS.get(result.model, result.model)
-    return f"{clearance_joints}, {model}, {result.speed_rpm:g} rpm, {_cycles(result.cycles)} counted"
+    joints = joints_words(result.clearance_joints)
+    return f"{joints}, {model}, {result.speed_rpm:g} rpm, {_cycles(result.cycles)} counted"
 
 
 def _cycles(number: float) -> str:
@@ -368,11 +367,8 @@ def _print_lifetimes(console: Console, report: "CycleReport", duty_hours: float)
 
 
 def _lifetime_table(told: "Mapping[str, JointForecast | LegForecast]") -> Table:
-    table = Table(box=None, pad_edge=False, padding=(0, 1), header_style="bold")
-    table.add_column("\nlasts", min_width=5)
-    for unit in ("h", "days"):
-        for fraction in ("p10", "p50", "p90"):
-            table.add_column(f"{fraction}\n{unit}", justify="right", no_wrap=True)
+    quantiles = (f"{fraction}\n{unit}" for unit in ("h", "days") for fraction in ("p10", "p50", "p90"))
+    table = plain_table(("\nlasts", *quantiles), 1)
     for name, each in told.items():
         table.add_row(name, *_lifetime(each))
     return table

@@ -56,13 +56,6 @@ def test_a_reference_is_written_beside_the_parameters(run, tmp_path: Path, monke
     assert "references at 60 rpm" in result.stdout
 
 
-def test_a_missing_recording_is_one_line(run) -> None:
-    result = run("commission", "nowhere.mcap")
-    assert result.exit_code == 2
-    assert result.stderr.startswith("error: nowhere.mcap")
-    assert len(result.stderr.splitlines()) == 1
-
-
 def test_an_unknown_crank_is_named_with_the_joints_that_there_are(run) -> None:
     result = run("commission", str(HEALTHY), "--crank-joint", "knee")
     assert result.exit_code == 2

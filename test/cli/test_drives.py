@@ -1,4 +1,4 @@
-"""``leg-wear-monitor drives``, and what ``check`` prints of a drive."""
+"""``leg-wear-monitor drives`` and ``materials``, and what ``check`` prints of a drive."""
 
 import json
 from pathlib import Path
@@ -9,35 +9,52 @@ import leg_wear_monitor as lw
 
 pytestmark = pytest.mark.plain
 
+EACH = pytest.mark.parametrize(
+    ("verb", "names", "load", "name", "known"),
+    [
+        ("drives", lw.drives, lw.load_drive, "pulse115-60", "viscous 1.403 N m s/rad"),
+        ("materials", lw.materials, lw.load_material, "du-on-steel-dry", "p v up to 1.8 N/mm^2 m/s"),
+    ],
+)
 
-def test_the_list_has_every_drive(run):
-    result = run("drives")
+
+@EACH
+def test_the_list_has_every_name(run, verb, names, load, name, known):
+    result = run(verb)
     assert result.exit_code == 0
-    assert [line for line in result.stdout.splitlines() if not line.startswith(" ")] == list(lw.drives())
-    assert "viscous 1.403 N m s/rad" in result.stdout
+    assert [line for line in result.stdout.splitlines() if not line.startswith(" ")] == list(names())
+    assert known in result.stdout
+    assert [one["name"] for one in json.loads(run(verb, "--json", "-").stdout)[verb]] == list(names())
 
 
-def test_a_drive_in_full_has_every_source(run):
-    drive = lw.load_drive("pulse115-60")
-    text = run("drives", drive.name).stdout
-    assert "those of the output shaft" in text
-    for key, value in drive.values():
+@EACH
+def test_one_in_full_has_every_source(run, verb, names, load, name, known):
+    text = run(verb, name).stdout
+    for key, value in load(name).values():
         assert f"{key}: {value.central:g}" in text
         assert value.source in text
 
 
 def test_json_has_the_numbers_of_the_files(run):
-    document = json.loads(run("drives", "--json", "-").stdout)
-    assert [drive["name"] for drive in document["drives"]] == list(lw.drives())
-    bandwidth = next(drive for drive in document["drives"] if drive["name"] == "pulse115-60")["bandwidth"]
-    assert bandwidth["value"] == bandwidth["si"] == 66.3
+    (drive,) = json.loads(run("drives", "pulse115-60", "--json", "-").stdout)["drives"]
+    assert drive["bandwidth"]["value"] == drive["bandwidth"]["si"] == 66.3
+    (pair,) = json.loads(run("materials", "du-on-steel-dry", "--json", "-").stdout)["materials"]
+    assert (pair["limits"]["pressure_speed"]["value"], pair["limits"]["pressure_speed"]["si"]) == (1.8, 1.8e6)
+    assert pair["friction"]["range"] == [0.02, 0.25]
 
 
-def test_an_unknown_drive_is_one_line(run, complaints):
-    result = run("drives", "erob8050")
+@pytest.mark.parametrize(
+    ("verb", "name", "near"),
+    [
+        ("drives", "erob8050", "erob80-50"),
+        ("materials", "steel-on-stel-dry-mild", "steel-on-steel-dry-mild"),
+    ],
+)
+def test_an_unknown_name_is_one_line(run, complaints, verb, name, near):
+    result = run(verb, name)
     assert result.exit_code == 2
     (line,) = complaints(result)
-    assert "did you mean erob80-50?" in line
+    assert f"did you mean {near}?" in line
 
 
 def test_check_prints_what_is_declared_of_the_drive(run, tmp_path: Path, monkeypatch):

@@ -46,15 +46,6 @@ def bag(tmp_path_factory):
     return path
 
 
-@pytest.fixture
-def cut(bag, tmp_path):
-    """The same, cut short."""
-    whole = bag.read_bytes()
-    path = tmp_path / "cut.mcap"
-    path.write_bytes(whole[: len(whole) * 2 // 3])
-    return path
-
-
 def test_the_lists_of_the_verb_are_the_librarys():
     assert verb.TIMES == TIMES
 
@@ -158,15 +149,6 @@ def test_json_on_stdout_is_all_that_is_there(run, bag):
     record = json.loads(run("replay", str(bag), "--json", "-").stdout)
     assert record["cycles"] >= 1
     assert record["monitor"]["clearance_joints"]
-
-
-@pytest.mark.no_cover
-def test_a_partial_recording_is_said_and_fails_unless_allowed(run, cut, complaints):
-    result = run("replay", str(cut))
-    assert result.exit_code == 1
-    (line,) = complaints(result)
-    assert line.startswith(f"warning: {cut}: ends at byte ")
-    assert run("replay", str(cut), "--allow-partial").exit_code == 0
 
 
 def test_an_alarm_asked_for_fails(run, bag, tmp_path):

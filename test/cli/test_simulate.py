@@ -5,29 +5,9 @@ import os
 
 import pytest
 
-import leg_wear_monitor as lw
 from leg_wear_monitor.dynamics import simulation
 
-# names are a contract: other programs read them
-TOP = [
-    "schema_version", "mechanism", "model", "speed_rpm", "cycles",
-    "wall_s", "simulated_s", "real_time_factor",
-    "drive_torque_nm", "energy_j", "toe", "joints", "impacts", "standard_error",
-    "trace",
-]  # fmt: skip
-TORQUE = {"mean", "rms", "min", "max", "p99", "max_abs", "max_error"}
-TOE = {"max_position_error_m", "max_velocity_error_mps", "max_acceleration_error_mps2"}
-ANY_JOINT = {"mean_force_n", "rms_force_n", "p99_force_n", "max_force_n"}
-CLEARANCE_JOINT = ANY_JOINT | {
-    "contact_fraction", "friction_work_j_per_cycle", "archard_integral_j_per_cycle", "wear_depth_m_per_cycle",
-    "wear_zone_deg", "clearance_m", "mean_pressure_pa", "p99_pressure_pa", "mean_sliding_speed_mps",
-    "mean_pressure_speed_pa_mps", "outside_limits", "holds_for", "contact_half_angle_deg",
-    "outside_contact_law",
-}  # fmt: skip
-DEPTH = {"bushing_max", "bushing_mean", "journal_max", "journal_mean"}
-IMPACT = {"begin_s", "speed_mps", "end_s", "peak_n"}
-TRACE = {"crank_angle_rad", "toe_x_m", "toe_y_m", "drive_torque_nm", "force_n"}
-CLOCK = ("wall_s", "real_time_factor")
+FORCES = {"mean_force_n", "rms_force_n", "p99_force_n", "max_force_n"}
 
 SHORT = ("simulate", "--mechanism", "four_bar", "--cycles", "0.25", "--skip-cycles", "0")
 
@@ -45,29 +25,16 @@ def never(monkeypatch):
     return install
 
 
-def test_json_has_the_keys_of_the_contract_and_the_library_s_numbers(run):
+def test_json_on_stdout_tells_contact_and_wear_of_the_clearance_joints_only(run):
+    """All keys, and that the numbers are the library's: doors/test_fields.py."""
     result = run(*SHORT, "--trace", "8", "--json", "-")
     assert (result.exit_code, result.stderr.count("\n") <= 1) == (0, True)
     record = json.loads(result.stdout)
-    assert list(record) == TOP
-    assert record["mechanism"] == "four_bar"
-    assert set(record["drive_torque_nm"]) == TORQUE
-    assert set(record["toe"]) == TOE
-    assert {name: set(joint) for name, joint in record["joints"].items()} == {
-        "A": ANY_JOINT, "B": CLEARANCE_JOINT, "C": CLEARANCE_JOINT, "D": ANY_JOINT
-    }  # fmt: skip
-    assert set(record["joints"]["B"]["wear_depth_m_per_cycle"]) == DEPTH
-    assert set(record["joints"]["B"]["clearance_m"]) == {"mean", "max"}
+    assert [name for name, joint in record["joints"].items() if set(joint) > FORCES] == ["B", "C"]
+    assert list(record["joints"]) == list(record["trace"]["force_n"]) == ["A", "B", "C", "D"]
     assert set(record["impacts"]) == {"B", "C"}
-    assert {frozenset(impact) for impact in record["impacts"]["B"]} == {frozenset(IMPACT)}
     assert record["standard_error"] is None  # of a quarter of a cycle
-    assert set(record["trace"]) == TRACE
-    assert set(record["trace"]["force_n"]) == {"A", "B", "C", "D"}
     assert record["trace"]["crank_angle_rad"][0] == 0.0
-    assert record["real_time_factor"] == pytest.approx(record["simulated_s"] / record["wall_s"])
-
-    same = lw.simulate(lw.load_mechanism("four_bar"), cycles=0.25, skip_cycles=0, trace=8).to_dict()
-    assert {key: value for key, value in record.items() if key not in CLOCK} == json.loads(json.dumps(same))
 
 
 @pytest.mark.plain
@@ -80,7 +47,7 @@ def test_an_ideal_run_has_no_contact_figures_and_no_picture_of_wear(run, tmp_pat
     record = json.loads((tmp_path / "figures.json").read_text())
     assert record == json.loads((tmp_path / "out" / "result.json").read_text())
     assert record["model"] == "ideal"
-    assert all(set(joint) == ANY_JOINT for joint in record["joints"].values())
+    assert all(set(joint) == FORCES for joint in record["joints"].values())
 
 
 def test_out_holds_result_and_pictures(run, tmp_path):

@@ -3,7 +3,7 @@
 import platform
 import shutil
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import datetime
 from functools import partial
 from importlib import metadata
@@ -21,7 +21,7 @@ from leg_wear_monitor.files import json_text, share_directory
 
 if TYPE_CHECKING:
     from leg_wear_monitor.mechanism.materials import Material
-    from leg_wear_monitor.mechanism.sourced import Drive
+    from leg_wear_monitor.mechanism.sourced import Drive, SourcedValue
     from leg_wear_monitor.monitor.config.sections import DriveParameters
 
 
@@ -30,8 +30,6 @@ _Sourced = TypeVar("_Sourced", "Drive", "Material")
 
 # ``leg-wear-monitor check``: what is wrong with a configuration or an installation.
 
-
-DOUBTED = 1
 
 _FIGURES = {
     "lag_s": "lag",
@@ -60,7 +58,7 @@ def check(configs: tuple[str, ...]) -> int:
         warnings.showwarning(doubt.message, doubt.category, doubt.filename, doubt.lineno)
     if not well:
         return 2
-    return DOUBTED if any(one.category is ConfigWarning for one in doubted) else 0
+    return common.WITH_FINDINGS if any(one.category is ConfigWarning for one in doubted) else 0
 
 
 def _installation() -> bool:
@@ -220,14 +218,9 @@ def _mechanism(name: str) -> str:
 
         linkage = prepare(leg).linkage
     common.warn_of(leg.source, (*doubts(leg), *conformity_doubts(linkage)))
-    clearance_joints = (
-        f"clearance joints {', '.join(leg.clearance_joints)}"
-        if leg.clearance_joints
-        else "no clearance joint"
-    )
     what = (
-        f"{len(leg.bodies)} moving bodies, {len(leg.joints)} joints ({clearance_joints}), mobility 1, "
-        "closes, and the crank turns through"
+        f"{len(leg.bodies)} moving bodies, {len(leg.joints)} joints "
+        f"({common.joints_words(leg.clearance_joints)}), mobility 1, closes, and the crank turns through"
     )
     return "\n".join([what, *(f"{'':13} {statement}" for statement in understood(linkage))])
 
@@ -259,6 +252,14 @@ def _told(
     common.say(json_file, chain.from_iterable(map(lines, known)), written)
 
 
+def _in_lines(values: "Iterable[tuple[str, SourcedValue]]") -> list[str]:
+    """Two lines for each number: what it is, and where it is from."""
+    lines = []
+    for key, value in values:
+        lines += [f"{key}: {value.text}, {value.conditions}", f"    {value.source}"]
+    return lines
+
+
 def _drive_listed(drive: "Drive") -> list[str]:
     """A drive in two lines: what it is, and what is known of it."""
     known = ", ".join(f"{key.replace('_', ' ')} {value.text}" for key, value in drive.values())
@@ -268,7 +269,7 @@ def _drive_listed(drive: "Drive") -> list[str]:
 def _drive_in_full(drive: "Drive") -> list[str]:
     """A drive with every number, its conditions and its source."""
     head = [f"{drive.name}: {drive.title}", f"torques and speeds are those of the {drive.shaft} shaft"]
-    return [*head, *common.sourced_lines(drive.values()), *([f"note: {drive.notes}"] if drive.notes else [])]
+    return [*head, *_in_lines(drive.values()), *([f"note: {drive.notes}"] if drive.notes else [])]
 
 
 # ``leg-wear-monitor materials``: material pairs of joints, with their sources.
@@ -306,7 +307,7 @@ def _in_full(pair: "Material") -> list[str]:
         f"{pair.name}: {pair.title}",
         f"bushing: {pair.bushing.material}; journal: {pair.journal.material}; lubricant: {pair.lubricant}",
         f"regime: {pair.regime}",
-        *common.sourced_lines(pair.values()),
+        *_in_lines(pair.values()),
     ]
     if pair.wear_coefficients is None:
         lines.append(

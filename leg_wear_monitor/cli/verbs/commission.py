@@ -16,20 +16,15 @@ if TYPE_CHECKING:
     from leg_wear_monitor.commissioning.result import CommissioningResult
     from leg_wear_monitor.mechanism.spec import Mechanism
     from leg_wear_monitor.monitor.config.settings import MonitorConfig
-    from leg_wear_monitor.play.fit import Clearances, Play
+    from leg_wear_monitor.play.fit import Play, PlayMeasurement
     from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 
 # ``leg-wear-monitor commission``: proposes the parameters of a robot from a recording of its healthy leg.
 
 
-WITH_FINDINGS = 1
-
-
 @click.command(short_help="Propose a robot's parameters from a recording.")
-@click.argument(
-    "recordings", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="RECORDING..."
-)
+@common.recordings_argument
 @common.path_option(
     "--config",
     "FILE",
@@ -50,19 +45,17 @@ WITH_FINDINGS = 1
     "write it, such as leg.reference.npz; the proposed parameters name it.",
     dir_okay=False,
 )
-@click.option("--joint-states", metavar="TOPIC", help="Topic of the crank.  [default: all are tried]")
-@click.option("--drive-torque", metavar="TOPIC", help="Topic of the torque.  [default: all are tried]")
-@click.option("--crank-joint", metavar="NAME", help="The crank's name.  [default: all joints are tried]")
+@common.option("--joint-states", "TOPIC", "Topic of the crank.  [default: all are tried]")
+@common.option("--drive-torque", "TOPIC", "Topic of the torque.  [default: all are tried]")
+@common.option("--crank-joint", "NAME", "The crank's name.  [default: all joints are tried]")
 @common.json_option("the result")
 def commission(
     recordings: tuple[Path, ...],
     config: Path | None,
     out: Path | None,
     reference: Path | None,
-    joint_states: str | None,
-    drive_torque: str | None,
-    crank_joint: str | None,
     json_file: Path | None,
+    **topics: str | None,
 ) -> int:
     """Propose the parameters of a robot from recordings of its healthy leg.
 
@@ -73,9 +66,7 @@ def commission(
     fit.
     """
     for option, path in (("--out", out), ("--reference", reference), ("--json", json_file)):
-        if path is not None and path != common.STDOUT:
-            common.check_file(option, path)
-    topics = {"joint_states": joint_states, "drive_torque": drive_torque, "crank_joint": crank_joint}
+        common.check_file(option, path)
     result = _run(recordings, config, reference, topics)
     if json_file != common.STDOUT:
         from leg_wear_monitor.cli.pages import print_commissioning
@@ -92,7 +83,7 @@ def commission(
             common.write_file(out, result.to_yaml().encode())
             written.append(out)
     common.say(json_file, (), written)
-    return 0 if result.is_sure else WITH_FINDINGS
+    return 0 if result.is_sure else common.WITH_FINDINGS
 
 
 def _write_reference(file: Path, config: "MonitorConfig", made: "TorqueReference") -> None:
@@ -195,23 +186,19 @@ def reference(
 
 
 @click.command(short_help="Measure the play of a joint that was rocked.")
-@click.argument(
-    "recordings", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="RECORDING..."
-)
-@click.option(
-    "--joint", required=True, metavar="NAME", help="Joint in a bag, or column in a table, that has the angle."
-)
-@click.option(
+@common.recordings_argument
+@common.option("--joint", "NAME", "Joint in a bag, or column in a table, that has the angle.", required=True)
+@common.option(
     "--load",
-    "loads",
-    multiple=True,
-    metavar="SIGNAL",
-    help="Signal with the direction of the push, in any unit: effort, effort:JOINT, TOPIC, TOPIC:AXIS "
+    "SIGNAL",
+    "Signal with the direction of the push, in any unit: effort, effort:JOINT, TOPIC, TOPIC:AXIS "
     "(torque of a wrench) or TOPIC:JOINT (position, such as a target) in a bag, a column in a table. Given "
     "several times, the signals add up, such as the positions of two motors that pull to one side each.  "
     "[default: none, the angle rests at two places]",
+    "loads",
+    multiple=True,
 )
-@click.option("--time", metavar="COLUMN", help="Column of the time in a table.  [default: that of --config]")
+@common.option("--time", "COLUMN", "Column of the time in a table.  [default: that of --config]")
 @click.option(
     "--time-unit", type=click.Choice([*STAMPS, DATE]), help="Its unit.  [default: that of --config]"
 )
@@ -232,21 +219,19 @@ def reference(
     "Parameter file with the column of the time and the units of a table.  "
     "[default: the one that comes with the package]",
 )
-@click.option(
+@common.option(
     "--mechanism",
-    metavar="FILE",
-    help="A mechanism, or the name of one that comes with the package: from which clearances the play comes.",
+    "FILE",
+    "A mechanism, or the name of one that comes with the package: from which clearances the play comes.",
 )
-@click.option(
-    "--encoder", metavar="JOINT", help="Joint of the mechanism that has the encoder.  [default: --joint]"
-)
-@click.option(
+@common.option("--encoder", "JOINT", "Joint of the mechanism that has the encoder.  [default: --joint]")
+@common.option(
     "--crank-angle",
+    "DEG",
+    "Crank angle of the mechanism in a recording; once for each, in their order.",
     "crank_angles",
     type=float,
     multiple=True,
-    metavar="DEG",
-    help="Crank angle of the mechanism in a recording; once for each, in their order.",
 )
 @common.clearances_option("A,B")
 @common.json_option("the result")
@@ -266,8 +251,9 @@ def play(
     postures, the command tells which joints have the clearance. Exit code 1 if the result is doubtful, if
     joints are not told apart, or if a part of a recording is lost.
     """
-    if json_file is not None and json_file != common.STDOUT:
-        common.check_file("--json", json_file)
+    from leg_wear_monitor.cli.pages import lines
+
+    common.check_file("--json", json_file)
     if mechanism is None and (encoder or crank_angles or clearances):
         raise click.UsageError("--encoder, --crank-angle and --clearances need --mechanism")
     if mechanism is not None and len(crank_angles) != len(recordings):
@@ -275,8 +261,11 @@ def play(
         raise ConfigError("--crank-angle", "", fault)
     leg = None if mechanism is None else _leg(mechanism, clearances)
     plays, is_lossy = _plays(recordings, crank_angles, **options)
-    found = None if leg is None else _clearances(leg, encoder or options["joint"], plays)
-    return _written(plays, found, leg, encoder or options["joint"], json_file) or int(is_lossy)
+    encoder = encoder or options["joint"]
+    result = _measurement(plays, leg, encoder)
+    printed = lines(result, leg.name if leg else "", encoder)
+    common.say(json_file, printed, common.write_json(json_file, result.to_json()))
+    return common.WITH_FINDINGS if is_lossy or not result.is_sure else 0
 
 
 def _leg(mechanism: str, clearances: str | None) -> "Mechanism":
@@ -297,20 +286,15 @@ def _plays(
     crank_angles: tuple[float, ...],
     joint: str,
     loads: tuple[str, ...],
-    counts_per_turn: float | None,
-    config: Path | None,
-    **of_table: str | None,
+    **of_table: Any,
 ) -> tuple[list["Play"], bool]:
     """The plays, and whether something of the recordings is lost."""
     import attrs
 
-    from leg_wear_monitor.monitor.config.parameters import load_config
-
-    settings = _settings(load_config(config), counts_per_turn, **of_table)
-    counts_per_turn = counts_per_turn or settings.input.counts_per_turn
+    settings = _settings(**of_table)
     plays, is_lossy = [], False
     for number, recording in enumerate(recordings):
-        one, lossy = _play(recording, settings, joint, loads, counts_per_turn)
+        one, lossy = _play(recording, settings, joint, loads)
         angle = math.radians(crank_angles[number]) if crank_angles else None
         plays.append(attrs.evolve(one, recording=str(recording), crank_angle_rad=angle))
         is_lossy |= lossy
@@ -318,7 +302,7 @@ def _plays(
 
 
 def _settings(
-    config: "MonitorConfig",
+    config: Path | None,
     counts_per_turn: float | None,
     time: str | None,
     time_unit: str | None,
@@ -327,10 +311,13 @@ def _settings(
     """The parameters with the options for a table in their place."""
     import attrs
 
+    from leg_wear_monitor.monitor.config.parameters import load_config
+
     def given(**values: str | float | None) -> dict[str, Any]:
         return {key: value for key, value in values.items() if value is not None}
 
-    table = config.input
+    settings = load_config(config)
+    table = settings.input
     if unit == COUNTS and not (counts_per_turn or table.counts_per_turn):
         raise ConfigError("--counts-per-turn", "", "is missing, expected it with --unit counts")
     table = attrs.evolve(
@@ -339,15 +326,11 @@ def _settings(
         units=attrs.evolve(table.units, **given(stamp=time_unit, crank_angle=unit)),
         **given(counts_per_turn=counts_per_turn),
     )
-    return attrs.evolve(config, input=table)
+    return attrs.evolve(settings, input=table)
 
 
 def _play(
-    recording: Path,
-    settings: "MonitorConfig",
-    joint: str,
-    loads: tuple[str, ...],
-    counts_per_turn: float | None,
+    recording: Path, settings: "MonitorConfig", joint: str, loads: tuple[str, ...]
 ) -> tuple["Play", bool]:
     with common.bags_installed():
         from leg_wear_monitor.bags.findings import Severity
@@ -356,6 +339,7 @@ def _play(
         read = read_rocked(recording, settings, joint, loads, progress)
     for finding in read.findings:
         click.echo(finding.line, err=True)
+    counts_per_turn = settings.input.counts_per_turn
     count = 2.0 * math.pi / counts_per_turn if counts_per_turn else None
     result = measure_play(
         read.time_s, read.angle_rad, read.load, count_rad=count, joint=joint, load_name=" + ".join(loads)
@@ -363,28 +347,13 @@ def _play(
     return result, any(finding.severity is Severity.LOSS for finding in read.findings)
 
 
-def _clearances(leg: "Mechanism", encoder: str, plays: list["Play"]) -> "Clearances":
-    from leg_wear_monitor.play.fit import clearances_of
+def _measurement(plays: list["Play"], leg: "Mechanism | None", encoder: str) -> "PlayMeasurement":
+    """The plays, and with a mechanism the clearances that they show."""
+    from leg_wear_monitor.play.fit import PlayMeasurement, clearances_of
 
-    angles = [play.crank_angle_rad or 0.0 for play in plays]
-    with common.compilation("mechanism"):
-        return clearances_of(
-            leg, encoder, angles, [play.play_rad for play in plays], [play.sigma_rad for play in plays]
-        )
-
-
-def _written(
-    plays: list["Play"],
-    found: "Clearances | None",
-    leg: "Mechanism | None",
-    encoder: str,
-    json_file: Path | None,
-) -> int:
-    """Print and write the result; the exit code."""
-    from leg_wear_monitor.cli.pages import lines
-    from leg_wear_monitor.play.fit import PlayMeasurement
-
-    result = PlayMeasurement(plays=tuple(plays), clearances=found)
-    printed = lines(result, leg.name if leg else "", encoder)
-    common.say(json_file, printed, common.write_json(json_file, result.to_json()))
-    return 0 if result.is_sure else WITH_FINDINGS
+    found = None
+    if leg is not None:
+        angles, sizes = [play.crank_angle_rad or 0.0 for play in plays], [play.play_rad for play in plays]
+        with common.compilation("mechanism"):
+            found = clearances_of(leg, encoder, angles, sizes, [play.sigma_rad for play in plays])
+    return PlayMeasurement(plays=tuple(plays), clearances=found)

@@ -27,33 +27,27 @@ def _numbers(ctx: click.Context, param: click.Parameter, value: str) -> tuple[fl
 @click.command(short_help="Find bushings with which each joint lasts the hours wanted.")
 @click.argument("mechanism", default="bionic_leg")
 @common.clearances_option("A,B")
-@click.option(
+@common.option(
     "--duty",
-    default="0:8",
-    show_default=True,
-    metavar="N:H,...|FILE",
-    help="Hours a day at each peak of the ground's vertical force on the toe [N], such as 0:2,300:5; or a "
+    "N:H,...|FILE",
+    "Hours a day at each peak of the ground's vertical force on the toe [N], such as 0:2,300:5; or a "
     "YAML file with duty: [{load_n, hours_per_day, speed_rpm}, ...].",
+    default="0:8",
 )
 @common.number_option(
     "--hours", "H", "Hours of walking that each joint should last.", "h", above=0.0, default=1000.0
 )
 @common.limit_option
-@click.option(
-    "--materials", metavar="NAME,...", help="Pairs to try.  [default: all that come with the package]"
+@common.option("--materials", "NAME,...", "Pairs to try.  [default: all that come with the package]")
+@common.option(
+    "--diameters-mm", "MM,...", "Diameters of the pin to try.", default="8,10,12,16,20", callback=_numbers
 )
-@click.option(
-    "--diameters-mm", default="8,10,12,16,20", show_default=True, callback=_numbers, metavar="MM,...",
-    help="Diameters of the pin to try.",
-)  # fmt: skip
-@click.option(
-    "--widths-mm", default="8,10,12,15,20", show_default=True, callback=_numbers, metavar="MM,...",
-    help="Widths of the bushing to try.",
-)  # fmt: skip
-@click.option(
-    "--clearances-um", default="25,50,100", show_default=True, callback=_numbers, metavar="UM,...",
-    help="Radial clearances when new to try.",
-)  # fmt: skip
+@common.option(
+    "--widths-mm", "MM,...", "Widths of the bushing to try.", default="8,10,12,15,20", callback=_numbers
+)
+@common.option(
+    "--clearances-um", "UM,...", "Radial clearances when new to try.", default="25,50,100", callback=_numbers
+)
 @common.json_option("the design")
 @common.out_option("Write design.html, design.json and design.csv with all candidates.")
 def design(

@@ -14,10 +14,6 @@ if TYPE_CHECKING:
     from leg_wear_monitor.fleet.update import FleetUpdate
 
 
-WITH_FINDINGS = 1
-_MOST_LINES = 20
-
-
 @click.group(short_help="Monitor many legs from their recordings.")
 def fleet() -> None:
     """Keep the ledgers, tables and the overview of many legs."""
@@ -27,18 +23,15 @@ def fleet() -> None:
 @click.argument("description", type=click.Path(path_type=Path), metavar="FLEET.yaml")
 @common.out_option("Directory of the fleet.  [default: out of the description, or fleet beside it]")
 @common.workers_option
-@click.option(
-    "--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers count instead, tcp://HOST:PORT."
-)
+@common.scheduler_option("count")
 @common.sample_option
 @click.option("--follow", is_flag=True, help="Go on with new recordings as they are completed, until ^C.")
-@click.option(
+@common.option(
     "--every-s",
+    "S",
+    "With --follow: time between two looks for new recordings [s].",
     type=click.FloatRange(min=0.1),
     default=10.0,
-    show_default=True,
-    metavar="S",
-    help="With --follow: time between two looks for new recordings [s].",
 )
 def update(
     description: Path,
@@ -68,9 +61,10 @@ def update(
     if follow:
         return _follow(description, count, every_s)
     done = count(legs)
-    _print_findings(done, out)
+    found = [f"warning: {leg}: {text}" for leg, text in done.findings]
+    common.print_findings(found, f" in {out}/legs/*/log")
     _print_counts(done, out)
-    return WITH_FINDINGS if done.findings else 0
+    return common.WITH_FINDINGS if done.findings else 0
 
 
 @fleet.command(short_help="Write the tables of a fleet as CSV and Parquet files.")
@@ -131,7 +125,7 @@ def _follow(description: Path, count: "Callable[[FleetDescription], FleetUpdate]
                     click.echo(f"{chain.leg.id}: {words_of(line)}")
             new = [each for each in done.findings if each not in told]
             told.update(new)
-            code = WITH_FINDINGS if told else 0
+            code = common.WITH_FINDINGS if told else 0
             for leg, text in new:
                 click.echo(f"warning: {leg}: {text}", err=True)
             time.sleep(every_s)
@@ -139,18 +133,9 @@ def _follow(description: Path, count: "Callable[[FleetDescription], FleetUpdate]
         return code
 
 
-def _print_findings(done: "FleetUpdate", out: Path) -> None:
-    for leg, text in done.findings[:_MOST_LINES]:
-        click.echo(f"warning: {leg}: {text}", err=True)
-    if len(done.findings) > _MOST_LINES:
-        click.echo(f"warning: {len(done.findings) - _MOST_LINES} more findings in {out}/legs/*/log", err=True)
-
-
 def _compile(chains: Sequence["Chain"]) -> None:
     """Compile all that the monitors of these legs need: once, and not in every worker at the same time."""
-    from leg_wear_monitor.cli.common import is_compiled
-
-    if is_compiled("monitor"):
+    if common.is_compiled("monitor"):
         return
     from leg_wear_monitor.dynamics.clearance.stepper import advance_beside
     from leg_wear_monitor.mechanism.loader import load_mechanism
@@ -185,13 +170,12 @@ def _print_counts(done: "FleetUpdate", out: Path) -> None:
 @fleet.command(short_help="Write the page of the fleet, and a page for each leg.")
 @click.argument("description", type=click.Path(path_type=Path), metavar="FLEET.yaml")
 @common.out_option("Directory of the fleet.  [default: out of the description, or fleet beside it]")
-@click.option(
+@common.option(
     "--fresh-days",
+    "DAYS",
+    "Age of its last recording up to which a leg counts as monitored.",
     type=click.FloatRange(min=0.0, min_open=True, max=3650.0),
-    metavar="DAYS",
     default=7.0,
-    show_default=True,
-    help="Age of its last recording up to which a leg counts as monitored.",
 )
 @common.workers_option
 def report(description: Path, out: Path | None, fresh_days: float, workers: int | None) -> int:
@@ -207,9 +191,8 @@ def report(description: Path, out: Path | None, fresh_days: float, workers: int 
 
     out = out or fleet_directory(description)
     common.check_directory("--out", out)
-    written = write_pages(description, out, fresh_days, workers or os.cpu_count() or 1)
-    for fault in written.faults[:_MOST_LINES]:
-        click.echo(f"warning: no page of its own: {fault}", err=True)
-    click.echo(f"pages of legs that have changed: {written.legs}")
-    click.echo(f"written: {written.fleet}")
-    return WITH_FINDINGS if written.faults else 0
+    changed, faults = write_pages(description, out, fresh_days, workers or os.cpu_count() or 1)
+    common.print_findings([f"warning: no page of its own: {fault}" for fault in faults])
+    click.echo(f"pages of legs that have changed: {changed}")
+    click.echo(f"written: {out / common.PAGE}")
+    return common.WITH_FINDINGS if faults else 0

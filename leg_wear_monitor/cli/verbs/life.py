@@ -28,32 +28,24 @@ _TABLE_ROWS = 12  # most rows of the printed table, spread over the life
 @common.limit_option
 @common.number_option("--horizon-cycles", "N", "Largest number of gait cycles.", above=0.0, default=1.0e9)
 @common.number_option("--wear-factor", "X", "Factor on all wear coefficients.", above=0.0, default=1.0)
-@click.option(
+@common.option(
     "--duty",
-    metavar="N:H,...",
-    help="Hours a day at each peak of the ground's vertical force on the toe [N], such as 0:2,300:5,600:1. "
+    "N:H,...",
+    "Hours a day at each peak of the ground's vertical force on the toe [N], such as 0:2,300:5,600:1. "
     "[default: the mechanism's own loads]",
 )
 @common.number_option(
     "--opens-m", "M", "Deepest change of a surface in a jump.  [default: 3e-05]", "m", above=0.0
 )
-@click.option(
-    "--legs", type=click.IntRange(min=1), metavar="N", help="Number of legs averaged.  [default: 2]"
-)
-@click.option(
-    "--cycles",
-    type=click.IntRange(min=2),
-    metavar="N",
-    help="Gait cycles of each leg averaged.  [default: 4]",
-)
-@click.option(
+@common.option("--legs", "N", "Number of legs averaged.  [default: 2]", type=click.IntRange(min=1))
+@common.option("--cycles", "N", "Gait cycles of each leg averaged.  [default: 4]", type=click.IntRange(min=2))
+@common.option(
     "--lives",
+    "N",
+    "Number of lives for --json; lives after the first have different wear coefficients, from which the "
+    "forecast finds the effect of joints on each other.",
     type=click.IntRange(min=1),
     default=1,
-    show_default=True,
-    metavar="N",
-    help="Number of lives for --json; lives after the first have different wear coefficients, from which the "
-    "forecast finds the effect of joints on each other.",
 )
 @common.json_option("the life")
 @common.out_option("Write life.json and life.png.")
@@ -64,6 +56,7 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
     the values scatter; the scatter is reported.
     """
     from leg_wear_monitor.mechanism.loader import load_mechanism
+    from leg_wear_monitor.mechanism.materials import lacks_wear
     from leg_wear_monitor.mechanism.plausible import doubts
 
     names = options.pop("clearances")
@@ -81,8 +74,9 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
 
         files = {"life.json": text.encode(), "life.png": life_picture(result)}
         written += common.write_directory(out, files)
-    printed = [*lines(result, options["limit_m"], _without_coefficient(leg)), *_regimes(leg, result)]
-    common.say(json_file, [*printed, *_load_remarks(leg, result)], written)
+    not_counted = [joint for joint in leg.clearance_joints if lacks_wear(leg.clearances[joint])]
+    printed = lines(result, options["limit_m"], not_counted)
+    common.say(json_file, [*printed, *_remarks(leg, result)], written)
 
 
 def _lives(leg: "Mechanism", lives: int, opens_m: float | None, duty: str | None, **options: Any) -> "Lives":
@@ -126,27 +120,13 @@ def _document(leg: "Mechanism", lives: "Lives", limit_m: float) -> dict[str, Any
     }
 
 
-def _regimes(leg: "Mechanism", result: "Life") -> list[str]:
-    """Remarks on the wear regime of each joint, for which alone the life is valid."""
-    from leg_wear_monitor.mechanism.materials import regimes
+def _remarks(leg: "Mechanism", result: "Life") -> list[str]:
+    """The wear regime of each joint, and its limits of load and speed, rating life and wide contacts."""
+    from leg_wear_monitor.life.result import contact_doubts, pressure_speed, rating_hours
+    from leg_wear_monitor.mechanism.materials import bushing_of, load_material, regimes
 
     found = regimes(leg, result.clearance_joints).items()
-    return [f"holds for {', '.join(joints)}: {what}" for what, joints in found]
-
-
-def _without_coefficient(leg: "Mechanism") -> list[str]:
-    """Joints whose material pair has no wear coefficient; their wear is not counted."""
-    from leg_wear_monitor.mechanism.materials import lacks_wear
-
-    return [joint for joint in leg.clearance_joints if lacks_wear(leg.clearances[joint])]
-
-
-def _load_remarks(leg: "Mechanism", result: "Life") -> list[str]:
-    """Remarks on each bushing: exceeded limits of load and speed, the maker's rating life, wide contacts."""
-    from leg_wear_monitor.life.result import contact_doubts, pressure_speed, rating_hours
-    from leg_wear_monitor.mechanism.materials import bushing_of, load_material
-
-    remarks = []
+    remarks = [f"holds for {', '.join(joints)}: {what}" for what, joints in found]
     for joint, load in pressure_speed(leg, result).items():
         settings = leg.clearances[joint]
         beyond = bushing_of(leg, joint).loaded(0.0, 0.0, 0.0, load).outside_limits
@@ -175,7 +155,7 @@ def _rating_life(hours: float, load: float, period_s: float, constants: "RatingL
     return f"{hours:.3g} h ({cycles:.3g} gait cycles) at {at}{below}, all factors 1; {validity}"
 
 
-def lines(result: "Life", limit_m: float, not_counted: Sequence[str] = ()) -> list[str]:
+def lines(result: "Life", limit_m: float, not_counted: Sequence[str]) -> list[str]:
     """The life as a table of some of its points, and when each joint reaches the limit."""
     points = len(result.cycles)
     shown = sorted(

@@ -60,7 +60,7 @@ gait_publisher = common.node_verb(
 # ``leg-wear-monitor demo``: node and synthetic leg as two processes, recorded, replayed, reported.
 
 
-DONE, WITH_FINDINGS = 0, 1
+DONE = 0
 _NAMESPACE = "/demo"
 _PATIENCE_S = 60.0
 # topics that nobody's acknowledgement changes
@@ -68,13 +68,12 @@ _COMPARED = ("clearance_states", "impact_forces", "predicted_torque")
 
 
 @click.command(short_help="Run a demonstration on this machine, about half a minute.")
-@click.option(
+@common.option(
     "--out",
+    "DIR",
+    "Directory of recording, report and logs.",
     type=click.Path(path_type=Path),
     default="leg_wear_demo",
-    show_default=True,
-    metavar="DIR",
-    help="Directory of recording, report and logs.",
 )
 def demo(out: Path) -> int:
     """Run the monitor and a synthetic leg as two ROS processes; record, replay and report the run.
@@ -93,7 +92,7 @@ def demo(out: Path) -> int:
     click.echo(f"report: {(out / 'report.html').resolve()}")
     if not same or not any(name.startswith("impact_force") for name in demo_listener.acknowledged):
         click.echo("error: the demo failed; see the logs beside the report", err=True)
-        return WITH_FINDINGS
+        return common.WITH_FINDINGS
     return DONE
 
 
@@ -242,12 +241,12 @@ _NODE = "/leg_wear_monitor"
 
 
 @click.command(short_help="Show a leg or a fleet live in a browser, for reading only.")
-@click.option(
+@common.option(
     "--node",
+    "[NAME]",
+    f"Full name of a running monitor, such as /left/leg_wear_monitor.  [default: {_NODE}]",
     is_flag=False,
     flag_value=_NODE,
-    metavar="[NAME]",
-    help=f"Full name of a running monitor, such as /left/leg_wear_monitor.  [default: {_NODE}]",
 )
 @common.path_option(
     "--ledger",
@@ -260,20 +259,11 @@ _NODE = "/leg_wear_monitor"
     "--fleet", "FLEET.yaml", "A fleet instead, as the last fleet update left it.", dir_okay=False, exists=True
 )
 @common.config_option
-@click.option(
-    "--host",
-    default="127.0.0.1",
-    show_default=True,
-    metavar="HOST",
-    help="Address to listen on; 0.0.0.0 for all of this machine.",
+@common.option(
+    "--host", "HOST", "Address to listen on; 0.0.0.0 for all of this machine.", default="127.0.0.1"
 )
-@click.option(
-    "--port",
-    type=click.IntRange(0, 65535),
-    default=8350,
-    show_default=True,
-    metavar="PORT",
-    help="Port to listen on; 0 for any free one.",
+@common.option(
+    "--port", "PORT", "Port to listen on; 0 for any free one.", type=click.IntRange(0, 65535), default=8350
 )
 def dashboard(
     node: str | None, ledger: Path | None, fleet: Path | None, config: Path | None, host: str, port: int

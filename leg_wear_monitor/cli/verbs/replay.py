@@ -25,11 +25,8 @@ if TYPE_CHECKING:
 # ``leg-wear-monitor replay``: a recording through the same monitor that runs live.
 
 
-WITH_FINDINGS = 1
-
 # Spelled out, for --help shall not wait for numba; the tests compare them with the library's.
 TIMES = ("header", "log", "publish")
-_MOST_LINES = 20
 
 
 @click.command(short_help="Replay a recording through the monitor.")
@@ -44,24 +41,21 @@ _MOST_LINES = 20
     show_default=True,
     help="Source of the samples' stamps.",
 )
-@click.option("--joint-states", metavar="TOPIC", help="Topic of the crank.  [default: */joint_states]")
-@click.option("--drive-torque", metavar="TOPIC", help="Topic of the torque.  [default: */drive_torque]")
-@click.option("--foot-load", metavar="TOPIC", help="Topic of the foot load.  [default: */foot_load]")
-@click.option(
+@common.option("--joint-states", "TOPIC", "Topic of the crank.  [default: */joint_states]")
+@common.option("--drive-torque", "TOPIC", "Topic of the torque.  [default: */drive_torque]")
+@common.option("--foot-load", "TOPIC", "Topic of the foot load.  [default: */foot_load]")
+@common.option(
     "--node",
-    metavar="NAME",
-    help="Full name of the node to replace.  [default: leg_wear_monitor beside the crank's topic]",
+    "NAME",
+    "Full name of the node to replace.  [default: leg_wear_monitor beside the crank's topic]",
 )
-@click.option(
-    "--crank-joint", metavar="NAME", help="The crank's name.  [default: crank_joint of the parameters]"
-)
-@click.option(
+@common.option("--crank-joint", "NAME", "The crank's name.  [default: crank_joint of the parameters]")
+@common.option(
     "--memory-mb",
+    "MB",
+    "Memory limit of reading, temporary files included.",
     type=click.FloatRange(min=16.0),
     default=512.0,
-    show_default=True,
-    metavar="MB",
-    help="Memory limit of reading, temporary files included.",
 )
 @common.sample_option
 @common.path_option(
@@ -71,14 +65,14 @@ _MOST_LINES = 20
     dir_okay=False,
 )
 @click.option("--allow-partial", is_flag=True, help="Exit with 0 even if parts of the recording are lost.")
-@click.option(
+@common.option(
     "--fail-on",
-    type=click.Choice(("verdict", "alarm", "warning", "input", *KINDS)),
-    multiple=True,
-    metavar="WHAT",
-    help="Exit with 1 on 'verdict' (inspect, stop or not monitored at the end), 'alarm' (any at ERROR), "
+    "WHAT",
+    "Exit with 1 on 'verdict' (inspect, stop or not monitored at the end), 'alarm' (any at ERROR), "
     "'warning' (any alarm), 'input' (any alarm of the input), or a kind of alarm: "
     f"{', '.join(KINDS)}. May be repeated.",
+    type=click.Choice(("verdict", "alarm", "warning", "input", *KINDS)),
+    multiple=True,
 )
 @common.json_option("the summary")
 def replay(
@@ -102,10 +96,7 @@ def replay(
 
     is_report_there = out is not None and (out / common.SUMMARY).exists()
     result, wall_s = _run(bags, out, write, **options)
-    for finding in result.findings[:_MOST_LINES]:
-        click.echo(finding.line, err=True)
-    if len(result.findings) > _MOST_LINES:
-        click.echo(f"warning: {len(result.findings) - _MOST_LINES} more findings", err=True)
+    common.print_findings([finding.line for finding in result.findings])
     if result.is_unusable:
         missing = result.evidence.missing()
         click.echo(f"warning: no gait cycle fits this leg, so no forces are given: {missing}", err=True)
@@ -119,7 +110,7 @@ def replay(
     failed = (result.is_partial and not allow_partial) or is_raised(result, fail_on)
     failed = failed or result.is_unusable or result.monitor.is_all_counted
     failed = failed or ("verdict" in fail_on and asks_to_act(result))
-    return WITH_FINDINGS if failed else 0
+    return common.WITH_FINDINGS if failed else 0
 
 
 def _run(
@@ -223,11 +214,8 @@ def report(directory: Path) -> int:
     if (directory / common.SUMMARY).is_file():
         return _replay(directory)
     if not (directory / "study.json").is_file():
-        raise ConfigError(
-            str(directory),
-            "",
-            "contains no study.json, expected the --out of a study or of a replay",
-        )
+        fault = "contains no study.json, expected the --out of a study or of a replay"
+        raise ConfigError(str(directory), "", fault)
     from leg_wear_monitor.cli.verbs.study import write_study_page
 
     with _as_one_line(directory / "study.json", "study"):

@@ -25,18 +25,14 @@ if TYPE_CHECKING:
 # spelled out, for --help shall not wait for numpy; the tests compare it with the library's
 NAMES = ("size", "speed", "location", "wear", "multi", "chaos", "laws", "lubrication", "load", "legs")
 
-FAULTS_FOUND = 1
-
 
 @click.command(short_help="Run one of the parameter studies of the paper.")
 @click.argument("name", type=click.Choice(NAMES), metavar="NAME")
-@click.option("--mechanism", metavar="FILE", help="Another leg than that of the study file.")
+@common.option("--mechanism", "FILE", "Another leg than that of the study file.")
 @common.path_option("--config", "FILE", "Study file.  [default: config/studies/NAME.yaml of the package]")
 @common.path_option("--out", "DIR", "Data and page.", required=True)
 @common.workers_option
-@click.option(
-    "--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers compute instead, tcp://HOST:PORT."
-)
+@common.scheduler_option("compute")
 def study(
     name: str,
     mechanism: str | None,
@@ -106,13 +102,11 @@ def write_study_page(path: Path) -> int:
         click.echo(f"warning: point {label}: {fault}", err=True)
     for label in results.missing:
         click.echo(f"warning: point {label}: is not computed yet", err=True)
-    return FAULTS_FOUND if results.faults or results.missing else 0
+    return common.WITH_FINDINGS if results.faults or results.missing else 0
 
 
 # ``leg-wear-monitor draw``: a picture of a mechanism, working or not.
 
-
-WITH_FINDINGS = 1
 
 _URDF = ".urdf"
 _SUFFIXES = (".html", ".svg", _URDF)
@@ -210,7 +204,7 @@ def _draw(mechanism: str, target: Path, forces: bool, crank_angle: float | None,
     click.echo(f"{how}: {target}: {printable(leg.name)}: {printable(drawing.headline)}")
     for finding in drawing.findings:
         click.echo(f"warning: {leg.source}: {printable(finding)}", err=True)
-    return WITH_FINDINGS if drawing.findings else 0
+    return common.WITH_FINDINGS if drawing.findings else 0
 
 
 def _content(drawing: "Drawing", target: Path, watch: bool) -> bytes:
@@ -307,11 +301,11 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
     show_default=True,
     help="Whether wear opens the clearances during the run; it is counted either way.",
 )
-@click.option(
+@common.option(
     "--normal-law",
+    "NAME",
+    f"Normal contact law of all clearance joints: {', '.join(NORMAL_LAWS)}.",
     type=click.Choice(NORMAL_LAWS),
-    metavar="NAME",
-    help=f"Normal contact law of all clearance joints: {', '.join(NORMAL_LAWS)}.",
 )
 @click.option(
     "--trace",
@@ -321,11 +315,11 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
     help="Keep N samples per cycle, for --json and for the pictures of --out; from some hundred on, samples "
     "take longer than the simulation.",
 )
-@click.option(
+@common.option(
     "--intervals",
+    "N",
+    "Resolution of model clearance: intervals of time per gait cycle.  [default: 2048]",
     type=int,
-    metavar="N",
-    help="Resolution of model clearance: intervals of time per gait cycle.  [default: 2048]",
 )
 @common.json_option("the result")
 @common.out_option("Write result.json and pictures of the leg and its worn bushings.")

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager, nullcontext
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import click
 
@@ -47,27 +47,29 @@ def leg_of(config: Path | None, ledger: Path | None) -> tuple["MonitorConfig", "
 
 
 @contextmanager
-def opened(settings: "MonitorConfig", dry_run: bool) -> Iterator["Ledger"]:
-    """The ledger; a copy of it that is thrown away, if nothing shall be written."""
+def opened(
+    config: Path | None, ledger: Path | None, dry_run: bool, joint: str | None = None
+) -> Iterator[tuple["Ledger", "Mechanism", "MonitorConfig"]]:
+    """The ledger, the leg and its parameters; a copy of the ledger, if nothing shall be written."""
     import attrs
 
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.monitor.ledger.file import copy_of
     from leg_wear_monitor.monitor.ledger.ledger import open_ledger
 
-    leg = load_mechanism(settings.mechanism)  # without its parameters, which a ledger applies itself
+    settings, leg = leg_of(config, ledger)
+    if joint is not None:
+        leg.clearance_joint(joint)  # refuses another one before a ledger is made
+    plain = load_mechanism(settings.mechanism)  # without its parameters, which a ledger applies itself
     with copy_of(settings.ledger.path) if dry_run else nullcontext(settings.ledger.path) as path:
-        kept = open_ledger(leg, attrs.evolve(settings, ledger=attrs.evolve(settings.ledger, path=str(path))))
-        if kept is None:
-            raise ConfigError("--ledger", "", "no ledger given, neither by --ledger nor by ledger.path")
-        with closing(kept):
-            yield kept
+        kept = attrs.evolve(settings, ledger=attrs.evolve(settings.ledger, path=str(path)))
+        with closing(cast("Ledger", open_ledger(plain, kept))) as there:  # a path is given
+            yield there, leg, settings
 
 
 def list_measurements(config: Path | None, ledger: Path | None) -> None:
     """Print all measurements of a ledger, a line each; the ledger is left as it is."""
-    settings, _ = leg_of(config, ledger)
-    with opened(settings, dry_run=True) as kept:
+    with opened(config, ledger, dry_run=True) as (kept, _, _):
         for each in kept.measurements:
             click.echo(_line(each))
         if not kept.measurements:
@@ -78,8 +80,7 @@ def withdraw(
     joint: str | None, which: str, who: str, config: Path | None, ledger: Path | None, dry_run: bool
 ) -> None:
     """Withdraw a measurement, by its number or the last one of a joint, and print what it is then."""
-    settings, _ = leg_of(config, ledger)
-    with opened(settings, dry_run) as kept:
+    with opened(config, ledger, dry_run) as (kept, _, _):
         number = _number(kept, joint, which)
         click.echo(_line(kept.withdraw(number, time.time_ns(), who)))
         kept.record()
@@ -121,7 +122,7 @@ def _date(stamp_ns: int) -> str:
 @common.ledger_option
 @common.node_option
 @common.wait_option
-@click.option("--dry-run", is_flag=True, help="Print the result and write nothing.")
+@common.dry_run_option
 def acknowledge(
     config: Path | None, ledger: Path | None, node: str | None, wait_s: float, dry_run: bool
 ) -> int:
@@ -136,8 +137,7 @@ def acknowledge(
         return 0
     from leg_wear_monitor.monitor.operators import acknowledge_in
 
-    settings, leg = leg_of(config, ledger)
-    with opened(settings, dry_run) as kept:
+    with opened(config, ledger, dry_run) as (kept, leg, settings):
         click.echo(acknowledge_in(kept, leg, settings, time.time_ns()).words)
     if dry_run:
         click.echo("dry run: nothing was written")
@@ -154,7 +154,7 @@ def acknowledge(
 @common.node_option
 @common.wait_option
 @click.option("--undo", is_flag=True, help="Undo the last reset: the part was not replaced.")
-@click.option("--dry-run", is_flag=True, help="Print the result and write nothing.")
+@common.dry_run_option
 def reset(
     joint: str,
     config: Path | None,
@@ -184,9 +184,9 @@ def _reset_in(joint: str, config: Path | None, ledger: Path | None, undo: bool, 
     """Enter it into a ledger, and print what came of it."""
     from leg_wear_monitor.monitor.operators import reset_in, undo_in, wear_words
 
-    settings, leg = leg_of(config, ledger)
-    joint, now_ns, who = leg.clearance_joint(joint), time.time_ns(), getpass.getuser()
-    with opened(settings, dry_run) as kept:
+    now_ns, who = time.time_ns(), getpass.getuser()
+    with opened(config, ledger, dry_run, joint) as (kept, leg, settings):
+        joint = leg.clearance_joint(joint)
         if undo:
             words = wear_words(undo_in(kept, joint, now_ns, who))
             click.echo(
@@ -203,9 +203,6 @@ def _reset_in(joint: str, config: Path | None, ledger: Path | None, undo: bool, 
 # ``leg-wear-monitor measure``: a clearance that somebody measured, into the ledger.
 
 
-WITH_FINDINGS = 1
-
-
 @click.command(short_help="Enter a measured clearance, which updates the forecast.")
 @click.argument("joint", required=False)
 @click.argument("mm", type=float, required=False, callback=common.bounded("mm", above=0.0))
@@ -213,16 +210,16 @@ WITH_FINDINGS = 1
 @common.config_option
 @common.ledger_option
 @click.option("--accept", is_flag=True, help="Use it even if it contradicts the model.")
-@click.option("--dry-run", is_flag=True, help="Print the result and write nothing.")
+@common.dry_run_option
 @common.node_option
 @common.wait_option
 @click.option("--list", "listed", is_flag=True, help="Print the ledger's measurements with their numbers.")
-@click.option(
+@common.option(
     "--withdraw",
-    "withdrawn",
-    metavar=f"NUMBER|{LAST}",
-    help=f"Withdraw a measurement: it stays in the ledger and no longer counts. {LAST}: the last one, of "
+    f"NUMBER|{LAST}",
+    f"Withdraw a measurement: it stays in the ledger and no longer counts. {LAST}: the last one, of "
     "JOINT if given.",
+    "withdrawn",
 )
 def measure(
     joint: str | None,
@@ -241,7 +238,8 @@ def measure(
     clearance stays as it is. Exit code 1 if the measurement contradicts the model or is at its limit.
     """
     if node is not None:
-        _check_alone(listed, withdrawn, **options)
+        alone = {name: options[name] for name in ("config", "ledger", "dry_run")}
+        common.check_alone(**alone, list=listed, withdraw=withdrawn)
     if (listed or withdrawn) and (mm is not None or sigma is not None or (listed and withdrawn)):
         raise click.UsageError("--list and --withdraw cannot be combined, nor used with MM or --sigma")
     if listed:
@@ -261,17 +259,7 @@ def measure(
         click.echo(line)
     if options["dry_run"]:
         click.echo("dry run: nothing was written")
-    return WITH_FINDINGS if has_findings else 0
-
-
-def _check_alone(
-    listed: bool, withdrawn: str | None, config: Path | None, ledger: Path | None, dry_run: bool, accept: bool
-) -> None:
-    """A running monitor has its own parameters and ledger."""
-    if listed or withdrawn or config or ledger or dry_run:
-        raise click.UsageError(
-            "--node cannot be combined with --config, --ledger, --dry-run, --list or --withdraw"
-        )
+    return common.WITH_FINDINGS if has_findings else 0
 
 
 def _on_node(node: str, joint: str, clearance_m: float, sigma_m: float, accept: bool, wait_s: float) -> int:
@@ -282,7 +270,7 @@ def _on_node(node: str, joint: str, clearance_m: float, sigma_m: float, accept: 
 
     told = measure_on(node, joint, clearance_m, sigma_m, accept, wait_s)
     click.echo(told)
-    return WITH_FINDINGS if asks_to_act(told) else 0
+    return common.WITH_FINDINGS if asks_to_act(told) else 0
 
 
 def _measured(
@@ -304,11 +292,10 @@ def _measured(
     from leg_wear_monitor.monitor.operators import overrule_in, shown_in
     from leg_wear_monitor.monitor.verdict.situation import SOURCES
 
-    settings, leg = leg_of(config, ledger)
-    joint = leg.clearance_joint(joint)
-    limits_m = AlarmBoard(settings, leg.clearance_joints).clearance_limits_m
-    limit_m = limits_m[leg.clearance_joints.index(joint)]
-    with opened(settings, dry_run) as kept:
+    with opened(config, ledger, dry_run, joint) as (kept, leg, settings):
+        joint = leg.clearance_joint(joint)
+        limits_m = AlarmBoard(settings, leg.clearance_joints).clearance_limits_m
+        limit_m = limits_m[leg.clearance_joints.index(joint)]
         parts = {wear.name: wear for wear in kept.entry.joints} if kept.entry else {}
         part = parts.get(joint) or new_part(joint)
         found = evaluate(

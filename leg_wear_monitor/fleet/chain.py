@@ -17,11 +17,8 @@ from leg_wear_monitor.errors import LegWearError, printable
 from leg_wear_monitor.files import write_whole
 from leg_wear_monitor.fleet.description import FleetLeg
 from leg_wear_monitor.fleet.directory import LegDirectory, Line, cycle_columns, locked, write_parquet
-from leg_wear_monitor.monitor.forecast.forecast import ForecastBasis
-from leg_wear_monitor.monitor.reports import Lost
 from leg_wear_monitor.playback.replay import replay
 from leg_wear_monitor.playback.summary import ReplayResult
-from leg_wear_monitor.state import JointClearance, LifeHours, Verdict
 from leg_wear_monitor.workers import Job, package_digest
 
 # What is kept of one recording of a leg.
@@ -47,122 +44,70 @@ class Outcome(Enum):
         return self in (Outcome.COUNTED, Outcome.ALREADY_COUNTED)
 
 
-@attrs.frozen(kw_only=True)
-class RecordingRecord:
-    """One recording of a leg.
+_UNREAD: Line = {
+    "key": "",  # digest of its content
+    "file": "",  # its name when it was counted
+    "outcome": "",  # value of an `Outcome`
+    "settings": "",  # digest of the leg's settings; what was not counted is tried again with others
+    "begin_ns": 0,  # first and last stamp; 0 if there are none
+    "end_ns": 0,
+    "duration_s": 0.0,  # time between them
+    "cycles": 0,  # gait cycles that were counted from it
+    "is_partial": False,  # whether recorded data are lost or may be wrong
+    "is_late": False,  # whether a later recording had been counted before it
+    "findings": [],  # faults and remarks; the first twenty
+    "lost": None,  # samples and time that were not used; null if nothing was replayed
+    "verdict": None,  # `Verdict` at its end; null unless it was counted
+    "clearances": {},  # `JointClearance` by joint
+    "life": {},  # `LifeHours` of each joint, and of the ``leg``
+    "basis": None,  # `ForecastBasis` of its forecast; null without one
+    "knows": "",  # digest of the measurements and priors in it; with others, the forecast is made again
+}
+"""The line of a recording of which nothing is known."""
 
-    Attributes
+
+def line_of(result: ReplayResult, about: Line, is_late: bool, knows: str) -> Line:
+    """Line of a replayed recording; `ReplayResult.findings` must be complete.
+
+    Parameters
     ----------
-    key : str
-        Digest of its content.
-    file : str
-        Its name when it was counted.
-    outcome : Outcome
-    settings : str
-        Digest of the leg's settings; what was not counted is tried again with others.
-    begin_ns, end_ns : int
-        First and last stamp [ns]; 0 if there are none.
-    duration_s : float
-        Time between them [s].
-    cycles : int
-        Gait cycles that were counted from it.
-    is_partial : bool
-        Whether recorded data are lost or may be wrong.
+    result : ReplayResult
+    about : dict
+        Key, file and settings.
     is_late : bool
-        Whether a later recording had been counted before it.
-    findings : tuple of str
-        Faults and remarks; the first twenty.
-    lost : Lost or None
-        Samples and time that were not used; None if nothing was replayed.
-    verdict : Verdict or None
-        Verdict at its end; None unless it was counted, like the next two.
-    clearances : dict of str to JointClearance
-    life : dict of str to LifeHours or None
-        Remaining life of each joint, and of the ``leg``.
-    basis : ForecastBasis or None
-        What the forecast rests on; None without one.
     knows : str
-        Digest of the measurements and priors in it; with others, the forecast is made again.
     """
-
-    key: str
-    file: str
-    outcome: Outcome
-    settings: str
-    begin_ns: int = 0
-    end_ns: int = 0
-    duration_s: float = 0.0
-    cycles: int = 0
-    is_partial: bool = False
-    is_late: bool = False
-    findings: tuple[str, ...] = ()
-    lost: Lost | None = None
-    verdict: Verdict | None = None
-    clearances: dict[str, JointClearance] = attrs.Factory(dict)
-    life: dict[str, LifeHours | None] = attrs.Factory(dict)
-    basis: ForecastBasis | None = None
-    knows: str = ""
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain object, as its line in the file has it."""
-        return dict(part_document(self))
-
-    @property
-    def is_sound(self) -> bool:
-        """Whether nothing of it is lost."""
-        return not self.is_partial and self.outcome.is_final
-
-
-def unreadable(key: str, file: str, settings: str, fault: str) -> RecordingRecord:
-    """Record of a recording that cannot be read."""
-    return RecordingRecord(
-        key=key,
-        file=file,
-        settings=settings,
-        outcome=Outcome.UNREADABLE,
-        is_partial=True,
-        findings=(printable(fault),),
-    )
-
-
-def record_of(
-    result: "ReplayResult", *, key: str, file: str, settings: str, is_late: bool, knows: str = ""
-) -> RecordingRecord:
-    """Record of a replay; `ReplayResult.findings` must be complete."""
-    texts = [printable(one.text) for one in result.findings]
-    about: dict[str, Any] = {
-        "key": key,
-        "file": file,
-        "settings": settings,
+    monitor, texts = result.monitor, [printable(one.text) for one in result.findings]
+    outcome, counted = Outcome.COUNTED, dict[str, Any]()
+    if result.is_unusable:
+        outcome = Outcome.NO_GAIT
+        texts.insert(0, f"no gait cycle fits this leg: {printable(result.evidence.missing())}")
+    elif monitor.is_all_counted:
+        outcome = Outcome.ALREADY_COUNTED
+        texts.insert(
+            0, "all of its time is that of recordings before it; if it is another walk, its clock is wrong"
+        )
+    else:
+        state, basis = monitor.state, monitor.forecast_basis
+        counted = {
+            "cycles": len(result.history),
+            "verdict": state.verdict,
+            "clearances": state.clearances if result.history.last else {},
+            "life": state.life,
+            "basis": basis if basis and math.isfinite(basis.cycle_s) else None,
+            "knows": knows,
+        }
+    read = {
+        "outcome": outcome,
         "begin_ns": result.begin_ns,
         "end_ns": result.end_ns,
         "duration_s": result.duration_s,
         "is_partial": result.is_partial,
         "is_late": is_late,
-        "lost": result.monitor.lost,
+        "findings": texts[:_MOST_FINDINGS],
+        "lost": monitor.lost,
     }
-    if result.is_unusable:
-        texts.insert(0, f"no gait cycle fits this leg: {printable(result.evidence.missing())}")
-        return RecordingRecord(outcome=Outcome.NO_GAIT, findings=tuple(texts[:_MOST_FINDINGS]), **about)
-    if result.monitor.is_all_counted:
-        texts.insert(
-            0, "all of its time is that of recordings before it; if it is another walk, its clock is wrong"
-        )
-        return RecordingRecord(
-            outcome=Outcome.ALREADY_COUNTED, findings=tuple(texts[:_MOST_FINDINGS]), **about
-        )
-    state, basis = result.monitor.state, result.monitor.forecast_basis
-    return RecordingRecord(
-        outcome=Outcome.COUNTED,
-        cycles=len(result.history),
-        findings=tuple(texts[:_MOST_FINDINGS]),
-        verdict=state.verdict,
-        clearances=state.clearances if result.history.last else {},
-        life=state.life,
-        basis=basis if basis and math.isfinite(basis.cycle_s) else None,
-        knows=knows,
-        **about,
-    )
+    return dict(part_document(_UNREAD | about | read | counted))
 
 
 # Finds the recordings of a leg: what they contain tells them apart, not their names.
@@ -244,7 +189,12 @@ def begin_of(path: Path, leg: FleetLeg) -> tuple[int, str]:
     try:
         return _first_stamp_ns(path, leg), ""
     except RecordingError as error:
-        return 0, ": ".join(filter(None, (error.key, error.fault)))
+        return 0, _fault(error)
+
+
+def _fault(error: RecordingError) -> str:
+    """Why a recording cannot be read, without its name."""
+    return ": ".join(filter(None, (error.key, error.fault)))
 
 
 def entry_of(found: Found) -> dict[str, Any]:
@@ -360,30 +310,30 @@ def _is_done(line: Line, found: Found) -> bool:
 
 def _counted(leg: FleetLeg, directory: LegDirectory, found: Found, last_ns: int) -> Line:
     """Count a recording into a leg that is locked."""
+    about = {"key": found.key, "file": leg.shown(found.path), "settings": leg.settings}
     try:
         if found.fault:
             raise RecordingError("", "", found.fault)
-        line = _replayed(leg, directory, found, last_ns)
+        line = _replayed(leg, directory, found, about, last_ns)
     except RecordingError as error:
-        fault = ": ".join(filter(None, (error.key, error.fault)))
-        line = unreadable(found.key, leg.shown(found.path), leg.settings, fault).to_dict()
+        line = _UNREAD | about | {"outcome": Outcome.UNREADABLE.value, "is_partial": True}
+        line["findings"] = [printable(_fault(error))]
     directory.add(line, words_of(line))
     return line
 
 
-def _replayed(leg: FleetLeg, directory: LegDirectory, found: Found, last_ns: int) -> Line:
-    """Replay a recording into the ledger; its record."""
-    pending, lines = directory.pending(), []
+def _replayed(leg: FleetLeg, directory: LegDirectory, found: Found, about: Line, last_ns: int) -> Line:
+    """Replay a recording into the ledger; its line."""
+    pending, lines = directory.pending(), list[Line]()
     knows = directory.knowledge()
-    about = {"key": found.key, "file": leg.shown(found.path), "settings": leg.settings}
 
     def finish(result: ReplayResult) -> None:
-        record = record_of(result, **about, is_late=found.begin_ns < last_ns, knows=knows)
-        lines.append(record.to_dict())
-        if record.outcome is Outcome.COUNTED:
+        line = line_of(result, about, found.begin_ns < last_ns, knows)
+        lines.append(line)
+        if line["outcome"] == Outcome.COUNTED.value:
             write_parquet(directory.table(found.key), cycle_columns(result, leg.row))
             write_whole(directory.summary, result.summary().to_json().encode())
-            directory.expect(lines[0])
+            directory.expect(line)
 
     replay(
         found.path,

@@ -421,49 +421,21 @@ Legs = Iterable[tuple[str, str, LegDirectory]]
 _WHERE = {"leg": "string", "lot": "string", "key": "string"}
 
 RECORDINGS = {
-    **_WHERE,
-    "file": "string",
-    "outcome": "string",
-    "begin_ns": "int64",
-    "end_ns": "int64",
-    "duration_s": "float64",
-    "cycles": "int64",
-    "unmonitored_s": "float64",
-    "already_counted": "int64",
-    "is_partial": "bool_",
-    "is_late": "bool_",
-    "findings": "string",
-}
+    **_WHERE, "file": "string", "outcome": "string", "begin_ns": "int64", "end_ns": "int64",
+    "duration_s": "float64", "cycles": "int64", "unmonitored_s": "float64", "already_counted": "int64",
+    "is_partial": "bool_", "is_late": "bool_", "findings": "string",
+}  # fmt: skip
 VERDICTS = {
-    **_WHERE,
-    "stamp_ns": "int64",
-    "state": "string",
-    "fault_code": "string",
-    "joints": "string",
-    "since_ns": "int64",
-    "why": "string",
-    "do": "string",
-    "not_valid": "string",
-}
+    **_WHERE, "stamp_ns": "int64", "state": "string", "fault_code": "string", "joints": "string",
+    "since_ns": "int64", "why": "string", "do": "string", "not_valid": "string",
+}  # fmt: skip
 LIVES = {
-    **_WHERE,
-    "stamp_ns": "int64",
-    "joint": "string",
-    "believed_m": "float64",
-    "believed_sigma_m": "float64",
-    "believed_by": "string",
-    "status": "string",
-    "counted_m": "float64",
-    "seen_m": "float64",
-    "seen_sigma_m": "float64",
-    "seen_by": "string",
-    "new_m": "float64",
-    "limit_m": "float64",
-    "used_fraction": "float64",
-    "p10_h": "float64",
-    "p50_h": "float64",
-    "p90_h": "float64",
-}
+    **_WHERE, "stamp_ns": "int64", "joint": "string",
+    "believed_m": "float64", "believed_sigma_m": "float64", "believed_by": "string", "status": "string",
+    "counted_m": "float64", "seen_m": "float64", "seen_sigma_m": "float64", "seen_by": "string",
+    "new_m": "float64", "limit_m": "float64", "used_fraction": "float64",
+    "p10_h": "float64", "p50_h": "float64", "p90_h": "float64",
+}  # fmt: skip
 
 
 def recordings_table(legs: Legs) -> Any:

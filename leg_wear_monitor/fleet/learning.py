@@ -270,7 +270,6 @@ def parts_of(
     replaced_ns: Mapping[str, int],
     *,
     lot: str = "",
-    lots: Mapping[str, str] | None = None,
     corrections: Sequence[CorrectedClearance] = (),
 ) -> list[Part]:
     """All present parts of a leg, and its former parts that were measured.
@@ -287,9 +286,7 @@ def parts_of(
     replaced_ns : mapping of str to int
         When the present part of each joint was mounted; 0 for the first part, and for an absent joint.
     lot : str, optional
-        Lot of the parts that the leg was built with.
-    lots : mapping of str to str, optional
-        Lots of the present parts of single joints; a replaced part has no other known lot.
+        Lot of the parts that the leg was built with; a replaced part has no known lot.
     corrections : sequence of CorrectedClearance
         Of its ledger.
     """
@@ -301,7 +298,6 @@ def parts_of(
             observations = observations_of(measurements, joint, when)
             corrected = corrections_of(corrections, joint, when)
             factor, precision = measured_factor(settings, clearance.radial_clearance, observations, corrected)
-            own = (lots or {}).get(joint, "") if when == present else ""
             parts.append(
                 Part(
                     leg=leg,
@@ -309,7 +305,7 @@ def parts_of(
                     replaced_ns=when,
                     is_present=when == present,
                     pair=pair_of(clearance),
-                    lot=own or (lot if when == 0 else ""),
+                    lot=lot if when == 0 else "",
                     nominal_per_pa=nominal_per_pa(clearance),
                     prior=usual_prior(settings, clearance),
                     factor=factor,

@@ -234,7 +234,7 @@ def leg_overview(
             verdict=structure(counted[-1]["verdict"], Verdict, source, "verdict"),
             clearances=joints,
             used_fraction={name: _used(joint) for name, joint in joints.items()},
-            life=_life(counted[-1]["life"], source),
+            life=structure(counted[-1]["life"], dict[str, LifeHours | None], source, "life"),
         )
     return attrs.evolve(now, change=_change(now, before))
 
@@ -245,13 +245,6 @@ def _used(joint: JointClearance) -> float:
     if clearance_m is None:  # nothing is valid, or it is a line of an older version
         clearance_m = joint.counted_m if joint.seen_m is None else joint.seen_m
     return used_fraction(clearance_m, joint.new_m, joint.limit_m)
-
-
-def _life(given: Mapping[str, Any], source: str) -> dict[str, LifeHours | None]:
-    return {
-        name: None if hours is None else structure(hours, LifeHours, source, f"life.{name}")
-        for name, hours in given.items()
-    }
 
 
 def _health(lines: Iterable[Line], counted: list[Line], found: int) -> RecordingHealth:

@@ -39,11 +39,7 @@ from leg_wear_monitor.monitor.ledger.ledger import Ledger, open_ledger
 from leg_wear_monitor.monitor.leg_state import joint_clearance, life_of
 from leg_wear_monitor.monitor.verdict.situation import JointSituation, KnownClearance
 from leg_wear_monitor.playback.result import summary_of
-from leg_wear_monitor.playback.summary import (
-    joint_forecast,
-    ledger_verdict,
-    leg_forecast,
-)
+from leg_wear_monitor.playback.summary import joint_forecast, ledger_verdict, leg_forecast
 from leg_wear_monitor.state import JointClearance, Verdict
 
 # What a fleet has learned, as files: ``learning.json``, and for each leg the file of ``forecast.priors``.
@@ -168,26 +164,7 @@ def _coefficient(part: Part, prior: CoefficientPrior) -> LearnedCoefficient:
 # Learning from the ledgers of a fleet, before an update or after it.
 
 
-@attrs.frozen(kw_only=True)
-class FleetLearning:
-    """What a fleet has learned.
-
-    Attributes
-    ----------
-    pairs : mapping of str to LearnedPair
-        By material pair; empty if no clearance was measured.
-    priors : mapping of str to pathlib.Path
-        File for ``forecast.priors`` of each leg; empty if no ledger has ever had a measurement.
-    findings : tuple of (str, str)
-        The leg, and a line about a part that contradicts the others, or a ledger that cannot be read.
-    """
-
-    pairs: Mapping[str, LearnedPair]
-    priors: Mapping[str, Path]
-    findings: tuple[tuple[str, str], ...]
-
-
-def learn_fleet(legs: Sequence[FleetLeg], out: Path) -> FleetLearning:
+def learn_fleet(legs: Sequence[FleetLeg], out: Path) -> tuple[dict[str, Path], tuple[tuple[str, str], ...]]:
     """Learn from the measured clearances in the ledgers of a fleet, and write what was learned.
 
     Parameters
@@ -196,11 +173,18 @@ def learn_fleet(legs: Sequence[FleetLeg], out: Path) -> FleetLearning:
         In any order; the result is the same. A leg without a ledger has new parts.
     out : pathlib.Path
         Directory of the fleet, which exists.
+
+    Returns
+    -------
+    priors : dict of str to pathlib.Path
+        File for ``forecast.priors`` of each leg; empty if no clearance was measured.
+    findings : tuple of (str, str)
+        The leg, and a line about a part that contradicts the others, or a ledger that cannot be read.
     """
     ledgers = {leg.id: LegDirectory(out, leg.id).ledger for leg in legs}
     measured = measured_in(legs, out)
     if not measured:  # nobody ever measured: no ledger is copied
-        return FleetLearning(pairs={}, priors=write_learning(out, (), {}), findings=())
+        return write_learning(out, (), {}), ()
     parts: list[Part] = []
     findings = []
     for leg in sorted(legs, key=lambda leg: leg.id):
@@ -215,9 +199,8 @@ def learn_fleet(legs: Sequence[FleetLeg], out: Path) -> FleetLearning:
     pairs = learn(parts)
     for pair in pairs.values():
         findings += [(each.part.leg, each.finding) for each in pair.measured if each.finding]
-    return FleetLearning(
-        pairs=pairs, priors=write_learning(out, parts, pairs, measured), findings=tuple(sorted(findings))
-    )
+    priors = write_learning(out, parts, pairs, measured)
+    return priors if pairs else {}, tuple(sorted(findings))
 
 
 def measured_in(legs: Sequence[FleetLeg], out: Path) -> str:
@@ -317,10 +300,7 @@ def _renew(leg: FleetLeg, directory: LegDirectory) -> None:
         summary,
         verdict=verdict,
         joints={
-            joint: attrs.evolve(
-                one,
-                forecast=joint_forecast(forecasts[joint], verdict),
-            )
+            joint: attrs.evolve(one, forecast=joint_forecast(forecasts[joint], verdict))
             for joint, one in summary.joints.items()
         },
         clearances=clearances,

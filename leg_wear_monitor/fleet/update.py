@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import attrs
 
-from leg_wear_monitor.bags.bag import METADATA, PARQUET, find_files
+from leg_wear_monitor.bags.bag import METADATA, find_files
 from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.bags.mcap_layout import MAGIC
+from leg_wear_monitor.bags.table_file import PARQUET
 from leg_wear_monitor.files import data_frame
 from leg_wear_monitor.fleet.chain import Chain, begin_of, state_of, words_of
 from leg_wear_monitor.fleet.description import FleetDescription, FleetLeg, fleet_directory
@@ -238,11 +239,10 @@ class _UpdateJobs:
 
     def _learn(self) -> None:
         """Set the priors of all legs' forecasts from the measured clearances of the fleet."""
-        learning = learn_fleet([chain.leg for chain in self.chains], self.chains[0].out)
-        self.learned = learning.findings
-        for chain in self.chains if learning.pairs else ():
-            if chain.leg.id in learning.priors:
-                chain.leg = chain.leg.with_priors(learning.priors[chain.leg.id])
+        priors, self.learned = learn_fleet([chain.leg for chain in self.chains], self.chains[0].out)
+        for chain in self.chains:
+            if chain.leg.id in priors:
+                chain.leg = chain.leg.with_priors(priors[chain.leg.id])
 
 
 def _refuse_shared(chains: Sequence[Chain]) -> None:

@@ -86,13 +86,6 @@ def test_a_damaged_recording_costs_itself_and_is_named(first):
     assert (out / "legs/b/log").read_text().splitlines() == [trash[1], half[1]]
 
 
-def test_a_second_update_finds_nothing_to_do(home, updated, update):
-    before = contents(updated)
-    again = update(home / "fleet.yaml", updated, begin=lambda _: pytest.fail("nothing is to be computed"))
-    assert again.is_up_to_date and again.counted == 0
-    assert contents(updated) == before
-
-
 @pytest.mark.slow  # studies/test_run.py holds it for the same workers
 @pytest.mark.usefixtures("traps")
 def test_processes_give_the_same_to_the_bit(home, updated, update, tmp_path):

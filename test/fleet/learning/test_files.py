@@ -47,10 +47,10 @@ def parts(leg, *measurements, replaced_ns=None, **lots):
 
 def test_every_joint_has_its_present_part_and_those_that_were_measured():
     found = parts("left", measurement(), measurement(replaced_ns=5), replaced_ns={"A": 7, "B": 3},
-                  lot="2026-03", lots={"A": "2026-09"})  # fmt: skip
+                  lot="2026-03")  # fmt: skip
     of = {each.key: each for each in found}
     assert len(found) == 5 + 2
-    assert [of["left", "A", when].lot for when in (0, 5, 7)] == ["2026-03", "", "2026-09"]
+    assert [of["left", "A", when].lot for when in (0, 5, 7)] == ["2026-03", "", ""]
     assert [of["left", "A", when].is_present for when in (0, 5, 7)] == [False, False, True]
     assert (of["left", "B", 3].lot, of["left", "G", 0].lot) == ("", "2026-03")
     assert {each.pair for each in found} == {pair_of(MECHANISM.clearances["A"])}

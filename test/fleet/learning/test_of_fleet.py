@@ -54,8 +54,9 @@ def test_a_new_leg_learns_from_the_ledgers_of_its_lot(tmp_path):
     legs = [leg("a"), leg("b"), leg("new"), leg("other", "2026-09")]
     before = [measured(tmp_path, one, 4.2e-4) for one in legs[:2]]
     found = learn_fleet(legs, tmp_path)
-    assert found.findings == ()
-    new, other = (read_priors(str(found.priors[name])).joints["A"].present for name in ("new", "other"))
+    priors, findings = found
+    assert findings == ()
+    new, other = (read_priors(str(priors[name])).joints["A"].present for name in ("new", "other"))
     assert (new.basis, other.basis) == ("2 parts of lot 2026-03", "2 parts of other lots")
     assert new.sigma < other.sigma
     # twice the nominal coefficients of bushing and journal, as measured
@@ -71,21 +72,19 @@ def test_a_ledger_that_cannot_be_read_is_named_and_the_others_are_used(tmp_path)
     broken = LegDirectory(tmp_path, "broken").ledger
     broken.parent.mkdir()
     broken.write_bytes(b"not a ledger")
-    found = learn_fleet(legs, tmp_path)
-    ((name, text),) = found.findings
+    priors, ((name, text),) = learn_fleet(legs, tmp_path)
     assert name == "broken"
     assert text.startswith("nothing is learned from it: ")
-    assert sorted(found.priors) == ["a", "new"]
-    assert read_priors(str(found.priors["new"])).joints["A"].present.basis == "1 part of lot 2026-03"
+    assert sorted(priors) == ["a", "new"]
+    assert read_priors(str(priors["new"])).joints["A"].present.basis == "1 part of lot 2026-03"
 
 
 def test_a_leg_with_accelerated_wear_teaches_nothing(tmp_path):
     fast = leg("fast")
     fast = attrs.evolve(fast, config=attrs.evolve(fast.config, wear_acceleration=5000.0))
     measured(tmp_path, fast, 4.2e-4)
-    found = learn_fleet([fast, leg("new")], tmp_path)
-    assert dict(found.pairs) == {}
-    assert found.findings == (("fast", "nothing is learned from it: its wear is accelerated"),)
+    finding = "fast", "nothing is learned from it: its wear is accelerated"
+    assert learn_fleet([fast, leg("new")], tmp_path) == ({}, (finding,))
 
 
 def test_where_nobody_ever_measured_no_ledger_is_copied(tmp_path, monkeypatch):
@@ -96,14 +95,12 @@ def test_where_nobody_ever_measured_no_ledger_is_copied(tmp_path, monkeypatch):
         settings = attrs.evolve(one.config, ledger=attrs.evolve(one.config.ledger, path=str(path)))
         open_ledger(fitted(load_mechanism(settings.mechanism), settings), settings).close()
     monkeypatch.setattr(renew, "copy_of", lambda path: pytest.fail(f"{path} is copied"))
-    found = learn_fleet(legs, tmp_path)
-    assert (dict(found.pairs), dict(found.priors), found.findings) == ({}, {}, ())
+    assert learn_fleet(legs, tmp_path) == ({}, ())
     assert json.loads((tmp_path / "learning.json").read_text())["pairs"] == {}
 
 
 def test_when_the_only_measurement_is_withdrawn_the_priors_say_nothing(tmp_path):
     legs = [leg("a"), leg("b")]
     measured(tmp_path, legs[0], 4.2e-4, withdrawn=True)
-    found = learn_fleet(legs, tmp_path)
-    assert dict(found.pairs) == {}
-    assert dict(read_priors(str(found.priors["b"])).joints) == {}
+    assert learn_fleet(legs, tmp_path) == ({}, ())
+    assert dict(read_priors(str(LegDirectory(tmp_path, "b").priors)).joints) == {}

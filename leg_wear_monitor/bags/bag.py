@@ -28,7 +28,7 @@ from leg_wear_monitor.bags.findings import (
 )
 from leg_wear_monitor.bags.mcap_file import Due, McapFile, Piece
 from leg_wear_monitor.bags.mcap_layout import ZSTD_MAGIC, Channel, expand_message, expanded
-from leg_wear_monitor.bags.table_file import TableFile
+from leg_wear_monitor.bags.table_file import CSV, PARQUET, TableFile
 from leg_wear_monitor.configuration.strict import events_with_depth
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.messages.streams import Stream, streams_read
@@ -43,27 +43,15 @@ _LARGEST = 2**20  # bytes; a bag of 200 topics and 1000 files has some 250 kB
 _DEEPEST = 20
 
 
-@attrs.frozen
-class Metadata:
-    """Contents of metadata.yaml.
-
-    Attributes
-    ----------
-    files : list of str
-        File names in order, without duplicates.
-    by_message : bool
-        Whether each message is compressed on its own.
-    types : dict
-        Message type by topic name.
-    """
-
-    files: list[str]
-    by_message: bool
-    types: dict[str, str]
-
-
-def read_metadata(path: Path) -> Metadata:
+def read_metadata(path: Path) -> tuple[list[str], dict[str, Any]]:
     """Read metadata.yaml.
+
+    Returns
+    -------
+    names : list of str
+        File names in order, without duplicates.
+    parts : dict
+        ``by_message`` and ``types`` of each `BagFile`.
 
     Raises
     ------
@@ -92,15 +80,13 @@ def _check_simple(text: str) -> None:
             raise DamageError(f"is nested more than {_DEEPEST} deep")
 
 
-def _structured(information: Any) -> Metadata:
+def _structured(information: Any) -> tuple[list[str], dict[str, Any]]:
     names = [Path(name).name for name in information["relative_file_paths"]]
     topics = [topic["topic_metadata"] for topic in information.get("topics_with_message_count", [])]
     mode = information.get("compression_mode", "")
-    return Metadata(
-        files=list(dict.fromkeys(names)),
-        by_message=isinstance(mode, str) and mode.lower() == "message",
-        types={topic["name"]: topic["type"] for topic in topics if _is_text(topic["name"], topic["type"])},
-    )
+    types = {topic["name"]: topic["type"] for topic in topics if _is_text(topic["name"], topic["type"])}
+    by_message = isinstance(mode, str) and mode.lower() == "message"
+    return list(dict.fromkeys(names)), {"by_message": by_message, "types": types}
 
 
 def _is_text(*values: object) -> bool:
@@ -110,7 +96,7 @@ def _is_text(*values: object) -> bool:
 # Resolve what a user names to an ordered list of recordings: bags (plain, split, compressed) and tables.
 
 
-MCAP, CSV, PARQUET, IN_MEMORY = ".mcap", ".csv", ".parquet", ""
+MCAP, IN_MEMORY = ".mcap", ""
 TABLES = (CSV, PARQUET, IN_MEMORY)
 _NAME = re.compile(r".*(\.mcap|\.db3)(\.zstd)?", re.DOTALL)
 _TABLE = re.compile(r".*(\.csv|\.parquet)(\.zstd)?", re.DOTALL | re.IGNORECASE)
@@ -271,16 +257,15 @@ def _metadata(path: Path, findings: list[Finding]) -> tuple[list[str], dict[str,
     if not os.path.lexists(path):
         return [], {}
     try:
-        metadata = read_metadata(path)
+        listed, parts = read_metadata(path)
     except DamageError as error:
         findings.append(Finding(path, f"{error}: the directory's files are taken instead", Severity.NOTE))
         return [], {}
-    names = [name for name in metadata.files if _NAME.fullmatch(name)]
-    if names != metadata.files:
-        findings.append(
-            Finding(path, "names other files than .mcap and .db3: they are not read", Severity.NOTE)
-        )
-    return names, {"by_message": metadata.by_message, "types": metadata.types}
+    names = [name for name in listed if _NAME.fullmatch(name)]
+    if names != listed:
+        text = "names other files than .mcap and .db3: they are not read"
+        findings.append(Finding(path, text, Severity.NOTE))
+    return names, parts
 
 
 def _by_number(path: Path) -> tuple[list[tuple[int, str]], str]:
@@ -292,27 +277,8 @@ def _by_number(path: Path) -> tuple[list[tuple[int, str]], str]:
 # Selection of the crank and torque topics of a recording, and check of their types.
 
 
-@attrs.frozen
-class Role:
-    """Input required from a recording: its stream, and its topic if the user named one."""
-
-    stream: Stream
-    topic: str | None = None
-
-    @property
-    def name(self) -> str:
-        """Relative topic name, as in the node."""
-        return self.stream.topic
-
-
-def roles(config: MonitorConfig, given: Mapping[str, str | None]) -> list[Role]:
-    """Inputs that a monitor needs; `given` holds the user's topics."""
-    read = streams_read(config.drive_torque.source, config.foot_load.source)
-    return [Role(stream, given.get(stream.topic)) for stream in read]
-
-
-def find_topic(role: Role, topics: Iterable[str], where: str) -> str | None:
-    """Topic of a role: the given one, else the name in the root, else the name in its only namespace.
+def find_topic(stream: Stream, given: str | None, topics: Iterable[str], where: str) -> str | None:
+    """Topic of a stream: the given one, else the name in the root, else the name in its only namespace.
 
     Returns
     -------
@@ -325,27 +291,28 @@ def find_topic(role: Role, topics: Iterable[str], where: str) -> str | None:
         If the given topic does not exist, or several namespaces contain the name.
     """
     recorded = sorted(set(topics))
-    if role.topic is not None:
-        topic = "/" + role.topic.lstrip("/")
+    if given is not None:
+        topic = "/" + given.lstrip("/")
         if topic not in recorded:
             raise RecordingError(where, topic, f"is not a topic of the recording, it has {listed(recorded)}")
         return topic
-    if f"/{role.name}" in recorded:
-        return f"/{role.name}"
-    near = [topic for topic in recorded if topic.endswith(f"/{role.name}")]
+    name = stream.topic
+    if f"/{name}" in recorded:
+        return f"/{name}"
+    near = [topic for topic in recorded if topic.endswith(f"/{name}")]
     if len(near) > 1:
-        of_torque = role.stream.kind == TORQUE  # whichever topic brings it
-        option = "--drive-torque" if of_torque else f"--{role.name}".replace("_", "-")
-        raise RecordingError(where, role.name, f"could be {listed(near)}, select one with {option}")
+        of_torque = stream.kind == TORQUE  # whichever topic brings it
+        option = "--drive-torque" if of_torque else f"--{name}".replace("_", "-")
+        raise RecordingError(where, name, f"could be {listed(near)}, select one with {option}")
     return near[0] if near else None
 
 
-def check_channel(role: Role, channel: Channel, known_type: str, where: str) -> int:
-    """Stream code of a channel, after a check that its messages can be decoded.
+def check_channel(stream: Stream, channel: Channel, known_type: str, where: str) -> None:
+    """Check that the messages of a channel can be decoded as those of a stream.
 
     Parameters
     ----------
-    role : Role
+    stream : Stream
     channel : Channel
     known_type : str
         Type of the topic from metadata.yaml; empty if unknown.
@@ -357,7 +324,6 @@ def check_channel(role: Role, channel: Channel, known_type: str, where: str) -> 
     RecordingError
         If they cannot; the message names the file, the topic and the expected type.
     """
-    stream = role.stream
     kind = channel.type or known_type or stream.type
     if kind != stream.type:
         raise RecordingError(where, channel.topic, f"is of type {kind}, expected {stream.type}")
@@ -368,7 +334,6 @@ def check_channel(role: Role, channel: Channel, known_type: str, where: str) -> 
         if fields != stream.fields:
             text = f"defines {kind} by {'; '.join(fields)}, expected {'; '.join(stream.fields)}"
             raise RecordingError(where, channel.topic, text)
-    return stream.code
 
 
 def _fields(definition: str) -> tuple[str, ...]:
@@ -417,6 +382,14 @@ class Source:
     budget: Budget
     types: dict[int, int] = attrs.Factory(dict)
 
+    def select(self, stream: Stream, topic: str) -> None:
+        """Select the channels of a topic, to be read as a stream."""
+        for number, channel in self.file.channels.items():
+            if channel.topic == topic:
+                known = self.bag_file.types.get(topic, "")
+                check_channel(stream, channel, known, str(self.bag_file.path))
+                self.types[number] = stream.code
+
     def pieces(self) -> Iterator[Due]:
         """Pieces of the selected channels, in order of log time."""
         for due in self.file.pieces(self.types):
@@ -459,13 +432,22 @@ def open_sources(
     return sources, [Finding(Path(error.source), f"{error.fault}: it is lost") for error in failed]
 
 
-def assign(sources: list[Source], wanted: Iterable[Role]) -> tuple[dict[str, str], list[Finding]]:
-    """Find the topics of roles, and select the channels to read from each source.
+def assign(
+    sources: list[Source], config: MonitorConfig, given: Mapping[str, str | None]
+) -> tuple[dict[str, str], list[Finding]]:
+    """Find the topics of the streams that a monitor reads, and select their channels in each source.
+
+    Parameters
+    ----------
+    sources : list of Source
+    config : MonitorConfig
+    given : mapping
+        Topics that the user named, by their relative name in the node.
 
     Returns
     -------
     topics : dict
-        Topic by role name, for each role that was found.
+        Topic by its relative name in the node, for each stream that was found.
     findings : list of Finding
 
     Raises
@@ -477,27 +459,18 @@ def assign(sources: list[Source], wanted: Iterable[Role]) -> tuple[dict[str, str
     first = sources[0].bag_file.path
     topics: dict[str, str] = {}
     findings: list[Finding] = []
-    for role in wanted:
-        topic = find_topic(role, recorded, str(first))
+    for stream in streams_read(config.drive_torque.source, config.foot_load.source):
+        topic = find_topic(stream, given.get(stream.topic), recorded, str(first))
         if topic is not None:
-            topics[role.name] = topic
+            topics[stream.topic] = topic
             for source in sources:
-                source.types |= _types(source, role, topic)
+                source.select(stream, topic)
             continue
         text = f"is not a topic of the recording, it has {listed(recorded)}"
-        if role.stream.is_needed:
-            raise RecordingError(str(first), role.name, text)
-        findings.append(Finding(first, f"{role.name}: {text}", Severity.NOTE))
+        if stream.is_needed:
+            raise RecordingError(str(first), stream.topic, text)
+        findings.append(Finding(first, f"{stream.topic}: {text}", Severity.NOTE))
     return topics, findings
-
-
-def _types(source: Source, role: Role, topic: str) -> dict[int, int]:
-    known = source.bag_file.types.get(topic, "")
-    return {
-        number: check_channel(role, channel, known, str(source.bag_file.path))
-        for number, channel in source.file.channels.items()
-        if channel.topic == topic
-    }
 
 
 def _open(bag_file: BagFile, config: MonitorConfig, budget: Budget, stack: ExitStack) -> OpenFile:

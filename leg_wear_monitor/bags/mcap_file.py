@@ -57,39 +57,34 @@ class _Scan:
 
     def run(self) -> None:
         """Read record by record until the data section ends or the records become unreadable."""
-        while True:
-            self.file.seek(self.at)
-            head = self.file.read(mcap_layout.RECORD_HEAD)
-            if len(head) < mcap_layout.RECORD_HEAD:
-                self._ends_early(len(head))
-                return
-            opcode, length = mcap_layout.HEAD.unpack(head)
-            if opcode == mcap_layout.DATA_END and length == 4:
-                self.layout.data_end = self.at
-                self.layout.data_crc = int.from_bytes(self.file.read(4), "little")
-                return
-            if not 0 < opcode <= _LAST_STANDARD_OPCODE and opcode < _FIRST_PRIVATE_OPCODE:
-                self._report_loss("has no MCAP record")
-                return
-            if not self._step(opcode, length):
-                return
+        try:
+            while self._step():
+                pass
+        except DamageError as error:
+            text = f"byte {self.at} {error}: it and the {self.size - self.at} bytes from there on are lost"
+            self.layout.losses.append(text)
 
-    def _step(self, opcode: int, length: int) -> bool:
-        """Process one record, or the messages outside of chunks from here on; False ends the scan."""
+    def _step(self) -> bool:
+        """Process a record, or the messages outside of chunks from here on; False at the end of the data."""
+        self.file.seek(self.at)
+        head = self.file.read(mcap_layout.RECORD_HEAD)
+        if len(head) < mcap_layout.RECORD_HEAD:
+            return self._ends_early()
+        opcode, length = mcap_layout.HEAD.unpack(head)
         end = self.at + mcap_layout.RECORD_HEAD + length
+        if opcode == mcap_layout.DATA_END and length == 4:
+            self.layout.data_end = self.at
+            self.layout.data_crc = int.from_bytes(self.file.read(4), "little")
+            return False
+        if not 0 < opcode <= _LAST_STANDARD_OPCODE and opcode < _FIRST_PRIVATE_OPCODE:
+            raise DamageError("has no MCAP record")
         if opcode == mcap_layout.CHUNK:
-            try:
-                segment = mcap_layout.chunk_head(self.file, self.at, self.size)
-            except DamageError as error:
-                self._report_loss(str(error))
-                return False
+            segment = mcap_layout.chunk_head(self.file, self.at, self.size)
             self._add_segment(segment)
             if segment.cut:
-                self._ends_early(self.size - self.at)
-                return False
+                return self._ends_early()
         elif end > self.size:
-            self._ends_early(self.size - self.at)
-            return False
+            return self._ends_early()
         elif opcode in (mcap_layout.SCHEMA, mcap_layout.CHANNEL, mcap_layout.MESSAGE_RECORD):
             try:
                 self.budget.check(end - self.at)
@@ -98,8 +93,7 @@ class _Scan:
                 self.layout.losses.append(f"record at byte {self.at} {error}: it is lost")
         self.at = end
         if len(self.layout.segments) * _BYTES_PER_SEGMENT > self.budget.part_limit:
-            self._report_loss(f"is behind {len(self.layout.segments)} chunks, more than --memory-mb allows")
-            return False
+            raise DamageError(f"is behind {len(self.layout.segments)} chunks, more than --memory-mb allows")
         return True
 
     def _add_messages(self, end: int) -> int:
@@ -119,8 +113,7 @@ class _Scan:
         mcap_layout.walk(np.frombuffer(data, np.uint8), _ALL_IGNORED, np.zeros(0, MESSAGE), positions, counts)
         self._add_definitions(data, positions[: int(counts["definitions"][0])].tolist())
         if counts["last_log_time_ns"][0] >= 0:
-            first, last = int(counts["first_log_time_ns"][0]), int(counts["last_log_time_ns"][0])
-            segment = attrs.evolve(segment, start_ns=first, end_ns=last)
+            segment = attrs.evolve(segment, start_ns=int(counts["first_log_time_ns"][0]))
         if segment.data_at == segment.at:  # not a chunk: it ends with the last whole record
             read = int(counts["read"][0])
             segment = attrs.evolve(segment, stored=read, size=read)
@@ -133,18 +126,14 @@ class _Scan:
             if self.definition_bytes <= self.budget.part_limit // 4:
                 self.definitions[type(record), record.id] = record
 
-    def _ends_early(self, rest: int) -> None:
-        """Report that the file was cut off."""
+    def _ends_early(self) -> bool:
+        """Report that the file was cut off; False."""
+        rest = self.size - self.at
         self.layout.losses.append(
             f"ends at byte {self.size} without its closing records, in a part of {rest} bytes: the recording "
             "was cut off, and what came after is lost"
         )
-
-    def _report_loss(self, why: str) -> None:
-        """Report the rest of the file as lost."""
-        self.layout.losses.append(
-            f"byte {self.at} {why}: it and the {self.size - self.at} bytes from there on are lost"
-        )
+        return False
 
 
 def content(file: IO[bytes], segment: mcap_layout.Segment, budget: Budget) -> bytes:
@@ -157,10 +146,7 @@ def content(file: IO[bytes], segment: mcap_layout.Segment, budget: Budget) -> by
     """
     budget.check(segment.size + (segment.stored if segment.data_at != segment.at else 0))
     file.seek(segment.data_at)
-    data = file.read(segment.stored)
-    if segment.cut:
-        return mcap_layout.expand_part(data, segment.compression, segment.size)
-    return mcap_layout.expand(data, segment.compression, segment.size)
+    return mcap_layout.expand(file.read(segment.stored), segment.compression, segment.size, segment.cut)
 
 
 # The reader of one MCAP file: its topics, and its messages in pieces in order of log time.
@@ -276,22 +262,12 @@ class McapFile:
         return Piece(segment.start_ns, data, messages, segment.stored)
 
     def _verified_content(self, segment: mcap_layout.Segment) -> bytes:
-        """Records of a segment, whose head must agree with the index and whose checksum with the data."""
-        if segment.data_at == segment.at:  # messages outside of chunks
-            self.without_checksum += 1
-            return content(self.file, segment, self.budget)
-        head = mcap_layout.chunk_head(self.file, segment.at, self.size)
-        if (head.data_at, head.stored, head.size, head.compression) != (
-            segment.data_at,
-            segment.stored,
-            segment.size,
-            segment.compression,
-        ):
-            raise DamageError("differs from the index")
+        """Records of a segment, whose checksum must agree with the data; 0 means that there is none."""
         data = content(self.file, segment, self.budget)
-        if not segment.cut:
-            mcap_layout.check(data, head.crc)
-        self.without_checksum += not head.crc or segment.cut
+        is_checked = segment.crc and not segment.cut
+        if is_checked and zlib.crc32(data) != segment.crc:
+            raise DamageError("does not match its checksum")
+        self.without_checksum += not is_checked
         return data
 
     def _messages(

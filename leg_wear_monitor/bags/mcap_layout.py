@@ -9,6 +9,7 @@ from typing import IO, Any
 
 import attrs
 import numpy as np
+import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.records import Channel as ChannelRecord
@@ -28,7 +29,7 @@ _BLOCK = 2**17  # bytes per decompression step: the size limit of a zstd block
 _LARGEST_WINDOW = 2**27  # largest accepted window of a zstd frame [bytes]: the default limit of zstd
 
 
-def expand(data: bytes, compression: str, size: int) -> bytes:
+def expand(data: bytes, compression: str, size: int, is_cut: bool) -> bytes:
     """Decompress the content of a chunk.
 
     Parameters
@@ -37,46 +38,39 @@ def expand(data: bytes, compression: str, size: int) -> bytes:
     compression : str
     size : int
         Expected size [bytes]; decompression stops there, whatever size the data declare.
+    is_cut : bool
+        Whether the chunk is truncated: then as much as possible is decompressed.
 
     Raises
     ------
     DamageError
         If the data do not match the chunk header.
     """
-    if compression == "zstd":
-        content = _zstd(data, size)
-    elif compression == "lz4":
-        content = _lz4(data, size)
-    elif compression == "":
-        content = data
-    else:
-        raise DamageError(f"has compression {compression!r}, expected zstd, lz4 or none")
-    if len(content) != size:
+    import lz4.frame
+
+    try:
+        if compression == "zstd" and is_cut:
+            content = _join(expanded(BytesIO(data)), size)
+        elif compression == "zstd":
+            declared = zstandard.frame_content_size(data)
+            if declared not in (-1, size):
+                raise DamageError(f"contains {declared} bytes, expected {size}")
+            content = zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
+        elif compression == "lz4":
+            content = lz4.frame.LZ4FrameDecompressor().decompress(data, size if is_cut else size + 1)
+        elif compression == "":
+            content = data[:size] if is_cut else data
+        else:
+            raise DamageError(f"has compression {compression!r}, expected zstd, lz4 or none")
+    except (zstandard.ZstdError, RuntimeError, EOFError) as error:
+        raise DamageError(f"cannot be decompressed: {error}") from error
+    if len(content) != size and not is_cut:
         raise DamageError(f"contains {len(content)} bytes, expected {size}")
     return content
 
 
-def expand_part(data: bytes, compression: str, size: int) -> bytes:
-    """Decompress as much as possible of a truncated chunk; empty if nothing can be recovered."""
-    import lz4.frame
-
-    if compression == "":
-        return data[:size]
-    if compression == "zstd":
-        return _join(expanded(BytesIO(data)), size)
-    if compression == "lz4":
-        try:
-            part: bytes = lz4.frame.LZ4FrameDecompressor().decompress(data, size)
-        except RuntimeError:
-            return b""
-        return part
-    return b""
-
-
 def expanded(file: IO[bytes]) -> Iterator[bytes]:
     """Decompress a zstd file in parts of bounded size, up to its end or the first damage."""
-    import zstandard
-
     expander = zstandard.ZstdDecompressor(max_window_size=_LARGEST_WINDOW)
     parts = expander.read_to_iter(file, read_size=_PART, write_size=_BLOCK)
     while True:
@@ -89,37 +83,9 @@ def expanded(file: IO[bytes]) -> Iterator[bytes]:
         yield part
 
 
-def check(content: bytes, crc: int) -> None:
-    """Verify the checksum of a chunk's content; 0 means that there is no checksum.
-
-    Raises
-    ------
-    DamageError
-    """
-    if crc and zlib.crc32(content) != crc:
-        raise DamageError("does not match its checksum")
-
-
 def expand_message(data: bytes, most: int) -> bytes:
-    """Decompress a message; uncompressed messages are returned unchanged, unusable ones as empty bytes.
-
-    Parameters
-    ----------
-    data : bytes
-    most : int
-        Size limit of the content [bytes].
-    """
-    import zstandard
-
-    if not data.startswith(ZSTD_MAGIC):
-        return data
-    most = min(most, _LARGEST_MESSAGE)
-    try:
-        if zstandard.frame_content_size(data) > most:
-            return b""
-    except zstandard.ZstdError:
-        return b""
-    return _join(expanded(BytesIO(data)), most)
+    """Decompress a message, up to a number of bytes; an uncompressed message is returned unchanged."""
+    return _join(expanded(BytesIO(data)), min(most, _LARGEST_MESSAGE)) if data[:4] == ZSTD_MAGIC else data
 
 
 def _join(parts: Iterator[bytes], most: int) -> bytes:
@@ -130,28 +96,6 @@ def _join(parts: Iterator[bytes], most: int) -> bytes:
         if len(content) >= most:
             break
     return bytes(content)
-
-
-def _zstd(data: bytes, size: int) -> bytes:
-    import zstandard
-
-    try:
-        said = zstandard.frame_content_size(data)
-        if said not in (-1, size):
-            raise DamageError(f"contains {said} bytes, expected {size}")
-        return zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
-    except zstandard.ZstdError as error:
-        raise DamageError(f"cannot be decompressed: {error}") from error
-
-
-def _lz4(data: bytes, size: int) -> bytes:
-    import lz4.frame
-
-    try:
-        content: bytes = lz4.frame.LZ4FrameDecompressor().decompress(data, size + 1)
-    except (RuntimeError, EOFError) as error:
-        raise DamageError(f"cannot be decompressed: {error}") from error
-    return content
 
 
 # Records of an MCAP chunk, found in one pass over its bytes (https://mcap.dev/spec).
@@ -244,7 +188,7 @@ def walk(data, roles, out_messages, out_definitions, out_counts):
     out_counts[0]["read"] = at
 
 
-# Locations of the messages in an MCAP file, from its index; without a sound index, see `salvage`.
+# Locations of the messages in an MCAP file, from its index; without a sound one, see `mcap_file.by_scan`.
 
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -280,8 +224,8 @@ class Segment:
         File offset of the segment, file offset of its content, stored size of its content [bytes].
     size, compression, crc : int, str, int
         Uncompressed size [bytes], compression and checksum of the content; 0 means no checksum.
-    start_ns, end_ns : int
-        First and last log time declared by the file [ns].
+    start_ns : int
+        First log time declared by the file [ns].
     cut : bool
         Whether the file ends inside the segment.
     """
@@ -293,7 +237,6 @@ class Segment:
     compression: str = ""
     crc: int = 0
     start_ns: int = 0
-    end_ns: int = 0
     cut: bool = False
 
 
@@ -311,7 +254,7 @@ class Layout:
         Expected number of messages by channel; None if the file does not declare it.
     data_end, data_crc : int
         End of the data section [bytes], and its checksum; 0 if there is none.
-    losses, notes : list of str
+    losses : list of str
     """
 
     segments: list[Segment]
@@ -320,7 +263,6 @@ class Layout:
     data_end: int = 0
     data_crc: int = 0
     losses: list[str] = attrs.Factory(list)
-    notes: list[str] = attrs.Factory(list)
 
 
 def by_index(file: IO[bytes], size: int, budget: Budget) -> Layout | None:
@@ -341,10 +283,21 @@ def by_index(file: IO[bytes], size: int, budget: Budget) -> Layout | None:
     if _overlap(indexes):
         return None
     for index in sorted(indexes, key=lambda index: (index.message_start_time, index.chunk_start_offset)):
-        at, head = index.chunk_start_offset, RECORD_HEAD + _CHUNK_HEAD.size + 4 + len(index.compression) + 8
+        at = index.chunk_start_offset
         if at + index.chunk_length > size:
             return None
-        layout.segments.append(_indexed(index, at + head))
+        try:
+            head = chunk_head(file, at, size)
+            if (head.stored, head.size, head.compression) != (
+                index.compressed_size,
+                index.uncompressed_size,
+                index.compression,
+            ):
+                raise DamageError("differs from the index")
+        except DamageError as error:
+            layout.losses.append(f"chunk at byte {at} {error}: its messages are lost")
+        else:
+            layout.segments.append(attrs.evolve(head, start_ns=index.message_start_time))
     return layout
 
 
@@ -352,18 +305,6 @@ def _overlap(indexes: list[ChunkIndex]) -> bool:
     """Whether chunks overlap; a malicious index could list one chunk a million times."""
     spans = sorted((index.chunk_start_offset, index.chunk_length) for index in indexes)
     return any(at + length > after for (at, length), (after, _) in pairwise(spans))
-
-
-def _indexed(index: ChunkIndex, data_at: int) -> Segment:
-    return Segment(
-        at=index.chunk_start_offset,
-        data_at=data_at,
-        stored=index.compressed_size,
-        size=index.uncompressed_size,
-        compression=index.compression,
-        start_ns=index.message_start_time,
-        end_ns=index.message_end_time,
-    )
 
 
 def _footer(file: IO[bytes], size: int) -> tuple[int, int]:
@@ -415,7 +356,7 @@ def chunk_head(file: IO[bytes], at: int, size: int) -> Segment:
     head = file.read(RECORD_HEAD + _CHUNK_HEAD.size + 4 + 16 + 8)
     try:
         opcode, length = HEAD.unpack_from(head)
-        start, end, expanded, crc = _CHUNK_HEAD.unpack_from(head, RECORD_HEAD)
+        start, _, expanded, crc = _CHUNK_HEAD.unpack_from(head, RECORD_HEAD)
         text_at = RECORD_HEAD + _CHUNK_HEAD.size + 4
         (text,) = struct.unpack_from("<I", head, text_at - 4)
         if opcode != CHUNK or text > 16:
@@ -428,18 +369,8 @@ def chunk_head(file: IO[bytes], at: int, size: int) -> Segment:
     if stored != length - (data_at - at - RECORD_HEAD):
         raise DamageError("has lengths that contradict each other")
     available = max(0, min(stored, size - data_at))
-    limit = 2**63 - 1  # keeps a damaged time within the range of a stamp
-    return Segment(
-        at,
-        data_at,
-        available,
-        expanded,
-        compression,
-        crc,
-        min(start, limit),
-        min(end, limit),
-        available < stored,
-    )
+    start = min(start, 2**63 - 1)  # keeps a damaged time within the range of a stamp
+    return Segment(at, data_at, available, expanded, compression, crc, start, available < stored)
 
 
 def channels_of(records: Iterable[Any]) -> dict[int, Channel]:

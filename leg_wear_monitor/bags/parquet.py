@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
 
-import attrs
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,26 +27,7 @@ _VALUES = 1  # field of either header of data
 _DEEPEST = 8
 
 
-@attrs.frozen
-class Pages:
-    """What the pages of a column contain.
-
-    Attributes
-    ----------
-    values : int
-        With nulls: a value a row, if the column is no list.
-    size : int
-        Uncompressed [bytes].
-    are_checked : bool
-        Whether each has a checksum.
-    """
-
-    values: int
-    size: int
-    are_checked: bool
-
-
-def pages_of(file: IO[bytes], begin: int, stored: int, most: int) -> Pages:
+def pages_of(file: IO[bytes], begin: int, stored: int, most: int) -> tuple[int, int, bool]:
     """Pages of a column in a row group.
 
     Parameters
@@ -57,6 +37,15 @@ def pages_of(file: IO[bytes], begin: int, stored: int, most: int) -> Pages:
         Offset and size of the column [bytes].
     most : int
         Values that are expected; there cannot be many more pages.
+
+    Returns
+    -------
+    values : int
+        With nulls: a value a row, if the column is no list.
+    size : int
+        Uncompressed [bytes].
+    are_checked : bool
+        Whether each has a checksum.
 
     Raises
     ------
@@ -81,7 +70,7 @@ def pages_of(file: IO[bytes], begin: int, stored: int, most: int) -> Pages:
         values, size, at = values + found, size + expanded, at + window.at + compressed
     if at != begin + stored:
         raise DamageError("has pages beyond its end")
-    return Pages(values, size, are_checked)
+    return values, size, are_checked
 
 
 class _Compact:
@@ -260,13 +249,14 @@ class ParquetFile:
                 continue
             starts = (column.dictionary_page_offset, column.data_page_offset)
             begin = min(start for start in starts if start)
-            pages = pages_of(self._content, begin, column.total_compressed_size, head.num_rows)
-            if not pages.values == column.num_values == head.num_rows:
-                text = f"column {column.path_in_schema!r} has {pages.values} rows in its pages"
+            stored = column.total_compressed_size
+            values, expanded, are_checked = pages_of(self._content, begin, stored, head.num_rows)
+            if not values == column.num_values == head.num_rows:
+                text = f"column {column.path_in_schema!r} has {values} rows in its pages"
                 declared = f"the footer declares {column.num_values} and {head.num_rows}"
                 raise DamageError(f"{text}, of which {declared}")
-            self._are_checked &= pages.are_checked
-            size += max(pages.size, column.total_uncompressed_size)
+            self._are_checked &= are_checked
+            size += max(expanded, column.total_uncompressed_size)
         self._budget.check(2 * size)
 
     def _find(self, first: int, rows: int, fault: str) -> None:

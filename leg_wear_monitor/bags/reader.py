@@ -363,7 +363,7 @@ class Recording:
             self._sources, lost = bag.open_sources(bag_files, config, self._budget, stack)
             given = {"joint_states": joint_states, "drive_torque": drive_torque, "foot_load": foot_load}
             given["dynamic_joint_states"] = drive_torque
-            self.topics, missing = bag.assign(self._sources, bag.roles(config, given))
+            self.topics, missing = bag.assign(self._sources, config, given)
             self._findings += lost + missing + check_topics(self._sources, self.topics, joint_states)
             self._close = stack.pop_all()
         recordings = [source.bag_file.recording for source in self._sources]

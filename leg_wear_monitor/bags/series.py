@@ -7,7 +7,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.bags.bag import Recordable, Role, Source, check_channel, find_files, open_sources
+from leg_wear_monitor.bags.bag import Recordable, Source, check_channel, find_files, open_sources
 from leg_wear_monitor.bags.findings import Budget, Finding, RecordingError, Severity
 from leg_wear_monitor.bags.mcap_layout import Channel
 from leg_wear_monitor.estimate.torque_model import Series, series
@@ -166,7 +166,7 @@ def _select(
             if stream is None:
                 continue
             try:
-                check_channel(Role(stream, channel.topic), channel, known, str(path))
+                check_channel(stream, channel, known, str(path))
             except RecordingError as error:
                 findings.append(Finding(path, f"{error.key} {error.fault}: it is not read", Severity.NOTE))
                 continue

@@ -1,7 +1,7 @@
 """Layout of tables: columns, rows, stamps, units that are plausible, damage."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from decimal import Decimal
 from pathlib import Path
 
@@ -163,16 +163,11 @@ class LostLines:
     word: str = "line"
     count: int = attrs.field(init=False, default=0)
 
-    def add(self, line: int, fault: str) -> None:
-        """Report a line."""
-        self.count += 1
-        if self.count <= _MOST:
-            self.findings.append(Finding(self.path, f"{self.word} {line} is lost: {fault}"))
-
-    @property
-    def left(self) -> int:
-        """Number of lines that are still reported one by one."""
-        return max(0, _MOST - self.count)
+    def add(self, line: NDArray[np.int64], lost: NDArray[np.int64], fault: Callable[[int], str]) -> None:
+        """Report what is wrong with the lost ones among some lines, by their indices, and count them."""
+        for k in lost[: max(0, _MOST - self.count)].tolist():
+            self.findings.append(Finding(self.path, f"{self.word} {line[k]} is lost: {fault(k)}"))
+        self.count += len(lost)
 
     def close(self) -> None:
         """Report how many more there are; after the last line."""
@@ -284,19 +279,6 @@ _FAR = 2.0  # beyond this factor of the commanded speed no gait cycle counts (`m
 _APART = 1.25  # speed column against the speed of the angle
 
 
-@attrs.frozen
-class _Turning:
-    """How the crank's joint turns: angle passed [rad], time passed [s], where both are known."""
-
-    angle_rad: float
-    time_s: float
-
-    @property
-    def rpm(self) -> float:
-        """Mean speed [rpm]."""
-        return 60.0 * self.angle_rad / TURN / self.time_s
-
-
 def unit_doubts(rows: Rows, config: MonitorConfig) -> Iterator[str]:
     """Doubts about units from the first rows of a table."""
     chosen = rows.measured[CRANK_ANGLE] & np.isfinite(rows.values[CRANK_ANGLE])
@@ -312,10 +294,10 @@ def unit_doubts(rows: Rows, config: MonitorConfig) -> Iterator[str]:
     if _wraps(angle):
         turned = (turned + math.pi) % TURN - math.pi
     ahead = steps_s > 0.0
-    turning = _Turning(float(turned[ahead].sum()), float(steps_s[ahead].sum()))
-    if abs(turning.angle_rad) < _LEAST_TURNS * TURN:
+    turns = float(turned[ahead].sum()) / TURN
+    if abs(turns) < _LEAST_TURNS:
         return
-    if hint := _cadence(turning, config):
+    if hint := _cadence(60.0 * turns / float(steps_s[ahead].sum()), config):
         yield hint
     if CRANK_SPEED in rows.values:
         speed = rows.values[CRANK_SPEED][chosen][1:][ahead]
@@ -341,18 +323,16 @@ def _other_turn(angle: Floats, config: MonitorConfig) -> str:
     raw = (span + step) / of_unit
     for other, turn in turns.items():
         if other != unit and max(raw / turn, turn / raw) < _SAME:
-            key, value = (
-                "input.units.crank_angle",
-                f"the angle jumps back by about {raw:.3g} each turn",
-            )
-            return f"{value}, in {unit!r} a turn is {turns[unit]:.4g}: is it in {other!r} ({key})?"
+            value = f"the angle jumps back by about {raw:.3g} each turn"
+            text = f"{value}, in {unit!r} a turn is {turns[unit]:.4g}: is it in {other!r}"
+            return f"{text} (input.units.crank_angle)?"
     return ""
 
 
-def _cadence(turning: _Turning, config: MonitorConfig) -> str:
+def _cadence(joint_rpm: float, config: MonitorConfig) -> str:
     """Doubt about the time or the angle, if another unit gives the commanded cadence."""
     units, found = config.input.units, []
-    rpm, commanded = abs(turning.rpm) / config.crank.gear_ratio, abs(config.cadence.commanded_rpm)
+    rpm, commanded = abs(joint_rpm) / config.crank.gear_ratio, abs(config.cadence.commanded_rpm)
     if 1.0 / _FAR <= rpm / commanded <= _FAR:
         return ""
     if units.stamp in tables.STAMPS and not config.input.rate_hz:

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
 
-import attrs
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,27 +24,20 @@ _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 _SEPARATORS = ",;\t"
 
 
-@attrs.frozen
-class Lines:
-    """Complete lines of a file.
+def blocks(
+    path: Path, file: IO[bytes], size: int, findings: list[Finding]
+) -> Iterator[tuple[list[str], int, int]]:
+    """Complete lines, about `size` bytes at a time; what is not a complete line becomes a finding.
 
-    Attributes
-    ----------
+    Yields
+    ------
     texts : list of str
-        Without line breaks.
+        Lines without line breaks.
     first : int
-        Number of the first line, from 1.
+        Number of the first one, from 1.
     stored : int
         Their bytes in the file.
     """
-
-    texts: list[str]
-    first: int
-    stored: int
-
-
-def blocks(path: Path, file: IO[bytes], size: int, findings: list[Finding]) -> Iterator[Lines]:
-    """Complete lines, about `size` bytes at a time; what is not a complete line becomes a finding."""
     file.seek(0)
     number, rest, at = 1, b"", 0
     while part := file.read(size):
@@ -54,7 +46,7 @@ def blocks(path: Path, file: IO[bytes], size: int, findings: list[Finding]) -> I
             if not at:
                 text = text.removeprefix(_UTF8_MARK)
             texts = text.decode("utf-8", "surrogateescape").split("\n")
-            yield Lines(texts, number, len(text) + 1)
+            yield texts, number, len(text) + 1
             number += len(texts)
         elif len(rest) >= size:
             findings.append(
@@ -131,8 +123,8 @@ class CsvFile:
         first = next(blocks(path, file, self._block, []), None)
         if first is None:
             raise RecordingError(str(path), "", "has no complete line, expected the names of the columns")
-        self._separator = separator_of(path, first.texts[0])
-        names = self._names(first.texts[0])
+        self._separator = separator_of(path, first[0][0])
+        names = self._names(first[0][0])
         self._has_header = not all(map(is_number, names))
         self.names = names if self._has_header else [str(k + 1) for k in range(len(names))]
         self._columns = table_layout.columns_of(config)
@@ -140,10 +132,10 @@ class CsvFile:
 
     def parts(self) -> Iterator[table_layout.Rows]:
         """All sound rows, block by block."""
-        for lines in blocks(self._path, self._file, self._block, self._findings):
-            rows, numbers = self._rows(lines)
-            skipped = 1 if lines.first == 1 and self._has_header else 0
-            yield self._converted(rows[skipped:], numbers[skipped:], lines.stored)
+        for texts, first, stored in blocks(self._path, self._file, self._block, self._findings):
+            rows, line = self._rows(texts), first + np.arange(len(texts))
+            skipped = 1 if first == 1 and self._has_header else 0
+            yield self._converted(rows[skipped:], line[skipped:], stored)
         self._lost.close()
 
     def _names(self, header: str) -> list[str]:
@@ -154,17 +146,14 @@ class CsvFile:
     def _reader(self, texts: Sequence[str]) -> "Iterator[_Row]":
         return csv.reader(texts, delimiter=self._separator, skipinitialspace=self._separator == " ")
 
-    def _rows(self, lines: Lines) -> tuple[list[_Row], NDArray[np.int64]]:
-        """Cells of complete rows and their line numbers; blank lines are none."""
+    def _rows(self, texts: list[str]) -> list[_Row]:
+        """Cells of lines."""
         try:
-            rows = list(self._reader(lines.texts))
+            rows = list(self._reader(texts))
         except csv.Error:
-            rows = [self._one(text) for text in lines.texts]
-        numbers = lines.first + np.arange(len(rows))
-        if len(rows) != len(lines.texts):  # a cell in quotes contains a line break
-            rows = [self._one(text) for text in lines.texts]
-            numbers = lines.first + np.arange(len(rows))
-        return rows, numbers
+            rows = []
+        # otherwise, a cell in quotes contains a line break
+        return rows if len(rows) == len(texts) else [self._one(text) for text in texts]
 
     def _one(self, text: str) -> _Row:
         try:
@@ -196,10 +185,13 @@ class CsvFile:
         if all(len(row) == expected for row in rows):
             return rows, line
         complete = np.array([len(row) == expected for row in rows], bool)
-        for k in np.flatnonzero(~complete):
-            if any(cell.strip() for cell in rows[k]):  # else a blank line
-                hint = "; decimal commas?" if self._separator == "," and len(rows[k]) > expected else ""
-                self._lost.add(int(line[k]), f"{len(rows[k])} cells, expected {expected}{hint}")
+        is_blank = np.array([not any(cell.strip() for cell in row) for row in rows], bool)
+
+        def fault(k: int) -> str:
+            hint = "; decimal commas?" if self._separator == "," and len(rows[k]) > expected else ""
+            return f"{len(rows[k])} cells, expected {expected}{hint}"
+
+        self._lost.add(line, np.flatnonzero(~complete & ~is_blank), fault)
         return [row for row in rows if len(row) == expected], line[complete]
 
     def _regular(self, line: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -227,27 +219,24 @@ class CsvFile:
     def _report(
         self, column: table_layout.Column, texts: list[str], line: NDArray[np.int64], bad: NDArray[np.bool_]
     ) -> None:
-        for k in np.flatnonzero(bad):
-            self._lost.add(int(line[k]), f"column {column.name!r}: {_fault(column, texts[k])}")
+        self._lost.add(
+            line, np.flatnonzero(bad), lambda k: f"column {column.name!r}: {_fault(column, texts[k])}"
+        )
 
 
 def _numbers(texts: list[str]) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
     """Numbers of cells, whether anything is in the cell, and whether that is not a number."""
+    is_there, bad = np.ones(len(texts), bool), np.zeros(len(texts), bool)
     try:
-        found = np.array(list(map(float, texts)), float)
+        return np.array(list(map(float, texts)), float), is_there, bad
     except ValueError:
-        found, is_there, bad = (
-            np.full(len(texts), np.nan),
-            np.ones(len(texts), bool),
-            np.zeros(len(texts), bool),
-        )
-        for k, text in enumerate(texts):
-            is_there[k] = bool(text.strip())
-            bad[k] = is_there[k] and not is_number(text)
-            if is_there[k] and not bad[k]:
-                found[k] = float(text)
-        return found, is_there, bad
-    return found, np.ones(len(texts), bool), np.zeros(len(texts), bool)
+        found = np.full(len(texts), np.nan)
+    for k, text in enumerate(texts):
+        is_there[k] = bool(text.strip())
+        bad[k] = is_there[k] and not is_number(text)
+        if is_there[k] and not bad[k]:
+            found[k] = float(text)
+    return found, is_there, bad
 
 
 def _fault(column: table_layout.Column, text: str) -> str:
@@ -338,14 +327,13 @@ def rows_of(
     rows = table_layout.Rows(row + 1, stamps, values, there, stored)
     if good.all():
         return rows
-    bad = np.flatnonzero(~good)
-    shown = bad[: lost.left]
-    for k in shown:
-        time, unit = arrays[table_layout.STAMP][k], table.units.stamp
+
+    def fault(k: int) -> str:
+        time = arrays[table_layout.STAMP][k]
         is_there = measured[table_layout.STAMP][k] and not (isinstance(time, np.floating) and np.isnan(time))
-        fault = f"{time} {unit} is no time from 1902 to 2038" if is_there else "has no time"
-        lost.add(int(row[k]) + 1, fault)
-    lost.count += len(bad) - len(shown)
+        return f"{time} {table.units.stamp} is no time from 1902 to 2038" if is_there else "has no time"
+
+    lost.add(row + 1, np.flatnonzero(~good), fault)
     return rows.part(good)
 
 
@@ -402,14 +390,8 @@ class Frame:
         """All sound rows, block by block."""
         for begin in range(0, self._rows, _ROWS):
             chosen = {key: array[begin : begin + _ROWS] for key, array in self._arrays.items()}
-            there = {
-                key: ~np.isnan(array)
-                if array.dtype.kind == "f"
-                else ~np.isnat(array)
-                if array.dtype.kind == "M"
-                else np.ones(len(array), bool)
-                for key, array in chosen.items()
-            }
+            # neither NaN nor NaT equals itself
+            there = {key: np.asarray(array == array) for key, array in chosen.items()}
             stored = self.size * min(_ROWS, self._rows - begin) // self._rows
             yield rows_of(self._columns, chosen, there, begin, stored, self._config, self._lost)
         self._lost.close()

@@ -152,7 +152,7 @@ class Trends:
         columns: dict[str, Any] = {name: _column(row.leg.get(name) for row in rows) for name in CYCLE_COLUMNS}
         columns |= {
             name: {joint: _column(row.joints.get(name, {}).get(joint) for row in rows) for joint in joints}
-            for name in (*SUMMARY_COLUMNS.values(), *SEEN_COLUMNS)
+            for name in SUMMARY_COLUMNS.values()
         }
         stamps = np.array([row.stamp_ns for row in rows], np.int64)
         return ReplayHistory(stamp_ns=stamps, **columns)

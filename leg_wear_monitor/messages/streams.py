@@ -57,73 +57,27 @@ class Stream:
     is_needed: bool = False
 
 
+_JOINTS = "Header header", "string[] name", "float64[] position", "float64[] velocity", "float64[] effort"
+_INTERFACES = "Header header", "string[] joint_names", "InterfaceValue[] interface_values"
+_WRENCH = "Header header", "Wrench wrench"
+
 STREAMS = (
-    Stream(
-        code=JOINT_STATE,
-        topic="joint_states",
-        type="sensor_msgs/msg/JointState",
-        fields=(
-            "Header header",
-            "string[] name",
-            "float64[] position",
-            "float64[] velocity",
-            "float64[] effort",
-        ),
-        kind=CRANK,  # also carries the angles of further encoders, and the torque if its source is the effort
-        is_needed=True,
-    ),
-    Stream(
-        code=WRENCH_STAMPED,
-        topic="drive_torque",
-        type="geometry_msgs/msg/WrenchStamped",
-        fields=("Header header", "Wrench wrench"),
-        kind=TORQUE,
-        torque_source="wrench",
-    ),
-    Stream(
-        code=FLOAT64,
-        topic="drive_torque",
-        type="std_msgs/msg/Float64",
-        fields=("float64 data",),
-        kind=TORQUE,
-        torque_source="float64",
-        has_stamp=False,
-    ),
-    Stream(
-        code=INTERFACES,
-        topic="dynamic_joint_states",
-        type="control_msgs/msg/DynamicJointState",
-        fields=("Header header", "string[] joint_names", "InterfaceValue[] interface_values"),
-        kind=TORQUE,
-        torque_source="interface",
-    ),
-    Stream(
-        code=LOAD_WRENCH,
-        topic="foot_load",
-        type="geometry_msgs/msg/WrenchStamped",
-        fields=("Header header", "Wrench wrench"),
-        kind=LOAD,
-        load_source="wrench",
-    ),
-    Stream(
-        code=LOAD_FLOAT64,
-        topic="foot_load",
-        type="std_msgs/msg/Float64",
-        fields=("float64 data",),
-        kind=LOAD,
-        load_source="float64",
-        has_stamp=False,
-    ),
-    Stream(
-        code=CONTACT,
-        topic="foot_load",
-        type="std_msgs/msg/Bool",
-        fields=("bool data",),
-        kind=LOAD,
-        load_source="contact",
-        has_stamp=False,
-    ),
-)
+    # also carries the angles of further encoders, and the torque if its source is the effort
+    Stream(code=JOINT_STATE, topic="joint_states", type="sensor_msgs/msg/JointState", fields=_JOINTS,
+           kind=CRANK, is_needed=True),
+    Stream(code=WRENCH_STAMPED, topic="drive_torque", type="geometry_msgs/msg/WrenchStamped", fields=_WRENCH,
+           kind=TORQUE, torque_source="wrench"),
+    Stream(code=FLOAT64, topic="drive_torque", type="std_msgs/msg/Float64", fields=("float64 data",),
+           kind=TORQUE, torque_source="float64", has_stamp=False),
+    Stream(code=INTERFACES, topic="dynamic_joint_states", type="control_msgs/msg/DynamicJointState",
+           fields=_INTERFACES, kind=TORQUE, torque_source="interface"),
+    Stream(code=LOAD_WRENCH, topic="foot_load", type="geometry_msgs/msg/WrenchStamped", fields=_WRENCH,
+           kind=LOAD, load_source="wrench"),
+    Stream(code=LOAD_FLOAT64, topic="foot_load", type="std_msgs/msg/Float64", fields=("float64 data",),
+           kind=LOAD, load_source="float64", has_stamp=False),
+    Stream(code=CONTACT, topic="foot_load", type="std_msgs/msg/Bool", fields=("bool data",),
+           kind=LOAD, load_source="contact", has_stamp=False),
+)  # fmt: skip
 
 
 def streams_read(torque_source: str, load_source: str = "none") -> tuple[Stream, ...]:
@@ -224,15 +178,12 @@ class Definition:
 
     Attributes
     ----------
-    name : str
-        Such as ``sensor_msgs/msg/JointState``.
     text : str
         Definition in ros2msg format, including those of all nested types.
     digest : str
         Type hash of REP-2011, ``RIHS01_...``.
     """
 
-    name: str
     text: str
     digest: str
 
@@ -262,7 +213,7 @@ def types() -> "Typestore":
 def definition(name: str) -> Definition:
     """Definition of a message type of ROS 2's common interfaces or of ros2_control."""
     text, _ = types().generate_msgdef(name, ros_version=2)
-    return Definition(name, text, types().hash_rihs01(name))
+    return Definition(text, types().hash_rihs01(name))
 
 
 # Times of forecast messages: a minute after the last one, after an alarm change, on a new answer.

@@ -10,6 +10,7 @@ import numpy as np
 
 from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.bags.mcap_writer import McapWriter
+from leg_wear_monitor.files import or_nan
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.messages.encode import LegDrawing
 from leg_wear_monitor.messages.leg_markers import LegMarkers
@@ -17,7 +18,7 @@ from leg_wear_monitor.messages.outputs import ALARMS, DIAGNOSTICS, FORECAST, STA
 from leg_wear_monitor.messages.streams import ForecastTimes, topic_of
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.parameters import NODE
-from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, JointReport, Reports
+from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, Reports
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.state import Level
 
@@ -33,11 +34,13 @@ JOINT_COLUMNS = (
     "mean_force_n",
     "impacts",
 )
-SUMMARY_COLUMNS = {name: name.replace("clearance_", "counted_") for name in JOINT_COLUMNS}
-"""Names of these columns in a summary, whose one clearance of a joint is the believed one."""
-
 SEEN_COLUMNS = ("seen_m", "seen_sigma_m")
 """What encoders or the drive torque show best of a joint."""
+
+_OF_A_JOINT = (*JOINT_COLUMNS, *SEEN_COLUMNS)
+
+SUMMARY_COLUMNS = {name: name.replace("clearance_", "counted_") for name in _OF_A_JOINT}
+"""Names of the columns of a joint in a summary, whose one clearance of a joint is the believed one."""
 
 CYCLE_COLUMNS = (
     "cycle",
@@ -79,7 +82,6 @@ class History:
         self._stamps = array("q")
         self._cycles = array("d")
         self._joints = array("d")
-        self._seen = array("d")
         self._before: dict[str, Alarm] = {}
 
     def __len__(self) -> int:
@@ -91,8 +93,7 @@ class History:
         self._stamps.append(report.stamp_ns)
         self._cycles.extend(float(getattr(report, name)) for name in CYCLE_COLUMNS)
         for joint in report.joints:
-            self._joints.extend(_number(joint, name) for name in JOINT_COLUMNS)
-            self._seen.extend(_number(joint, name) for name in SEEN_COLUMNS)
+            self._joints.extend(or_nan(getattr(joint, name)) for name in _OF_A_JOINT)
 
     def add_alarms(self, alarms: AlarmList) -> None:
         """Add the alarms of a list that have changed."""
@@ -115,20 +116,10 @@ class History:
         table = np.array(self._cycles).reshape(len(self), len(CYCLE_COLUMNS))
         return table[:, CYCLE_COLUMNS.index(name)]
 
-    def seen_column(self, name: str) -> Floats:
-        """One of `SEEN_COLUMNS`, shape (cycles, clearance joints); NaN where nothing is shown."""
-        table = np.array(self._seen).reshape(len(self), len(self.clearance_joints), len(SEEN_COLUMNS))
-        return table[:, :, SEEN_COLUMNS.index(name)]
-
     def joint_column(self, name: str) -> Floats:
-        """One of `JOINT_COLUMNS`, shape (cycles, clearance joints); NaN where it is unknown."""
-        table = np.array(self._joints).reshape(len(self), len(self.clearance_joints), len(JOINT_COLUMNS))
-        return table[:, :, JOINT_COLUMNS.index(name)]
-
-
-def _number(joint: JointReport, name: str) -> float:
-    value = getattr(joint, name)
-    return float("nan") if value is None else float(value)
+        """One of `JOINT_COLUMNS` or `SEEN_COLUMNS`, shape (cycles, clearance joints); NaN where unknown."""
+        table = np.array(self._joints).reshape(len(self), len(self.clearance_joints), len(_OF_A_JOINT))
+        return table[:, :, _OF_A_JOINT.index(name)]
 
 
 # Writes reports to an MCAP file, as the messages that a live node would have published.

@@ -6,7 +6,7 @@ What the verdict does not believe has no remaining life.
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import attrs
 import numpy as np
@@ -17,15 +17,14 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import is_on_ground, outline_of
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms import ADVICE
-from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
 from leg_wear_monitor.monitor.gait_evidence import GaitEvidence
 from leg_wear_monitor.monitor.ledger.entry import VerdictEvent
 from leg_wear_monitor.monitor.leg_state import leg_alarm
-from leg_wear_monitor.monitor.reports import JointReport, Status
+from leg_wear_monitor.monitor.reports import JointReport
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
-from leg_wear_monitor.playback.history import CYCLE_COLUMNS, SEEN_COLUMNS, SUMMARY_COLUMNS, History
+from leg_wear_monitor.playback.history import CYCLE_COLUMNS, SUMMARY_COLUMNS, History
 from leg_wear_monitor.playback.result import (
     EncoderEvidence,
     LegJoint,
@@ -46,7 +45,6 @@ from leg_wear_monitor.shown import Drawable
 from leg_wear_monitor.state import AlarmChange, Evidence, Figure, State, Verdict
 from leg_wear_monitor.twin import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import Samples, brings
-from leg_wear_monitor.twin.statistics import Sampling
 from leg_wear_monitor.wear import BUSHING, JOURNAL
 
 # Condition of the leg at the end of a replay; what the verdict does not believe has no remaining life.
@@ -98,6 +96,8 @@ _RANGED = (
     "load_n",
     "friction_nm",
 )
+_Record = TypeVar("_Record", EncoderEvidence, ReplaySampling, ReplayStatus)
+
 _LONGER, _LONGER_S = 1.05, 1.0  # stamps may span this factor times, plus these seconds, the logged time
 
 
@@ -210,9 +210,9 @@ def summary(
         forecast=told,
         measurements=tuple(monitor.measurements),
         walked=monitor.walked,
-        status=tuple(map(_status, monitor.status())),
+        status=tuple(_view(ReplayStatus, status) for status in monitor.status()),
         lost=monitor.lost,
-        sampling=_sampling(monitor.sampling),
+        sampling=_view(ReplaySampling, monitor.sampling) if monitor.sampling else None,
         history=_history(result.history),
         wear_depth_m=_wear(result),
         advice=ADVICE,
@@ -220,15 +220,9 @@ def summary(
     )
 
 
-def _sampling(sampling: Sampling | None) -> ReplaySampling | None:
-    if sampling is None:
-        return None
-    return ReplaySampling(
-        fraction=sampling.fraction,
-        followed_cycles=sampling.followed_cycles,
-        estimated_cycles=sampling.estimated_cycles,
-        blocks=sampling.blocks,
-    )
+def _view(kind: type[_Record], of: object) -> _Record:
+    """A record of the attributes of another one with the same names."""
+    return kind(**{field.name: getattr(of, field.name) for field in attrs.fields(kind)})
 
 
 def _recording(result: ReplayResult) -> ReplayRecording:
@@ -314,7 +308,7 @@ def _joint(history: History, k: int, joint: JointReport, verdict: Verdict) -> Re
         forecast=joint_forecast(joint.forecast, verdict),
         peak_force_n=_of_known(np.max, peak),
         mean_force_n=_of_known(np.mean, mean),
-        encoders=_by_encoders(joint.seen) if joint.seen else None,
+        encoders=_view(EncoderEvidence, joint.seen) if joint.seen else None,
         impacts=int(np.nansum(impacts)),
         load=joint.load,
         sampling_sigma_m=joint.sampling_sigma_m,
@@ -327,23 +321,9 @@ def _of_known(statistic: Callable[[Floats], Any], values: Floats) -> float | Non
     return float(statistic(known)) if len(known) else None
 
 
-def _by_encoders(seen: ClearanceEstimate) -> EncoderEvidence:
-    return EncoderEvidence(
-        observation=seen.observation,
-        departure_m=seen.departure_m,
-        sigma_m=seen.sigma_m,
-        believed=seen.believed,
-        is_other=seen.is_other,
-    )
-
-
 def _changes(result: ReplayResult) -> tuple[AlarmChange, ...]:
     changes = result.history.changes
     return tuple(AlarmChange(stamp_ns=stamp_ns, alarm=leg_alarm(alarm)) for stamp_ns, alarm in changes)
-
-
-def _status(status: Status) -> ReplayStatus:
-    return ReplayStatus(**attrs.asdict(status, recurse=False))
 
 
 def _history(history: History) -> ReplayHistory:
@@ -353,9 +333,6 @@ def _history(history: History) -> ReplayHistory:
     for name, shown in SUMMARY_COLUMNS.items():
         thinned = _thinned(name, history.joint_column(name), last)
         columns[shown] = {joint: thinned[:, k] for k, joint in enumerate(history.clearance_joints)}
-    for name in SEEN_COLUMNS:
-        seen = history.seen_column(name)[last]
-        columns[name] = {joint: seen[:, k] for k, joint in enumerate(history.clearance_joints)}
     if len(history) > len(last):
         begins = _begins(last)
         for name, reduced in (("lowest", np.fmin), ("highest", np.fmax)):  # of those that are known

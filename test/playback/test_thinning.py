@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS, SEEN_COLUMNS, History
+from leg_wear_monitor.playback.history import CYCLE_COLUMNS, SUMMARY_COLUMNS, History
 from leg_wear_monitor.playback.summary import POINTS, _history
 
 pytestmark = pytest.mark.plain
@@ -13,8 +13,7 @@ def long_history(cycles):
     history, draw = History(("A", "B")), np.random.default_rng(3)
     history._stamps.extend(range(cycles))
     history._cycles.extend(draw.normal(size=cycles * len(CYCLE_COLUMNS)))
-    history._joints.extend(draw.normal(size=cycles * 2 * len(JOINT_COLUMNS)))
-    history._seen.extend(draw.normal(size=cycles * 2 * len(SEEN_COLUMNS)))
+    history._joints.extend(draw.normal(size=cycles * 2 * len(SUMMARY_COLUMNS)))
     return history
 
 

@@ -72,12 +72,8 @@ def write(walked: tuple[Samples, Samples], tmp_path: Path) -> Callable[..., Path
                 channel = writer.channel("/dynamic_joint_states", encode.DYNAMIC_JOINT_STATE)
                 writer.write_many(channel, torque["stamp_ns"] + TRANSPORT_NS, rows)
             if source == "float64":
-                channel = writer.channel("/drive_torque", "std_msgs/msg/Float64")
-                head = np.frombuffer(b"\0\1\0\0", np.uint8)
-                rows = np.stack(
-                    [np.append(head, np.frombuffer(value.tobytes(), np.uint8)) for value in values]
-                )
-                writer.write_many(channel, torque["stamp_ns"] + TRANSPORT_NS, rows)
+                channel = writer.channel("/drive_torque", encode.FLOAT64)
+                writer.write_many(channel, torque["stamp_ns"] + TRANSPORT_NS, encode.float64s(values))
         return path
 
     return bag

@@ -7,7 +7,7 @@ import pytest
 from made_up_summary import made_up_summary
 
 from leg_wear_monitor import ConfigError
-from leg_wear_monitor.playback.history import CYCLE_COLUMNS, SEEN_COLUMNS, SUMMARY_COLUMNS
+from leg_wear_monitor.playback.history import CYCLE_COLUMNS, SUMMARY_COLUMNS
 from leg_wear_monitor.playback.result import ReplayJoint, columns_of, summary_of
 from leg_wear_monitor.state import JointClearance
 
@@ -54,7 +54,7 @@ def test_json_has_a_version_and_null_for_what_is_not_known(summary):
     assert record["alarms"]["now"][0]["level"] == "WARN" and record["alarms"]["now"][0]["worst"] is None
     assert record["status"][0]["values"] == {"cadence_rpm": None}
     assert record["history"]["cycle"] == [1.0, None]
-    columns = ["stamp_ns", *CYCLE_COLUMNS, *SUMMARY_COLUMNS.values(), *SEEN_COLUMNS, "lowest", "highest"]
+    columns = ["stamp_ns", *CYCLE_COLUMNS, *SUMMARY_COLUMNS.values(), "lowest", "highest"]
     assert list(record["history"]) == columns
 
 

@@ -222,10 +222,9 @@ class McapFile:
         self._check_magic()
         indexed = mcap_layout.by_index(file, self.size, budget)
         self.layout = indexed or by_scan(file, self.size, budget)
-        self.is_indexed = indexed is not None
         for text in self.layout.losses:
             self._add_finding(text)
-        if not (self.is_indexed or self.layout.losses):
+        if indexed is None and not self.layout.losses:
             self._add_finding("has no index, or a damaged one: read from start to end", Severity.NOTE)
         self._check_data()
 

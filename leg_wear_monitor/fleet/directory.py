@@ -144,10 +144,6 @@ class LegDirectory:
         learned = self.priors.read_bytes() if self.priors.exists() else b""
         return hashlib.sha256(measurements_of(self.ledger).encode() + b"\0" + learned).hexdigest()[:20]
 
-    def keys(self) -> set[str]:
-        """Keys of all recordings so far."""
-        return {line["key"] for line in self.lines()}
-
     def add(self, line: Line, words: str) -> None:
         """Add the record of a recording, and its line in the log; it is no longer pending."""
         append_line(self.records, json.dumps(line, allow_nan=False))
@@ -172,7 +168,7 @@ class LegDirectory:
 
     def pending(self) -> Line | None:
         """Record of the recording that may or may not be in the ledger; None if there is none."""
-        return _read(self._pending)
+        return json_object(self._pending) if self._pending.exists() else None
 
     def expect(self, line: Line) -> None:
         """Write a record down before its recording is in the ledger."""
@@ -185,20 +181,13 @@ class LegDirectory:
     def files(self) -> Line:
         """Known files by path; empty if nothing usable is there, since it can be found again."""
         try:
-            return _read(self._files) or {}
+            return json_object(self._files)
         except ConfigError:
             return {}
 
     def keep_files(self, files: Mapping[str, Any]) -> None:
         """Replace the known files."""
         write_whole(self._files, json.dumps(files).encode())
-
-
-def _read(path: Path) -> Line | None:
-    try:
-        return _object(path.read_bytes(), str(path))
-    except FileNotFoundError:
-        return None
 
 
 def json_object(path: Path) -> Line:

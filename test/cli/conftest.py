@@ -33,6 +33,20 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
 
 
 @pytest.fixture
+def refused(run: Run) -> Callable[..., str]:
+    """Call the command line with what cannot be: exit code 2, nothing on stdout; the one line on stderr."""
+
+    def call(*arguments: str) -> str:
+        result = run(*arguments)
+        (line,) = result.stderr.splitlines()
+        assert (result.exit_code, result.stdout) == (2, "")
+        assert line.startswith("error: ")
+        return line
+
+    return call
+
+
+@pytest.fixture
 def shipped() -> Callable[[str], str]:
     """Text of a mechanism that comes with the package."""
     return lambda name: (share_directory() / "config" / "mechanisms" / f"{name}.yaml").read_text()

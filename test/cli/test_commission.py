@@ -56,7 +56,7 @@ def test_a_reference_is_written_beside_the_parameters(run, tmp_path: Path, monke
     assert "references at 60 rpm" in result.stdout
 
 
-def test_an_unknown_crank_is_named_with_the_joints_that_there_are(run) -> None:
-    result = run("commission", str(HEALTHY), "--crank-joint", "knee")
-    assert result.exit_code == 2
-    assert "'knee' is not a joint of the recording, it has crank" in result.stderr
+def test_an_unknown_crank_is_named_with_the_joints_that_there_are(refused) -> None:
+    assert "'knee' is not a joint of the recording, it has crank" in refused(
+        "commission", str(HEALTHY), "--crank-joint", "knee"
+    )

@@ -85,11 +85,8 @@ def test_a_table_gives_the_play(run, table: str, one: Rocks) -> None:
         ((), "--joint"),
     ],
 )
-def test_a_bad_table_is_one_line(run, table: str, options: tuple[str, ...], said: str) -> None:
-    result = run("play", table, *options, "--config", "units.yaml")
-    assert result.exit_code == 2
-    (line,) = result.stderr.splitlines()
-    assert said in line
+def test_a_bad_table_is_one_line(refused, table: str, options: tuple[str, ...], said: str) -> None:
+    assert said in refused("play", table, *options, "--config", "units.yaml")
 
 
 @pytest.mark.parametrize(
@@ -103,11 +100,8 @@ def test_a_bad_table_is_one_line(run, table: str, options: tuple[str, ...], said
         (("--joint", "knee", "--load", "push:x"), "push:x: does not reverse"),
     ],
 )
-def test_a_bad_bag_is_one_line(run, bag: str, options: tuple[str, ...], said: str) -> None:
-    result = run("play", bag, *options)
-    assert result.exit_code == 2
-    (line,) = result.stderr.splitlines()
-    assert said in line
+def test_a_bad_bag_is_one_line(refused, bag: str, options: tuple[str, ...], said: str) -> None:
+    assert said in refused("play", bag, *options)
 
 
 @pytest.mark.parametrize("counts", [8.0, 14.8])
@@ -190,8 +184,7 @@ def test_one_posture_does_not_tell_joints_apart(run, postures: list[str]) -> Non
         (("--mechanism", "bionic_leg", "--crank-angle", "20", "--clearances", "Q"), "Q"),
     ],
 )
-def test_a_bad_mechanism_is_one_line(run, postures: list[str], options: tuple[str, ...], said: str) -> None:
-    result = run("play", postures[0], "--joint", "G", "--load", "push", *options)
-    assert result.exit_code == 2
-    (line,) = result.stderr.splitlines()
-    assert said in line
+def test_a_bad_mechanism_is_one_line(
+    refused, postures: list[str], options: tuple[str, ...], said: str
+) -> None:
+    assert said in refused("play", postures[0], "--joint", "G", "--load", "push", *options)

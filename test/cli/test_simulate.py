@@ -80,14 +80,9 @@ def test_the_table_has_every_joint_and_fits_80_columns(run):
         ("--mechanism soft.yaml --cycles 1 --model clearance", "joint B", "higher stiffness"),
     ],
 )
-def test_a_run_that_diverges_says_where_and_leaves_nothing(
-    run, complaints, shipped, tmp_path, line, joint, advice
-):
+def test_a_run_that_diverges_says_where_and_leaves_nothing(refused, shipped, tmp_path, line, joint, advice):
     (tmp_path / "soft.yaml").write_text(shipped("slider_crank").replace("6.6102e10", "1.0e-3"))
-    result = run("simulate", *line.split(), "--json", "result.json", "--out", "out")
-    assert result.exit_code == 2
-    assert result.stdout == ""
-    (complaint,) = complaints(result)
+    complaint = refused("simulate", *line.split(), "--json", "result.json", "--out", "out")
     for part in (joint, " at t = ", " s: ", advice):
         assert part in complaint
     assert [path.name for path in tmp_path.iterdir()] == ["soft.yaml"]

@@ -6,6 +6,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import attrs
 import click
 
 from leg_wear_monitor.cli import common
@@ -149,8 +150,6 @@ def reference(
     or measured.
     """
     common.check_file("--out", out)
-    import attrs
-
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.mechanism.person import read_toe_force
     from leg_wear_monitor.monitor.config.fitting import fitted
@@ -269,8 +268,6 @@ def play(
 
 
 def _leg(mechanism: str, clearances: str | None) -> "Mechanism":
-    import attrs
-
     from leg_wear_monitor.dynamics.simulation import given_joints
     from leg_wear_monitor.mechanism.loader import load_mechanism
 
@@ -289,8 +286,6 @@ def _plays(
     **of_table: Any,
 ) -> tuple[list["Play"], bool]:
     """The plays, and whether something of the recordings is lost."""
-    import attrs
-
     settings = _settings(**of_table)
     plays, is_lossy = [], False
     for number, recording in enumerate(recordings):
@@ -309,8 +304,6 @@ def _settings(
     unit: str | None,
 ) -> "MonitorConfig":
     """The parameters with the options for a table in their place."""
-    import attrs
-
     from leg_wear_monitor.monitor.config.parameters import load_config
 
     def given(**values: str | float | None) -> dict[str, Any]:

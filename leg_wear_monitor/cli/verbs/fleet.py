@@ -1,5 +1,6 @@
 """``leg-wear-monitor fleet``: many legs, many recordings."""
 
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -84,8 +85,6 @@ def export(path: Path, out: Path | None) -> None:
 def _update(
     legs: "FleetDescription", out: Path, workers: int | None, scheduler: str | None, sample: float | None
 ) -> "FleetUpdate":
-    import os
-
     from leg_wear_monitor.fleet.update import update_fleet
 
     with common.progress_bar("updating the fleet") as progress:
@@ -184,8 +183,6 @@ def report(description: Path, out: Path | None, fresh_days: float, workers: int 
     A leg of the description that was never updated is on the page, without a recording. Nothing is computed.
     Exits with 1 if the page of a leg cannot be made.
     """
-    import os
-
     from leg_wear_monitor.cli.pages import write_pages
     from leg_wear_monitor.fleet.description import fleet_directory
 

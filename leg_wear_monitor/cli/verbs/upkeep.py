@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+import attrs
 import click
 
 from leg_wear_monitor.cli import common
@@ -28,8 +29,6 @@ LAST = "last"
 
 def leg_of(config: Path | None, ledger: Path | None) -> tuple["MonitorConfig", "Mechanism"]:
     """The parameters, with the ledger that is asked for, and the leg as they want it."""
-    import attrs
-
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.monitor.config.fitting import fitted
     from leg_wear_monitor.monitor.config.parameters import load_config
@@ -51,8 +50,6 @@ def opened(
     config: Path | None, ledger: Path | None, dry_run: bool, joint: str | None = None
 ) -> Iterator[tuple["Ledger", "Mechanism", "MonitorConfig"]]:
     """The ledger, the leg and its parameters; a copy of the ledger, if nothing shall be written."""
-    import attrs
-
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.monitor.ledger.file import copy_of
     from leg_wear_monitor.monitor.ledger.ledger import open_ledger
@@ -283,8 +280,6 @@ def _measured(
     dry_run: bool,
 ) -> tuple[tuple[str, ...], bool]:
     """What came of a measurement, a line each, and whether the caller has to act."""
-    import attrs
-
     from leg_wear_monitor.monitor.evaluation import AlarmBoard
     from leg_wear_monitor.monitor.forecast.measurement import measure as evaluate
     from leg_wear_monitor.monitor.forecast.wear_coefficients import prior_source

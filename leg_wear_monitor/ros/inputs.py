@@ -4,6 +4,7 @@ import itertools
 import struct
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import import_module
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import attrs
@@ -27,7 +28,6 @@ from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, Samples
 
 _STAMP = (struct.Struct(">iI"), struct.Struct("<iI"))  # by the byte order's bit of the encapsulation
 
-_LEAST_NS = 2_000_000  # between two attempts, for messages that look complete and are not
 _MOST_NS = 50_000_000  # for which messages wait, for instance where one of two topics has stopped
 
 
@@ -54,24 +54,15 @@ class Due:
         self._newest: dict[int, int] = {}
         self._due_ns, self._processed_ns = 0, 0
 
-    def completes(self, stream: Stream, raw: bytes, log_time_ns: int, now_ns: int) -> bool:
-        """Note a received message; whether the reports are due with it.
+    def note(self, stream: Stream, last: "Arrival") -> None:
+        """Note the last message of a stream so far."""
+        self._newest[stream.code] = stamp_of(last.raw) if stream.has_stamp else last.log_time_ns
 
-        Parameters
-        ----------
-        stream : Stream
-        raw : bytes
-        log_time_ns : int
-            Time of arrival [ns], which stamps messages without a header.
-        now_ns : int
-            The same time on a monotonic clock [ns].
-        """
-        self._newest[stream.code] = stamp_of(raw) if stream.has_stamp else log_time_ns
-        return 0 < self._due_ns <= min(self._newest.values()) and now_ns - self._processed_ns >= _LEAST_NS
-
-    def is_late(self, now_ns: int) -> bool:
-        """Whether to process messages without a due report, at a time [ns] of the monotonic clock."""
-        return self._due_ns == 0 or now_ns - self._processed_ns > _MOST_NS
+    def is_now(self, now_ns: int) -> bool:
+        """Whether reports are due at a time of a monotonic clock [ns], or messages have waited too long."""
+        if self._due_ns == 0 or now_ns - self._processed_ns > _MOST_NS:
+            return True
+        return bool(self._newest) and self._due_ns <= min(self._newest.values())
 
     def processed(self, now_ns: int) -> None:
         """Note that messages were processed, at a time [ns] of the monotonic clock."""
@@ -388,21 +379,48 @@ class InputTopic:
     shared: int = 0
 
 
-def subscribe(
-    node: Node, config: MonitorConfig, take: Callable[[InputTopic, bytes], None]
-) -> list[tuple[InputTopic, Subscription]]:
-    """Subscribe to the configured inputs; best effort, which is compatible with reliable publishers."""
-    return [
-        _subscribe(node, stream, take)
-        for stream in streams_read(config.drive_torque.source, config.foot_load.source)
-    ]
+class Inputs:
+    """Subscriptions to the configured inputs, whose messages are taken all at once.
+
+    An executor's call for each message takes more time than all else that is done with it. They are best
+    effort, which is compatible with reliable publishers.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+    config : MonitorConfig
+
+    Attributes
+    ----------
+    topics : tuple of InputTopic
+    subscriptions : tuple of Subscription
+        Those of the topics, which no executor may serve.
+    """
+
+    def __init__(self, node: Node, config: MonitorConfig) -> None:
+        streams = streams_read(config.drive_torque.source, config.foot_load.source)
+        self.topics = tuple(InputTopic(node.resolve_topic_name(each.topic), each) for each in streams)
+        self.subscriptions = tuple(_subscribe(node, topic) for topic in self.topics)
+
+    def taken(self, now_ns: int) -> list[Arrival]:
+        """Messages that have come since the last call, in the order of their arrival.
+
+        Parameters
+        ----------
+        now_ns : int
+            Time of arrival where the middleware does not tell it [ns].
+        """
+        found = []
+        for topic, subscription in zip(self.topics, self.subscriptions, strict=True):
+            code, kind, handle = topic.stream.code, subscription.msg_type, subscription.handle
+            with handle:
+                while (message := handle.take_message(kind, True)) is not None:
+                    raw, info = message
+                    found.append(Arrival(code, info["received_timestamp"] or now_ns, raw))
+        return sorted(found, key=attrgetter("log_time_ns"))
 
 
-def _subscribe(
-    node: Node, stream: Stream, take: Callable[[InputTopic, bytes], None]
-) -> tuple[InputTopic, Subscription]:
-    topic = InputTopic(node.resolve_topic_name(stream.topic), stream)
-
+def _subscribe(node: Node, topic: InputTopic) -> Subscription:
     def lost(event: Any) -> None:
         topic.lost += event.total_count_change
 
@@ -416,25 +434,23 @@ def _subscribe(
         policy = qos_policy_name_from_kind(event.last_policy_kind)
         misfit(f"its {policy.lower()} is lower than this node requests; see qos_overrides")
 
+    def come(_raw: Any) -> None:
+        raise RuntimeError(f"an executor takes messages of {topic.name}")
+
     callbacks = SubscriptionEventCallbacks(
         incompatible_qos=quality,
-        incompatible_type=lambda _: misfit(f"its type is not {stream.type}"),
+        incompatible_type=lambda _: misfit(f"its type is not {topic.stream.type}"),
         message_lost=lost,
     )
-
-    def come(raw: Any) -> None:  # bytes, because of `raw`; rclpy's type hints omit this
-        take(topic, raw)
-
-    subscription = node.create_subscription(
-        message_class(stream.type),
-        stream.topic,
+    return node.create_subscription(
+        message_class(topic.stream.type),
+        topic.stream.topic,
         come,
         QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT),
         raw=True,
         event_callbacks=callbacks,
         qos_overriding_options=QoSOverridingOptions.with_default_policies(),
     )
-    return topic, subscription
 
 
 # Check that the drive's torque is on the axis that is read; otherwise report the axis that carries one.

@@ -1,7 +1,7 @@
 """Node ``leg_wear_monitor``: passes samples from topics to the monitor, and publishes its reports."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -11,6 +11,7 @@ import attrs
 import numpy as np
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
+from rclpy.subscription import Subscription
 from std_srvs.srv import Trigger
 
 from leg_wear_monitor.dynamics.clearance.stepper import advance_beside
@@ -28,7 +29,7 @@ from leg_wear_monitor.monitor.operators import wear_words
 from leg_wear_monitor.monitor.reports import Reports, Status
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor, open_monitor
 from leg_wear_monitor.ros.health import Load, load_status, recording_status
-from leg_wear_monitor.ros.inputs import Due, Inbox, InputTopic, subscribe
+from leg_wear_monitor.ros.inputs import Due, Inbox, Inputs
 from leg_wear_monitor.ros.measure import MeasureRequest, measured, offer_measure
 from leg_wear_monitor.ros.outputs import BlackBox, MarkerTopic, MotionTopic, Outlets
 from leg_wear_monitor.ros.running import ClosingNode, Parameters, release_memory, repeated, run, spin
@@ -174,7 +175,7 @@ def undone(joint: str, wear: JointWear) -> str:
 
 NO_COMMANDS = "It publishes no commands and must not be part of a safety function."
 
-_WORK_S = 0.01  # period at which messages are processed while no report is due at a known stamp
+_TAKE_S = 0.005  # period at which messages are taken
 _RELEASE_S = 60.0  # period at which free memory is given back
 _AT_ONCE = 500  # messages at once, so that services and parameters are also served
 _HELD = 20_000  # capacity in messages: ten seconds at 1 kHz on both topics
@@ -183,6 +184,8 @@ _A_SAMPLE = (outputs.TORQUE, outputs.MEASURED_TORQUE, outputs.IMPACTS)
 
 class MonitorNode(ClosingNode):
     """The live monitor node."""
+
+    _inputs: Inputs | None = None
 
     def __init__(self, **options: Any) -> None:
         super().__init__("leg_wear_monitor", **options)
@@ -232,19 +235,25 @@ class MonitorNode(ClosingNode):
         self._markers = MarkerTopic(self, self._outlets, self._monitor, lambda: self._supervision.is_current)
         self._motion = MotionTopic(self, self._monitor.clearance_joints)
         self._send_state()
-        self._inputs = subscribe(self, config, self._receive)
-        self._supervision.inputs = [topic for topic, _ in self._inputs]
+        inputs = self._inputs = Inputs(self, config)
+        self._supervision.inputs = inputs.topics
         for topic in self._supervision.inputs:
             self._black_box.add_topic(topic.name, topic.stream.type, SENSOR_DATA)
         # work and diagnostics continue while simulation time stands still
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(_WORK_S, self._work_in_time, clock=steady)
+        self.create_timer(_TAKE_S, partial(self._take, inputs), clock=steady)
         self.create_timer(config.diagnostics.period_s, self._diagnose, clock=steady)
         self.create_timer(_RELEASE_S, release_memory, clock=steady)
         joints, leg = ", ".join(self._monitor.clearance_joints), self._monitor.mechanism.name
         self.get_logger().info(f"monitoring joints {joints} of {leg}")
         for doubt in acceleration_doubts(config):
             self.get_logger().warning(str(doubt))
+
+    @property
+    def subscriptions(self) -> Iterator[Subscription]:
+        """Those that an executor serves: the inputs are taken by a timer."""
+        own = self._inputs.subscriptions if self._inputs else ()
+        return (one for one in super().subscriptions if one not in own)
 
     @property
     def monitor(self) -> WearMonitor:
@@ -279,15 +288,19 @@ class MonitorNode(ClosingNode):
         logger = self.get_logger()
         logger.error(line) if is_error else logger.warning(line)
 
-    def _receive(self, topic: InputTopic, raw: bytes) -> None:
-        topic.heard_ns, topic.heard_wall_ns = self._turn(), time.time_ns()
-        self._inbox.add(topic.stream.code, raw, topic.heard_wall_ns)
-        if self._due.completes(topic.stream, raw, topic.heard_wall_ns, topic.heard_ns):
-            self._work()
-
-    def _work_in_time(self) -> None:
-        """Process messages that wait too long, or all while no report is due at a known stamp."""
-        if self._due.is_late(self._turn()):
+    def _take(self, inputs: Inputs) -> None:
+        """Take the messages that came, and process them where reports are due."""
+        now_ns = self._turn()
+        arrivals = inputs.taken(time.time_ns())
+        for one in arrivals:
+            self._inbox.add(one.kind, one.raw, one.log_time_ns)
+        last = {one.kind: one for one in arrivals}
+        for topic in inputs.topics:
+            if topic.stream.code in last:
+                newest = last[topic.stream.code]
+                topic.heard_ns, topic.heard_wall_ns = now_ns, newest.log_time_ns
+                self._due.note(topic.stream, newest)
+        if self._due.is_now(now_ns):
             self._work()
 
     def _turn(self) -> int:
@@ -304,7 +317,7 @@ class MonitorNode(ClosingNode):
         coarse = self._load.note(self._inbox.delay_s(time.time_ns()))
         arrivals = self._inbox.take(_AT_ONCE)
         if self._black_box.takes_inputs:
-            names = {topic.stream.code: topic.name for topic, _ in self._inputs}
+            names = {topic.stream.code: topic.name for topic in self._supervision.inputs}
             for arrival in arrivals:
                 self._black_box.write(names[arrival.kind], arrival.log_time_ns, arrival.raw)
         samples = self._inbox.decoded(arrivals)

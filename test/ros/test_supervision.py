@@ -21,13 +21,13 @@ from std_msgs.msg import Float64
 from visualization_msgs.msg import MarkerArray
 
 from leg_wear_monitor.messages.cdr import Decoder
-from leg_wear_monitor.messages.streams import JOINT_STATE
+from leg_wear_monitor.messages.streams import JOINT_STATE, WRENCH_STAMPED
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.reports import AlarmList, Status
 from leg_wear_monitor.ros import inputs
 from leg_wear_monitor.ros.health import ClockMonitor, NodeAlarms, Silence, both_clocks
-from leg_wear_monitor.ros.inputs import CrankNames, Inbox
+from leg_wear_monitor.ros.inputs import Arrival, CrankNames, Inbox, Inputs
 from leg_wear_monitor.ros.supervision import AlarmLog, StatusLog
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin import KINDS
@@ -454,3 +454,25 @@ def test_alarms_reach_the_log_of_the_node(stage, walk) -> None:
     stage.wait_for(
         lambda: any(one.msg.startswith("alarm clearance A rises from OK to WARN") for one in heard), "the log"
     )
+
+
+def test_inputs_are_taken_at_once_in_the_order_and_with_the_times_of_their_arrival(stage) -> None:
+    """However long they wait, and from whichever topic: no executor calls anything for them."""
+    node = Node("taker", context=stage.node.context)
+    inputs = Inputs(node, MonitorConfig())
+    crank = stage.node.create_publisher(JointState, "joint_states", 100)
+    torque = stage.node.create_publisher(WrenchStamped, "drive_torque", 100)
+    for publisher in (crank, torque):
+        stage.wait_for(lambda publisher=publisher: publisher.get_subscription_count() > 0, "the taker")
+    taken: list[Arrival] = []
+    before_ns = time.time_ns()
+    for _ in range(5):
+        for publisher, message in ((crank, JointState(name=["crank"])), (torque, WrenchStamped())):
+            publisher.publish(message)  # within a process, it has arrived when this returns
+    after_ns = time.time_ns()
+    stage.wait_for(lambda: len(taken.extend(inputs.taken(0)) or taken) == 10, "all messages")
+    assert [one.kind for one in taken] == [JOINT_STATE, WRENCH_STAMPED] * 5
+    times = [one.log_time_ns for one in taken]
+    assert times == sorted(times) and before_ns < times[0] < times[-1] < after_ns
+    assert inputs.taken(0) == []
+    node.destroy_node()

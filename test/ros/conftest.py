@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -35,7 +36,7 @@ if find_spec("rclpy"):
     from leg_wear_monitor.gait.sensors import readings
     from leg_wear_monitor.messages.streams import streams_read
     from leg_wear_monitor.ros.gait_publisher import PublisherConfig, sensor_message
-    from leg_wear_monitor.ros.inputs import message_class
+    from leg_wear_monitor.ros.inputs import Arrival, Inputs, message_class
     from leg_wear_monitor.ros.monitor_node import MonitorNode
     from leg_wear_monitor.ros.running import spin
 
@@ -224,6 +225,23 @@ def shared_stage() -> Iterator[Stage]:
     stage = Stage(next(_domains))
     yield stage
     stage.close()
+
+
+@pytest.fixture
+def arrive_at(monkeypatch: pytest.MonkeyPatch) -> Callable[[float], None]:
+    """Sets the time at which messages come to a node, in seconds after `START_NS`."""
+    now, taken = [START_NS], Inputs.taken
+    clock = SimpleNamespace(time_ns=lambda: now[0], monotonic_ns=time.monotonic_ns)
+    monkeypatch.setattr("leg_wear_monitor.ros.monitor_node.time", clock)
+
+    def taken_now(self: Inputs, now_ns: int) -> list[Arrival]:
+        return [one._replace(log_time_ns=now[0]) for one in taken(self, now_ns)]
+
+    def set_clock(at_s: float) -> None:
+        now[0] = START_NS + round(1.0e9 * at_s)
+
+    monkeypatch.setattr(Inputs, "taken", taken_now)
+    return set_clock
 
 
 @pytest.fixture(scope="session")

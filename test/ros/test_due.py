@@ -8,7 +8,7 @@ from leg_wear_monitor.messages.streams import FLOAT64, STREAMS, WRENCH_STAMPED, 
 
 pytest.importorskip("rclpy")
 
-from leg_wear_monitor.ros.inputs import Due, stamp_of
+from leg_wear_monitor.ros.inputs import Arrival, Due, stamp_of
 
 BY_CODE = {stream.code: stream for stream in STREAMS}
 TORQUE, BARE = BY_CODE[WRENCH_STAMPED], BY_CODE[FLOAT64]
@@ -38,37 +38,38 @@ def test_a_message_too_short_for_a_stamp_has_none(raw: bytes) -> None:
     assert stamp_of(raw) == 0
 
 
+def note(due: Due, stream: Stream, raw: bytes, log_time_ns: int = 0) -> None:
+    due.note(stream, Arrival(stream.code, log_time_ns, raw))
+
+
 def test_all_topics_must_reach_the_stamp() -> None:
     due = due_at(100 * MS)
-    assert not due.completes(JOINTS, message(99 * MS), 0, 10 * MS)
-    assert not due.completes(TORQUE, message(101 * MS), 0, 10 * MS)
-    assert due.completes(JOINTS, message(100 * MS), 0, 10 * MS)
+    assert not due.is_now(10 * MS)
+    note(due, JOINTS, message(99 * MS))
+    note(due, TORQUE, message(101 * MS))
+    assert not due.is_now(10 * MS)
+    note(due, JOINTS, message(100 * MS))
+    assert due.is_now(10 * MS)
 
 
 def test_a_message_without_header_is_stamped_by_its_arrival() -> None:
     due = due_at(100 * MS)
-    assert not due.completes(BARE, b"\0\1\0\0" + bytes(8), 99 * MS, 10 * MS)
-    assert due.completes(BARE, b"\0\1\0\0" + bytes(8), 100 * MS, 10 * MS)
-
-
-def test_messages_that_look_complete_are_not_tried_at_once_again() -> None:
-    due = due_at(100 * MS)
-    due.processed(10 * MS)
-    tried = [due.completes(TORQUE, message(200 * MS), 0, now) for now in range(10 * MS, 13 * MS, MS // 2)]
-    assert tried == [False] * 4 + [True] * 2
+    for at_ns in (99 * MS, 100 * MS):
+        note(due, BARE, b"\0\1\0\0" + bytes(8), at_ns)
+        assert due.is_now(10 * MS) == (at_ns == 100 * MS)
 
 
 @pytest.mark.parametrize("stream", [JOINTS, TORQUE])
 def test_one_topic_alone_makes_messages_late_not_stuck(stream: Stream) -> None:
     due = due_at(100 * MS)
     other = TORQUE if stream is JOINTS else JOINTS
-    due.completes(other, message(1), 0, 0)
-    assert not due.completes(stream, message(500 * MS), 0, 40 * MS)
-    assert not due.is_late(40 * MS)
-    assert due.is_late(51 * MS)
+    note(due, other, message(1))
+    note(due, stream, message(500 * MS))
+    assert not due.is_now(40 * MS)
+    assert due.is_now(51 * MS)
 
 
-def test_without_a_known_stamp_all_messages_are_processed_in_time() -> None:
+def test_without_a_known_stamp_all_messages_are_processed_at_once() -> None:
     due = due_at(0)
-    assert not due.completes(TORQUE, message(500 * MS), 0, 40 * MS)
-    assert due.is_late(1)
+    note(due, TORQUE, message(500 * MS))
+    assert due.is_now(1)

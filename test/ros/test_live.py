@@ -2,9 +2,7 @@
 
 import itertools
 import json
-import time
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -375,19 +373,13 @@ def test_an_encoder_that_starts_at_zero_is_found_and_replayed(stage, tmp_path: P
 
 @pytest.mark.parametrize("model", ["measured", "none"])
 def test_a_foot_load_is_taken_told_recorded_and_replayed(
-    stage, tmp_path: Path, model: str, monkeypatch
+    stage, tmp_path: Path, model: str, arrive_at
 ) -> None:
     """A wrench, which acts, or a contact switch, which has no stamp: it is of the time at which it comes.
 
     In the last second there are no samples.
     """
-    now, source = [1_700_000_000 * 10**9], "wrench" if model == "measured" else "contact"
-    clock = SimpleNamespace(time_ns=lambda: now[0], monotonic_ns=time.monotonic_ns)
-    monkeypatch.setattr("leg_wear_monitor.ros.monitor_node.time", clock)
-
-    def set_clock(at_s: float) -> None:
-        now[0] = 1_700_000_000 * 10**9 + round(1.0e9 * at_s)
-
+    source = "wrench" if model == "measured" else "contact"
     recording = tmp_path / "live.mcap"
     sensor = FootLoadSensorConfig(source=source, silent_from_s=4.0)
     config = PublisherConfig(duration_s=5.0, load=LoadConfig(ground_n=300.0), foot_load_sensor=sensor)
@@ -395,7 +387,7 @@ def test_a_foot_load_is_taken_told_recorded_and_replayed(
     monitor = stage.monitor(record__path=str(recording), diagnostics__period_s=0.2, **values)
     diagnostics = stage.listen("/diagnostics", DiagnosticArray)
     block_s = 1.0e-4 if source == "contact" else 0.015
-    stage.legs(load=source).play(stage.walk(config), monitor, block_s=block_s, before=set_clock)
+    stage.legs(load=source).play(stage.walk(config), monitor, block_s=block_s, before=arrive_at)
     stage.wait_for(lambda: diagnostics and levels(diagnostics[-1]).get("foot_load") == 2, "the silence")
     monitor.stop()
     live = monitor.node.monitor

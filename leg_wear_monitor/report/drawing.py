@@ -6,7 +6,6 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import combinations
-from typing import Any
 
 import attrs
 import numpy as np
@@ -19,7 +18,7 @@ from leg_wear_monitor.mechanism.position import TURN, ideal_motion
 from leg_wear_monitor.mechanism.reach import POINTS, Reach, dead_words, findings, headline, reach_of
 from leg_wear_monitor.mechanism.spec import GROUND, Mechanism, PrismaticJoint, SpeedDrive, TorqueDrive
 from leg_wear_monitor.report.figure import INK, SMALL, USUAL, VERMILION, finish, new_figure, plain, svg
-from leg_wear_monitor.report.leg_picture import draw_leg, leg_data
+from leg_wear_monitor.report.leg_picture import draw_leg, leg_data, leg_slider, run_data
 from leg_wear_monitor.report.page import (
     Fragment,
     Page,
@@ -130,9 +129,6 @@ def _forces(reach: Reach) -> Floats:
 # A mechanism as one HTML page: through its cycle, with its lengths to compare with the source of them.
 
 
-_FLIP = np.array([1.0, -1.0])  # y is downwards in the page
-
-
 def drawing_html(drawing: Drawing, is_watched: bool = False) -> str:
     """The page as HTML text.
 
@@ -145,12 +141,10 @@ def drawing_html(drawing: Drawing, is_watched: bool = False) -> str:
     reach, found = drawing.reach, drawing.findings
     mechanism = reach.mechanism
     faults = [Section("What is wrong", [Sentences(found)])] if found else []
-    told = (
-        [Section("In everyday units", [Sentences(understood(reach.linkage))])]
-        if reach.turns and not found
-        else []
-    )
-    reload = [Section("Redrawn on save", [_reload()])] if is_watched else []
+    everyday = understood(reach.linkage) if reach.turns and not found else []
+    told = [Section("In everyday units", [Sentences(everyday)])] if everyday else []
+    again = Fragment(render("drawing/reload.html"), template_text("drawing/reload.js"))
+    reload = [Section("Redrawn on save", [again])] if is_watched else []
     page = Page(
         title=mechanism.name,
         summary=f"{len(mechanism.bodies)} moving bodies, {len(mechanism.joints)} joints: {drawing.headline}.",
@@ -170,18 +164,19 @@ def drawing_html(drawing: Drawing, is_watched: bool = False) -> str:
 
 def _live(drawing: Drawing) -> Fragment:
     """The interactive picture."""
-    reach = drawing.reach
+    reach, mechanism, text = drawing.reach, drawing.reach.mechanism, "To scale, all joints without clearance."
     data = leg_data(reach) | {"first": drawing.shown, "runs": [], "said": _said(reach)}
-    names: list[str] = []
+    if mechanism.toe is not None and len(reach.q) > 1:
+        text += " Dashed: path of the toe."
     if drawing.forces_n is not None:
-        data |= _force_data(reach.mechanism, drawing.forces_n)
-        names = [""]
+        run = run_data("", tuple(mechanism.joints), drawing.forces_n)
+        data |= {"runs": [run], "longest_n": run["largest_n"] or 1.0}
+        text += (
+            " Arrows: force on the pin at the speed of the drive; their length grows with the root of the "
+            f"force, up to {data['longest_n']:.0f} N."
+        )
     words = "The mechanism at the chosen crank angle" if len(reach.q) > 1 else "The mechanism"
-    return Fragment(
-        markup=render("leg_slider.html", data=data, names=names, alt=words),
-        script=template_text("leg_slider.js"),
-        caption=_caption(drawing, data),
-    )
+    return leg_slider(data, words, text)
 
 
 def _said(reach: Reach) -> dict[int, str]:
@@ -192,46 +187,17 @@ def _said(reach: Reach) -> dict[int, str]:
     return {i: f"Dead point: {dead_words(dead)}." for i, dead in ends if dead is not None}
 
 
-def _caption(drawing: Drawing, data: dict[str, Any]) -> str:
-    mechanism = drawing.reach.mechanism
-    text = "To scale, all joints without clearance."
-    if mechanism.toe is not None and len(drawing.reach.q) > 1:
-        text += " Dashed: path of the toe."
-    if drawing.forces_n is not None:
-        text += (
-            " Arrows: force on the pin at the speed of the drive; their length grows with the root of the "
-            f"force, up to {data['longest_n']:.0f} N."
-        )
-    return text
-
-
-def _force_data(mechanism: Mechanism, forces_n: np.ndarray) -> dict[str, Any]:
-    """The forces as the script takes them, N."""
-    flipped = (forces_n * _FLIP).round(1)
-    pins = {name: {"f": flipped[:, k].tolist()} for k, name in enumerate(mechanism.joints)}
-    longest = float(np.linalg.norm(forces_n, axis=-1).max())
-    return {"runs": [{"label": "", "pins": pins}], "longest_n": longest or 1.0}
-
-
-def _reload() -> Fragment:
-    return Fragment(markup=render("drawing/reload.html"), script=template_text("drawing/reload.js"))
-
-
 def _lengths(mechanism: Mechanism) -> Table:
     """Distance between any two points of a body, which lie apart."""
-    points = {
-        GROUND: mechanism.ground.points,
-        **{name: body.points for name, body in mechanism.bodies.items()},
-    }
+    named = {name: body.points for name, body in mechanism.bodies.items()}
     rows = [
         (body, f"{a} – {b}", f"{1e3 * length:.2f}")
-        for body, named in points.items()
-        for (a, p), (b, q) in combinations(named.items(), 2)
+        for body, points in [(GROUND, mechanism.ground.points), *named.items()]
+        for (a, p), (b, q) in combinations(points.items(), 2)
         if (length := math.dist(p, q)) > 0.0
     ]
-    return Table(
-        caption="Distances between the points of each body", head=("body", "points", "mm"), rows=rows
-    )
+    caption = "Distances between the points of each body"
+    return Table(caption=caption, head=("body", "points", "mm"), rows=rows)
 
 
 def _joints(reach: Reach, shown: int) -> Table:

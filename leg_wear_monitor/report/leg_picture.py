@@ -1,6 +1,6 @@
 """The leg as a figure, as data for the interactive picture of a page, and the figures of a simulation."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from itertools import cycle
 from typing import Any
 
@@ -39,6 +39,7 @@ from leg_wear_monitor.report.figure import (
     png,
     worn_bushings,
 )
+from leg_wear_monitor.report.page import Fragment, render, template_text
 
 # Drawing of single bodies, joints, supports and springs.
 
@@ -399,6 +400,28 @@ def _mark(reach: Reach, dead: DeadPoint, frame: int) -> dict[str, Any]:
         for joint in dead.joints
     ]
     return {"frame": frame, "line": millimetres(np.array(places))}
+
+
+_FLIP = np.array([1.0, -1.0])  # y is downwards in the picture
+
+
+def run_data(
+    label: str, joints: Sequence[str], forces_n: Floats, places: Floats | None = None
+) -> dict[str, Any]:
+    """Forces (s, k, 2) [N] in joints over a cycle, and places of the pins in their bushings [clearances]."""
+    pins = {name: {"f": (forces_n[:, k] * _FLIP).round(1).tolist()} for k, name in enumerate(joints)}
+    if places is not None:
+        for k, name in enumerate(joints):
+            pins[name]["e"] = (places[:, k] * _FLIP).round(3).tolist()
+    largest_n = float(np.linalg.norm(forces_n, axis=-1).max())
+    return {"label": label, "pins": pins, "largest_n": largest_n}
+
+
+def leg_slider(data: dict[str, Any], alt: str, caption: str) -> Fragment:
+    """The interactive picture as a part of a page."""
+    names = [run["label"] for run in data["runs"]]
+    markup = render("leg_slider.html", data=data, names=names, alt=alt)
+    return Fragment(markup, template_text("leg_slider.js"), caption)
 
 
 def millimetres(points: Floats) -> list[list[float]]:

@@ -33,17 +33,6 @@ def test_the_logistic_map_at_four_has_the_logarithm_of_two():
 
 
 @PLAIN
-def test_henon_s_map():
-    """0.41922, e.g. Sprott, Chaos and Time-Series Analysis, 2003."""
-
-    def henon(p):
-        return np.array([1.0 - 1.4 * p[0] ** 2 + p[1], 0.3 * p[0]])
-
-    estimate = measured(henon, [[0.1, 0.1], [0.2, 0.0], [-0.3, 0.1], [0.4, -0.1]], 4000)
-    assert agrees(estimate, 0.41922, 2.0e-3)
-
-
-@PLAIN
 def test_lorenz_s_flow():
     """0.9056, e.g. Sprott, Chaos and Time-Series Analysis, 2003; Runge and Kutta's fourth order."""
 

@@ -3,7 +3,7 @@
 import io
 import textwrap
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import attrs
 import numpy as np
@@ -22,7 +22,7 @@ from leg_wear_monitor.report.figure import (
     new_figure,
     png,
 )
-from leg_wear_monitor.report.leg_picture import leg_data, leg_picture
+from leg_wear_monitor.report.leg_picture import leg_data, leg_picture, leg_slider, run_data
 from leg_wear_monitor.report.page import (
     Fragment,
     Gallery,
@@ -32,8 +32,6 @@ from leg_wear_monitor.report.page import (
     Sentences,
     Table,
     Text,
-    render,
-    template_text,
 )
 from leg_wear_monitor.report.study import findings
 from leg_wear_monitor.report.study.chaos import (
@@ -65,7 +63,7 @@ from leg_wear_monitor.report.study.text import (
     wear_table,
 )
 from leg_wear_monitor.studies.execution import STUDIES
-from leg_wear_monitor.studies.plan import DEPTH, VOLUME, Arrays, Found, Sweep, clearance_joints_of, spread
+from leg_wear_monitor.studies.plan import DEPTH, VOLUME, Found, Sweep, clearance_joints_of, spread
 from leg_wear_monitor.studies.results import FAILS, HOLDS, UNDECIDED, LegClaims, StudyResults
 
 CLEARANCE_FRACTION = 0.3  # drawn clearance, as a fraction of the bushing's radius
@@ -141,7 +139,7 @@ def _sections(results: StudyResults) -> list[Section]:
     tables = [table(found, own.head) for table in (error_table, force_table, wear_table)]
     return [
         *sections,
-        Section("One gait cycle", [leg_slider(results.mechanism, shown)]),
+        Section("One gait cycle", [_slider(results.mechanism, shown)]),
         Section("Curves of a cycle", curve_galleries(shown)),
         Section("Wear", [worn]),
         Section("Tables", [*tables, *own.tables]),
@@ -302,36 +300,29 @@ def influence_gallery(claims: LegClaims) -> Gallery:
     return Gallery(pictures=pictures, caption=caption)
 
 
-def leg_slider(mechanism: Mechanism, found: Found) -> Fragment:
+def _slider(mechanism: Mechanism, found: Found) -> Fragment:
     """Interactive picture of the leg over a gait cycle: one cycle of an example run of each point."""
     linkage, speed_rpm = build_linkage(mechanism), found[0][0].speed_rpm
     frames = len(found[0][1]["example_eccentricity_m"])
     motion = one_cycle(linkage, frames, speed_rpm * np.pi / 30.0)  # ideal: only its direction matters
-    reach = Reach(linkage, 1, motion.crank_angle, motion.q, turns=True)
-    runs = [_run_data(point.label, arrays, point.clearance_m) for point, arrays in found]
+    reach, runs = Reach(linkage, 1, motion.crank_angle, motion.q, turns=True), []
+    for point, arrays in found:
+        places, forces_n = (
+            arrays["example_eccentricity_m"] / point.clearance_m,
+            arrays["example_contact_force_n"],
+        )
+        run = run_data(point.label, clearance_joints_of(arrays), forces_n, places)
+        runs.append(run | {"clearance_mm": round(1.0e3 * point.clearance_m, 4)})
     longest_n = max(run["largest_n"] for run in runs)
     data = leg_data(reach) | {"digits": 0, "skip": 2, "runs": runs, "longest_n": longest_n}
     radius = mechanism.clearances[clearance_joints_of(found[0][1])[0]].bushing_radius
     factors = [CLEARANCE_FRACTION * radius / point.clearance_m for point, _ in found]
     low, high = min(factors), max(factors)
     factor = f"{low:.3g}" if high - low < 1.0e-6 * high else f"{low:.3g} to {high:.3g}"
-    return Fragment(
-        markup=render("leg_slider.html", data=data, names=[run["label"] for run in runs], alt=_ALT),
-        script=template_text("leg_slider.js"),
-        caption="One gait cycle of one run, an example. The leg is to scale, its bodies in ideal positions: "
+    caption = (
+        "One gait cycle of one run, an example. The leg is to scale, its bodies in ideal positions: "
         "clearance moves them by millimetres. Arrows: force of the bushing on the pin; their length grows "
         f"with the root of the force, up to {longest_n:.0f} N. Circles: each pin in its bushing, the "
-        f"clearance magnified {factor} times, with the path of the pin's centre over the cycle.",
+        f"clearance magnified {factor} times, with the path of the pin's centre over the cycle."
     )
-
-
-def _run_data(label: str, arrays: Arrays, clearance_m: float) -> dict[str, Any]:
-    """Eccentricities [clearances] and contact forces [N] of an example cycle, with y downwards."""
-    e, force = arrays["example_eccentricity_m"] / clearance_m, arrays["example_contact_force_n"]
-    flip = np.array([1.0, -1.0])
-    pins = {
-        name: {"e": (e[:, k] * flip).round(3).tolist(), "f": (force[:, k] * flip).round(1).tolist()}
-        for k, name in enumerate(clearance_joints_of(arrays))
-    }
-    largest = float(np.linalg.norm(force, axis=-1).max())
-    return {"label": label, "clearance_mm": round(1.0e3 * clearance_m, 4), "pins": pins, "largest_n": largest}
+    return leg_slider(data, _ALT, caption)

@@ -21,9 +21,7 @@ from leg_wear_monitor import load_mechanism, replay
 from leg_wear_monitor.bags.reader import Recording
 from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.gait.config import (
-    EncoderConfig,
     FootLoadSensorConfig,
-    KnockConfig,
     LoadConfig,
     PaceConfig,
     TransportConfig,
@@ -56,17 +54,6 @@ def seconds(message) -> float:
 def levels(message: DiagnosticArray) -> dict[str, int]:
     """Level of each line by its name, without the node's."""
     return {status.name.split(": ", 1)[1]: status.level[0] for status in message.status}
-
-
-def raised(messages: list[DiagnosticArray]) -> list[tuple[float, str]]:
-    """When each alarm was raised; its own word for it, for a list may be overtaken by the next."""
-    found = {}
-    for message in messages:
-        for status in message.status:
-            if status.level[0]:
-                at = next(float(one.value) for one in status.values if one.key == "raised_s")
-                found[status.name.split(": ", 1)[1]] = at - 1_700_000_000
-    return sorted((at, name) for name, at in found.items())
 
 
 def test_an_even_gait_is_followed_told_recorded_and_replayed(stage, walk, tmp_path: Path) -> None:
@@ -227,50 +214,6 @@ def test_the_seconds_before_a_stop_are_kept_and_replay_to_it(stage, walk, tmp_pa
     assert verdict.joints == ("A",)
 
 
-@pytest.mark.slow  # monitor/test_wear_monitor.py holds it without ROS
-def test_a_knock_raises_its_alarm_within_four_gait_cycles_and_not_before(stage) -> None:
-    knock = KnockConfig(joint="G", at_s=3.5, clearance_m=2.0e-3)
-    walk = stage.walk(PublisherConfig(duration_s=9.0, knock=knock))
-    monitor = stage.monitor(
-        limits__torque_mismatch=0.15, alarms__on_delay_cycles=1, limits__impact_force_n=1.0e6
-    )
-    alarms = stage.listen(f"{ME}/alarms", DiagnosticArray, latched=True)
-    stage.legs().play(walk, monitor)
-    stage.wait_for(lambda: bool(raised(alarms)), "an alarm")
-    at, name = raised(alarms)[0]
-    assert name == "torque_mismatch"
-    assert 3.5 < at <= 7.5 + 0.02
-
-
-@pytest.mark.slow  # the alarms' own tests hold it without ROS
-@pytest.mark.no_cover
-def test_an_impact_beyond_the_limit_raises_its_alarm_within_a_gait_cycle(stage) -> None:
-    pace = PaceConfig(times_s=(0.0, 3.0), speeds_rpm=(60.0, 80.0))
-    walk = stage.walk(PublisherConfig(duration_s=5.5, pace=pace))
-    limit = 7000.0
-    # commanded at the faster cadence: above the commanded one, the limits of impacts grow with it
-    monitor = stage.monitor(
-        limits__impact_force_n=limit,
-        limits__warn_fraction=1.0,
-        cadence__commanded_rpm=80.0,
-        cadence__tolerance_rpm=50.0,
-    )
-    alarms = stage.listen(f"{ME}/alarms", DiagnosticArray, latched=True)
-    peaks = stage.listen(f"{ME}/clearance_states", JointState)
-    stage.legs().play(walk, monitor)
-
-    def of_impacts() -> list[float]:
-        # on a busy machine the leg may be silent for a second, which is an alarm of its own
-        return [at for at, name in raised(alarms) if name.startswith("impact_force")]
-
-    stage.wait_for(lambda: bool(of_impacts()), "an alarm of an impact")
-    at = of_impacts()[0]
-    cycle = next(one for one in peaks if max(one.effort) >= limit)
-    # not before the first gait cycle with such an impact began, and not after it ended
-    assert seconds(cycle) - 1.0 < at <= seconds(cycle) + 0.01
-    assert seconds(cycle) - 1.0 > 2.5
-
-
 @pytest.mark.no_cover
 def test_several_legs_in_namespaces_do_not_hear_each_other(stage, walk) -> None:
     slow = stage.walk(PublisherConfig(duration_s=3.0, pace=PaceConfig(speeds_rpm=(50.0,))))
@@ -344,31 +287,6 @@ def replayed_from(path: Path, monitor: WearMonitor) -> dict[str, list[bytes]]:
         for out in itertools.chain.from_iterable(itertools.chain.from_iterable(several)):
             found.setdefault(out.output.name, []).extend(row.tobytes() for row in out.messages)
     return found
-
-
-@pytest.mark.slow  # playback/test_crank_zero.py holds it without ROS
-def test_an_encoder_that_starts_at_zero_is_found_and_replayed(stage, tmp_path: Path) -> None:
-    recording = tmp_path / "live.mcap"
-    anew = stage.walk(PublisherConfig(duration_s=6.0, encoder=EncoderConfig(restarts_s=(0.3,))))
-    values = {"crank__zero": "at_start", "diagnosis__enabled": False}
-    monitor = stage.monitor(record__path=str(recording), diagnostics__period_s=0.2, **values)
-    diagnostics = stage.listen("/diagnostics", DiagnosticArray)
-    verdicts = stage.listen(f"{ME}/verdict", DiagnosticArray, latched=True)
-    stage.legs().play(anew, monitor)
-    stage.wait_for(lambda: diagnostics and levels(diagnostics[-1]).get("crank zero") == 0, "the zero")
-    stage.wait_for(lambda: any("CRANK_ZERO" in repr(one) for one in verdicts), "why nothing is monitored")
-    monitor.stop()
-    (found,) = (one for one in monitor.node.monitor.status() if one.name == "crank zero")
-    assert found.values["times_found"] == 1.0
-    # at 0.3 s, the crank of 60 rpm has turned by 0.3 turns
-    assert found.values["offset_rad"] == pytest.approx(0.3 * 2.0 * np.pi, abs=0.04)
-    config = config_from(dotted(values))
-    again = WearMonitor(load_mechanism(config.mechanism), config)
-    lived, replayed = published(recording), replayed_from(recording, again)
-    assert repr(found) in map(repr, again.status())
-    assert len(replayed["~/clearance_states"]) >= 4
-    for topic in ("~/clearance_states", "~/predicted_torque"):
-        assert lived[topic] == replayed[topic]
 
 
 @pytest.mark.parametrize("model", ["measured", "none"])

@@ -160,16 +160,6 @@ def test_nobody_publishing_is_an_error_after_ten_seconds(after_s: int, level: Le
     assert (told.level, told.message) == (level, "/left/joint_states: nobody publishes it")
 
 
-def test_a_publisher_of_another_type_is_named_with_both_types() -> None:
-    other = Publishers(other=(("/arm/driver", "std_msgs/msg/Float64"),))
-    told = topics_status([topic(publishers=other, heard_ns=0)], 2 * SECOND, SECOND)
-    assert told.level is Level.ERROR
-    assert told.message == (
-        "/left/joint_states: /arm/driver publishes std_msgs/msg/Float64, "
-        "expected sensor_msgs/msg/JointState; no message arrives from it"
-    )
-
-
 def test_a_quality_of_service_that_does_not_fit_is_an_error() -> None:
     told = topics_status([topic(incompatible="its reliability is less")], 11 * SECOND, SECOND)
     assert told.level is Level.ERROR

@@ -71,22 +71,6 @@ def test_a_signal_between_the_making_and_the_serving_of_a_node_leaves_an_ordered
     db.close()
 
 
-@pytest.mark.slow  # tests beside it stop it just before and just after
-def test_a_monitor_stopped_while_it_gets_ready_leaves_an_ordered_ledger(stage, tmp_path: Path) -> None:
-    ledger, log = tmp_path / "wear.db", tmp_path / "monitor.log"
-    node = started("monitor", log, "-p", f"ledger.path:={ledger}")
-    try:
-        stage.wait_for(lambda: b"the leg is set up" in log.read_bytes(), f"a leg that is set up in {log}")
-        node.send_signal(signal.SIGTERM)
-        assert node.wait(60) == 0
-    finally:
-        node.kill()
-        node.wait()
-    with sqlite3.connect(ledger) as db:
-        assert db.execute("SELECT closed FROM run").fetchall() == [(1,)]
-    db.close()
-
-
 @pytest.mark.parametrize(
     ("name", "verb", "module"),
     [

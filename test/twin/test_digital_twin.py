@@ -89,11 +89,6 @@ def test_any_split_into_blocks_gives_the_same(_made, eventful, in_one_go, cuts):
     np.testing.assert_array_equal(twin.depth, in_one_go[1])
 
 
-def test_blocks_of_one_give_the_same(twin, eventful, in_one_go):
-    assert_same(run(twin, np.split(eventful, len(eventful))), in_one_go[0])
-    np.testing.assert_array_equal(twin.depth, in_one_go[1])
-
-
 @settings(max_examples=8)
 @given(where=st.integers(1, 1990))
 def test_restored_it_goes_on_bit_for_bit(_made, gait, eventful, in_one_go, where):

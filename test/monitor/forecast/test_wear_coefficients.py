@@ -6,7 +6,7 @@ import statistics
 import attrs
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor import ConfigError, load_mechanism
@@ -83,25 +83,6 @@ def test_an_accepted_measurement_moves_the_belief_as_far_as_it_says(factor):
         assert f"{middle:.3g} times the nominal one" in told.words[-1]
     else:  # next to no wear where the twin has counted much
         assert np.exp(told.after.log_factors(0.9)) < 0.2
-
-
-@settings(max_examples=25)
-@given(st.floats(-0.9, 60.0), st.floats(0.1, 10.0), st.floats(0.02, 3.0))
-def test_the_belief_is_prior_times_likelihood(mean, own, sigma):
-    """Against a plain sum over a grid that is wide and fine, for a measurement that is not exact."""
-    prior = attrs.evolve(PRIOR, wear_coefficient_sigma=sigma, clearance_sigma_m=1e-9)
-    coefficient_estimate = estimate_coefficient(
-        prior, FRESH, [ClearanceAtWear(FRESH + mean * 1e-5, own * 1e-5, 1e-5)]
-    )
-    u = np.linspace(-12.0 * sigma - 5.0, 12.0 * sigma + 5.0, 200_001)
-    log_weight = -0.5 * (u / sigma) ** 2 - 0.5 * ((np.exp(u) - mean) / own) ** 2
-    weight = np.exp(log_weight - log_weight.max())
-    weight /= weight.sum()
-    assert coefficient_estimate.mean == pytest.approx(
-        weight @ u, abs=0.01 * coefficient_estimate.sigma + 2e-4
-    )
-    assert coefficient_estimate.sigma == pytest.approx(np.sqrt(weight @ (u - weight @ u) ** 2), rel=0.02)
-    assert coefficient_estimate.weight[[0, -1]].max() < 1e-6
 
 
 @given(st.permutations(range(4)))

@@ -143,12 +143,13 @@ def test_a_file_can_be_read_by_owner_and_group_alone_or_less(open_ledger, walk, 
         assert ledger.path.stat().st_mode & 0o777 == mode
 
 
-def test_a_raised_alarm_keeps_its_worst_value_between_whole_surfaces(open_ledger, entry_at) -> None:
+@pytest.mark.parametrize("whole", [True, False])
+def test_a_raised_alarm_keeps_its_worst_value(open_ledger, entry_at, whole) -> None:
     worst = Alarm(kind="input_gaps", level=Level.ERROR, value=0.0, worst=0.42, limit=0.05, raised_ns=7)
     entry = attrs.evolve(entry_at(2), alarms=(worst, Alarm(kind="cadence")))
     ledger = open_ledger()
     ledger.keep(entry_at(1))
-    ledger.keep(entry, whole=False)
+    ledger.keep(entry, whole=whole)
     ledger.close()
     kept = {alarm.name: alarm for alarm in open_ledger().entry.alarms}
     assert (kept["input_gaps"].worst, kept["input_gaps"].limit) == (0.42, 0.05)

@@ -11,7 +11,6 @@ from leg_wear_monitor import WearMonitor, open_ledger
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.monitor.accounting import next_point_s
 from leg_wear_monitor.monitor.config.parameters import config_from
-from leg_wear_monitor.monitor.ledger.ledger import LedgerError
 from leg_wear_monitor.state import Level
 
 SECOND = 10**9
@@ -192,14 +191,6 @@ def test_a_ledger_that_cannot_be_written_stops_nothing(begin, gait):
     monitor.close()
     again, _ = begin()
     np.testing.assert_array_equal(again._twin.depth, monitor._twin.depth)
-
-
-def test_another_leg_is_refused_before_anything_is_worn(begin, gait):
-    monitor, _ = begin()
-    monitor.update(gait(2.0))
-    monitor.close()
-    with pytest.raises(LedgerError, match=r"is of hardware id leg, not other; .*else set ledger.path to"):
-        begin({"hardware_id": "other"})
 
 
 def test_clearances_are_noted_for_the_history(begin, gait, tmp_path):

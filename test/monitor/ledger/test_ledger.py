@@ -1,6 +1,5 @@
 """The ledger: what is kept is what was given; what cannot be continued is refused and left as it is."""
 
-import math
 import sqlite3
 import subprocess
 import sys
@@ -64,13 +63,6 @@ def test_what_is_kept_is_there_again(open_ledger, entry_at):
     (alarm,) = found.entry.alarms
     assert (alarm.name, alarm.level, alarm.acknowledged) == ("clearance A", Level.WARN, True)
     assert found.counted_ns.tolist() == [[0, 3 * SECOND]]
-
-
-def test_a_run_that_ended_in_order_has_lost_nothing(open_ledger, entry_at):
-    ledger = open_ledger()
-    ledger.keep(entry_at(4), closed=True)
-    ledger.close()
-    assert open_ledger().cut_off_s is None
 
 
 def test_a_run_that_was_cut_off_says_how_much_may_be_lost(open_ledger, entry_at):
@@ -336,17 +328,6 @@ def test_a_leg_with_another_mass_is_another_leg(leg):
     renamed = attrs.evolve(leg, name="mine", source="mine.yaml")
     assert binding_of(heavier, config).fingerprint != binding_of(leg, config).fingerprint
     assert binding_of(renamed, config).fingerprint == binding_of(leg, config).fingerprint
-
-
-def test_a_raised_alarm_keeps_its_worst_value_over_a_new_start(open_ledger, entry_at) -> None:
-    alarm = Alarm(kind="input_gaps", level=Level.ERROR, value=0.0, worst=0.42, limit=0.05, raised_ns=7)
-    unknown = Alarm(kind="cadence", level=Level.WARN, raised_ns=8)
-    ledger = open_ledger()
-    assert ledger.keep(attrs.evolve(entry_at(3), alarms=(alarm, unknown)))
-    ledger.close()
-    kept = {one.name: one for one in open_ledger().entry.alarms}
-    assert (kept["input_gaps"].worst, kept["input_gaps"].limit) == (0.42, 0.05)
-    assert math.isnan(kept["cadence"].worst) and math.isnan(kept["cadence"].limit)
 
 
 @pytest.mark.parametrize(("wider_m", "cycles"), [(6e-4, CYCLES), (3e-4, 2 * CYCLES)])

@@ -13,7 +13,7 @@ import zstandard
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import Channel, ChunkIndex, DataEnd, Footer, Header, Schema, Statistics, SummaryOffset
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.bags.mcap_layout import HEAD, MAGIC
@@ -22,7 +22,8 @@ from leg_wear_monitor.messages.streams import RELIABLE, Qos, definition
 # An MCAP chunk under construction, and its serialization as records.
 
 
-_MESSAGE = np.dtype(
+_MESSAGE = struct.Struct("<BQHIQQ")
+_MESSAGE_TYPE = np.dtype(
     [
         ("opcode", "u1"),
         ("length", "<u8"),
@@ -33,6 +34,7 @@ _MESSAGE = np.dtype(
     ]
 )
 _INDEX = np.dtype([("log_time_ns", "<u8"), ("offset", "<u8")])
+_HEAD_OF_MESSAGE = _MESSAGE.size - HEAD.size
 
 
 @attrs.define(eq=False)
@@ -42,18 +44,31 @@ class Chunk:
     content: bytearray = attrs.Factory(bytearray)
     indexes: dict[int, list[NDArray[Any]]] = attrs.Factory(dict)
 
-    def add(self, channel: int, log_time_ns: NDArray[np.int64], messages: NDArray[np.uint8]) -> None:
+    def add(self, channel: int, log_time_ns: int, raw: bytes) -> None:
+        """Add one message."""
+        self._note(channel, log_time_ns, len(self.content))
+        length = _HEAD_OF_MESSAGE + len(raw)
+        self.content += _MESSAGE.pack(Opcode.MESSAGE, length, channel, 0, log_time_ns, log_time_ns)
+        self.content += raw
+
+    def add_many(self, channel: int, log_time_ns: NDArray[np.int64], messages: NDArray[np.uint8]) -> None:
         """Add messages of equal length, one per row."""
         n, size = messages.shape
-        heads, index = np.zeros(n, _MESSAGE), np.empty(n, _INDEX)
-        length = _MESSAGE.itemsize - HEAD.size + size
-        heads["opcode"], heads["length"], heads["channel"] = Opcode.MESSAGE, length, channel
+        heads = np.zeros(n, _MESSAGE_TYPE)
+        heads["opcode"], heads["length"], heads["channel"] = Opcode.MESSAGE, _HEAD_OF_MESSAGE + size, channel
         heads["log_time_ns"] = heads["publish_time_ns"] = log_time_ns
-        records = np.concatenate([heads.view(np.uint8).reshape(n, -1), messages], axis=1)
-        index["log_time_ns"] = log_time_ns
-        index["offset"] = len(self.content) + np.arange(n) * records.shape[1]
-        self.indexes.setdefault(channel, []).append(index)
+        records = np.empty((n, _MESSAGE.size + size), np.uint8)
+        records[:, : _MESSAGE.size] = heads.view(np.uint8).reshape(n, -1)
+        records[:, _MESSAGE.size :] = messages
+        self._note(channel, log_time_ns, len(self.content) + np.arange(n) * records.shape[1])
         self.content += records.tobytes()
+
+    def _note(self, channel: int, log_time_ns: ArrayLike, offset: ArrayLike) -> None:
+        """Index messages of a channel: their offsets and log times."""
+        times = np.atleast_1d(np.asarray(log_time_ns))
+        index = np.empty(len(times), _INDEX)
+        index["log_time_ns"], index["offset"] = times, offset
+        self.indexes.setdefault(channel, []).append(index)
 
     def records(self, at: int, compressor: zstandard.ZstdCompressor) -> tuple[ChunkIndex, bytes]:
         """Serialize the chunk and its message indexes; also return its chunk index for the summary.
@@ -184,7 +199,10 @@ class McapWriter:
         raw : bytes
             CDR with its encapsulation header.
         """
-        self.write_many(channel, np.array([log_time_ns]), np.frombuffer(raw, np.uint8)[None, :])
+        self._chunk.add(channel, log_time_ns, raw)
+        self._counts[channel] += 1
+        if len(self._chunk.content) >= self._chunk_bytes:
+            self.flush()
 
     def write_many(self, channel: int, log_time_ns: NDArray[np.int64], messages: NDArray[np.uint8]) -> None:
         """Add messages of equal length.
@@ -197,7 +215,7 @@ class McapWriter:
         messages : (n, bytes) array of uint8
             One message per row.
         """
-        self._chunk.add(channel, log_time_ns, messages)
+        self._chunk.add_many(channel, log_time_ns, messages)
         self._counts[channel] += len(messages)
         if len(self._chunk.content) >= self._chunk_bytes:
             self.flush()

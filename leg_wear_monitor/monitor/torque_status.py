@@ -91,7 +91,7 @@ def diagnosis_status(joints: Sequence[str], diagnosis: Diagnosis) -> Status:
         values["foot_load_sigma_n"] = or_nan(diagnosis.load.peak_sigma_n)
         values["heel_strike_phase"] = or_nan(diagnosis.load.heel_strike_phase)
         values["toe_off_phase"] = or_nan(diagnosis.load.toe_off_phase)
-    if math.isfinite(diagnosis.temperature_c):
+    if diagnosis.temperature_c is not None:
         values["drive_temperature_c"] = diagnosis.temperature_c
     if diagnosis.compliance:
         values["drive_stiffness_nm_per_rad"] = 1.0 / diagnosis.compliance

@@ -12,6 +12,7 @@ from leg_wear_monitor.estimate.cause import Change
 from leg_wear_monitor.estimate.ground_load import GroundLoad
 from leg_wear_monitor.estimate.leg_model import ClearanceFit, DetectorState
 from leg_wear_monitor.estimate.signature import DIRECT, Channel, CommissionedTorque, TorqueSensor, averaged
+from leg_wear_monitor.files import finite_or_none
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.state import FootLoad
@@ -173,8 +174,8 @@ class Diagnosis:
         Force of the ground that the foot surely carries.
     compliance : float
         Between the measured crank angle and the crank [rad/(N m)], that the wear is counted with; 0 if rigid.
-    temperature_c, commissioned_c : float
-        Temperature of the drive in the last gait cycles, and in those of the baseline [°C]; NaN where it was
+    temperature_c, commissioned_c : float or None
+        Temperature of the drive in the last gait cycles, and in those of the baseline [°C]; None where it was
         not measured.
     """
 
@@ -191,8 +192,8 @@ class Diagnosis:
     friction: float = 1.0
     load: FootLoad | None = None
     compliance: float = 0.0
-    temperature_c: float = math.nan
-    commissioned_c: float = math.nan
+    temperature_c: float | None = attrs.field(default=None, converter=finite_or_none)
+    commissioned_c: float | None = attrs.field(default=None, converter=finite_or_none)
 
     def of_joint(self, k: int) -> tuple[float, float] | None:
         """Clearance of joint k, and its standard deviation; None where it is not observable."""

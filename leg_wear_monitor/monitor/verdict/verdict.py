@@ -292,7 +292,7 @@ class CauseWords:
     def _temperatures(self) -> str:
         """Temperatures of the drive now and when the leg was commissioned; empty where one is not known."""
         found = self.diagnosis
-        if found is None or math.isnan(found.temperature_c) or math.isnan(found.commissioned_c):
+        if found is None or found.temperature_c is None or found.commissioned_c is None:
             return ""
         return (
             f" (the drive is at {found.temperature_c:.0f} °C, and was at {found.commissioned_c:.0f} °C then)"

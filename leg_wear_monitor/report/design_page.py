@@ -11,10 +11,10 @@ from leg_wear_monitor.report.figure import (
     PALE,
     SMALL,
     VERMILION,
+    finish,
     new_figure,
     plain,
     svg,
-    tidy,
 )
 from leg_wear_monitor.report.page import Page, Picture, Section, Sentences, Table, value
 
@@ -44,16 +44,13 @@ def design_page(mechanism: Mechanism, result: Design, choices: BushingChoices) -
     choices : BushingChoices
         What was tried.
     """
-    joints = [_joint(mechanism, result, joint) for joint in result.loads.joints]
+    asked, first = (f"{words[:1].upper()}{words[1:]}." for words in (result.asked, result.first))
     return Page(
         title=f"Bushings for {result.mechanism}",
-        summary=f"{result.asked[:1].upper()}{result.asked[1:]}.",
+        summary=asked,
         sections=[
-            Section(
-                "The leg as it is",
-                [Sentences([f"{result.first[:1].upper()}{result.first[1:]}."]), _own(result)],
-            ),
-            *joints,
+            Section("The leg as it is", [Sentences([first]), _own(result)]),
+            *(_joint(mechanism, result, joint) for joint in result.loads.joints),
             Section("What changes a life", [_sensitivities(result)]),
             Section("What this supposes", [Sentences(_SUPPOSED)]),
         ],
@@ -85,28 +82,17 @@ def _joint(mechanism: Mechanism, result: Design, joint: str) -> Section:
         caption=caption,
         wide=True,
     )
-    rows = [
-        (
-            one.material,
-            value(1e3, one.diameter_m),
-            value(1e3, one.width_m),
-            value(1e6, one.clearance_m),
-            one.life_words,
-        )
-        for one in _distinct(lasting)[:_SHOWN]
-    ]
+    smallest: dict[str, Candidate] = {}
+    for one in lasting:
+        smallest.setdefault(one.material, one)
+    rows = []
+    for one in list(smallest.values())[:_SHOWN]:
+        sizes = value(1e3, one.diameter_m), value(1e3, one.width_m), value(1e6, one.clearance_m)
+        rows.append((one.material, *sizes, one.life_words))
     head = ("pair", "pin [mm]", "width [mm]", "clearance [µm]", "life")
     note = f"{len(lasting)} of those tried last; the smallest of each pair is shown, {_SHOWN} pairs at most."
     table = Table(caption="Smallest bushings that last.", head=head, rows=rows, note=note, is_text=True)
     return Section(f"Joint {mechanism.joint_words(joint)}", [picture, table])
-
-
-def _distinct(found: Sequence[Candidate]) -> list[Candidate]:
-    """The first candidate of each pair."""
-    first: dict[str, Candidate] = {}
-    for one in found:
-        first.setdefault(one.material, one)
-    return list(first.values())
 
 
 def _chart(hours: float, known: Sequence[Candidate]) -> bytes:
@@ -128,14 +114,11 @@ def _chart(hours: float, known: Sequence[Candidate]) -> bytes:
             axes.annotate(f" {one.limited_by}", (middle, row), fontsize=SMALL, color=VERMILION, va="bottom")
     axes.axvline(hours, color=INK, linewidth=1.0, linestyle="--")
     axes.annotate(f" {hours:g} h", (hours, len(ordered) - 0.4), fontsize=SMALL, color=INK)
-    tidy(axes)
+    finish(axes, x="hours of walking: by wear (dots, 10 to 90 %), by the maker's formula (diamonds)")
     axes.set_xscale("log")
     axes.set_yticks(range(len(ordered)), [plain(one.material) for one in ordered])
     axes.set_ylim(-0.7, len(ordered) + 0.3)
     axes.grid(color=PALE, axis="y", linewidth=0.3)
-    axes.set_xlabel(
-        "hours of walking: by wear (dots, 10 to 90 %), by the maker's formula (diamonds)", fontsize=SMALL
-    )
     return svg(figure)
 
 

@@ -406,8 +406,8 @@ def page_html(page: Page) -> str:
 
 def template_text(name: str) -> str:
     """The text of a file in ``report/templates``, not rendered: a script."""
-    loader = jinja2.PackageLoader("leg_wear_monitor.report")
-    text: str = loader.get_source(jinja2.Environment(autoescape=True), name)[0]
+    environment = _environment()
+    text: str = environment.loader.get_source(environment, name)[0]
     return text
 
 
@@ -429,11 +429,6 @@ def reason(verdict: Verdict) -> str:
     if Figure.CLEARANCES in verdict.not_valid:
         return "leg differs from its model"
     return "leg not monitored" if verdict.state is State.NOT_MONITORED else "see the verdict"
-
-
-def joints_words(summary: ReplaySummary) -> str:
-    """The joints of the verdict with their labels, such as ``joint G (knee)``; empty without any."""
-    return joints_in_words(summary.verdict.joints, summary.leg.joint_words)
 
 
 def since_words(summary: ReplaySummary, stamp_ns: int) -> str:
@@ -495,7 +490,7 @@ def verdict_banner(summary: ReplaySummary, guide: str, certainty: str) -> Banner
     return Banner(
         symbol=symbol,
         word=verdict.state.words.upper(),
-        subject=joints_words(summary),
+        subject=joints_in_words(verdict.joints, summary.leg.joint_words),
         text=verdict.why,
         notes=notes,
         severity=severity,

@@ -208,7 +208,7 @@ class Sweep:
 
 @attrs.frozen(kw_only=True)
 class Study:
-    """Settings of a study; its subclasses are the studies, one file each in `plan.kinds`.
+    """Settings of a study; its subclasses are the studies, in `studies.kinds`.
 
     Attributes
     ----------

@@ -23,7 +23,8 @@ def summary_with(*figures, **seen):
     summary = made_up_summary()
     joints = {name: attrs.evolve(joint, encoders=seen.get(name)) for name, joint in summary.joints.items()}
     verdict = attrs.evolve(summary.verdict, not_valid=figures)
-    return attrs.evolve(summary, joints=joints, verdict=verdict)
+    history = attrs.evolve(summary.history, seen_m={}, seen_sigma_m={})  # no estimates over time
+    return attrs.evolve(summary, joints=joints, verdict=verdict, history=history)
 
 
 def shown(observation, departure_m=None, is_other=False):

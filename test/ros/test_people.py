@@ -125,13 +125,6 @@ def test_a_part_is_replaced_and_the_ledger_saved(shared_stage, monitor, ledger: 
     assert "has no reset to undo" in answer.message
 
 
-def test_saving_without_a_ledger_says_so(stage) -> None:
-    stage.monitor()
-    answer = trigger(stage, "save_state")
-    assert not answer.success
-    assert "ledger.path" in answer.message
-
-
 @pytest.mark.parametrize(
     ("node", "parameters", "line"),
     [

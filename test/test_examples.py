@@ -1,14 +1,21 @@
-"""The examples in the docstrings of public names run as they stand."""
+"""The examples in the docstrings of public names and those of examples/ run as they stand."""
 
 import doctest
+import json
+import re
+import runpy
+import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 
 import leg_wear_monitor as lw
+from leg_wear_monitor.cli.main import cli
 
 ROOT = Path(__file__).parents[1]
+EXAMPLES = ROOT / "examples"
 
 
 def examples() -> list[Any]:
@@ -31,3 +38,60 @@ def test_an_example_runs(example: doctest.DocTest, monkeypatch: pytest.MonkeyPat
 def test_there_are_examples_of_what_is_used_most() -> None:
     named = {test.name for test in examples()}
     assert {"WearMonitor", "load_config", "load_mechanism", "plot", "replay", "simulate"} <= named
+
+
+def run_script(path: Path, monkeypatch: pytest.MonkeyPatch, *arguments: str) -> dict[str, Any]:
+    """Run a script of examples/ in this process; its names at the end."""
+    monkeypatch.setattr(sys, "argv", [str(path), *arguments])
+    return runpy.run_path(str(path), run_name="__main__")
+
+
+def test_the_table_of_examples_csv_has_the_verdict_of_its_leg(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    table = tmp_path / "leg.csv"
+    run_script(EXAMPLES / "csv" / "make_table.py", monkeypatch, str(table))
+    verdict = lw.replay(table, EXAMPLES / "csv" / "monitor.yaml").summary().verdict
+    assert verdict.state.value == "stop" and verdict.joints == ("G",)
+
+
+def test_the_fleet_of_examples_fleet_needs_a_person_at_one_leg(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for module in ("mcap", "pandas", "pyarrow"):
+        pytest.importorskip(module)
+    command = ["fleet", "update", str(EXAMPLES / "fleet" / "fleet.yaml"), "--out", str(tmp_path)]
+    done = CliRunner().invoke(cli, [*command, "--workers", "1"])
+    assert done.exit_code == 0, done.output
+    run_script(EXAMPLES / "fleet" / "worn.py", monkeypatch, str(tmp_path))
+    left, right = capsys.readouterr().out.splitlines()
+    assert left.startswith("left-07: healthy ") and right.startswith("right-07: stop CLEARANCE_SEEN_G; G ")
+
+
+def test_the_cells_of_examples_notebook_run() -> None:
+    pytest.importorskip("mcap")
+    notebook = json.loads((EXAMPLES / "notebook" / "verdict.ipynb").read_text())
+    names: dict[str, Any] = {}
+    for cell in notebook["cells"]:
+        if cell["cell_type"] == "code":
+            assert cell["outputs"] == [] and cell["execution_count"] is None
+            exec("".join(cell["source"]), names)  # as a notebook does
+    assert names["summary"].verdict.joints == ("G",) and names["seen"]["G"] > 0.6
+    assert "<img" in names["summary"]._repr_html_()
+
+
+def test_the_linkage_of_examples_own_linkage_walks(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run_script(EXAMPLES / "own_linkage" / "walk.py", monkeypatch)
+    ideal, loose = capsys.readouterr().out.splitlines()
+    assert ideal.startswith("clearance in none: ") and loose.startswith("clearance in B, C: ")
+
+
+@pytest.mark.plain
+def test_every_example_is_in_the_table_and_no_file_of_it_is_lost() -> None:
+    page = (EXAMPLES / "README.md").read_text()
+    directories = sorted(path.name for path in EXAMPLES.iterdir() if path.is_dir())
+    assert re.findall(r"^\| `(\w+)/` \|", page, re.MULTILINE) == directories
+    named = [*re.findall(r"examples/\S+?\.(?:py|yaml|ipynb)", page)]
+    assert named and all((ROOT / name).is_file() for name in named)

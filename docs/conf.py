@@ -20,6 +20,7 @@ copyright = author
 version = release = ElementTree.parse(ROOT / "package.xml").findtext("version") or "unknown"
 
 extensions = [
+    "example_page",
     "myst_parser",
     "numpydoc",
     "root_pages",
@@ -88,15 +89,21 @@ html_theme = "pydata_sphinx_theme"
 html_title = f"leg_wear_monitor {version}"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
-html_sidebars = {"lessons/*": []}  # what a terminal prints is wide
+html_favicon = "_static/logo.svg"
+html_extra_path = [str(ROOT / "docs" / f"knee_breaks.{kind}") for kind in ("webp", "png")]
 html_copy_source = False
 html_show_sourcelink = False
 html_theme_options = {
-    "logo": {"text": "leg_wear_monitor"},
+    "logo": {
+        "text": html_title,
+        "image_light": "_static/logo.svg",
+        "image_dark": "_static/logo.svg",
+        "alt_text": "",
+    },
     "navbar_align": "left",
     "navigation_depth": 3,
     "show_toc_level": 2,
-    "secondary_sidebar_items": ["page-toc"],
+    "secondary_sidebar_items": {"[!l]**": ["page-toc"]},  # all but lessons/: what a terminal prints is wide
     "footer_start": ["copyright"],
     "footer_end": ["sphinx-version"],
 }

@@ -86,11 +86,13 @@ sphinx_gallery_conf = {
 }
 
 html_theme = "pydata_sphinx_theme"
+html_context = {"default_mode": "auto"}  # light or dark as the browser is
 html_title = f"leg_wear_monitor {version}"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_favicon = "_static/logo.svg"
 html_extra_path = [str(ROOT / "docs" / f"knee_breaks.{kind}") for kind in ("webp", "png")]
+html_search_scorer = str(ROOT / "docs" / "_static" / "search_scorer.js")
 html_copy_source = False
 html_show_sourcelink = False
 html_theme_options = {

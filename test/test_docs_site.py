@@ -32,3 +32,11 @@ def test_every_public_name_has_its_place_in_the_reference_of_python():
     pages = "".join(path.read_text() for path in DOCS.glob("reference/python/*.rst"))
     told = re.findall(r"^\.\. auto(?:function|class|exception):: (\w+)$", pages, re.MULTILINE)
     assert sorted(told) == sorted(lw.__all__)
+
+
+def test_the_pictures_on_top_are_there_and_light():
+    pictures = [DOCS / f"knee_breaks.{kind}" for kind in ("webp", "png")]
+    for page in (DOCS.parent / "README.md", DOCS / "index.rst"):
+        shown = re.findall(r'(?:src|srcset)="(\S+)"', page.read_text())
+        assert sorted(DOCS / Path(each).name for each in shown) == sorted(pictures), page
+    assert sum(picture.stat().st_size for picture in pictures) < 400_000

@@ -353,36 +353,29 @@ class TorqueObserver(KeepsSamples):
     @property
     def diagnosis(self) -> Diagnosis:
         """What the drive torque shows now."""
-        state = self.state
+        state, known = self.state, self.state.commissioned
         is_old = not state.cycles or (len(state.unused) == UNUSED_CYCLES and not state.changes)
-        upcoming = next_step(state, self._references, self.config)
-        load = self._load
+        found = Diagnosis(
+            next_step=next_step(state, self._references, self.config),
+            changes=state.settled,
+            cycles_not_used=state.not_used,
+            channel=state.sensor.channel if state.sensor else DIRECT,
+            load=self._load,
+            temperature_c=state.temperature_c,
+            commissioned_c=known.temperature_c if known else None,
+        )
         if state.fit is None or state.detector is None or is_old:
-            return Diagnosis(
-                state=DiagnosisState.WAITING,
-                reason=missing(state, self._references, self.config),
-                next_step=upcoming,
-                changes=state.settled,
-                cycles_not_used=state.not_used,
-                channel=state.sensor.channel if state.sensor else DIRECT,
-                load=load,
-                temperature_c=state.temperature_c,
-                commissioned_c=state.commissioned.temperature_c if state.commissioned else math.nan,
-            )
+            reason = missing(state, self._references, self.config)
+            return attrs.evolve(found, state=DiagnosisState.WAITING, reason=reason)
         clearance_m, sigma_m = self._observed(state.fit)
-        return Diagnosis(
+        return attrs.evolve(
+            found,
             state=DiagnosisState.CHANGED if state.changes else DiagnosisState.AS_COUNTED,
             reason=doubt(state, self._references, self._models),
-            next_step=upcoming,
             cycles=state.fit_cycles,
             clearance_m=tuple(clearance_m.tolist()),
             sigma_m=tuple(sigma_m.tolist()),
             changes=state.settled + state.changes,
-            cycles_not_used=state.not_used,
-            channel=state.sensor.channel if state.sensor else DIRECT,
-            load=load,
-            temperature_c=state.temperature_c,
-            commissioned_c=state.commissioned.temperature_c if state.commissioned else math.nan,
         )
 
     def _observed(self, fit: ClearanceFit) -> tuple[Floats, Floats]:

@@ -40,9 +40,9 @@ ROOT = Path(__file__).parents[1]
 NAME = "knocking"
 NODE = "/leg_wear_monitor"
 SIZE = (720, 616)
-BEGIN_S, END_S, FRAME_S = 5.9, 9.1, 0.1  # of the recording; the knee breaks after 5 s
+BEGIN_S, END_S, FRAME_S = 4.7, 9.1, 0.125  # of the recording; the knee breaks after 5 s
 SETTLED_S = 1.2  # the hub looks for news twice a second
-STOP_S, PAGE_S, ROLL_S, LEG_S = 2.4, 3.0, 0.12, 2.4
+STOP_S, PAGE_S, ROLL_S, LEG_S = 2.0, 3.0, 0.12, 2.4
 LEFT_OUT = """
 main > :not(#motion), #motion > h2, .note, .no-print { display: none !important; }
 footer, figcaption, .banner dl { display: none !important; }
@@ -135,7 +135,7 @@ class Film:
 def dashboard_frames(
     film: Film, page: LivePage, recorded: Recorded, moments: Iterator[tuple[float, bool]]
 ) -> None:
-    """The leg as it walks, until it stands still after the verdict."""
+    """The leg as it walks into the verdict, then the last moment of the recording."""
     due_s, angle = BEGIN_S, "document.querySelector('#leg-slider .angle')?.textContent"
     for now_s, has_news in moments:
         if has_news:
@@ -187,7 +187,7 @@ def main() -> None:
         finally:
             page.close()
     first, *others = film.frames
-    settings = {"duration": film.times_ms, "loop": 0, "quality": 25, "method": 5}
+    settings = {"duration": film.times_ms, "loop": 0, "quality": 18, "method": 6}
     moving, still = ROOT / "docs" / "knee_breaks.webp", ROOT / "docs" / "knee_breaks.png"
     first.save(moving, save_all=True, append_images=others, **settings)
     stop.quantize(64, dither=Image.Dither.NONE).save(still, optimize=True)

@@ -13,7 +13,7 @@ from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import LedgerFile
 from leg_wear_monitor.monitor.gait_evidence import FRICTION_KEY, SIGMA_KEY
-from leg_wear_monitor.monitor.inputs import Pauses
+from leg_wear_monitor.monitor.inputs import InputGuard, Pauses
 from leg_wear_monitor.monitor.ledger.entry import (
     AlarmEvent,
     ClearancePoint,
@@ -27,7 +27,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
     together,
 )
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
-from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, VerdictReport
+from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, Lost, VerdictReport
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import Samples
@@ -217,6 +217,26 @@ class Accounting:
         others_s = self.state.skipped_s + self.state.pauses.passed_s(unmonitored_s)
         return max(0.0, unmonitored_s - others_s) + self.state.without_zero_s
 
+    def lost(self, guard: InputGuard) -> Lost:
+        """Samples and time that were not integrated so far, with those that a guard has withheld."""
+        intake, pauses = self._twin.intake, self.state.pauses
+        return Lost(
+            unmonitored_s=self.unmonitored_s,
+            already_counted=self.state.skipped,
+            faulty=intake.faulty,
+            conflicting=guard.conflicting,
+            implausible=guard.implausible,
+            duplicates=intake.duplicates,
+            late=intake.late,
+            stray_stamps=intake.stray_stamps,
+            outliers=intake.outliers,
+            gaps_bridged=intake.gaps_bridged,
+            gaps_lost=max(0, intake.lost - pauses.number),
+            backward_jumps=intake.backward_jumps,
+            failures=intake.failures,
+            paused_s=pauses.total_s,
+        )
+
     def pause(self, pause_s: float) -> None:
         """Nobody records for a time [s], from the newest sample on."""
         self.state.pauses = self.state.pauses.with_pause(pause_s, self._twin.intake.unmonitored_s)
@@ -393,10 +413,6 @@ class Accounting:
             if shown[alarm.name] != self.state.shown.get(alarm.name, (Level.OK, False)):
                 self.note(AlarmEvent(change.stamp_ns, alarm))
         self.state.shown = shown
-
-    def note_verdict(self, report: VerdictReport) -> None:
-        """Note a changed verdict for the ledger."""
-        self.note(verdict_event(report))
 
     def note_clearances(self, report: CycleReport) -> None:
         """Take the clearances down, now and then."""

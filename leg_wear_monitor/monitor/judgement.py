@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import attrs
 
 from leg_wear_monitor.monitor import alarm_specs
+from leg_wear_monitor.monitor.accounting import verdict_event
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
 from leg_wear_monitor.monitor.encoders import faults
 from leg_wear_monitor.monitor.gait_evidence import doubts
@@ -50,7 +51,7 @@ def update_verdict(parts: Parts) -> tuple[VerdictReport, ...]:
     if before and (Figure.FORECAST in before.not_valid) != (Figure.FORECAST in now.not_valid):
         parts.forecaster.expire()
     if before or now.fault_code != NO_GAIT_CYCLE:  # a run that monitored nothing has no verdict to store
-        parts.accounting.note_verdict(report)
+        parts.accounting.note(verdict_event(report))
     return (report,)
 
 

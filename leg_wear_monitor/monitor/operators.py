@@ -53,16 +53,8 @@ from leg_wear_monitor.monitor.verdict.verdict import Finding, dated
 from leg_wear_monitor.state import Level
 
 
-@attrs.frozen(eq=False)
-class Reset:
-    """A reset that can be taken back: its row in the ledger, and the joint's wear before it."""
-
-    id: int
-    before: JointWear
-
-
-def last_reset(ledger: Ledger | None, joint: str, now: JointWear) -> Reset:
-    """The last reset of a joint that was not taken back.
+def last_reset(ledger: Ledger | None, joint: str, now: JointWear) -> tuple[int, JointWear]:
+    """The last reset of a joint that was not taken back: its row, and the joint's wear before it.
 
     Parameters
     ----------
@@ -85,7 +77,7 @@ def last_reset(ledger: Ledger | None, joint: str, now: JointWear) -> Reset:
         raise LegWearError(f"joint {joint}: the ledger has no reset to undo")
     if found.joint.depth.shape != now.depth.shape:
         raise LegWearError(f"joint {joint}: had {found.joint.depth.shape[1]} sectors when it was reset")
-    return Reset(found.id, found.joint)
+    return found.id, found.joint
 
 
 def rested_on(alarms: Iterable[Alarm], joint: str, named: Iterable[str] = ()) -> tuple[str, ...]:
@@ -169,10 +161,10 @@ def reset_wear(parts: Parts, joint: str, stamp_ns: int, who: str) -> Acknowledge
 def undo_reset(parts: Parts, joint: str, stamp_ns: int, who: str) -> JointWear:
     """See `WearMonitor.undo_reset`."""
     accounting = parts.accounting
-    reset = last_reset(accounting.ledger, joint, accounting.wear_of(joint))
-    since = accounting.put_back(joint, reset.before)
-    _part_changed(parts, joint, reset.before.replaced_ns)
-    accounting.note(Audit(stamp_ns, who, "undo_reset", since, undoes=reset.id))
+    row, before = last_reset(accounting.ledger, joint, accounting.wear_of(joint))
+    since = accounting.put_back(joint, before)
+    _part_changed(parts, joint, before.replaced_ns)
+    accounting.note(Audit(stamp_ns, who, "undo_reset", since, undoes=row))
     parts.keep()
     return accounting.wear_of(joint)
 
@@ -418,9 +410,9 @@ def undo_in(ledger: Ledger, joint: str, stamp_ns: int, who: str) -> JointWear:
         If there is no reset to undo, or the ledger cannot be written.
     """
     entry, since = _entry_with(ledger, joint)
-    reset = last_reset(ledger, joint, since)
-    part = one_part(reset.before, since)
-    ledger.note(Audit(stamp_ns, who, "undo_reset", since, undoes=reset.id))
+    row, before = last_reset(ledger, joint, since)
+    part = one_part(before, since)
+    ledger.note(Audit(stamp_ns, who, "undo_reset", since, undoes=row))
     ledger.record(_with_part(entry, part))
     return part
 

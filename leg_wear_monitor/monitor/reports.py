@@ -1,27 +1,21 @@
 """Reports of the monitor: samples, gait cycles, changes of alarms and of the verdict, and its own status."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import attrs
 
-from leg_wear_monitor.mechanism.materials import Bushing, BushingLoad
+from leg_wear_monitor.mechanism.materials import BushingLoad
 from leg_wear_monitor.monitor.alarms import NO_FAULT, Alarm
 from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate, ClearanceObservation
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
 from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointForecast, LegForecast
-from leg_wear_monitor.monitor.forecast.measurement import (
-    GrowthWindow,
-    ModelError,
-    growth_rate,
-    judged_clearance_m,
-)
-from leg_wear_monitor.monitor.inputs import InputGuard, Pauses
+from leg_wear_monitor.monitor.forecast.measurement import judged_clearance_m
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.verdict.situation import KnownClearance, joint_status, surest
 from leg_wear_monitor.monitor.verdict.verdict import Finding, verdict_of
 from leg_wear_monitor.state import LegState, Level, Verdict
-from leg_wear_monitor.twin.statistics import CycleStatistics, Intake, SampleStatistics, TorqueStatistics
+from leg_wear_monitor.twin.statistics import SampleStatistics
 
 SampleReports = SampleStatistics
 """The leg at each processed sample; NaN while it is not followed."""
@@ -277,28 +271,6 @@ class Lost:
     paused_s: float = 0.0
 
 
-def lost(
-    intake: Intake, already_counted: int, unmonitored_s: float, guard: InputGuard, pauses: Pauses
-) -> Lost:
-    """Samples and time not integrated, from the counts of a twin and of its input guard."""
-    return Lost(
-        unmonitored_s=unmonitored_s,
-        already_counted=already_counted,
-        faulty=intake.faulty,
-        conflicting=guard.conflicting,
-        implausible=guard.implausible,
-        duplicates=intake.duplicates,
-        late=intake.late,
-        stray_stamps=intake.stray_stamps,
-        outliers=intake.outliers,
-        gaps_bridged=intake.gaps_bridged,
-        gaps_lost=max(0, intake.lost - pauses.number),
-        backward_jumps=intake.backward_jumps,
-        failures=intake.failures,
-        paused_s=pauses.total_s,
-    )
-
-
 @attrs.frozen(eq=False)
 class Reports:
     """Reports of an update.
@@ -341,91 +313,7 @@ class Status:
     fault_code: str = NO_FAULT
 
 
-# A gait cycle's statistics from the twin, as a report with growth and remaining life.
-
-
-def cycle_report(
-    statistics: CycleStatistics,
-    cycle: int,
-    bushings: Mapping[str, Bushing],
-    growth: Sequence[GrowthWindow],
-    model: ModelError,
-    forecast: Forecast,
-    seen: Sequence[ClearanceEstimate] | None,
-    measured: Sequence[Measurement | None],
-    sampling_sigma_m: Sequence[float],
-    diagnosis: Diagnosis,
-) -> CycleReport:
-    """Report of a gait cycle.
-
-    Parameters
-    ----------
-    statistics : CycleStatistics
-    cycle : int
-        Its number over all runs.
-    bushings : mapping of str to Bushing
-        Those of the clearance joints, in their order.
-    growth : sequence of GrowthWindow
-        Of each of them, this cycle included.
-    model : ModelError
-        What the growth of each may be off beside its scatter.
-    forecast : Forecast
-    seen : sequence of ClearanceEstimate or None
-        None without encoders.
-    measured : sequence of Measurement or None
-        Last measurement of each joint's part.
-    sampling_sigma_m : sequence of float
-        Standard deviation of each mean clearance, because not all gait cycles were followed.
-    diagnosis : Diagnosis
-        Clearances that the drive torque shows.
-    """
-    torque = statistics.torque
-    return CycleReport(
-        cycle=cycle,
-        begin_ns=statistics.begin_ns,
-        stamp_ns=statistics.stamp_ns,
-        cadence_rpm=statistics.cadence_rpm,
-        moving_s=statistics.moving_s,
-        bridged_s=statistics.bridged_s,
-        joints=tuple(
-            _joint_report(
-                statistics,
-                k,
-                joint,
-                bushing,
-                growth[k],
-                model,
-                forecast.joints[k],
-                seen[k] if seen else None,
-                measured[k],
-                float(sampling_sigma_m[k]),
-                shown_by_torque(k, diagnosis),
-            )
-            for k, (joint, bushing) in enumerate(bushings.items())
-        ),
-        torque_samples=torque.samples,
-        measured_torque_rms_nm=float(torque.measured_rms_nm),
-        predicted_torque_rms_nm=float(torque.predicted_rms_nm),
-        residual_torque_rms_nm=float(torque.residual_rms_nm),
-        torque_mismatch=_mismatch(torque),
-        load_n=float(torque.load_n),
-        load_sigma_n=float(torque.load_sigma_n),
-        load_acting_n=float(torque.load_acting_n),
-        friction_nm=float(torque.friction_nm),
-        load_friction=float(torque.load_friction),
-        load_friction_sigma=float(torque.load_friction_sigma),
-        torque_lag_s=float(torque.torque_lag_s),
-        friction_sigma_nm=float(torque.friction_sigma_nm),
-        torque_lag_sigma_s=float(torque.torque_lag_sigma_s),
-        forecast=forecast.leg,
-        is_followed=statistics.is_followed,
-    )
-
-
-def _mismatch(torque: TorqueStatistics) -> float:
-    """What load, frictions and lag do not explain, as a fraction of what was predicted; NaN if not known."""
-    predicted_nm = torque.predicted_rms_nm
-    return float(torque.unexplained_rms_nm / predicted_nm) if predicted_nm > 0.0 else math.nan
+# A gait cycle after another one, and with a newer forecast.
 
 
 def latest(report: CycleReport, followed: CycleReport | None) -> CycleReport:
@@ -460,42 +348,6 @@ def with_forecast(
         for joint, new, by, sigma_m in joints
     )
     return attrs.evolve(report, joints=renewed, forecast=forecast.leg)
-
-
-def _joint_report(
-    statistics: CycleStatistics,
-    k: int,
-    joint: str,
-    bushing: Bushing,
-    window: GrowthWindow,
-    model: ModelError,
-    forecast: JointForecast,
-    seen: ClearanceEstimate | None,
-    measured: Measurement | None,
-    sampling_sigma_m: float,
-    shown: KnownClearance | None,
-) -> JointReport:
-    rate = growth_rate(window)
-    mean_n, p99_n = float(statistics.mean_force_n[k]), float(statistics.p99_force_n[k])
-    rubbing_w = float(statistics.archard_j[k] / statistics.moving_s)
-    return JointReport(
-        joint=joint,
-        clearance_m=float(statistics.clearance_mean_m[k]),
-        clearance_max_m=float(statistics.clearance_max_m[k]),
-        growth_m_per_cycle=rate.per_cycle_m if rate else None,
-        growth_mps=rate.per_second_m if rate else None,
-        growth_error_m_per_cycle=rate.error_m(model.relative(k, rate.per_cycle_m)) if rate else None,
-        forecast=forecast,
-        seen=seen,
-        measured=measured,
-        peak_force_n=float(statistics.peak_force_n[k]),
-        p99_force_n=p99_n,
-        mean_force_n=mean_n,
-        impacts=int(statistics.impacts[k]) if statistics.is_followed else None,
-        load=bushing.load(mean_n, p99_n, rubbing_w) if statistics.is_followed else None,
-        sampling_sigma_m=sampling_sigma_m,
-        shown=shown,
-    )
 
 
 def shown_by_torque(k: int, diagnosis: Diagnosis) -> KnownClearance | None:

@@ -8,14 +8,16 @@ from numpy.typing import NDArray
 from leg_wear_monitor.errors import LegWearError, closed_at_the_end
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.accounting import verdict_event
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.fitting import check_limits
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.corrections import clearance_estimates, explain_mismatch, observe_torque
+from leg_wear_monitor.monitor.cycle_report import cycle_report
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
 from leg_wear_monitor.monitor.evaluation import EvaluationPeriods
 from leg_wear_monitor.monitor.forecast.forecast import ForecastBasis
-from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult, extended
+from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult, all_extended
 from leg_wear_monitor.monitor.judgement import (
     evaluate_clearances,
     is_forecast_valid,
@@ -43,9 +45,7 @@ from leg_wear_monitor.monitor.reports import (
     SampleReports,
     Status,
     VerdictReport,
-    cycle_report,
     latest,
-    lost,
 )
 from leg_wear_monitor.monitor.status import statuses
 from leg_wear_monitor.monitor.verdict.situation import is_held_by_estimate
@@ -219,32 +219,17 @@ class WearMonitor:
         parts, state = self._parts, self._parts.state
         self._accounting.ended(statistics)
         if statistics.is_followed:
-            state.growth = tuple(
-                extended(window, float(growth), statistics.moving_s, self.config.growth.window_cycles)
-                for window, growth in zip(state.growth, statistics.growth_mean_m, strict=True)
-            )
+            state.growth = all_extended(state.growth, statistics, self.config.growth.window_cycles)
         estimates = clearance_estimates(parts, statistics)
-        sigma_m = self._accounting.sampling_sigma_m
         forecast = parts.forecaster.after(
             statistics,
             parts.worn_m(statistics.clearance_mean_m),  # the twin itself may be ahead
             self.clearance_limits_m,
             lambda: is_forecast_valid(parts, state.findings),
-            sigma_m,
+            self._accounting.sampling_sigma_m,
             parts.model_error,
         )
-        report = cycle_report(
-            statistics,
-            self._accounting.state.cycles,
-            parts.bushings,
-            state.growth,
-            parts.model_error,
-            forecast,
-            estimates,
-            parts.measured,
-            sigma_m.tolist(),
-            parts.diagnosis,
-        )
+        report = cycle_report(parts, statistics, forecast, estimates)
         state.last = latest(report, state.last)
         self._accounting.note_clearances(report)
         return report
@@ -338,14 +323,7 @@ class WearMonitor:
     @property
     def lost(self) -> Lost:
         """Samples and time that were not integrated so far."""
-        accounting = self._accounting.state
-        return lost(
-            self._twin.intake,
-            accounting.skipped,
-            self._accounting.unmonitored_s,
-            self._parts.guard,
-            accounting.pauses,
-        )
+        return self._accounting.lost(self._parts.guard)
 
     @property
     def sampling(self) -> Sampling | None:
@@ -551,7 +529,8 @@ class WearMonitor:
         if self._parts.state.findings:
             is_noted = bool(update_verdict(self._parts))
             if not is_noted and any(map(is_held_by_estimate, self.alarms.alarms)):
-                self._accounting.note_verdict(self.verdict)  # the ledger's verdict names the last estimate
+                # the ledger's verdict names the last estimate
+                self._accounting.note(verdict_event(self.verdict))
         kept = self._parts.keep(closed=True)
         ledger.close()
         if ledger.at_end and not kept:

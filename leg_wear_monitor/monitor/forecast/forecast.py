@@ -397,25 +397,6 @@ class ForecastBasis:
     is_valid: bool
 
 
-@attrs.frozen(eq=False)
-class _Legs:
-    """The ensemble: n legs that might be this one.
-
-    Attributes
-    ----------
-    clearance_m : (k, n) array
-        Now.
-    base_m : (k, n) array
-        Growth a cycle when all was new.
-    duty_h : (n,) array
-        Walking a day.
-    """
-
-    clearance_m: Floats
-    base_m: Floats
-    duty_h: Floats
-
-
 def forecast(
     now: Sequence[JointCondition],
     coefficient_estimates: Sequence[CoefficientEstimate],
@@ -440,13 +421,13 @@ def forecast(
     valid : bool
         Whether the model holds for what the leg does.
     """
-    legs = _legs(now, coefficient_estimates, settings, law)
-    clearances = [quantiles(row) for row in legs.clearance_m]
+    clearance_m, base_m, duty_h = _legs(now, coefficient_estimates, settings, law)
+    clearances = [quantiles(row) for row in clearance_m]
     answers = [each.answer(q.p50, valid) for each, q in zip(now, clearances, strict=True)]
     limit = np.array([each.limit_m for each in now])
     ended = np.array([[answer is Answer.AT_LIMIT] for answer in answers])
-    ends = cycles_to(law, np.where(ended, limit[:, None], legs.clearance_m), legs.base_m, limit)
-    day = cycle_s / 3600.0 / legs.duty_h
+    ends = cycles_to(law, np.where(ended, limit[:, None], clearance_m), base_m, limit)
+    day = cycle_s / 3600.0 / duty_h
     joints = tuple(
         JointForecast(
             answer=a,
@@ -480,7 +461,11 @@ def _legs(
     coefficient_estimates: Sequence[CoefficientEstimate],
     settings: Forecasting,
     law: GrowthLaw,
-) -> _Legs:
+) -> tuple[Floats, Floats, Floats]:
+    """The ensemble of n legs that might be this one.
+
+    Clearances (k, n) now, growth (k, n) a gait cycle when all was new, and hours (n,) of walking a day.
+    """
     k = len(now)
     fractions, normals = even_fractions(3 * k + 2), even_normals(3 * k + 2)
     log_factor = np.array(
@@ -515,7 +500,7 @@ def _legs(
     here, twin = law.log_growth(clearance), law.log_growth(fresh + wear)
     log_base = log_rate + 0.5 * (here - twin) - here
     duty = settings.duty_hours_per_day * np.exp(settings.duty_sigma * normals[3 * k + 1])
-    return _Legs(clearance, np.maximum(growth, 0.0) * np.exp(log_base), duty)
+    return clearance, np.maximum(growth, 0.0) * np.exp(log_base), duty
 
 
 def _life(answer: Answer, cycles: Floats, cycle_s: float, day: Floats) -> dict[str, Quantiles | None]:

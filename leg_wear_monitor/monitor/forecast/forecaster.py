@@ -260,10 +260,7 @@ class Forecaster:
         """
         state = self.state
         if statistics.is_followed:
-            state.growth = tuple(
-                measurement.extended(window, float(growth), statistics.moving_s, self._settings.window_cycles)
-                for window, growth in zip(state.growth, statistics.growth_mean_m, strict=True)
-            )
+            state.growth = measurement.all_extended(state.growth, statistics, self._settings.window_cycles)
         is_recent = 0 <= statistics.stamp_ns - state.stamp_ns < RENEWED_NS
         if state.last is not None and is_recent and not statistics.is_followed:
             return state.last
@@ -282,13 +279,32 @@ class Forecaster:
         model: measurement.ModelError | None = None,
     ) -> Forecast:
         """A new forecast from the present state; parameters as in `after`."""
-        rates = [measurement.growth_rate(window) for window in self.state.growth]
-        self.state.known = _known(rates)
+        state = self.state
+        rates = [measurement.growth_rate(window) for window in state.growth]
+        state.known = _known(rates)
         if sampling_sigma_m is None:
             sampling_sigma_m = np.zeros(len(wear_m))
         model = model or measurement.ModelError.none(len(wear_m))
-        self.state.last = self._forecast(rates, model, wear_m, sampling_sigma_m, limits_m, is_valid)
-        return self.state.last
+        now = [
+            JointCondition(
+                joint=joint,
+                fresh_m=self._fresh_m[k],
+                wear_m=float(wear_m[k]),
+                wear_sigma_m=float(sampling_sigma_m[k]),
+                limit_m=limits_m[k],
+                growth_m=rate.per_cycle_m if rate else None,
+                growth_error_m=rate.error_m(model.by_load(k, rate.per_cycle_m)) if rate else 0.0,
+                has_coefficient=max(self._clearances[k].wear_coefficient) > 0.0,
+            )
+            for k, (joint, rate) in enumerate(zip(self._clearance_joints, rates, strict=True))
+        ]
+        # a new part's window is shorter than the others'
+        walked = max((window.moving_s for window in state.growth), key=len)
+        state.basis = ForecastBasis(
+            conditions=tuple(now), observed=state.observed, cycle_s=float(np.mean(walked)), is_valid=is_valid
+        )
+        state.last = self._of(state.basis)
+        return state.last
 
     def expire(self) -> None:
         """Make a new forecast after the next gait cycle: what it rests on has changed."""
@@ -411,36 +427,6 @@ class Forecaster:
             *coefficient_estimates[k + 1 :],
         )
         self.state.last = None
-
-    def _forecast(
-        self,
-        rates: Sequence[measurement.GrowthRate | None],
-        model: measurement.ModelError,
-        wear_m: Floats,
-        sampling_sigma_m: Floats,
-        limits_m: Sequence[float],
-        valid: bool,
-    ) -> Forecast:
-        state = self.state
-        now = [
-            JointCondition(
-                joint=joint,
-                fresh_m=self._fresh_m[k],
-                wear_m=float(wear_m[k]),
-                wear_sigma_m=float(sampling_sigma_m[k]),
-                limit_m=limits_m[k],
-                growth_m=rate.per_cycle_m if rate else None,
-                growth_error_m=rate.error_m(model.by_load(k, rate.per_cycle_m)) if rate else 0.0,
-                has_coefficient=max(self._clearances[k].wear_coefficient) > 0.0,
-            )
-            for k, (joint, rate) in enumerate(zip(self._clearance_joints, rates, strict=True))
-        ]
-        # a new part's window is shorter than the others'
-        walked = max((window.moving_s for window in state.growth), key=len)
-        state.basis = ForecastBasis(
-            conditions=tuple(now), observed=state.observed, cycle_s=float(np.mean(walked)), is_valid=valid
-        )
-        return self._of(state.basis)
 
     def _of(self, basis: ForecastBasis) -> Forecast:
         return forecast(

@@ -22,6 +22,7 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
 )
 from leg_wear_monitor.monitor.ledger.entry import CorrectedClearance, JointWear, Measurement
 from leg_wear_monitor.twin.reference import MASS_TOLERANCE
+from leg_wear_monitor.twin.statistics import CycleStatistics
 
 # How past forecasts did: a measured clearance is later reality, and the ledger says what was expected.
 
@@ -503,6 +504,14 @@ def extended(window: GrowthWindow, growth_m: float, moving_s: float, cycles: int
     return GrowthWindow(
         np.append(window.growth_m[keep:], growth_m), np.append(window.moving_s[keep:], moving_s)
     )
+
+
+def all_extended(
+    windows: Sequence[GrowthWindow], statistics: CycleStatistics, cycles: int
+) -> tuple[GrowthWindow, ...]:
+    """Windows of all joints, with a gait cycle that was followed."""
+    each = zip(windows, statistics.growth_mean_m.tolist(), strict=True)
+    return tuple(extended(window, growth_m, statistics.moving_s, cycles) for window, growth_m in each)
 
 
 def growth_rate(window: GrowthWindow) -> GrowthRate | None:

@@ -132,6 +132,22 @@ def json_text(value: Any) -> str:
     return json.dumps(value, indent=1, allow_nan=False) + "\n"
 
 
+def read_json(path: str) -> Any:
+    """Content of a JSON file that a parameter names.
+
+    Raises
+    ------
+    ConfigError
+        If it cannot be read, or is no JSON.
+    """
+    try:
+        return json.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(path, "", f"cannot be read: {error.strerror}") from error
+    except (ValueError, RecursionError) as error:
+        raise ConfigError(path, "", f"is not JSON: {' '.join(str(error).split())}") from error
+
+
 def finite_or_none(value: float | None) -> float | None:
     """A number for JSON or a table, None where it is NaN or infinite."""
     return None if value is None or not math.isfinite(value) else float(value)

@@ -408,22 +408,35 @@ class AlarmEvaluation:
             if foot_load is None
             else {spec.name(): spec.value(foot_load) for spec in alarm_specs.FOOT_LOAD}
         )
-        if not report.is_followed:
-            return self._end_tracked(report, sensor)
+        factor = 1.0
+        if report.is_followed:
+            values = self._of_cycle(report, record)
+            factor = self._impact_factor(report.cadence_rpm)
+            self.state.cadence_rpm = report.cadence_rpm
+        else:
+            values = self._of_tracked(report)
+        values |= sensor
+        for name in self.board.held_by_estimate:  # it is evaluated with the estimate, at the period's end
+            values.pop(name, None)
+        return self.board.evaluate(values, report.stamp_ns, impact_factor=factor)
+
+    def _of_cycle(self, report: CycleReport, record: TorqueRecord) -> dict[str, float]:
+        """Values of a gait cycle that was followed, by the names of their alarms."""
         torque = torque_values(report, record, self.torque_bounds)
         cycle = CycleEvidence(report, torque, self.config.cadence.commanded_rpm)
-        values = {
-            spec.name(): spec.value(cycle) for spec in (*alarm_specs.TORQUE, *alarm_specs.GAIT)
-        } | sensor
+        values = {spec.name(): spec.value(cycle) for spec in (*alarm_specs.TORQUE, *alarm_specs.GAIT)}
         if not self.config.cadence.allows(report.cadence_rpm):
             del values[alarm_specs.MISMATCH.name()]
         for joint in report.joints:
             values |= {spec.name(joint.joint): spec.value(joint) for spec in joint_specs(self.config)}
-        for name in self.board.held_by_estimate:  # it is evaluated with the estimate, at the period's end
-            values.pop(name, None)
-        factor = self._impact_factor(report.cadence_rpm)
-        self.state.cadence_rpm = report.cadence_rpm
-        return self.board.evaluate(values, report.stamp_ns, impact_factor=factor)
+        return values
+
+    def _of_tracked(self, report: CycleReport) -> dict[str, float]:
+        """Those of one that was tracked only: it has neither forces nor a predicted torque."""
+        clearance = alarm_specs.CLEARANCE
+        departure = abs(report.cadence_rpm - self.config.cadence.commanded_rpm)
+        clearances = {clearance.name(joint.joint): clearance.value(joint) for joint in report.joints}
+        return {alarm_specs.CADENCE.name(): departure, **clearances}
 
     def _impact_factor(self, rpm: float) -> float:
         """Factor on the limits of impact forces, which are those of the commanded cadence, at another one.
@@ -437,19 +450,6 @@ class AlarmEvaluation:
         commanded = abs(cadence.commanded_rpm)
         fastest = min(max(abs(rpm), abs(self.state.cadence_rpm)), commanded + cadence.tolerance_rpm)
         return (fastest / commanded) ** 2 if fastest > _FASTER * commanded else 1.0
-
-    def _end_tracked(self, report: CycleReport, sensor: Mapping[str, float]) -> tuple[AlarmList, ...]:
-        """Evaluate a gait cycle that was tracked only: it has neither forces nor a predicted torque."""
-        departure = abs(report.cadence_rpm - self.config.cadence.commanded_rpm)
-        clearances = {
-            alarm_specs.CLEARANCE.name(joint.joint): alarm_specs.CLEARANCE.value(joint)
-            for joint in report.joints
-        }
-        for name in self.board.held_by_estimate:
-            clearances.pop(name, None)
-        return self.board.evaluate(
-            {alarm_specs.CADENCE.name(): departure, **clearances, **sensor}, report.stamp_ns
-        )
 
     def end_period(self, skipped: int = 0) -> tuple[AlarmList, ...]:
         """Evaluate impacts of the running gait cycle, and once per duration of a cycle the input.

@@ -25,6 +25,7 @@ from leg_wear_monitor.monitor.judgement import (
     shown,
     update_verdict,
     verdict_report,
+    with_measured,
 )
 from leg_wear_monitor.monitor.ledger.entry import (
     AlarmEvent,
@@ -226,11 +227,8 @@ def _note_alarms(parts: Parts, stamp_ns: int) -> None:
 
 def _compared(parts: Parts, joint: str) -> tuple[AlarmList, ...]:
     """Compare a new measurement with the limit; it ends an alarm of the clearance that it contradicts."""
-    changes, board, name = (
-        evaluate_clearances(parts),
-        parts.evaluation.board,
-        alarm_specs.CLEARANCE.name(joint),
-    )
+    changes, board = evaluate_clearances(parts), parts.evaluation.board
+    name = alarm_specs.CLEARANCE.name(joint)
     own, before = _situation(parts, joint), board.alarms[name]
     if own.measured is None or before.cause in ("", COUNTED) or before.level is Level.OK:
         return changes
@@ -371,25 +369,19 @@ def note_verdict_of(
 
     Nothing is known of the drive torque until the leg walks again.
     """
-    known, limits_m = (
-        ledger.measurements if measurements is None else measurements,
-        clearance_limits(leg, config),
-    )
+    known = ledger.measurements if measurements is None else measurements
+    limits_m = clearance_limits(leg, config)
     joints = []
     for part in entry.joints:
-        last = last_measured(known, part.name, part.replaced_ns)
-        by = KnownClearance("measured", last.clearance_m, last.sigma_m) if last else None
-        joints.append(
-            JointSituation(
-                joint=part.name,
-                counted_m=leg.clearances[part.name].radial_clearance + part.mean_m,
-                limit_m=limits_m[part.name],
-                measured=by,
-                label=leg.joints[part.name].label,
-                replaced_ns=part.replaced_ns,
-                part_cycles=part.cycles,
-            )
+        one = JointSituation(
+            joint=part.name,
+            counted_m=leg.clearances[part.name].radial_clearance + part.mean_m,
+            limit_m=limits_m[part.name],
+            label=leg.joints[part.name].label,
+            replaced_ns=part.replaced_ns,
+            part_cycles=part.cycles,
         )
+        joints.append(with_measured(one, last_measured(known, part.name, part.replaced_ns)))
     situation = Situation(
         joints=tuple(joints), alarms=entry.alarms, quantities=alarm_specs.QUANTITIES, mismatch=math.nan
     )

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import attrs
 import numpy as np
@@ -17,18 +18,18 @@ from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.fitting import fitted, twin_settings
 from leg_wear_monitor.monitor.config.inputs import AT_START
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.crank_zero import CrankZero, CrankZeroSnapshot
-from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver, TorqueObserverSnapshot
+from leg_wear_monitor.monitor.crank_zero import CrankZero
+from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.reference_file import read_references
 from leg_wear_monitor.monitor.diagnosis.state import Body, Diagnosis, DiagnosisState
-from leg_wear_monitor.monitor.encoders import EncoderObserver, EncoderSnapshot
+from leg_wear_monitor.monitor.encoders import EncoderObserver
 from leg_wear_monitor.monitor.evaluation import (
     A_CYCLE,
     AlarmEvaluation,
     AlarmEvaluationState,
     EvaluationPeriods,
 )
-from leg_wear_monitor.monitor.foot_load import FootLoadCheck, FootLoadState
+from leg_wear_monitor.monitor.foot_load import FootLoadCheck
 from leg_wear_monitor.monitor.forecast.forecaster import Forecaster, ForecastState
 from leg_wear_monitor.monitor.forecast.measurement import GrowthWindow, ModelError, model_error
 from leg_wear_monitor.monitor.gait_evidence import NO_MISMATCH, MismatchWindow, TorqueRecord
@@ -69,7 +70,10 @@ class MonitorState:
 
 @attrs.frozen(eq=False)
 class MonitorSnapshot:
-    """Snapshot of a monitor without its ledger."""
+    """Snapshot of a monitor without its ledger.
+
+    ``observers`` are the snapshots of `Parts.observers`, None where a monitor has no such part.
+    """
 
     twin: TwinSnapshot
     state: MonitorState
@@ -78,11 +82,7 @@ class MonitorSnapshot:
     forecast: ForecastState
     alarms: dict[str, Alarm]
     evaluation_periods: Records
-    guard: Records
-    encoders: EncoderSnapshot | None = None
-    torque: TorqueObserverSnapshot | None = None
-    crank_zero: CrankZeroSnapshot | None = None
-    foot_load: FootLoadState | None = None
+    observers: tuple[Any, ...]
 
 
 class Parts:
@@ -253,6 +253,11 @@ class Parts:
         explained = self.state.mismatch.explanation
         return explained is not None and explained.is_input_fault
 
+    @property
+    def observers(self) -> tuple[Any, ...]:
+        """What looks at samples beside the twin, and has snapshots of its own; None for what is not there."""
+        return self.guard, self.encoders, self.torque, self.crank_zero, self.foot_load
+
     def snapshot(self) -> MonitorSnapshot:
         """A copy of the whole state, except for the ledger's."""
         return MonitorSnapshot(
@@ -263,11 +268,7 @@ class Parts:
             attrs.evolve(self.forecaster.state),
             self.evaluation.board.alarms,
             self.evaluation_periods.state.copy(),
-            self.guard.snapshot(),
-            self.encoders.snapshot() if self.encoders else None,
-            self.torque.snapshot() if self.torque else None,
-            self.crank_zero.snapshot() if self.crank_zero else None,
-            self.foot_load.snapshot() if self.foot_load else None,
+            tuple(each.snapshot() if each else None for each in self.observers),
         )
 
     def restore(self, snapshot: MonitorSnapshot) -> None:
@@ -279,15 +280,9 @@ class Parts:
         self.forecaster.state = attrs.evolve(snapshot.forecast)
         self.evaluation.board.alarms = snapshot.alarms
         self.evaluation_periods.state[:] = snapshot.evaluation_periods
-        self.guard.restore(snapshot.guard)
-        if self.encoders and snapshot.encoders:
-            self.encoders.restore(snapshot.encoders)
-        if self.torque and snapshot.torque:
-            self.torque.restore(snapshot.torque)
-        if self.crank_zero and snapshot.crank_zero:
-            self.crank_zero.restore(snapshot.crank_zero)
-        if self.foot_load and snapshot.foot_load:
-            self.foot_load.restore(snapshot.foot_load)
+        for each, kept in zip(self.observers, snapshot.observers, strict=True):
+            if each and kept is not None:
+                each.restore(kept)
 
     def keep(self, closed: bool = False) -> bool:
         """Write an entry into the ledger; return whether it is on the disk.

@@ -1,16 +1,14 @@
 """The forecast as gait cycles come in: renewed once a minute of their stamps, or when more is known."""
 
-import json
 import reprlib
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 import attrs
 import numpy as np
 
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.files import share_directory
+from leg_wear_monitor.files import read_json, share_directory
 from leg_wear_monitor.life.result import SCHEMA_VERSION
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
@@ -105,12 +103,7 @@ def _lives_in(document: dict[str, Any], path: str, mechanism: Mechanism) -> Sequ
 
 
 def _document(path: str) -> dict[str, Any]:
-    try:
-        document = json.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(path, "", f"cannot be read: {error.strerror}") from error
-    except (ValueError, RecursionError) as error:
-        raise ConfigError(path, "", f"is not JSON: {' '.join(str(error).split())}") from error
+    document = read_json(path)
     if not isinstance(document, dict):
         raise ConfigError(path, "", "is not a life, expected the output of `life --json`")
     version = document.get("schema_version", 1)

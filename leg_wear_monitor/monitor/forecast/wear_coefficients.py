@@ -9,10 +9,8 @@ Where the counted clearance was corrected by what the drive torque shows, c_0, d
 clearance, its error and the wear since; x remains.
 """
 
-import json
 import math
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from statistics import NormalDist
 
 import attrs
@@ -22,6 +20,7 @@ from numpy.typing import ArrayLike
 from leg_wear_monitor.configuration import described, quantity
 from leg_wear_monitor.configuration.strict import structure
 from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.files import read_json
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials import USUAL_SPREAD, regime_of, spread_of
 from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
@@ -175,13 +174,7 @@ def read_priors(path: str) -> LearnedPriors:
     ConfigError
         If it cannot be read.
     """
-    try:
-        document = json.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(path, "", f"cannot be read: {error.strerror}") from error
-    except (ValueError, RecursionError) as error:
-        raise ConfigError(path, "", f"is not JSON: {' '.join(str(error).split())}") from error
-    priors: LearnedPriors = structure(document, LearnedPriors, path, "")
+    priors: LearnedPriors = structure(read_json(path), LearnedPriors, path, "")
     if priors.schema_version != SCHEMA_VERSION:
         fault = f"{priors.schema_version} is not {SCHEMA_VERSION}, the version that this program reads"
         raise ConfigError(path, "schema_version", f"{fault}; update the fleet again")

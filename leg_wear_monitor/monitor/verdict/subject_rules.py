@@ -236,18 +236,9 @@ def departing(situation: Situation) -> Sequence[Hit]:
     """Joints whose clearance by encoders differs from the counted one; the forecast may use it."""
     used = {each.joint for each in situation.joints if each.is_used}
     return [
-        hit if hit.joint in used else _with_forecast(hit) for hit in raised("clearance_departure")(situation)
+        hit if hit.joint in used else attrs.evolve(hit, not_valid=(Figure.FORECAST,))
+        for hit in raised("clearance_departure")(situation)
     ]
-
-
-def _with_forecast(hit: Hit) -> Hit:
-    return Hit(
-        words=hit.words,
-        joint=hit.joint,
-        since_ns=hit.since_ns,
-        evidence=hit.evidence,
-        not_valid=(Figure.FORECAST,),
-    )
 
 
 def diagnosed(situation: Situation) -> Sequence[Hit]:

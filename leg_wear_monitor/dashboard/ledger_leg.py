@@ -27,7 +27,6 @@ from leg_wear_monitor.monitor.ledger.ledger import LedgerContent, read_ledger
 from leg_wear_monitor.monitor.leg_state import joint_clearance, leg_alarm
 from leg_wear_monitor.monitor.verdict.situation import JointSituation, KnownClearance
 from leg_wear_monitor.playback.result import ReplaySummary
-from leg_wear_monitor.playback.summary import ledger_verdict
 from leg_wear_monitor.state import Figure, JointClearance, LegAlarms, LegState, LifeHours, Verdict
 
 OLD_AFTER_S = 60.0  # a monitor of a walking leg writes more often
@@ -118,7 +117,7 @@ class LedgerLeg:
             raise LedgerError(self._fault)
         parts = {part.name: part for part in found.entry.joints} if found.entry else {}
         joints = {joint: parts[joint] for joint in self._setup.joints if joint in parts}
-        verdict = ledger_verdict(found.verdict) if found.verdict else NO_VERDICT
+        verdict = found.verdict or NO_VERDICT
         is_doubted = Figure.FORECAST in verdict.not_valid
         state = LegState(
             verdict=verdict,

@@ -39,7 +39,7 @@ from leg_wear_monitor.monitor.ledger.ledger import Ledger, open_ledger
 from leg_wear_monitor.monitor.leg_state import joint_clearance, life_of
 from leg_wear_monitor.monitor.verdict.situation import JointSituation, KnownClearance
 from leg_wear_monitor.playback.result import summary_of
-from leg_wear_monitor.playback.summary import joint_forecast, ledger_verdict, leg_forecast
+from leg_wear_monitor.playback.summary import joint_forecast, leg_forecast
 from leg_wear_monitor.state import JointClearance, Verdict
 
 # What a fleet has learned, as files: ``learning.json``, and for each leg the file of ``forecast.priors``.
@@ -278,12 +278,12 @@ def _renew(leg: FleetLeg, directory: LegDirectory) -> None:
     before = structure(line["clearances"], dict[str, JointClearance], source, "clearances")
     mechanism = fitted(load_mechanism(leg.config.mechanism), leg.config)
     with ledger_copy(mechanism, leg.config, directory.ledger) as ledger:
-        entry, event = ledger.entry, ledger.last_verdict
+        entry, now = ledger.entry, ledger.last_verdict
         replaced = {part.name: part.replaced_ns for part in entry.joints} if entry else {}
         replaced_ns = [replaced.get(joint, 0) for joint in mechanism.clearance_joints]
         known = ledger.measurements, replaced_ns, ledger.corrections
         forecaster = Forecaster(mechanism, leg.used_config.forecast, *known)
-    if event is not None and _differs(now := ledger_verdict(event), verdict):
+    if now is not None and _differs(now, verdict):
         verdict = now
     told = forecaster.again(basis, replaced_ns)
     forecasts = dict(zip(mechanism.clearance_joints, told.joints, strict=True))

@@ -1,6 +1,5 @@
 """Accounting: counters over all runs of the monitor, time coverage, and the entries of the ledger."""
 
-import json
 import math
 from collections.abc import Iterable, Mapping
 
@@ -21,13 +20,12 @@ from leg_wear_monitor.monitor.ledger.entry import (
     Event,
     ForecastPoint,
     JointWear,
-    VerdictEvent,
     WalkedLoad,
     one_part,
     together,
 )
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
-from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, Lost, VerdictReport
+from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, Lost
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import Samples
@@ -144,21 +142,6 @@ def next_point_s(moving_s: float) -> float:
 
 def _is_apart(step_ns: Ints) -> NDArray[np.bool_]:
     return np.asarray((step_ns < 0) | (step_ns > NEIGHBOURS_NS))
-
-
-def verdict_event(report: VerdictReport) -> VerdictEvent:
-    """A verdict as the ledger stores it."""
-    told = report.verdict.to_dict()
-    texts = {key: json.dumps(told[key], allow_nan=False) for key in ("joints", "evidence", "not_valid")}
-    return VerdictEvent(
-        stamp_ns=report.stamp_ns,
-        state=told["state"],
-        fault_code=told["fault_code"],
-        since_ns=told["since_ns"],
-        why=told["why"],
-        to_do=told["do"],
-        **texts,
-    )
 
 
 class Accounting:

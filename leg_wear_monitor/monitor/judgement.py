@@ -6,11 +6,10 @@ from collections.abc import Sequence
 import attrs
 
 from leg_wear_monitor.monitor import alarm_specs
-from leg_wear_monitor.monitor.accounting import verdict_event
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
 from leg_wear_monitor.monitor.encoders import faults
 from leg_wear_monitor.monitor.gait_evidence import doubts
-from leg_wear_monitor.monitor.ledger.entry import Measurement
+from leg_wear_monitor.monitor.ledger.entry import Measurement, VerdictEvent
 from leg_wear_monitor.monitor.parts import Parts
 from leg_wear_monitor.monitor.reports import AlarmList, VerdictReport, shown_by_torque
 from leg_wear_monitor.monitor.verdict.rules import findings
@@ -51,7 +50,7 @@ def update_verdict(parts: Parts) -> tuple[VerdictReport, ...]:
     if before and (Figure.FORECAST in before.not_valid) != (Figure.FORECAST in now.not_valid):
         parts.forecaster.expire()
     if before or now.fault_code != NO_GAIT_CYCLE:  # a run that monitored nothing has no verdict to store
-        parts.accounting.note(verdict_event(report))
+        parts.accounting.note(VerdictEvent(report.stamp_ns, now))
     return (report,)
 
 

@@ -3,7 +3,6 @@
 First in a monitor, then in a ledger that no monitor uses, whose entry is changed in the same way.
 """
 
-import json
 import math
 from collections.abc import Iterable, Sequence
 
@@ -12,7 +11,6 @@ import attrs
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor import alarm_specs
-from leg_wear_monitor.monitor.accounting import verdict_event
 from leg_wear_monitor.monitor.alarms import Alarm, acknowledged
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
@@ -33,12 +31,13 @@ from leg_wear_monitor.monitor.ledger.entry import (
     Entry,
     JointWear,
     Measurement,
+    VerdictEvent,
     new_part,
     one_part,
 )
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.parts import Parts
-from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, VerdictReport, with_forecast
+from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, with_forecast
 from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.situation import (
     COUNTED,
@@ -50,7 +49,7 @@ from leg_wear_monitor.monitor.verdict.situation import (
     Situation,
     is_surely_below,
 )
-from leg_wear_monitor.monitor.verdict.verdict import Finding, dated
+from leg_wear_monitor.monitor.verdict.verdict import Finding, dated, verdict_of
 from leg_wear_monitor.state import Level
 
 
@@ -279,7 +278,7 @@ def reset_in(
     entry, was = _entry_with(ledger, joint)
     last = ledger.last_verdict
     is_named = last is not None and last.fault_code.startswith("CLEARANCE")
-    gone = rested_on(entry.alarms, joint, json.loads(last.joints) if last and is_named else ())
+    gone = rested_on(entry.alarms, joint, last.joints if last and is_named else ())
     entry = attrs.evolve(entry, alarms=tuple(alarm for alarm in entry.alarms if alarm.name not in gone))
     entry = _with_part(entry, attrs.evolve(new_part(joint), replaced_ns=stamp_ns))
     ledger.note(Audit(stamp_ns, who, "reset_wear", was))
@@ -385,7 +384,8 @@ def note_verdict_of(
     situation = Situation(
         joints=tuple(joints), alarms=entry.alarms, quantities=alarm_specs.QUANTITIES, mismatch=math.nan
     )
-    ledger.note(verdict_event(VerdictReport(stamp_ns, dated(findings(situation), (), stamp_ns))))
+    verdict = verdict_of(dated(findings(situation), (), stamp_ns))
+    ledger.note(VerdictEvent(stamp_ns, verdict))
 
 
 def undo_in(ledger: Ledger, joint: str, stamp_ns: int, who: str) -> JointWear:

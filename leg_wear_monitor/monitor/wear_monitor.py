@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from leg_wear_monitor.errors import LegWearError, closed_at_the_end
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.accounting import verdict_event
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.fitting import check_limits
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -24,7 +23,14 @@ from leg_wear_monitor.monitor.judgement import (
     update_verdict,
     verdict_report,
 )
-from leg_wear_monitor.monitor.ledger.entry import AlarmEvent, Audit, JointWear, Measurement, WalkedLoad
+from leg_wear_monitor.monitor.ledger.entry import (
+    AlarmEvent,
+    Audit,
+    JointWear,
+    Measurement,
+    VerdictEvent,
+    WalkedLoad,
+)
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import Ledger, open_ledger
 from leg_wear_monitor.monitor.leg_state import leg_state
@@ -530,7 +536,8 @@ class WearMonitor:
             is_noted = bool(update_verdict(self._parts))
             if not is_noted and any(map(is_held_by_estimate, self.alarms.alarms)):
                 # the ledger's verdict names the last estimate
-                self._accounting.note(verdict_event(self.verdict))
+                last = self.verdict
+                self._accounting.note(VerdictEvent(last.stamp_ns, last.verdict))
         kept = self._parts.keep(closed=True)
         ledger.close()
         if ledger.at_end and not kept:

@@ -3,7 +3,6 @@
 What the verdict does not believe has no remaining life.
 """
 
-import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
@@ -20,7 +19,6 @@ from leg_wear_monitor.monitor.alarms import ADVICE
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
 from leg_wear_monitor.monitor.gait_evidence import GaitEvidence
-from leg_wear_monitor.monitor.ledger.entry import VerdictEvent
 from leg_wear_monitor.monitor.leg_state import leg_alarm
 from leg_wear_monitor.monitor.reports import JointReport
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
@@ -42,7 +40,7 @@ from leg_wear_monitor.playback.result import (
     WornDepth,
 )
 from leg_wear_monitor.shown import Drawable
-from leg_wear_monitor.state import AlarmChange, Evidence, Figure, State, Verdict
+from leg_wear_monitor.state import AlarmChange, Figure, Verdict
 from leg_wear_monitor.twin import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import Samples, brings
 from leg_wear_monitor.wear import BUSHING, JOURNAL
@@ -62,24 +60,6 @@ def leg_forecast(told: LegForecast | None, verdict: Verdict) -> LegForecast | No
     if told is None or Figure.FORECAST not in verdict.not_valid:
         return told
     return attrs.evolve(told, cycles=None, hours=None, days=None, first_probability={}, first=None)
-
-
-def ledger_verdict(event: VerdictEvent) -> Verdict:
-    """A verdict of a ledger."""
-    return Verdict(
-        state=State(event.state),
-        joints=tuple(json.loads(event.joints)),
-        why=event.why,
-        since_ns=event.since_ns,
-        do=event.to_do,
-        evidence=tuple(_evidence(each) for each in json.loads(event.evidence)),
-        not_valid=tuple(map(Figure, json.loads(event.not_valid))),
-        fault_code=event.fault_code,
-    )
-
-
-def _evidence(record: dict[str, Any]) -> Evidence:
-    return Evidence(**{field.name: record[field.name] for field in attrs.fields(Evidence)})
 
 
 # The summary of a replay, from which its files and its page are made.

@@ -1,14 +1,12 @@
 """The page of a ledger: its verdict, while a monitor writes it; what cannot be read is said."""
 
-import json
-
 import attrs
 import numpy as np
 import pytest
 from html_reader import read
 
 from leg_wear_monitor.dashboard import ledger_leg
-from leg_wear_monitor.dashboard.ledger_leg import LedgerLeg, ledger_verdict
+from leg_wear_monitor.dashboard.ledger_leg import LedgerLeg
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.fitting import fitted
@@ -25,7 +23,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
 )
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
-from leg_wear_monitor.state import Evidence, Figure, Level, State
+from leg_wear_monitor.state import Evidence, Figure, Level, State, Verdict
 from leg_wear_monitor.wear import SECTORS
 
 pytestmark = pytest.mark.plain
@@ -43,20 +41,20 @@ def entry(second, worn_m=1.0e-5, alarms=()):
 
 
 def verdict(stamp_s, state="healthy", **changes):
-    event = VerdictEvent(
-        stamp_ns=stamp_s * SECOND, state=state, fault_code="NONE", joints="[]", since_ns=stamp_s * SECOND,
-        why="no alarm is raised", to_do="nothing now", evidence="[]", not_valid="[]",
+    found = Verdict(
+        state=State(state), fault_code="NONE", joints=(), since_ns=stamp_s * SECOND, why="no alarm is raised",
+        do="nothing now", evidence=(), not_valid=(),
     )  # fmt: skip
-    return attrs.evolve(event, **changes)
+    return VerdictEvent(stamp_s * SECOND, attrs.evolve(found, **changes))
 
 
 OPENED = {
     "fault_code": "CLEARANCE_G",
-    "joints": '["G"]',
+    "joints": ("G",),
     "why": "the counted clearance of joint G is 0.7 mm",
-    "to_do": "replace it",
-    "evidence": json.dumps([{"name": "clearance G", "value": 7e-4, "limit": 6e-4, "unit": "m"}]),
-    "not_valid": '["forecast"]',
+    "do": "replace it",
+    "evidence": (Evidence("clearance G", 7e-4, 6e-4, "m"),),
+    "not_valid": (Figure.FORECAST,),
 }
 
 
@@ -124,8 +122,10 @@ def test_what_the_monitor_writes_meanwhile_is_shown_and_its_files_are_left_alone
     assert ledger.keep(entry(22))  # nothing stands in the monitor's way
 
 
-def test_the_verdict_is_the_one_that_was_written():
-    found = ledger_verdict(verdict(3, "inspect", **OPENED))
+def test_the_verdict_is_the_one_that_was_written(ledger):
+    ledger.note(verdict(3, "inspect", **OPENED))
+    assert ledger.keep(entry(10))
+    found = ledger.last_verdict
     assert (found.state, found.joints, found.since_ns) == (State.INSPECT, ("G",), 3 * SECOND)
     assert found.evidence == (Evidence("clearance G", 7e-4, 6e-4, "m"),)
     assert found.not_valid == (Figure.FORECAST,)

@@ -14,6 +14,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.state import Verdict
 from leg_wear_monitor.twin.reference import LegParameters
 from leg_wear_monitor.twin.torque_reference import TorqueReference
 from leg_wear_monitor.wear import SECTORS
@@ -301,19 +302,12 @@ class AlarmEvent:
     alarm: Alarm
 
 
-@attrs.frozen(kw_only=True)
+@attrs.frozen
 class VerdictEvent:
-    """A changed verdict at a stamp; ``joints``, ``evidence`` and ``not_valid`` as JSON."""
+    """A changed verdict at a stamp."""
 
     stamp_ns: int
-    state: str
-    fault_code: str
-    joints: str
-    since_ns: int
-    why: str
-    to_do: str
-    evidence: str
-    not_valid: str
+    verdict: Verdict
 
 
 @attrs.frozen

@@ -30,12 +30,12 @@ from leg_wear_monitor.monitor.ledger.entry import (
     ForecastPoint,
     Measurement,
     Run,
-    VerdictEvent,
     WalkedLoad,
     Withdrawal,
     binding_of,
 )
 from leg_wear_monitor.monitor.ledger.file import MOVE, LedgerError, connect, copy_of, create, transaction
+from leg_wear_monitor.state import Verdict
 
 WHOLE_S = 60.0
 """Longest time in motion between two entries that are written with whole surfaces."""
@@ -198,8 +198,8 @@ class Ledger:
         return now
 
     @property
-    def last_verdict(self) -> VerdictEvent | None:
-        """The last stored change of the verdict; None without one.
+    def last_verdict(self) -> Verdict | None:
+        """The verdict since its last stored change; None without one.
 
         Raises
         ------
@@ -304,7 +304,7 @@ class Ledger:
         """Result of a query."""
         try:
             return ask(self._connection())
-        except (sqlite3.Error, ValueError) as error:
+        except (sqlite3.Error, ValueError, TypeError) as error:
             raise LedgerError(f"{self.path}: cannot be read: {error}") from error
 
     def _connection(self) -> sqlite3.Connection:
@@ -349,8 +349,8 @@ class LedgerContent:
     ----------
     entry : Entry or None
         The last entry; None in a new ledger.
-    verdict : VerdictEvent or None
-        The last change of the verdict.
+    verdict : Verdict or None
+        Since its last change.
     clearances : tuple of ClearancePoint
         In the order in which they were written.
     forecasts : dict of str to ForecastPoint
@@ -361,7 +361,7 @@ class LedgerContent:
     """
 
     entry: Entry | None
-    verdict: VerdictEvent | None
+    verdict: Verdict | None
     clearances: tuple[ClearancePoint, ...]
     forecasts: dict[str, ForecastPoint]
     measurements: tuple[Measurement, ...]

@@ -1,5 +1,6 @@
 """Entries and events as rows of the ledger's tables, and back."""
 
+import json
 import sqlite3
 from typing import Any, TypeVar
 
@@ -30,12 +31,12 @@ from leg_wear_monitor.monitor.ledger.entry import (
     together,
 )
 from leg_wear_monitor.monitor.ledger.schema import add, replace, sealed
-from leg_wear_monitor.state import Level
+from leg_wear_monitor.state import Evidence, Figure, Level, State, Verdict
 from leg_wear_monitor.twin.leg_simulation import POINTS
 from leg_wear_monitor.twin.reference import UNLIKE, CrankProfile, LegParameters
 from leg_wear_monitor.twin.torque_reference import CADENCES, CYCLES, TorqueReference
 
-_Row = TypeVar("_Row", Measurement, CorrectedClearance, ForecastPoint, VerdictEvent, ClearancePoint)
+_Row = TypeVar("_Row", Measurement, CorrectedClearance, ForecastPoint, ClearancePoint)
 
 # events whose fields are the columns of a table
 _TABLES: dict[type, str] = {
@@ -43,8 +44,10 @@ _TABLES: dict[type, str] = {
     CorrectedClearance: "correction",
     ForecastPoint: "forecast",
     Measurement: "measurement",
-    VerdictEvent: "verdict",
 }
+
+
+_VERDICT_LISTS = ("joints", "evidence", "not_valid")
 
 
 # --- runs and entries ---
@@ -209,6 +212,8 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
             add(db, "identified_leg", {"stamp_ns": stamp_ns, **_leg_values(bodies, parameters)})
         case SimulatedReference():
             _write_reference(db, event)
+        case VerdictEvent(stamp_ns, verdict):
+            add(db, "verdict", {"stamp_ns": stamp_ns, **_verdict_values(verdict)})
         case _:
             values = attrs.asdict(event, filter=lambda field, _: field.name != "id")
             add(db, _TABLES[type(event)], values)
@@ -228,6 +233,14 @@ def _alarm_event_values(alarm: Alarm) -> dict[str, Any]:
 def _audit_values(was: JointWear) -> dict[str, Any]:
     values = attrs.asdict(was, filter=lambda field, _: field.name != "name")
     return {"joint": was.name} | values | {"depth": _blob(was.depth)}
+
+
+def _verdict_values(verdict: Verdict) -> dict[str, Any]:
+    """Values of a verdict's row, lists as JSON."""
+    told = verdict.to_dict()
+    texts = {name: json.dumps(told[name], allow_nan=False) for name in _VERDICT_LISTS}
+    told["to_do"] = told.pop("do")
+    return told | texts
 
 
 def _baseline_values(baseline: CommissionedTorque) -> dict[str, Any]:
@@ -294,10 +307,26 @@ def read_measurements(db: sqlite3.Connection) -> tuple[Measurement, ...]:
     return tuple(attrs.evolve(each, counts=bool(each.counts)) for each in read_rows(db, Measurement))
 
 
-def read_last_verdict(db: sqlite3.Connection) -> VerdictEvent | None:
-    """The last change of the verdict."""
-    found = read_rows(db, VerdictEvent, "id = (SELECT max(id) FROM verdict)")
-    return found[0] if found else None
+def read_last_verdict(db: sqlite3.Connection) -> Verdict | None:
+    """The verdict since its last change."""
+    row = db.execute(
+        "SELECT state, why, since_ns, to_do, fault_code, joints, evidence, not_valid "
+        "FROM verdict ORDER BY id DESC LIMIT 1"
+    ).fetchone()
+    if row is None:
+        return None
+    state, why, since_ns, to_do, fault_code = row[:5]
+    joints, evidence, not_valid = map(json.loads, row[5:])
+    return Verdict(
+        state=State(state),
+        joints=tuple(joints),
+        why=why,
+        since_ns=since_ns,
+        do=to_do,
+        evidence=tuple(Evidence(**each) for each in evidence),
+        not_valid=tuple(map(Figure, not_valid)),
+        fault_code=fault_code,
+    )
 
 
 def read_last_reset(db: sqlite3.Connection, joint: str) -> Audit | None:

@@ -25,7 +25,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
 )
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.schema import create_tables, expected_definitions
-from leg_wear_monitor.state import Level
+from leg_wear_monitor.state import Level, State, Verdict
 from leg_wear_monitor.twin.leg_simulation import POINTS
 from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
 from leg_wear_monitor.twin.torque_reference import TorqueReference
@@ -52,8 +52,17 @@ def full(open_ledger, entry_at):
     reference = TorqueReference(CrankProfile.steady(6.0), np.full((2, 5), 3e-4), tuple(torque), LEG)
     ledger.note(SimulatedReference(1, ("thigh",), reference))
     ledger.note(IdentifiedLeg(1, ("thigh",), LegParameters(np.array([1.02]), np.array([0.999]), 1.5)))
-    texts = ("state", "fault_code", "joints", "why", "to_do", "evidence", "not_valid")
-    ledger.note(VerdictEvent(stamp_ns=4, since_ns=3, **dict.fromkeys(texts, "[]")))
+    verdict = Verdict(
+        state=State.HEALTHY,
+        joints=(),
+        why="",
+        since_ns=3,
+        do="",
+        evidence=(),
+        not_valid=(),
+        fault_code="NONE",
+    )
+    ledger.note(VerdictEvent(4, verdict))
     ledger.keep(entry_at(2), closed=True)
     ledger.close()
     return ledger.path

@@ -1,6 +1,6 @@
 """Verdicts, identified legs and simulated references in the ledger."""
 
-import json
+import math
 import sqlite3
 from contextlib import closing
 
@@ -10,31 +10,44 @@ import pytest
 
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.monitor.ledger.entry import IdentifiedLeg, SimulatedReference, VerdictEvent
+from leg_wear_monitor.state import Evidence, Figure, State, Verdict
 from leg_wear_monitor.twin.reference import LegParameters
 
 pytestmark = pytest.mark.plain
 
 LOAD_N = np.outer(np.arange(128.0), [0.1, 1.0])
-EVENT = VerdictEvent(
-    stamp_ns=7,
-    state="inspect",
-    fault_code="CLEARANCE_CHANGED_G",
-    joints='["G"]',
-    since_ns=5,
+VERDICT = Verdict(
+    state=State.INSPECT,
+    joints=("G",),
     why="the drive torque shows a clearance",
-    to_do="rock joint G",
-    evidence='[{"name": "clearance G", "value": 1e-3, "limit": null, "unit": "m"}]',
-    not_valid='["forecast"]',
+    since_ns=5,
+    do="rock joint G",
+    evidence=(Evidence("clearance G", 1e-3, math.nan, "m"),),
+    not_valid=(Figure.FORECAST,),
+    fault_code="CLEARANCE_CHANGED_G",
 )
+ROW = {
+    "id": 1,
+    "stamp_ns": 7,
+    "state": "inspect",
+    "fault_code": "CLEARANCE_CHANGED_G",
+    "joints": '["G"]',
+    "since_ns": 5,
+    "why": "the drive torque shows a clearance",
+    "to_do": "rock joint G",
+    "evidence": '[{"name": "clearance G", "value": 0.001, "limit": null, "unit": "m"}]',
+    "not_valid": '["forecast"]',
+}
 
 
-def test_a_verdict_is_a_row(open_ledger, entry_at):
+def test_a_verdict_is_a_row_and_is_read_as_written(open_ledger, entry_at):
     ledger = open_ledger()
-    ledger.note(EVENT)
+    assert ledger.last_verdict is None
+    ledger.note(VerdictEvent(7, VERDICT))
     ledger.keep(entry_at(1), closed=True)
     ledger.close()
-    assert rows(ledger.path) == [{"id": 1, **attrs.asdict(EVENT)}]
-    assert json.loads(rows(ledger.path)[0]["evidence"])[0]["limit"] is None
+    assert rows(ledger.path) == [ROW]
+    assert open_ledger().last_verdict == VERDICT
 
 
 def test_an_identified_leg_is_read_as_written_and_the_last_is_in_force(open_ledger, entry_at):

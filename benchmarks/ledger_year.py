@@ -69,7 +69,7 @@ class Walk:
                 for name, depth in zip(self.clearance_joints, self.depth, strict=True)
             ),
             totals={"cycles": moving_s, "moving_s": moving_s, "standing_s": 0.0, "bridged_s": 0.1},
-            spans=((self.begin_ns, stamp_ns),),
+            spans=((self.begin_ns, stamp_ns, 0),),
         )
 
     def points(self, entry):

@@ -180,14 +180,15 @@ class Accounting:
     def _take_over(self, joints: dict[str, JointWear]) -> None:
         own = [joints[name] for name in self._twin.clearance_joints]
         self._twin.set_depth(np.stack([joint.depth for joint in own]))
-        self.state.parts = tuple(
-            PartLife(
-                self.state.cycles - joint.cycles,
-                self._before["moving_s"] - joint.moving_s,
-                joint.replaced_ns,
-                joint.sampling_m2,
-            )
-            for joint in own
+        self.state.parts = tuple(self._part(k, joint) for k, joint in enumerate(own))
+
+    def _part(self, k: int, wear: JointWear) -> PartLife:
+        """A part of joint k that has walked so much until now."""
+        return PartLife(
+            self.state.cycles - wear.cycles,
+            self.totals["moving_s"] - wear.moving_s,
+            wear.replaced_ns,
+            wear.sampling_m2 - float(self._run_sampling_m2[k]),
         )
 
     @property
@@ -353,10 +354,7 @@ class Accounting:
         part = one_part(before, since)
         depth[k] = part.depth
         self._twin.set_depth(depth)
-        begun_s = self.totals["moving_s"] - part.moving_s
-        sampling_m2 = part.sampling_m2 - float(self._run_sampling_m2[k])
-        cycles = self.state.cycles - part.cycles
-        self._set_part(k, PartLife(cycles, begun_s, part.replaced_ns, sampling_m2))
+        self._set_part(k, self._part(k, part))
         return since
 
     def _set_part(self, k: int, part: PartLife) -> None:
@@ -436,7 +434,6 @@ class Accounting:
     def _entry(self, alarms: Iterable[Alarm]) -> Entry:
         depth = self._twin.depth
         epoch = self.ledger.epoch if self.ledger else 0
-        spans = (*self.state.past, *((*span, epoch) for span in self.state.spans))
         return Entry(
             stamp_ns=self._twin.intake.followed_stamp_ns or (self.ledger.kept_ns if self.ledger else 0),
             joints=tuple(self.joint_wear(k, depth) for k in range(len(self._twin.clearance_joints))),
@@ -445,7 +442,6 @@ class Accounting:
             | self._sampling_totals
             | {_DUE_KEY: self.state.point_due_s},
             alarms=tuple(alarm for alarm in alarms if alarm.level is not Level.OK),
-            spans=tuple((begin, end) for begin, end, _ in spans),
-            span_epochs=tuple(of for *_, of in spans) if any(of for *_, of in spans) else (),
+            spans=(*self.state.past, *((*span, epoch) for span in self.state.spans)),
             loads=self.state.loads,
         )

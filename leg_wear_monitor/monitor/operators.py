@@ -425,4 +425,4 @@ def _entry_with(ledger: Ledger, joint: str) -> tuple[Entry, JointWear]:
 def _with_part(entry: Entry, part: JointWear) -> Entry:
     """The entry with another part of a joint; the spans stay those of the run that counted them."""
     joints = tuple(part if each.name == part.name else each for each in entry.joints)
-    return attrs.evolve(entry, joints=joints, spans=(), span_epochs=())
+    return attrs.evolve(entry, joints=joints, spans=())

@@ -39,7 +39,7 @@ def ledger(tmp_path):
         Alarm(kind="clearance", subject="A", **raised),
     )
     totals = {"cycles": 5e3, "moving_s": 5e3}
-    entry = Entry(stamp_ns=10**9, joints=joints, totals=totals, alarms=alarms, spans=((0, 10**9),))
+    entry = Entry(stamp_ns=10**9, joints=joints, totals=totals, alarms=alarms, spans=((0, 10**9, 0),))
     kept.keep(entry, closed=True)
     kept.close()
     return path

@@ -37,7 +37,7 @@ def entry(second, worn_m=1.0e-5, alarms=()):
     depth = np.full((2, SECTORS), worn_m / 2.0)
     joints = tuple(JointWear(name, depth, second, float(second)) for name in LEG.clearance_joints)
     totals = {"cycles": float(second), "moving_s": float(second)}
-    return Entry(second * SECOND, joints, totals, alarms, spans=((0, second * SECOND),))
+    return Entry(second * SECOND, joints, totals, alarms, spans=((0, second * SECOND, 0),))
 
 
 def verdict(stamp_s, state="healthy", **changes):

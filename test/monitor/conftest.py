@@ -38,7 +38,7 @@ def entry_at() -> Callable[[int], Entry]:
             ),
             totals={"cycles": float(second), "moving_s": 0.9 * second},
             alarms=(Alarm(kind="clearance", subject="A", level=Level.WARN, acknowledged=second % 2 == 1),),
-            spans=((0, second * SECOND),),
+            spans=((0, second * SECOND, 0),),
             loads=(WalkedLoad(300, second, 0.9 * second, 290.0, 8.0),),
         )
 

@@ -2,7 +2,7 @@
 
 import reprlib
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import attrs
 import numpy as np
@@ -33,6 +33,8 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
 )
 from leg_wear_monitor.monitor.ledger.entry import CorrectedClearance, JointWear, Measurement, fingerprint
 from leg_wear_monitor.twin.statistics import CycleStatistics
+
+_T = TypeVar("_T")
 
 # Lives from files of ``leg-wear-monitor life --json``, each bound to the leg it was simulated for.
 
@@ -316,7 +318,7 @@ class Forecaster:
     def replaced(self, joint: str, replaced_ns: int) -> None:
         """Reset the estimate of a joint whose part changed to what is known of this part."""
         k, state = self._clearance_joints.index(joint), self.state
-        state.growth = (*state.growth[:k], measurement.GrowthWindow(), *state.growth[k + 1 :])
+        state.growth = _with(state.growth, k, measurement.GrowthWindow())
         self._update_coefficients(k, self._estimate(k, replaced_ns))
         self._observe(k, None)
 
@@ -409,17 +411,12 @@ class Forecaster:
         )
 
     def _observe(self, k: int, observation: ClearanceAtWear | None) -> None:
-        observed = self.state.observed
-        self.state.observed = (*observed[:k], observation, *observed[k + 1 :])
+        self.state.observed = _with(self.state.observed, k, observation)
 
     def _update_coefficients(self, k: int, coefficient_estimate: CoefficientEstimate) -> None:
-        coefficient_estimates = self.state.coefficient_estimates
-        self.state.coefficient_estimates = (
-            *coefficient_estimates[:k],
-            coefficient_estimate,
-            *coefficient_estimates[k + 1 :],
-        )
-        self.state.last = None
+        state = self.state
+        state.coefficient_estimates = _with(state.coefficient_estimates, k, coefficient_estimate)
+        state.last = None
 
     def _of(self, basis: ForecastBasis) -> Forecast:
         return forecast(
@@ -434,3 +431,8 @@ class Forecaster:
 
 def _known(rates: Sequence[measurement.GrowthRate | None]) -> int:
     return sum(rate is not None for rate in rates)
+
+
+def _with(values: tuple[_T, ...], k: int, new: _T) -> tuple[_T, ...]:
+    """Values with another one at k."""
+    return (*values[:k], new, *values[k + 1 :])

@@ -248,10 +248,8 @@ class Entry:
         Counters over all runs; each name ends in the unit.
     alarms : tuple of Alarm
         Those that are not OK.
-    spans : tuple of (int, int)
-        Begin and end [ns] of the time spans of this run whose wear is counted.
-    span_epochs : tuple of int
-        Clock epoch of each span; empty if all spans are in epoch 0.
+    spans : tuple of (int, int, int)
+        Begin and end [ns] of the time spans of this run whose wear is counted, and their clock epochs.
     loads : tuple of WalkedLoad
         Foot loads that acted in this run.
     """
@@ -260,8 +258,7 @@ class Entry:
     joints: tuple[JointWear, ...]
     totals: dict[str, float]
     alarms: tuple[Alarm, ...] = ()
-    spans: tuple[tuple[int, int], ...] = ()
-    span_epochs: tuple[int, ...] = ()
+    spans: tuple[tuple[int, int, int], ...] = ()
     loads: tuple[WalkedLoad, ...] = ()
 
     @property

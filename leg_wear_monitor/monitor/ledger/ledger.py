@@ -13,9 +13,7 @@ from pathlib import Path
 from typing import TypeVar
 
 import attrs
-import numpy as np
 
-from leg_wear_monitor.mechanism.arrays import Ints
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -83,6 +81,8 @@ class Ledger:
         Of this run's clock and computer, stored with each entry; until set, those of the previous run.
     cut_off_s : float or None
         If the last run was interrupted: the longest time of walking whose wear was lost.
+    counted_ns : (n, 2) array
+        Begin and end [ns] of the time spans counted in earlier runs, in all epochs.
     kept_ns : int
         Stamp of the last entry on the disk, 0 before.
     loss : str
@@ -125,7 +125,7 @@ class Ledger:
         self.entry = rows.read_entry(db)
         self.kept_ns = self.entry.stamp_ns if self.entry else 0
         self._kept_moving_s = self.entry.moving_s if self.entry else 0.0
-        self._spans = np.array(sorted(set(rows.read_spans(db))), dtype=np.int64).reshape(-1, 3)
+        self.counted_ns = rows.read_spans(db)
         self.measurements = rows.read_measurements(db)
         self.corrections = rows.read_rows(db, CorrectedClearance)
         self.commissioned = rows.read_commissioned(db)
@@ -146,15 +146,6 @@ class Ledger:
             db.execute("ROLLBACK")
         except sqlite3.Error as error:
             raise LedgerError(f"{self.path}: cannot be written: {error}") from error
-
-    @property
-    def counted_ns(self) -> Ints:
-        """Begin and end (n, 2) [ns] of the time spans counted in earlier runs, in all epochs."""
-        return self._spans[:, :2]
-
-    def counted_in(self, epoch: int) -> Ints:
-        """Begin and end (n, 2) [ns] of the counted time spans in one epoch of the clock."""
-        return self._spans[self._spans[:, 2] == epoch, :2]
 
     @property
     def waiting(self) -> int:

@@ -9,7 +9,7 @@ import numpy as np
 
 from leg_wear_monitor.estimate.signature import Channel, CommissionedTorque
 from leg_wear_monitor.files import finite_or_none, or_nan
-from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.ledger.entry import (
     AlarmEvent,
@@ -92,9 +92,7 @@ def write_entry(db: sqlite3.Connection, run: int, entry: Entry, whole: bool) -> 
         replace(db, "surface", [(joint.name, _blob(joint.depth)) for joint in entry.joints])
     replace(db, "total", (_totals(db) | entry.totals).items())
     replace(db, "alarm", [_alarm_values(alarm) for alarm in entry.alarms])
-    epochs = entry.span_epochs or (0,) * len(entry.spans)
-    spans = zip(entry.spans, epochs, strict=True)
-    replace(db, "span", [(run, part, *span, of) for part, (span, of) in enumerate(spans)], "run = ?", (run,))
+    replace(db, "span", [(run, part, *span) for part, span in enumerate(entry.spans)], "run = ?", (run,))
     replace(db, "load", [(run, *attrs.astuple(load)) for load in entry.loads], "run = ?", (run,))
 
 
@@ -120,8 +118,7 @@ def read_entry(db: sqlite3.Connection) -> Entry | None:
         joints=tuple(_risen(_joint(*row[:6]), row[6:]) for row in joints),
         totals=_totals(db),
         alarms=tuple(_alarm_of(*row) for row in db.execute("SELECT * FROM alarm ORDER BY kind, subject")),
-        spans=tuple((begin, end) for begin, end, _ in spans),
-        span_epochs=tuple(epoch for *_, epoch in spans) if any(epoch for *_, epoch in spans) else (),
+        spans=tuple(spans),
         loads=_loads(db, "run = ?", run),
     )
 
@@ -166,9 +163,10 @@ def _alarm_of(
     )  # fmt: skip
 
 
-def read_spans(db: sqlite3.Connection) -> list[tuple[int, int, int]]:
-    """Begin, end [ns] and epoch of all counted time spans."""
-    return db.execute("SELECT begin_ns, end_ns, epoch FROM span").fetchall()
+def read_spans(db: sqlite3.Connection) -> Ints:
+    """Begin and end (n, 2) [ns] of all counted time spans, in all epochs."""
+    spans = db.execute("SELECT DISTINCT begin_ns, end_ns FROM span ORDER BY begin_ns, end_ns").fetchall()
+    return np.array(spans, dtype=np.int64).reshape(-1, 2)
 
 
 def read_loads(db: sqlite3.Connection) -> tuple[WalkedLoad, ...]:

@@ -148,7 +148,7 @@ def _entry(run: int, step: int):  # type: ignore[no-untyped-def]
         joints=tuple(JointWear(name, depth[k], 5 * n, 5.0 * n, k) for k, name in enumerate("AB")),
         totals={"cycles": 5.0 * n, "moving_s": 5.0 * n},
         alarms=(Alarm(kind="clearance", subject="A", level=Level.WARN),),
-        spans=(((5 * 9 * run + 100 * run) * _SECOND, (5 * n + 100 * run) * _SECOND),),
+        spans=(((5 * 9 * run + 100 * run) * _SECOND, (5 * n + 100 * run) * _SECOND, 0),),
     )
 
 

@@ -37,7 +37,7 @@ def walk(entry_at):
         )
         stamp_ns = last.stamp_ns + 5 * SECOND
         totals = {"cycles": last.totals["cycles"] + 5.0, "moving_s": last.moving_s + 5.0}
-        spans = ((0, stamp_ns),)
+        spans = ((0, stamp_ns, 0),)
         entries.append(attrs.evolve(last, stamp_ns=stamp_ns, joints=joints, totals=totals, spans=spans))
     return entries
 

@@ -55,14 +55,14 @@ ACCELERATED = "wear is accelerated: clearances grow within the gait cycles that 
 class MonitorState:
     """State beside twin, alarms and accounting; every value is immutable.
 
-    ``findings`` are those of the last evaluation period; empty before the first. ``has_ended``: whether a
-    gait cycle has ended since the last state of the leg was reported.
+    ``findings`` are those of the last evaluation period; empty before the first. ``happened``: the last event
+    of the twin. ``has_ended``: whether a gait cycle has ended since the last state of the leg was reported.
     """
 
     growth: tuple[GrowthWindow, ...]
     torque: TorqueRecord
     last: CycleReport | None = None
-    happened: tuple[Event, ...] = ()
+    happened: Event | None = None
     findings: tuple[Finding, ...] = ()
     mismatch: MismatchWindow = NO_MISMATCH
     has_ended: bool = False

@@ -135,7 +135,7 @@ def _gait(parts: Parts) -> Status:
     elif parts.without_zero:
         message, level, code = "not monitored: see crank zero", max(level, Level.WARN), CRANK_ZERO
     elif happened and tracking in (Tracking.STARTING, Tracking.OUT_OF_STEP):
-        message += f", last {happened[-1].what.value.replace('_', ' ')}"
+        message += f", last {happened.what.value.replace('_', ' ')}"
     if parts.config.wear_acceleration != 1.0:
         message += "; wear is accelerated, this is a demonstration"
     values = {

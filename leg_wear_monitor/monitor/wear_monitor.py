@@ -60,8 +60,6 @@ from leg_wear_monitor.state import LegState
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples, SamplingSettings
 from leg_wear_monitor.twin.statistics import CycleStatistics, Sampling, joined
 
-_KEPT_EVENTS = 1
-
 
 class WearMonitor:
     """Monitors the joint wear of a leg from its crank's motion and its drive torque.
@@ -199,7 +197,8 @@ class WearMonitor:
             if observer:
                 observer.add_samples(piece)
         self._accounting.followed(update.samples)
-        parts.state.happened = (*parts.state.happened, *update.events)[-_KEPT_EVENTS:]
+        if update.events:
+            parts.state.happened = update.events[-1]
         return update.samples, update.cycles
 
     def _end_cycle(self, statistics: CycleStatistics, changes: list[AlarmList]) -> CycleReport:

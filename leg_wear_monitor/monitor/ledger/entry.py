@@ -376,15 +376,6 @@ class Measurement:
 
 
 @attrs.frozen
-class Withdrawal:
-    """Withdrawal of a measurement, given by the `id` of its row: it is no longer used."""
-
-    stamp_ns: int
-    who: str
-    measurement: int
-
-
-@attrs.frozen
 class CorrectedClearance:
     """A counted clearance that was replaced by the one that the drive torque shows.
 
@@ -487,7 +478,6 @@ Event = (
     | AlarmEvent
     | ClearancePoint
     | Measurement
-    | Withdrawal
     | CorrectedClearance
     | ForecastPoint
     | Commissioned

@@ -29,7 +29,6 @@ from leg_wear_monitor.monitor.ledger.entry import (
     Measurement,
     Run,
     WalkedLoad,
-    Withdrawal,
     binding_of,
 )
 from leg_wear_monitor.monitor.ledger.file import MOVE, LedgerError, connect, copy_of, create, transaction
@@ -185,7 +184,7 @@ class Ledger:
             raise LedgerError(f"{self.path}: measurement {measurement} is withdrawn already")
         now = attrs.evolve(found[measurement], withdrawn_ns=stamp_ns, withdrawn_by=who)
         self.measurements = tuple(now if each.id == measurement else each for each in self.measurements)
-        self.note(Withdrawal(stamp_ns, who, measurement))
+        self.note(now)
         return now
 
     @property

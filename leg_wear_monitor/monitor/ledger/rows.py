@@ -27,7 +27,6 @@ from leg_wear_monitor.monitor.ledger.entry import (
     SimulatedReference,
     VerdictEvent,
     WalkedLoad,
-    Withdrawal,
     together,
 )
 from leg_wear_monitor.monitor.ledger.schema import add, replace, sealed
@@ -186,13 +185,16 @@ def _loads(db: sqlite3.Connection, which: str, run: int) -> tuple[WalkedLoad, ..
 
 
 def write_event(db: sqlite3.Connection, event: Event) -> None:
-    """Append an event; to be called within a transaction."""
+    """Append an event; to be called within a transaction.
+
+    A measurement that has a row is a withdrawn one: its row says so from then on.
+    """
     match event:
-        case Withdrawal(stamp_ns, who, measurement):
-            with sealed(db, "measurement", "id = ?", (measurement,)):
+        case Measurement(withdrawn_ns=withdrawn_ns, withdrawn_by=who, id=row) if row:
+            with sealed(db, "measurement", "id = ?", (row,)):
                 db.execute(
                     "UPDATE measurement SET withdrawn_ns = ?, withdrawn_by = ? WHERE id = ?",
-                    (stamp_ns, who, measurement),
+                    (withdrawn_ns, who, row),
                 )
         case AlarmEvent(stamp_ns, alarm):
             values = _alarm_event_values(alarm)

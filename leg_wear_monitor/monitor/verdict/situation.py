@@ -35,6 +35,11 @@ class KnownClearance:
     clearance_m: float
     sigma_m: float
 
+    @property
+    def words(self) -> str:
+        """Such as ``0.62 mm ± 0.03 mm``."""
+        return estimate(self.clearance_m, self.sigma_m, "m")
+
 
 @attrs.frozen(kw_only=True)
 class JointSituation:
@@ -473,10 +478,7 @@ def hit_of(alarm: Alarm, situation: Situation, **words: str) -> Hit:
     each = _measured(alarm, value, situation)
     if each is not None and each.measured is not None:
         told["known"] = "measured" if value <= each.measured.clearance_m else "estimated"
-        told["past"] += (
-            f"; {estimate(each.measured.clearance_m, each.measured.sigma_m, 'm')} was measured, "
-            f"{amount(each.counted_m, 'm')} is counted"
-        )
+        told["past"] += f"; {each.measured.words} was measured, {amount(each.counted_m, 'm')} is counted"
         evidence = (
             Evidence(f"measured clearance {each.joint}", each.measured.clearance_m, each.limit_m, "m"),
             Evidence(f"counted clearance {each.joint}", each.counted_m, each.limit_m, "m"),

@@ -193,12 +193,12 @@ def _seen_hit(each: JointSituation, alarm: Alarm | None, seen: KnownClearance, s
     is_present = seen in each.seen
     past = "" if is_present else f" (since {time_words(raised_ns)}; not shown now)"
     if each.measured is not None:
-        past += f"; {estimate(each.measured.clearance_m, each.measured.sigma_m, 'm')} was measured"
+        past += f"; {each.measured.words} was measured"
     return Hit(
         words={
             "joint": situation.joint_words(each.joint),
             "by": SOURCES[seen.by],
-            "value": estimate(seen.clearance_m, seen.sigma_m, "m"),
+            "value": seen.words,
             "limit": amount(each.limit_m, "m"),
             "past": past,
             "doubt": doubt(situation) if seen.by == "torque" and is_present else "",
@@ -257,7 +257,7 @@ def _hit(change: Change, situation: Situation, doubts: str = "") -> Hit:
     own = (each.measured for each in situation.joints if each.joint == change.subject)
     measured = next(own, None)
     if measured is not None:
-        doubts += f"; {estimate(measured.clearance_m, measured.sigma_m, 'm')} was measured"
+        doubts += f"; {measured.words} was measured"
     return Hit(
         words={"change": f"{words_of(change, situation)}{doubts}"},
         joint=change.subject,

@@ -21,11 +21,12 @@ from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.measurement import last_measured
+from leg_wear_monitor.monitor.judgement import with_measured
 from leg_wear_monitor.monitor.ledger.entry import ClearancePoint, JointWear, binding_of, walked_words
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import LedgerContent, read_ledger
 from leg_wear_monitor.monitor.leg_state import joint_clearance, leg_alarm
-from leg_wear_monitor.monitor.verdict.situation import JointSituation, KnownClearance
+from leg_wear_monitor.monitor.verdict.situation import JointSituation
 from leg_wear_monitor.playback.result import ReplaySummary
 from leg_wear_monitor.state import Figure, JointClearance, LegAlarms, LegState, LifeHours, Verdict
 
@@ -137,12 +138,7 @@ class LedgerLeg:
     ) -> JointClearance:
         joint, limit_m = part.name, self._setup.limits_m[part.name]
         last = last_measured(found.measurements, joint, part.replaced_ns)
-        known = JointSituation(
-            joint=joint,
-            counted_m=counted_m,
-            limit_m=limit_m,
-            measured=KnownClearance("measured", last.clearance_m, last.sigma_m) if last else None,
-        )
+        known = with_measured(JointSituation(joint=joint, counted_m=counted_m, limit_m=limit_m), last)
         alarms = found.entry.alarms if found.entry else ()
         own = next((each for each in alarms if (each.kind, each.subject) == ("clearance", joint)), None)
         return joint_clearance(known, own, [verdict], self._setup.new_m[joint])

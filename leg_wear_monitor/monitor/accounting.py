@@ -140,10 +140,6 @@ def next_point_s(moving_s: float) -> float:
     return moving_s + max(POINT_S, POINT_FRACTION * moving_s)
 
 
-def _is_apart(step_ns: Ints) -> NDArray[np.bool_]:
-    return np.asarray((step_ns < 0) | (step_ns > NEIGHBOURS_NS))
-
-
 class Accounting:
     """Counts for the ledger, and writes to it when it is time.
 
@@ -229,11 +225,6 @@ class Accounting:
     def replaced_ns(self) -> list[int]:
         """When each joint's part was replaced, 0 if it never was."""
         return [part.replaced_ns for part in self.state.parts]
-
-    @property
-    def part_lives(self) -> list[tuple[int, int]]:
-        """When each joint's part was replaced, 0 if it never was, and its gait cycles."""
-        return [(part.replaced_ns, self.state.cycles - part.cycles) for part in self.state.parts]
 
     @property
     def totals(self) -> dict[str, float]:
@@ -379,7 +370,9 @@ class Accounting:
         """Take down the time in which the leg was followed."""
         stamp = samples.stamp_ns[np.isfinite(samples.crank_angle_rad)]
         if len(stamp):
-            for part in np.split(stamp, np.flatnonzero(_is_apart(np.diff(stamp))) + 1):
+            step_ns = np.diff(stamp)
+            is_apart = (step_ns < 0) | (step_ns > NEIGHBOURS_NS)
+            for part in np.split(stamp, np.flatnonzero(is_apart) + 1):
                 self.state.spans = with_span(self.state.spans, int(part[0]), int(part[-1]))
 
     def note(self, event: Event) -> None:

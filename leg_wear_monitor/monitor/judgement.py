@@ -114,8 +114,8 @@ def joint_situations(parts: Parts, diagnosis: Diagnosis | None = None) -> tuple[
     last, measured, joints = parts.state.last, parts.measured, parts.clearance_joints
     diagnosis = diagnosis or parts.diagnosis
     counted_m, limits_m = parts.twin.clearance_mean_m.tolist(), parts.evaluation.board.clearance_limits_m
-    found = []
-    for k, (joint, part) in enumerate(zip(joints, parts.accounting.part_lives, strict=True)):
+    walked, found = parts.accounting.state, []
+    for k, (joint, part) in enumerate(zip(joints, walked.parts, strict=True)):
         report = last.joints[k] if last else None
         by_encoders, by_torque = report.by_encoders if report else None, shown_by_torque(k, diagnosis)
         one = JointSituation(
@@ -127,8 +127,8 @@ def joint_situations(parts: Parts, diagnosis: Diagnosis | None = None) -> tuple[
             is_used=bool(report and by_encoders and report.seen and report.seen.believed),
             label=parts.mechanism.joints[joint].label,
             load=report.load if report else None,
-            replaced_ns=part[0],
-            part_cycles=part[1],
+            replaced_ns=part.replaced_ns,
+            part_cycles=walked.cycles - part.cycles,
         )
         found.append(with_measured(one, measured[k]))
     return tuple(found)

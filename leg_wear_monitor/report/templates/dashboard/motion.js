@@ -32,12 +32,20 @@
     }
   }
 
+  // The picture that a renewed page took away is out of sight, too: only the present one counts.
+  const sight = new IntersectionObserver((entries) => {
+    const own = entries.filter((entry) => entry.target === leg());
+    if (own.length) isSeen = own[own.length - 1].isIntersecting;
+    update();
+  });
+
   function begin() {
     const there = leg(), button = there && there.querySelector(".play");
     if (!button || button.dataset.ready) return;
     button.dataset.ready = "1";
     button.addEventListener("click", () => { playing = !playing; update(); });
-    new IntersectionObserver((entries) => { isSeen = entries[entries.length - 1].isIntersecting; update(); }).observe(there);
+    sight.disconnect();
+    sight.observe(there);
     update();
   }
 

@@ -49,6 +49,11 @@ def test_the_leg_on_ros2_control_is_healthy(stage: Any, stand_ins: Any, monkeypa
     """NaN, another publisher's joints and a sensor that turns with the foot included."""
     given = load_config(EXAMPLE / "monitor.yaml")
     torque, load = given.drive_torque, given.foot_load
+    # before the monitor, which would call it silent while its kernels are compiled
+    robot = stand_ins.Robot(
+        context=stage.node.context,
+        cli_args=["--ros-args", "-r", "foot_sensor_broadcaster:~/wrench:=foot_load"],
+    )
     monitor = stage.monitor(
         crank_joint=given.crank_joint,
         drive_torque__source=torque.source,
@@ -61,10 +66,6 @@ def test_the_leg_on_ros2_control_is_healthy(stage: Any, stand_ins: Any, monkeypa
         load__model=given.load.model,
     )
     alarms = stage.listen(f"{ME}/alarms", DiagnosticArray, latched=True)
-    robot = stand_ins.Robot(
-        context=stage.node.context,
-        cli_args=["--ros-args", "-r", "foot_sensor_broadcaster:~/wrench:=foot_load"],
-    )
     for topic in ("joint_states", "dynamic_joint_states", "foot_load"):
         stage.wait_for(lambda topic=topic: stage.node.count_subscribers(topic) > 0, topic)
         stage.wait_for(lambda topic=topic: monitor.node.count_publishers(topic) > 0, topic)

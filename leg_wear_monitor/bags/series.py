@@ -15,7 +15,7 @@ from leg_wear_monitor.messages import outputs
 from leg_wear_monitor.messages.cdr import Decoder
 from leg_wear_monitor.messages.names import interfaces_in, names_in
 from leg_wear_monitor.messages.streams import INTERFACES, JOINT_STATE, STREAMS, WRENCH_STAMPED, Stream
-from leg_wear_monitor.monitor.config.inputs import DriveTorque
+from leg_wear_monitor.monitor.config.inputs import EFFORT, FLOAT64, INTERFACE, WRENCH, DriveTorque
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, ZERO_STAMP, Samples
@@ -23,7 +23,6 @@ from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, ZERO_STAMP, Sa
 # The series: each joint is a candidate for the crank, each torque one for the drive torque.
 
 
-WRENCH, FLOAT64, EFFORT, INTERFACE = "wrench", "float64", "effort", "interface"
 # of a joint's interfaces those that are no torque, and the one that joint_states has, too
 _NO_TORQUE = ("position", "velocity", "acceleration", "effort")
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from leg_wear_monitor.bags.bag import Recordable, listed_recordings
 from leg_wear_monitor.bags.findings import RecordingError
-from leg_wear_monitor.bags.series import EFFORT, FLOAT64, JointName, Signals, TorqueSource, read_signals
+from leg_wear_monitor.bags.series import JointName, Signals, TorqueSource, read_signals
 from leg_wear_monitor.commissioning import proposal
 from leg_wear_monitor.commissioning.detection import LEAST_CYCLES, Walk, walk_of, with_detections
 from leg_wear_monitor.commissioning.evidence import (
@@ -45,6 +45,7 @@ from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.fitting import fitted, largest_lag_s
+from leg_wear_monitor.monitor.config.inputs import EFFORT, FLOAT64
 from leg_wear_monitor.monitor.config.parameters import config_from, load_config, values_of
 from leg_wear_monitor.monitor.config.sections import drive_figures
 from leg_wear_monitor.monitor.config.settings import MonitorConfig

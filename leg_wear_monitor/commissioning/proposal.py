@@ -7,7 +7,6 @@ from typing import Any
 import attrs
 import numpy as np
 
-from leg_wear_monitor.bags.series import INTERFACE, WRENCH
 from leg_wear_monitor.commissioning.evidence import (
     LowPass,
     Sampling,
@@ -23,6 +22,7 @@ from leg_wear_monitor.estimate.signature import DriveFigures
 from leg_wear_monitor.estimate.torque_fit import Fit, Terms, fit, repeating
 from leg_wear_monitor.estimate.torque_model import JointMotion, TorqueModel
 from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.monitor.config.inputs import INTERFACE, WRENCH
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 
 # A gear's ratio is that of two numbers of teeth: the simplest fraction within a measurement's error.

@@ -7,7 +7,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.bags.series import EFFORT, INTERFACE, JointName, TorqueSource
+from leg_wear_monitor.bags.series import JointName, TorqueSource
 from leg_wear_monitor.estimate.torque_fit import Fit, fit, repeating, too_alike
 from leg_wear_monitor.estimate.torque_model import (
     JointMotion,
@@ -20,6 +20,7 @@ from leg_wear_monitor.estimate.torque_model import (
 )
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.monitor.config.inputs import EFFORT, INTERFACE
 
 # Where to start: every gear ratio, direction, offset and torque sign at once, judged by the leg's model.
 #

@@ -291,7 +291,7 @@ def bool_message(data, begin, end):
 
 @entry
 def decode(
-    data, messages, crank, interface, warmth, encoders, ends_at, axis, use_effort, out, out_angles, out_force
+    data, messages, crank, interface, thermal, encoders, ends_at, axis, use_effort, out, out_angles, out_force
 ):
     """Read messages into samples as they are: no sign, no scale, no offset.
 
@@ -303,7 +303,7 @@ def decode(
         Name of the crank's joint, UTF-8.
     interface : (characters,) array of uint8
         Name of the crank's interface that is its torque, UTF-8.
-    warmth : (characters,) array of uint8
+    thermal : (characters,) array of uint8
         Name of the crank's interface that is the temperature of its drive, UTF-8; empty: none.
     encoders : (characters,) array of uint8
         Names of the joints with further encoders, one after the other.
@@ -342,7 +342,7 @@ def decode(
                 stamp = messages[i]["log_time_ns"]
             elif kind == INTERFACES:
                 fault, stamp, torque, temperature = dynamic_joint_state(
-                    data, begin, end, big, crank, interface, warmth
+                    data, begin, end, big, crank, interface, thermal
                 )
             elif kind == LOAD_WRENCH:
                 fault, stamp = wrench_force(data, begin, end, big, force)
@@ -391,7 +391,7 @@ class Decoder:
         self._torque_scale = torque.sign * torque.scale * torque.gear_ratio
         self._axis = _AXES[torque.axis]
         self._effort = torque.source == "effort"
-        self._interface, self._warmth = (
+        self._interface, self._thermal = (
             np.frombuffer(name.encode(), np.uint8)
             for name in (torque.interface, config.drive.temperature_interface)
         )
@@ -418,7 +418,7 @@ class Decoder:
         angles = np.empty((len(messages), len(self._ends)))
         force = np.empty((len(messages), 2))
         out = samples, angles, force
-        names = self._crank, self._interface, self._warmth, self._encoders
+        names = self._crank, self._interface, self._thermal, self._encoders
         decode(data, messages, *names, self._ends, self._axis, self._effort, *out)
         samples["foot_force_n"] = force * self._force_scale
         samples["encoder_rad"] = np.nan

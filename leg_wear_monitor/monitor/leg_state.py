@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 import attrs
 
 from leg_wear_monitor.estimate.cause import Cause, NamedCause, TorqueExplanation
-from leg_wear_monitor.files import finite_or_none, or_nan
+from leg_wear_monitor.files import finite_or_none
 from leg_wear_monitor.monitor.alarm_specs import CLEARANCE
 from leg_wear_monitor.monitor.alarms import Alarm, state_of
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
@@ -150,7 +150,7 @@ def _drive(last: CycleReport | None, diagnosis: Diagnosis, explained: TorqueExpl
         coulomb_nm=_estimate(last.friction_nm, last.friction_sigma_nm) if last else None,
         load_friction=_estimate(last.load_friction, last.load_friction_sigma) if last else None,
         bandwidth_hz=Estimate(value=1.0 / (_TURN * pole_s)) if pole_s > 0.0 else None,
-        temperature_c=_estimate(or_nan(diagnosis.temperature_c), math.nan),
+        temperature_c=None if diagnosis.temperature_c is None else Estimate(value=diagnosis.temperature_c),
     )
 
 

@@ -9,11 +9,12 @@ import numpy as np
 
 from leg_wear_monitor.bags.bag import TABLES, Recordable, find_files, listed
 from leg_wear_monitor.bags.findings import Finding, RecordingError
-from leg_wear_monitor.bags.series import EFFORT, WRENCH, JointName, Signals, TorqueSource, read_signals
+from leg_wear_monitor.bags.series import JointName, Signals, TorqueSource, read_signals
 from leg_wear_monitor.errors import ConfigError, LegWearError, did_you_mean
 from leg_wear_monitor.estimate.torque_model import Series
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.monitor.config.inputs import EFFORT, WRENCH
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.play.fit import MANY, Fit, Plateaus, Play, Sides, fit_play, plateaus, sides
 

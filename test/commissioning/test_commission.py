@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import LegWearError, Mechanism, MonitorConfig, simulate
-from leg_wear_monitor.bags.series import EFFORT, FLOAT64, INTERFACE, WRENCH, JointName, Signals, TorqueSource
+from leg_wear_monitor.bags.series import JointName, Signals, TorqueSource
 from leg_wear_monitor.commissioning.commission import commission, propose
 from leg_wear_monitor.commissioning.result import CommissioningResult
 from leg_wear_monitor.estimate.torque_model import Series, TorqueModel
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.fitting import fitted
+from leg_wear_monitor.monitor.config.inputs import EFFORT, FLOAT64, INTERFACE, WRENCH
 from leg_wear_monitor.monitor.config.parameters import load_config
 
 from .conftest import Robot, Walk, columns_of

@@ -37,9 +37,9 @@ def fitted(mechanism: Mechanism, config: MonitorConfig, source: str = "parameter
         there, or a load on a mechanism without a toe.
     """
     drive_figures(config.drive, source)  # a fault of it ends the start, whoever uses the figures
-    warmth, torque = config.drive.temperature_interface, config.drive_torque.source
-    if warmth and torque != INTERFACE:
-        fault = f"{warmth!r} needs drive_torque.source {INTERFACE!r}, which is {torque!r}"
+    interface, torque = config.drive.temperature_interface, config.drive_torque.source
+    if interface and torque != INTERFACE:
+        fault = f"{interface!r} needs drive_torque.source {INTERFACE!r}, which is {torque!r}"
         raise ConfigError(source, "drive.temperature_interface", fault)
     if not isinstance(mechanism.drive, SpeedDrive):
         raise ConfigError(

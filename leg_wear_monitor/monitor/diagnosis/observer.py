@@ -39,8 +39,8 @@ from leg_wear_monitor.monitor.diagnosis.state import (
     TorqueSamples,
     TorqueState,
     cycle_torque,
-    mean_of,
     sensor_period_s,
+    temperature_of,
 )
 from leg_wear_monitor.state import FootLoad
 from leg_wear_monitor.twin.reference import LegParameters
@@ -94,7 +94,7 @@ def settle(state: TorqueState, correction: Correction, counted_m: Floats) -> Non
         sigma_m,
         before.channel if before else DIRECT,
         state.profile.speed,
-        mean_of(np.array([cycle.temperature_c for cycle in state.cycles])),
+        temperature_of(state.cycles),
     )
     state.settled = (*state.settled, attrs.evolve(change, is_corrected=True))
 
@@ -449,7 +449,7 @@ class TorqueObserver(KeepsSamples):
             state.counted_m,
             state.signatures,
             speed=state.profile.speed,
-            temperature_c=mean_of(np.array([cycle.temperature_c for cycle in state.cycles])),
+            temperature_c=temperature_of(state.cycles),
         )
         self._evidence.review(state, self.config)
 

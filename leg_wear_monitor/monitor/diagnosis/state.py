@@ -1,7 +1,7 @@
 """State of the torque observer; every value is immutable, so a shallow copy is a snapshot."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from typing import NamedTuple
 
@@ -222,6 +222,11 @@ class SignedCycle(NamedTuple):
     temperature_c: float = math.nan
 
 
+def temperature_of(cycles: Sequence[SignedCycle]) -> float:
+    """Mean temperature of the drive in some gait cycles [°C]; NaN where it was not measured."""
+    return mean_of(np.array([cycle.temperature_c for cycle in cycles], float))
+
+
 @attrs.frozen(eq=False)
 class AtCadence:
     """What is known of a leg at one cadence, more precisely under one motion of the crank.
@@ -353,8 +358,7 @@ class TorqueState:
     @property
     def temperature_c(self) -> float:
         """Mean temperature of the drive in the last gait cycles; NaN where it is not measured."""
-        cycles = (self.cycles or self.waiting)[-LAST_CYCLES:]
-        return mean_of(np.array([cycle.temperature_c for cycle in cycles], float))
+        return temperature_of((self.cycles or self.waiting)[-LAST_CYCLES:])
 
     @property
     def is_compared(self) -> bool:

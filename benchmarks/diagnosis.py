@@ -55,9 +55,14 @@ from leg_wear_monitor.monitor.diagnosis.references import LegModels
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
 from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin import TORQUE as TORQUE_SAMPLE
-from leg_wear_monitor.twin.leg_simulation import LegSimulation
 from leg_wear_monitor.twin.load import torque_size
-from leg_wear_monitor.twin.reference import CrankProfile, LegParameters, cycle_profile, mean_profile
+from leg_wear_monitor.twin.reference import (
+    CrankProfile,
+    LegParameters,
+    LegSimulation,
+    cycle_profile,
+    mean_profile,
+)
 from leg_wear_monitor.twin.sample import gait_samples
 from leg_wear_monitor.twin.torque_reference import TorqueReference, TorqueReferenceRun
 from leg_wear_monitor.wear import SECTORS
@@ -364,7 +369,8 @@ def first_diagnosis(name: str, walks: dict[str, np.ndarray], options, random) ->
     """Gait cycles and seconds of processor until joints are named surely, and what is named from then on."""
     leg = load_mechanism(LEGS[name].mechanism)
     size, known = torque_size(build_linkage(leg), TURN), new(leg)
-    LegSimulation(leg).torque(CrankProfile.steady(TURN), LegParameters.none(leg), *known, 1)  # loads kernels
+    steady, own = CrankProfile.steady(TURN), LegParameters.none(leg)
+    LegSimulation(leg).simulate(steady, own, *known, 0, 1)  # loads kernels
     samples, misfits = received(walks["new"], LONGEST, 0, options, random), []
     begin, estimate = time.process_time(), None
     observer = TorqueObserver(leg, MonitorConfig(), size, known[0])

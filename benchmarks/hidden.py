@@ -26,7 +26,7 @@ from leg_wear_monitor.monitor.angle_regression import (
 )
 from leg_wear_monitor.monitor.config.inputs import Encoders
 from leg_wear_monitor.monitor.encoders import commissioned, errors_of, prior_with
-from leg_wear_monitor.twin.reference import ReferenceRun, angle_model
+from leg_wear_monitor.twin.angle_reference import AngleReferenceRun, angle_model
 from leg_wear_monitor.wear import SECTORS
 
 SENSORS = {"B": "hip", "G": "knee", "I": "ankle"}
@@ -102,11 +102,9 @@ def worn_by_archard(leg: Mechanism) -> np.ndarray:
 
 def referred(leg, model, clearance, depth=None):
     """A reference, and what it took [s]."""
-    run, began = ReferenceRun(leg, model), time.process_time()
+    run, began = AngleReferenceRun(leg, model), time.process_time()
     run.begin(clearance, np.zeros((5, 2, SECTORS)) if depth is None else depth)
-    while (found := run.advance()) is None:
-        pass
-    return found, time.process_time() - began
+    return run.finish(), time.process_time() - began
 
 
 def commission(model, reference, walk, every, noise):

@@ -24,7 +24,8 @@ from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.angle_regression import ClearanceRegression
 from leg_wear_monitor.monitor.encoders import EncoderErrors, commissioned, prior_with
-from leg_wear_monitor.twin.reference import AngleModel, CrankProfile, Reference, ReferenceRun, angle_model
+from leg_wear_monitor.twin.angle_reference import AngleModel, AngleReference, AngleReferenceRun, angle_model
+from leg_wear_monitor.twin.reference import CrankProfile
 from leg_wear_monitor.wear import SECTORS
 
 RATE = 1000  # steps of a gait cycle at which a walk is kept; encoders give each fifth
@@ -60,17 +61,19 @@ def cycles_of(walk: np.ndarray, random: np.random.Generator) -> list[tuple[np.nd
     return [(crank[number == n], angles[number == n]) for n in range(2, number.max())]
 
 
-def referred(leg: Mechanism, model: AngleModel, clearance_m: np.ndarray, profile: CrankProfile) -> Reference:
+def referred(
+    leg: Mechanism, model: AngleModel, clearance_m: np.ndarray, profile: CrankProfile
+) -> AngleReference:
     """A reference at some clearances."""
-    run = ReferenceRun(leg, model)
+    run = AngleReferenceRun(leg, model)
     run.begin(clearance_m, np.zeros((5, 2, SECTORS)), profile)
-    while (found := run.advance()) is None:
-        if not run.is_busy:
-            raise SystemExit("the leg could not be simulated")
+    found = run.finish()
+    if found is None:
+        raise SystemExit("the leg could not be simulated")
     return found
 
 
-def estimated(model: AngleModel, reference: Reference, held: EncoderErrors, cycles) -> np.ndarray:
+def estimated(model: AngleModel, reference: AngleReference, held: EncoderErrors, cycles) -> np.ndarray:
     """Clearances (k,) [m] from some gait cycles."""
     regression = ClearanceRegression(model, reference, prior_with(held, reference.clearance_m, UNKNOWN_M))
     for cycle in cycles:
@@ -78,7 +81,7 @@ def estimated(model: AngleModel, reference: Reference, held: EncoderErrors, cycl
     return regression.fused().clearance_m
 
 
-def commission(model: AngleModel, reference: Reference, cycles) -> EncoderErrors:
+def commission(model: AngleModel, reference: AngleReference, cycles) -> EncoderErrors:
     """The encoders' errors, from the first gait cycles of a new leg."""
     regression = ClearanceRegression(model, reference, prior_with(UNKNOWN, NEW, NEW_SIGMA_M))
     for cycle in cycles[:COMMISSIONING]:

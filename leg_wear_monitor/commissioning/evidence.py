@@ -17,8 +17,7 @@ from leg_wear_monitor.estimate.torque_model import Pair, TorqueModel, is_steady,
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.twin.leg_simulation import LegSimulation
-from leg_wear_monitor.twin.reference import LegParameters
+from leg_wear_monitor.twin.reference import LegParameters, LegSimulation
 from leg_wear_monitor.twin.sample import AVERAGE, INSTANT
 from leg_wear_monitor.twin.torque_reference import TorqueReference
 from leg_wear_monitor.wear import SECTORS
@@ -110,12 +109,12 @@ def expected_leg(walk: Walk) -> TorqueReference | None:
     own, new_m = LegParameters.none(walk.mechanism), walk.new_m
     unworn = np.zeros((len(new_m), 2, SECTORS))
     try:
-        torque = LegSimulation(walk.mechanism).torque(walk.profile, own, new_m, unworn, _SETTLING + _CYCLES)
+        leg = LegSimulation(walk.mechanism).simulate(walk.profile, own, new_m, unworn, _SETTLING, _CYCLES)
     except AssemblyError:
         return None
-    if torque is None:
+    if leg is None:
         return None
-    return TorqueReference(walk.profile, new_m[None], (torque[_SETTLING:].astype(np.float16),), own)
+    return TorqueReference(walk.profile, new_m[None], (leg.torque.astype(np.float16),), own)
 
 
 # What repeats with each turn and is not the ideal leg's torque: a foot load, other masses, another leg.

@@ -8,7 +8,7 @@ import numpy as np
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.twin.leg_simulation import POINTS
+from leg_wear_monitor.twin.reference import POINTS
 from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 SAMPLES = 200  # a gait cycle: what comes faster is averaged, since clearances show at these times already

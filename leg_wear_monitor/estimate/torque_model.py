@@ -12,8 +12,8 @@ from leg_wear_monitor.estimate.explanations import torque_coefficients
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.twin.leg_simulation import even_angles
 from leg_wear_monitor.twin.load import load_signature
+from leg_wear_monitor.twin.reference import even_angles
 from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 _HARMONICS = 12  # of what clearances change: a mean over a twelfth of a turn shows no more

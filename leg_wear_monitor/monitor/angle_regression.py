@@ -9,7 +9,7 @@ import numpy as np
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.twin.reference import PHASES, AngleModel, Reference
+from leg_wear_monitor.twin.angle_reference import PHASES, AngleModel, AngleReference
 
 _RIDGE = 1.0e-9
 _HUBER = 1.5  # standard deviations beyond which a bin loses weight
@@ -122,7 +122,7 @@ _NO_NEWS = 1.0e6  # times the prior variance: no information
 
 
 ClearanceRegressionSnapshot = tuple[
-    Reference | None, Estimate | None, tuple[tuple[Floats, Floats], ...], tuple[Floats, ...]
+    AngleReference | None, Estimate | None, tuple[tuple[Floats, Floats], ...], tuple[Floats, ...]
 ]
 """All of a `ClearanceRegression`; nothing in it changes."""
 
@@ -133,7 +133,7 @@ class ClearanceRegression:
     Parameters
     ----------
     model : AngleModel
-    reference : Reference, optional
+    reference : AngleReference, optional
         Expected angles; cycles are kept without evaluation until it is given.
     before : Estimate, optional
         Prior knowledge without these cycles; given with the reference.
@@ -149,7 +149,7 @@ class ClearanceRegression:
     def __init__(
         self,
         model: AngleModel,
-        reference: Reference | None = None,
+        reference: AngleReference | None = None,
         before: Estimate | None = None,
         most: int = 300,
     ) -> None:
@@ -169,7 +169,7 @@ class ClearanceRegression:
             self._each.append(self._regressed(deviation, counts))
         del self._cycles[: -self.most], self._each[: -self.most]
 
-    def refer(self, reference: Reference, before: Estimate) -> None:
+    def refer(self, reference: AngleReference, before: Estimate) -> None:
         """Evaluate the kept cycles with a new reference and a new prior."""
         self._reference, self._before = reference, before
         self._each = [self._regressed(*cycle) for cycle in self._cycles]
@@ -199,13 +199,13 @@ class ClearanceRegression:
         columns[:, :, : before.joints][:, :, ~shown] = 0.0
         return columns
 
-    def _given(self) -> tuple[Reference, Estimate]:
+    def _given(self) -> tuple[AngleReference, Estimate]:
         if self._reference is None or self._before is None:
             raise LegWearError("no reference was given yet")
         return self._reference, self._before
 
     @property
-    def reference(self) -> Reference | None:
+    def reference(self) -> AngleReference | None:
         """Reference that the cycles are compared with."""
         return self._reference
 

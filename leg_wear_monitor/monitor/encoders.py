@@ -26,17 +26,11 @@ from leg_wear_monitor.monitor.angle_regression import (
 from leg_wear_monitor.monitor.config.inputs import Encoders
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.ledger.entry import Commissioned
-from leg_wear_monitor.twin.reference import (
-    PHASES,
-    CrankProfile,
-    ReferenceRun,
-    ReferenceSnapshot,
-    angle_model,
-    cycle_profile,
-    mean_profile,
-)
+from leg_wear_monitor.twin.angle_reference import PHASES, AngleReferenceRun, angle_model
+from leg_wear_monitor.twin.reference import CrankProfile, cycle_profile, mean_profile
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, KeepsSamples, Samples, newest, of_crank, within
 from leg_wear_monitor.twin.statistics import CycleStatistics
+from leg_wear_monitor.twin.torque_reference import ReferenceSnapshot
 
 # Errors of the encoders: unknown at first, estimated together with the clearances of a leg whose clearances
 # are nearly known (commissioning), then fixed and stored in the ledger.
@@ -251,7 +245,7 @@ def faults(names: Sequence[str], state: EncoderState) -> list[str]:
 #
 # Everything is computed at the end of an evaluation period; periods depend on the order of arrival only, so a
 # replay gives the same results. A period evaluates the gait cycles that ended in it. The cycles are compared
-# with a reference, a simulation of the leg as counted, of which each period computes at most one gait cycle.
+# with a reference, a simulation of the leg as counted.
 
 
 _CHANGE_CYCLES = 20  # cycles in a row with other encoders until the change counts as permanent
@@ -298,7 +292,7 @@ class EncoderObserver(KeepsSamples):
             [mechanism.clearances[joint].radial_clearance for joint in mechanism.clearance_joints]
         )
         self._model = angle_model(mechanism, self._settings.joints)
-        self._reference = ReferenceRun(mechanism, self._model)
+        self._reference = AngleReferenceRun(mechanism, self._model)
         self._clearance_regression = ClearanceRegression(self._model)
         errors = errors_of(self._settings, known)
         self.state = EncoderState(no_encoder_samples(len(self._settings.names)), errors)
@@ -325,13 +319,17 @@ class EncoderObserver(KeepsSamples):
             and self._clearance_regression.reference is None
         )
 
+    def go_live(self) -> None:
+        """Never wait for what is simulated."""
+        self._reference.may_be_late = True
+
     def ended(self, statistics: CycleStatistics) -> None:
         """Queue an ended gait cycle for evaluation, if the leg walked steadily at the commanded cadence."""
         if statistics.is_steady and self.config.cadence.allows(statistics.cadence_rpm):
             self.state.due = (*self.state.due, (statistics.begin_ns, statistics.stamp_ns))
 
     def end_period(self, clearance_m: Floats, depth: Floats) -> Commissioned | None:
-        """Evaluate the queued gait cycles, and simulate one more for the reference.
+        """Evaluate the queued gait cycles, and go on with what is simulated for the reference.
 
         Parameters
         ----------

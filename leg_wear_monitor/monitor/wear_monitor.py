@@ -135,8 +135,9 @@ class WearMonitor:
 
         On a machine that is too busy a reference comes into force later than in a replay.
         """
-        if self._parts.torque:
-            self._parts.torque.go_live()
+        for observer in (self._parts.torque, self._parts.encoders):
+            if observer:
+                observer.go_live()
 
     def note_late(self, is_late: bool) -> None:
         """Note whether samples may be missing because this program was late: their rate is then unknown."""

@@ -14,7 +14,7 @@ from leg_wear_monitor.files import json_text
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.twin.reference import PHASES, AngleModel, angle_model
+from leg_wear_monitor.twin.angle_reference import PHASES, AngleModel, angle_model
 
 # Results of a play measurement: plays, and the clearances that they come from.
 

@@ -18,9 +18,8 @@ from leg_wear_monitor.mechanism.position import TURN, Linkage
 from leg_wear_monitor.twin import cycle, follower_state
 from leg_wear_monitor.twin import statistics as step_codes
 from leg_wear_monitor.twin.following import CYCLE, LEFT, NEEDS_START, REPORTED, follow
-from leg_wear_monitor.twin.leg_simulation import drive_coupling
 from leg_wear_monitor.twin.load import FootLoad, force_of, set_force, shape_torque, torque_size
-from leg_wear_monitor.twin.reference import LegParameters
+from leg_wear_monitor.twin.reference import LegParameters, drive_coupling
 from leg_wear_monitor.twin.sample import FOOT_FRAME, GROUND, INSTANT, MEASURED, STANCE, TwinSettings
 from leg_wear_monitor.twin.sampling import SampledState
 from leg_wear_monitor.twin.statistics import (

@@ -1,136 +1,32 @@
-"""Encoder angles of a leg with given clearances, and their derivatives by each clearance, from simulation.
+"""A simulated leg: its parameters, how its crank turns, and its drive torque and eccentricities.
 
-The linear model of `joint_angles` contains the effect of an eccentricity on an angle. A wider clearance also
-changes the eccentricities of the other joints, so a regression on the linear model alone attributes the
-effect to wrong joints. Therefore the leg is simulated with the expected clearances, and with each of them
-widened in turn; the differences are the columns of the regression. This takes seconds and is therefore done
-one gait cycle at a time. The simulated crank turns as the measured one: ripple of 3 % under a reference of a
-steady crank looks like clearances that are 65 um off.
+References are made of them: what the sensors of a leg with given clearances show.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import attrs
 import numpy as np
 
-from leg_wear_monitor.contact.arrays import clearance_settings, compile_contacts
-from leg_wear_monitor.dynamics.clearance.basis import Basis
-from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper, Snapshot
-from leg_wear_monitor.dynamics.run import DONE, CrankMotion, new_run_statistics, quintic
+from leg_wear_monitor.compiled.kernel import entry
+from leg_wear_monitor.dynamics.clearance.advance import ADVANCE
+from leg_wear_monitor.dynamics.clearance.basis import is_damped
+from leg_wear_monitor.dynamics.clearance.model import ClearanceModel, Coupling, coupling_of, rigid_coupling
+from leg_wear_monitor.dynamics.clearance.stepper import (
+    INTERVALS,
+    ClearanceStepper,
+    LoadedTables,
+    loaded_tables,
+    put_force,
+)
+from leg_wear_monitor.dynamics.clearance.tables import POINTS as TABLE_POINTS
+from leg_wear_monitor.dynamics.run import DONE, TORQUE, CrankMotion, Setup, new_run_statistics, quintic
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.mechanism.arrays import Floats, body_names
+from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.person import with_toe_force
-from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
-from leg_wear_monitor.mechanism.spec import Mechanism, RevoluteJoint
-
-# Effect of clearances on the angles of further joints: the linear model of `monitor.encoders`.
-#
-# An encoder on a revolute joint measures the angle from the bushing's body to the journal's. It deviates from
-# that of the ideal linkage by S_phi(theta) e, linear in the eccentricities e (physics.md section 7). The mean
-# of e_k over gait cycles is c_k u_k: c_k is the clearance, and u_k(theta) a shape from simulation, of a
-# length near 1 and along the contact's normal.
-
-
-PHASES = 128  # crank phases per turn: bins of samples, and points of the tables of this module
-
-_ROUNDING = 1.0e-9  # rad/m: a smaller effect on an encoder's angle is rounding of 0
-_FINE = 64  # points of the ideal angles per phase
-
-
-@attrs.frozen(eq=False)
-class AngleModel:
-    """Angles of m encoders over P phases, and their derivatives by the eccentricities of k clearance joints.
-
-    Attributes
-    ----------
-    sensors, clearance_joints : tuple of str
-        Joints with an encoder; clearance joints.
-    angle : (P _FINE, m) array, rad
-        Angles of the ideal linkage at equal steps of the crank from 0.
-    by_crank : (P, m) array
-        Their derivatives by the crank angle at the middle of each phase.
-    by_e : (P, m, k, 2) array, rad/m
-        S_phi there; exactly 0 where an eccentricity has no effect on an encoder.
-    """
-
-    sensors: tuple[str, ...]
-    clearance_joints: tuple[str, ...]
-    angle: Floats
-    by_crank: Floats
-    by_e: Floats
-
-    def deviation(self, crank_angle: Floats, angles: Floats) -> Floats:
-        """Deviation (n, m) [rad] of measured angles (n, m) from the ideal linkage's at crank angles (n,)."""
-        points = len(self.angle)
-        at = np.arange(points + 1) * (TURN / points)
-        ideal = [np.interp(crank_angle % TURN, at, np.append(one, one[0])) for one in self.angle.T]
-        return np.asarray((angles - np.stack(ideal, axis=1) + np.pi) % TURN - np.pi)
-
-
-def angle_model(mechanism: Mechanism, sensors: Sequence[str]) -> AngleModel:
-    """Model of encoders on the revolute joints ``sensors`` of a mechanism.
-
-    Raises
-    ------
-    ConfigError
-        If a sensor is not on a revolute joint.
-    AssemblyError
-        If the linkage does not close or has a dead point.
-    """
-    for name in sensors:
-        if not isinstance(mechanism.joints.get(name), RevoluteJoint):
-            ready = [name for name, joint in mechanism.joints.items() if isinstance(joint, RevoluteJoint)]
-            raise ConfigError(
-                mechanism.source,
-                "joints",
-                f"{name!r} is not a revolute joint, expected some of {', '.join(ready)}",
-            )
-    linkage = build_linkage(mechanism)
-    contacts = compile_contacts(
-        mechanism, mechanism.clearance_joints, clearance_settings(mechanism, mechanism.clearance_joints)
-    )
-    motion = one_cycle(linkage, 2 * PHASES, 1.0)
-    turns = _differences(mechanism, sensors, motion.q[:, :, 2])
-    by_crank = _differences(mechanism, sensors, motion.v[:, :, 2])
-    s = Basis(linkage, contacts, motion).s
-    rotation = np.concatenate([np.zeros((len(s), 1, s.shape[2])), s[:, 2::3]], axis=1)
-    by_e = _differences(mechanism, sensors, rotation).reshape(2 * PHASES, len(sensors), -1, 2)
-    by_e[np.abs(by_e) < _ROUNDING] = 0.0
-    return AngleModel(
-        tuple(sensors), mechanism.clearance_joints, _finer(turns, PHASES * _FINE), by_crank[1::2], by_e[1::2]
-    )
-
-
-def _differences(mechanism: Mechanism, sensors: Sequence[str], of_bodies: Floats) -> Floats:
-    """Values (P, m, ...) at the sensors of bodies' values (P, n, ...): journal's minus bushing's body."""
-    names = body_names(mechanism)
-    pairs = [[names.index(body) for body in mechanism.sides(joint)] for joint in sensors]
-    return np.stack([of_bodies[:, j] - of_bodies[:, b] for b, j in pairs], axis=1)
-
-
-def _finer(table: Floats, points: int) -> Floats:
-    """A smooth periodic table (p, m), interpolated to more points by its Fourier series."""
-    series = np.fft.rfft(table, axis=0)
-    return np.asarray(np.fft.irfft(series, points, axis=0) * (points / len(table)))
-
-
-def design(model: AngleModel, shape: Floats) -> Floats:
-    """Columns (P, m, k + 1 + 2 m) of the regression, for mean shapes (P, k, 2) of the eccentricities.
-
-    The parameters are the clearances [rad/m], the crank encoder's offset, and the offset and the scale error
-    of each encoder.
-    """
-    sensors = len(model.sensors)
-    by_clearance = np.einsum("pmkd,pkd->pmk", model.by_e, shape)
-    angle = model.angle[_FINE // 2 :: _FINE]
-    own = np.zeros((PHASES, sensors, 2 * sensors))
-    for i in range(sensors):
-        own[:, i, i] = 1.0
-        own[:, i, sensors + i] = angle[:, i] - angle[:, i].mean()
-    return np.concatenate([by_clearance, -model.by_crank[:, :, None], own], axis=2)
-
+from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.mechanism.spec import Mechanism
 
 # A leg whose masses, lengths and friction are not quite those of the mechanism file.
 
@@ -355,192 +251,194 @@ def mean_profile(profiles: Sequence[CrankProfile]) -> CrankProfile:
     )
 
 
-CYCLES = 48  # simulated cycles of each leg: the scatter equals that of as many observed cycles
-OPENED_M = 1.5e-4  # increase of each clearance in turn [m]
-
-_LEAST_CLEARANCE_M = 5.0e-5
-_LEAST_WEAR_M = 5.0e-6  # least mean wear whose profile is scaled; with less, a joint is widened evenly
+# Simulation of such a leg without wear, from gait cycle to gait cycle alike.
 
 
-@attrs.frozen(eq=False)
-class Reference:
-    """Deviations of a leg with given clearances from the ideal linkage, and their derivatives.
+POINTS = INTERVALS // 4  # of a gait cycle: whole intervals of the stepper
+
+# scatter of the ground's force from step to step, of its size and of its time in a gait cycle
+_SIZE, _TIMING, _SEED = 0.1, 0.02, 20261125
+
+_advance = ADVANCE.call
+
+
+@entry
+def simulate_cycles(
+    advance_address,
+    model,
+    feeds_back,
+    state,
+    pieces,
+    period,
+    turn,
+    first,
+    settling,
+    statistics,
+    work,
+    polynomial,
+    out_torque,
+    out_eccentricity,
+):
+    """Simulate gait cycles from the one with the number ``first``.
+
+    ``pieces`` (POINTS, 7) are the crank's motion in cycle 0, and a cycle takes ``period`` [s] for ``turn``
+    [rad]. ``out_torque`` (cycles, POINTS) [N m] gets the mean torques between equal times; to
+    ``out_eccentricity`` (POINTS, 2 k) [m] those at these times are added, but for the first ``settling``
+    cycles. Returns DONE, or the reason for stopping.
+    """
+    cycles, points = out_torque.shape
+    impulse = statistics.drive_integral[TORQUE]
+    for cycle in range(first, first + cycles):
+        for i in range(points):
+            for j in range(polynomial.shape[0]):
+                polynomial[j] = pieces[i, j]
+            polynomial[0] += cycle * period
+            polynomial[1] += cycle * turn
+            # a little past the end of an interval, or rounding could leave it out
+            end = (cycle * points + i + 1.01) * period / points
+            status, _ = _advance(
+                advance_address, (model, feeds_back, state, polynomial, end, statistics, work)
+            )
+            if status != DONE:
+                return status
+            before, impulse = impulse, statistics.drive_integral[TORQUE]
+            out_torque[cycle - first, i] = (impulse - before) * (points / period)
+            if cycle >= settling:
+                for j in range(out_eccentricity.shape[1]):
+                    out_eccentricity[i, j] += state.e[j]
+    return DONE
+
+
+class SimulatedLeg(NamedTuple):
+    """Drive torque and eccentricities of a simulated leg, at equal steps of time of a gait cycle.
 
     Attributes
     ----------
-    clearance_m : (k,) array
-        Mean radial clearances.
-    deviation : (P, m) array, rad
-        Deviations for these clearances and encoders without errors.
-    columns : (P, m, k + 1 + 2 m) array
-        Derivatives by clearances [rad/m], the crank encoder's offset, each encoder's offset and scale error.
-    cycles : int
-        Number of simulated cycles of each leg.
-    profile : CrankProfile
-        How their crank turned.
+    torque : (cycles, POINTS) array
+        Mean torque between them [N m].
+    eccentricity : (POINTS, k, 2) array
+        Mean over the gait cycles at the end of each step [m].
     """
 
-    clearance_m: Floats
-    deviation: Floats
-    columns: Floats
-    cycles: int
-    profile: CrankProfile
+    torque: Floats
+    eccentricity: Floats
 
 
-class ReferenceSnapshot(NamedTuple):
-    """Complete state of a `ReferenceRun` as plain arrays and numbers."""
-
-    profile: CrankProfile
-    clearance_m: Floats
-    depth: Floats
-    total: Floats
-    means: tuple[Floats, ...]
-    cycle: int
-    stepper: Snapshot | None
-
-
-class ReferenceRun:
-    """Computes a reference, one gait cycle at a time.
+class LegSimulation:
+    """Simulates legs without wear, one after the other.
 
     Parameters
     ----------
     mechanism : Mechanism
-        Driven at the speed of the observed gait.
-    model : AngleModel
-    cycles : int
-        Averaged gait cycles of each leg, after a first one that is left out.
     """
 
-    def __init__(self, mechanism: Mechanism, model: AngleModel, cycles: int = CYCLES) -> None:
-        self._setup, self._model, self._cycles = prepare(mechanism, wear=True), model, cycles
-        self._setup.contacts.wear_coefficient[:] = 0.0
-        self._fresh = self._setup.contacts.clearance.copy()
-        self._tables = ClearanceStepper(self._setup).model.tables
-        self._statistics = new_run_statistics(len(mechanism.joints))
-        self._stepper: ClearanceStepper | None = None
-        self._target, self._depth = self._fresh, self._setup.surfaces.depth.copy()
-        self._total, self._cycle = np.zeros(0), 0
-        self._means: tuple[Floats, ...] = ()
-        self._use(CrankProfile.steady(self._setup.speed))
+    def __init__(self, mechanism: Mechanism) -> None:
+        self._mechanism = mechanism
+        self._parameters: LegParameters | None = None
+        self._loaded: LoadedTables | None = None
 
-    @property
-    def is_busy(self) -> bool:
-        """Whether a reference is in progress."""
-        return self._stepper is not None
-
-    def begin(self, clearance_m: Floats, depth: Floats, profile: CrankProfile | None = None) -> None:
-        """Begin a reference.
+    def simulate(
+        self,
+        profile: CrankProfile,
+        parameters: LegParameters,
+        clearance_m: Floats,
+        depth: Floats,
+        settling: int,
+        cycles: int,
+    ) -> SimulatedLeg | None:
+        """Simulate a leg from the start.
 
         Parameters
         ----------
+        profile : CrankProfile
+        parameters : LegParameters
         clearance_m : (k,) array
-            Mean clearances.
+            Mean clearances [m].
         depth : (k, 2, N) array
             Wear depths [m], which show where joints are worn.
-        profile : CrankProfile, optional
-            That of a steady crank by default.
-        """
-        self._use(profile or CrankProfile.steady(self._setup.speed))
-        self._target, self._depth = np.maximum(clearance_m, _LEAST_CLEARANCE_M), depth.copy()
-        self._means = ()
-        self._begin_leg()
-
-    def advance(self) -> Reference | None:
-        """Simulate one gait cycle.
+        settling : int
+            Gait cycles before those that count.
+        cycles : int
 
         Returns
         -------
-        Reference or None
-            The reference after its last cycle, else None. If the motion of a leg diverges, the computation
-            ends without a reference.
+        SimulatedLeg or None
+            None if it cannot be simulated.
+
+        Raises
+        ------
+        AssemblyError
+            If its bodies do not close.
         """
-        if self._stepper is None:
-            return None
-        begin_s = self._cycle * self._times[-1]
-        turned = np.copysign(TURN * self._cycle, self._profile.speed)
-        for i in range(PHASES):
-            if self._cycle:  # the first cycle is left out
-                self._total[i] += self._stepper.eccentricity.ravel()
-            piece = self._pieces[i].copy()
-            piece[0] += begin_s
-            piece[1] += turned
-            status, _ = self._stepper.advance(piece, begin_s + self._times[i + 1], self._statistics)
-            if status != DONE:
-                self._stepper = None
-                return None
-        self._cycle += 1
-        if self._cycle <= self._cycles:
-            return None
-        self._means = (*self._means, _by_angle(self._total / self._cycles, self._setup.speed))
-        if len(self._means) <= len(self._fresh):
-            self._begin_leg()
-            return None
-        self._stepper = None
-        return self._reference()
-
-    def snapshot(self) -> ReferenceSnapshot:
-        """A copy of the whole state."""
-        stepper = self._stepper.snapshot() if self._stepper else None
-        return ReferenceSnapshot(
-            self._profile, self._target, self._depth, self._total.copy(), self._means, self._cycle, stepper
-        )
-
-    def restore(self, snapshot: ReferenceSnapshot) -> None:
-        """Restore a snapshot of a run of the same mechanism and model; it continues bit-identically."""
-        self._use(snapshot.profile)
-        self._target, self._depth, self._means = snapshot.clearance_m, snapshot.depth, snapshot.means
-        self._stepper = None
-        if snapshot.stepper is not None:
-            self._begin_leg().restore(snapshot.stepper)
-        self._total, self._cycle = snapshot.total.copy(), snapshot.cycle
-
-    def _begin_leg(self) -> ClearanceStepper:
-        """Start the next leg: first with the target clearances, then with each of them widened in turn."""
-        target = self._opened(len(self._means))
-        clearance, depth = worn_to(self._fresh, self._depth, target)
+        if parameters != self._parameters:
+            self._prepare(parameters)
+        period, turn = TURN / abs(profile.speed), float(np.copysign(TURN, profile.speed))
+        motions, step = [profile.at(phi) for phi in even_angles(profile)], period / POINTS
+        pieces = np.array([quintic(i * step, motions[i], step, motions[i + 1]) for i in range(POINTS)])
+        clearance, worn = worn_to(self._fresh, depth, clearance_m)
         self._setup.contacts.clearance[:] = clearance
-        self._setup.surfaces.depth[:] = depth
-        self._stepper = ClearanceStepper(self._setup, tables=self._tables)
-        self._stepper.init(self._start.angle, self._start.speed)
-        self._total, self._cycle = np.zeros((PHASES, 2 * len(self._fresh))), 0
-        return self._stepper
+        self._setup.surfaces.depth[:] = worn
+        stepper = ClearanceStepper(self._setup, period / INTERVALS, tables=self._tables)
+        coupling = drive_coupling(self._setup, stepper.model, parameters)
+        stepper.model = stepper.model._replace(coupling=coupling)
+        stepper.init(motions[0].angle, motions[0].speed)
+        statistics = new_run_statistics(len(self._mechanism.joints))
+        polynomial, torque = np.empty(7), np.empty((settling + cycles, POINTS))
+        eccentricity = np.zeros((POINTS, len(stepper.state.e)))
+        address = stepper.advance_address(polynomial, statistics)
+        for first, last in self._steps_alike(parameters.load, len(torque)):
+            status = simulate_cycles(
+                address, stepper.model, self._setup.surfaces.feeds_back, stepper.state, pieces, period, turn,
+                first, settling, statistics, stepper.work, polynomial, torque[first:last], eccentricity,
+            )  # fmt: skip
+            if status != DONE:
+                return None
+        return SimulatedLeg(torque[settling:], eccentricity.reshape(POINTS, -1, 2) / cycles)
 
-    def _use(self, profile: CrankProfile) -> None:
-        """Prepare the drive between the middles of the phases, in a turn."""
-        self._profile = profile
-        sign = np.copysign(1.0, profile.speed)
-        wanted = 0.5 * TURN / PHASES + sign * np.arange(PHASES + 1) * (TURN / PHASES)
-        even = sign * np.linspace(-TURN, 2.0 * TURN, 3 * PHASES * _FINE + 1)
-        phi = np.interp(sign * wanted, sign * profile.angles(even), even)
-        self._times = (phi - phi[0]) / profile.speed
-        motions = [profile.at(at) for at in phi]
-        steps = np.diff(self._times)
-        self._start = motions[0]
-        self._pieces = np.array(
-            [quintic(self._times[i], motions[i], steps[i], motions[i + 1]) for i in range(PHASES)]
-        )
+    def _steps_alike(self, load: Floats, cycles: int) -> Iterator[tuple[int, int]]:
+        """Gait cycles, from the first to before the last, under the same load, which acts on the leg.
 
-    def _opened(self, leg: int) -> Floats:
-        """Clearances (k,) [m]: those of the target for leg 0, with joint k widened for leg k + 1."""
-        target = self._target.copy()
-        target[leg - 1 : leg] += OPENED_M
-        return target
+        A force that were the same in each step would let impacts fall at the same phases.
+        """
+        if self._loaded is None:
+            yield 0, cycles
+            return
+        random, place = np.random.default_rng(_SEED), np.arange(len(load)) / len(load)
+        phase = np.arange(TABLE_POINTS) / TABLE_POINTS
+        for cycle in range(cycles):
+            factor, late = 1.0 + _SIZE * random.standard_normal(), _TIMING * random.standard_normal()
+            force = [factor * np.interp(phase - late, place, one, period=1.0) for one in load.T]
+            put_force(self._loaded, np.stack(force, axis=1))
+            yield cycle, cycle + 1
 
-    def _reference(self) -> Reference:
-        joints = len(self._fresh)
-        by_e = self._model.by_e
-        deviations = [np.einsum("pmkd,pkd->pm", by_e, mean) for mean in self._means]
-        columns = design(self._model, self._means[0] / self._target[:, None])
-        for k in range(joints):
-            columns[:, :, k] = (deviations[k + 1] - deviations[0]) / OPENED_M
-        return Reference(self._target, deviations[0], columns, self._cycles, self._profile)
+    def _prepare(self, parameters: LegParameters) -> None:
+        """Prepare the simulation of legs with given masses, lengths and friction."""
+        self._setup = prepare(parameters.in_air.applied(self._mechanism), wear=True)
+        self._setup.contacts.wear_coefficient[:] = 0.0
+        self._fresh = self._setup.contacts.clearance.copy()
+        self._tables = ClearanceStepper(self._setup).model.tables
+        self._loaded = None
+        if parameters.load.size:
+            self._loaded = loaded_tables(self._setup.linkage, self._setup.contacts, self._tables)
+        self._parameters = parameters
 
 
-def _by_angle(mean: Floats, speed: float) -> Floats:
-    """Means (P, k, 2) in the order of the crank angle, for either direction of rotation."""
-    if speed < 0.0:
-        mean = np.roll(mean[::-1], 1, axis=0)
-    return np.asarray(mean.reshape(PHASES, -1, 2))
+def drive_coupling(setup: Setup, model: ClearanceModel, parameters: LegParameters) -> Coupling:
+    """Coupling of a leg whose drive has a compliance."""
+    if parameters.compliance == 0.0:
+        return rigid_coupling()
+    joints, damped = len(setup.clearance_joints), is_damped(setup.linkage.arrays)
+    return coupling_of(
+        model.tables, joints, damped, model.interval, 1.0 / parameters.compliance, parameters.damping
+    )
+
+
+def even_angles(profile: CrankProfile) -> Floats:
+    """Angles (POINTS + 1,) [rad] of the evenly turning crank at equal steps of a gait cycle."""
+    return np.linspace(0.0, np.copysign(TURN, profile.speed), POINTS + 1)
+
+
+_LEAST_WEAR_M = 5.0e-6  # least mean wear whose profile is scaled; with less, a joint is widened evenly
 
 
 def worn_to(fresh: Floats, depth: Floats, target: Floats) -> tuple[Floats, Floats]:

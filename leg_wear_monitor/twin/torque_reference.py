@@ -16,7 +16,7 @@ import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
-from typing import NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import attrs
 import numba
@@ -26,8 +26,13 @@ from numpy.typing import NDArray
 from leg_wear_monitor.errors import AssemblyError
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.twin.leg_simulation import LegSimulation, even_angles
-from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
+from leg_wear_monitor.twin.reference import (
+    CrankProfile,
+    LegParameters,
+    LegSimulation,
+    SimulatedLeg,
+    even_angles,
+)
 
 CADENCES = 6  # of which the references of a leg are kept
 
@@ -46,9 +51,10 @@ STIFFER = 1.08  # factor on the stiffness of a drive that is not rigid: a quarte
 _BEHIND = 2  # legs that are due and not simulated, from which on threads of higher priority help
 _SETTLING = 2  # gait cycles before those that count
 _NICE = 10  # lets the node have as much of a core as it needs, and other programs most of it
-_LEAST_CLEARANCE_M = 5.0e-5
+LEAST_CLEARANCE_M = 5.0e-5
 
 HalfFloats = NDArray[np.float16]
+FoundT = TypeVar("FoundT")
 
 
 @attrs.frozen(eq=False)
@@ -88,25 +94,25 @@ class TorqueReference:
         return self.profile.angles(even_angles(self.profile))
 
 
-class _Leg(NamedTuple):
+class Leg(NamedTuple):
     """A leg to be simulated: its parameters, and its clearances (k,) [m]."""
 
     parameters: LegParameters
     clearance_m: Floats
 
 
-class TorqueReferenceSnapshot(NamedTuple):
-    """State of a `TorqueReferenceRun`; plain arrays and numbers."""
+class ReferenceSnapshot(NamedTuple):
+    """State of a `ReferenceRun`; plain arrays and numbers."""
 
     profile: CrankProfile
-    legs: tuple[_Leg, ...]
+    legs: tuple[Leg, ...]
     depth: Floats
-    done: tuple[HalfFloats, ...]
+    done: tuple[NDArray[Any], ...]
     periods: int
 
 
-class TorqueReferenceRun:
-    """Simulates a torque reference while evaluation periods pass.
+class ReferenceRun(Generic[FoundT]):
+    """Simulates legs while evaluation periods pass: what a sensor shows of them is its reference.
 
     Threads simulate some legs ahead of the caller. `advance` waits for them when all are due: what it returns
     depends on the number of calls alone, and a machine that is busy for a while catches up before. There are
@@ -116,8 +122,6 @@ class TorqueReferenceRun:
     Parameters
     ----------
     mechanism : Mechanism
-    cycles : int, optional
-        Gait cycles of each wider leg; default: CYCLES.
 
     Attributes
     ----------
@@ -128,21 +132,35 @@ class TorqueReferenceRun:
 
     may_be_late = False
 
-    def __init__(self, mechanism: Mechanism, cycles: int | None = None) -> None:
-        self._mechanism, self._cycles = mechanism, cycles
-        joints = [mechanism.clearances[joint] for joint in mechanism.clearance_joints]
-        self._radius = np.array([joint.bushing_radius for joint in joints])
-        self._fresh = np.array([joint.radial_clearance for joint in joints])
+    def __init__(self, mechanism: Mechanism) -> None:
+        self._mechanism = mechanism
         self._profile, self._depth = CrankProfile.steady(1.0), np.zeros(0)
-        self._legs: tuple[_Leg, ...] = ()
-        self._done: tuple[HalfFloats, ...] = ()
+        self._legs: tuple[Leg, ...] = ()
+        self._done: tuple[NDArray[Any], ...] = ()
         self._periods = 0
         self._threads = numba.config.NUMBA_NUM_THREADS
-        self._pool = ThreadPoolExecutor(self._threads, "torque-reference", _lower_priority)
-        self._urgent = ThreadPoolExecutor(self._threads, "torque-reference-urgent")
-        self._ahead: list[Future[HalfFloats | None]] = []
-        self._hurried: list[Future[HalfFloats | None]] = []
+        self._pool = ThreadPoolExecutor(self._threads, "reference", _lower_priority)
+        self._urgent = ThreadPoolExecutor(self._threads, "reference-urgent")
+        self._ahead: list[Future[NDArray[Any] | None]] = []
+        self._hurried: list[Future[NDArray[Any] | None]] = []
         self._of_thread = threading.local()
+
+    def _so_far(self) -> FoundT:
+        """The reference by the legs that are simulated."""
+        raise NotImplementedError
+
+    def _kept(self, leg: SimulatedLeg) -> NDArray[Any]:
+        """What of a simulated leg the reference is made of."""
+        raise NotImplementedError
+
+    def _cycles_of(self, leg: Leg) -> int:
+        """Gait cycles of a leg that count."""
+        raise NotImplementedError
+
+    @property
+    def _pace(self) -> int:
+        """Simulated gait cycles in an evaluation period."""
+        raise NotImplementedError
 
     @property
     def is_busy(self) -> bool:
@@ -157,97 +175,20 @@ class TorqueReferenceRun:
     @property
     def progress(self) -> float:
         """Fraction of the gait cycles that are done; 0 where nothing was begun."""
-        return min(1.0, PACE * self._periods / max(1, self._cost(self._legs)))
+        return min(1.0, self._pace * self._periods / max(1, self._cost(self._legs)))
 
     @property
     def is_late(self) -> bool:
         """Whether all of it is due, and not all is simulated."""
-        return self.is_busy and self._cost(self._legs) <= PACE * self._periods
+        return self.is_busy and self._cost(self._legs) <= self._pace * self._periods
 
     @property
     def cycles_left(self) -> float:
         """Commanded gait cycles until all of it is due."""
-        periods = -(-self._cost(self._legs) // PACE) - self._periods
+        periods = -(-self._cost(self._legs) // self._pace) - self._periods
         return max(0, periods) / _PERIODS
 
-    def begin(
-        self,
-        clearance_m: Floats,
-        depth: Floats,
-        profile: CrankProfile,
-        parameters: LegParameters | None = None,
-    ) -> None:
-        """Begin a reference: the expected leg, and each of its joints wider in turn.
-
-        Parameters
-        ----------
-        clearance_m : (k,) array
-                Expected mean clearances [m].
-        depth : (k, 2, N) array
-            Wear depths [m], which show where joints are worn.
-        profile : CrankProfile
-        parameters : LegParameters, optional
-            Those of the mechanism file by default.
-        """
-        parameters = parameters or LegParameters.none(self._mechanism)
-        centre = np.maximum(clearance_m, _LEAST_CLEARANCE_M)
-        # no clearance is wider than its journal is thick; a worn joint may have got a new part without a word
-        widest, is_worn = 0.5 * self._radius, centre > WORN * self._fresh
-        narrower = np.where(is_worn, self._fresh, NARROWER * centre)
-        legs = [_Leg(parameters, centre)]
-        for k in range(len(centre)):
-            sizes = [min(factor * centre[k], widest[k]) for factor in WIDER]
-            for size in [*sizes, narrower[k]] if is_worn.any() else sizes:
-                other = centre.copy()
-                other[k] = size
-                legs.append(_Leg(parameters, other))
-        self._begin(legs, depth, profile)
-
-    def begin_expected(
-        self, clearance_m: Floats, depth: Floats, profile: CrankProfile, parameters: LegParameters
-    ) -> None:
-        """Begin the expected leg alone, as of `begin`."""
-        self._begin([_Leg(parameters, np.maximum(clearance_m, _LEAST_CLEARANCE_M))], depth, profile)
-
-    def go_on(self, part: TorqueReference, depth: Floats) -> None:
-        """Go on with a reference, or an identification, whose first legs were simulated in an earlier run.
-
-        Parameters
-        ----------
-        part : TorqueReference
-        depth : (k, 2, N) array
-            Wear depths [m], as of `begin`.
-        """
-        if part.is_of_parameters:
-            legs = _changed(part.parameters, part.clearance_m[0])[: len(part.clearance_m)]
-        else:
-            legs = [_Leg(part.parameters, clearance_m) for clearance_m in part.clearance_m]
-        self._begin(legs, depth, part.profile)
-        self._done = part.torque_nm
-        self._periods = -(-self._cost(legs[: len(self._done)]) // PACE)
-
-    @property
-    def part(self) -> TorqueReference | None:
-        """The legs of a reference that are due so far; None where none is, or all are."""
-        self._take(waits=not self.may_be_late)
-        return self._so_far() if self._done and self.is_busy else None
-
-    def begin_identification(
-        self,
-        clearance_m: Floats,
-        depth: Floats,
-        profile: CrankProfile,
-        near: LegParameters,
-        is_drive_known: bool = False,
-    ) -> None:
-        """Begin the leg with given parameters, then each body heavier, each longer, and more friction.
-
-        Where its drive is compliant, and not known, a last leg has a stiffer one.
-        """
-        legs = _changed(near, np.maximum(clearance_m, _LEAST_CLEARANCE_M))
-        self._begin(legs[:-1] if near.compliance and is_drive_known else legs, depth, profile)
-
-    def advance(self, waits: bool = False) -> TorqueReference | None:
+    def advance(self, waits: bool = False) -> FoundT | None:
         """Note that an evaluation period has passed; return the reference when all of it is due.
 
         A leg that cannot be simulated ends it then without one. The caller may wait for each leg.
@@ -255,7 +196,7 @@ class TorqueReferenceRun:
         if not self.is_busy:
             return None
         self._periods += 1
-        is_due = self._cost(self._legs) <= PACE * self._periods
+        is_due = self._cost(self._legs) <= self._pace * self._periods
         self._take(waits or (is_due and not self.may_be_late), hurries=is_due and not waits)
         if not is_due or (self.is_busy and not self._ahead[0].done()):
             return None
@@ -265,7 +206,7 @@ class TorqueReferenceRun:
         self._of_thread = threading.local()  # gives back 20 MB a thread
         return self._so_far()
 
-    def finish(self, progress: Callable[[float], None] = lambda _fraction: None) -> TorqueReference | None:
+    def finish(self, progress: Callable[[float], None] = lambda _fraction: None) -> FoundT | None:
         """Simulate the legs that are left, at once; None where one cannot be simulated."""
         found = None
         while self.is_busy:
@@ -273,41 +214,36 @@ class TorqueReferenceRun:
             progress(self.progress)
         return found
 
-    def snapshot(self) -> TorqueReferenceSnapshot:
+    def snapshot(self) -> ReferenceSnapshot:
         """The whole state; legs that are simulated ahead are simulated again."""
         self._take(waits=True)
-        return TorqueReferenceSnapshot(self._profile, self._legs, self._depth, self._done, self._periods)
+        return ReferenceSnapshot(self._profile, self._legs, self._depth, self._done, self._periods)
 
-    def restore(self, snapshot: TorqueReferenceSnapshot) -> None:
+    def restore(self, snapshot: ReferenceSnapshot) -> None:
         """Restore a snapshot of a run of the same mechanism; it continues bit for bit."""
         self._begin(snapshot.legs, snapshot.depth, snapshot.profile)
         self._done, self._periods = snapshot.done, snapshot.periods
 
-    def _begin(self, legs: Sequence[_Leg], depth: Floats, profile: CrankProfile) -> None:
+    def _begin(self, legs: Sequence[Leg], depth: Floats, profile: CrankProfile) -> None:
         for one in self._ahead:
             one.cancel()
         self._ahead, self._hurried, self._periods = [], [], 0
         self._legs, self._depth, self._done, self._profile = tuple(legs), depth.copy(), (), profile
 
-    def _so_far(self) -> TorqueReference:
-        """The reference with the torques of the legs that are simulated."""
-        clearance_m = np.array([leg.clearance_m for leg in self._legs])
-        return TorqueReference(self._profile, clearance_m, self._done, self._legs[0].parameters)
-
     @property
     def _due(self) -> int:
         """Number of legs that are due."""
         costs = np.cumsum([_SETTLING + self._cycles_of(leg) for leg in self._legs])
-        return int(np.searchsorted(costs, PACE * self._periods, side="right"))
+        return int(np.searchsorted(costs, self._pace * self._periods, side="right"))
 
     def _take(self, waits: bool, hurries: bool = False) -> None:
         """Take the legs that are due and simulated, or wait for them, up to one that cannot be."""
         self._look_ahead(hurries)
         while self._ahead and len(self._done) < self._due and (waits or self._ahead[0].done()):
-            torque = self._ahead[0].result()
-            if torque is None:
+            leg = self._ahead[0].result()
+            if leg is None:
                 break
-            self._done, self._ahead = (*self._done, torque), self._ahead[1:]
+            self._done, self._ahead = (*self._done, leg), self._ahead[1:]
             self._look_ahead(hurries)
 
     def _look_ahead(self, hurries: bool = False) -> None:
@@ -335,30 +271,135 @@ class TorqueReferenceRun:
             self._ahead[i] = self._urgent.submit(self._simulated, *arguments)
             self._hurried.append(self._ahead[i])
 
-    def _cycles_of(self, leg: _Leg) -> int:
-        """Gait cycles of a leg that count."""
-        cycles = self._cycles or CYCLES
-        return cycles if (leg.clearance_m != self._legs[0].clearance_m).any() else 2 * cycles
-
-    def _cost(self, legs: Sequence[_Leg]) -> int:
+    def _cost(self, legs: Sequence[Leg]) -> int:
         """Gait cycles that are simulated for some legs, with those in which they settle."""
         return sum(_SETTLING + self._cycles_of(leg) for leg in legs)
 
-    def _simulated(self, profile: CrankProfile, leg: _Leg, depth: Floats, cycles: int) -> HalfFloats | None:
-        """Mean torque (cycles, POINTS) of a leg; None if it cannot be simulated."""
+    def _simulated(self, profile: CrankProfile, leg: Leg, depth: Floats, cycles: int) -> NDArray[Any] | None:
+        """What is kept of a leg; None if it cannot be simulated."""
         own = self._of_thread
         if not hasattr(own, "simulation"):
             own.simulation = LegSimulation(self._mechanism)
         try:
-            torque = own.simulation.torque(
-                profile, leg.parameters, leg.clearance_m, depth, _SETTLING + cycles
+            found = own.simulation.simulate(
+                profile, leg.parameters, leg.clearance_m, depth, _SETTLING, cycles
             )
         except AssemblyError:  # with such lengths it does not close
             return None
-        return None if torque is None else torque[_SETTLING:].astype(np.float16)
+        return None if found is None else self._kept(found)
 
 
-def _changed(near: LegParameters, clearance_m: Floats) -> list[_Leg]:
+class TorqueReferenceRun(ReferenceRun[TorqueReference]):
+    """Simulates a torque reference while evaluation periods pass.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    cycles : int, optional
+        Gait cycles of each wider leg; default: CYCLES.
+    """
+
+    def __init__(self, mechanism: Mechanism, cycles: int | None = None) -> None:
+        super().__init__(mechanism)
+        self._cycles = cycles
+        joints = [mechanism.clearances[joint] for joint in mechanism.clearance_joints]
+        self._radius = np.array([joint.bushing_radius for joint in joints])
+        self._fresh = np.array([joint.radial_clearance for joint in joints])
+
+    def begin(
+        self,
+        clearance_m: Floats,
+        depth: Floats,
+        profile: CrankProfile,
+        parameters: LegParameters | None = None,
+    ) -> None:
+        """Begin a reference: the expected leg, and each of its joints wider in turn.
+
+        Parameters
+        ----------
+        clearance_m : (k,) array
+                Expected mean clearances [m].
+        depth : (k, 2, N) array
+            Wear depths [m], which show where joints are worn.
+        profile : CrankProfile
+        parameters : LegParameters, optional
+            Those of the mechanism file by default.
+        """
+        parameters = parameters or LegParameters.none(self._mechanism)
+        centre = np.maximum(clearance_m, LEAST_CLEARANCE_M)
+        # no clearance is wider than its journal is thick; a worn joint may have got a new part without a word
+        widest, is_worn = 0.5 * self._radius, centre > WORN * self._fresh
+        narrower = np.where(is_worn, self._fresh, NARROWER * centre)
+        legs = [Leg(parameters, centre)]
+        for k in range(len(centre)):
+            sizes = [min(factor * centre[k], widest[k]) for factor in WIDER]
+            for size in [*sizes, narrower[k]] if is_worn.any() else sizes:
+                other = centre.copy()
+                other[k] = size
+                legs.append(Leg(parameters, other))
+        self._begin(legs, depth, profile)
+
+    def begin_expected(
+        self, clearance_m: Floats, depth: Floats, profile: CrankProfile, parameters: LegParameters
+    ) -> None:
+        """Begin the expected leg alone, as of `begin`."""
+        self._begin([Leg(parameters, np.maximum(clearance_m, LEAST_CLEARANCE_M))], depth, profile)
+
+    def go_on(self, part: TorqueReference, depth: Floats) -> None:
+        """Go on with a reference, or an identification, whose first legs were simulated in an earlier run.
+
+        Parameters
+        ----------
+        part : TorqueReference
+        depth : (k, 2, N) array
+            Wear depths [m], as of `begin`.
+        """
+        if part.is_of_parameters:
+            legs = _changed(part.parameters, part.clearance_m[0])[: len(part.clearance_m)]
+        else:
+            legs = [Leg(part.parameters, clearance_m) for clearance_m in part.clearance_m]
+        self._begin(legs, depth, part.profile)
+        self._done = part.torque_nm
+        self._periods = -(-self._cost(legs[: len(self._done)]) // PACE)
+
+    @property
+    def part(self) -> TorqueReference | None:
+        """The legs of a reference that are due so far; None where none is, or all are."""
+        self._take(waits=not self.may_be_late)
+        return self._so_far() if self._done and self.is_busy else None
+
+    def begin_identification(
+        self,
+        clearance_m: Floats,
+        depth: Floats,
+        profile: CrankProfile,
+        near: LegParameters,
+        is_drive_known: bool = False,
+    ) -> None:
+        """Begin the leg with given parameters, then each body heavier, each longer, and more friction.
+
+        Where its drive is compliant, and not known, a last leg has a stiffer one.
+        """
+        legs = _changed(near, np.maximum(clearance_m, LEAST_CLEARANCE_M))
+        self._begin(legs[:-1] if near.compliance and is_drive_known else legs, depth, profile)
+
+    def _so_far(self) -> TorqueReference:
+        clearance_m = np.array([leg.clearance_m for leg in self._legs])
+        return TorqueReference(self._profile, clearance_m, self._done, self._legs[0].parameters)
+
+    def _kept(self, leg: SimulatedLeg) -> HalfFloats:
+        return leg.torque.astype(np.float16)
+
+    def _cycles_of(self, leg: Leg) -> int:
+        cycles = self._cycles or CYCLES
+        return cycles if (leg.clearance_m != self._legs[0].clearance_m).any() else 2 * cycles
+
+    @property
+    def _pace(self) -> int:
+        return PACE
+
+
+def _changed(near: LegParameters, clearance_m: Floats) -> list[Leg]:
     """The leg with given parameters, then each body heavier, each longer, more friction, a stiffer drive."""
     each = np.eye(len(near.mass))
     changed = [
@@ -369,7 +410,7 @@ def _changed(near: LegParameters, clearance_m: Floats) -> list[_Leg]:
     ]
     if near.compliance:
         changed.append(attrs.evolve(near, compliance=near.compliance / STIFFER))
-    return [_Leg(parameters, clearance_m) for parameters in changed]
+    return [Leg(parameters, clearance_m) for parameters in changed]
 
 
 def _lower_priority() -> None:

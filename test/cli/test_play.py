@@ -13,7 +13,7 @@ from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.bags.mcap_writer import McapWriter
 from leg_wear_monitor.messages import encode
 from leg_wear_monitor.play.fit import effects
-from leg_wear_monitor.twin.reference import angle_model
+from leg_wear_monitor.twin.angle_reference import angle_model
 
 START_NS = 1_772_352_000 * 10**9
 

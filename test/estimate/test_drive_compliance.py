@@ -8,8 +8,7 @@ from leg_wear_monitor.estimate.channel import compliance_of, leg_behind_coupling
 from leg_wear_monitor.estimate.signature import Channel, TorqueSensor, simulated_signatures
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
-from leg_wear_monitor.twin.leg_simulation import LegSimulation
-from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
+from leg_wear_monitor.twin.reference import CrankProfile, LegParameters, LegSimulation
 from leg_wear_monitor.twin.torque_reference import TorqueReference
 from leg_wear_monitor.wear import SECTORS
 
@@ -29,9 +28,9 @@ def behind(leg) -> TorqueReference:
     profile = attrs.evolve(CrankProfile.steady(TURN), sine=np.array([0.0, 0.01, *[0.0] * 6]))
     parameters = attrs.evolve(LegParameters.none(leg), mass=np.array(MASS), compliance=1.0e-3)
     clearance, unworn = np.full(5, 3.0e-4), np.zeros((5, 2, SECTORS))
-    torque = LegSimulation(leg).torque(profile, parameters, clearance, unworn, 8)
-    assert torque is not None
-    return TorqueReference(profile, clearance[None], (torque[2:].astype(np.float16),), parameters)
+    found = LegSimulation(leg).simulate(profile, parameters, clearance, unworn, 2, 6)
+    assert found is not None
+    return TorqueReference(profile, clearance[None], (found.torque.astype(np.float16),), parameters)
 
 
 @pytest.mark.chaotic

@@ -16,8 +16,7 @@ from leg_wear_monitor.estimate.signature import (
 )
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
-from leg_wear_monitor.twin.leg_simulation import POINTS
-from leg_wear_monitor.twin.reference import LegParameters
+from leg_wear_monitor.twin.reference import POINTS, LegParameters
 from leg_wear_monitor.twin.torque_reference import HEAVIER, LONGER, ROUGHER
 
 SENSOR = TorqueSensor(period_s=0.005, cycle_s=1.0, size_nm=9.2, noise_nm=0.3)

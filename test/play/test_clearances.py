@@ -8,7 +8,7 @@ from leg_wear_monitor import LegWearError, Mechanism, load_mechanism
 from leg_wear_monitor.mechanism.arrays import body_names
 from leg_wear_monitor.mechanism.position import build_linkage, ideal_motion
 from leg_wear_monitor.play.fit import clearances_of, effects, solved
-from leg_wear_monitor.twin.reference import angle_model
+from leg_wear_monitor.twin.angle_reference import angle_model
 
 POSTURES = np.array([0.3, 1.5, 2.9, 4.4, 5.6])
 SHIFT_M = 1.0e-5

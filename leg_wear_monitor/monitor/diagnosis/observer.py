@@ -46,7 +46,7 @@ from leg_wear_monitor.state import FootLoad
 from leg_wear_monitor.twin.reference import LegParameters
 from leg_wear_monitor.twin.sample import GROUND, INSTANT, MEASURED, KeepsSamples
 from leg_wear_monitor.twin.statistics import CycleStatistics
-from leg_wear_monitor.twin.torque_reference import TorqueReference, TorqueReferenceSnapshot
+from leg_wear_monitor.twin.torque_reference import ReferenceSnapshot, TorqueReference
 
 # Counted clearances that are surely wrong, and what becomes of the evidence when they are corrected.
 
@@ -147,7 +147,7 @@ _MOVED, _LEAST_LOAD_N = 0.3, 100.0
 _ESTIMATED_M, _ESTIMATED = 1.0e-4, 0.2  # largest standard deviation of an observable clearance; of it
 
 
-TorqueObserverSnapshot = tuple[TorqueState, TorqueReferenceSnapshot | None]
+TorqueObserverSnapshot = tuple[TorqueState, ReferenceSnapshot | None]
 """Whole state of a `TorqueObserver`."""
 
 

@@ -24,9 +24,9 @@ from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.monitor.diagnosis.state import AtCadence, TorqueState
 from leg_wear_monitor.twin.reference import UNLIKE, CrankProfile, LegParameters, mean_profile
 from leg_wear_monitor.twin.torque_reference import (
+    ReferenceSnapshot,
     TorqueReference,
     TorqueReferenceRun,
-    TorqueReferenceSnapshot,
 )
 
 # Models that follow from the state of a `TorqueObserver`: explanations, tests and the misfit.
@@ -256,11 +256,11 @@ class References:
         """Whether a reference was known beforehand."""
         return any(reference is one for one in self._given)
 
-    def snapshot(self) -> TorqueReferenceSnapshot | None:
+    def snapshot(self) -> ReferenceSnapshot | None:
         """State of the simulation; None before the first one."""
         return self._run.snapshot() if self._run else None
 
-    def restore(self, snapshot: TorqueReferenceSnapshot | None) -> None:
+    def restore(self, snapshot: ReferenceSnapshot | None) -> None:
         """Restore a snapshot of the same mechanism; later results are equal bit for bit."""
         self._run = None
         if snapshot is not None:

@@ -31,8 +31,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
 )
 from leg_wear_monitor.monitor.ledger.schema import add, replace, sealed
 from leg_wear_monitor.state import Evidence, Figure, Level, State, Verdict
-from leg_wear_monitor.twin.leg_simulation import POINTS
-from leg_wear_monitor.twin.reference import UNLIKE, CrankProfile, LegParameters
+from leg_wear_monitor.twin.reference import POINTS, UNLIKE, CrankProfile, LegParameters
 from leg_wear_monitor.twin.torque_reference import CADENCES, CYCLES, TorqueReference
 
 _Row = TypeVar("_Row", Measurement, CorrectedClearance, ForecastPoint, ClearancePoint)

@@ -21,9 +21,8 @@ from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.monitor.diagnosis.state import UNUSED_CYCLES, DiagnosisState
 from leg_wear_monitor.twin import CRANK, TORQUE, torque_reference
-from leg_wear_monitor.twin.leg_simulation import POINTS, LegSimulation
 from leg_wear_monitor.twin.load import load_shape, load_signature
-from leg_wear_monitor.twin.reference import CrankProfile
+from leg_wear_monitor.twin.reference import POINTS, CrankProfile, LegSimulation
 from leg_wear_monitor.twin.sample import GROUND, gait_samples
 from leg_wear_monitor.twin.torque_reference import WIDER
 from leg_wear_monitor.wear import SECTORS
@@ -355,9 +354,9 @@ def test_on_the_ground_references_are_those_of_the_loaded_leg(leg, reference, mo
     observer = TorqueObserver(leg, MonitorConfig(load=Load(model=GROUND)), SIZE_NM, NEW)
     load = 300.0 * load_shape(build_linkage(leg), GROUND)
     own = attrs.evolve(reference.parameters, load=load)
-    torque = LegSimulation(leg).torque(reference.profile, own, NEW, DEPTH, 42)
-    assert torque is not None
-    loaded = attrs.evolve(reference, torque_nm=(torque[2:],), parameters=own)
+    found = LegSimulation(leg).simulate(reference.profile, own, NEW, DEPTH, 2, 40)
+    assert found is not None
+    loaded = attrs.evolve(reference, torque_nm=(found.torque,), parameters=own)
     walk(observer, samples(loaded, [0] * (COMMISSIONING_CYCLES + references.LOAD_ROUNDS + 8)))
     state, parameters = observer.state, observer.parameters
     assert state.load_rounds == references.LOAD_ROUNDS

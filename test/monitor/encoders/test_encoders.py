@@ -17,7 +17,7 @@ from leg_wear_monitor.monitor.encoders import errors_of
 from leg_wear_monitor.monitor.ledger.ledger import LedgerError
 from leg_wear_monitor.monitor.ledger.rows import read_commissioned
 from leg_wear_monitor.state import Level
-from leg_wear_monitor.twin.reference import PHASES, ReferenceRun, angle_model
+from leg_wear_monitor.twin.angle_reference import PHASES, AngleReferenceRun, angle_model
 from leg_wear_monitor.twin.sample import EMPTY
 
 NAMES, JOINTS = ("hip", "knee", "ankle"), ("B", "G", "I")
@@ -30,11 +30,9 @@ REFERENCE_CYCLES = 1  # for time: the encoders here obey the reference, whatever
 
 @pytest.fixture(scope="module")
 def reference(leg):
-    run = ReferenceRun(leg, angle_model(leg, JOINTS), REFERENCE_CYCLES)
+    run = AngleReferenceRun(leg, angle_model(leg, JOINTS), REFERENCE_CYCLES)
     run.begin(FRESH, np.zeros((5, 2, 720)))
-    while (found := run.advance()) is None:
-        pass
-    return found
+    return run.finish()
 
 
 @pytest.fixture(scope="module")
@@ -178,7 +176,7 @@ def test_a_restored_monitor_goes_on_bit_for_bit(new_watch, read):
     monitor = new_watch()
     monitor.update(read(2.5))
     assert monitor._parts.encoders._reference.is_busy
-    middle, rest = monitor.snapshot(), read(4.0, 2.5)
+    middle, rest = monitor.snapshot(), read(6.0, 2.5)
     first = said(monitor, [monitor.update(rest)])
     _, (reference, *_), _ = monitor._parts.encoders.snapshot()
     monitor.restore(middle)
@@ -207,10 +205,10 @@ def test_a_leg_that_cannot_be_simulated_is_told_and_the_crank_goes_on(new_watch,
     monitor = new_watch()
     # whatever the stepper says, it failed
     monkeypatch.setattr("leg_wear_monitor.twin.reference.DONE", -1)
-    reports = monitor.update(read(3.5))
+    reports = monitor.update(read(7.5))
     assert "could not be simulated" in status(monitor).message
     assert status(monitor).level is Level.WARN
-    assert len(reports.cycles) == 2
+    assert len(reports.cycles) == 6
 
 
 def test_an_encoder_on_another_joint_than_said_is_told(new_watch, read):

@@ -26,8 +26,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.schema import create_tables, expected_definitions
 from leg_wear_monitor.state import Level, State, Verdict
-from leg_wear_monitor.twin.leg_simulation import POINTS
-from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
+from leg_wear_monitor.twin.reference import POINTS, CrankProfile, LegParameters
 from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 pytestmark = pytest.mark.plain

@@ -29,8 +29,7 @@ from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.ledger.schema import FORMAT, UNRELEASED_ID
 from leg_wear_monitor.state import Level
-from leg_wear_monitor.twin.leg_simulation import POINTS
-from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
+from leg_wear_monitor.twin.reference import POINTS, CrankProfile, LegParameters
 from leg_wear_monitor.twin.torque_reference import CYCLES, TorqueReference
 
 pytestmark = pytest.mark.plain

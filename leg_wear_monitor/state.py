@@ -67,6 +67,11 @@ class Figure(_Word):
         return "counted clearances" if self is Figure.CLEARANCES else super().words
 
 
+def as_plain(text: str) -> str:
+    """A text of a verdict for a terminal or a message: without the backticks around its commands."""
+    return text.replace("`", "")
+
+
 @attrs.frozen
 class Evidence:
     """A value that a finding rests on, and its limit.
@@ -104,7 +109,7 @@ class Verdict(Shown):
     since_ns : int
         Stamp since which the reason has been valid; 0 if it is not known.
     do : str
-        Next action of a person.
+        Next action of a person; commands stand between backticks, as they may in ``why``.
     evidence : tuple of Evidence
         Of all findings, that of the reason first.
     not_valid : tuple of Figure
@@ -126,7 +131,7 @@ class Verdict(Shown):
     def words(self) -> str:
         """State, joints, reason and action in one line."""
         whose = f" joint {', '.join(self.joints)}" if self.joints else ""
-        return f"{self.state.words}{whose}: {self.why}. To do: {self.do}"
+        return as_plain(f"{self.state.words}{whose}: {self.why}. To do: {self.do}")
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data as in summary.json; an unknown value is None."""

@@ -223,7 +223,7 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
     """
     from leg_wear_monitor.monitor.ledger.entry import walked_words
     from leg_wear_monitor.monitor.verdict.situation import COUNTED, believed_words
-    from leg_wear_monitor.state import Figure
+    from leg_wear_monitor.state import Figure, as_plain
 
     console = Console(highlight=False)
     monitor, verdict = result.monitor, result.monitor.verdict.verdict
@@ -254,7 +254,7 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
             console.print(words, soft_wrap=True)
         console.print()
         if Figure.FORECAST in verdict.not_valid:
-            console.print(f"lasts  {NOT_VALID}: {verdict.why}\n", soft_wrap=True)
+            console.print(f"lasts  {NOT_VALID}: {as_plain(verdict.why)}\n", soft_wrap=True)
         else:
             _print_lifetimes(console, last, monitor.config.forecast.duty_hours_per_day)
     from leg_wear_monitor.monitor.alarms import raised_words, state_of
@@ -276,12 +276,14 @@ def _print_verdict(console: Console, state: "LegState", joint_words: Callable[[s
     from leg_wear_monitor.monitor.alarms import time_words
     from leg_wear_monitor.monitor.verdict.decision import decision_of
     from leg_wear_monitor.monitor.verdict.verdict import guide_to
+    from leg_wear_monitor.state import as_plain
 
     verdict = state.verdict
     whose = f" joint {', '.join(map(joint_words, verdict.joints))}" if verdict.joints else ""
-    console.print(f"\n[bold]{verdict.state.words.upper()}{whose}[/bold]: {verdict.why}", soft_wrap=True)
+    head = f"{verdict.state.words.upper()}{whose}"
+    console.print(f"\n[bold]{head}[/bold]: {as_plain(verdict.why)}", soft_wrap=True)
     for title, text in (("to do", verdict.do), *decision_of(state, joint_words).notes):
-        console.print(f"{title.lower():<10} {text}", soft_wrap=True, markup=False)
+        console.print(f"{title.lower():<10} {as_plain(text)}", soft_wrap=True, markup=False)
     page = share_directory() / guide_to(verdict)
     console.print(f"code       {verdict.fault_code}, see {page}", soft_wrap=True)
     if verdict.not_valid:

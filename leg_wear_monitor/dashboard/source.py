@@ -12,12 +12,12 @@ import numpy as np
 from leg_wear_monitor.dashboard.motion import MotionFeed
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.alarms import ADVICE
+from leg_wear_monitor.monitor.alarms import ADVICE, amount
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.ledger.entry import Measurement, WalkedLoad
 from leg_wear_monitor.monitor.reports import Lost
-from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, amount, guide_to
+from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, guide_to
 from leg_wear_monitor.playback.result import (
     ReplayGait,
     ReplayHistory,

@@ -343,7 +343,7 @@ CODES_OF_GUIDES = {
         "INPUT_GAPS_FOOT_LOAD",
         "INPUT_RATE_FOOT_LOAD",
     ),
-    "force_growth_life": ("IMPACT_FORCE", "GROWTH", "REMAINING_LIFE", "MATERIAL_LIMIT"),
+    "force_growth_life": ("CLEARANCE_NEAR", "IMPACT_FORCE", "GROWTH", "REMAINING_LIFE", "MATERIAL_LIMIT"),
     "input": (
         "BAD_INPUT",
         "INPUT_GAPS",
@@ -391,6 +391,7 @@ def guide_of(code: str) -> str:
 
 
 _FIRST_DATE_S = 1.0e8  # a smaller stamp is from a clock that began at zero
+_SHOWN = {"m": (1.0e3, "mm"), "m/h": (1.0e6, "um/h"), "s": (1.0e3, "ms"), "rad": (1.0e3, "mrad")}
 
 ADVICE = "The monitor advises. The absence of an alarm does not mean the joints are healthy."
 
@@ -419,7 +420,7 @@ def raised_words(state: str, worst: float | None, limit: float | None, unit: str
     words = [state]
     for name, value in (("worst", worst), ("limit", limit)):
         if value is not None and not math.isnan(value):
-            words.append(f"{name} {_three_digits(value)} {unit}".rstrip())
+            words.append(f"{name} {amount(value, unit)}")
     return ", ".join([*words, f"since {time_words(raised_ns)}"])
 
 
@@ -431,6 +432,15 @@ def time_words(stamp_ns: int) -> str:
     return datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
 
 
-def _three_digits(value: float) -> str:
-    """Three digits; whole numbers as they are."""
-    return f"{value:.0f}" if 1000.0 <= abs(value) < 1.0e6 else f"{value:.3g}"
+def amount(value: float, unit: str) -> str:
+    """A value [SI] with its unit, such as ``0.62 mm``; a fraction has none."""
+    factor, shown = _SHOWN.get(unit, (1.0, unit))
+    if unit == "s" and abs(value) >= 1.0:
+        factor, shown = 1.0, unit
+    return f"{_digits(factor * value)} {shown}".rstrip()
+
+
+def _digits(value: float) -> str:
+    if math.isnan(value):
+        return "unknown"
+    return f"{value:.0f}" if 999.5 <= abs(value) < 1.0e6 else f"{value:.3g}"

@@ -17,6 +17,7 @@ from leg_wear_monitor.monitor.alarms import (
     LEDGER_INTERRUPTED,
     LEDGER_NOT_WRITTEN,
     NOT_FOLLOWED,
+    amount,
     code_of,
     worst_code,
 )
@@ -35,7 +36,6 @@ from leg_wear_monitor.monitor.torque_status import diagnosis_status, torque_stat
 from leg_wear_monitor.monitor.verdict.situation import believed_words, sampled_words
 from leg_wear_monitor.monitor.verdict.verdict import (
     Finding,
-    amount,
     estimate,
     level_of,
     verdict_of,

@@ -35,6 +35,7 @@ from leg_wear_monitor.report.page import (
     render,
     template_text,
 )
+from leg_wear_monitor.state import as_plain
 
 # Rows of the page's table, as plain data for its script.
 
@@ -74,7 +75,7 @@ def _row(leg: LegOverview, joints: Sequence[str], day: Day, rank: int, has_page:
     standing, used, age = day.standing(leg), valid_used(leg), day.age_days(leg)
     health, rise, doubt = leg.recordings, growth(leg), day.doubt(leg)
     life = None if leg.is_accelerated else leg.life.get("leg")
-    why = "; ".join(filter(None, [leg.verdict.why if leg.verdict else "", doubt]))
+    why = as_plain("; ".join(filter(None, [leg.verdict.why if leg.verdict else "", doubt])))
     return {
         "id": leg.id,
         "page": page_address(leg.id) if has_page else "",
@@ -342,7 +343,7 @@ def _card(leg: LegOverview, day: Day, has_page: bool) -> dict[str, Any]:
     card = {"leg": leg, "standing": standing, "by": deadline(leg, standing, day)}
     card["page"] = page_address(leg.id) if has_page else ""
     if verdict is None or standing is Standing.OUTDATED:
-        do = "record its gait, then run leg-wear-monitor fleet update"
+        do = "record its gait, then run `leg-wear-monitor fleet update`"
         return card | {"joints": "", "why": doubt, "do": do, "code": ""}
     why = f"{verdict.why}; {doubt}" if doubt else verdict.why
     code = f"{verdict.fault_code}, see {guide_to(verdict)}"

@@ -88,7 +88,10 @@ def _parser() -> MarkdownIt:
 
 
 def _markup(tokens: Sequence[Token]) -> str:
-    return str(_parser().renderer.render(list(tokens), _parser().options, {}))
+    markup = str(_parser().renderer.render(list(tokens), _parser().options, {}))
+    for wide in ("pre", "table"):  # what scrolls sideways is reached by keys, too
+        markup = markup.replace(f"<{wide}>", f'<{wide} tabindex="0">')
+    return markup
 
 
 def _title(tokens: Sequence[Token]) -> str:

@@ -13,6 +13,7 @@ from urllib.parse import quote
 import attrs
 import jinja2
 import numpy as np
+from markupsafe import Markup, escape
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.alarms import time_words
@@ -253,7 +254,7 @@ Part = Text | Sentences | Picture | Gallery | Table | Fragment | Chart
 # picture.
 
 
-_SPACES = re.compile(r"[^a-z0-9]+")
+_SPACES, _CODE = re.compile(r"[^a-z0-9]+"), re.compile(r"`([^`]+)`")
 
 
 @attrs.frozen
@@ -390,13 +391,20 @@ def render(name: str, **values: Any) -> str:
 @cache
 def _environment() -> Any:
     """The templates of this package, each compiled once: a live page renders them again and again."""
-    return jinja2.Environment(
+    environment = jinja2.Environment(
         loader=jinja2.PackageLoader("leg_wear_monitor.report"),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["marked"] = marked
+    return environment
+
+
+def marked(text: Any) -> Markup:
+    """A text as markup, what stands between backticks as code."""
+    return Markup(_CODE.sub(r"<code>\1</code>", str(escape(text))))
 
 
 def page_html(page: Page) -> str:

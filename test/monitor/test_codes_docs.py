@@ -29,7 +29,9 @@ pytestmark = pytest.mark.plain
 
 def plain(text: str) -> str:
     """A rule's text; what it fills in is in italics."""
-    return re.sub(r"\{(\w+)\}", r"*\1*", re.sub(r"\{(past|causes|doubt|next)\}", "", text))
+    text = re.sub(r"\{(past|causes|doubt|next)\}", "", text)
+    text = re.sub(r"`[^`]*`", lambda code: re.sub(r"\{(\w+)\}", lambda word: word[1].upper(), code[0]), text)
+    return re.sub(r"\{(\w+)\}", r"*\1*", text)
 
 
 def meanings() -> Iterator[tuple[str, str]]:

@@ -11,8 +11,9 @@ import attrs
 
 from leg_wear_monitor.configuration.strict import read_document, structure
 from leg_wear_monitor.files import share_directory
+from leg_wear_monitor.monitor.alarms import amount
 from leg_wear_monitor.monitor.forecast.forecast import three_digits
-from leg_wear_monitor.monitor.verdict.verdict import amount, code_of_rule, guide_to
+from leg_wear_monitor.monitor.verdict.verdict import code_of_rule, guide_to
 from leg_wear_monitor.state import Figure, JointClearance, LegState, LifeHours, State, Verdict
 
 # How often findings were right where the truth is known, from the one file that has these figures.
@@ -83,6 +84,7 @@ OF_CODE: Mapping[str, tuple[str, ...]] = {
     "CLEARANCE_DEPARTURE": ("encoder_name",),
     "CLEARANCE": ("life_interval",),
     "CLEARANCE_BELIEVED": ("life_interval",),
+    "CLEARANCE_NEAR": ("life_interval",),
     "REMAINING_LIFE": ("life_interval",),
     "GROWTH": ("growth_interval",),
     "TORQUE_LOAD": ("load_name",),
@@ -91,7 +93,7 @@ OF_CODE: Mapping[str, tuple[str, ...]] = {
 """Figures that say how often a finding with this code is right."""
 
 _ON_GROUND = "_on_ground"  # end of the name of a figure for legs that carry a load
-_COUNTED_CODES = ("CLEARANCE", "CLEARANCE_BELIEVED")
+_COUNTED_CODES = ("CLEARANCE", "CLEARANCE_BELIEVED", "CLEARANCE_NEAR")
 # Guides whose codes say what the monitor knows of itself; the others are findings on the leg.
 _KNOWN_OF_ITSELF = ("input", "node", "not_observed", "gait")
 _REPLACED_CODE = "PART_REPLACED"

@@ -8,10 +8,10 @@ import attrs
 from leg_wear_monitor.estimate.cause import NamedCause, TorqueExplanation
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials import BushingLoad
-from leg_wear_monitor.monitor.alarms import Alarm, time_words
+from leg_wear_monitor.monitor.alarms import Alarm, amount, time_words
 from leg_wear_monitor.monitor.config.inputs import Crank, DriveTorque
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
-from leg_wear_monitor.monitor.verdict.verdict import Finding, amount, estimate
+from leg_wear_monitor.monitor.verdict.verdict import Finding, estimate
 from leg_wear_monitor.state import Evidence, Figure, JointClearance, Level, State, Verdict
 from leg_wear_monitor.twin.statistics import Sampling
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 import attrs
 
 from leg_wear_monitor.estimate.cause import SURE_OF_NAME, Cause, Change, NamedCause
-from leg_wear_monitor.monitor.alarms import CAUSES_OF_ALARMS, Alarm, time_words
+from leg_wear_monitor.monitor.alarms import CAUSES_OF_ALARMS, Alarm, amount, time_words
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.verdict.situation import (
     SEEN,
@@ -19,7 +19,7 @@ from leg_wear_monitor.monitor.verdict.situation import (
     hit_of,
     raised,
 )
-from leg_wear_monitor.monitor.verdict.verdict import EVIDENCE, CauseWords, amount, estimate
+from leg_wear_monitor.monitor.verdict.verdict import EVIDENCE, CauseWords, estimate
 from leg_wear_monitor.state import Evidence, Figure, Level, State
 
 # Conditions on what explains the drive torque: one code a cause, whoever finds it.
@@ -176,6 +176,15 @@ def counted_at_limit(situation: Situation) -> Sequence[Hit]:
     """Alarms of clearances that are at their limit as counted or as measured."""
     alarms = (alarm for alarm in situation.alarms if alarm.kind == "clearance" and alarm.cause not in SEEN)
     return [hit_of(alarm, situation) for alarm in alarms if alarm.level is Level.ERROR]
+
+
+def near_limit(situation: Situation) -> Sequence[Hit]:
+    """The warning that comes before a joint is at its limit."""
+    return [
+        hit_of(alarm, situation)
+        for alarm in situation.alarms
+        if alarm.kind == "clearance" and alarm.level is Level.WARN
+    ]
 
 
 def seen_at_limit(situation: Situation) -> Sequence[Hit]:

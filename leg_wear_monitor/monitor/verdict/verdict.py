@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 import attrs
 
 from leg_wear_monitor.estimate.cause import Cause, NamedCause, TorqueExplanation
-from leg_wear_monitor.monitor.alarms import guide_of
+from leg_wear_monitor.monitor.alarms import amount, guide_of
 from leg_wear_monitor.monitor.config.inputs import AT_START, Crank, DriveTorque
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
 from leg_wear_monitor.state import Evidence, Figure, Level, State, Verdict
@@ -116,7 +116,6 @@ def _identity(verdict: Verdict) -> tuple[object, ...]:
 
 
 _KEYS = {"m/h": "m_per_hour", "N m": "nm"}
-_SHOWN = {"m": (1.0e3, "mm"), "m/h": (1.0e6, "um/h"), "s": (1.0e3, "ms"), "rad": (1.0e3, "mrad")}
 
 
 def with_unit(name: str, unit: str) -> str:
@@ -125,23 +124,9 @@ def with_unit(name: str, unit: str) -> str:
     return f"{name}_{key}" if key and not name.endswith(f"_{key}") else name
 
 
-def amount(value: float, unit: str) -> str:
-    """A value [SI] with its unit, such as ``0.62 mm``; a fraction has none."""
-    factor, shown = _SHOWN.get(unit, (1.0, unit))
-    if unit == "s" and abs(value) >= 1.0:
-        factor, shown = 1.0, unit
-    return f"{_digits(factor * value)} {shown}".rstrip()
-
-
 def estimate(value: float, sigma: float, unit: str) -> str:
     """A value [SI] and its standard deviation, such as ``0.62 mm ± 0.03 mm``."""
     return f"{amount(value, unit)} ± {amount(sigma, unit)}"
-
-
-def _digits(value: float) -> str:
-    if math.isnan(value):
-        return "unknown"
-    return f"{value:.0f}" if 999.5 <= abs(value) < 1.0e6 else f"{value:.3g}"
 
 
 # What explains a drive torque, in words: causes with values, and what a person does about them.

@@ -32,6 +32,7 @@ def test_a_latched_alarm_tells_its_worst_value_and_not_that_of_today() -> None:
     assert words(attrs.evolve(alarm, unit="N", raised_ns=1_700_000_000 * 10**9, worst=12345.6)) == (
         "latched, worst 12346 N, limit 10 N, since 2023-11-14 22:13:20 UTC"
     )
+    assert "worst 1.65 mm, limit 10 mm" in words(attrs.evolve(alarm, unit="m", worst=1.65e-3, limit=1e-2))
 
 
 def test_the_worst_of_a_rate_is_the_least() -> None:

@@ -80,7 +80,8 @@ def seen(by: str, clearance_m: float, sigma_m: float, **more: Any) -> tuple[Join
 CASES = [
     ({}, State.HEALTHY, "NONE", ()),
     ({"alarms": (alarm("clearance G"),)}, State.STOP, "CLEARANCE_G", ()),
-    ({"alarms": (alarm("clearance G", Level.WARN),)}, State.WATCH, "ALARM_G", ()),
+    ({"alarms": (alarm("clearance G", Level.WARN),)}, State.WATCH, "CLEARANCE_NEAR_G", ()),
+    ({"alarms": (alarm("growth G", Level.WARN),)}, State.WATCH, "ALARM_G", ()),
     ({"alarms": (alarm("clearance A"), alarm("clearance G"))}, State.STOP, "CLEARANCE_A_G", ()),
     ({"joints": seen("torque", 6.7e-4, 3.0e-5)}, State.STOP, "CLEARANCE_SEEN_G", tuple(Figure)),
     ({"joints": (attrs.evolve(NEW[0], replaced_ns=1, part_cycles=19),)}, State.WATCH, "PART_REPLACED_A", ()),
@@ -385,7 +386,7 @@ def test_an_alarm_is_told_in_words_with_the_label_of_its_joint() -> None:
     assert impact.why == "the impact force in joint G (knee) is 2 N (limit 1 N)"
     assert "rock joint G (knee); " in impact.do and "leg-wear-monitor measure G MM" in impact.do
     warning = judged(alarms=(alarm("clearance G", Level.WARN, value=5e-4, limit=6e-4),), joints=labelled)
-    assert warning.why == "alarm: the mean radial clearance of joint G (knee) is 0.5 mm (limit 0.6 mm)"
+    assert warning.why == "the counted clearance of joint G (knee) is 0.5 mm, near its limit of 0.6 mm"
     samples = judged(alarms=(alarm("input_samples", value=0.0972, limit=0.05),), input_causes=("x",))
     assert samples.why == "the fraction of unusable samples is 0.0972 (limit 0.05): x"
 

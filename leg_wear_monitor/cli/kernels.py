@@ -5,6 +5,8 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, suppress
 from importlib.util import find_spec
 
+import numpy as np
+
 import leg_wear_monitor as lw
 from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.gait.config import GaitConfig
@@ -12,6 +14,8 @@ from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.sensors import readings
 from leg_wear_monitor.messages.cdr import Decoder
 from leg_wear_monitor.messages.streams import STREAMS
+from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
+from leg_wear_monitor.twin.torque_reference import TorqueReferenceRun
 from leg_wear_monitor.workers import Job, run_here, run_in_processes
 
 SETS = ("clearance", "full", "gait", "monitor")
@@ -27,8 +31,13 @@ def _simulation() -> None:
 
 
 def _monitor() -> None:
-    """What the monitor runs beside the leg."""
-    lw.WearMonitor(lw.load_mechanism()).warm_up()
+    """What the monitor runs beside the leg, and what it simulates while the leg walks."""
+    leg = lw.load_mechanism()
+    lw.WearMonitor(leg).warm_up()
+    parameters, depth = LegParameters.none(leg), np.zeros((len(leg.clearance_joints), 2, 1))
+    run = TorqueReferenceRun(leg, cycles=1)
+    run.begin_expected(np.zeros(len(depth)), depth, CrankProfile.steady(1.0), parameters)
+    run.finish()
 
 
 def _reading() -> None:

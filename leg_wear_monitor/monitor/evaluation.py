@@ -27,7 +27,7 @@ from leg_wear_monitor.monitor.inputs import (
 )
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, JointReport
 from leg_wear_monitor.monitor.torque_checks import TorqueBounds, torque_bounds, torque_causes, torque_values
-from leg_wear_monitor.monitor.verdict.situation import is_held_by_estimate
+from leg_wear_monitor.monitor.verdict.situation import is_held
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import NO_LOAD, Samples
@@ -101,10 +101,10 @@ class AlarmBoard:
         )
 
     @property
-    def held_by_estimate(self) -> tuple[str, ...]:
-        """Alarms of clearances that are present because of what encoders or the drive torque showed."""
+    def held(self) -> tuple[str, ...]:
+        """Alarms of clearances that are present because of something else than counting."""
         names = map(alarm_specs.CLEARANCE.name, self._clearance_joints)
-        return tuple(name for name in names if is_held_by_estimate(self.alarms[name]))
+        return tuple(name for name in names if is_held(self.alarms[name]))
 
     def evaluate(
         self,
@@ -416,7 +416,7 @@ class AlarmEvaluation:
         else:
             values = self._of_tracked(report)
         values |= sensor
-        for name in self.board.held_by_estimate:  # it is evaluated with the estimate, at the period's end
+        for name in self.board.held:  # it is evaluated with all that is known, at the period's end
             values.pop(name, None)
         return self.board.evaluate(values, report.stamp_ns, impact_factor=factor)
 

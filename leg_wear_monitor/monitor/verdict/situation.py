@@ -275,20 +275,20 @@ def joint_status(joint: str, is_known: bool, findings: Sequence[Finding | Verdic
 def alarm_value(joint: JointSituation, alarm: Alarm) -> KnownClearance | None:
     """The clearance that its alarm is evaluated with at the end of a period; None to leave it as it is.
 
-    A counted clearance is evaluated once a gait cycle instead, unless an estimate had raised the alarm.
+    A counted clearance is evaluated once a gait cycle instead, unless the alarm is held by another source.
     """
     known, sure = judged(joint), surely_at(joint.limit_m, joint.seen)
     if sure is not None and sure.clearance_m > known.clearance_m:
         return sure
-    if is_held_by_estimate(alarm):
-        # what the torque said, only the torque takes back: a new run shows nothing for a while
-        return None if is_overruled(joint, alarm) and not joint.seen else known
-    return None if known.by == COUNTED else known
+    # what the torque said, only the torque takes back: a new run shows nothing for a while
+    if is_held(alarm, SEEN) and is_overruled(joint, alarm) and not joint.seen:
+        return None
+    return None if known.by == COUNTED and not is_held(alarm) else known
 
 
-def is_held_by_estimate(alarm: Alarm) -> bool:
-    """Whether an alarm of the clearance is present because of what encoders or the drive torque showed."""
-    return alarm.present is not Level.OK and alarm.cause in SEEN
+def is_held(alarm: Alarm, by: Sequence[str] = (MEASURED, BOTH, *SEEN)) -> bool:
+    """Whether an alarm of the clearance is present because of what some sources say, not counting alone."""
+    return alarm.present is not Level.OK and alarm.cause in by
 
 
 # What a sampled replay adds to a verdict: how much of the gait was followed, and the standard errors.

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.monitor.alarms import Alarm, Limit, acknowledged, evaluated
+from leg_wear_monitor.monitor.alarms import Alarm, Limit, acknowledged, evaluated, has_changed
 from leg_wear_monitor.monitor.leg_state import joint_clearance
 from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.situation import (
@@ -17,6 +17,7 @@ from leg_wear_monitor.monitor.verdict.situation import (
     alarm_value,
     at_limit_by_estimate,
     believed,
+    is_held,
 )
 from leg_wear_monitor.monitor.verdict.verdict import verdict_of
 from leg_wear_monitor.state import Level, State
@@ -95,6 +96,17 @@ def test_a_measurement_that_contradicts_ends_the_stop_until_the_estimate_rises_a
 def test_a_measurement_at_the_limit_ends_no_stop() -> None:
     measured = attrs.evolve(COUNTED, measured=KnownClearance("measured", 5.9e-4, 1.0e-5))
     assert verdict(acknowledged(after(NEW, BROKEN)), BROKEN, joint=measured).state is State.STOP
+
+
+def test_a_clearance_at_its_limit_by_all_that_is_known_stays_so_between_the_gait_cycles() -> None:
+    """The end of each gait cycle, which judges the counted clearance, took it back: two changes a cycle."""
+    joint = attrs.evolve(COUNTED, believed_m=6.5e-4)
+    raised = after(NEW, joint=joint)
+    assert (raised.level, raised.cause, is_held(raised)) == (Level.ERROR, "both", True)
+    assert not has_changed(raised, after(raised, joint=joint))
+    lower = after(raised, joint=attrs.evolve(joint, believed_m=3.5e-4))  # the forecast learned otherwise
+    assert (lower.level, lower.present, is_held(lower)) == (Level.ERROR, Level.OK, False)
+    assert after(NEW) is NEW
 
 
 def test_an_estimate_is_believed_although_the_counted_clearance_is_not_valid() -> None:

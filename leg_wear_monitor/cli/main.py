@@ -17,7 +17,7 @@ COULD_NOT = 2
 
 _VERBS = {
     "acknowledge": "upkeep", "cache": "check", "check": "check", "commission": "commission",
-    "dashboard": "nodes", "demo": "nodes", "design": "design", "draw": "study", "drives": "check",
+    "dashboard": "nodes", "demo": "nodes", "design": "life", "draw": "study", "drives": "check",
     "fleet": "fleet", "gait-publisher": "nodes", "life": "life", "materials": "check", "measure": "upkeep",
     "monitor": "nodes", "play": "commission", "reference": "commission", "replay": "replay",
     "report": "replay", "reset": "upkeep", "simulate": "study", "study": "study",

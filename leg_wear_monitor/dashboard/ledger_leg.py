@@ -21,11 +21,10 @@ from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.measurement import last_measured
-from leg_wear_monitor.monitor.judgement import with_measured
+from leg_wear_monitor.monitor.judgement import joint_clearance, leg_alarm, with_measured
 from leg_wear_monitor.monitor.ledger.entry import ClearancePoint, JointWear, binding_of, walked_words
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import LedgerContent, read_ledger
-from leg_wear_monitor.monitor.leg_state import joint_clearance, leg_alarm
 from leg_wear_monitor.monitor.verdict.situation import JointSituation
 from leg_wear_monitor.playback.result import ReplaySummary
 from leg_wear_monitor.state import Figure, JointClearance, LegAlarms, LegState, LifeHours, Verdict

@@ -32,11 +32,10 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     LearnedJoint,
     LearnedPriors,
 )
-from leg_wear_monitor.monitor.judgement import with_measured
+from leg_wear_monitor.monitor.judgement import joint_clearance, life_of, with_measured
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.ledger.file import copy_of, measurements_of
 from leg_wear_monitor.monitor.ledger.ledger import Ledger, open_ledger
-from leg_wear_monitor.monitor.leg_state import joint_clearance, life_of
 from leg_wear_monitor.monitor.verdict.situation import JointSituation, KnownClearance
 from leg_wear_monitor.playback.result import summary_of
 from leg_wear_monitor.playback.summary import joint_forecast, leg_forecast

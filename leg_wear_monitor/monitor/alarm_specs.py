@@ -18,15 +18,15 @@ from leg_wear_monitor.monitor.alarms import (
     Alarm,
     Limit,
 )
-from leg_wear_monitor.monitor.torque_checks import BIAS, DRIFT, LAG
+from leg_wear_monitor.monitor.gait_evidence import BIAS, DRIFT, LAG
 from leg_wear_monitor.twin import KINDS as SAMPLE_KINDS
 from leg_wear_monitor.twin import LOAD
 
 if TYPE_CHECKING:
     from leg_wear_monitor.monitor.config.settings import Alarms, MonitorConfig
+    from leg_wear_monitor.monitor.gait_evidence import TorqueBounds
     from leg_wear_monitor.monitor.inputs import InputGuard, InputHealth
     from leg_wear_monitor.monitor.reports import CycleReport, JointReport
-    from leg_wear_monitor.monitor.torque_checks import TorqueBounds
 
 
 # The monitor's alarms, one entry each: board, units, status, command line and docs are derived from it.

@@ -1,14 +1,23 @@
-"""A gait cycle's statistics from the twin, as a report with growth and remaining life."""
+"""A gait cycle: its report, and what it shows of the leg, taken over into forecast and twin."""
 
 import math
 from collections.abc import Sequence
 
-from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate
-from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
+import attrs
+
+from leg_wear_monitor.estimate.mismatch import explanation
+from leg_wear_monitor.monitor.alarm_specs import MISMATCH
+from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate, ClearanceObservation
+from leg_wear_monitor.monitor.diagnosis.observer import Correction, TorqueObserver
+from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, TorqueState
 from leg_wear_monitor.monitor.forecast.forecast import Forecast
+from leg_wear_monitor.monitor.forecast.forecaster import RENEWED_NS
 from leg_wear_monitor.monitor.forecast.measurement import growth_rate
+from leg_wear_monitor.monitor.forecast.wear_coefficients import ClearanceAtWear
+from leg_wear_monitor.monitor.ledger.entry import Audit, CorrectedClearance, IdentifiedLeg, SimulatedReference
 from leg_wear_monitor.monitor.parts import Parts
 from leg_wear_monitor.monitor.reports import CycleReport, JointReport, shown_by_torque
+from leg_wear_monitor.twin.reference import LegParameters
 from leg_wear_monitor.twin.statistics import CycleStatistics, TorqueStatistics
 
 
@@ -94,3 +103,117 @@ def _joint_report(
         sampling_sigma_m=float(parts.accounting.sampling_sigma_m[k]),
         shown=shown_by_torque(k, diagnosis),
     )
+
+
+# What the gait shows of the leg, taken over: by encoders into the forecast, by the torque into the twin.
+
+
+def clearance_estimates(parts: Parts, statistics: CycleStatistics) -> tuple[ClearanceEstimate, ...] | None:
+    """Clearances estimated from encoders after a gait cycle, and whether the forecast uses them.
+
+    They update the forecast each minute of stamps, or on a finding; None without encoders.
+    """
+    if parts.encoders is None:
+        return None
+    state, estimates = parts.encoders.state, parts.encoders.estimates(statistics.clearance_mean_m)
+    is_seen = [one.observation is ClearanceObservation.SEEN for one in estimates]
+    other = tuple(one.is_other for one in estimates)
+    is_due = other != state.other or not 0 <= statistics.stamp_ns - state.updated_ns < RENEWED_NS
+    if is_due and any(is_seen):
+        state.updated_ns, state.other = statistics.stamp_ns, other
+        worn_m, replaced_ns = parts.worn_m(statistics.clearance_mean_m), parts.accounting.replaced_ns
+        state.believed = tuple(
+            is_seen[k]
+            and parts.forecaster.use_estimate(
+                k, ClearanceAtWear(one.clearance_m, one.sigma_m, float(worn_m[k])), replaced_ns[k]
+            )
+            for k, one in enumerate(estimates)
+        )
+    believed = state.believed or (False,) * len(estimates)
+    each = zip(estimates, believed, is_seen, strict=True)
+    return tuple(attrs.evolve(one, believed=yes and seen) for one, yes, seen in each)
+
+
+def explain_mismatch(parts: Parts, statistics: CycleStatistics) -> None:
+    """Look for causes of a torque mismatch after a gait cycle; a wrong torque says nothing of the leg."""
+    allowed, was_wrong = parts.evaluation.allowed_torque, parts.is_torque_wrong
+    parts.state.mismatch = parts.state.mismatch.with_cycle(
+        statistics,
+        parts.evaluation.board.alarms[MISMATCH.name()],
+        lambda cycles: explanation(parts.mechanism, cycles, allowed),
+    )
+    if parts.torque and parts.is_torque_wrong and not was_wrong:
+        # the alarm rose some gait cycles after the torque became wrong
+        before = parts.config.alarms.on_delay_cycles + 1
+        first = parts.state.mismatch.cycles[0]
+        parts.torque.withdraw(first.begin_ns - before * (first.stamp_ns - first.begin_ns))
+
+
+def observe_torque(parts: Parts) -> None:
+    """Compare the drive torque with that of the counted leg, and correct what is surely counted wrong."""
+    torque, twin = parts.torque, parts.twin
+    if torque is None:
+        return
+    before = attrs.evolve(torque.state)
+    correction = torque.end_period(twin.clearance_mean_m, twin.depth)
+    is_wrong = parts.is_torque_wrong
+    if not is_wrong:
+        _take_parameters(parts, torque.parameters)
+    if correction is not None and not is_wrong:
+        correct(parts, correction)
+        torque.corrected(correction, twin.clearance_mean_m)
+        twin.pull_block()
+    _note_torque(parts, torque, before)
+    if correction is not None and not is_wrong:
+        parts.keep()
+
+
+def correct(parts: Parts, correction: Correction) -> None:
+    """Open a joint to the clearance that the drive torque shows, and count its wear from there."""
+    stamp_ns, k = parts.twin.intake.followed_stamp_ns, correction.joint
+    joint = parts.clearance_joints[k]
+    was = parts.accounting.correct(joint, correction.clearance_m)
+    now = parts.accounting.wear_of(joint)
+    corrected = CorrectedClearance(
+        stamp_ns=stamp_ns,
+        joint=joint,
+        clearance_m=float(parts.twin.clearance_mean_m[k]),
+        sigma_m=correction.change.sigma,
+        before_m=was.mean_m,
+        wear_m=now.mean_m,
+        replaced_ns=now.replaced_ns,
+    )
+    parts.accounting.note(Audit(stamp_ns, "diagnosis", "correct_clearance", was))
+    parts.accounting.note(corrected)
+    parts.forecaster.corrected(corrected)
+    if parts.encoders:
+        parts.encoders.state.updated_ns = 0  # the next estimate updates the forecast again
+    parts.grows_anew([joint])
+
+
+def _take_parameters(parts: Parts, found: LegParameters | None) -> None:
+    """Let the twin walk on with the masses, lengths and friction that the drive torque shows."""
+    if found is None or found == parts.twin.parameters or not parts.config.diagnosis.correct:
+        return
+    parts.twin.set_parameters(found)
+    parts.twin.pull_block()
+    stamp_ns = parts.twin.intake.followed_stamp_ns
+    parts.accounting.note(IdentifiedLeg(stamp_ns, tuple(parts.mechanism.bodies), found))
+    parts.grows_anew(parts.clearance_joints)
+    parts.keep()
+
+
+def _note_torque(parts: Parts, torque: TorqueObserver, before: TorqueState) -> None:
+    """Store the baselines and the references of the leg that are new since a state.
+
+    To simulate a reference again takes a minute of walking.
+    """
+    known, stamp_ns = before.all_commissioned, parts.twin.intake.followed_stamp_ns
+    for one in torque.state.all_commissioned:
+        if all(one is not other for other in known):
+            parts.accounting.note(one)
+    names, made = tuple(parts.mechanism.bodies), [one.reference for one in before.known]
+    for reference in torque.simulated_references:
+        if all(reference is not other for other in made):
+            parts.accounting.note(SimulatedReference(stamp_ns, names, reference))
+            parts.keep()

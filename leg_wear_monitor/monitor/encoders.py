@@ -207,7 +207,7 @@ class EncoderState:
         Stamp of the last forecast update with `found`, 0 if an update is due.
     other, believed : tuple of bool
         At that update: whether each clearance differed significantly from the counted one, and whether the
-        forecast used it. Both are set by `monitor.corrections`.
+        forecast used it. Both are set by `monitor.cycle_report`.
     """
 
     samples: EncoderSamples

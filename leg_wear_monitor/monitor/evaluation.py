@@ -16,7 +16,13 @@ from leg_wear_monitor.monitor.alarm_specs import AlarmSpec, CycleEvidence, Limit
 from leg_wear_monitor.monitor.alarms import Alarm, Limit, acknowledged, cleared, evaluated, has_changed
 from leg_wear_monitor.monitor.config.fitting import largest_lag_s
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.gait_evidence import TorqueRecord
+from leg_wear_monitor.monitor.gait_evidence import (
+    TorqueBounds,
+    TorqueRecord,
+    torque_bounds,
+    torque_causes,
+    torque_values,
+)
 from leg_wear_monitor.monitor.inputs import (
     InputGuard,
     InputHealth,
@@ -26,7 +32,6 @@ from leg_wear_monitor.monitor.inputs import (
     with_torques,
 )
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, JointReport
-from leg_wear_monitor.monitor.torque_checks import TorqueBounds, torque_bounds, torque_causes, torque_values
 from leg_wear_monitor.monitor.verdict.situation import is_held
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.digital_twin import DigitalTwin

@@ -9,9 +9,9 @@ from leg_wear_monitor.files import or_nan
 from leg_wear_monitor.monitor import alarm_specs
 from leg_wear_monitor.monitor.alarms import CAUSES_OF_ALARMS, DIAGNOSIS, worst_code
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState, NotUsed
+from leg_wear_monitor.monitor.gait_evidence import offset_error_rad
 from leg_wear_monitor.monitor.parts import Parts
 from leg_wear_monitor.monitor.reports import Status
-from leg_wear_monitor.monitor.torque_checks import offset_error_rad
 from leg_wear_monitor.monitor.verdict.verdict import EVIDENCE, CauseWords, diagnosis_words, with_unit
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.statistics import NotCompared

@@ -11,8 +11,12 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.fitting import check_limits
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.corrections import clearance_estimates, explain_mismatch, observe_torque
-from leg_wear_monitor.monitor.cycle_report import cycle_report
+from leg_wear_monitor.monitor.cycle_report import (
+    clearance_estimates,
+    cycle_report,
+    explain_mismatch,
+    observe_torque,
+)
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
 from leg_wear_monitor.monitor.evaluation import EvaluationPeriods
 from leg_wear_monitor.monitor.forecast.forecast import ForecastBasis
@@ -20,6 +24,7 @@ from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult, all
 from leg_wear_monitor.monitor.judgement import (
     evaluate_clearances,
     is_forecast_valid,
+    leg_state,
     update_verdict,
     verdict_report,
 )
@@ -33,7 +38,6 @@ from leg_wear_monitor.monitor.ledger.entry import (
 )
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import Ledger, open_ledger
-from leg_wear_monitor.monitor.leg_state import leg_state
 from leg_wear_monitor.monitor.operators import (
     Acknowledged,
     acknowledge,

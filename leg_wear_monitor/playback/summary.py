@@ -19,7 +19,7 @@ from leg_wear_monitor.monitor.alarms import ADVICE
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
 from leg_wear_monitor.monitor.gait_evidence import GaitEvidence
-from leg_wear_monitor.monitor.leg_state import leg_alarm
+from leg_wear_monitor.monitor.judgement import leg_alarm
 from leg_wear_monitor.monitor.reports import JointReport
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, SUMMARY_COLUMNS, History

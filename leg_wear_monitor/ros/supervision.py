@@ -13,7 +13,7 @@ from leg_wear_monitor.messages.names import wanted_interfaces
 from leg_wear_monitor.messages.streams import INTERFACES, WRENCH_STAMPED, streams_read
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.leg_state import leg_alarm
+from leg_wear_monitor.monitor.judgement import leg_alarm
 from leg_wear_monitor.monitor.reports import AlarmList, Status, VerdictReport
 from leg_wear_monitor.monitor.status import verdict_status
 from leg_wear_monitor.monitor.verdict.rules import findings

@@ -11,11 +11,12 @@ from hypothesis import strategies as st
 from leg_wear_monitor.estimate.cause import Cause, NamedCause
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
-from leg_wear_monitor.monitor.gait_evidence import COMMISSIONING_CYCLES, TorqueRecord
-from leg_wear_monitor.monitor.torque_checks import (
+from leg_wear_monitor.monitor.gait_evidence import (
     BIAS,
+    COMMISSIONING_CYCLES,
     DRIFT,
     LAG,
+    TorqueRecord,
     offset_error_rad,
     torque_bounds,
     torque_causes,

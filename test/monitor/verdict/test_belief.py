@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor.monitor.alarms import Alarm, Limit, acknowledged, evaluated, has_changed
-from leg_wear_monitor.monitor.leg_state import joint_clearance
+from leg_wear_monitor.monitor.judgement import joint_clearance
 from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.situation import (
     JointSituation,

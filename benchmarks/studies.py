@@ -24,7 +24,8 @@ os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM
 from watch import Watch
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.studies.execution import STUDIES, load_settings, parse_settings, run_study
+from leg_wear_monitor.studies.execution import load_settings, parse_settings, run_study
+from leg_wear_monitor.studies.kinds import STUDIES
 from leg_wear_monitor.studies.leg_tasks import compute
 from leg_wear_monitor.studies.plan import Study, code_digest
 from leg_wear_monitor.studies.results import load_results

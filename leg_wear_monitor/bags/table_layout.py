@@ -13,7 +13,7 @@ from leg_wear_monitor.bags.findings import Finding, RecordingError
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.monitor.config import sections
+from leg_wear_monitor.monitor.config import tables
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin.sample import CONTACT, NO_LOAD, WRENCH
 
@@ -91,10 +91,10 @@ def columns_of(config: MonitorConfig) -> tuple[Column, ...]:
     scales = {
         STAMP: (1.0, 1.0),
         CRANK_ANGLE: config.input.angle_scale,
-        CRANK_SPEED: sections.SPEEDS[units.crank_speed],
-        DRIVE_TORQUE: sections.TORQUES[units.drive_torque],
+        CRANK_SPEED: tables.SPEEDS[units.crank_speed],
+        DRIVE_TORQUE: tables.TORQUES[units.drive_torque],
     }
-    force = (1.0, 1.0) if config.foot_load.source == CONTACT else sections.FORCES[units.foot_load]
+    force = (1.0, 1.0) if config.foot_load.source == CONTACT else tables.FORCES[units.foot_load]
     if config.foot_load.source != NO_LOAD:
         scales[FOOT_LOAD] = force
     if config.foot_load.source == WRENCH:
@@ -111,7 +111,7 @@ def columns_of(config: MonitorConfig) -> tuple[Column, ...]:
     return (*own, *further)
 
 
-def _unit(key: str, units: sections.Units) -> str:
+def _unit(key: str, units: tables.Units) -> str:
     return str(getattr(units, FOOT_LOAD if key == FOOT_LOAD_ALONG else key))
 
 
@@ -199,31 +199,31 @@ class Clock:
     start_ns: int
 
     @classmethod
-    def of(cls, table: sections.TableInput) -> "Clock":
+    def of(cls, table: tables.TableInput) -> "Clock":
         """The clock that the parameters declare."""
         unit = table.units.stamp
-        return cls(unit, 0 if unit == sections.DATE else table.start_ns)
+        return cls(unit, 0 if unit == tables.DATE else table.start_ns)
 
     def of_numbers(self, times: NDArray[np.number]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Stamps [ns] of times in the clock's unit, and whether each is within what a stamp can be."""
         if times.dtype.kind in "iu":
-            scale = 10 ** sections.STAMPS[self.unit]
+            scale = 10 ** tables.STAMPS[self.unit]
             within = (times <= MOST_NS // scale) & (times >= -(MOST_NS // scale))
             stamps = np.where(within, times, 0).astype(np.int64) * scale
             return self._started(stamps, np.asarray(within))
         values = np.asarray(times, float)
         with np.errstate(invalid="ignore"):
-            within = np.abs(values) <= MOST_NS / 10.0 ** sections.STAMPS[self.unit]
+            within = np.abs(values) <= MOST_NS / 10.0 ** tables.STAMPS[self.unit]
         whole = np.floor(np.where(within, values, 0.0))
         rest = np.where(within, values, 0.0) - whole
-        scale = 10 ** sections.STAMPS[self.unit]
+        scale = 10 ** tables.STAMPS[self.unit]
         stamps = whole.astype(np.int64) * scale + np.rint(rest * scale).astype(np.int64)
         return self._started(stamps, within)
 
     def of_texts(self, texts: Sequence[str], times: Floats) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Stamps [ns] of times that are also there as texts, and whether each is within its range."""
         stamps, within = self.of_numbers(times)
-        power = sections.STAMPS[self.unit]
+        power = tables.STAMPS[self.unit]
         if np.abs(times[within]).max(initial=0.0) * 10.0**power >= _EXACT_NS:
             # below 1 a double has the nanosecond, and the text may have an exponent that no Decimal takes
             for k in np.flatnonzero(within & (np.abs(times) >= 1.0)).tolist():
@@ -319,7 +319,7 @@ def _other_turn(angle: Floats, config: MonitorConfig) -> str:
         return ""
     span = float(angle.max() - angle.min())
     step = float(np.median(np.abs(np.diff(angle))))
-    turns = {one: TURN * over / by for one, (by, over) in sections.ANGLES.items()} | {unit: TURN / of_unit}
+    turns = {one: TURN * over / by for one, (by, over) in tables.ANGLES.items()} | {unit: TURN / of_unit}
     raw = (span + step) / of_unit
     for other, turn in turns.items():
         if other != unit and max(raw / turn, turn / raw) < _SAME:
@@ -335,11 +335,11 @@ def _cadence(joint_rpm: float, config: MonitorConfig) -> str:
     rpm, commanded = abs(joint_rpm) / config.crank.gear_ratio, abs(config.cadence.commanded_rpm)
     if 1.0 / _FAR <= rpm / commanded <= _FAR:
         return ""
-    if units.stamp in sections.STAMPS and not config.input.rate_hz:
-        for other, power in sections.STAMPS.items():
-            found.append((rpm * 10.0 ** (sections.STAMPS[units.stamp] - power), "input.units.stamp", other))
+    if units.stamp in tables.STAMPS and not config.input.rate_hz:
+        for other, power in tables.STAMPS.items():
+            found.append((rpm * 10.0 ** (tables.STAMPS[units.stamp] - power), "input.units.stamp", other))
     factor, divisor = config.input.angle_scale
-    for other, (its_factor, its_divisor) in sections.ANGLES.items():
+    for other, (its_factor, its_divisor) in tables.ANGLES.items():
         of_other = rpm * (its_factor / its_divisor) / (factor / divisor)
         found.append((of_other, "input.units.crank_angle", other))
     told = f"the crank turns at {rpm:.3g} rpm, commanded are {commanded:g} rpm"
@@ -355,12 +355,12 @@ def _speed(speed: Floats, steps_s: Floats, turned: Floats, config: MonitorConfig
     if not passed_s or abs(shown) < TURN or (told / shown > 1.0 / _APART and told / shown < _APART):
         return ""
     unit = config.input.units.crank_speed
-    of_unit = sections.SPEEDS[unit][0] / sections.SPEEDS[unit][1]
+    of_unit = tables.SPEEDS[unit][0] / tables.SPEEDS[unit][1]
     text = (
         f"crank_speed is {told / passed_s / of_unit:.4g} {unit} in the mean, but the angle turns at "
         f"{shown / passed_s / of_unit:.4g} {unit}"
     )
-    for other, (factor, divisor) in sections.SPEEDS.items():
+    for other, (factor, divisor) in tables.SPEEDS.items():
         ratio = told / of_unit * (factor / divisor) / shown
         if other != unit and 1.0 / _APART < ratio < _APART:
             return f"{text}: is it in {other!r} (input.units.crank_speed)?"

@@ -13,8 +13,8 @@ from leg_wear_monitor.bags import table_layout
 from leg_wear_monitor.bags.findings import Budget, Finding, RecordingError
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.monitor.config.sections import DATE, TableInput
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.config.tables import DATE, TableInput
 
 # Lines of a CSV file in blocks, in bounded memory, whatever the file contains.
 

@@ -31,7 +31,9 @@ from leg_wear_monitor.state import Figure, JointClearance, LegAlarms, LegState, 
 
 OLD_AFTER_S = 60.0  # a monitor of a walking leg writes more often
 
-_TRIES = 6  # half a second apart: a copy that a monitor wrote into meanwhile is not whole
+# Times that a ledger is read, half a second apart while it is shown: a copy into which a monitor wrote
+# meanwhile is not whole.
+_TRIES = 6
 _SILENCE = "nothing was written into the ledger; the monitor does not run, or the leg does not walk"
 
 
@@ -53,7 +55,7 @@ class LedgerLeg:
         If the ledger is not one of this leg.
     """
 
-    motion = None
+    motion = None  # a ledger has no crank angles
 
     def __init__(
         self, path: Path, config: MonitorConfig, mechanism: Mechanism, clock: Callable[[], float]
@@ -109,7 +111,7 @@ class LedgerLeg:
         return LegPage(fresh="Written ").content(regions, words, self.freshness())
 
     def leg_page(self, name: str) -> None:
-        """There is one leg."""
+        """None: that is for a fleet, and this is one leg."""
 
     def _view(self) -> ReplaySummary:
         found = self._content

@@ -320,7 +320,7 @@ class LiveLeg:
         return Freshness(age_s, silence, self._old_after_s)
 
     def leg_page(self, name: str) -> None:
-        """There is one leg."""
+        """None: that is for a fleet, and this is one leg."""
 
     def _words(self, view: ReplaySummary) -> Words:
         node, leg = printable(self._node), printable(view.monitor.hardware_id) or "a leg"

@@ -1,4 +1,7 @@
-"""The signature of a gait cycle: what its drive torque is in each phase, and how rough."""
+"""The signature of a gait cycle: what its drive torque is in each phase, and how rough.
+
+Throughout, F is the length of a signature: mean and roughness in each phase.
+"""
 
 import math
 
@@ -247,9 +250,10 @@ class SimulatedSensor:
         between = period / (period / sensor.period_s + _PART_OF_SAMPLE)
         place = np.arange(between, period * cycles, between) * (POINTS / period)
         self._cycles, self._step_s = cycles, period / POINTS
+        # places and distances of samples are counted in points of the simulated torque, from its first one
         self._samples, self._between = len(place), between * (POINTS / period)
         self._at = np.minimum(place.astype(np.int64), cycles * POINTS - 1)
-        # of averaged samples
+        # where each averaged sample ends, and from there its gait cycle and its crank angle
         self._ends = place[sensor.together - 1 :: sensor.together]
         cycle = np.minimum((self._ends / POINTS).astype(np.int64), cycles - 1)
         angle = np.interp(self._ends % POINTS, np.arange(POINTS + 1.0), reference.angle) + offset_rad
@@ -273,6 +277,7 @@ class SimulatedSensor:
         if self._sensor.is_instant:
             return averaged(torque[self._at], self._sensor.together)
         at = np.minimum(self._ends.astype(np.int64), len(torque) - 1)
+        # a mean is the difference of what was received up to the ends of two samples
         impulse = np.cumsum(torque)[at] + (self._ends - at - 1.0) * torque[at]
         return np.asarray(np.diff(impulse, prepend=0.0) / (self._sensor.together * self._between))
 
@@ -349,6 +354,8 @@ def signature_model(reference: TorqueReference, sensor: TorqueSensor) -> Signatu
     means = np.array([leg.mean(axis=0) for leg in legs])
     scatter = np.concatenate([leg - mean for leg, mean in zip(legs, means, strict=True)])
     covariance = scatter.T @ scatter / (len(scatter) - len(legs))
+    # after the expected leg, the legs of each joint follow one another; with the expected one in front, they
+    # are the joint's grid, in the order of their clearances
     joints = reference.clearance_m.shape[1]
     order = np.arange(1, len(legs)).reshape(joints, -1)
     grid = np.array([reference.clearance_m[[0, *order[k]], k] for k in range(joints)])

@@ -8,9 +8,12 @@ import attrs
 
 from leg_wear_monitor.files import or_nan
 from leg_wear_monitor.monitor.alarms import (
+    BIAS,
+    DRIFT,
     EXCHANGED,
     FOOT_LOAD_LIMITS,
     GAPS,
+    LAG,
     SCALE,
     SIGN,
     STUCK,
@@ -18,7 +21,6 @@ from leg_wear_monitor.monitor.alarms import (
     Alarm,
     Limit,
 )
-from leg_wear_monitor.monitor.gait_evidence import BIAS, DRIFT, LAG
 from leg_wear_monitor.twin import KINDS as SAMPLE_KINDS
 from leg_wear_monitor.twin import LOAD
 

@@ -288,12 +288,15 @@ FAULT_CODES = {
 }
 """Codes that are not the name of an alarm, and their meaning."""
 
-CAUSES_OF_ALARMS = {
-    "torque_bias": Cause.BIAS,
-    "torque_drift": Cause.FRICTION,
-    "torque_lag": Cause.TIMING,
-}
+BIAS, DRIFT, LAG = "torque_bias", "torque_drift", "torque_lag"
+CAUSES_OF_ALARMS = {BIAS: Cause.BIAS, DRIFT: Cause.FRICTION, LAG: Cause.TIMING}
 """Causes that have a limit of their own, by the alarm."""
+
+
+def joint_of(name: str) -> str:
+    """Joint of an alarm with a name such as ``clearance A``; empty for one of the leg or an input."""
+    kind, _, subject = name.partition(" ")
+    return "" if kind.startswith("input_") else subject
 
 
 def code_of(alarm: Alarm) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from leg_wear_monitor.estimate.cause import Cause, NamedCause, TorqueExplanation, beyond_friction
 from leg_wear_monitor.estimate.mismatch import TimingBySpeed
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.monitor.alarms import Alarm
+from leg_wear_monitor.monitor.alarms import BIAS, DRIFT, LAG, Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.reports import CycleReport
 from leg_wear_monitor.state import Level
@@ -321,8 +321,6 @@ NO_MISMATCH = MismatchWindow()
 
 # Checks of the measured torque for an impossible bias, drift or lag: bounds, values, causes.
 
-
-BIAS, DRIFT, LAG = "torque_bias", "torque_drift", "torque_lag"
 
 # fractions of the predicted torque's RMS, if the parameters are 0: joints and gears lose some tenths of the
 # transmitted torque; a tenth is also the limit of the mismatch

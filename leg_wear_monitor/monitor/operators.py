@@ -11,7 +11,7 @@ import attrs
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor import alarm_specs
-from leg_wear_monitor.monitor.alarms import Alarm, acknowledged
+from leg_wear_monitor.monitor.alarms import Alarm, acknowledged, joint_of
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult, last_measured
@@ -41,7 +41,6 @@ from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, with_foreca
 from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.situation import (
     COUNTED,
-    OF_A_JOINT,
     SEEN,
     SOURCES,
     JointSituation,
@@ -94,7 +93,7 @@ def rested_on(alarms: Iterable[Alarm], joint: str, named: Iterable[str] = ()) ->
         Joints that the verdict named for their clearance.
     """
     raised = [alarm for alarm in alarms if alarm.level is not Level.OK]
-    own = [alarm for alarm in raised if alarm.kind in OF_A_JOINT and alarm.subject == joint]
+    own = [alarm for alarm in raised if joint_of(alarm.name) == joint]
     explains = joint in named or any(alarm.kind == alarm_specs.CLEARANCE.kind for alarm in own)
     mismatch = [alarm for alarm in raised if explains and alarm.kind == alarm_specs.MISMATCH.kind]
     return tuple(alarm.name for alarm in (*own, *mismatch))

@@ -94,7 +94,8 @@ def draw_joint(axes: Axes, place: Floats, names: Mapping[str, bool], away: Float
     # estimated widths of the names [points]; beside the joint the row of names starts or ends at it, above or
     # below it the row is centred
     wide = [6.0 * len(name) + 5.0 for name in names]
-    start = dx - 0.5 * sum(wide) + 0.5 * np.sign(dx) * (abs(dx) > 8.0) * (sum(wide) - wide[0])
+    is_beside = abs(dx) > 8.0
+    start = dx - 0.5 * sum(wide) + 0.5 * np.sign(dx) * is_beside * (sum(wide) - wide[0])
     for i, (name, has_clearance) in enumerate(names.items()):  # each in its own colour
         along = start + sum(wide[:i]) + 0.5 * wide[i]
         write_beside(axes, place, name, (along, dy), VERMILION if has_clearance else INK)
@@ -189,7 +190,7 @@ def leg_picture(mechanism: Mechanism, clearance_joints: Collection[str] | None =
 def draw_leg(axes: Axes, reach: Reach, shown: int) -> None:
     """Draw one position of a mechanism to scale, the path of its toe, an open joint, and joints in line.
 
-    ``shown`` is the number of the position in the reach.
+    ``shown`` is the number of the position, from 0, among those that the reach has.
     """
     mechanism, paths = reach.mechanism, _paths(reach.mechanism, reach.q)
     low, high = _extent(paths)
@@ -213,7 +214,7 @@ def _in_line(reach: Reach) -> list[tuple[int, DeadPoint]]:
 
 
 def _paths(mechanism: Mechanism, q: Floats) -> Paths:
-    """Paths of all points at coordinates q (N, n, 3)."""
+    """Paths of all points at coordinates q (N, n, 3): x, y [m] and angle [rad] of n bodies in N positions."""
     return {
         body: {point: point_path(mechanism, q, body, point) for point in mechanism.points_of(body)}
         for body in (GROUND, *mechanism.bodies)

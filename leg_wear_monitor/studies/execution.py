@@ -20,27 +20,13 @@ from leg_wear_monitor.configuration.strict import structure
 from leg_wear_monitor.errors import ConfigError, ConfigWarning
 from leg_wear_monitor.files import json_text, share_directory, write_whole
 from leg_wear_monitor.mechanism.loader import is_file_name, load_mechanism, read_yaml, shipped_mechanisms
-from leg_wear_monitor.studies import kinds
+from leg_wear_monitor.studies.kinds import STUDIES
 from leg_wear_monitor.studies.leg_tasks import TASKS, compute
 from leg_wear_monitor.studies.life_tasks import check_points
 from leg_wear_monitor.studies.plan import Arrays, Point, Study, code_digest
 from leg_wear_monitor.workers import Job, run_here, run_in_processes, run_on_cluster
 
-# The studies by name, and their settings from YAML files.
-
-
-STUDIES: dict[str, type[Study]] = {
-    "size": kinds.Size,
-    "speed": kinds.Speed,
-    "location": kinds.Location,
-    "wear": kinds.Wear,
-    "multi": kinds.Multi,
-    "chaos": kinds.Chaos,
-    "laws": kinds.Laws,
-    "lubrication": kinds.Lubrication,
-    "load": kinds.Load,
-    "legs": kinds.Legs,
-}
+# Settings of studies from YAML files.
 
 
 def shipped_study(name: str) -> Path:
@@ -321,7 +307,7 @@ def run_study(
     Parameters
     ----------
     name : str
-        A key of `leg_wear_monitor.studies.execution.STUDIES`.
+        A key of `STUDIES`.
     settings : Study
     out : pathlib.Path
         Directory of the study. Existing results for this mechanism, settings and code are reused if their

@@ -419,3 +419,18 @@ class Load(OnePlace):
                 exponent_point(label, where, self.ensemble, self.exponent),
             ]
         return points
+
+
+STUDIES: dict[str, type[Study]] = {
+    "size": Size,
+    "speed": Speed,
+    "location": Location,
+    "wear": Wear,
+    "multi": Multi,
+    "chaos": Chaos,
+    "laws": Laws,
+    "lubrication": Lubrication,
+    "load": Load,
+    "legs": Legs,
+}
+"""By name; each has a file in config/studies/."""

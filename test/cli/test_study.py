@@ -72,7 +72,7 @@ def test_points_that_are_missing_are_told_and_the_rest_is_shown(run, done, tmp_p
 @pytest.mark.parametrize(
     ("line", "fault"),
     [
-        (["study", "sizes", "--out", "o"], "'sizes' is not one of 'size', 'speed'"),
+        (["study", "sizes", "--out", "o"], "'sizes' is not one of 'chaos', 'laws'"),
         (["study", "size"], "Missing option '--out'"),
         (["study", "size", "--config", "no.yaml", "--out", "o"], "no.yaml: cannot be read: No such file"),
         (["study", "size", "--mechanism", "frog", "--out", "o"], "frog: no mechanism of this name"),

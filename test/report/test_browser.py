@@ -14,7 +14,7 @@ from leg_wear_monitor.mechanism.loader import load_mechanism, parse_mechanism
 from leg_wear_monitor.report.drawing import drawing_html, drawing_of
 from leg_wear_monitor.report.page import page_html
 from leg_wear_monitor.report.replay.page import replay_page
-from leg_wear_monitor.studies.execution import STUDIES
+from leg_wear_monitor.studies.kinds import STUDIES
 
 pytestmark = NEEDS_CHROMIUM
 

@@ -11,7 +11,7 @@ from typing import Any
 import attrs
 import pytest
 
-from leg_wear_monitor.studies.execution import STUDIES
+from leg_wear_monitor.studies.kinds import STUDIES
 
 PAGE = Path(__file__).parents[2] / "docs" / "appendix" / "study.md"
 TABLE = re.compile(r"(<!-- keys -->\n).*?(<!-- end -->)", re.DOTALL)

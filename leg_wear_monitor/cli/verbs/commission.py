@@ -11,7 +11,7 @@ import click
 
 from leg_wear_monitor.cli import common
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.monitor.config.sections import ANGLES, COUNTS, DATE, STAMPS
+from leg_wear_monitor.monitor.config.tables import ANGLES, COUNTS, DATE, STAMPS
 
 if TYPE_CHECKING:
     from leg_wear_monitor.commissioning.result import CommissioningResult

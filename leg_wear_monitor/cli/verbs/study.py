@@ -10,6 +10,7 @@ import click
 
 from leg_wear_monitor.cli import common
 from leg_wear_monitor.errors import ConfigError, LegWearError, printable
+from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.mechanism import NORMAL_LAWS
 
 if TYPE_CHECKING:
@@ -22,11 +23,18 @@ if TYPE_CHECKING:
 # ``leg-wear-monitor study``: the paper's parameter studies, each with a page of its own.
 
 
-# spelled out, for --help shall not wait for numpy; the tests compare it with the library's
-NAMES = ("size", "speed", "location", "wear", "multi", "chaos", "laws", "lubrication", "load", "legs")
+# by their files, for --help shall not wait for numpy
+NAMES = tuple(sorted(path.stem for path in (share_directory() / "config" / "studies").glob("*.yaml")))
 
 
-@click.command(short_help="Run one of the parameter studies of the paper.")
+@click.command(
+    short_help="Run one of the parameter studies of the paper.",
+    help=f"""Compute a study and write its page.
+
+    NAME is one of {", ".join(NAMES)}. What DIR holds already for the same leg, settings and code is kept, so
+    an interrupted study goes on where it was.
+    """,
+)
 @click.argument("name", type=click.Choice(NAMES), metavar="NAME")
 @common.option("--mechanism", "FILE", "Another leg than that of the study file.")
 @common.path_option("--config", "FILE", "Study file.  [default: config/studies/NAME.yaml of the package]")
@@ -41,11 +49,7 @@ def study(
     workers: int | None,
     scheduler: str | None,
 ) -> int:
-    """Compute a study and write its page.
-
-    NAME is size, speed, location, wear, multi, chaos, laws, lubrication, load or legs. What DIR holds already
-    for the same leg, settings and code is kept, so an interrupted study goes on where it was.
-    """
+    """Compute a study and write its page; the help above says more."""
     import attrs
 
     from leg_wear_monitor.studies.execution import load_settings

@@ -17,7 +17,8 @@ from leg_wear_monitor.monitor.config.inputs import (
     Load,
     Tracker,
 )
-from leg_wear_monitor.monitor.config.sections import DriveParameters, Forecasting, TableInput
+from leg_wear_monitor.monitor.config.sections import DriveParameters, Forecasting
+from leg_wear_monitor.monitor.config.tables import TableInput
 
 
 def _filled(text: str) -> str | None:

@@ -39,7 +39,7 @@ def _cause(code: str, meaning: str, state: State = State.INSPECT, not_valid: tup
     return Rule(
         code=code,
         state=state,
-        hits=subject_rules.found(code),
+        hits=subject_rules.has_cause(code),
         why=f"the drive torque differs from the prediction: {meaning}{{causes}}",
         do=f"{{remedy}}; {_ACKNOWLEDGE}",
         not_valid=not_valid,

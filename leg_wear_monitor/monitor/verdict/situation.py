@@ -8,7 +8,7 @@ import attrs
 from leg_wear_monitor.estimate.cause import NamedCause, TorqueExplanation
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials import BushingLoad
-from leg_wear_monitor.monitor.alarms import Alarm, amount, time_words
+from leg_wear_monitor.monitor.alarms import Alarm, amount, joint_of, time_words
 from leg_wear_monitor.monitor.config.inputs import Crank, DriveTorque
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
 from leg_wear_monitor.monitor.verdict.verdict import Finding, estimate
@@ -414,15 +414,6 @@ class Rule:
 
 Condition = Callable[[Situation], Sequence[Hit]]
 
-OF_A_JOINT = (
-    "impact_force",
-    "clearance",
-    "growth",
-    "remaining_life",
-    "material_limit",
-    "clearance_departure",
-)
-
 
 def raised(*kinds: str, least: Level = Level.WARN) -> Condition:
     """Alarms of some kinds (all if none is given) at a level or above it."""
@@ -464,10 +455,10 @@ def hit_of(alarm: Alarm, situation: Situation, **words: str) -> Hit:
     is_present = alarm.present is alarm.level  # a level that has fallen has a value within the limit
     is_last = math.isnan(alarm.worst) or (is_present and not math.isnan(alarm.value))
     value = alarm.value if is_last else alarm.worst
-    is_of_a_joint = alarm.kind in OF_A_JOINT
-    joint, noun = situation.joint_words(alarm.subject), situation.quantity(alarm)
+    own, noun = joint_of(alarm.name), situation.quantity(alarm)
+    joint = situation.joint_words(own)
     told = {
-        "quantity": f"{noun} of joint {joint}" if is_of_a_joint else noun,
+        "quantity": f"{noun} of joint {joint}" if own else noun,
         "joint": joint,
         "value": amount(value, alarm.unit),
         "limit": amount(alarm.limit, alarm.unit),
@@ -485,7 +476,7 @@ def hit_of(alarm: Alarm, situation: Situation, **words: str) -> Hit:
         )
     return Hit(
         words=told | words,
-        joint=alarm.subject if is_of_a_joint else "",
+        joint=own,
         since_ns=alarm.raised_ns,
         evidence=(Evidence(alarm.name, value, alarm.limit, alarm.unit), *evidence),
     )

@@ -28,8 +28,8 @@ from leg_wear_monitor.state import Evidence, Figure, Level, State
 # causes, and the diagnosis shows what has changed since the leg was commissioned.
 
 
-def found(code: str) -> Callable[[Situation], Sequence[Hit]]:
-    """The drive torque has a cause of this code; the surest way of finding it decides."""
+def has_cause(code: str) -> Callable[[Situation], Sequence[Hit]]:
+    """The condition that the drive torque has a cause of this code; the surest way of finding it decides."""
 
     def hits(situation: Situation) -> Sequence[Hit]:
         return _explained(code, situation) or _beyond_limits(code, situation) or _diagnosed(code, situation)
@@ -38,7 +38,7 @@ def found(code: str) -> Callable[[Situation], Sequence[Hit]]:
 
 
 def _explained(code: str, situation: Situation) -> list[Hit]:
-    """The torque mismatch has surely some causes, the first of them one of this code."""
+    """A torque mismatch that is explained, where the first of its causes has this code."""
     named = situation.explained.named if situation.explained else ()
     if not named or named[0].cause.fault_code != code:
         return []
@@ -57,11 +57,12 @@ def _beyond_limits(code: str, situation: Situation) -> list[Hit]:
         return []
     words, hits = words_for(situation), []
     for hit in raised(*kinds, least=Level.ERROR)(situation):
-        cause = situation.torque_causes.get(hit.evidence[0].name)
+        alarm = hit.evidence[0].name  # the evidence of a raised alarm is the alarm's value, by its name
+        cause = situation.torque_causes.get(alarm)
         sentence = f"; {words.cause(cause)}" if cause else ""
         told = {
             "causes": ": the {quantity} is {value} (limit {limit}){past}".format(**hit.words) + sentence,
-            "remedy": words.remedy(cause or NamedCause(CAUSES_OF_ALARMS[hit.evidence[0].name], 0.0, 0.0)),
+            "remedy": words.remedy(cause or NamedCause(CAUSES_OF_ALARMS[alarm], 0.0, 0.0)),
         }
         hits.append(Hit(words=told, since_ns=hit.since_ns, evidence=hit.evidence, state=State.INSPECT))
     return hits
@@ -141,10 +142,12 @@ def _as_told(change: Change, situation: Situation) -> NamedCause:
 
 
 def _in_words(situation: Situation) -> str:
+    """What explains the torque mismatch; empty where nothing does yet."""
     return words_for(situation).explanation(situation.explained) if situation.explained else ""
 
 
 def _evidence(one: NamedCause) -> Evidence:
+    """The value of a cause; a cause has no limit."""
     name, unit = EVIDENCE[one.cause]
     return Evidence(f"{name} {one.subject}".rstrip(), one.value, math.nan, unit)
 
@@ -198,6 +201,7 @@ def seen_at_limit(situation: Situation) -> Sequence[Hit]:
 
 
 def _seen_hit(each: JointSituation, alarm: Alarm | None, seen: KnownClearance, situation: Situation) -> Hit:
+    """A joint at its limit by an estimate: by the present one, or by the one that the alarm keeps."""
     raised_ns = alarm.raised_ns if alarm is not None and alarm.level is Level.ERROR else 0
     is_present = seen in each.seen
     past = "" if is_present else f" (since {time_words(raised_ns)}; not shown now)"
@@ -253,22 +257,23 @@ def departing(situation: Situation) -> Sequence[Hit]:
 def diagnosed(situation: Situation) -> Sequence[Hit]:
     """Clearances that have changed by the drive torque, and that are not corrected."""
     found = [change for change in changes(situation) if change.cause is Cause.CLEARANCE]
-    return [_hit(change, situation, doubt(situation)) for change in found]
+    return [_clearance_hit(change, situation, doubt(situation)) for change in found]
 
 
 def corrected(situation: Situation) -> Sequence[Hit]:
     """Changes by which counted clearances were corrected."""
     found = situation.diagnosis.changes if situation.diagnosis else ()
-    return [_hit(change, situation) for change in found if change.is_corrected]
+    return [_clearance_hit(change, situation) for change in found if change.is_corrected]
 
 
-def _hit(change: Change, situation: Situation, doubts: str = "") -> Hit:
+def _clearance_hit(change: Change, situation: Situation, addition: str = "") -> Hit:
+    """A changed clearance in words, with an addition and with what somebody measured at that joint."""
     own = (each.measured for each in situation.joints if each.joint == change.subject)
     measured = next(own, None)
     if measured is not None:
-        doubts += f"; {measured.words} was measured"
+        addition += f"; {measured.words} was measured"
     return Hit(
-        words={"change": f"{words_of(change, situation)}{doubts}"},
+        words={"change": f"{words_of(change, situation)}{addition}"},
         joint=change.subject,
         since_ns=change.since_ns,
         evidence=(Evidence(f"clearance {change.subject} by torque", change.value, math.nan, "m"),),
@@ -404,6 +409,7 @@ def _compared(found: Diagnosis | None) -> str:
 
 
 def _said(cause: str) -> Sequence[Hit]:
+    """A hit with a cause in words; none where there are no words."""
     return [Hit(words={"cause": cause})] if cause else []
 
 

@@ -6,8 +6,9 @@ from typing import Any
 
 import attrs
 
+from leg_wear_monitor.monitor.alarms import joint_of
 from leg_wear_monitor.monitor.forecast.forecast import clearance_mm, three_digits
-from leg_wear_monitor.monitor.verdict.situation import MEASURED, OF_A_JOINT, SEEN, SOURCES
+from leg_wear_monitor.monitor.verdict.situation import MEASURED, SEEN, SOURCES
 from leg_wear_monitor.playback.result import Place, ReplaySummary
 from leg_wear_monitor.report.page import LEVEL_LOOKS, STATE_LOOKS, not_valid, render
 from leg_wear_monitor.state import Figure, JointClearance, LegAlarm, Level, LifeHours, State
@@ -85,8 +86,8 @@ def _view(summary: ReplaySummary, joint: str) -> JointView:
     used = _used(clearance) if clearance else None
     if summary.verdict.state is State.NOT_MONITORED and (used or 0.0) < 1.0:
         used = None  # a joint that nobody watches is not shown as one that is all right
-    drawn, names = summary.leg.joints.get(joint), {f"{kind} {joint}" for kind in OF_A_JOINT}
-    raised = [alarm for alarm in summary.alarms.now if alarm.level is not Level.OK and alarm.name in names]
+    drawn, now = summary.leg.joints.get(joint), summary.alarms.now
+    raised = [alarm for alarm in now if alarm.level is not Level.OK and joint_of(alarm.name) == joint]
     return JointView(
         joint=joint,
         label=drawn.label if drawn else "",

@@ -3,9 +3,9 @@
 import attrs
 
 from leg_wear_monitor.files import share_directory
-from leg_wear_monitor.monitor.alarms import raised_words, time_words
+from leg_wear_monitor.monitor.alarms import joint_of, raised_words, time_words
 from leg_wear_monitor.monitor.verdict.decision import decision_of, figures_of
-from leg_wear_monitor.monitor.verdict.situation import COUNTED, OF_A_JOINT
+from leg_wear_monitor.monitor.verdict.situation import COUNTED
 from leg_wear_monitor.monitor.verdict.verdict import guide_to
 from leg_wear_monitor.playback.result import (
     ReplayGait,
@@ -67,8 +67,8 @@ def raised_alarms(summary: ReplaySummary, otherwise: str) -> str:
 def _raised(summary: ReplaySummary, alarm: LegAlarm) -> dict[str, str]:
     """A raised alarm in words, without a value that the verdict does not believe."""
     symbol, look = LEVEL_LOOKS[alarm.level]
-    kind, _, subject = alarm.name.partition(" ")
-    name = f"{kind} {summary.leg.joint_words(subject)}" if kind in OF_A_JOINT else alarm.name
+    joint = joint_of(alarm.name)
+    name = f"{alarm.name.removesuffix(joint)}{summary.leg.joint_words(joint)}" if joint else alarm.name
     words = raised_words(alarm.state, alarm.worst, alarm.limit, alarm.unit, alarm.raised_ns)
     doubt = _alarm_doubt(summary, alarm)
     return {

@@ -62,7 +62,7 @@ from leg_wear_monitor.report.study.text import (
     life_table,
     wear_table,
 )
-from leg_wear_monitor.studies.execution import STUDIES
+from leg_wear_monitor.studies.kinds import STUDIES
 from leg_wear_monitor.studies.plan import DEPTH, VOLUME, Found, Sweep, clearance_joints_of, spread
 from leg_wear_monitor.studies.results import FAILS, HOLDS, UNDECIDED, LegClaims, StudyResults
 

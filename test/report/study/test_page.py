@@ -10,7 +10,7 @@ from leg_wear_monitor.report.page import Sentences, Table
 from leg_wear_monitor.report.study import findings
 from leg_wear_monitor.report.study.page import study_page
 from leg_wear_monitor.report.study.text import number, with_spread, zone_text
-from leg_wear_monitor.studies.execution import STUDIES
+from leg_wear_monitor.studies.kinds import STUDIES
 from leg_wear_monitor.studies.plan import Spread, power_law, spread
 
 

@@ -54,10 +54,12 @@ from leg_wear_monitor.dynamics.clearance.step import (
     deposit_pending,
     gather_wear,
     integrate_joints,
+    leave_pending,
     load_state,
     release,
     sample_start,
     shift_start,
+    take_pending,
     try_step,
     turn_crank,
 )
@@ -218,11 +220,12 @@ def advance_clearances(model, feeds_back, state, polynomial, t_end, statistics, 
     surfaces = Surfaces(state.depth, feeds_back)
     while (state.intervals[0] + 1.0) * model.interval <= t_end * (1.0 + 1.0e-12) + 1.0e-15:
         copy_array(state.motion, work.backup)
+        take_pending(state.pending, work.pending)
         status, k = _interval(model, surfaces, state, polynomial, statistics, work)
         if status != DONE:
-            copy_array(state.pending, work.pending)  # deposited wear must not become pending again
             copy_array(work.backup, state.motion)
-            copy_array(work.pending, state.pending)
+        leave_pending(work.pending, state.pending)  # deposited wear must not become pending again
+        if status != DONE:
             return status, k
     return DONE, -1
 
@@ -364,7 +367,7 @@ def _accept(model, surfaces, state, t, h, turned, statistics, work):
     statistics.steps[1] += 1
     integrate_joints(model, state.approach, h, start, end, work.added)
     integrate_films(model.film.settings, contacts.joint, h, start, end, work.added, statistics.peak)
-    gather_wear(work.added, start, end, state.pending)
+    gather_wear(work.added, start, end, work.pending)
     for k in range(0, work.added.shape[1], WIDTH):
         for r in range(JOINT_RATES):
             put_vector(work.sums, (r, k), vector_at(work.sums, (r, k)) + vector_at(work.added, (r, k)))
@@ -375,7 +378,7 @@ def _accept(model, surfaces, state, t, h, turned, statistics, work):
     shift_start(now, x)
     copy_array(end, start)
     statistics.worn_energy[0] += deposit_due(
-        contacts, surfaces, state.approach, start, now, turned, state.pending, work.weight
+        contacts, surfaces, state.approach, start, now, turned, work.pending, work.weight
     )
     _sample_drive(now, x, start, work.drive_end, statistics)
     toe_deviation(now, x, statistics.response)
@@ -408,7 +411,7 @@ def _finish(model, surfaces, state, statistics, work):
     for k in range(state.approach.shape[0]):
         if (count + k) % WEARING == 0:
             statistics.worn_energy[0] += deposit_pending(
-                model.contacts, surfaces, k, sample, now, here, amid, state.pending, work.weight
+                model.contacts, surfaces, k, sample, now, here, amid, work.pending, work.weight
             )
         force = math.sqrt(sample[F_N, k] ** 2 + sample[F_T, k] ** 2)
         if model.film.settings.shape[0] > 0:

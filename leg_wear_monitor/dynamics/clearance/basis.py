@@ -268,6 +268,11 @@ def stored_shapes(k: int) -> Shapes:
     }  # fmt: skip
 
 
+def start_of(name: str, shapes: Shapes) -> int:
+    """Where a named part starts in a flat array."""
+    return sum(math.prod(shapes[before]) for before in list(shapes)[: list(shapes).index(name)])
+
+
 def views(flat: Floats, shapes: Shapes) -> dict[str, Floats]:
     """Named views of consecutive parts of a flat array."""
     parts, start = {}, 0

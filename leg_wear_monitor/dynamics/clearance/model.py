@@ -6,9 +6,18 @@ from typing import NamedTuple
 import numpy as np
 
 from leg_wear_monitor.compiled.kernel import kernel
-from leg_wear_monitor.compiled.vectors import WIDTH, every, fetch, padded, part_at, put_part, vector_at
+from leg_wear_monitor.compiled.vectors import (
+    WIDTH,
+    every,
+    fetch,
+    padded,
+    part_at,
+    put_part,
+    put_vector,
+    vector_at,
+)
 from leg_wear_monitor.contact.arrays import ContactArrays
-from leg_wear_monitor.dynamics.clearance.basis import motion_shapes, views
+from leg_wear_monitor.dynamics.clearance.basis import motion_shapes, start_of, views
 from leg_wear_monitor.dynamics.clearance.contact import ADDED, TO_ANGLE, VECTORS, FilmModel, fresh_sample
 from leg_wear_monitor.dynamics.clearance.film_system import ContactSystem, contact_system
 from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables
@@ -130,13 +139,13 @@ class StepTables(NamedTuple):
     Parts that depend on e are evaluated for the eccentricities in the middle of the part of an interval.
     ``speed`` (2,): speed [rad/s] and acceleration [rad/s^2] of the crank. ``middle`` (d,): these
     eccentricities. For both: ``force`` (d,) [N]: on e at rest, without contact; ``bare`` (d,): its
-    acceleration; ``drift`` (d, d): accelerations per e', ``drift_line`` (d d,): the same entries, as
-    ``coriolis_line``, ``angle_line`` and ``turn_line`` those of ``coriolis``, ``angle`` and ``turn``;
-    ``moment`` (k, d): forces on e per friction force in each joint, ``lever`` transposed; drive torque:
-    ``torque_0`` (1,) [N m] at rest, ``torque_by_v`` (d,) per e', ``torque_by_e`` (d,) per e. ``toward`` (3,
-    k): reference directions of the eccentricities at the start of the interval. For the moments of films, of
-    both bodies of each joint: ``spin`` (d, d): their rates per e', ``spin_turn`` (d,): per crank speed;
-    ``spin_response`` (d, d): accelerations per moment.
+    acceleration; ``drift`` (d, d): accelerations per e', ``drift_line`` and ``coriolis_line``
+    (room for d d): the entries of ``drift`` and ``coriolis`` in vectors, ``angle_line`` and ``turn_line``
+    those of ``angle`` and ``turn``; ``moment`` (k, d): forces on e per friction force in each joint,
+    ``lever`` transposed; drive torque: ``torque_0`` (1,) [N m] at rest, ``torque_by_v`` (d,) per e',
+    ``torque_by_e`` (d,) per e. ``toward`` (3, k): reference directions of the eccentricities at the start of
+    the interval. For the moments of films, of both bodies of each joint: ``spin`` (d, d): their rates per e',
+    ``spin_turn`` (d,): per crank speed; ``spin_response`` (d, d): accelerations per moment.
     """
 
     row: Floats
@@ -183,8 +192,8 @@ class ClearanceWork(NamedTuple):
     on an arc; ``by`` (c,): factors of the reactions' table; ``reaction`` (r,), ``toe`` (2,): observed values;
     ``added`` (ADDED, room): increments of the joints' integrals in a step, ``sums`` (JOINT_RATES, room): in
     an interval; ``drive_start``, ``drive_end`` (3,): of the drive at its ends; ``backup`` (s,): state to
-    restore after a failed interval, except ``pending`` (4, k); ``crank`` (3,): drive at the start of the
-    interval.
+    restore after a failed interval; ``pending`` (4, room): that of the state, within an interval; ``crank``
+    (3,): drive at the start of the interval.
     """
 
     now: StepTables
@@ -237,17 +246,18 @@ def clearance_work(model: ClearanceModel, state: ClearanceState) -> ClearanceWor
     clearance_joints, d = len(state.approach), len(state.e)
     films = 2 * len(model.film.settings)
     row = np.zeros(model.tables.motion.shape[1])
-    parts = views(row, motion_shapes(clearance_joints, model.damped > 0))
-    drift = np.zeros((d, d))
+    shapes = motion_shapes(clearance_joints, model.damped > 0)
+    parts, start = views(row, shapes), start_of("coriolis", shapes)
+    drift = np.zeros(padded(d * d))
     now = StepTables(
         row=row,
         speed=np.zeros(2),
         middle=np.zeros(d),
         force=np.zeros(d),
         bare=np.zeros(d),
-        drift=drift,
-        drift_line=drift.reshape(-1),
-        coriolis_line=parts["coriolis"].reshape(-1),
+        drift=drift[: d * d].reshape(d, d),
+        drift_line=drift,
+        coriolis_line=row[start : start + padded(d * d)],
         moment=np.zeros((clearance_joints, d)),
         torque_0=np.zeros(1),
         torque_by_v=np.zeros(d),
@@ -275,7 +285,7 @@ def clearance_work(model: ClearanceModel, state: ClearanceState) -> ClearanceWor
         drive_start=np.zeros(3),
         drive_end=np.zeros(3),
         backup=np.zeros_like(state.motion),
-        pending=np.zeros_like(state.pending),
+        pending=np.zeros((len(state.pending), padded(clearance_joints))),
         crank=np.zeros(3),
     )
 
@@ -295,8 +305,8 @@ def take_tables(tables, angle, speed, acceleration, out_step_tables):
     motion, row = tables.motion, out_step_tables.row
     i, w = blend(motion.shape[0] - 1, angle)
     for j in range(0, row.shape[0], WIDTH):
-        before = part_at(motion, (i, j))
-        put_part(row, j, before + w * (part_at(motion, (i + 1, j)) - before))
+        before = vector_at(motion, (i, j))
+        put_vector(row, j, before + w * (vector_at(motion, (i + 1, j)) - before))
     out_step_tables.speed[0], out_step_tables.speed[1] = speed, acceleration
 
 
@@ -337,10 +347,10 @@ def _follow_eccentricities(tables, angle, e, v, ahead, now):
         now.middle[j] = e[j] + ahead * v[j]
     for block in range(by_e.shape[1]):
         i = WIDTH * block
-        put_part(row, i, part_at(row, i) + _times_table(by_e, n, w, block, now.middle))
+        put_vector(row, i, vector_at(row, i) + _times_table(by_e, n, w, block, now.middle))
     for block in range(bend.shape[1]):
         i = WIDTH * block
-        put_part(drift, i, speed * part_at(coriolis, i) - _times_table(bend, n, w, block, v))
+        put_vector(drift, i, speed * vector_at(coriolis, i) - _times_table(bend, n, w, block, v))
 
 
 @kernel

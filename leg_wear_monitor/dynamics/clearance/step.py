@@ -9,7 +9,6 @@ from leg_wear_monitor.compiled.vectors import (
     every,
     largest,
     part_at,
-    put_part,
     put_vector,
     root,
     vector_at,
@@ -214,8 +213,24 @@ def _add(row, k, weight, value, out_added):
 
 
 @kernel
+def take_pending(pending, out_pending):
+    """Copy pending wear (4, k) into rows with room for vectors (4, room)."""
+    for r in range(pending.shape[0]):
+        for k in range(pending.shape[1]):
+            out_pending[r, k] = pending[r, k]
+
+
+@kernel
+def leave_pending(pending, out_pending):
+    """Copy pending wear (4, room) back into rows (4, k)."""
+    for r in range(out_pending.shape[0]):
+        for k in range(out_pending.shape[1]):
+            out_pending[r, k] = pending[r, k]
+
+
+@kernel
 def gather_wear(added, start, end, pending):
-    """Add a step's Archard integrals, and the eccentricities at which they acted, to ``pending`` (4, k)."""
+    """Add a step's Archard integrals, and where the journals were, to ``pending`` (4, room)."""
     for k in range(0, added.shape[1], WIDTH):
         integral = vector_at(added, (ARCHARD, k))
         if any_of(integral > 0.0):
@@ -227,10 +242,10 @@ def gather_wear(added, start, end, pending):
             ey += w * (vector_at(end, (EY, k)) - ey)
             length = root(ex * ex + ey * ey)
             per_length = integral / where(integral > 0.0, length, 1.0)
-            put_part(pending, (0, k), part_at(pending, (0, k)) + integral)
-            put_part(pending, (1, k), part_at(pending, (1, k)) + per_length * ex)
-            put_part(pending, (2, k), part_at(pending, (2, k)) + per_length * ey)
-            put_part(pending, (3, k), part_at(pending, (3, k)) + integral * length)
+            _add(0, k, 1.0, integral, pending)
+            _add(1, k, per_length, ex, pending)
+            _add(2, k, per_length, ey, pending)
+            _add(3, k, integral, length, pending)
 
 
 @kernel
@@ -264,7 +279,7 @@ def deposit_due(contacts, surfaces, approach, start, now, turned, pending, out_w
     Returns the contact energy lost with the removed material [J]; ``turned`` as in `deposit_pending`.
     """
     limit, lost = 4.0 * math.pi / surfaces.depth.shape[2], 0.0
-    for k in range(pending.shape[1]):
+    for k in range(approach.shape[0]):
         across = abs(pending[1, k] * start[EY, k] - pending[2, k] * start[EX, k])
         if approach[k] == 0.0 or across > limit * pending[3, k]:
             lost += deposit_pending(contacts, surfaces, k, start, now, turned, 0.0, pending, out_weight)

@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.compiled.kernel import compile_for
+from leg_wear_monitor.compiled.vectors import padded
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.dynamics.clearance.advance import ADVANCE, advance_clearances, observe
 from leg_wear_monitor.dynamics.clearance.basis import (
@@ -388,7 +389,7 @@ def _contacts() -> ContactArrays:
 
 def _tables() -> ClearanceTables:
     """Tables of one clearance joint, all 0 and as small as can be."""
-    width = sum(math.prod(shape) for shape in motion_shapes(1, damped=False).values())
+    width = padded(sum(math.prod(shape) for shape in motion_shapes(1, damped=False).values()))
     return ClearanceTables(
         motion=np.zeros((1, width)),
         reaction=np.zeros((1, 1, 1)),

@@ -44,10 +44,10 @@ _MOST_PARTS = 8  # parts of an interval: bounds its cost
 class ClearanceTables(NamedTuple):
     """Tables at N equal steps of the crank, the first repeated at the end; k clearance joints, d = 2 k.
 
-    ``motion`` (N + 1, w): rows of `motion_shapes`; ``reaction`` (N + 1, 4 + 3 d + k, r): drive torque and
-    reactions of the ideal joints, coefficients of (1, w', w^2, w, e'', w e', e', F_t); ``reaction_joint``
-    (r,): joint of each, ``DRIVE`` first; ``stored`` (N + 1, u): parts of the stored energy of
-    `stored_shapes`;
+    ``motion`` (N + 1, w): rows of `motion_shapes`, with zeros up to a whole number of vectors; ``reaction``
+    (N + 1, 4 + 3 d + k, r): drive torque and reactions of the ideal joints, coefficients of (1, w', w^2, w,
+    e'', w e', e', F_t); ``reaction_joint`` (r,): joint of each, ``DRIVE`` first; ``stored`` (N + 1, u): parts
+    of the stored energy of `stored_shapes`;
     ``parts`` (N,): number of parts of an interval that starts there.
 
     ``by_e`` (M + 1, u / WIDTH, d, WIDTH): derivatives by e of the parts of `changing_shapes`, in blocks of
@@ -122,6 +122,7 @@ def build_tables(
         parts["viscous"] = parts["damper"] = np.zeros((points, 0))
     shapes = motion_shapes(len(contacts.joint), bool(basis.drag.any()))
     rows = np.concatenate([parts[name].reshape(points, -1) for name in shapes], axis=1)
+    rows = np.pad(rows, ((0, 0), (0, padded(rows.shape[1]) - rows.shape[1])))
     closing = rows[:1].copy()
     turns = np.round(motion.v[:, linkage.arrays.joint_body[contacts.joint], 2].mean(axis=0))
     views(closing[0], shapes)["angle"][:] += TURN * turns

@@ -129,7 +129,7 @@ class _Own(NamedTuple):
 def _sections(results: StudyResults) -> list[Section]:
     """The template: question, conclusions, own pictures, a cycle, curves, wear and tables of the points."""
     found, sweep = results.of("response"), STUDIES[results.study].sweep
-    own = _swept(sweep, found) if sweep else _PAGES[results.study](results, found)
+    own = _swept(sweep, found) if sweep else _PAGES.get(results.study, _points)(results, found)
     sections = [_asked(results), Section("Conclusions", [Sentences(own.sentences)]), *own.sections]
     if not found:
         return sections
@@ -180,6 +180,11 @@ def _swept(sweep: Sweep, found: Found) -> _Own:
 def _compared(found: Found, sentences: list[str], head: str = "clearance joints") -> _Own:
     gallery = compare_gallery(panels_of(found), [point.label for point, _ in found])
     return _Own(sentences, [Section("Side by side", [gallery])], head)
+
+
+def _points(_results: StudyResults, found: Found) -> _Own:
+    """Of a study that has no page of its own: its points side by side."""
+    return _compared(found, findings.disturbance(found)) if found else _Own([], [])
 
 
 def _location(_results: StudyResults, found: Found) -> _Own:

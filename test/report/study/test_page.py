@@ -8,6 +8,7 @@ import pytest
 
 from leg_wear_monitor.report.page import Sentences, Table
 from leg_wear_monitor.report.study import findings
+from leg_wear_monitor.report.study import page as pages
 from leg_wear_monitor.report.study.page import study_page
 from leg_wear_monitor.report.study.text import number, with_spread, zone_text
 from leg_wear_monitor.studies.kinds import STUDIES
@@ -68,6 +69,13 @@ def test_a_superposition_is_called_one_only_where_it_is(study):
     assert findings.superposition(alone, summed).startswith("All at once is the sum of the places alone")
     halved = {**summed, "error_toe_velocity_mps": 0.5 * summed["error_toe_velocity_mps"]}
     assert findings.superposition(alone, halved).startswith("All at once is not the sum")
+
+
+def test_a_study_without_a_page_of_its_own_shows_its_points(study, monkeypatch):
+    own = study_page(study("multi"))
+    monkeypatch.delitem(pages._PAGES, "multi")
+    found = study_page(study("multi"))
+    assert [section.title for section in found.sections] == [section.title for section in own.sections]
 
 
 def test_points_that_failed_or_are_missing_come_first(study, unpainted):

@@ -1,8 +1,6 @@
-"""ros.md lists the gait publisher's parameters as they are declared; a script renews the table."""
+"""Launch files and shipped parameter files fit the nodes."""
 
-import re
 from configparser import ConfigParser
-from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
@@ -10,34 +8,8 @@ import pytest
 from ruamel.yaml import YAML
 
 from leg_wear_monitor.files import share_directory
-from leg_wear_monitor.monitor.config.parameters import Parameter, parameters_of, parse_config, structured
+from leg_wear_monitor.monitor.config.parameters import parse_config, structured
 from leg_wear_monitor.ros.gait_publisher import PublisherConfig
-
-PAGE = Path(__file__).parents[2] / "docs" / "reference" / "ros.md"
-TABLE = re.compile(r"(<!-- parameters -->\n).*?(<!-- end -->)", re.DOTALL)
-
-
-def cell(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    return repr(list(value)) if isinstance(value, tuple) else str(value)
-
-
-def row(one: Parameter) -> str:
-    cells = (f"`{one.name}`", one.type, one.unit, cell(one.default), one.bounds, one.description)
-    return f"| {' | '.join(cells)} |"
-
-
-def renewed(page: str) -> str:
-    head = ["| name | type | unit | default | bounds | what it is |", "|---|---|---|---|---|---|"]
-    table = "\n".join([*head, *map(row, parameters_of(PublisherConfig).values()), ""])
-    return TABLE.sub(lambda found: found[1] + table + found[2], page)
-
-
-@pytest.mark.plain
-def test_the_page_lists_every_parameter_as_it_is_declared() -> None:
-    page = PAGE.read_text(encoding="utf-8")
-    assert renewed(page) == page
 
 
 def flat(mapping: dict[str, Any], prefix: str = "") -> dict[str, Any]:
@@ -111,7 +83,3 @@ def test_the_parameters_for_tools_prevail_where_rviz_is_asked_for() -> None:
             if node.get("exec") == "monitor":
                 files = [one.get("from") for one in node.iter("param") if one.get("from")]
                 assert files == ["$(var params_file)", "$(var shown)"]
-
-
-if __name__ == "__main__":
-    PAGE.write_text(renewed(PAGE.read_text(encoding="utf-8")), encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Fault codes: those of alarms, and the table of the others in ros.md, which this script renews."""
+"""Fault codes of alarms and of statuses."""
 
 import re
 from pathlib import Path
@@ -6,14 +6,12 @@ from pathlib import Path
 import attrs
 import pytest
 
-from leg_wear_monitor.monitor.alarms import FAULT_CODES, NO_FAULT, Alarm, code_of, worst_code
+from leg_wear_monitor.monitor.alarms import NO_FAULT, Alarm, code_of, worst_code
 from leg_wear_monitor.state import Level
 
 pytestmark = pytest.mark.plain
 
 PACKAGE = Path(__file__).parents[3] / "leg_wear_monitor"
-PAGE = PACKAGE.parent / "docs" / "reference" / "ros.md"
-TABLE = re.compile(r"(<!-- fault codes -->\n).*?(<!-- end -->)", re.DOTALL)
 CLEAR = Alarm(kind="clearance", subject="A")
 WARNS, FAILS = attrs.evolve(CLEAR, level=Level.WARN), Alarm(kind="torque_mismatch", level=Level.ERROR)
 
@@ -37,20 +35,3 @@ def test_every_status_that_is_not_sound_is_made_with_a_code() -> None:
     ]
     assert len(made) > 5
     assert [call for call in made if not re.search(r"[A-Z]{3,}_?[A-Z]*\)$", call)] == []
-
-
-def renewed(page: str) -> str:
-    rows = ["| `fault_code` | meaning |", "|---|---|"]
-    rows += [f"| `{code}` | {meaning} |" for code, meaning in FAULT_CODES.items()]
-    table = "\n".join([*rows, ""])
-    return TABLE.sub(lambda found: found[1] + table + found[2], page)
-
-
-def test_the_page_lists_every_code() -> None:
-    page = PAGE.read_text(encoding="utf-8")
-    assert "<!-- fault codes -->" in page
-    assert renewed(page) == page
-
-
-if __name__ == "__main__":
-    PAGE.write_text(renewed(PAGE.read_text(encoding="utf-8")), encoding="utf-8")

@@ -1,7 +1,5 @@
-"""The table of alarms is what monitor.md lists and a board holds; a script renews the page's table."""
+"""The table of alarms is what a board holds."""
 
-import re
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -15,33 +13,8 @@ from leg_wear_monitor.state import Level
 
 pytestmark = pytest.mark.plain
 
-PAGE = Path(__file__).parents[3] / "docs" / "reference" / "monitor.md"
-TABLE = re.compile(r"(<!-- alarms -->\n).*?(<!-- end -->)", re.DOTALL)
 ENCODERS = {"encoders.names": ["knee"], "encoders.joints": ["G"]}
 FOOT_LOAD = {"foot_load.source": "contact"}
-
-
-def renewed(page):
-    rows = ["| alarm | value | limit |", "|---|---|---|"]
-    for group in (
-        alarm_specs.JOINT,
-        alarm_specs.ENCODERS,
-        alarm_specs.TORQUE,
-        alarm_specs.GAIT,
-        alarm_specs.INPUT,
-        (alarm_specs.SOURCES,),
-        alarm_specs.OF_FOOT_LOAD,
-    ):
-        joint = "<joint>" if group in (alarm_specs.JOINT, alarm_specs.ENCODERS) else ""
-        rows += [f"| `{spec.name(joint)}` | {spec.meaning} | {spec.limit_words} |" for spec in group]
-    table = "\n".join([*rows, ""])
-    return TABLE.sub(lambda found: found[1] + table + found[2], page)
-
-
-def test_the_page_lists_every_alarm_as_it_is_declared():
-    page = PAGE.read_text(encoding="utf-8")
-    assert "<!-- alarms -->" in page
-    assert renewed(page) == page
 
 
 def test_kinds_are_those_of_the_board():
@@ -111,7 +84,3 @@ def test_a_life_that_may_be_short_raises_its_alarm_and_one_that_is_not_known_doe
     for cycle in range(config.alarms.on_delay_cycles):
         board.evaluate({"remaining_life A": value}, 10**9 * (1 + cycle))
     assert board.alarms["remaining_life A"].level is level
-
-
-if __name__ == "__main__":
-    PAGE.write_text(renewed(PAGE.read_text(encoding="utf-8")), encoding="utf-8")

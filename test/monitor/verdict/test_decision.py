@@ -1,7 +1,4 @@
-"""Each verdict says how sure it is, how soon to act, what an error costs and what settles it.
-
-docs/explanation/validity.md has the figures; this file as a script renews its table.
-"""
+"""Each verdict says how sure it is, how soon to act, what an error costs and what settles it."""
 
 import re
 from datetime import date
@@ -13,7 +10,6 @@ import pytest
 from leg_wear_monitor.monitor.verdict.decision import (
     FIGURES_FILE,
     OF_CODE,
-    MeasuredFigure,
     decision_of,
     figures_of,
     measured_figures,
@@ -30,22 +26,8 @@ from leg_wear_monitor.state import (
 )
 
 ROOT = Path(__file__).parents[3]
-PAGE = ROOT / "docs" / "explanation" / "validity.md"
-TABLE = re.compile(r"(<!-- certainty -->\n).*?(<!-- end -->)", re.DOTALL)
 
 pytestmark = pytest.mark.plain
-
-
-def row(figure: MeasuredFigure) -> str:
-    source = figure.source.replace("docs/explanation/", "").replace("docs/", "../")
-    cells = (figure.counted, figure.words, figure.where, figure.date, f"[results]({source})")
-    return f"| {' | '.join(cells)} |"
-
-
-def renewed(page: str) -> str:
-    head = ["| right | what | measured on | date | |", "|---|---|---|---|---|"]
-    table = "\n".join([*head, *map(row, measured_figures().values()), ""])
-    return TABLE.sub(lambda found: found[1] + table + found[2], page)
 
 
 def leg(code="CLEARANCE_SEEN", state=State.STOP, joints=("G",), not_valid=(), by="torque", **changes):
@@ -69,12 +51,6 @@ def leg(code="CLEARANCE_SEEN", state=State.STOP, joints=("G",), not_valid=(), by
 
 def decided(*args, **changes):
     return decision_of(leg(*args, **changes), lambda joint: f"{joint} (knee)")
-
-
-def test_the_page_has_the_figures_of_the_file() -> None:
-    page = PAGE.read_text(encoding="utf-8")
-    assert "<!-- certainty -->" in page
-    assert renewed(page) == page
 
 
 def test_every_figure_has_a_source_and_a_date_and_is_possible() -> None:
@@ -149,7 +125,3 @@ def test_a_healthy_leg_is_looked_at_again_after_half_of_its_p10_and_a_month_at_t
     long = {"leg": LifeHours(p10_h=1.0e5, p50_h=2.0e5, p90_h=3.0e5)}
     assert "240 h" in decided("NONE", State.HEALTHY, (), life=long).again
     assert "not known" in decided("NONE", State.HEALTHY, (), life={}).again
-
-
-if __name__ == "__main__":
-    PAGE.write_text(renewed(PAGE.read_text(encoding="utf-8")), encoding="utf-8")

@@ -2,7 +2,6 @@
 
 import math
 import re
-from pathlib import Path
 from typing import Any
 
 import attrs
@@ -532,32 +531,6 @@ def test_a_verdict_is_plain_data() -> None:
         "unit": "m",
     }
     assert record["not_valid"] == ["clearances", "growth", "impact_forces", "forecast"]
-
-
-# --- the page ---
-
-PAGE = Path(__file__).parents[3] / "docs" / "reference" / "monitor.md"
-TABLE = re.compile(r"(<!-- verdicts -->\n).*?(<!-- end -->)", re.DOTALL)
-
-
-def renewed(page: str) -> str:
-    rows = ["| `fault_code` | state | reason | values that are not valid |", "|---|---|---|---|"]
-    for rule in RULES:
-        figures = ", ".join(figure.value for figure in rule.not_valid)
-        why = re.sub(r"\{(\w+)\}", r"*\1*", re.sub(r"\{(past|causes|doubt)\}", "", rule.why))
-        rows.append(f"| `{rule.code}` | {rule.state.value} | {why} | {figures} |")
-    table = "\n".join([*rows, ""])
-    return TABLE.sub(lambda found: found[1] + table + found[2], page)
-
-
-def test_the_page_lists_every_rule_as_it_is_declared() -> None:
-    page = PAGE.read_text(encoding="utf-8")
-    assert "<!-- verdicts -->" in page
-    assert renewed(page) == page
-
-
-if __name__ == "__main__":
-    PAGE.write_text(renewed(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
 
 
 def test_a_name_that_is_not_sure_is_said_to_be_so() -> None:

@@ -4,19 +4,17 @@ import json
 import threading
 from collections import deque
 from collections.abc import Mapping
-from typing import Any
 
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.reach import reach_of
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.messages.leg_motion import JointMotion, received_frame
-from leg_wear_monitor.report.leg_picture import leg_data
+from leg_wear_monitor.messages.leg_motion import received_frame
+from leg_wear_monitor.report.leg_picture import drawn_pin, leg_data
 from leg_wear_monitor.report.page import render
 from leg_wear_monitor.state import JointClearance
 
 POSITIONS = 180  # of the crank in a turn: more are not told apart
 _KEPT = 40  # frames, two seconds
-_AT_LIMIT, _MOST_GAP, _LEAST_GAP = 0.5, 0.85, 0.02  # drawn clearance, as a fraction of the bushing's radius
 
 
 class MotionFeed:
@@ -37,7 +35,7 @@ class MotionFeed:
         except ConfigError:  # the age of the data on the page tells that nothing comes
             return
         joints = {
-            joint: _drawn(motion, clearances[joint])
+            joint: drawn_pin(motion, clearances[joint])
             for joint, motion in frame.joints.items()
             if joint in clearances
         }
@@ -55,22 +53,6 @@ class MotionFeed:
         with self._lock:
             later = [frame for frame in self._frames if frame[0] > number]
         return later if number else later[-1:]
-
-
-def _drawn(motion: JointMotion, clearance: JointClearance) -> dict[str, Any]:
-    """A joint as the page draws it: y downwards, lengths in clearances, forces in N."""
-    x, y = motion.eccentricity_m
-    size = (x * x + y * y) ** 0.5
-    pushed = (-motion.force_n * x / size, motion.force_n * y / size) if size else (0.0, 0.0)
-    counted = clearance.counted_m or 1.0
-    width = clearance.believed_m or counted
-    gap = min(max(_AT_LIMIT * width / clearance.limit_m, _LEAST_GAP), _MOST_GAP)
-    return {
-        "e": [round(x / counted, 3), round(-y / counted, 3)],
-        "f": [round(pushed[0], 1), round(pushed[1], 1)],
-        "hit": round(motion.impact_n, 1),
-        "gap": round(gap, 3),
-    }
 
 
 def motion_region(mechanism: Mechanism, torque_mismatch: float) -> str:

@@ -5,7 +5,7 @@ Made only while somebody looks, and kept nowhere: a recording has all of it from
 
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import attrs
@@ -22,7 +22,7 @@ from leg_wear_monitor.monitor.reports import SampleReports
 MOTION = Output("~/motion", encode.STRING, SENSOR_DATA)
 
 PERIOD_NS = 50_000_000
-PHASES = 72  # of a gait cycle, by crank angle
+PHASES = 72  # equal parts of a gait cycle, by crank angle
 _LEAST_FILLED = 0.5  # of the phases: a torque that comes more seldom is not drawn
 _MOST_CHARACTERS = 20_000  # of a message; that of a leg with five joints has 2 000
 _MOST_JOINTS = 50
@@ -49,7 +49,7 @@ class JointMotion:
 
 @attrs.frozen
 class CycleTorque:
-    """Mean drive torque of a gait cycle in each of `PHASES` of the crank angle; None where there is none."""
+    """Mean drive torque of a gait cycle in each of 72 equal parts of a turn; None where there is none."""
 
     measured_nm: tuple[float | None, ...]
     predicted_nm: tuple[float | None, ...]
@@ -96,6 +96,25 @@ def received_frame(text: str, source: str) -> MotionFrame:
     return frame
 
 
+@attrs.frozen
+class CycleMotion:
+    """A whole gait cycle in equal parts of a turn of the crank.
+
+    Attributes
+    ----------
+    stamp_ns : int
+        Its end.
+    torque : CycleTorque
+        Drive torque.
+    joints : dict of str to tuple of JointMotion
+        The clearance joints, at the first sample of each part.
+    """
+
+    stamp_ns: int
+    torque: CycleTorque
+    joints: dict[str, tuple[JointMotion, ...]]
+
+
 class LegMotion:
     """Frames of reports, at the first sample of each twentieth of a second of the samples' stamps.
 
@@ -103,26 +122,30 @@ class LegMotion:
     ----------
     joints : sequence of str
         The clearance joints.
+    by_phase : bool
+        At the first sample of each of `PHASES` of the crank angle instead.
     """
 
-    def __init__(self, joints: Sequence[str]) -> None:
-        self._joints = tuple(joints)
-        self._last_ns = 0
+    def __init__(self, joints: Sequence[str], *, by_phase: bool = False) -> None:
+        self._joints, self._by_phase = tuple(joints), by_phase
+        self._last = -1
         self._largest_n, self._least_n = np.zeros(len(joints)), np.full(len(joints), math.inf)
         self._torque = _PhaseMeans()
 
     def of(self, samples: SampleReports) -> Iterator[MotionFrame]:
         """Frames of samples; none while the leg is not followed."""
         begin = 0
-        before_ns = np.concatenate([[self._last_ns], samples.stamp_ns[:-1]])
-        for i in np.flatnonzero(samples.stamp_ns // PERIOD_NS != before_ns // PERIOD_NS).tolist():
+        steps = samples.stamp_ns // PERIOD_NS
+        if self._by_phase:
+            steps = np.nan_to_num(samples.crank_angle_rad * (PHASES / math.tau)).astype(int) % PHASES
+        for i in np.flatnonzero(np.diff(steps, prepend=self._last)).tolist():
             self._take(samples, begin, i + 1)
             begin = i + 1
             if not math.isnan(samples.crank_angle_rad[i]):
                 yield self._frame(samples, i)
         self._take(samples, begin, len(samples))
         if len(samples):
-            self._last_ns = int(samples.stamp_ns[-1])
+            self._last = int(steps[-1])
 
     def _take(self, samples: SampleReports, begin: int, end: int) -> None:
         forces = np.nan_to_num(samples.contact_force_n[begin:end])
@@ -145,6 +168,32 @@ class LegMotion:
         self._largest_n[:], self._least_n[:] = 0.0, math.inf
         angle = round(float(samples.crank_angle_rad[i]), 4)
         return MotionFrame(int(samples.stamp_ns[i]), angle, joints, self._torque.pop())
+
+
+def whole_cycles(joints: Sequence[str], reports: Iterable[SampleReports]) -> list[CycleMotion]:
+    """The gait cycles of reports that follow on each other; the one that has begun before is left out."""
+    motion, frames, cycles = LegMotion(joints, by_phase=True), list[MotionFrame](), list[CycleMotion]()
+    for frame in (frame for samples in reports for frame in motion.of(samples)):
+        if frame.torque:
+            if frames:
+                cycles.append(_cycle(frame.stamp_ns, frame.torque, frames))
+            frames.clear()
+        frames.append(frame)
+    return cycles[1:]
+
+
+def _cycle(stamp_ns: int, torque: CycleTorque, frames: Sequence[MotionFrame]) -> CycleMotion:
+    """Frames by the part of the turn; a part without one is like the one before."""
+    at, last, filled = {_phase(frame.crank_angle_rad): frame for frame in frames}, frames[-1], []
+    for phase in range(PHASES):
+        last = at.get(phase, last)
+        filled.append(last)
+    joints = {joint: tuple(frame.joints[joint] for frame in filled) for joint in last.joints}
+    return CycleMotion(stamp_ns, torque, joints)
+
+
+def _phase(angle_rad: float) -> int:
+    return int(angle_rad * (PHASES / math.tau)) % PHASES
 
 
 def _rounded(values: Any, per_unit: float) -> list[float]:

@@ -25,6 +25,7 @@ from leg_wear_monitor.mechanism.position import (
 )
 from leg_wear_monitor.mechanism.reach import DeadPoint, Reach
 from leg_wear_monitor.mechanism.spec import GROUND, Mechanism, PrismaticJoint
+from leg_wear_monitor.messages.leg_motion import JointMotion
 from leg_wear_monitor.report.figure import (
     BODY_COLOURS,
     INK,
@@ -40,6 +41,7 @@ from leg_wear_monitor.report.figure import (
     worn_bushings,
 )
 from leg_wear_monitor.report.page import Fragment, render, template_text
+from leg_wear_monitor.state import JointClearance
 
 # Drawing of single bodies, joints, supports and springs.
 
@@ -336,30 +338,60 @@ def leg_data(reach: Reach) -> dict[str, Any]:
         for point in mechanism.points_of(body)
         if body != GROUND or point in mechanism.joints
     ]
-    low, high = np.concatenate(every).min(axis=0), np.concatenate(every).max(axis=0)
+    given = picture_data(
+        _bodies(reach),
+        [_joint(reach, name) for name in mechanism.joints],
+        np.concatenate(every),
+        np.rad2deg(reach.crank_angle).round(1).tolist(),
+    )
+    return given | {
+        "toe": [] if mechanism.toe is None else millimetres(reach.path(*mechanism.toe)),
+        "turns": reach.turns or (bool(reach.open_joint) and len(reach.q) > 1),
+        "marks": [_mark(reach, dead, i) for i, dead in _in_line(reach)],
+    }
+
+
+def picture_data(
+    bodies: Sequence[dict[str, Any]],
+    joints: Sequence[dict[str, Any]],
+    extent: Floats,
+    angles: Sequence[float],
+) -> dict[str, Any]:
+    """Data of the interactive picture of a leg that turns through, without the path of a toe.
+
+    Parameters
+    ----------
+    bodies, joints : sequence of dict
+        As `leg_slider.js` draws them.
+    extent : (n, 2) array
+        Points that fit into the picture [m].
+    angles : sequence of float
+        Crank angle of each position [deg].
+    """
+    low, high = extent.min(axis=0), extent.max(axis=0)
     margin = 0.09 * float((high - low).max())
     corner = 1.0e3 * np.array([low[0] - margin, -high[1] - margin])
     size = 1.0e3 * (high - low + 2.0 * margin)
     return {
-        "bodies": _bodies(reach),
-        "joints": [_joint(reach, name) for name in mechanism.joints],
+        "bodies": sorted(bodies, key=lambda body: -float(np.ptp(np.array(body["outline"]), axis=0).sum())),
+        "joints": joints,
         "box": [round(float(value), 1) for value in (*corner, *size)],
-        "toe": [] if mechanism.toe is None else millimetres(reach.path(*mechanism.toe)),
-        "angles": np.rad2deg(reach.crank_angle).round(1).tolist(),
-        "turns": reach.turns or (bool(reach.open_joint) and len(reach.q) > 1),
-        "marks": [_mark(reach, dead, i) for i, dead in _in_line(reach)],
+        "toe": [],
+        "angles": angles,
+        "turns": True,
+        "marks": [],
         "said": {},
         "live": False,
         "first": 0,
         "digits": 1,
         "skip": 1,
-        "frames": len(reach.crank_angle),
+        "frames": len(angles),
         "arrow_mm": round(ARROW_FRACTION * float(size[1]), 1),
     }
 
 
 def _bodies(reach: Reach) -> list[dict[str, Any]]:
-    """The bodies, the largest first; shapes [mm] in their own frames, and poses of these."""
+    """The bodies; shapes [mm] in their own frames, and poses of these."""
     mechanism = reach.mechanism
     colours = cycle(BODY_COLOURS)
     bodies = []
@@ -375,7 +407,7 @@ def _bodies(reach: Reach) -> list[dict[str, Any]]:
             "outline": millimetres(shape),
             "poses": [[x, y, turn] for (x, y), turn in zip(poses.tolist(), turns.tolist(), strict=True)],
         })  # fmt: skip
-    return sorted(bodies, key=lambda body: -float(np.ptp(np.array(body["outline"]), axis=0).sum()))
+    return bodies
 
 
 def _joint(reach: Reach, name: str) -> dict[str, Any]:
@@ -416,6 +448,25 @@ def run_data(
             pins[name]["e"] = (places[:, k] * _FLIP).round(3).tolist()
     largest_n = float(np.linalg.norm(forces_n, axis=-1).max())
     return {"label": label, "pins": pins, "largest_n": largest_n}
+
+
+_AT_LIMIT, _MOST_GAP, _LEAST_GAP = 0.5, 0.85, 0.02  # drawn clearance, as a fraction of the bushing's radius
+
+
+def drawn_pin(motion: JointMotion, clearance: JointClearance) -> dict[str, Any]:
+    """A joint as the page draws it: y downwards, lengths in clearances, forces in N."""
+    x, y = motion.eccentricity_m
+    size = (x * x + y * y) ** 0.5
+    pushed = (-motion.force_n * x / size, motion.force_n * y / size) if size else (0.0, 0.0)
+    counted = clearance.counted_m or 1.0
+    width = clearance.believed_m or counted
+    gap = min(max(_AT_LIMIT * width / clearance.limit_m, _LEAST_GAP), _MOST_GAP)
+    return {
+        "e": [round(x / counted, 3), round(-y / counted, 3)],
+        "f": [round(pushed[0], 1), round(pushed[1], 1)],
+        "hit": round(motion.impact_n, 1),
+        "gap": round(gap, 3),
+    }
 
 
 def leg_slider(data: dict[str, Any], alt: str, caption: str) -> Fragment:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.messages.leg_motion import PERIOD_NS, PHASES, LegMotion, received_frame
+from leg_wear_monitor.messages.leg_motion import PERIOD_NS, PHASES, LegMotion, received_frame, whole_cycles
 from leg_wear_monitor.twin.statistics import SampleStatistics
 
 pytestmark = pytest.mark.plain
@@ -65,6 +65,19 @@ def test_frames_do_not_depend_on_how_samples_are_cut(turns_per_s):
     samples = walked(turns_per_s=turns_per_s)
     ends = sorted({int(end) for end in np.random.default_rng(1).integers(1, len(samples), 40)})
     assert frames(*cut(samples, ends)) == frames(samples)
+
+
+@pytest.mark.parametrize("turns_per_s", [1.0, -1.0])
+def test_whole_cycles_have_a_frame_a_phase_however_samples_are_cut(turns_per_s):
+    samples = walked(seconds=3.5, turns_per_s=turns_per_s)
+    cycles = whole_cycles(["A", "B"], cut(samples, [700, 1234, 2900]))
+    assert cycles == whole_cycles(["A", "B"], [samples])
+    assert len(cycles) == 2  # the first one may have begun before the samples
+    for cycle in cycles:
+        places = np.array([motion.eccentricity_m for motion in cycle.joints["A"]])
+        parts = np.arctan2(places[:, 1], places[:, 0]) * PHASES / (2.0 * np.pi)
+        off = (parts - np.arange(PHASES) + PHASES / 2) % PHASES - PHASES / 2
+        assert (off > -0.01).all() and (off < 1.01).all()
 
 
 def test_an_impact_is_where_contact_began():

@@ -43,6 +43,7 @@ from leg_wear_monitor.report.replay.charts import (
 )
 from leg_wear_monitor.report.replay.forecast_section import forecast_section, wear_section
 from leg_wear_monitor.report.replay.joints import joints_and_leg
+from leg_wear_monitor.report.replay.motion import motion_section
 from leg_wear_monitor.state import AlarmChange, Figure, LegAlarm, Level
 
 # Alarms: those that are raised at the end, and all changes over time.
@@ -310,7 +311,8 @@ def replay_page(summary: ReplaySummary) -> Page:
     recording, monitor = summary.recording, summary.monitor
     sections = [_joints(summary), Section("Are these values valid?", [Fragment(belief(summary))])]
     raised = raised_alarms(summary, otherwise="No alarm is raised at the end.")
-    sections.append(Section("Alarms", [Fragment(raised)]))
+    sections += [Section("Alarms", [Fragment(raised)]), *motion_section(summary)]
+    shown = len(sections)
     if summary.gait.believable_cycles:
         sections += [clearance_section(summary), *encoder_sections(summary), forecast_section(summary)]
         sections += [force_section(summary), wear_section(summary)]
@@ -320,13 +322,14 @@ def replay_page(summary: ReplaySummary) -> Page:
         title=f"Joint wear of {monitor.hardware_id}",
         summary=f"{monitor.mechanism}: {duration(recording.duration_s)} from "
         f"{time_words(recording.begin_ns)}, {summary.cycles} gait cycles",
-        sections=[*sections[:3], *guides, sure, *sections[3:]],
+        sections=[*sections[:shown], *guides, sure, *sections[shown:]],
         versions=summary.made_with,
         banner=verdict_banner(summary, f"#{guides[0].anchor}", f"#{sure.anchor}"),
         styles=[
             template_text("uplot/uPlot.min.css"),
             template_text("replay/replay.css"),
             template_text("guide.css"),
+            template_text("torque_phase.css"),
         ],
         libraries=[template_text("uplot/uPlot.iife.min.js"), template_text("replay/charts.js")],
         has_dark=True,

@@ -11,7 +11,8 @@
     parent.appendChild(element);
   }
 
-  function draw(svg, cycles, limit) {  // {measured_nm, predicted_nm} each, the last one is the newest
+  // Cycles: {measured_nm, predicted_nm} each, the last one is the newest. Phase: that of the crank, if it is marked.
+  function draw(svg, cycles, limit, phase) {
     while (svg.firstChild) svg.removeChild(svg.firstChild);
     if (!cycles.length) return;
     const newest = cycles[cycles.length - 1], phases = newest.predicted_nm.length;
@@ -41,13 +42,14 @@
     for (let angle = 0; angle <= 360; angle += 90) {
       add(svg, "text", ["tick middle", LEFT + (WIDTH - LEFT - RIGHT) * angle / 360 - (angle === 360 ? 8 : 0), HEIGHT - 20], angle + "°");
     }
-    add(svg, "text", ["tick middle", (LEFT + WIDTH) / 2, HEIGHT - 1], "crank angle");
+    add(svg, "text", ["tick middle", (LEFT + WIDTH) / 2, HEIGHT - 4], "crank angle");
     const there = mean.map((value, k) => [k, value]).filter((each) => each[1] !== null);
     const edge = (points, sign) => points.map(([k, value]) => x(k).toFixed(1) + " " + y(value + sign * half).toFixed(1));
     add(svg, "path", ["band", "M" + edge(there, 1).concat(edge(there.reverse(), -1)).join("L") + "Z"]);
     cycles.forEach((cycle, k) => add(svg, "path", [k === cycles.length - 1 ? "measured newest" : "measured", path(cycle.measured_nm)]));
     add(svg, "path", ["predicted", path(mean)]);
-    svg.setAttribute("aria-label", "Drive torque over the crank angle, " + cycles.length + " gait cycles");
+    if (phase !== undefined) add(svg, "line", ["now", x(phase), TOP, x(phase), HEIGHT - BOTTOM]);
+    svg.setAttribute("aria-label", "Drive torque over the crank angle, " + cycles.length + (cycles.length > 1 ? " gait cycles" : " gait cycle"));
   }
 
   window.torquePhase = { draw: draw, most: MOST };

@@ -36,7 +36,8 @@ NUMBERS = {
     "ground": {"diagnostics": 98, "clearance_states": 96, "impact_forces": 19513, "predicted_torque": 19513},
 }
 SECTIONS = [
-    "Joints", "Are these values valid?", "Alarms", "A gait cycle to play", "Guide", "Guide", "How sure is the verdict?",
+    "Joints", "Are these values valid?", "Alarms", "A gait cycle to play", "Guide", "Guide",
+    "How sure is the verdict?",
     "Clearance over time", "Forecast", "Impact forces",
     "Wear around each bushing", "Changes of alarms", "Input health", "The recording", "Made with",
 ]  # fmt: skip

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 
+import attrs
 import numpy as np
 from numpy.typing import NDArray
 
@@ -328,7 +329,9 @@ class WearMonitor:
     @property
     def diagnosis(self) -> Diagnosis:
         """Clearances that the drive torque shows; empty while the received torque is wrong."""
-        return self._parts.diagnosis
+        found, torque = self._parts.diagnosis, self._parts.torque
+        explained = torque.explained if torque and found.clearance_m else None
+        return attrs.evolve(found, joints=tuple(self.clearance_joints), torque=explained)
 
     @property
     def lost(self) -> Lost:

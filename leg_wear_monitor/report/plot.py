@@ -8,14 +8,17 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from leg_wear_monitor.dynamics.result import SimulationResult
+from leg_wear_monitor.estimate.cause import Change
 from leg_wear_monitor.fleet.overview import FleetOverview, LegOverview
 from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.materials import Material
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms import ADVICE
+from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, ExplainedTorque
 from leg_wear_monitor.monitor.verdict.decision import decision_of
 from leg_wear_monitor.monitor.verdict.situation import SEEN, SOURCES, SURE_SIGMAS
+from leg_wear_monitor.monitor.verdict.verdict import EVIDENCE, diagnosis_words, estimate
 from leg_wear_monitor.playback.result import ReplaySummary
 from leg_wear_monitor.playback.summary import ReplayResult
 from leg_wear_monitor.report.drawing import draw_drawing, drawing_of, drawing_svg
@@ -253,6 +256,55 @@ def _clearance_picture(state: LegState) -> Picture | None:
     finish(axes, x="clearance [mm], two standard deviations; black: estimate beside it; red: limit")
     told = "; ".join(f"{joint} {1.0e3 * (each.believed_m or 0.0):.3g} mm" for joint, each in known)
     return Picture(image=svg(figure), alt=f"Clearances against their limits: {told}")
+
+
+@_shown.register
+def _diagnosis_html(found: Diagnosis) -> _Shown:
+    """What the drive torque shows, with odds, the estimates, and the torque that they rest on."""
+    heading, *lines = diagnosis_words(found, found.joints).split("; ")
+    lines += [f"over {found.cycles} gait cycles"] if found.cycles else []
+    lines += map(_change_words, found.changes)
+    estimates = zip(found.joints, found.clearance_m, found.sigma_m, strict=False)
+    rows = [
+        (joint, *("not observable" if np.isnan(each) else _number(1.0e3 * each) for each in pair))
+        for joint, *pair in estimates
+    ]
+    head = ["joint", "estimate [mm]", "±, one standard deviation [mm]"]
+    table = Table(caption="Clearances by the drive torque", head=head, rows=rows) if rows else None
+    picture = _torque_picture(found.torque) if found.torque else None
+    return _Shown(f"Diagnosis: {heading}", tuple(lines), table, picture)
+
+
+def _change_words(change: Change) -> str:
+    """A change with the odds for it."""
+    subject = f" of {change.subject}" if change.subject else ""
+    size = estimate(change.value, change.sigma, EVIDENCE.get(change.cause, ("", "m"))[1])
+    words = f"{change.cause.value}{subject}: {size}, odds {_odds(change.log_odds)} against the leg as counted"
+    if change.runner_up:
+        words += f", {_odds(change.runner_up_log_odds)} against {change.runner_up}"
+    return words
+
+
+def _odds(log_odds: float) -> str:
+    """Odds as a power of ten; above a hundred digits, more say no more."""
+    digits = log_odds / np.log(10.0)
+    return "over 10^100 to 1" if digits > 100.0 else f"10^{digits:.0f} to 1"
+
+
+def _torque_picture(torque: ExplainedTorque) -> Picture:
+    """Torque over the crank angle: measured, as the counted clearances give it, and as the estimates do."""
+    figure = new_figure(5.0, 2.6)
+    axes = figure.subplots()
+    angle = 360.0 * (np.arange(len(torque.measured_nm)) + 0.5) / len(torque.measured_nm)
+    axes.plot(angle, torque.measured_nm, color=INK, linewidth=1.6, label="measured")
+    axes.plot(angle, torque.counted_nm, "--", color=BLUE, linewidth=1.2, label="of the counted clearances")
+    axes.plot(angle, torque.estimated_nm, color=VERMILION, linewidth=1.0, label="of the estimated clearances")
+    axes.set_xlim(0.0, 360.0)
+    _finished(axes, "crank angle [°]", "drive torque [N m]")
+    rests = (torque.measured_nm - each for each in (torque.counted_nm, torque.estimated_nm))
+    counted, estimated = (f"{np.sqrt(np.mean(rest**2)):.3g} N m RMS" for rest in rests)
+    alt = f"Drive torque: {counted} off the counted clearances, {estimated} off the estimated ones"
+    return Picture(image=svg(figure), alt=alt)
 
 
 @_shown.register

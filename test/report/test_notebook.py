@@ -1,6 +1,9 @@
 """What a notebook shows: small, without scripts, with names as text; and `plot` as a method."""
 
+import math
+
 import attrs
+import numpy as np
 import pytest
 from made_up_fleet import made_up_fleet, random_fleet
 from made_up_summary import made_up_summary
@@ -8,7 +11,9 @@ from matplotlib import pyplot
 
 import leg_wear_monitor as lw
 import leg_wear_monitor.state
+from leg_wear_monitor.estimate.cause import Cause, Change
 from leg_wear_monitor.mechanism.loader import parse_mechanism
+from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState, ExplainedTorque
 from leg_wear_monitor.report.plot import notebook_html
 from leg_wear_monitor.state import Figure
 
@@ -114,3 +119,34 @@ def test_a_fleet_is_a_picture_of_its_wear_and_a_table_of_the_legs_that_come_firs
         >= 4
     )
     assert "Fleet: 0 legs" in made_up_fleet([])._repr_html_()
+
+
+def test_a_diagnosis_is_its_torque_with_estimates_and_odds():
+    change = Change(
+        cause=Cause.CLEARANCE, subject=EVIL, value=6.2e-4, sigma=3e-5, since_ns=5, counted=3e-4,
+        log_odds=30.0 * math.log(10.0), runner_up="joint B", runner_up_log_odds=3.0 * math.log(10.0),
+    )  # fmt: skip
+    torque = ExplainedTorque(np.full(80, 2.0), np.full(80, 1.0), np.full(80, 1.5))
+    found = Diagnosis(
+        state=DiagnosisState.CHANGED, cycles=6, clearance_m=(6.2e-4, math.nan), sigma_m=(3e-5, math.nan),
+        changes=(change,), joints=("A", "B"), torque=torque,
+    )  # fmt: skip
+    html = found._repr_html_()
+    assert "<script" not in html
+    assert "Diagnosis: the drive torque shows a change" in html
+    assert "odds 10^30 to 1 against the leg as counted, 10^3 to 1 against joint B" in html
+    assert "<td>0.62</td>" in html and html.count("<td>not observable</td>") == 2
+    assert "1 N m RMS off the counted clearances, 0.5 N m RMS off the estimated ones" in html
+    assert "<img" not in attrs.evolve(found, torque=None)._repr_html_()
+    assert "<table" not in Diagnosis(reason="diagnosis.enabled is false")._repr_html_()
+
+
+def test_the_diagnosis_of_a_replay_has_a_torque_that_its_estimates_explain():
+    bag = lw.share_directory() / "bags" / "knocking"
+    found = lw.replay(f"{bag}.mcap", f"{bag}.yaml").monitor.diagnosis
+    assert found.joints == tuple("ABGIJ")
+    off = [
+        np.std(found.torque.measured_nm - each)
+        for each in (found.torque.counted_nm, found.torque.estimated_nm)
+    ]
+    assert off[1] < 0.9 * off[0]

@@ -34,6 +34,7 @@ from leg_wear_monitor.monitor.diagnosis.state import (
     WINDOW_CYCLES,
     Diagnosis,
     DiagnosisState,
+    ExplainedTorque,
     NotUsed,
     SignedCycle,
     TorqueSamples,
@@ -377,6 +378,17 @@ class TorqueObserver(KeepsSamples):
             sigma_m=tuple(sigma_m.tolist()),
             changes=state.settled + state.changes,
         )
+
+    @property
+    def explained(self) -> ExplainedTorque | None:
+        """What the estimate rests on; None without one."""
+        state = self.state
+        if state.fit is None or not state.cycles:
+            return None
+        explainer = self._models.explainer(state)
+        measured = state.signatures[-max(state.fit_cycles, 1) :].mean(axis=0) - explainer.baseline.offset
+        expected = (explainer.model.at(each)[0] for each in (state.counted_m, state.fit.clearance_m))
+        return ExplainedTorque(*(each[: len(each) // 2] for each in (measured, *expected)))
 
     def _observed(self, fit: ClearanceFit) -> tuple[Floats, Floats]:
         """Observable clearances and their standard deviations, NaN for the others.

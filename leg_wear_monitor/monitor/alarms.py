@@ -1,12 +1,15 @@
 """Alarms: levels, limits and latches, their codes, words, and the guide of each."""
 
 import math
+import re
 from collections.abc import Iterable
 from datetime import UTC, datetime
+from functools import cache
 
 import attrs
 
 from leg_wear_monitor.estimate.cause import Cause
+from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.state import Level
 
 # Alarms as a state machine: levels with a deadband and an on-delay, latched until acknowledged.
@@ -314,69 +317,15 @@ def worst_code(alarms: Iterable[Alarm]) -> str:
 
 
 FOLDER = "docs/howto/verdict"
-START = "index"
+_CODE = re.compile(r"/reference/codes\.md#(\w+)\)")
 
-CODES_OF_GUIDES = {
-    START: ("ALARM",),
-    "healthy": ("NONE",),
-    "joint_at_limit": ("CLEARANCE", "CLEARANCE_SEEN", "CLEARANCE_BELIEVED", "PART_REPLACED"),
-    "clearance_changed": (
-        "CLEARANCE_CHANGED",
-        "CLEARANCE_CORRECTED",
-        "CLEARANCE_DEPARTURE",
-        "DIAGNOSIS",
-    ),
-    "torque_sensor": (
-        "TORQUE_SIGN",
-        "TORQUE_SCALE",
-        "TORQUE_TIMING",
-        "TORQUE_BIAS",
-        "TORQUE_DRIFT",
-        "TORQUE_LAG",
-    ),
-    "torque_mismatch": ("TORQUE_MISMATCH", "MECHANISM_CHANGED", "TORQUE_MASS"),
-    "load_and_friction": ("TORQUE_LOAD", "FRICTION_CHANGED"),
-    "foot_load": (
-        "FOOT_LOAD_EXCHANGED",
-        "FOOT_LOAD_MISSING",
-        "FOOT_LOAD_SCALE",
-        "FOOT_LOAD_SIGN",
-        "FOOT_LOAD_STUCK",
-        "FOOT_LOAD_ZERO",
-        "INPUT_GAPS_FOOT_LOAD",
-        "INPUT_RATE_FOOT_LOAD",
-    ),
-    "force_growth_life": ("CLEARANCE_NEAR", "IMPACT_FORCE", "GROWTH", "REMAINING_LIFE", "MATERIAL_LIMIT"),
-    "input": (
-        "BAD_INPUT",
-        "INPUT_GAPS",
-        "INPUT_RATE_CRANK",
-        "INPUT_RATE_TORQUE",
-        "INPUT_SAMPLES",
-        "INPUT_SILENCE",
-        "INPUT_SOURCES",
-        "INPUT_TORQUE",
-        "NO_GAIT_CYCLE",
-        "TOPICS",
-    ),
-    "gait": ("CADENCE", "CRANK_ZERO", "NOT_FOLLOWED", "NOT_THIS_LEG"),
-    "not_observed": ("ENCODER", "ENCODERS", "NOT_OBSERVED", "NO_DRIVE_TORQUE", "TORQUE_NOT_COMPARED"),
-    "node": (
-        "ALREADY_COUNTED",
-        "CLOCK_MISSING",
-        "CLOCK_SET_BACK",
-        "CLOCK_STOPPED",
-        "LEDGER_INTERRUPTED",
-        "LEDGER_NOT_WRITTEN",
-        "RECORDING_STOPPED",
-        "SAMPLES_DROPPED",
-        "SAMPLES_NOT_PUBLISHED",
-        "STAMPS_AHEAD",
-    ),
-}
-"""Codes without their joints, by the name of the page; a test compares them with the codes that there are."""
 
-_PAGES = {code: page for page, codes in CODES_OF_GUIDES.items() for code in codes}
+@cache
+def _guides() -> dict[str, str]:
+    """Path of the page of each code, which is the page that links the code."""
+    pages = sorted((share_directory() / FOLDER).glob("*.md"))
+    links = ((page, _CODE.findall(page.read_text(encoding="utf-8"))) for page in pages)
+    return {code.upper(): f"{FOLDER}/{page.name}" for page, codes in links for code in codes}
 
 
 def guide_of(code: str) -> str:
@@ -387,7 +336,7 @@ def guide_of(code: str) -> str:
     code : str
         Without joints: ``CLEARANCE_SEEN``, not ``CLEARANCE_SEEN_G``.
     """
-    return f"{FOLDER}/{_PAGES.get(code, START)}.md"
+    return _guides().get(code, f"{FOLDER}/index.md")
 
 
 # Human-readable texts of an alarm: its state, its worst value, its start.

@@ -191,17 +191,18 @@ class ReferenceRun(Generic[FoundT]):
     def advance(self, waits: bool = False) -> FoundT | None:
         """Note that an evaluation period has passed; return the reference when all of it is due.
 
-        A leg that cannot be simulated ends it then without one. The caller may wait for each leg.
+        A leg that cannot be simulated ends it then without one, or before where the run may be late. The
+        caller may wait for each leg.
         """
         if not self.is_busy:
             return None
         self._periods += 1
         is_due = self._cost(self._legs) <= self._pace * self._periods
         self._take(waits or (is_due and not self.may_be_late), hurries=is_due and not waits)
-        if not is_due or (self.is_busy and not self._ahead[0].done()):
-            return None
-        if self.is_busy:  # a leg could not be simulated
+        # a leg that is due and simulated, and was not taken, could not be simulated
+        if len(self._done) < self._due and self._ahead[0].done() and (is_due or self.may_be_late):
             self._begin((), self._depth, self._profile)
+        if not is_due or self.is_busy or not self._legs:
             return None
         self._of_thread = threading.local()  # gives back 20 MB a thread
         return self._so_far()

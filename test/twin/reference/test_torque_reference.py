@@ -164,6 +164,20 @@ def test_a_leg_that_does_not_close_ends_a_run(leg, short) -> None:
         assert not each.is_busy
 
 
+def test_a_live_run_ends_as_soon_as_a_leg_cannot_be_simulated(leg, short) -> None:
+    none, run, periods = LegParameters.none(leg), TorqueReferenceRun(leg), 0
+    run.may_be_late = True
+    crank = np.eye(len(leg.bodies))[list(leg.bodies).index("crank")]
+    run.begin(NEW, UNWORN, STEADY, attrs.evolve(none, length=none.length + 50.0 * crank))
+    run.advance()  # its first leg is due in the second period, all of it in the 17th
+    while run.is_busy and periods < 15:
+        while not run._ahead[0].done():
+            time.sleep(0.01)
+        assert run.advance() is None
+        periods += 1
+    assert periods == 1
+
+
 def test_threads_that_are_behind_get_help(leg, short, whole) -> None:
     """Where a machine is busy, threads of low priority got nothing, and the node waited for them."""
     run, stuck, found = TorqueReferenceRun(leg), Event(), None

@@ -311,6 +311,8 @@ def _urgency(verdict: Verdict, life: LifeHours | None, joint_words: Callable[[st
             return "before the next use: how long it can wait is not known"
         case State.NOT_MONITORED:
             return "before the next use: until then nobody sees a joint that opens"
+        case State.WATCH if code_of_rule(verdict) == _REPLACED_CODE:
+            return "with the next gait cycles: until then nothing is known of the new part"
         case State.WATCH:
             return f"at the next stop, {hours} at the latest" if hours else "at the next stop"
     return "nothing is urgent"

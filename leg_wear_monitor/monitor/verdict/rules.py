@@ -20,17 +20,18 @@ from leg_wear_monitor.state import Figure, Level, State
 
 _ACKNOWLEDGE = "then acknowledge the alarms: `leg-wear-monitor acknowledge --ledger FILE`, or `--node NAME`"
 _COUNTED = "its faults are counted in the status `input` of /diagnostics, and in `lost` of `replay --json`"
+_MEASURE = "`leg-wear-monitor measure {joint} MM --sigma MM --ledger FILE`, or `--node NAME`"
 _ROCK = (
     "stop when it is safe, block the drive and rock joint {joints}; measure its radial clearance and enter "
-    "it: `leg-wear-monitor measure {joint} MM --sigma MM`"
+    f"it: {_MEASURE}"
 )
 _ENTER_PART = (
     "replace the parts of joint {joints}, and enter that: `leg-wear-monitor reset {joint} --ledger FILE`, or "
     "`--node NAME` while a monitor runs"
 )
 _REPLACE = (
-    "stop when it is safe, block the drive, and measure joint {joints}: `leg-wear-monitor measure {joint} MM "
-    f"--sigma MM`; if the joint is at its limit, {_ENTER_PART}"
+    f"stop when it is safe, block the drive, and measure joint {{joints}}: {_MEASURE}; if the joint is at "
+    f"its limit, {_ENTER_PART}"
 )
 
 
@@ -127,8 +128,8 @@ RULES = (
         why="the drive torque does not fit the counted leg, so the forecast is not valid: {value} of the "
         "predicted RMS is not explained (limit {limit}){past}{causes}",
         do="stop when it is safe, block the drive and rock each joint; measure the joint with play and enter "
-        "it: `leg-wear-monitor measure JOINT MM --sigma MM`; if none has play, check the load at the foot "
-        f"and the torque sensor; {_ACKNOWLEDGE}",
+        "it: `leg-wear-monitor measure JOINT MM --sigma MM --ledger FILE`, or `--node NAME`; if none has "
+        f"play, check the load at the foot and the torque sensor; {_ACKNOWLEDGE}",
         not_valid=EVERYTHING,
     ),
     _cause("TORQUE_BIAS", "it has a constant part that friction cannot be"),
@@ -270,7 +271,7 @@ RULES = (
         hits=subject_rules.near_limit,
         why="the {known} clearance of joint {joint} is {value}, near its limit of {limit}{past}",
         do="order the journal and the bushing of joint {joints}; at the next stop, rock the joint, measure "
-        "its radial clearance and enter it: `leg-wear-monitor measure {joint} MM --sigma MM`",
+        f"its radial clearance and enter it: {_MEASURE}",
     ),
     Rule(
         code="ALARM",

@@ -382,6 +382,9 @@ def encoder_faults(situation: Situation) -> Sequence[Hit]:
     return [Hit(words={"cause": fault}) for fault in situation.encoder_faults]
 
 
+_LEAST_REST = 0.01  # of the drive torque: below it, noise and tolerances of the leg decide
+
+
 def nothing_found(situation: Situation) -> Sequence[Hit]:
     """Always holds; it counts where no other rule does."""
     observed = "the encoders show the counted clearances"
@@ -389,9 +392,10 @@ def nothing_found(situation: Situation) -> Sequence[Hit]:
     if situation.has_torque and not math.isnan(situation.mismatch):
         limit = situation.mismatch_limit
         evidence = (Evidence("torque_mismatch", situation.mismatch, limit, ""),)
+        rest = f"{100.0 * situation.mismatch:.2g} %" if situation.mismatch >= _LEAST_REST else "less than 1 %"
         observed = (
-            f"the drive torque agrees with the counted leg: {amount(situation.mismatch, '')} of its RMS is "
-            f"not explained (limit {amount(limit, '')})"
+            f"the drive torque agrees with the counted leg: {rest} of its RMS is not explained "
+            f"(limit {100.0 * limit:.3g} %)"
         )
         observed += _compared(situation.diagnosis)
     return [Hit(words={"observed": observed}, evidence=evidence)]

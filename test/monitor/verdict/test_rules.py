@@ -437,7 +437,7 @@ def test_encoders_on_all_joints_observe_the_leg_without_a_drive_torque() -> None
 def test_a_healthy_leg_is_told_that_no_alarm_is_no_proof() -> None:
     verdict = judged()
     assert ADVICE in verdict.do
-    assert "0.031 of its RMS is not explained (limit 0.1)" in verdict.why
+    assert "3.1 % of its RMS is not explained (limit 10 %)" in verdict.why
 
 
 def test_a_healthy_leg_is_told_that_the_diagnosis_is_off() -> None:

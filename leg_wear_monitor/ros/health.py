@@ -287,7 +287,7 @@ class Load:
     def late_ns(self, now_ns: int) -> int:
         """By how much the node is late with a turn at a time of the monotonic clock [ns]; 0 if it is not.
 
-        A turn comes every 5 ms. What came meanwhile waits in the middleware, which holds some seconds of it.
+        A turn comes every 50 ms. What came meanwhile waits in the middleware, which holds some seconds of it.
         """
         passed_ns, self._turn_ns = now_ns - (self._turn_ns or now_ns), now_ns
         if passed_ns < _LATE_NS:

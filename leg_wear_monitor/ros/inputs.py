@@ -2,7 +2,7 @@
 
 import itertools
 import struct
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import import_module
 from operator import attrgetter
 from typing import Any, NamedTuple
@@ -16,58 +16,12 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
 
 from leg_wear_monitor.errors import printable
-from leg_wear_monitor.messages.cdr import ENCAPSULATION, MESSAGE, Decoder
+from leg_wear_monitor.messages.cdr import MESSAGE, Decoder
 from leg_wear_monitor.messages.names import is_without, names_in, without_interface
 from leg_wear_monitor.messages.streams import INTERFACES, JOINT_STATE, WRENCH_STAMPED, Stream, streams_read
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.ros.generated_type import generated_class
 from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, Samples
-
-# When received messages complete the next reports: processing them earlier gives none, later delays them.
-
-
-_STAMP = (struct.Struct(">iI"), struct.Struct("<iI"))  # by the byte order's bit of the encapsulation
-
-_MOST_NS = 50_000_000  # for which messages wait, for instance where one of two topics has stopped
-
-
-def stamp_of(raw: bytes) -> int:
-    """Stamp [ns] of a serialized message that begins with a header; 0 if it is too short."""
-    order = _STAMP[raw[1] & 1] if len(raw) > 1 else _STAMP[0]
-    if len(raw) < ENCAPSULATION + order.size:
-        return 0
-    seconds, rest = order.unpack_from(raw, ENCAPSULATION)
-    return int(seconds) * 1_000_000_000 + int(rest)
-
-
-class Due:
-    """Compares the stamps of received messages with the stamp that completes the next reports.
-
-    Parameters
-    ----------
-    due_stamp_ns : callable
-        Stamp that samples of all kinds must reach for the next reports; 0 if it is not known.
-    """
-
-    def __init__(self, due_stamp_ns: Callable[[], int]) -> None:
-        self._due_stamp_ns = due_stamp_ns
-        self._newest: dict[int, int] = {}
-        self._due_ns, self._processed_ns = 0, 0
-
-    def note(self, stream: Stream, last: "Arrival") -> None:
-        """Note the last message of a stream so far."""
-        self._newest[stream.code] = stamp_of(last.raw) if stream.has_stamp else last.log_time_ns
-
-    def is_now(self, now_ns: int) -> bool:
-        """Whether reports are due at a time of a monotonic clock [ns], or messages have waited too long."""
-        if self._due_ns == 0 or now_ns - self._processed_ns > _MOST_NS:
-            return True
-        return bool(self._newest) and self._due_ns <= min(self._newest.values())
-
-    def processed(self, now_ns: int) -> None:
-        """Note that messages were processed, at a time [ns] of the monotonic clock."""
-        self._due_ns, self._processed_ns = self._due_stamp_ns(), now_ns
-
 
 # Bounded queue of received messages that wait for the monitor; adding a message is cheap.
 

@@ -1,7 +1,7 @@
 """Material pairs of bushing and journal: their files, those of joints, load p, v and p v, rating life."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +10,8 @@ import attrs
 from leg_wear_monitor.configuration import described
 from leg_wear_monitor.configuration.strict import Library
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.mechanism.sourced import SourcedValue, WearCoefficient, sourced
+from leg_wear_monitor.mechanism.sourced import SourcedFile, SourcedValue, WearCoefficient, sourced
 from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
-from leg_wear_monitor.shown import Shown
 
 # Types of a material file: one pair of bushing and journal, with its lubricant.
 
@@ -67,7 +66,7 @@ class RatingLife:
 
 
 @attrs.frozen(kw_only=True)
-class Material(Shown):
+class Material(SourcedFile):
     """A pair of bushing and journal with its lubricant."""
 
     name: str = described("name, as the file's")
@@ -86,31 +85,6 @@ class Material(Shown):
         """Wear coefficients of bushing and journal [1/Pa]; None unless both are known or not counted."""
         bushing, journal = self.bushing.wear_si, self.journal.wear_si
         return None if bushing is None or journal is None else (bushing, journal)
-
-    def values(self) -> Iterator[tuple[str, SourcedValue]]:
-        """Every number with its dotted key."""
-        yield from _values(self, "")
-
-    def to_dict(self) -> dict[str, Any]:
-        """The keys of the file, and the SI value of each number as ``si``; absent ones are null."""
-        document: dict[str, Any] = _document(self)
-        return document
-
-
-def _values(part: Any, path: str) -> Iterator[tuple[str, SourcedValue]]:
-    for field in attrs.fields(type(part)):
-        value, key = getattr(part, field.name), f"{path}{field.name}"
-        if isinstance(value, SourcedValue):
-            yield key, value
-        if attrs.has(type(value)):
-            yield from _values(value, f"{key}.")
-
-
-def _document(part: Any) -> Any:
-    if not attrs.has(type(part)):
-        return list(part) if isinstance(part, tuple) else part
-    record = {field.name: _document(getattr(part, field.name)) for field in attrs.fields(type(part))}
-    return record | {"si": part.si} if isinstance(part, SourcedValue) else record
 
 
 # Reading of material files.

@@ -187,8 +187,36 @@ def sourced(dimension: str, doc: str) -> Any:
 SHAFTS = OUTPUT, MOTOR = ("output", "motor")
 
 
+class SourcedFile(Shown):
+    """Content of a file of figures with their sources."""
+
+    def values(self) -> Iterator[tuple[str, SourcedValue]]:
+        """Every number with its dotted key."""
+        yield from _values(self, "")
+
+    def to_dict(self) -> dict[str, Any]:
+        """The keys of the file, and the SI value of each number as ``si``; absent ones are null."""
+        return dict(_document(self))
+
+
+def _values(part: Any, path: str) -> Iterator[tuple[str, SourcedValue]]:
+    for field in attrs.fields(type(part)):
+        value, key = getattr(part, field.name), f"{path}{field.name}"
+        if isinstance(value, SourcedValue):
+            yield key, value
+        if attrs.has(type(value)):
+            yield from _values(value, f"{key}.")
+
+
+def _document(part: Any) -> Any:
+    if not attrs.has(type(part)):
+        return list(part) if isinstance(part, tuple) else part
+    record = {field.name: _document(getattr(part, field.name)) for field in attrs.fields(type(part))}
+    return record | {"si": part.si} if isinstance(part, SourcedValue) else record
+
+
 @attrs.frozen(kw_only=True)
-class Drive(Shown):
+class Drive(SourcedFile):
     """A motor with its gear and controller; what no source states is left out."""
 
     name: str = described("name, as the file's")
@@ -223,21 +251,6 @@ class Drive(Shown):
     def motor_turns(self) -> float:
         """Turns of the figures' shaft per turn of the drive's output."""
         return self.gear_ratio.si if self.shaft == MOTOR and self.gear_ratio is not None else 1.0
-
-    def values(self) -> Iterator[tuple[str, SourcedValue]]:
-        """Every number with its key."""
-        for field in attrs.fields(type(self)):
-            value = getattr(self, field.name)
-            if isinstance(value, SourcedValue):
-                yield field.name, value
-
-    def to_dict(self) -> dict[str, Any]:
-        """The keys of the file, and the SI value of each number as ``si``; absent ones are null."""
-        return {field.name: _document(getattr(self, field.name)) for field in attrs.fields(type(self))}
-
-
-def _document(value: Any) -> Any:
-    return attrs.asdict(value) | {"si": value.si} if isinstance(value, SourcedValue) else value
 
 
 # Reading of drive files.

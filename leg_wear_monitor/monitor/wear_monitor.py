@@ -556,6 +556,11 @@ class WearMonitor:
             self._accounting.ledger.close()
 
     @property
+    def ledger_loss(self) -> str:
+        """What the ledger had lost when it was opened; empty if nothing was lost."""
+        return self._accounting.ledger.loss if self._accounting.ledger else ""
+
+    @property
     def is_all_counted(self) -> bool:
         """Whether there were samples, and the ledger already contained the wear of all of them."""
         return self._accounting.is_all_counted

@@ -28,6 +28,10 @@ from leg_wear_monitor.twin.reference import LegParameters
 # of what a clearance changes, and of an opening: legs with masses 4 % off show 10 to 27 % less (2026-11-23)
 MODEL_ERROR = 0.2
 
+# of the root mean square of a change, in units of the scatter of gait cycles: what the model has wrong of its
+# shape, 0.27 to 0.6 where masses are 4 % off, 0.05 to 0.18 where they were identified (2026-11-26)
+MODEL_NOISE = 0.3
+
 _APART = 2.0  # standard deviations by which likely sizes may scatter about the best one
 _SIZES = 24  # clearances of a joint that are tried; between them a parabola finds the best
 _LEAST_FACTOR = 0.7  # of the counted clearance
@@ -181,6 +185,7 @@ class Explainer:
         self.model, self.joints, self.baseline = model, tuple(joints), baseline
         self.nuisances, self.channels = tuple(nuisances), tuple(channels)
         self.fresh_m = model.grid_m[:, 0] if fresh_m is None else fresh_m
+        self._root = np.linalg.cholesky(model.covariance)
         self._constant = baseline.covariance.copy()  # what does not become less over several cycles
         for one in nuisances:
             if one.spread:
@@ -188,8 +193,12 @@ class Explainer:
 
     def covariance(self, cycles: int) -> Floats:
         """Covariance (F, F) of the mean of some cycles' signatures in a leg as counted."""
-        model = self.model
-        return np.asarray(model.covariance * (1.0 / cycles + 1.0 / model.cycles) + self._constant)
+        return np.asarray(self.model.covariance / cycles + self._constant)
+
+    def error(self, change: Floats) -> Floats:
+        """Variance (n,) of what the model of changes (n, F) is off, as a part of that of a gait cycle."""
+        in_scatter = np.linalg.solve(self._root, change.T)
+        return np.asarray(MODEL_NOISE**2 * np.square(in_scatter).mean(axis=0))
 
     def explanations(self, mean: Floats, cycles: int, counted_m: Floats) -> list[Explanation]:
         """Single causes of a change, the best first.
@@ -210,7 +219,7 @@ class Explainer:
         return sorted(found, key=lambda one: one.misfit)
 
     def _as_counted(self, rest: Floats, covariance: Floats) -> Explanation:
-        misfits = Misfits(rest[None], covariance, np.zeros((1, len(rest))))
+        misfits = Misfits(rest[None], covariance)
         return misfits.explanation(0, NamedCause(Cause.UNKNOWN, 0.0, 0.0))
 
     def _late(self, rest: Floats, covariance: Floats) -> list[Explanation]:
@@ -222,12 +231,10 @@ class Explainer:
         if not self.channels:
             return []
         change = np.array([one.column for one in self.channels])
-        exact = np.zeros_like(change)
-        left, without = (Misfits(each, covariance, exact).square for each in (rest - change, rest + exact))
-        possible = left < _LEFT * without
+        possible = Misfits(rest - change, covariance).square < _LEFT * Misfits(rest[None], covariance).square
         if not possible.any():
             return []
-        misfits = Misfits(rest - change, covariance, MODEL_ERROR * change)
+        misfits = Misfits(rest - change, covariance + _diagonal(MODEL_ERROR * change))
         best = int(np.where(possible, misfits.value, np.inf).argmin())
         return [misfits.explanation(best, NamedCause(Cause.LAG, self.channels[best].later_s, _LATE_SIGMA_S))]
 
@@ -237,8 +244,11 @@ class Explainer:
         """Best clearance of one joint, the others as counted."""
 
         def tried(sizes: Floats) -> Misfits:
-            change = np.array([self.model.at(opened(counted_m, k, size))[0] for size in sizes]) - there
-            return Misfits(rest - change, covariance, MODEL_ERROR * change)
+            each = [opened(counted_m, k, size) for size in sizes]
+            change = np.array([self.model.at(one)[0] for one in each]) - there
+            scatter = np.array([self.model.scatter_at(one) for one in each])
+            scatter += self.error(change)
+            return Misfits(rest - change, covariance + scatter[:, None, None] * self.model.covariance)
 
         widest = self.model.grid_m[k, -1]
         least = _LEAST_FACTOR * min(counted_m[k], self.fresh_m[k])
@@ -280,7 +290,8 @@ class Explainer:
         sigmas = np.sqrt(1.0 / information - spread**2)
         more = np.sqrt(np.maximum(0.0, values**2 - sigmas**2 - spread**2))[:, None] * columns
         rests = np.broadcast_to(rest, columns.shape)
-        misfits = Misfits(rests, covariance, MODEL_ERROR * values[:, None] * columns, more)
+        error = _diagonal(MODEL_ERROR * values[:, None] * columns)
+        misfits = Misfits(rests, covariance + error, more)
         found = []
         for i, one in enumerate(self.nuisances):
             counted = _COUNTED.get(one.cause, 0.0)
@@ -296,9 +307,7 @@ class Misfits:
     ----------
     rest : (n, F) array
         What is left over.
-    covariance : (F, F) array
-    error : (n, F) array
-        Further standard deviations.
+    covariance : (F, F) or (n, F, F) array
     more : (n, F) array, optional
         Columns whose outer products belong to the covariance, too.
 
@@ -310,14 +319,13 @@ class Misfits:
         Minus twice the logarithms of the densities, less a constant.
     """
 
-    def __init__(self, rest: Floats, covariance: Floats, error: Floats, more: Floats | None = None) -> None:
+    def __init__(self, rest: Floats, covariance: Floats, more: Floats | None = None) -> None:
         n, size = rest.shape
         bordered = np.zeros((n, size + 1, size + 1))
         bordered[:, :size, :size] = covariance
         if more is not None:
             bordered[:, :size, :size] += more[:, :, None] * more[:, None, :]
         diagonal = np.arange(size)
-        bordered[:, diagonal, diagonal] += error**2
         # a further row of L is the solution of L z = rest; the corner, of no meaning, only has to be large
         bordered[:, size, :size], bordered[:, size, size] = rest, _CORNER
         root = np.linalg.cholesky(bordered)
@@ -333,6 +341,11 @@ class Misfits:
             misfit=float(self.value[i]),
             square=float(self.square[i]) / self._size,
         )
+
+
+def _diagonal(sigma: Floats) -> Floats:
+    """Covariances (n, F, F) of independent errors with standard deviations (n, F)."""
+    return np.asarray(np.eye(sigma.shape[1]) * np.square(sigma)[:, :, None])
 
 
 def opened(clearance_m: Floats, k: int, size: float) -> Floats:

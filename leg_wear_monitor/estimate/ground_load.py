@@ -466,10 +466,14 @@ def commissioned_baseline(
     return Baseline(mean - expected, covariance / commissioned.cycles, left_out)
 
 
-def unknown_baseline(found: list[Nuisance], sensor: TorqueSensor) -> Baseline:
-    """Baseline of a leg that was never commissioned, with its tolerances."""
+def unknown_baseline(found: list[Nuisance], sensor: TorqueSensor, covariance: Floats) -> Baseline:
+    """Baseline of a leg that was never commissioned, with its tolerances.
+
+    The covariance (F, F) is that of the expected signature.
+    """
     phases = sensor.phases
-    covariance = np.diag(np.repeat([_MEAN_ERROR * sensor.size_nm, _ROUGHNESS_ERROR], phases) ** 2)
+    sigma = np.repeat([_MEAN_ERROR * sensor.size_nm, _ROUGHNESS_ERROR], phases)
+    covariance = covariance + np.diag(sigma**2)
     for one in found:
         spread = _TOLERANCES.get(one.cause, _SENSOR_TOLERANCE * one.spread)
         covariance += spread**2 * np.outer(one.column, one.column)

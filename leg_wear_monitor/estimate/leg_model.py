@@ -187,16 +187,22 @@ def _covariance(model: SignatureModel, nuisances: Sequence[Nuisance], cycles: in
 
 _LEAST_FACTOR = 0.7  # of the expected clearance
 _FLAT = 1.0  # prior standard deviation of a clearance's logarithm: what shows nothing keeps its prior
+_FIT_ROUNDS = 2
+_ELSEWHERE = 1.5  # times the counted clearance, where a search for each joint begins, too
 _MODEL_M = 5.0e-6  # error of the model against full coordinates (docs/explanation/diagnosis.md)
 
 
 @attrs.frozen(eq=False)
 class ClearanceFit:
-    """Clearances (k,) [m], their covariance (k, k) [m^2], and the misfit: about F if the model holds."""
+    """Clearances (k,) [m], their covariance (k, k) [m^2], and the misfit: about F if the model holds.
+
+    `unlikely` is minus twice the logarithm of their probability, less a constant.
+    """
 
     clearance_m: Floats
     covariance: Floats
     misfit: float
+    unlikely: float
 
     @property
     def sigma_m(self) -> Floats:
@@ -227,24 +233,28 @@ def fit_clearances(
     """
     model = explainer.model
     measured, counted = mean - explainer.baseline.offset, np.log(counted_m)
-    change = model.at(start_m)[0] - model.at(counted_m)[0]
-    covariance = explainer.covariance(cycles) + np.diag((MODEL_ERROR * change) ** 2)
-    whiten = np.linalg.inv(np.linalg.cholesky(covariance))
-
-    def at(x: Floats) -> Point:
-        expected, slopes = model.at(np.exp(x))
-        rest = np.concatenate([whiten @ (expected - measured), (x - counted) / _FLAT])
-        return Point(rest, lambda: np.vstack([whiten @ slopes, np.eye(len(x)) / _FLAT]))
-
     low, high = np.log(_LEAST_FACTOR * model.grid_m[:, 0]), np.log(model.grid_m[:, -1])
-    found = gauss_newton(at, np.log(start_m), low=low, high=high)
-    clearance: Floats = np.asarray(np.exp(found.x), dtype=np.float64)
+    clearance: Floats = start_m
+    for _ in range(_FIT_ROUNDS):  # what the model may be off depends on the clearances
+        change = model.at(clearance)[0] - model.at(counted_m)[0]
+        scatter = model.scatter_at(clearance) + explainer.error(change[None])[0]
+        root = np.linalg.cholesky(explainer.covariance(cycles) + scatter * model.covariance)
+        whiten = np.linalg.inv(root)
+
+        def at(x: Floats, whiten: Floats = whiten) -> Point:
+            expected, slopes = model.at(np.exp(x))
+            rest = np.concatenate([whiten @ (expected - measured), (x - counted) / _FLAT])
+            return Point(rest, lambda: np.vstack([whiten @ slopes, np.eye(len(x)) / _FLAT]))
+
+        found = gauss_newton(at, np.log(clearance), low=low, high=high)
+        clearance = np.asarray(np.exp(found.x), dtype=np.float64)
     # what a clearance changes is known to a fraction, and so is a clearance that is far from the counted one
     uncertain = np.hypot(_MODEL_M, MODEL_ERROR * (clearance - counted_m))
     # a baseline after a correction hides what that is off
     covariance = found.covariance * np.outer(clearance, clearance) + np.diag(uncertain**2 + known_sigma_m**2)
     misfit = float(np.square(found.point.rest[: len(mean)]).sum())
-    return ClearanceFit(clearance, max(1.0, misfit / len(mean)) * covariance, misfit)
+    unlikely = found.point.square + 2.0 * float(np.log(np.diagonal(root)).sum())
+    return ClearanceFit(clearance, max(1.0, misfit / len(mean)) * covariance, misfit, unlikely)
 
 
 def explainer_of(
@@ -257,7 +267,7 @@ def explainer_of(
     model = signature_model(reference, sensor)
     found, joints = nuisances(mechanism, reference, sensor), mechanism.clearance_joints
     if commissioned is None:
-        baseline = unknown_baseline(found, sensor)
+        baseline = unknown_baseline(found, sensor, model.covariance / model.cycles)
     else:
         expected = model.at(commissioned.clearance_m)[0]
         left_out = parts_left_out(model.covariance, commissioned.signatures)
@@ -278,7 +288,29 @@ def best_fit(
 ) -> ClearanceFit:
     """All clearances from a mean signature, from the best of several starts: there are several minima."""
     fits = [fit_clearances(explainer, mean, cycles, start, counted_m, known_sigma_m) for start in starts]
-    return min(fits, key=lambda fit: fit.misfit)
+    return min(fits, key=lambda fit: fit.unlikely)
+
+
+def starts_of(explainer: Explainer, change: Change | None, counted_m: Floats) -> list[Floats]:
+    """Clearances (k,) [m] where searches begin: those of a change, or each joint as counted and wider."""
+    joints, widest = explainer.joints, explainer.model.grid_m[:, -1]
+    if change is not None and change.cause is Cause.CLEARANCE:
+        return [start_of(change, joints, counted_m)]
+    wider = np.minimum(_ELSEWHERE * counted_m, np.maximum(widest, counted_m))
+    return [counted_m, *(opened(counted_m, k, size) for k, size in enumerate(wider.tolist()))]
+
+
+def with_rivals(
+    found: ClearanceFit, explanations: Sequence[Explanation], joints: Sequence[str]
+) -> ClearanceFit:
+    """A fit with the clearances that explain a change as well, alone: which of them it was is not known."""
+    best = min((one.misfit for one in explanations), default=0.0)
+    apart = np.zeros(len(joints))
+    for one in explanations:
+        if one.cause is Cause.CLEARANCE and 0.5 * (one.misfit - best) < SURE_LOG_ODDS:
+            k = joints.index(one.subject)
+            apart[k] = one.value - found.clearance_m[k]
+    return attrs.evolve(found, covariance=found.covariance + np.diag(apart**2))
 
 
 def start_of(change: Change | None, joints: Sequence[str], counted_m: Floats) -> Floats:

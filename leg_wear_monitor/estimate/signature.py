@@ -313,6 +313,8 @@ class SignatureModel:
         Of the signature of one gait cycle.
     cycles : int
         Simulated gait cycles of each leg.
+    scatter : (k, s) array
+        Variance of each change, as a part of that of a gait cycle; 0 where they are exact.
     """
 
     sensor: TorqueSensor
@@ -321,6 +323,7 @@ class SignatureModel:
     change: Floats
     covariance: Floats
     cycles: int
+    scatter: Floats = attrs.field()
     _log_grid: Floats = attrs.field(init=False)
     _slopes: Floats = attrs.field(init=False)
 
@@ -334,6 +337,15 @@ class SignatureModel:
         i = (grid[:, 1:-1] < x[:, None]).sum(axis=1)
         slopes, beyond = self._slopes[joints, i], x - grid[joints, i]
         return self.mean + self.change[joints, i].sum(axis=0) + beyond @ slopes, slopes.T
+
+    def scatter_at(self, clearance_m: Floats) -> float:
+        """Variance of the signature at clearances (k,) [m], as a part of that of a gait cycle."""
+        x, grid = np.log(clearance_m), self._log_grid
+        return float(sum(np.interp(x[k], grid[k], self.scatter[k]) for k in range(len(grid))))
+
+    @scatter.default
+    def _exact(self) -> Floats:
+        return np.zeros(self.grid_m.shape)
 
     @_log_grid.default
     def _logarithms(self) -> Floats:
@@ -360,9 +372,56 @@ def signature_model(reference: TorqueReference, sensor: TorqueSensor) -> Signatu
     order = np.arange(1, len(legs)).reshape(joints, -1)
     grid = np.array([reference.clearance_m[[0, *order[k]], k] for k in range(joints)])
     change = np.array([means[[0, *order[k]]] - means[0] for k in range(joints)])
+    variance = np.zeros(grid.shape)
+    for k in range(joints):
+        own = np.array([1.0 / cycles[i] for i in order[k]])
+        opening = grid[k, 1:] / grid[k, 0] - 1.0
+        change[k, 1:], variance[k, 1:] = without_scatter(
+            opening, change[k, 1:], covariance, own, 1.0 / cycles[0]
+        )
     place = np.argsort(grid, axis=1, kind="stable")
-    grid, change = np.take_along_axis(grid, place, 1), np.take_along_axis(change, place[:, :, None], 1)
-    return SignatureModel(sensor, grid, means[0], change, covariance, cycles[1])
+    grid, variance = (np.take_along_axis(one, place, 1) for one in (grid, variance))
+    change = np.take_along_axis(change, place[:, :, None], 1)
+    return SignatureModel(sensor, grid, means[0], change, covariance, cycles[1], variance)
+
+
+_STEEPNESS = np.geomspace(1.0e-4, 1.0e4, 81)  # variances per opening that are tried, of a cycle's variance
+
+
+def without_scatter(
+    opening: Floats, change: Floats, covariance: Floats, own: Floats, common: float
+) -> tuple[Floats, Floats]:
+    """Most probable changes (s, F) of a signature by one clearance, given those of chaotic simulated legs.
+
+    With the variance (s,) of each of them, as a part of that of a gait cycle.
+
+    The change is taken for a random walk over the clearance, from zero at the expected one, in units of the
+    scatter of a gait cycle; its steepness is that by which all s changes are most probable. Without this,
+    what simulated means scatter counts as what a clearance changes, and a clearance that the torque does
+    not show seems to be known.
+
+    Parameters
+    ----------
+    opening : (s,) array
+        Of the clearance, as a fraction of the expected one; negative where it is narrower.
+    change : (s, F) array
+    covariance : (F, F) array
+        Of a gait cycle.
+    own : (s,) array
+        Variance of the mean of each leg, of that of a gait cycle; common is that of the expected leg.
+    """
+    square = change @ np.linalg.solve(covariance, change.T)
+    scatter = np.diag(own) + common
+    is_alike = np.sign(opening)[:, None] == np.sign(opening)
+    walk = np.where(is_alike, np.minimum(np.abs(opening)[:, None], np.abs(opening)), 0.0)
+
+    def unlikely(steepness: float) -> float:
+        total = steepness * walk + scatter
+        return float(change.shape[1] * np.linalg.slogdet(total)[1] + np.trace(np.linalg.solve(total, square)))
+
+    best = min(_STEEPNESS.tolist(), key=unlikely)
+    taken = best * np.linalg.solve(best * walk + scatter, walk).T
+    return taken @ change, best * np.diagonal(walk - taken @ walk)
 
 
 def simulated_signatures(

@@ -8,7 +8,14 @@ import numpy as np
 
 from leg_wear_monitor.estimate.cause import SURE_LOG_ODDS, Cause, Change
 from leg_wear_monitor.estimate.explanations import Explanation
-from leg_wear_monitor.estimate.leg_model import best_fit, change_of, first_changed, start_of
+from leg_wear_monitor.estimate.leg_model import (
+    best_fit,
+    change_of,
+    first_changed,
+    start_of,
+    starts_of,
+    with_rivals,
+)
 from leg_wear_monitor.estimate.signature import DIRECT, with_noise_of
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
@@ -116,7 +123,7 @@ class Evidence:
         if not is_known:
             state.fit = None
         else:
-            self._fit(state, mean, len(cycles), change)
+            self._fit(state, mean, len(cycles), change, explanations if since_ns else ())
 
     def _least_cycles(self, state: TorqueState) -> int:
         """Gait cycles since a change before it is explained."""
@@ -154,13 +161,20 @@ class Evidence:
         first = first_changed(explainer, state.signatures, state.counted_m, changed_m)
         return attrs.evolve(change, since_ns=state.cycles[first].begin_ns)
 
-    def _fit(self, state: TorqueState, mean: Floats, cycles: int, change: Change | None) -> None:
+    def _fit(
+        self,
+        state: TorqueState,
+        mean: Floats,
+        cycles: int,
+        change: Change | None,
+        explanations: Sequence[Explanation],
+    ) -> None:
         """Estimate all clearances from the mean signature (F,) of some cycles."""
         explainer, counted_m = self._models.explainer(state), state.counted_m
-        starts = [counted_m, start_of(change, explainer.joints, counted_m)]
-        starts += [state.fit.clearance_m] if state.fit else []
+        starts = starts_of(explainer, change, counted_m)
         known_sigma_m = state.commissioned.sigma_m if state.commissioned else 0.0
-        state.fit = best_fit(explainer, mean, cycles, counted_m, starts, known_sigma_m)
+        found = best_fit(explainer, mean, cycles, counted_m, starts, known_sigma_m)
+        state.fit = with_rivals(found, explanations, explainer.joints)
         state.fit_cycles = cycles
 
 

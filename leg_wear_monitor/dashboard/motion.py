@@ -9,7 +9,7 @@ from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.reach import reach_of
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.messages.leg_motion import received_frame
-from leg_wear_monitor.report.leg_picture import drawn_pin, leg_data
+from leg_wear_monitor.report.leg_slider import drawn_pin, leg_data
 from leg_wear_monitor.report.page import render
 from leg_wear_monitor.state import JointClearance
 

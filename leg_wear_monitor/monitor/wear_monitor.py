@@ -330,7 +330,7 @@ class WearMonitor:
     def diagnosis(self) -> Diagnosis:
         """Clearances that the drive torque shows; empty while the received torque is wrong."""
         found, torque = self._parts.diagnosis, self._parts.torque
-        explained = torque.explained if torque and found.clearance_m else None
+        explained = torque.models.explained(torque.state) if torque and found.clearance_m else None
         return attrs.evolve(found, joints=tuple(self.clearance_joints), torque=explained)
 
     @property

@@ -18,7 +18,8 @@ from leg_wear_monitor.mechanism.position import TURN, ideal_motion
 from leg_wear_monitor.mechanism.reach import POINTS, Reach, dead_words, findings, headline, reach_of
 from leg_wear_monitor.mechanism.spec import GROUND, Mechanism, PrismaticJoint, SpeedDrive, TorqueDrive
 from leg_wear_monitor.report.figure import INK, SMALL, USUAL, VERMILION, finish, new_figure, plain, svg
-from leg_wear_monitor.report.leg_picture import draw_leg, leg_data, leg_slider, run_data
+from leg_wear_monitor.report.leg_picture import draw_leg
+from leg_wear_monitor.report.leg_slider import leg_data, leg_slider, run_data
 from leg_wear_monitor.report.page import (
     Fragment,
     Page,

@@ -1,6 +1,6 @@
-"""The leg as a figure, as data for the interactive picture of a page, and the figures of a simulation."""
+"""The leg as a figure, and the figures of a simulation."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from itertools import cycle
 from typing import Any
 
@@ -18,14 +18,11 @@ from leg_wear_monitor.mechanism.position import (
     build_linkage,
     carriers,
     corners,
-    is_on_ground,
     one_cycle,
     point_path,
-    rotated,
 )
 from leg_wear_monitor.mechanism.reach import DeadPoint, Reach
 from leg_wear_monitor.mechanism.spec import GROUND, Mechanism, PrismaticJoint
-from leg_wear_monitor.messages.leg_motion import JointMotion
 from leg_wear_monitor.report.figure import (
     BODY_COLOURS,
     INK,
@@ -40,8 +37,6 @@ from leg_wear_monitor.report.figure import (
     png,
     worn_bushings,
 )
-from leg_wear_monitor.report.page import Fragment, render, template_text
-from leg_wear_monitor.state import JointClearance
 
 # Drawing of single bodies, joints, supports and springs.
 
@@ -202,14 +197,14 @@ def draw_leg(axes: Axes, reach: Reach, shown: int) -> None:
         if reach.is_open(joint):
             first, last = (paths[body][joint][shown] for body in carriers(mechanism, joint))
             draw_gap(axes, (first, last), f"{1e3 * reach.gap_of(joint)[shown]:.3g} mm")
-    for i, dead in _in_line(reach):
+    for i, dead in in_line(reach):
         if i == shown:
             line = np.array([paths[mechanism.sides(joint)[1]][joint][i] for joint in dead.joints])
             axes.plot(*line.T, "--", color=VERMILION, linewidth=1.8, zorder=19.0)
     axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
 
 
-def _in_line(reach: Reach) -> list[tuple[int, DeadPoint]]:
+def in_line(reach: Reach) -> list[tuple[int, DeadPoint]]:
     """Numbers of the positions in which three joints are in line, with the dead points."""
     ends = ((0, reach.low), (len(reach.q) - 1, reach.high))
     return [(i, dead) for i, dead in ends if dead and dead.is_in_line and not reach.open_joint]
@@ -320,165 +315,6 @@ def _draw_legend(axes: Axes, mechanism: Mechanism) -> None:
     axes.legend(
         list(entries.values()), list(entries), fontsize=SMALL, frameon=False, loc="center", labelspacing=0.9
     )
-
-
-# Data of the interactive picture: a mechanism over its crank's range in mm and degrees. The y axis points
-# down, as in SVG.
-
-
-ARROW_FRACTION = 0.3  # length of the longest arrow, as a fraction of the picture's height
-
-
-def leg_data(reach: Reach) -> dict[str, Any]:
-    """Data of the interactive picture: bodies, joints, path of the toe, open joints, and joints in line."""
-    mechanism = reach.mechanism
-    every = [
-        reach.path(body, point)
-        for body in (GROUND, *mechanism.bodies)
-        for point in mechanism.points_of(body)
-        if body != GROUND or point in mechanism.joints
-    ]
-    given = picture_data(
-        _bodies(reach),
-        [_joint(reach, name) for name in mechanism.joints],
-        np.concatenate(every),
-        np.rad2deg(reach.crank_angle).round(1).tolist(),
-    )
-    return given | {
-        "toe": [] if mechanism.toe is None else millimetres(reach.path(*mechanism.toe)),
-        "turns": reach.turns or (bool(reach.open_joint) and len(reach.q) > 1),
-        "marks": [_mark(reach, dead, i) for i, dead in _in_line(reach)],
-    }
-
-
-def picture_data(
-    bodies: Sequence[dict[str, Any]],
-    joints: Sequence[dict[str, Any]],
-    extent: Floats,
-    angles: Sequence[float],
-) -> dict[str, Any]:
-    """Data of the interactive picture of a leg that turns through, without the path of a toe.
-
-    Parameters
-    ----------
-    bodies, joints : sequence of dict
-        As `leg_slider.js` draws them.
-    extent : (n, 2) array
-        Points that fit into the picture [m].
-    angles : sequence of float
-        Crank angle of each position [deg].
-    """
-    low, high = extent.min(axis=0), extent.max(axis=0)
-    margin = 0.09 * float((high - low).max())
-    corner = 1.0e3 * np.array([low[0] - margin, -high[1] - margin])
-    size = 1.0e3 * (high - low + 2.0 * margin)
-    return {
-        "bodies": sorted(bodies, key=lambda body: -float(np.ptp(np.array(body["outline"]), axis=0).sum())),
-        "joints": joints,
-        "box": [round(float(value), 1) for value in (*corner, *size)],
-        "toe": [],
-        "angles": angles,
-        "turns": True,
-        "marks": [],
-        "said": {},
-        "live": False,
-        "first": 0,
-        "digits": 1,
-        "skip": 1,
-        "frames": len(angles),
-        "arrow_mm": round(ARROW_FRACTION * float(size[1]), 1),
-    }
-
-
-def _bodies(reach: Reach) -> list[dict[str, Any]]:
-    """The bodies; shapes [mm] in their own frames, and poses of these."""
-    mechanism = reach.mechanism
-    colours = cycle(BODY_COLOURS)
-    bodies = []
-    for i, (name, body) in enumerate(mechanism.bodies.items(), start=1):
-        shape = corners({point: np.array(place) for point, place in body.points.items()})
-        angle = reach.q[:, i, 2]
-        origin = reach.q[:, i, :2] - rotated(body.com, angle)
-        poses = np.column_stack([1.0e3 * origin[:, 0], -1.0e3 * origin[:, 1]]).round(1)
-        turns = (-np.rad2deg(angle)).round(2)
-        bodies.append({
-            "name": name,
-            "colour": next(colours),
-            "outline": millimetres(shape),
-            "poses": [[x, y, turn] for (x, y), turn in zip(poses.tolist(), turns.tolist(), strict=True)],
-        })  # fmt: skip
-    return bodies
-
-
-def _joint(reach: Reach, name: str) -> dict[str, Any]:
-    """Name and path of a joint; of an open one, also the path of its other point and the gap [mm]."""
-    other, carrier = carriers(reach.mechanism, name)
-    joint = {
-        "name": name,
-        "path": millimetres(reach.path(carrier, name)),
-        "ground": is_on_ground(reach.mechanism, name),
-    }
-    if reach.is_open(name):
-        joint |= {
-            "other": millimetres(reach.path(other, name)),
-            "gap_mm": [float(f"{1.0e3 * gap:.3g}") for gap in reach.gap_of(name)],
-        }
-    return joint
-
-
-def _mark(reach: Reach, dead: DeadPoint, frame: int) -> dict[str, Any]:
-    """Line through the three joints that are in line at a dead point."""
-    places = [
-        point_path(reach.mechanism, dead.q[None], reach.mechanism.sides(joint)[1], joint)[0]
-        for joint in dead.joints
-    ]
-    return {"frame": frame, "line": millimetres(np.array(places))}
-
-
-_FLIP = np.array([1.0, -1.0])  # y is downwards in the picture
-
-
-def run_data(
-    label: str, joints: Sequence[str], forces_n: Floats, places: Floats | None = None
-) -> dict[str, Any]:
-    """Forces (s, k, 2) [N] in joints over a cycle, and places of the pins in their bushings [clearances]."""
-    pins = {name: {"f": (forces_n[:, k] * _FLIP).round(1).tolist()} for k, name in enumerate(joints)}
-    if places is not None:
-        for k, name in enumerate(joints):
-            pins[name]["e"] = (places[:, k] * _FLIP).round(3).tolist()
-    largest_n = float(np.linalg.norm(forces_n, axis=-1).max())
-    return {"label": label, "pins": pins, "largest_n": largest_n}
-
-
-_AT_LIMIT, _MOST_GAP, _LEAST_GAP = 0.5, 0.85, 0.02  # drawn clearance, as a fraction of the bushing's radius
-
-
-def drawn_pin(motion: JointMotion, clearance: JointClearance) -> dict[str, Any]:
-    """A joint as the page draws it: y downwards, lengths in clearances, forces in N."""
-    x, y = motion.eccentricity_m
-    size = (x * x + y * y) ** 0.5
-    pushed = (-motion.force_n * x / size, motion.force_n * y / size) if size else (0.0, 0.0)
-    counted = clearance.counted_m or 1.0
-    width = clearance.believed_m or counted
-    gap = min(max(_AT_LIMIT * width / clearance.limit_m, _LEAST_GAP), _MOST_GAP)
-    return {
-        "e": [round(x / counted, 3), round(-y / counted, 3)],
-        "f": [round(pushed[0], 1), round(pushed[1], 1)],
-        "hit": round(motion.impact_n, 1),
-        "gap": round(gap, 3),
-    }
-
-
-def leg_slider(data: dict[str, Any], alt: str, caption: str) -> Fragment:
-    """The interactive picture as a part of a page."""
-    names = [run["label"] for run in data["runs"]]
-    markup = render("leg_slider.html", data=data, names=names, alt=alt)
-    return Fragment(markup, template_text("leg_slider.js"), caption)
-
-
-def millimetres(points: Floats) -> list[list[float]]:
-    """Places (n, 2) [m] in mm, with y downwards."""
-    return [[round(1.0e3 * float(x), 1), round(-1.0e3 * float(y), 1)] for x, y in points]
 
 
 # Figures of a simulation as PNG files.

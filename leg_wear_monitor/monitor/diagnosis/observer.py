@@ -34,7 +34,6 @@ from leg_wear_monitor.monitor.diagnosis.state import (
     WINDOW_CYCLES,
     Diagnosis,
     DiagnosisState,
-    ExplainedTorque,
     NotUsed,
     SignedCycle,
     TorqueSamples,
@@ -188,17 +187,15 @@ class TorqueObserver(KeepsSamples):
     ) -> None:
         self.config, self._size_nm, self._joints = config, size_nm, mechanism.clearance_joints
         figures = drive_figures(config.drive)
-        self._models = LegModels(mechanism, figures)
+        self.models = LegModels(mechanism, figures)
         part = next((one for one in references if not one.is_whole), None)
         whole = [one for one in references if one.is_whole]
         is_drive_known = not math.isnan(figures.stiffness_nm_per_rad)
         # references of a measured load, too, are simulated under the mean one that the torque shows
         self._is_on_ground = config.load.model in (GROUND, MEASURED) and mechanism.toe is not None
         self._up = upwards(mechanism)
-        self._references = References(
-            mechanism, self._models, whole, part, is_drive_known, self._is_on_ground
-        )
-        self._evidence = Evidence(self._models)
+        self._references = References(mechanism, self.models, whole, part, is_drive_known, self._is_on_ground)
+        self._evidence = Evidence(self.models)
         counted_m = np.asarray(counted_m, float).copy()
         if parameters is None:  # those that files and unfinished references were made with
             own = LegParameters.none(mechanism)
@@ -221,7 +218,7 @@ class TorqueObserver(KeepsSamples):
 
     def warm_up(self) -> None:
         """Compute before the first sample what depends on the mechanism alone."""
-        self._models.warm_up()
+        self.models.warm_up()
 
     def ended(
         self, statistics: CycleStatistics, is_torque_wrong: bool = False, load_n: float = math.nan
@@ -282,7 +279,7 @@ class TorqueObserver(KeepsSamples):
         ended = self.evaluate_due(self._evaluate)
         if self._references.advance(state, counted_m, depth):
             self._evidence.review(state, self.config)
-        if not ended or not self.config.diagnosis.correct or not self._models.is_of_file(state):
+        if not ended or not self.config.diagnosis.correct or not self.models.is_of_file(state):
             return None
         return correction_of(state, self._joints)
 
@@ -308,7 +305,7 @@ class TorqueObserver(KeepsSamples):
             or state.reference.parameters != state.parameters
         ):
             return None
-        is_near = self._models.fits if state.parameters.load.size else self._models.is_of_file
+        is_near = self.models.fits if state.parameters.load.size else self.models.is_of_file
         return state.parameters if is_near(state) else None
 
     @property
@@ -372,23 +369,12 @@ class TorqueObserver(KeepsSamples):
         return attrs.evolve(
             found,
             state=DiagnosisState.CHANGED if state.changes else DiagnosisState.AS_COUNTED,
-            reason=doubt(state, self._references, self._models),
+            reason=doubt(state, self._references, self.models),
             cycles=state.fit_cycles,
             clearance_m=tuple(clearance_m.tolist()),
             sigma_m=tuple(sigma_m.tolist()),
             changes=state.settled + state.changes,
         )
-
-    @property
-    def explained(self) -> ExplainedTorque | None:
-        """What the estimate rests on; None without one."""
-        state = self.state
-        if state.fit is None or not state.cycles:
-            return None
-        explainer = self._models.explainer(state)
-        measured = state.signatures[-max(state.fit_cycles, 1) :].mean(axis=0) - explainer.baseline.offset
-        expected = (explainer.model.at(each)[0] for each in (state.counted_m, state.fit.clearance_m))
-        return ExplainedTorque(*(each[: len(each) // 2] for each in (measured, *expected)))
 
     def _observed(self, fit: ClearanceFit) -> tuple[Floats, Floats]:
         """Observable clearances and their standard deviations, NaN for the others.
@@ -396,7 +382,7 @@ class TorqueObserver(KeepsSamples):
         A joint that the fit of all joints does not show is known from its own change. Where the reference is
         not that of the leg, a change can have the name of another joint, and no clearance is known.
         """
-        if not self._models.fits(self.state):
+        if not self.models.fits(self.state):
             nothing = np.full(len(fit.clearance_m), math.nan)
             return nothing, nothing
         observable = fit.sigma_m <= np.maximum(_ESTIMATED_M, _ESTIMATED * fit.clearance_m)

@@ -21,7 +21,7 @@ from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
-from leg_wear_monitor.monitor.diagnosis.state import AtCadence, TorqueState
+from leg_wear_monitor.monitor.diagnosis.state import AtCadence, ExplainedTorque, TorqueState
 from leg_wear_monitor.twin.reference import UNLIKE, CrankProfile, LegParameters, mean_profile
 from leg_wear_monitor.twin.torque_reference import (
     ReferenceSnapshot,
@@ -87,6 +87,15 @@ class LegModels:
     def explainer(self, state: TorqueState) -> Explainer:
         """Possible explanations of the measured torque: other clearances and other causes."""
         return self._of(state).explainer
+
+    def explained(self, state: TorqueState) -> ExplainedTorque | None:
+        """What the estimate rests on; None without one."""
+        if state.fit is None or not state.cycles:
+            return None
+        explainer = self.explainer(state)
+        measured = state.signatures[-max(state.fit_cycles, 1) :].mean(axis=0) - explainer.baseline.offset
+        expected = (explainer.model.at(each)[0] for each in (state.counted_m, state.fit.clearance_m))
+        return ExplainedTorque(*(each[: len(each) // 2] for each in (measured, *expected)))
 
     def detector(self, state: TorqueState, config: MonitorConfig) -> leg_model.ChangeDetector:
         """Tests for a change of the counted clearances."""

@@ -13,7 +13,7 @@ from leg_wear_monitor.mechanism.position import rotated
 from leg_wear_monitor.messages.leg_motion import PHASES, CycleMotion
 from leg_wear_monitor.playback.result import ReplayLeg, ReplaySummary
 from leg_wear_monitor.report.figure import BODY_COLOURS
-from leg_wear_monitor.report.leg_picture import drawn_pin, millimetres, picture_data
+from leg_wear_monitor.report.leg_slider import drawn_pin, millimetres, picture_data
 from leg_wear_monitor.report.page import Fragment, Section, render, since_words, template_text
 from leg_wear_monitor.state import JointClearance, State
 

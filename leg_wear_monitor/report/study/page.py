@@ -22,7 +22,8 @@ from leg_wear_monitor.report.figure import (
     new_figure,
     png,
 )
-from leg_wear_monitor.report.leg_picture import leg_data, leg_picture, leg_slider, run_data
+from leg_wear_monitor.report.leg_picture import leg_picture
+from leg_wear_monitor.report.leg_slider import leg_data, leg_slider, run_data
 from leg_wear_monitor.report.page import (
     Fragment,
     Gallery,

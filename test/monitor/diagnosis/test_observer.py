@@ -364,7 +364,7 @@ def test_on_the_ground_references_are_those_of_the_loaded_leg(leg, reference, mo
     assert state.reference.parameters == parameters
     assert state.load.peak_n == pytest.approx(300.0, abs=3.0 * state.load.peak_sigma_n)
     assert parameters.load[:, 1].max() == pytest.approx(300.0, rel=0.2)
-    assert observer._models.misfit(state) < 2.0
+    assert observer.models.misfit(state) < 2.0
     assert "set load.model" not in observer.diagnosis.reason
 
 

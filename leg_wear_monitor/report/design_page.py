@@ -91,7 +91,13 @@ def _joint(mechanism: Mechanism, result: Design, joint: str) -> Section:
         rows.append((one.material, *sizes, one.life_words))
     head = ("pair", "pin [mm]", "width [mm]", "clearance [µm]", "life")
     note = f"{len(lasting)} of those tried last; the smallest of each pair is shown, {_SHOWN} pairs at most."
-    table = Table(caption="Smallest bushings that last.", head=head, rows=rows, note=note, is_text=True)
+    table = Table(
+        caption=f"Smallest bushings that last in joint {joint}.",
+        head=head,
+        rows=rows,
+        note=note,
+        is_text=True,
+    )
     return Section(f"Joint {mechanism.joint_words(joint)}", [picture, table])
 
 

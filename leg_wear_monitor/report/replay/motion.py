@@ -26,7 +26,7 @@ def motion_section(summary: ReplaySummary) -> list[Section]:
     if not summary.motion or not leg.poses or not clearances:
         return []
     cycles = summary.motion if _has_changed(summary) else summary.motion[-1:]
-    names = ["before the change", "after the change"] if len(cycles) > 1 else ["at the end"]
+    names = ["before the change", "after the change"] if len(cycles) > 1 else ["the last one"]
     new = {joint: attrs.evolve(each, believed_m=each.counted_m) for joint, each in clearances.items()}
     runs = [_run(each, clearances if each is cycles[-1] else new) for each in cycles]
     forces = [
@@ -34,13 +34,13 @@ def motion_section(summary: ReplaySummary) -> list[Section]:
     ]
     named = [{"label": name, "pins": run} for name, run in zip(names, runs, strict=True)]
     ends = (since_words(summary, each.stamp_ns) for each in cycles)
-    said = "; ".join(f"{name} ended {end}" for name, end in zip(names, ends, strict=True))
+    said = "; ".join(f"{name}, ended {end}" for name, end in zip(names, ends, strict=True))
     markup = render(
         "replay/motion.html",
         data=_leg(leg) | {"runs": named, "longest_n": max([1.0, *forces])},
         names=names,
         alt="The leg over a gait cycle, with the contact forces in its clearance joints",
-        said=f"The gait cycle {said}.",
+        said=f"Gait cycle: {said}.",
         limit=summary.monitor.limits.torque_mismatch,
         cycles=[attrs.asdict(each.torque) for each in cycles],
     )

@@ -205,6 +205,7 @@ def certainty_section(summary: ReplaySummary) -> Section:
 
 _ANSWERS = {Level.OK: "yes", Level.WARN: "in part", Level.ERROR: "no"}
 _MOST_SENTENCES = 3
+_LEAST_REST = 0.01  # of the torque, as the verdict of a healthy leg says it
 
 _Card = tuple[str, Level, list[str]]
 """One question: its name, whether the answer is fine, and why."""
@@ -303,7 +304,8 @@ def _explained(summary: ReplaySummary) -> str:
     if mismatch is None:
         return ""
     limit = 100.0 * summary.monitor.limits.torque_mismatch
-    return f"{100.0 * mismatch:.2g} % of the drive torque is not explained (limit {limit:.3g} %)"
+    rest = f"{100.0 * mismatch:.2g}" if mismatch >= _LEAST_REST else "less than 1"
+    return f"{rest} % of the drive torque is not explained (limit {limit:.3g} %)"
 
 
 def replay_page(summary: ReplaySummary) -> Page:

@@ -40,7 +40,7 @@
       add(svg, "text", ["tick end", LEFT - 6, y(value) + 4], String(value));
     }
     for (let angle = 0; angle <= 360; angle += 90) {
-      add(svg, "text", ["tick middle", LEFT + (WIDTH - LEFT - RIGHT) * angle / 360 - (angle === 360 ? 8 : 0), HEIGHT - 20], angle + "°");
+      add(svg, "text", ["tick middle", LEFT + (WIDTH - LEFT - RIGHT) * angle / 360 - (angle === 360 ? 8 : 0), HEIGHT - 24], angle + "°");
     }
     add(svg, "text", ["tick middle", (LEFT + WIDTH) / 2, HEIGHT - 4], "crank angle");
     const there = mean.map((value, k) => [k, value]).filter((each) => each[1] !== null);

@@ -51,7 +51,7 @@ def test_a_break_out_is_played_before_and_after_it(knocked):
 def test_a_healthy_leg_has_one_gait_cycle_to_play(knocked):
     healthy = attrs.evolve(knocked, verdict=attrs.evolve(knocked.verdict, state=State.HEALTHY))
     (run,) = played(healthy)["data"]["runs"]
-    assert run["label"] == "at the end"
+    assert run["label"] == "the last one"
 
 
 def test_the_leg_is_where_the_mechanism_is():

@@ -18,7 +18,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from leg_wear_monitor.dynamics.clearance.basis import Basis
-from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper, needs_speed
+from leg_wear_monitor.dynamics.clearance.stepper import (
+    INTERVALS,
+    ClearanceStepper,
+    length_of,
+    needs_speed,
+)
 from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, build_basis, build_tables
 from leg_wear_monitor.dynamics.result import SimulationResult
 from leg_wear_monitor.dynamics.run import DONE, RunStatistics, Setup, new_run_statistics, steady_drive, stop
@@ -137,6 +142,7 @@ class SharedBasis:
     def __init__(self, setup: Setup) -> None:
         self._lock, self._setup = Lock(), setup
         self._basis: Basis | None = None
+        self.tables: ClearanceTables | None = None  # the first that were built with it
 
     def get(self) -> Basis:
         """The basis; the first call builds it, other threads wait meanwhile."""
@@ -165,16 +171,23 @@ class SharedTables:
         """The tables; the first call builds them, other threads wait meanwhile."""
         with self._lock:
             if self._tables is None:
-                basis = self._basis.get() if self._basis else None
-                self._tables = build_tables(self._setup.linkage, self._setup.contacts, basis=basis)
+                self._tables = self._build()
                 self._basis = None
             return self._tables
+
+    def _build(self) -> ClearanceTables:
+        linkage, contacts, shared = self._setup.linkage, self._setup.contacts, self._basis
+        if shared is None:
+            return build_tables(linkage, contacts, basis=None)
+        tables = build_tables(linkage, contacts, basis=shared.get(), like=shared.tables)
+        shared.tables = shared.tables or tables
+        return tables
 
 
 def share_tables(setups: Sequence[Setup | AssemblyError]) -> Iterator[tuple[int, Setup, SharedTables]]:
     """Index, setup and tables of the valid legs; legs with common tables, then bases, follow each other.
 
-    Therefore no more tables and bases exist at a time than legs are running.
+    Therefore hardly more tables and bases exist at a time than legs are running.
     """
     groups: dict[object, dict[object, list[tuple[int, Setup]]]] = {}
     for i, setup in enumerate(setups):
@@ -243,6 +256,7 @@ def simulate_batch(
     *,
     cycles: float = 5.0,
     skip_cycles: float = 1.0,
+    intervals: int = INTERVALS,
     workers: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> list[Outcome]:
@@ -253,6 +267,8 @@ def simulate_batch(
     legs : sequence of Leg
     cycles, skip_cycles : float
         Counted gait cycles of each leg, and gait cycles before counting starts.
+    intervals : int
+        As in `simulate`.
     workers : int, optional
         Number of threads; default: the number of cores. Results do not depend on it.
     progress : callable, optional
@@ -277,7 +293,7 @@ def simulate_batch(
     with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
         try:
             futures = {
-                i: pool.submit(_simulate, legs[i], setup, tables, cycles, skip_cycles, stopped)
+                i: pool.submit(_simulate, legs[i], setup, tables, cycles, skip_cycles, intervals, stopped)
                 for i, setup, tables in share_tables(setups)
             }
             for done, future in enumerate(as_completed(futures.values()), 1):
@@ -300,12 +316,18 @@ def _outcome(future: Future[SimulationResult]) -> SimulationResult | SimulationE
 
 
 def _simulate(
-    leg: Leg, setup: Setup, tables: SharedTables, cycles: float, skip_cycles: float, stopped: Event
+    leg: Leg,
+    setup: Setup,
+    tables: SharedTables,
+    cycles: float,
+    skip_cycles: float,
+    intervals: int,
+    stopped: Event,
 ) -> SimulationResult:
     """Result of one leg."""
     if not setup.clearance_joints:
         return ideal_result(setup, cycles, 0)
-    stepper = ClearanceStepper(setup, tables=tables.get())
+    stepper = ClearanceStepper(setup, length_of(setup, intervals), tables=tables.get())
     leg.start(stepper)
     joints = len(setup.linkage.mechanism.joints)
     _turn(leg, setup, stepper, skip_cycles, new_run_statistics(joints), stopped)

@@ -272,7 +272,8 @@ def simulate(
         is integrated to its own instant: from some hundred per cycle on, they take longer than the run.
     intervals : int, optional
         Resolution of model ``clearance``: intervals of time per gait cycle, `LEAST_INTERVALS` or more;
-        default: 2048. Inside them, steps adapt to a local error.
+        default: 2048. Inside them, steps adapt to a local error. 1024 take a tenth less time, and change mean
+        forces and wear by less than they scatter.
     progress : callable, optional
         Called with the completed fraction of the run.
 

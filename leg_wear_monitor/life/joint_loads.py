@@ -10,6 +10,7 @@ import numpy as np
 from leg_wear_monitor.configuration import described, quantity
 from leg_wear_monitor.configuration.strict import read_document, structure
 from leg_wear_monitor.dynamics.batch import Leg, simulate_batch
+from leg_wear_monitor.dynamics.clearance.stepper import STATISTICS_INTERVALS
 from leg_wear_monitor.dynamics.result import SimulationResult
 from leg_wear_monitor.errors import ConfigError, LegWearError
 from leg_wear_monitor.life.result import Duty
@@ -166,7 +167,9 @@ def joint_loads(
         for part, speed in zip(duty, speeds, strict=True)
         for start in range(_STARTS)
     ]
-    outcomes = simulate_batch(legs, cycles=_CYCLES, workers=workers, progress=progress)
+    outcomes = simulate_batch(
+        legs, cycles=_CYCLES, intervals=STATISTICS_INTERVALS, workers=workers, progress=progress
+    )
     results = [_result(one) for one in outcomes]
     joints = mechanism.clearance_joints
     radius = np.array([mechanism.clearances[joint].bushing_radius for joint in joints])

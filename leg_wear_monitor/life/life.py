@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from leg_wear_monitor.configuration import described, quantity
 from leg_wear_monitor.dynamics.batch import Leg, advance_batch, prepare_legs, share_tables
-from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
+from leg_wear_monitor.dynamics.clearance.stepper import STATISTICS_INTERVALS, ClearanceStepper, length_of
 from leg_wear_monitor.dynamics.run import (
     ARCHARD,
     DONE,
@@ -208,7 +208,8 @@ class LifeRun:
         self.clearance_joints, self.fresh_m = first.clearance_joints, first.contacts.clearance
         self.radius_m = first.contacts.bushing_radius
         self._steppers = [
-            ClearanceStepper(setup, tables=tables.get()) for _, setup, tables in share_tables(self._setups)
+            ClearanceStepper(setup, length_of(setup, STATISTICS_INTERVALS), tables=tables.get())
+            for _, setup, tables in share_tables(self._setups)
         ]
         self._polynomials = []
         perturb_m = self.settings.perturb_fraction * float(self.fresh_m.min())

@@ -129,16 +129,21 @@ def test_parts_of_a_duty_count_by_their_hours():
 
 @pytest.mark.chaotic
 def test_lives_are_those_of_a_whole_life():
-    """The screening supposes that wear spreads over the circumference; a life follows where it goes."""
+    """The screening supposes that wear spreads over the circumference; a life follows where it goes.
+
+    C is 16 % above the mean of lives from four starts, whose sigma is 3 % each (2026-11-26); B is 4 % above.
+    """
     leg = lw.load_mechanism("four_bar")
     fresh_m = leg.clearances["B"].radial_clearance
     limit_m = fresh_m + 1e-4
     choices = tried("pai-on-steel-dry", fresh_m=fresh_m)
     found = lw.design(leg, read_duty("0:8"), choices, limit_m=limit_m)
-    run = lw.LifeRun(leg, lw.LifeSettings(cycles=8), duty=lw.Duty.parse("0:8"))
-    whole = lw.simulate_life(run, limit_m=limit_m, horizon_cycles=1e12).end(limit_m)
+    settings = [lw.LifeSettings(cycles=8, seed=seed) for seed in range(4)]
+    runs = [lw.LifeRun(leg, one, duty=lw.Duty.parse("0:8")) for one in settings]
+    lives = [lw.simulate_life(run, limit_m=limit_m, horizon_cycles=1e12).end(limit_m) for run in runs]
     for one in found.own:
-        assert one.wear_h[1] == pytest.approx(whole[one.joint]["hours"], rel=0.2)
+        whole = np.mean([life[one.joint]["hours"] for life in lives])
+        assert one.wear_h[1] == pytest.approx(whole, rel=0.2)
 
 
 @pytest.mark.plain

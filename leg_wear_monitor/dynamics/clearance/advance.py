@@ -237,8 +237,8 @@ ADVANCE = ByAddress(advance_clearances, types.UniTuple(types.int64, 2))
 @kernel
 def _interval(model, surfaces, state, polynomial, statistics, work):
     """Advance by one interval, in parts where the linkage moves fast; returns status and joint."""
-    i, _ = blend(model.tables.parts.shape[0], state.drive[ANGLE])
-    parts, status, k = model.tables.parts[i], DONE, -1
+    i, _ = blend(model.parts.shape[0], state.drive[ANGLE])
+    parts, status, k = model.parts[i], DONE, -1
     if model.coupling.law[STIFFNESS] > 0.0:
         parts *= int(model.coupling.law[PARTS])
     for part in range(parts):

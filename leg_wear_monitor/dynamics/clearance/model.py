@@ -22,7 +22,7 @@ from leg_wear_monitor.dynamics.clearance.contact import ADDED, TO_ANGLE, VECTORS
 from leg_wear_monitor.dynamics.clearance.film_system import ContactSystem, contact_system
 from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables
 from leg_wear_monitor.dynamics.run import JOINT_RATES
-from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
 
 # What is between the drive and the crank: nothing, or a coupling or a belt (physics.md section 7).
 
@@ -95,7 +95,8 @@ class ClearanceModel(NamedTuple):
     ``interval`` [s]: time between the instants at which the state exists; ``tolerance`` (2,): reciprocals of
     the local error allowed in a step, of eccentricities [1/m] and of their rates [s/m]; ``law`` (LAW_ROWS,
     room): of `contact_laws`, ``usual``: 1 if `have_usual_laws`, else 0; ``film``: films of the joints;
-    ``damped``: 1 with dampers, else 0; ``coupling``: between the drive and the crank.
+    ``damped``: 1 with dampers, else 0; ``coupling``: between the drive and the crank; ``parts`` (N,): number
+    of parts of an interval that starts at each point of the tables.
     """
 
     contacts: ContactArrays
@@ -107,6 +108,7 @@ class ClearanceModel(NamedTuple):
     film: FilmModel
     damped: int
     coupling: Coupling
+    parts: Ints
 
 
 class ClearanceState(NamedTuple):

@@ -62,6 +62,9 @@ from leg_wear_monitor.mechanism.spec import ConstantLoad, Mechanism, SpeedDrive,
 from leg_wear_monitor.workers import compiled_beside
 
 INTERVALS = 2048  # intervals per turn at the setup's speed
+# where only statistics and wear are asked, and the drive is rigid; their errors are in physics.md section 7
+STATISTICS_INTERVALS = 1024
+_MOST_PARTS = 8  # parts of an interval of the usual length: bounds its cost
 TOLERANCE_M = 5.0e-9  # local error of a step in the eccentricities [m]; a smaller one does not change means
 TOLERANCE_RATE = 1.0e4  # 1/s: ratio of the rates' tolerance to it, the reciprocal duration of a contact
 
@@ -126,16 +129,19 @@ class ClearanceStepper:
         if not isinstance(mechanism.drive, SpeedDrive):
             raise needs_speed(mechanism)
         self._setup = setup
+        interval = interval_s or length_of(setup, INTERVALS)
+        tables = tables or build_tables(setup.linkage, setup.contacts)
         self.model = ClearanceModel(
             contacts=setup.contacts,
-            tables=tables or build_tables(setup.linkage, setup.contacts),
-            interval=interval_s or TURN / abs(setup.speed) / INTERVALS,
+            tables=tables,
+            interval=interval,
             tolerance=np.array([1.0, 1.0 / TOLERANCE_RATE]) / tolerance_m,
             law=contact_laws(setup.contacts),
             usual=int(have_usual_laws(setup.contacts)),
             film=film_model(setup.contacts, setup.films),
             damped=int(is_damped(setup.linkage.arrays)),
             coupling=rigid_coupling(),
+            parts=_parts(tables, INTERVALS * interval * abs(setup.speed) / TURN),
         )
         self.state: ClearanceState = clearance_state(setup.surfaces.depth, 0.0, setup.speed)
         self.work = clearance_work(self.model, self.state)
@@ -251,6 +257,20 @@ class ClearanceStepper:
         self.state.depth[:] = snapshot.depth
 
 
+def length_of(setup: Setup, intervals: int) -> float:
+    """Length of an interval [s], from the number of intervals per turn at the setup's speed."""
+    return float(TURN / abs(setup.speed) / intervals)
+
+
+def _parts(tables: ClearanceTables, length: float) -> Ints:
+    """Number of parts (N,) of an interval at the tables' points; ``length``: over that of the usual one.
+
+    A longer interval has more parts, so that none is longer where the linkage moves fast.
+    """
+    length = max(1.0, round(length, 3))
+    return np.clip(np.ceil(length * tables.parts), 1, round(_MOST_PARTS * length)).astype(np.int64)
+
+
 def needs_speed(mechanism: Mechanism) -> ConfigError:
     """Error for a mechanism that is driven by a constant torque or by a controller."""
     key = "drive.torque" if isinstance(mechanism.drive, TorqueDrive) else "drive.track"
@@ -299,7 +319,7 @@ class ClearanceRun:
     def __init__(self, setup: Setup, intervals: int = INTERVALS) -> None:
         if not isinstance(setup.linkage.mechanism.drive, SpeedDrive):
             raise needs_speed(setup.linkage.mechanism)
-        self.stepper = ClearanceStepper(setup, TURN / abs(setup.speed) / intervals)
+        self.stepper = ClearanceStepper(setup, length_of(setup, intervals))
         self._setup = setup
         self._polynomial = steady_drive(0.0, setup.speed)
         self._ahead: tuple[ClearanceRun, RunStatistics] | None = None
@@ -395,7 +415,7 @@ def _tables() -> ClearanceTables:
         reaction=np.zeros((1, 1, 1)),
         reaction_joint=np.zeros(1, np.int64),
         stored=np.zeros((1, 1)),
-        parts=np.zeros(1, np.int64),
+        parts=np.zeros(1),
         by_e=np.zeros((1, 1, 1, 1), np.float32),
         bend=np.zeros((1, 1, 1, 1), np.float32),
         spin=np.zeros((1, 1, 1, 1), np.float32),
@@ -417,6 +437,7 @@ def _leg() -> tuple[ClearanceModel, ClearanceState, ClearanceWork]:
         film=film,
         damped=0,
         coupling=rigid_coupling(),
+        parts=np.zeros(1, np.int64),
     )
     state = clearance_state(np.zeros((1, 2, 1)), 0.0, 1.0)
     return model, state, clearance_work(model, state)

@@ -15,6 +15,7 @@ energy, so the energy balance is closed. In addition, A changes with e by Gamma 
 M q_ee, and the term Gamma e' e' is added to A e''; the drive torque and the stored energy neglect both.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +28,7 @@ from leg_wear_monitor.dynamics.clearance.basis import (
     derivative,
     motion_shapes,
     project,
+    start_of,
     views,
 )
 from leg_wear_monitor.mechanism.arrays import Floats, Ints, Singles, body_names, point_from_com
@@ -38,7 +40,6 @@ COARSER = 2  # ratio of the step of the tables of first order in e to that of th
 
 # 1/rad^2: largest second derivative of the Coriolis terms over their RMS for an undivided interval
 _BENT = 10.0
-_MOST_PARTS = 8  # parts of an interval: bounds its cost
 
 
 class ClearanceTables(NamedTuple):
@@ -48,7 +49,7 @@ class ClearanceTables(NamedTuple):
     (N + 1, 4 + 3 d + k, r): drive torque and reactions of the ideal joints, coefficients of (1, w', w^2, w,
     e'', w e', e', F_t); ``reaction_joint`` (r,): joint of each, ``DRIVE`` first; ``stored`` (N + 1, u): parts
     of the stored energy of `stored_shapes`;
-    ``parts`` (N,): number of parts of an interval that starts there.
+    ``parts`` (N,): parts into which an interval of 1/2048 turn that starts there should be cut, as a float.
 
     ``by_e`` (M + 1, u / WIDTH, d, WIDTH): derivatives by e of the parts of `changing_shapes`, in blocks of
     vectors; ``bend`` (M + 1, d d / WIDTH, d, WIDTH): accelerations A^-1 Gamma, bilinear in e'. Both are
@@ -62,7 +63,7 @@ class ClearanceTables(NamedTuple):
     reaction: Floats
     reaction_joint: Ints
     stored: Floats
-    parts: Ints
+    parts: Floats
     by_e: Singles
     bend: Singles
     spin: Singles
@@ -81,7 +82,11 @@ def build_basis(linkage: Linkage, contacts: ContactArrays, points: int = POINTS)
 
 
 def build_tables(
-    linkage: Linkage, contacts: ContactArrays, points: int = POINTS, basis: Basis | None = None
+    linkage: Linkage,
+    contacts: ContactArrays,
+    points: int = POINTS,
+    basis: Basis | None = None,
+    like: ClearanceTables | None = None,
 ) -> ClearanceTables:
     """Tables of a linkage with the clearance joints of ``contacts``.
 
@@ -93,6 +98,8 @@ def build_tables(
         Crank steps per turn.
     basis : Basis, optional
         That of the same linkage and clearance joints, with any radii; ``points`` is then not used.
+    like : ClearanceTables, optional
+        Tables of this basis with any radii: those that do not depend on the radii are shared, not copied.
 
     Returns
     -------
@@ -104,14 +111,15 @@ def build_tables(
         If the linkage does not close or has a dead point.
     """
     basis = basis.with_contacts(linkage, contacts) if basis else build_basis(linkage, contacts, points)
+    if like is not None:
+        return _with_levers(like, linkage, basis)
     motion, points = basis.motion, len(basis.motion.q)
     held, joints = _held_rows(linkage, basis)
     reaction = _reactions(basis, held)
     parts = {
         **_accelerations(basis),
         **_torque(basis),
-        "lever": project(basis.s, basis.friction),
-        "lever_drive": project(basis.friction, basis.drive[:, :, None]),
+        **_levers(basis),
         "angle": motion.q[:, linkage.arrays.joint_body[contacts.joint], 2],
         "turn": motion.v[:, linkage.arrays.joint_body[contacts.joint], 2],
         "toe": _toe(linkage, motion, basis),
@@ -121,13 +129,14 @@ def build_tables(
     if not basis.drag.any():
         parts["viscous"] = parts["damper"] = np.zeros((points, 0))
     shapes = motion_shapes(len(contacts.joint), bool(basis.drag.any()))
-    rows = np.concatenate([parts[name].reshape(points, -1) for name in shapes], axis=1)
-    rows = np.pad(rows, ((0, 0), (0, padded(rows.shape[1]) - rows.shape[1])))
-    closing = rows[:1].copy()
+    width = sum(math.prod(shape) for shape in shapes.values())
+    rows = np.zeros((points + 1, padded(width)))
+    np.concatenate([parts[name].reshape(points, -1) for name in shapes], axis=1, out=rows[:-1, :width])
+    rows[-1] = rows[0]
     turns = np.round(motion.v[:, linkage.arrays.joint_body[contacts.joint], 2].mean(axis=0))
-    views(closing[0], shapes)["angle"][:] += TURN * turns
+    views(rows[-1], shapes)["angle"][:] += TURN * turns
     return ClearanceTables(
-        motion=np.concatenate([rows, closing]),
+        motion=rows,
         reaction=np.concatenate([reaction, reaction[:1]]),
         reaction_joint=joints,
         stored=_stored(basis),
@@ -137,15 +146,56 @@ def build_tables(
     )
 
 
-def _parts(table: Floats) -> Ints:
-    """Number of parts of an interval at each point (N,), from the second derivative of a table (N, d, d)."""
+def _with_levers(tables: ClearanceTables, linkage: Linkage, basis: Basis) -> ClearanceTables:
+    """Tables of the same linkage and clearance joints with the levers of friction of a basis."""
+    k = basis.friction.shape[2]
+    motion, reaction, by_e = tables.motion.copy(), tables.reaction.copy(), tables.by_e.copy()
+    shapes = motion_shapes(k, bool(basis.drag.any()))
+    for name, part in _levers(basis).items():
+        first, columns = start_of(name, shapes), part.reshape(len(part), -1)
+        motion[:-1, first : first + columns.shape[1]] = columns
+        motion[-1, first : first + columns.shape[1]] = columns[0]
+    held, _ = _held_rows(linkage, basis)
+    reaction[:-1, -k:] = _friction_reactions(basis, held)
+    reaction[-1] = reaction[0]
+    slopes, first = _lever_slopes(basis)[_coarse(len(basis.s))], start_of("lever_drive", changing_shapes(k))
+    for i in range(k):
+        by_e[:, (first + i) // WIDTH, :, (first + i) % WIDTH] = slopes[:, :, i]
+    return tables._replace(motion=motion, reaction=reaction, by_e=by_e)
+
+
+def _levers(basis: Basis) -> dict[str, Floats]:
+    """Parts of `motion_shapes` that depend on the radii of the clearance joints."""
+    return {
+        "lever": project(basis.s, basis.friction),
+        "lever_drive": project(basis.friction, basis.drive[:, :, None]),
+    }
+
+
+def _lever_slopes(basis: Basis) -> Floats:
+    """Derivatives (N, d, k) by e of ``lever_drive``."""
+    return project(basis.s_t, basis.friction)
+
+
+def _friction_reactions(basis: Basis, rows: list[int]) -> Floats:
+    """Drive torque and reactions of the ideal joints per friction force (N, k, r)."""
+    return project(-basis.friction, basis.x[:, :, rows])
+
+
+def _coarse(points: int) -> list[int]:
+    """Every `COARSER`-th point of a turn, the first repeated at the end."""
+    return [*range(0, points, COARSER), 0]
+
+
+def _parts(table: Floats) -> Floats:
+    """Parts of an interval at each point (N,), as a float, by the second derivative of a table (N, d, d)."""
     step = TURN / len(table)
     bend = np.roll(table, -1, axis=0) - 2.0 * table + np.roll(table, 1, axis=0)
     size = np.sqrt((table**2).mean(axis=0)).max()
     if size == 0.0:
-        return np.ones(len(table), dtype=np.int64)
+        return np.ones(len(table))
     roughness = np.abs(bend).max(axis=(1, 2)) / (step**2 * size * _BENT)
-    return np.asarray(np.clip(np.ceil(np.sqrt(roughness)), 1, _MOST_PARTS), dtype=np.int64)
+    return np.asarray(np.sqrt(roughness))
 
 
 def _accelerations(basis: Basis) -> dict[str, Floats]:
@@ -172,14 +222,14 @@ def _first_order(basis: Basis, inverse_mass: Floats) -> dict[str, Singles]:
     The inverse of A + Gamma e + (Gamma e)^T is A^-1 - Q e - (Q e)^T with Q = A^-1 Gamma A^-1.
     """
     n, d = inverse_mass.shape[:2]
-    coarse = [*range(0, n, COARSER), 0]
+    coarse = _coarse(n)
     inverse_mass, m = inverse_mass[coarse], len(coarse)
     bend = (inverse_mass @ basis.gamma[coarse].reshape(m, d, d * d)).reshape(m, d, d, d).transpose(0, 3, 2, 1)
     change = inverse_mass[:, None] @ bend
     free = np.stack([basis.force_e, -basis.b_e, 0.5 * basis.c_ee - derivative(basis.b_e)], axis=1)
     parts = {
         "free": free.transpose(0, 3, 1, 2),
-        "lever_drive": project(basis.s_t, basis.friction),
+        "lever_drive": _lever_slopes(basis),
         "load_power": np.concatenate(
             [basis.load_e.transpose(0, 2, 1), basis.drive_load_e[:, :, None]], axis=2
         ),
@@ -251,8 +301,9 @@ def _reactions(basis: Basis, rows: list[int]) -> Floats:
     mass = basis.mass[:, None]
     by = [-basis.force[:, :, None], mass * basis.drive[:, :, None], mass * basis.drive_t[:, :, None]]
     by += [basis.drag[:, :, -1:], mass * basis.s, 2.0 * mass * basis.s_t]
-    by += [basis.drag[:, :, :-1], -basis.friction]
-    return project(np.concatenate(by, axis=2), basis.x[:, :, rows])
+    by.append(basis.drag[:, :, :-1])
+    others = project(np.concatenate(by, axis=2), basis.x[:, :, rows])
+    return np.concatenate([others, _friction_reactions(basis, rows)], axis=1)
 
 
 def _spins(bodies: Ints, basis: Basis, rows: list[int]) -> dict[str, Singles]:
@@ -263,7 +314,7 @@ def _spins(bodies: Ints, basis: Basis, rows: list[int]) -> dict[str, Singles]:
     moment = np.broadcast_to(unit[3:], (n, len(basis.mass), moments))  # on the ground it does nothing
     spin = np.stack([project(moment, basis.s), project(moment, basis.s_t)], axis=1)
     reaction = -project(moment, basis.x[:, :, rows])
-    coarse = [*range(0, n, COARSER), 0]
+    coarse = _coarse(n)
     return {
         "spin": np.ascontiguousarray(spin[coarse], dtype=np.float32),
         "spin_reaction": np.ascontiguousarray(reaction[coarse], dtype=np.float32),

@@ -142,9 +142,13 @@ def test_tables_of_a_shared_basis_are_those_of_the_leg_alone(name, joints):
     first, other = (
         prepare(load_mechanism(name), clearances=joints, clearance_m=clearance) for clearance in (None, 1e-4)
     )
-    shared = build_tables(other.linkage, other.contacts, basis=build_basis(first.linkage, first.contacts))
+    basis = build_basis(first.linkage, first.contacts)
+    shared = build_tables(other.linkage, other.contacts, basis=basis)
     alone, former = (build_tables(setup.linkage, setup.contacts) for setup in (other, first))
     assert all(map(np.array_equal, shared, alone))
+    assert all(
+        map(np.array_equal, build_tables(other.linkage, other.contacts, basis=basis, like=former), alone)
+    )
     assert not all(map(np.array_equal, shared, former))
 
 

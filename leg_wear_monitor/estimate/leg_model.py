@@ -35,6 +35,7 @@ from leg_wear_monitor.estimate.signature import (
     signature_model,
     signature_of_torque,
     simulated_signatures,
+    without_scatter,
 )
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.spec import Mechanism
@@ -111,7 +112,14 @@ def identified_leg(
             np.append(steps, -math.log(STIFFER)),
             np.append(sigma, _LOG_COMPLIANCE),
         )
-    slopes = ((np.array(means[1:]) - means[0]) / steps[:, None]).T
+    # as of clearances: a mass that does nothing would seem known by what its simulated gait cycles scatter
+    scatter = [1.0 / len(torque) for torque in legs.torque_nm]
+    one = np.ones(1)
+    changes = [
+        without_scatter(one, (mean - means[0])[None], model.covariance, own * one, scatter[0])[0][0]
+        for mean, own in zip(means[1:], scatter[1:], strict=True)
+    ]
+    slopes = (np.array(changes) / steps[:, None]).T
     weighted = np.linalg.solve(_covariance(model, nuisances, commissioned.cycles), slopes)
     information = slopes.T @ weighted + np.diag(sigma**-2.0)
     rest = commissioned.mean - means[0]
@@ -458,6 +466,13 @@ class ChangeDetector:
         self._half = np.where(is_possible, self._half, np.inf)
         self._excess = excess(_scatter(explainer, change))
         self.threshold = threshold(false_alarm_cycles, len(change))
+        self._step, self._counted_m = (information - self._half) / self._excess, counted_m
+
+    def unseen_m(self, cycles: int) -> Floats:
+        """Widest clearances (k,) [m] that are not expected to be detected within some gait cycles."""
+        steps = self._step.reshape(len(self._counted_m), -1)[:, : len(FACTORS)]
+        factors = np.where(cycles * steps < self.threshold, FACTORS, 1.0)
+        return np.asarray(factors.max(axis=1) * self._counted_m)
 
     def fresh(self) -> DetectorState:
         """State before the first gait cycle."""

@@ -47,6 +47,34 @@ def test_the_threshold_grows_with_the_time_between_false_alarms_and_with_the_tes
     assert threshold(1000.0, 20) == pytest.approx(math.log(20_000.0))
 
 
+@pytest.mark.parametrize("k", [0, 1])
+def test_the_widest_joint_that_is_not_seen_is_the_last_that_is_not_found(k: int) -> None:
+    """Within as many gait cycles, on a leg that shows 0.8 of what the model expects."""
+    tests, own, cycles = detector(), model(), 8
+    unseen = tests.unseen_m(cycles)[k]
+    after = FACTORS[int(np.searchsorted(FACTORS, unseen / NEW[k] + 1e-9))]
+    for size, least, most in ((unseen, 0, 11), (after * NEW[k], 14, 20)):
+        wide, found = NEW.copy(), 0
+        wide[k] = size
+        mean = own.mean + 0.8 * (own.at(wide)[0] - own.mean)
+        for seed in range(20):
+            random, state = np.random.default_rng(seed), tests.fresh()
+            for i in range(round(1.3 * cycles)):
+                state = tests.with_cycle(state, mean + random.standard_normal(F), 1 + i)
+            found += tests.detection(state) is not None
+        assert least <= found <= most
+
+
+def test_a_joint_that_the_torque_does_not_show_is_never_seen() -> None:
+    own = model()
+    hidden = attrs.evolve(own, change=own.change * np.array([1.0, 0.0])[:, None, None])
+    none = Baseline(np.zeros(F), np.zeros((F, F)))
+    tests = ChangeDetector(Explainer(hidden, ("A", "B"), none, ()), NEW, 1e6)
+    unseen = tests.unseen_m(10**6)
+    assert unseen[0] == NEW[0]
+    assert unseen[1] == FACTORS[-1] * NEW[1]
+
+
 def test_false_alarms_are_as_rare_as_chosen() -> None:
     """With a chosen mean of 200 cycles, in 6000 cycles at most 30 are expected; the bound is conservative."""
     tests, alarms = detector(200.0 / 3600.0), 0

@@ -379,13 +379,17 @@ class TorqueObserver(KeepsSamples):
     def _observed(self, fit: ClearanceFit) -> tuple[Floats, Floats]:
         """Observable clearances and their standard deviations, NaN for the others.
 
-        A joint that the fit of all joints does not show is known from its own change. Where the reference is
-        not that of the leg, a change can have the name of another joint, and no clearance is known.
+        Nor is a joint observable that no test would find where it is as wide as is corrected. A joint that the
+        fit of all joints does not show is known from its own change. Where the reference is not that of the
+        leg, a change can have the name of another joint, and no clearance is known.
         """
         if not self.models.fits(self.state):
             nothing = np.full(len(fit.clearance_m), math.nan)
             return nothing, nothing
         observable = fit.sigma_m <= np.maximum(_ESTIMATED_M, _ESTIMATED * fit.clearance_m)
+        if self.state.commissioned is not None:
+            unseen_m = self.models.detector(self.state, self.config).unseen_m(WINDOW_CYCLES)
+            observable &= unseen_m <= CORRECTED_FROM * self.state.counted_m
         clearance_m, sigma_m = (
             np.where(observable, each, math.nan) for each in (fit.clearance_m, fit.sigma_m)
         )

@@ -379,7 +379,7 @@ class TorqueObserver(KeepsSamples):
     def _observed(self, fit: ClearanceFit) -> tuple[Floats, Floats]:
         """Observable clearances and their standard deviations, NaN for the others.
 
-        Nor is a joint observable that no test would find where it is as wide as is corrected. A joint that the
+        Nor is a joint observable that no test would find as wide as is corrected. A joint that the
         fit of all joints does not show is known from its own change. Where the reference is not that of the
         leg, a change can have the name of another joint, and no clearance is known.
         """

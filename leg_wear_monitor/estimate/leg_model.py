@@ -35,7 +35,6 @@ from leg_wear_monitor.estimate.signature import (
     signature_model,
     signature_of_torque,
     simulated_signatures,
-    without_scatter,
 )
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.spec import Mechanism
@@ -112,14 +111,7 @@ def identified_leg(
             np.append(steps, -math.log(STIFFER)),
             np.append(sigma, _LOG_COMPLIANCE),
         )
-    # as of clearances: a mass that does nothing would seem known by what its simulated gait cycles scatter
-    scatter = [1.0 / len(torque) for torque in legs.torque_nm]
-    one = np.ones(1)
-    changes = [
-        without_scatter(one, (mean - means[0])[None], model.covariance, own * one, scatter[0])[0][0]
-        for mean, own in zip(means[1:], scatter[1:], strict=True)
-    ]
-    slopes = (np.array(changes) / steps[:, None]).T
+    slopes = ((np.array(means[1:]) - means[0]) / steps[:, None]).T
     weighted = np.linalg.solve(_covariance(model, nuisances, commissioned.cycles), slopes)
     information = slopes.T @ weighted + np.diag(sigma**-2.0)
     rest = commissioned.mean - means[0]

@@ -92,20 +92,6 @@ def test_other_bodies_are_identified_from_the_torque(leg, known) -> None:
     assert after < 0.25 * before
 
 
-def test_a_mass_that_does_nothing_stays_that_of_the_file(leg, known) -> None:
-    """Simulated means scatter: what they differ by was taken for what the crank's mass changes."""
-    reference, model, found = known
-    legs, random = legs_of(leg, reference), np.random.default_rng(7)
-    drawn = [torque[random.integers(len(torque), size=len(torque))] for torque in legs.torque_nm]
-    truth = LegParameters.none(leg)
-    truth = attrs.evolve(truth, mass=truth.mass + 0.1 * (np.array(list(leg.bodies)) == "shank"))
-    other = commissioned(reference, walked(leg, reference, truth))
-    bodies = identified_leg(attrs.evolve(legs, torque_nm=tuple(drawn)), model, found, other)
-    moved = dict(zip(leg.bodies, np.abs(bodies.mass - 1.0), strict=True))
-    assert moved["crank"] < 1.0e-4
-    assert max(moved, key=moved.__getitem__) == "shank"
-
-
 # legs that can turn
 @pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (4, 6))])
 def test_a_leg_far_from_its_file_is_found_near_by_the_ideal_torque(leg, known, seed) -> None:

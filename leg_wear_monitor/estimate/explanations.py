@@ -247,8 +247,8 @@ class Explainer:
             each = [opened(counted_m, k, size) for size in sizes]
             change = np.array([self.model.at(one)[0] for one in each]) - there
             scatter = np.array([self.model.scatter_at(one) for one in each])
-            scatter += self.error(change)
-            return Misfits(rest - change, covariance + scatter[:, None, None] * self.model.covariance)
+            own = scatter[:, None, None] * self.model.covariance + _diagonal(MODEL_ERROR * change)
+            return Misfits(rest - change, covariance + own)
 
         widest = self.model.grid_m[k, -1]
         least = _LEAST_FACTOR * min(counted_m[k], self.fresh_m[k])

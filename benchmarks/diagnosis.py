@@ -381,7 +381,7 @@ def first_diagnosis(name: str, walks: dict[str, np.ndarray], options, random) ->
             estimate = cycle
         if state.commissioned is None:
             continue
-        off = f"{observer._models.misfit(state):.2f}"
+        off = f"{observer.models.misfit(state):.2f}"
         misfits += [] if off in misfits else [off]
         if not found.reason:
             break

@@ -233,7 +233,7 @@ def main() -> None:
     for peak_n, given in cases():
         rows = drawn(cycles_of("", 0.3, peak_n, 5, given), options.cycles)
         one, found = watched(leg, size, rows)
-        own, off = one.state.sensor, one._models.misfit(one.state)
+        own, off = one.state.sensor, one.models.misfit(one.state)
         channel = f"{1e3 * own.channel.delay_s:.2f}, {1e3 * own.channel.time_constant_s:.2f}"
         print(f"| {peak_n:.0f} | {given or '-'} | {channel} | {off:.1f} | {found or 'none'} |", flush=True)
     print("\n| load [N] | drive | opened [mm] | found, in cycle | clearance ± |\n|---|---|---|---|---|")

@@ -171,7 +171,7 @@ def main() -> None:
             order = drawn(np.arange(cycles.shape[1])[:, None], round(3600 * options.hours))
             rows = warming(cycles, [int(one[0]) for one in order])
             one, found = watched(leg, size, rows)
-            own, off = one.state.sensor, one._models.misfit(one.state)
+            own, off = one.state.sensor, one.models.misfit(one.state)
             own = own.channel
             channel = (
                 f"{1e3 * own.delay_s:.2f} ms, {1e3 * own.time_constant_s:.2f} ms, {own.load_friction:.3f}"

@@ -152,7 +152,7 @@ def main() -> None:
             cycles = cycles_of(walk(peak_n).rows, drive, sensor, 5)[0]
             one, found = watched(leg, size, list(cycles[:BEFORE]), config=config, periods=4)
             state = one.state
-            load, channel, off = state.load, state.sensor.channel, one._models.misfit(state)
+            load, channel, off = state.load, state.sensor.channel, one.models.misfit(state)
             print(
                 f"{peak_n:.0f} N, {name}: load {load.peak_n:.0f} ± {load.peak_sigma_n:.0f} N, stance "
                 f"{load.heel_strike:.3f} to {load.toe_off:.3f}, friction {load.load_friction:.2f}; channel "

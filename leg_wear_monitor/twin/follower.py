@@ -161,6 +161,7 @@ class LegFollower:
         Behind a compliant drive, as in ``parameters``, the crank swings; the load has the shape of theirs.
         """
         self._load.rebuild(linkage, parameters.load)
+        self._stepper.take_tables()
         model = self._stepper.model
         self._stepper.model = model._replace(coupling=drive_coupling(self._setup, model, parameters))
         contacts = self._setup.contacts

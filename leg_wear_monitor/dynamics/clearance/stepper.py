@@ -141,8 +141,9 @@ class ClearanceStepper:
             film=film_model(setup.contacts, setup.films),
             damped=int(is_damped(setup.linkage.arrays)),
             coupling=rigid_coupling(),
-            parts=_parts(tables, INTERVALS * interval * abs(setup.speed) / TURN),
+            parts=np.empty(len(tables.parts), np.int64),
         )
+        self.take_tables()
         self.state: ClearanceState = clearance_state(setup.surfaces.depth, 0.0, setup.speed)
         self.work = clearance_work(self.model, self.state)
 
@@ -255,6 +256,11 @@ class ClearanceStepper:
         """Restore a snapshot of a stepper of the same setup."""
         self.state.motion[:] = snapshot.motion
         self.state.depth[:] = snapshot.depth
+
+    def take_tables(self) -> None:
+        """Cut intervals into parts as the tables say, which were changed in place."""
+        model = self.model
+        model.parts[:] = _parts(model.tables, INTERVALS * model.interval * abs(self._setup.speed) / TURN)
 
 
 def length_of(setup: Setup, intervals: int) -> float:

@@ -227,6 +227,15 @@ def shared_stage() -> Iterator[Stage]:
     stage.close()
 
 
+@pytest.fixture(scope="session", autouse=True)
+def take_soon() -> Iterator[None]:
+    """A node in this process takes its messages each 5 ms: a walk is sent no faster than it is taken."""
+    with pytest.MonkeyPatch.context() as patch:
+        if find_spec("rclpy"):
+            patch.setattr("leg_wear_monitor.ros.monitor_node._TAKE_S", 0.005)
+        yield
+
+
 @pytest.fixture
 def arrive_at(monkeypatch: pytest.MonkeyPatch) -> Callable[[float], None]:
     """Sets the time at which messages come to a node, in seconds after `START_NS`."""

@@ -393,8 +393,6 @@ def without_scatter(
 ) -> tuple[Floats, Floats]:
     """Most probable changes (s, F) of a signature by one clearance, given those of chaotic simulated legs.
 
-    With the variance (s,) of each of them, as a part of that of a gait cycle.
-
     The change is taken for a random walk over the clearance, from zero at the expected one, in units of the
     scatter of a gait cycle; its steepness is that by which all s changes are most probable. Without this,
     what simulated means scatter counts as what a clearance changes, and a clearance that the torque does
@@ -408,7 +406,15 @@ def without_scatter(
     covariance : (F, F) array
         Of a gait cycle.
     own : (s,) array
-        Variance of the mean of each leg, of that of a gait cycle; common is that of the expected leg.
+        Variance of the mean of each leg, as a part of that of a gait cycle.
+    common : float
+        Likewise of the expected leg, which all changes have in common.
+
+    Returns
+    -------
+    change : (s, F) array
+    variance : (s,) array
+        Of each of them, as a part of that of a gait cycle.
     """
     square = change @ np.linalg.solve(covariance, change.T)
     scatter = np.diag(own) + common

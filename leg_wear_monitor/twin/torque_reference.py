@@ -198,9 +198,8 @@ class ReferenceRun(Generic[FoundT]):
             return None
         self._periods += 1
         is_due = self._cost(self._legs) <= self._pace * self._periods
-        self._take(waits or (is_due and not self.may_be_late), hurries=is_due and not waits)
-        # a leg that is due and simulated, and was not taken, could not be simulated
-        if len(self._done) < self._due and self._ahead[0].done() and (is_due or self.may_be_late):
+        can = self._take(waits or (is_due and not self.may_be_late), hurries=is_due and not waits)
+        if not can and (is_due or self.may_be_late):
             self._begin((), self._depth, self._profile)
         if not is_due or self.is_busy or not self._legs:
             return None
@@ -237,15 +236,19 @@ class ReferenceRun(Generic[FoundT]):
         costs = np.cumsum([_SETTLING + self._cycles_of(leg) for leg in self._legs])
         return int(np.searchsorted(costs, self._pace * self._periods, side="right"))
 
-    def _take(self, waits: bool, hurries: bool = False) -> None:
-        """Take the legs that are due and simulated, or wait for them, up to one that cannot be."""
+    def _take(self, waits: bool, hurries: bool = False) -> bool:
+        """Take the legs that are due and simulated, or wait for them, up to one that cannot be.
+
+        Returns whether all of them can be simulated.
+        """
         self._look_ahead(hurries)
         while self._ahead and len(self._done) < self._due and (waits or self._ahead[0].done()):
             leg = self._ahead[0].result()
             if leg is None:
-                break
+                return False
             self._done, self._ahead = (*self._done, leg), self._ahead[1:]
             self._look_ahead(hurries)
+        return True
 
     def _look_ahead(self, hurries: bool = False) -> None:
         """Let the threads simulate the next legs: not all, since a program's end waits for them."""

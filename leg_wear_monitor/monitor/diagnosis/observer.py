@@ -387,7 +387,8 @@ class TorqueObserver(KeepsSamples):
             nothing = np.full(len(fit.clearance_m), math.nan)
             return nothing, nothing
         observable = fit.sigma_m <= np.maximum(_ESTIMATED_M, _ESTIMATED * fit.clearance_m)
-        if self.state.commissioned is not None:
+        known = self.state.commissioned
+        if known is not None and known.is_as_counted:  # a corrected one is known from its correction
             unseen_m = self.models.detector(self.state, self.config).unseen_m(WINDOW_CYCLES)
             observable &= unseen_m <= CORRECTED_FROM * self.state.counted_m
         clearance_m, sigma_m = (

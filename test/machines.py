@@ -14,6 +14,7 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import attrs
+from llvmlite import binding
 
 BUILD = Path("build/machines").absolute()
 SELECTION = "not slow and not uncompiled"
@@ -23,12 +24,18 @@ OF_VENV = f"{sys.version_info.major}.{sys.version_info.minor}"
 
 @attrs.frozen
 class Machine:
-    """What differs: variables, and the environment if it is of another Python."""
+    """What differs: variables, what the processor must have, and the environment if of another Python."""
 
     name: str
     what: str
     variables: dict[str, str] = attrs.field(factory=dict)
     environment: str = ".venv"
+    needs: frozenset[str] = frozenset()
+
+    def lacks(self) -> list[str]:
+        """Features that it needs and this processor does not have, by LLVM's names: it would end at once."""
+        has = binding.get_host_cpu_features()
+        return sorted(feature for feature in self.needs if not has.get(feature, False))
 
     def run(self, *line: str) -> int:
         """Exit code of a command of its Python."""
@@ -37,8 +44,18 @@ class Machine:
 
 
 MACHINES = (
-    Machine("haswell", "OpenBLAS as on Haswell", {"OPENBLAS_CORETYPE": "Haswell"}),
-    Machine("skylakex", "OpenBLAS as on Skylake with AVX-512", {"OPENBLAS_CORETYPE": "SkylakeX"}),
+    Machine(
+        "haswell",
+        "OpenBLAS as on Haswell",
+        {"OPENBLAS_CORETYPE": "Haswell"},
+        needs=frozenset({"avx2", "fma"}),
+    ),
+    Machine(
+        "skylakex",
+        "OpenBLAS as on Skylake with AVX-512",
+        {"OPENBLAS_CORETYPE": "SkylakeX"},
+        needs=frozenset({"avx512f", "avx512cd", "avx512bw", "avx512dq", "avx512vl"}),
+    ),
     Machine("nehalem", "OpenBLAS as on Nehalem", {"OPENBLAS_CORETYPE": "Nehalem"}),
     Machine(
         "no-fma",
@@ -71,6 +88,8 @@ class Outcome:
 def try_on(machine: Machine, options: list[str]) -> Outcome:
     """Compile the kernels and run the tests."""
     print(f"== {machine.name}: {machine.what}", flush=True)
+    if lacking := machine.lacks():
+        return Outcome(machine.name, f"not run: this processor lacks {', '.join(lacking)}", True)
     if machine in OTHER_PYTHONS:
         if not _is_there(machine.name):
             return Outcome(machine.name, "not run: this Python, with venv, is not on the machine", True)
@@ -102,9 +121,10 @@ def _counted(report: Path) -> str:
 
 
 def chosen(name: str, turn: int | None) -> tuple[Machine, ...]:
-    """The machines to try: all, one by name, or one in turn that needs no environment of its own."""
+    """The machines to try: all, one by name, or one in turn that runs here, in this environment."""
     if turn is not None:
-        return (MACHINES[turn % len(MACHINES)],)
+        here = [machine for machine in MACHINES if not machine.lacks()]
+        return (here[turn % len(here)],)
     return tuple(machine for machine in (*MACHINES, *OTHER_PYTHONS) if name in ("all", machine.name))
 
 

@@ -4,9 +4,9 @@ The legs of `disturbed.py` in the air, in full coordinates, with masses 4 % off 
 a drive: friction that grows with the load, Coulomb and viscous friction, cogging, a low-pass, a lag, a torque
 constant and friction that change over twenty minutes, steps of the sensor, lost samples, a coupling between
 the measured angle and the crank. The first table is of healthy legs: gait cycles drawn in blocks of ten make
-up the given time. The second is of joints that open after 90 gait cycles, J on three walks; where a drive
-warms up, when it is half warm. No leg is identified but those behind a coupling, as the monitor does; they
-open as late as those that warm up.
+up the given time. The second is of joints that open after 690 gait cycles, when a leg is identified and a
+drive that warms up is half warm; J on three walks. With `--as-of-file` no leg is identified, and names count
+as if the leg were that of its file.
 `python benchmarks/drives.py --keep DIRECTORY [--hours 100]`.
 """
 
@@ -36,7 +36,6 @@ OPENINGS = (  # and the walk, whose start is another one
     ("G", 0.6, 0), *(("J", 1.0, walk) for walk in range(3)),
 )  # fmt: skip
 WARM = 1200  # gait cycles until a drive is warm
-ROUNDS, UNLIKE_FILE = references.ROUNDS, leg_model.UNLIKE_FILE  # of the monitor
 LEVELS = 11  # of what drifts, between cold and warm
 
 
@@ -133,12 +132,6 @@ def warming(cycles: np.ndarray, order: list[int], begin: int = 0) -> list[np.nda
     return [cycles[round(w * last), i] for w, i in zip(warm.tolist(), order, strict=True)]
 
 
-def identify(is_wanted: bool) -> None:
-    """Whether legs are identified; where they are not, names count as if they were those of the leg."""
-    references.ROUNDS = ROUNDS if is_wanted else 0
-    leg_model.UNLIKE_FILE = UNLIKE_FILE if is_wanted else references.NAMED_TO
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--keep", type=Path)
@@ -146,7 +139,10 @@ def main() -> None:
     parser.add_argument("--drive", action="append", choices=sorted(DRIVES))
     parser.add_argument("--worn-only", action="store_true")
     parser.add_argument("--healthy-only", action="store_true")
+    parser.add_argument("--as-of-file", action="store_true", help="do not identify, correct as if it were")
     options = parser.parse_args()
+    if options.as_of_file:
+        references.ROUNDS, leg_model.UNLIKE_FILE = 0, references.NAMED_TO
     leg = load_mechanism("bionic_leg")
     mass = np.array([MASSES.get(body, 1.0) for body in leg.bodies])
     real = LegParameters(mass, np.ones(len(mass))).applied(leg)
@@ -166,7 +162,6 @@ def main() -> None:
     if not options.worn_only:
         print("| drive | lag, time constant, load friction found | misfit | findings |\n|---|---|---|---|")
         for name in names:
-            identify(DRIVES[name].stiffness_nm_per_rad > 0.0)
             cycles = cycles_of(walk(DRIVES[name].stiffness_nm_per_rad), DRIVES[name], sensor, 5)
             order = drawn(np.arange(cycles.shape[1])[:, None], round(3600 * options.hours))
             rows = warming(cycles, [int(one[0]) for one in order])
@@ -184,9 +179,8 @@ def main() -> None:
         print(f"\n| drive | {heads} |\n|---{'|---' * len(OPENINGS)}|")
         for name in names:
             cells, stiffness = [], DRIVES[name].stiffness_nm_per_rad
-            identify(stiffness > 0.0)
             healthy = cycles_of(walk(stiffness), DRIVES[name], sensor, 5)
-            before = COMMISSIONED + (WARM // 2 if DRIVES[name].drifts or stiffness else 0)
+            before = COMMISSIONED + WARM // 2
             order = [i % healthy.shape[1] for i in range(before)]
             one, found = watched(leg, size, warming(healthy, order))
             commissioned = one.snapshot()

@@ -179,11 +179,11 @@ def in_words(found: dict[str, list[int]], since: int = 0) -> str:
 def of_leg(one: Monitored) -> str:
     """What the observer knows of a healthy leg, and what it found, in words."""
     state, diagnosis = one.observer.state, one.observer.diagnosis
-    sensor, off = state.sensor, one.observer.models.misfit(state)
+    sensor, channel, off = state.sensor, state.sensor.channel, one.observer.models.misfit(state)
     unused = ", ".join(f"{cause} {number}" for cause, number in diagnosis.cycles_not_used.items())
     return (
-        f"Noise {sensor.noise_nm:.3f} N m, delay {1e3 * sensor.delay_s:.2f} ms, low-pass "
-        f"{1e3 * sensor.time_constant_s:.2f} ms, misfit {off:.2f} after {state.rounds} rounds; not used: "
+        f"Noise {sensor.noise_nm:.3f} N m, delay {1e3 * channel.delay_s:.2f} ms, low-pass "
+        f"{1e3 * channel.time_constant_s:.2f} ms, misfit {off:.2f} after {state.rounds} rounds; not used: "
         f"{unused or 'none'}; found in {one.cycle} healthy gait cycles (first; in how many): "
         f"{in_words(one.found)}."
     )

@@ -55,6 +55,10 @@ from leg_wear_monitor.twin.torque_reference import HEAVIER, LONGER, ROUGHER, STI
 
 UNLIKE_FILE = 0.8  # misfit from which on the leg is not that of its file (docs/explanation/diagnosis.md)
 
+# misfit from which on a leg is better identified: the scatter of gait cycles alone leaves 0.25 to 0.58. J at
+# 0.45 mm was 0.54 mm where masses left 0.46, and 0.62, or I was taken for it, at 0.68 (2026-11-26)
+WORTH_IDENTIFYING = 0.6
+
 FAR_FROM_FILE = 20.0  # misfit from which on the ideal torque comes first
 
 _MASS, _LENGTH = 0.03, 0.006  # standard deviations of a leg's bodies about those of its file

@@ -281,6 +281,8 @@ class TorqueObserver(KeepsSamples):
             self._evidence.review(state, self.config)
         if not ended or not self.config.diagnosis.correct or not self.models.is_of_file(state):
             return None
+        if state.reference is not None and self._references.is_to_identify(state):
+            return None
         return correction_of(state, self._joints)
 
     def corrected(self, correction: Correction, counted_m: Floats) -> None:

@@ -298,9 +298,21 @@ class References:
             self._begin(identified, counted_m, depth, state.reference.profile)
         elif self._may_be_loaded(state):
             self._begin_under_load(state, state.reference, depth)
-        elif state.rounds < ROUNDS and not (self._models.is_of_file(state) or self.is_load_left_out(state)):
+        elif self.is_to_identify(state):
             self._begin_identification(state, state.reference, depth)
         return False
+
+    def is_to_identify(self, state: TorqueState) -> bool:
+        """Whether another round of identification is due for the commissioned leg.
+
+        One that was identified in an earlier run is identified again only where it is unlike that.
+        """
+        if state.rounds >= ROUNDS or self.is_load_left_out(state):
+            return False
+        is_known = not state.rounds and state.parameters is not None
+        if is_known and self._models.is_of_file(state):
+            return False
+        return self._models.misfit(state) >= leg_model.WORTH_IDENTIFYING
 
     def is_load_left_out(self, state: TorqueState) -> bool:
         """Whether the foot surely carries a load, but the configuration has the model walk without one."""

@@ -652,7 +652,8 @@ def test_a_baseline_of_a_sensor_with_another_rate_is_not_used(leg, reference) ->
 
 
 def test_a_commissioned_leg_that_is_not_of_its_file_is_identified(leg, reference, monkeypatch) -> None:
-    monkeypatch.setattr(leg_model, "UNLIKE_FILE", 0.0)  # any leg
+    for misfit in ("UNLIKE_FILE", "WORTH_IDENTIFYING"):
+        monkeypatch.setattr(leg_model, misfit, 0.0)  # any leg
     observer = observer_of(leg)
     walk(observer, samples(reference, [0] * (COMMISSIONING_CYCLES + 4)))
     assert "its masses, lengths and friction are being simulated" in observer.diagnosis.reason
@@ -666,7 +667,8 @@ def test_a_commissioned_leg_that_is_not_of_its_file_is_identified(leg, reference
 def test_the_reference_of_an_identified_leg_is_used_if_it_explains_the_leg_better(
     leg, reference, monkeypatch
 ) -> None:
-    monkeypatch.setattr(leg_model, "UNLIKE_FILE", 0.0)
+    for misfit in ("UNLIKE_FILE", "WORTH_IDENTIFYING"):
+        monkeypatch.setattr(leg_model, misfit, 0.0)
     monkeypatch.setattr(references, "ROUNDS", 1)
     monkeypatch.setattr(torque_reference, "CYCLES", 8)
     monkeypatch.setattr(torque_reference, "PACE", 6)
@@ -685,3 +687,13 @@ def test_nothing_is_corrected_by_a_reference_of_another_leg(leg, reference, monk
     block = samples(reference, [0] * COMMISSIONING_CYCLES + [leg_number(0, 1.5)] * 25)
     assert walk(observer, block) == []
     assert observer.diagnosis.changes[0].subject == "A"
+
+
+def test_nothing_is_corrected_before_the_leg_is_identified(leg, reference, monkeypatch) -> None:
+    """Seen before: I at 0.45 mm was named J, and corrected as J, after the first of three rounds."""
+    monkeypatch.setattr(leg_model, "WORTH_IDENTIFYING", 0.0)
+    observer = observer_of(leg)
+    block = samples(reference, [0] * COMMISSIONING_CYCLES + [leg_number(0, 1.5)] * 25)
+    assert walk(observer, block) == []
+    (change,) = observer.diagnosis.changes
+    assert change.subject == "A" and not change.is_corrected

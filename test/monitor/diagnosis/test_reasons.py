@@ -15,7 +15,7 @@ from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.inputs import Cadence
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.evidence import doubt, missing, next_step
-from leg_wear_monitor.monitor.diagnosis.references import ROUNDS, LegModels
+from leg_wear_monitor.monitor.diagnosis.references import ROUNDS, LegModels, References
 from leg_wear_monitor.monitor.diagnosis.state import (
     AtCadence,
     Diagnosis,
@@ -26,7 +26,7 @@ from leg_wear_monitor.monitor.diagnosis.state import (
 )
 from leg_wear_monitor.monitor.verdict.situation import Situation
 from leg_wear_monitor.monitor.verdict.subject_rules import nothing_found
-from leg_wear_monitor.twin.reference import CrankProfile
+from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
 
 NEW = np.full(5, 3.0e-4)
 SENSOR = TorqueSensor(0.005, 1.0, 9.2)
@@ -168,3 +168,18 @@ def test_a_leg_on_the_ground_is_identified_before_what_is_left_counts_as_the_sha
     assert not is_of_file(1.2, loaded=True, rounds=0) and not is_of_file(1.2, loaded=True, rounds=ROUNDS - 1)
     assert is_of_file(1.2, loaded=True, rounds=ROUNDS) and not is_of_file(1.2, loaded=False, rounds=ROUNDS)
     assert is_of_file(0.5, loaded=True, rounds=0) and not is_of_file(3.0, loaded=True, rounds=ROUNDS)
+
+
+def test_a_leg_is_identified_until_scatter_is_left_and_one_of_an_earlier_run_where_it_is_unlike() -> None:
+    mechanism = load_mechanism("bionic_leg")
+    models = LegModels(mechanism)
+    references, own = References(mechanism, models), LegParameters.none(mechanism)
+
+    def is_to_identify(misfit: float, rounds: int, known: LegParameters | None) -> bool:
+        now = state(reference=SimpleNamespace(parameters=own), rounds=rounds, parameters=known)
+        with mock.patch.object(models, "misfit", lambda _: misfit):
+            return references.is_to_identify(now)
+
+    assert is_to_identify(0.7, 0, None) and is_to_identify(0.7, ROUNDS - 1, own)
+    assert not is_to_identify(0.5, 0, None) and not is_to_identify(0.7, ROUNDS, own)
+    assert not is_to_identify(0.7, 0, own) and is_to_identify(0.9, 0, own)

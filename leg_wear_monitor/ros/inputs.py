@@ -2,6 +2,7 @@
 
 import itertools
 import struct
+import threading
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import import_module
 from operator import attrgetter
@@ -55,9 +56,12 @@ class Inbox:
     ----------
     received, shed : int
         Numbers of messages since the start.
+    lock : threading.RLock
+        Held while messages are added or removed; held by who adds several in their order.
     """
 
     def __init__(self, decoder: Decoder, limit: int, limit_bytes: int = HELD_BYTES) -> None:
+        self.lock = threading.RLock()
         self._decoder, self._limit, self._limit_bytes = decoder, limit, limit_bytes
         self._waiting: list[Arrival] = []
         self._bytes = 0
@@ -73,15 +77,16 @@ class Inbox:
         Log times strictly increase. A recording that is read in the order of log time thus keeps the order
         of arrival.
         """
-        self._last_ns = max(now_ns, self._last_ns + 1)
-        self.received += 1
-        if len(raw) > self._limit_bytes:
-            self.shed += 1
-            return
-        while len(self._waiting) >= self._limit or self._bytes + len(raw) > self._limit_bytes:
-            self._drop((len(self._waiting) + 1) // 2)
-        self._waiting.append(Arrival(kind, self._last_ns, raw))
-        self._bytes += len(raw)
+        with self.lock:
+            self._last_ns = max(now_ns, self._last_ns + 1)
+            self.received += 1
+            if len(raw) > self._limit_bytes:
+                self.shed += 1
+                return
+            while len(self._waiting) >= self._limit or self._bytes + len(raw) > self._limit_bytes:
+                self._drop((len(self._waiting) + 1) // 2)
+            self._waiting.append(Arrival(kind, self._last_ns, raw))
+            self._bytes += len(raw)
 
     def _drop(self, number: int) -> None:
         self._bytes -= sum(len(one.raw) for one in self._waiting[:number])
@@ -94,11 +99,12 @@ class Inbox:
 
     def take(self, most: int, most_bytes: int = TAKEN_BYTES) -> list[Arrival]:
         """Remove and return the oldest messages within both limits; the first one may exceed `most_bytes`."""
-        ends = itertools.accumulate(len(one.raw) for one in self._waiting[:most])
-        number = max(1, sum(1 for end in ends if end <= most_bytes))
-        taken, self._waiting = self._waiting[:number], self._waiting[number:]
-        self._bytes -= sum(len(one.raw) for one in taken)
-        return taken
+        with self.lock:
+            ends = itertools.accumulate(len(one.raw) for one in self._waiting[:most])
+            number = max(1, sum(1 for end in ends if end <= most_bytes))
+            taken, self._waiting = self._waiting[:number], self._waiting[number:]
+            self._bytes -= sum(len(one.raw) for one in taken)
+            return taken
 
     def decoded(self, arrivals: list[Arrival]) -> Samples:
         """Decode messages to samples in the same order."""
@@ -285,7 +291,7 @@ def _listed(names: Iterable[str]) -> str:
 # Subscriptions of the monitor: serialized messages, and the middleware's events about them.
 
 
-# messages while the node is late: Fast DDS holds 5000 of them by default, five seconds at 1 kHz, and tells
+# messages until the node takes them: Fast DDS holds 5000 of them by default, five seconds at 1 kHz, and tells
 # how many more were lost; with a depth below that it would not tell
 DEPTH = 10_000
 

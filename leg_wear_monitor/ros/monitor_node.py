@@ -178,6 +178,9 @@ NO_COMMANDS = "It publishes no commands and must not be part of a safety functio
 # Period at which messages are taken and processed. Each turn has its cost, whatever comes in it: 5 ms, with
 # processing when a spline node is complete, takes 4 % of a core more and reports 25 ms sooner.
 _TAKE_S = 0.05
+# period at which a thread takes messages, too: a reference keeps the node busy for up to ten seconds where
+# the machine is, and the middleware holds five seconds at 1 kHz
+_RECEIVE_S = 1.0
 _RELEASE_S = 60.0  # period at which free memory is given back
 _AT_ONCE = 500  # messages at once, so that services and parameters are also served
 _HELD = 20_000  # capacity in messages: ten seconds at 1 kHz on both topics
@@ -245,6 +248,7 @@ class MonitorNode(ClosingNode):
         self.create_timer(_TAKE_S, partial(self._take, inputs), clock=steady)
         self.create_timer(config.diagnostics.period_s, self._diagnose, clock=steady)
         self.create_timer(_RELEASE_S, release_memory, clock=steady)
+        self._in_order.enter_context(repeated(lambda _: self._receive(inputs), _RECEIVE_S))
         joints, leg = ", ".join(self._monitor.clearance_joints), self._monitor.mechanism.name
         self.get_logger().info(f"monitoring joints {joints} of {leg}")
         for doubt in acceleration_doubts(config):
@@ -292,16 +296,21 @@ class MonitorNode(ClosingNode):
     def _take(self, inputs: Inputs) -> None:
         """Take the messages that came, and process them, for no longer than until the next turn."""
         now_ns = self._turn()
-        arrivals = inputs.taken(time.time_ns())
-        for one in arrivals:
-            self._inbox.add(one.kind, one.raw, one.log_time_ns)
-        last = {one.kind: one for one in arrivals}
+        self._receive(inputs)
+        while len(self._inbox) and time.monotonic_ns() < now_ns + _TAKE_S * 1.0e9:
+            self._work()
+
+    def _receive(self, inputs: Inputs) -> None:
+        """Put the messages that came into the inbox."""
+        with self._inbox.lock:
+            arrivals = inputs.taken(time.time_ns())
+            for one in arrivals:
+                self._inbox.add(one.kind, one.raw, one.log_time_ns)
+        last, now_ns = {one.kind: one for one in arrivals}, time.monotonic_ns()
         for topic in inputs.topics:
             if topic.stream.code in last:
                 newest = last[topic.stream.code]
                 topic.heard_ns, topic.heard_wall_ns = now_ns, newest.log_time_ns
-        while len(self._inbox) and time.monotonic_ns() < now_ns + _TAKE_S * 1.0e9:
-            self._work()
 
     def _turn(self) -> int:
         """Now [ns], on a monotonic clock; what was silent while the node was late was not."""

@@ -21,7 +21,7 @@ from disturbed import MASSES, NEW, NOISE_NM, walked
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.estimate.channel import leg_behind_coupling
-from leg_wear_monitor.estimate.leg_model import UNLIKE_FILE, ChangeDetector, identified_leg, misfit
+from leg_wear_monitor.estimate.leg_model import WORTH_IDENTIFYING, ChangeDetector, identified_leg, misfit
 from leg_wear_monitor.estimate.signature import TorqueSensor
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
 from leg_wear_monitor.mechanism.spec import Mechanism, Track, TrackDrive
@@ -52,7 +52,7 @@ def references(leg: Mechanism, walk: np.ndarray, sensor: TorqueSensor, file) -> 
         explainer, known, _ = explained(leg, found[-1], walk, sensor, NOISE_NM, np.random.default_rng(5))
         off = misfit(explainer.model, explainer.nuisances, known)
         print_leg(leg, found[-1], explainer.model.sensor, off)
-        if off < UNLIKE_FILE:
+        if off < WORTH_IDENTIFYING:
             break
 
         def next_leg(last=found[-1], explainer=explainer, known=known) -> LegParameters:

@@ -30,7 +30,7 @@ from leg_wear_monitor.estimate.cause import Cause
 from leg_wear_monitor.estimate.explanations import Explainer
 from leg_wear_monitor.estimate.leg_model import (
     FAR_FROM_FILE,
-    UNLIKE_FILE,
+    WORTH_IDENTIFYING,
     ChangeDetector,
     best_fit,
     explainer_of,
@@ -51,7 +51,7 @@ from leg_wear_monitor.mechanism.position import TURN, build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
-from leg_wear_monitor.monitor.diagnosis.references import LegModels
+from leg_wear_monitor.monitor.diagnosis.references import ROUNDS, LegModels
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
 from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin import TORQUE as TORQUE_SAMPLE
@@ -424,16 +424,24 @@ def known_leg(name, leg, walk, profile, sensor, random, options) -> tuple[Explai
         return explainer, healthy
     off = misfit(explainer.model, explainer.nuisances, known)
     print(f"misfit of leg {name} with the bodies of its file {off:.2f}")
-    if off < UNLIKE_FILE or options.as_of_file:
-        return explainer, healthy
-    reference = kept(
-        file("identified"), lambda: referred(leg, profile, bodies_of(leg, explainer, known, reference))
-    )
-    explainer, known, healthy = explained(leg, reference, *use)
-    off = misfit(explainer.model, explainer.nuisances, known)
-    for what, factors in (("masses", reference.parameters.mass), ("lengths", reference.parameters.length)):
-        print(f"identified {what} [% off the file]:", np.round(100.0 * (factors - 1.0), 1))
-    print(f"misfit with these {off:.2f}")
+    for number in range(1, ROUNDS + 1):
+        if off < WORTH_IDENTIFYING or options.as_of_file:
+            break
+
+        def identify(reference=reference, explainer=explainer, known=known) -> TorqueReference:
+            return referred(leg, profile, bodies_of(leg, explainer, known, reference))
+
+        other = kept(file(f"identified {number}"), identify)
+        found = explained(leg, other, *use)
+        now = misfit(found[0].model, found[0].nuisances, found[1])
+        masses, lengths = (
+            np.round(100.0 * (factors - 1.0), 1)
+            for factors in (other.parameters.mass, other.parameters.length)
+        )
+        print(f"misfit {now:.2f} with masses {masses} and lengths {lengths} % off the file")
+        if now > off:  # as in the monitor, the former one stays
+            break
+        reference, off, (explainer, known, healthy) = other, now, found
     return explainer, healthy
 
 

@@ -36,7 +36,7 @@ from diagnosis import (
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.estimate.explanations import Explainer
-from leg_wear_monitor.estimate.leg_model import UNLIKE_FILE, ChangeDetector, misfit
+from leg_wear_monitor.estimate.leg_model import WORTH_IDENTIFYING, ChangeDetector, misfit
 from leg_wear_monitor.estimate.signature import TorqueSensor
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle, point_motion
 from leg_wear_monitor.mechanism.spec import Mechanism, PhaseLoad
@@ -166,7 +166,7 @@ def known_reference(walk, profile, sensor: TorqueSensor, noise_nm: float, keep: 
     off = misfit(found[0].model, found[0].nuisances, found[1])
     print(f"{keep.name}: misfit {off:.2f} with the bodies of the file")
     for number in range(1, ROUNDS + 1):
-        if off < UNLIKE_FILE:
+        if off < WORTH_IDENTIFYING:
             break
 
         def identify(best=best, found=found):

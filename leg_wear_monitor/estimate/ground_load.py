@@ -224,9 +224,11 @@ def _phase_means(phases: int) -> Floats:
 def _shapes(stance: Stance, points: int) -> tuple[Floats, Floats]:
     """Template and harmonics (1 + harmonics, points) of the vertical and of the fore-aft force."""
     s = stance.fractions(points)
-    waves = np.where(s <= 1.0, np.sin(0.5 * TURN * np.outer(np.arange(1, _HARMONICS + 1), s)), 0.0)
-    vertical, along = stance_template(s)
-    return np.vstack([vertical, waves]), np.vstack([along, waves])
+    stands = s <= 1.0  # elsewhere all are 0
+    found = np.zeros((2, 1 + _HARMONICS, points))
+    found[:, 0, stands] = stance_template(s[stands])
+    found[:, 1:, stands] = np.sin(0.5 * TURN * np.outer(np.arange(1, _HARMONICS + 1), s[stands]))
+    return found[0], found[1]
 
 
 def ground_load(

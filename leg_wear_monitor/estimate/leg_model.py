@@ -191,27 +191,37 @@ def _covariance(model: SignatureModel, nuisances: Sequence[Nuisance], cycles: in
 
 _LEAST_FACTOR = 0.7  # of the expected clearance
 _FLAT = 1.0  # prior standard deviation of a clearance's logarithm: what shows nothing keeps its prior
+_NARROWER = 0.03  # that of a new part's on the narrow side: wear only opens
+# mean square up to which clearances explain: one joint that opened leaves 0.4 to 1.3, two at once do not add
+# up. A and G at 0.45 mm left 2.1 to 2.4, and G was 0.33 ± 0.01 mm, B 0.35 ± 0.02 (2026-11-26)
+_EXPLAINED = 1.75
 _FIT_ROUNDS = 2
-_ELSEWHERE = 1.5  # times the counted clearance, where a search for each joint begins, too
+_ELSEWHERE = 1.5  # times a clearance, where a search for each joint begins, too
 _MODEL_M = 5.0e-6  # error of the model against full coordinates (docs/explanation/diagnosis.md)
 
 
 @attrs.frozen(eq=False)
 class ClearanceFit:
-    """Clearances (k,) [m], their covariance (k, k) [m^2], and the misfit: about F if the model holds.
+    """Clearances (k,) [m] and their covariance (k, k) [m^2].
 
-    `unlikely` is minus twice the logarithm of their probability, less a constant.
+    `square` is the mean square of what they leave over, about 1 if the model holds; `unlikely` is minus twice
+    the logarithm of their probability, less a constant.
     """
 
     clearance_m: Floats
     covariance: Floats
-    misfit: float
+    square: float
     unlikely: float
 
     @property
     def sigma_m(self) -> Floats:
         """Standard deviations (k,)."""
         return np.asarray(np.sqrt(np.diagonal(self.covariance)))
+
+    @property
+    def explains(self) -> bool:
+        """Whether the clearances explain what was measured."""
+        return self.square <= _EXPLAINED
 
 
 def fit_clearances(
@@ -238,6 +248,7 @@ def fit_clearances(
     model = explainer.model
     measured, counted = mean - explainer.baseline.offset, np.log(counted_m)
     low, high = np.log(_LEAST_FACTOR * model.grid_m[:, 0]), np.log(model.grid_m[:, -1])
+    new, flat = np.log(np.minimum(counted_m, explainer.fresh_m)), np.eye(len(counted_m)) / _FLAT
     clearance: Floats = start_m
     for _ in range(_FIT_ROUNDS):  # what the model may be off depends on the clearances
         change = model.at(clearance)[0] - model.at(counted_m)[0]
@@ -247,8 +258,9 @@ def fit_clearances(
 
         def at(x: Floats, whiten: Floats = whiten) -> Point:
             expected, slopes = model.at(np.exp(x))
-            rest = np.concatenate([whiten @ (expected - measured), (x - counted) / _FLAT])
-            return Point(rest, lambda: np.vstack([whiten @ slopes, np.eye(len(x)) / _FLAT]))
+            below = np.minimum(x - new, 0.0) / _NARROWER
+            rest = np.concatenate([whiten @ (expected - measured), (x - counted) / _FLAT, below])
+            return Point(rest, lambda: np.vstack([whiten @ slopes, flat, np.diag((below < 0.0) / _NARROWER)]))
 
         found = gauss_newton(at, np.log(clearance), low=low, high=high)
         clearance = np.asarray(np.exp(found.x), dtype=np.float64)
@@ -256,9 +268,12 @@ def fit_clearances(
     uncertain = np.hypot(_MODEL_M, MODEL_ERROR * (clearance - counted_m))
     # a baseline after a correction hides what that is off
     covariance = found.covariance * np.outer(clearance, clearance) + np.diag(uncertain**2 + known_sigma_m**2)
-    misfit = float(np.square(found.point.rest[: len(mean)]).sum())
+    square = float(np.square(found.point.rest[: len(mean)]).mean())
     unlikely = found.point.square + 2.0 * float(np.log(np.diagonal(root)).sum())
-    return ClearanceFit(clearance, max(1.0, misfit / len(mean)) * covariance, misfit, unlikely)
+    fit = ClearanceFit(clearance, max(1.0, square) * covariance, square, unlikely)
+    if fit.explains:
+        return fit
+    return attrs.evolve(fit, covariance=fit.covariance + np.diag(clearance**2))
 
 
 def explainer_of(
@@ -296,12 +311,10 @@ def best_fit(
 
 
 def starts_of(explainer: Explainer, change: Change | None, counted_m: Floats) -> list[Floats]:
-    """Clearances (k,) [m] where searches begin: those of a change, or each joint as counted and wider."""
-    joints, widest = explainer.joints, explainer.model.grid_m[:, -1]
-    if change is not None and change.cause is Cause.CLEARANCE:
-        return [start_of(change, joints, counted_m)]
-    wider = np.minimum(_ELSEWHERE * counted_m, np.maximum(widest, counted_m))
-    return [counted_m, *(opened(counted_m, k, size) for k, size in enumerate(wider.tolist()))]
+    """Clearances (k,) [m] where searches begin: after a change, and from there with each joint wider."""
+    widest, first = explainer.model.grid_m[:, -1], start_of(change, explainer.joints, counted_m)
+    wider = np.minimum(_ELSEWHERE * first, np.maximum(widest, first))
+    return [first, *(opened(first, k, size) for k, size in enumerate(wider.tolist()))]
 
 
 def with_rivals(

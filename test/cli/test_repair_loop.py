@@ -50,9 +50,8 @@ def test_verdict_status_json_and_terminal_tell_one_story_of_the_joint(knocked):
     assert row.split()[2] == f"{1e3 * joint['believed_m']:.3f}"
     alarm = next(each for each in found["alarms"]["now"] if each["name"] == "clearance G")
     assert alarm["worst"] == joint["believed_m"]
-    others = [each for name, each in found["clearances"].items() if name != "G" and each["believed_m"]]
-    assert others  # beside a joint that has broken out, some are not observable
-    assert all(abs(each["believed_m"] - 3e-4) < 3.0 * each["believed_sigma_m"] for each in others)
+    # beside G at 2 mm the fit of all finds I at 0.6 mm: what several joints change does not add up
+    assert [name for name, each in found["clearances"].items() if each["believed_by"] == "torque"] == ["G"]
     first, last = (next(v for v in line if v is not None) for line in _ends(found["history"]["seen_m"]["G"]))
     assert last > 1.5e-3 > first
 
@@ -73,11 +72,11 @@ def _ends(column):
 def test_the_page_of_the_stop_shows_the_estimates_and_links_the_guide(knocked):
     page = (knocked[0] / "out" / "report.html").read_text()
     joints = json.loads((knocked[0] / "out" / "summary.json").read_text())["clearances"]
-    joint, seen = joints["G"], [one for one in joints.values() if one["believed_by"] == "torque"]
+    joint = joints["G"]
     value, sigma = (1e3 * joint[name] for name in ("believed_m", "believed_sigma_m"))
     assert abs(value - 2.0) < 2.0 * sigma  # the bushing is broken out to 2 mm
     assert f"estimated {value:.2f} ± {sigma:.2f} mm by the drive torque" in page
-    assert page.count("mm by the drive torque") == len(seen) > 1  # all that are observable
+    assert page.count("mm by the drive torque") == 1  # the others are not observable
     assert "Clearances by estimate" in page
     for name in ("href", "id"):  # the guide is in the page
         assert re.search(f'{name}="#?guide-a-joint-is-at-its-limit"', page)

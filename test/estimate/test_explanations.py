@@ -89,6 +89,25 @@ def test_joints_that_explain_a_change_as_well_widen_each_other(explainer: Explai
     assert fit.sigma_m[0] == best.sigma_m[0]
 
 
+def test_no_joint_gets_narrower_than_a_new_part_but_a_worn_one_may_have_got_one(explainer: Explainer) -> None:
+    """Wear only opens: with A and G opened at once, I was found at 0.21 ± 0.02 mm."""
+    less = -1.5 * explainer.model.change[0, 1]  # as if it were 0.76 times as wide
+    new = fit_clearances(explainer, measured(explainer, NEW, 1, 1, less), 1, NEW, NEW)
+    assert new.clearance_m[0] > 0.9 * NEW[0]
+    worn = NEW * np.array([2.0, 1.0, 1.0])
+    renewed = fit_clearances(explainer, measured(explainer, NEW, 10, 1), 10, worn, worn)
+    assert abs(renewed.clearance_m[0] - NEW[0]) < 3.0 * renewed.sigma_m[0] < NEW[0]
+
+
+def test_clearances_that_explain_poorly_are_not_known(explainer: Explainer) -> None:
+    """What several joints change does not add up: G at 0.45 mm was 0.33 ± 0.01 mm beside A."""
+    true, other = NEW * np.array([1.5, 1.0, 1.0]), np.random.default_rng(7).standard_normal(F)
+    for extra, explains in ((0.0, True), (2.0 * other, False)):
+        fit = fit_clearances(explainer, measured(explainer, true, 10, 1, extra), 10, NEW, NEW)
+        assert fit.explains is explains
+        assert (fit.sigma_m >= fit.clearance_m).all() is np.bool_(not explains)
+
+
 def test_more_cycles_are_better(explainer: Explainer) -> None:
     sigma = [
         fit_clearances(explainer, measured(explainer, NEW, n, 1), n, NEW, NEW).sigma_m for n in (2, 10, 60)

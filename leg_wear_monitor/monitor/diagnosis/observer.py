@@ -80,11 +80,14 @@ def settle(state: TorqueState, correction: Correction, counted_m: Floats) -> Non
     """Make the gait cycles since a change those of the commissioned leg, with clearances (k,) [m].
 
     What the correction is off does then not look like a further change; it stays in the standard deviation.
+    Where other joints may have changed with it, theirs are not known any more.
     """
     joint, _, change = correction
     state.cycles = tuple(cycle for cycle in state.cycles if cycle.begin_ns >= change.since_ns)
     signatures, before = state.signatures, state.commissioned
     sigma_m = before.sigma_m.copy() if before else np.zeros(len(counted_m))
+    if state.fit is not None and not state.fit.explains:
+        sigma_m = np.maximum(sigma_m, counted_m)
     sigma_m[joint] = change.sigma
     state.forget_baselines()
     state.commissioned = CommissionedTorque(

@@ -85,9 +85,8 @@ def settle(state: TorqueState, correction: Correction, counted_m: Floats) -> Non
     joint, _, change = correction
     state.cycles = tuple(cycle for cycle in state.cycles if cycle.begin_ns >= change.since_ns)
     signatures, before = state.signatures, state.commissioned
-    sigma_m = before.sigma_m.copy() if before else np.zeros(len(counted_m))
-    if state.fit is not None and not state.fit.explains:
-        sigma_m = np.maximum(sigma_m, counted_m)
+    sigma_m = before.sigma_m if before else np.zeros(len(counted_m))
+    sigma_m = np.maximum(sigma_m, 0.0 if state.fit is None or state.fit.explains else counted_m)
     sigma_m[joint] = change.sigma
     state.forget_baselines()
     state.commissioned = CommissionedTorque(
@@ -207,12 +206,11 @@ class TorqueObserver(KeepsSamples):
         if is_drive_known:
             whole_leg = parameters or LegParameters.none(mechanism)
             parameters = attrs.evolve(whole_leg, compliance=compliance_of(figures.stiffness_nm_per_rad))
-        is_known = parameters is not None and parameters.load.size > 0
         self.state = TorqueState(
             counted_m,
             baselines=tuple(commissioned),
             parameters=parameters,
-            load_rounds=LOAD_ROUNDS if is_known else 0,
+            load_rounds=LOAD_ROUNDS if parameters is not None and parameters.load.size else 0,
         )
 
     def go_live(self) -> None:
@@ -282,11 +280,9 @@ class TorqueObserver(KeepsSamples):
         ended = self.evaluate_due(self._evaluate)
         if self._references.advance(state, counted_m, depth):
             self._evidence.review(state, self.config)
-        if not ended or not self.config.diagnosis.correct or not self.models.is_of_file(state):
+        if not ended or not self.config.diagnosis.correct or self._references.is_to_identify(state):
             return None
-        if state.reference is not None and self._references.is_to_identify(state):
-            return None
-        return correction_of(state, self._joints)
+        return correction_of(state, self._joints) if self.models.is_of_file(state) else None
 
     def corrected(self, correction: Correction, counted_m: Floats) -> None:
         """Compare with the corrected clearances (k,) [m] from now on."""

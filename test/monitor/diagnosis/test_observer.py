@@ -429,6 +429,23 @@ def test_the_sigma_of_a_correction_stays_in_the_clearance(leg, reference) -> Non
     assert abs(correction.clearance_m - 1.5e-3) < 3.0 * correction.change.sigma
 
 
+@pytest.mark.parametrize("square", [1.0, 3.0])
+def test_other_joints_are_known_after_a_correction_where_the_clearances_explain(
+    leg, reference, square: float
+) -> None:
+    """Elsewhere others may have changed with it, and its gait cycles become the baseline of all."""
+    observer = observer_of(leg)
+    block = samples(reference, [0] * COMMISSIONING_CYCLES + [leg_number(0, 1.5)] * 25)
+    ((_, correction),) = walk(observer, block)[:1]
+    observer.state.fit = attrs.evolve(observer.state.fit, square=square)
+    counted = NEW.copy()
+    counted[0] = correction.clearance_m
+    observer.corrected(correction, counted)
+    sigma_m = observer.state.commissioned.sigma_m
+    assert sigma_m[0] == correction.change.sigma
+    np.testing.assert_array_equal(sigma_m[1:], 0.0 if square < 1.5 else NEW[1:])
+
+
 def test_another_leg_is_reported_within_twenty_cycles(leg, reference) -> None:
     observer = observer_of(leg)
     mass, length = body_torques(leg).at(TURN)

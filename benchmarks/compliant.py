@@ -16,20 +16,20 @@ import one_core  # noqa: F401, before numpy
 # isort: split
 import attrs
 import numpy as np
-from diagnosis import explained, kept, measured, named, new, referred, simulated
+from diagnosis import bodies_of, explained, kept, measured, named, rounds_of
 from disturbed import MASSES, NEW, NOISE_NM, walked
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.estimate.channel import leg_behind_coupling
-from leg_wear_monitor.estimate.leg_model import WORTH_IDENTIFYING, ChangeDetector, identified_leg, misfit
+from leg_wear_monitor.estimate.explanations import Explainer
+from leg_wear_monitor.estimate.leg_model import ChangeDetector
 from leg_wear_monitor.estimate.signature import TorqueSensor
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
 from leg_wear_monitor.mechanism.spec import Mechanism, Track, TrackDrive
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
-from leg_wear_monitor.monitor.diagnosis.references import ROUNDS
 from leg_wear_monitor.twin.load import torque_size
 from leg_wear_monitor.twin.reference import COUPLING_DAMPING, LegParameters
-from leg_wear_monitor.twin.torque_reference import TorqueReference, TorqueReferenceRun
+from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 STIFFNESS_NM_PER_RAD = (1000.0, 200.0)
 OPENINGS = (("G", 0.6), ("J", 1.0), ("B", 0.45), ("A", 0.45), ("I", 0.6))
@@ -45,32 +45,20 @@ def behind(leg: Mechanism, stiffness: float, damping_ratio: float = COUPLING_DAM
     return attrs.evolve(leg, drive=TrackDrive(body=leg.drive.body, track=track))
 
 
+def next_leg(leg: Mechanism, explainer: Explainer, known, last: TorqueReference) -> LegParameters:
+    """The leg behind a coupling that the ideal leg's torque shows; with one, or without any, its bodies."""
+    found = None
+    if not last.parameters.compliance:
+        found = leg_behind_coupling(leg, explainer.model.sensor, last.profile, known.mean)
+    return bodies_of(leg, explainer, known, last) if found is None else found
+
+
 def references(leg: Mechanism, walk: np.ndarray, sensor: TorqueSensor, file) -> list[TorqueReference]:
     """The reference of the file, that of the ideal leg's coupling, and those identified after it."""
-    found = [shipped_references(leg)[0]]
-    for number in range(ROUNDS):
-        explainer, known, _ = explained(leg, found[-1], walk, sensor, NOISE_NM, np.random.default_rng(5))
-        off = misfit(explainer.model, explainer.nuisances, known)
-        print_leg(leg, found[-1], explainer.model.sensor, off)
-        if off < WORTH_IDENTIFYING:
-            break
-
-        def next_leg(last=found[-1], explainer=explainer, known=known) -> LegParameters:
-            if not last.parameters.compliance:
-                start = leg_behind_coupling(leg, explainer.model.sensor, last.profile, known.mean)
-                if start is not None:
-                    return start
-            run = TorqueReferenceRun(leg)
-            run.begin_identification(*new(leg), last.profile, last.parameters)
-            return identified_leg(simulated(run), explainer.model, explainer.nuisances, known)
-
-        parameters = kept(file(f"leg {number}"), next_leg)
-        make = functools.partial(referred, leg, found[-1].profile, parameters)
-        found.append(kept(file(f"reference {number}"), make))
-    else:
-        explainer, known, _ = explained(leg, found[-1], walk, sensor, NOISE_NM, np.random.default_rng(5))
-        off = misfit(explainer.model, explainer.nuisances, known)
-        print_leg(leg, found[-1], explainer.model.sensor, off)
+    found, draws = [], functools.partial(np.random.default_rng, 5)
+    for one in rounds_of(leg, shipped_references(leg)[0], walk, sensor, NOISE_NM, draws, file, next_leg):
+        print_leg(leg, one.reference, one.explainer.model.sensor, one.misfit)
+        found.append(one.reference)
     return found
 
 

@@ -413,36 +413,58 @@ def walks_of(name: str, leg: Mechanism, keep: Path | None) -> dict[str, np.ndarr
     return walks
 
 
-def known_leg(name, leg, walk, profile, sensor, random, options) -> tuple[Explainer, np.ndarray]:
-    """The explainer of a leg, with its bodies identified if required, and its signatures when healthy."""
-    file = (lambda what: options.keep / f"{name} {what}.pkl") if options.keep else (lambda what: None)
-    use = walk, sensor, options.noise_nm, random, not options.uncommissioned
-    none = LegParameters.none(leg)
-    reference = kept(file("of file"), lambda: referred(leg, profile, none))
-    explainer, known, healthy = explained(leg, reference, *use)
-    if known is None:
-        return explainer, healthy
-    off = misfit(explainer.model, explainer.nuisances, known)
-    print(f"misfit of leg {name} with the bodies of its file {off:.2f}")
-    for number in range(1, ROUNDS + 1):
-        if off < WORTH_IDENTIFYING or options.as_of_file:
-            break
+class Round(NamedTuple):
+    """A leg as one round of identification knows it; without a baseline no misfit."""
+
+    reference: TorqueReference
+    explainer: Explainer
+    known: CommissionedTorque | None
+    healthy: np.ndarray
+    misfit: float | None
+
+
+def rounds_of(leg, reference, walk, sensor, noise_nm, draws, file, next_leg=bodies_of, commissioned=True):
+    """Yield the rounds of a leg as the monitor does them: with its first reference, then identified again.
+
+    `draws` makes the random numbers of a round; `file` names what is kept.
+    """
+    for number in range(1, ROUNDS + 2):
+        explainer, known, healthy = explained(leg, reference, walk, sensor, noise_nm, draws(), commissioned)
+        off = None if known is None else misfit(explainer.model, explainer.nuisances, known)
+        yield Round(reference, explainer, known, healthy, off)
+        if off is None or off < WORTH_IDENTIFYING or number > ROUNDS:
+            return
 
         def identify(reference=reference, explainer=explainer, known=known) -> TorqueReference:
-            return referred(leg, profile, bodies_of(leg, explainer, known, reference))
+            return referred(leg, reference.profile, next_leg(leg, explainer, known, reference))
 
-        other = kept(file(f"identified {number}"), identify)
-        found = explained(leg, other, *use)
-        now = misfit(found[0].model, found[0].nuisances, found[1])
-        masses, lengths = (
-            np.round(100.0 * (factors - 1.0), 1)
-            for factors in (other.parameters.mass, other.parameters.length)
-        )
-        print(f"misfit {now:.2f} with masses {masses} and lengths {lengths} % off the file")
-        if now > off:  # as in the monitor, the former one stays
+        reference = kept(file(f"identified {number}"), identify)
+
+
+def best_of(rounds: Iterator[Round], name: str) -> Round:
+    """The last round that is no worse than the one before it, as in the monitor."""
+    best = None
+    for one in rounds:
+        if best is not None and one.misfit > best.misfit:
+            print(f"{name}: misfit {one.misfit:.2f} after another round, refused", flush=True)
             break
-        reference, off, (explainer, known, healthy) = other, now, found
-    return explainer, healthy
+        best = one
+        if one.misfit is None:
+            break
+        parameters = one.reference.parameters
+        masses, lengths = (np.round(100.0 * (each - 1.0), 1) for each in (parameters.mass, parameters.length))
+        print(f"{name}: misfit {one.misfit:.2f}, masses {masses} and lengths {lengths} % off", flush=True)
+    return best
+
+
+def known_leg(name, leg, walk, profile, sensor, random, options) -> tuple[Explainer, np.ndarray]:
+    """The explainer of a leg, identified unless otherwise required, and its signatures when healthy."""
+    file = (lambda what: options.keep / f"{name} {what}.pkl") if options.keep else (lambda what: None)
+    reference = kept(file("of file"), lambda: referred(leg, profile, LegParameters.none(leg)))
+    how = {"commissioned": not options.uncommissioned}
+    rounds = rounds_of(leg, reference, walk, sensor, options.noise_nm, lambda: random, file, **how)
+    best = next(rounds) if options.as_of_file else best_of(rounds, f"leg {name}")
+    return best.explainer, best.healthy
 
 
 def main() -> None:

@@ -21,7 +21,7 @@ from diagnosis import (
     MONTH,
     NEW,
     STARTS,
-    bodies_of,
+    best_of,
     detected,
     explained,
     kept,
@@ -30,17 +30,17 @@ from diagnosis import (
     profile_of,
     referred,
     rightly,
+    rounds_of,
     truth,
     walked,
 )
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.estimate.explanations import Explainer
-from leg_wear_monitor.estimate.leg_model import WORTH_IDENTIFYING, ChangeDetector, misfit
+from leg_wear_monitor.estimate.leg_model import ChangeDetector, misfit
 from leg_wear_monitor.estimate.signature import TorqueSensor
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle, point_motion
 from leg_wear_monitor.mechanism.spec import Mechanism, PhaseLoad
-from leg_wear_monitor.monitor.diagnosis.references import ROUNDS
 from leg_wear_monitor.twin.load import torque_size
 from leg_wear_monitor.twin.reference import LegParameters
 
@@ -158,28 +158,13 @@ def print_row(name: str, row: Sequence[str]) -> None:
 
 def known_reference(walk, profile, sensor: TorqueSensor, noise_nm: float, keep: Path, paper: Mechanism):
     """The reference that the monitor would have of a leg: that of its file, or with identified bodies."""
-    best = kept(
-        keep.with_name(f"{keep.name} of file.pkl"),
-        lambda: referred(paper, profile, LegParameters.none(paper)),
-    )
-    found = explained(paper, best, walk, sensor, noise_nm, np.random.default_rng(5))
-    off = misfit(found[0].model, found[0].nuisances, found[1])
-    print(f"{keep.name}: misfit {off:.2f} with the bodies of the file")
-    for number in range(1, ROUNDS + 1):
-        if off < WORTH_IDENTIFYING:
-            break
 
-        def identify(best=best, found=found):
-            return referred(paper, profile, bodies_of(paper, found[0], found[1], best))
+    def file(what: str) -> Path:
+        return keep.with_name(f"{keep.name} {what}.pkl")
 
-        other = kept(keep.with_name(f"{keep.name} identified {number}.pkl"), identify)
-        found = explained(paper, other, walk, sensor, noise_nm, np.random.default_rng(5))
-        now = misfit(found[0].model, found[0].nuisances, found[1])
-        print(f"{keep.name}: misfit {now:.2f} after {number} rounds of identification", flush=True)
-        if now > off:
-            break
-        best, off = other, now
-    return best
+    reference = kept(file("of file"), lambda: referred(paper, profile, LegParameters.none(paper)))
+    draws = functools.partial(np.random.default_rng, 5)
+    return best_of(rounds_of(paper, reference, walk, sensor, noise_nm, draws, file), keep.name).reference
 
 
 def known(walk, sensor: TorqueSensor, noise_nm: float, random, reference, paper: Mechanism):

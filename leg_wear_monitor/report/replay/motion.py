@@ -1,4 +1,4 @@
-"""The gait cycle before and after a change, to play: the leg, its pins, forces, and the drive torque."""
+"""A gait cycle before and after a finding, to play: the leg, its pins, forces, and the drive torque."""
 
 import math
 from collections.abc import Mapping
@@ -26,7 +26,7 @@ def motion_section(summary: ReplaySummary) -> list[Section]:
     if not summary.motion or not leg.poses or not clearances:
         return []
     cycles = summary.motion if _has_changed(summary) else summary.motion[-1:]
-    names = ["before the change", "after the change"] if len(cycles) > 1 else ["the last one"]
+    names = ["before the finding", "after the finding"] if len(cycles) > 1 else ["the last one"]
     new = {joint: attrs.evolve(each, believed_m=each.counted_m) for joint, each in clearances.items()}
     runs = [_run(each, clearances if each is cycles[-1] else new) for each in cycles]
     forces = [

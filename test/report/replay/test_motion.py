@@ -35,7 +35,7 @@ def played(summary):
 def test_a_break_out_is_played_before_and_after_it(knocked):
     given = played(knocked)
     before, after = given["data"]["runs"]
-    assert (before["label"], after["label"]) == ("before the change", "after the change")
+    assert (before["label"], after["label"]) == ("before the finding", "after the finding")
     assert set(before["pins"]) == set(after["pins"]) == set(knocked.monitor.clearance_joints)
     assert after["pins"]["G"]["gap"] > 2.0 * before["pins"]["G"]["gap"]  # drawn as the verdict believes
     for pin in (*before["pins"].values(), *after["pins"].values()):

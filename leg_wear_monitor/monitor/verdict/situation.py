@@ -451,10 +451,16 @@ def of_foot_load(situation: Situation) -> Sequence[Hit]:
 
 
 def hit_of(alarm: Alarm, situation: Situation, **words: str) -> Hit:
-    """An alarm as a case of a rule: its worst value if it is known, else its last one."""
+    """An alarm as a case of a rule: its last value if that is beyond the limit, else its worst one."""
     is_present = alarm.present is alarm.level  # a level that has fallen has a value within the limit
-    is_last = math.isnan(alarm.worst) or (is_present and not math.isnan(alarm.value))
-    value = alarm.value if is_last else alarm.worst
+    is_known = is_present and not math.isnan(alarm.value)
+    value, past = alarm.worst, ""
+    if math.isnan(alarm.worst) or (is_known and (alarm.worst >= alarm.limit) is (alarm.value >= alarm.limit)):
+        value = alarm.value
+    elif is_known:  # within the limit, but not by the deadband
+        past = f", {amount(alarm.value, alarm.unit)} now"
+    if not is_present:
+        past = f" (since {time_words(alarm.raised_ns)}; now within its limit)"
     own, noun = joint_of(alarm.name), situation.quantity(alarm)
     joint = situation.joint_words(own)
     told = {
@@ -462,7 +468,7 @@ def hit_of(alarm: Alarm, situation: Situation, **words: str) -> Hit:
         "joint": joint,
         "value": amount(value, alarm.unit),
         "limit": amount(alarm.limit, alarm.unit),
-        "past": "" if is_present else f" (since {time_words(alarm.raised_ns)}; now within its limit)",
+        "past": past,
         "known": "counted",
     }
     evidence: tuple[Evidence, ...] = ()

@@ -234,7 +234,8 @@ def _input(summary: ReplaySummary) -> _Card:
     status, level, why = _status(summary, "input"), Level.OK, []
     if status:
         level = status.level
-        told = [part for part in status.message.split("; ") if not part.startswith("see: ")]
+        parts = status.message.split("; ")
+        told = [part for part in parts if not part.startswith("see: ")] or parts
         why += told[:_MOST_SENTENCES]
         if len(told) > _MOST_SENTENCES:
             why.append(f"{len(told) - _MOST_SENTENCES} more below")

@@ -393,9 +393,13 @@ def test_an_alarm_is_told_in_words_with_the_label_of_its_joint() -> None:
     impact = judged(alarms=(alarm("impact_force G"),), joints=labelled)
     assert impact.why == "the impact force in joint G (knee) is 2 N (limit 1 N)"
     assert "rock joint G (knee); " in impact.do and "leg-wear-monitor measure G MM" in impact.do
-    warning = judged(alarms=(alarm("clearance G", Level.WARN, value=5e-4, limit=6e-4),), joints=labelled)
+    warning = judged(
+        alarms=(alarm("clearance G", Level.WARN, value=5e-4, worst=5e-4, limit=6e-4),), joints=labelled
+    )
     assert warning.why == "the counted clearance of joint G (knee) is 0.5 mm, near its limit of 0.6 mm"
-    samples = judged(alarms=(alarm("input_samples", value=0.0972, limit=0.05),), input_causes=("x",))
+    samples = judged(
+        alarms=(alarm("input_samples", value=0.0972, worst=0.1, limit=0.05),), input_causes=("x",)
+    )
     assert samples.why == "the fraction of unusable samples is 0.0972 (limit 0.05): x"
 
 
@@ -416,6 +420,13 @@ def test_an_alarm_that_has_fallen_to_a_warning_is_told_with_its_worst_value_too(
     verdict = judged(alarms=(alarm("impact_force A", present=Level.WARN, value=0.9, worst=1234.5),))
     assert verdict.state is State.INSPECT
     assert "is 1234 N" in verdict.why and "now within its limit" in verdict.why
+
+
+def test_a_value_within_its_limit_by_less_than_the_deadband_is_told_beside_the_worst_one() -> None:
+    verdict = judged(alarms=(alarm("torque_mismatch", value=0.0896, worst=0.219, limit=0.1),))
+    assert "0.219 of the predicted RMS is not explained (limit 0.1), 0.0896 now" in verdict.why
+    slow = judged(alarms=(alarm("input_rate torque", value=41.0, worst=7.0, limit=40.0),))
+    assert "is 7 Hz (limit 40 Hz)" in slow.why and ", 41 Hz now" in slow.why
 
 
 def test_an_alarm_of_the_ledger_without_a_new_value_is_told_with_its_worst_value() -> None:

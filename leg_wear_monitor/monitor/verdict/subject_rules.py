@@ -94,7 +94,7 @@ def mismatch(situation: Situation) -> Sequence[Hit]:
         causes = f"; {_in_words(situation)}{causes}"
     return [
         attrs.evolve(hit, words={**hit.words, "causes": causes})
-        for hit in raised("torque_mismatch")(situation)
+        for hit in raised("torque_mismatch", least=Level.ERROR)(situation)
     ]
 
 

@@ -48,12 +48,12 @@ from leg_wear_monitor.twin.torque_reference import TorqueReference
 _HARMONICS = 12  # sin(k pi s) over stance, in each component
 
 # standard deviations about the template: begin and end of stance [turns], fore-aft over vertical force, each
-# harmonic of the vertical and fore-aft shape over the peak. Measured ones differ by 0.05 and 0.03 up to the
-# fifth, by 0.02 and 0.01 from there on (docs/appendix/benchmarks.md): a force that is continuous has
-# coefficients that fall with the square of their number. With 0.05 in each, what the torque of the model is
-# off became a ripple of the force, and wear of the heel under 100 N was counted 1.34 times too fast
+# harmonic of the vertical and fore-aft shape over the peak. Measured ones differ by 0.04 and 0.03 (RMS) up to
+# the sixth and by 0.02 and 0.01 from there on, 0.119 and 0.074 at most (docs/appendix/benchmarks.md): those
+# of a continuous force fall with the square of their number. With 0.05 and 0.025 in all twelve, what the
+# model's torque is off became a ripple of the force, and the heel's wear under 100 N was counted 1.3 times
 _TIMING, _FORE_AFT = 0.03, 0.03
-_SHAPES = np.outer([0.05, 0.025], np.minimum(1.0, (5.0 / np.arange(1, _HARMONICS + 1)) ** 2))
+_SHAPES = np.outer([0.06, 0.03], np.minimum(1.0, (6.0 / np.arange(1, _HARMONICS + 1)) ** 2))
 # by how much steps usually differ from the template: half as much as those on a treadmill do
 _USUAL = np.zeros((2, _HARMONICS))
 _USUAL[0, :9] = -0.012, 0.013, 0.0, 0.003, -0.035, 0.012, 0.008, 0.005, -0.007

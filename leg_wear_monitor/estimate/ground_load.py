@@ -51,7 +51,7 @@ _HARMONICS = 12  # sin(k pi s) over stance, in each component
 # harmonic of the vertical and fore-aft shape over the peak. Measured ones differ by 0.04 and 0.03 (RMS) up to
 # the sixth and by 0.02 and 0.01 from there on, 0.119 and 0.074 at most (docs/appendix/benchmarks.md): those
 # of a continuous force fall with the square of their number. With 0.05 and 0.025 in all twelve, what the
-# model's torque is off became a ripple of the force, and the heel's wear under 100 N was counted 1.3 times
+# model's torque is off became a ripple of the force, and the heel wore 1.3 times as fast under 100 N
 _TIMING, _FORE_AFT = 0.03, 0.03
 _SHAPES = np.outer([0.06, 0.03], np.minimum(1.0, (6.0 / np.arange(1, _HARMONICS + 1)) ** 2))
 # by how much steps usually differ from the template: half as much as those on a treadmill do

@@ -309,7 +309,8 @@ class References:
         """
         if state.rounds >= ROUNDS or self.is_load_left_out(state):
             return False
-        is_known = not state.rounds and state.parameters is not None
+        known, none = state.parameters, LegParameters.none(self._mechanism)
+        is_known = not state.rounds and known is not None and known.in_air != none  # not its load alone
         if is_known and self._models.is_of_file(state):
             return False
         return self._models.misfit(state) >= leg_model.WORTH_IDENTIFYING

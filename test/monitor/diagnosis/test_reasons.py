@@ -11,6 +11,7 @@ import pytest
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.estimate.ground_load import GroundLoad
 from leg_wear_monitor.estimate.signature import CommissionedTorque, TorqueSensor
+from leg_wear_monitor.mechanism.person import PHASES
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.inputs import Cadence
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -182,4 +183,7 @@ def test_a_leg_is_identified_until_scatter_is_left_and_one_of_an_earlier_run_whe
 
     assert is_to_identify(0.7, 0, None) and is_to_identify(0.7, ROUNDS - 1, own)
     assert not is_to_identify(0.5, 0, None) and not is_to_identify(0.7, ROUNDS, own)
-    assert not is_to_identify(0.7, 0, own) and is_to_identify(0.9, 0, own)
+    earlier = attrs.evolve(own, friction=1.2)
+    assert not is_to_identify(0.7, 0, earlier) and is_to_identify(0.9, 0, earlier)
+    loaded = attrs.evolve(own, load=np.ones((PHASES, 2)))  # its load was found, its bodies were not looked at
+    assert is_to_identify(0.7, 0, loaded) and not is_to_identify(0.5, 0, loaded)

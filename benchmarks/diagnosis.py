@@ -219,7 +219,8 @@ def referred(leg: Mechanism, profile: CrankProfile, bodies: LegParameters) -> To
 def bodies_of(leg: Mechanism, explainer: Explainer, known: CommissionedTorque, reference) -> LegParameters:
     """The bodies that explain the torque of a commissioned leg."""
     run, start = TorqueReferenceRun(leg), reference.parameters
-    if misfit(explainer.model, explainer.nuisances, known) >= FAR_FROM_FILE:
+    is_far = misfit(explainer.model, explainer.nuisances, known) >= FAR_FROM_FILE
+    if is_far and not start.compliance:  # the ideal leg's torque knows no coupling
         start = leg_of_ideal_torque(leg, explainer.model, known, reference.profile.speed, start.load)
     run.begin_identification(*new(leg), reference.profile, start)
     return identified_leg(simulated(run), explainer.model, explainer.nuisances, known)

@@ -25,7 +25,7 @@ def motion_section(summary: ReplaySummary) -> list[Section]:
     leg, clearances = summary.leg, summary.clearances
     if not summary.motion or not leg.poses or not clearances:
         return []
-    cycles = summary.motion if _has_changed(summary) else summary.motion[-1:]
+    cycles = summary.motion if _is_found_later(summary) else summary.motion[-1:]
     names = ["before the finding", "after the finding"] if len(cycles) > 1 else ["the last one"]
     new = {joint: attrs.evolve(each, believed_m=each.counted_m) for joint, each in clearances.items()}
     runs = [_run(each, clearances if each is cycles[-1] else new) for each in cycles]
@@ -48,7 +48,7 @@ def motion_section(summary: ReplaySummary) -> list[Section]:
     return [Section(TITLE, [Fragment(markup, script)])]
 
 
-def _has_changed(summary: ReplaySummary) -> bool:
+def _is_found_later(summary: ReplaySummary) -> bool:
     """Whether the verdict asks for something that was found after the first of the kept gait cycles."""
     verdict = summary.verdict
     is_found = verdict.state not in (State.HEALTHY, State.NOT_MONITORED)

@@ -397,9 +397,7 @@ def test_an_alarm_is_told_in_words_with_the_label_of_its_joint() -> None:
         alarms=(alarm("clearance G", Level.WARN, value=5e-4, worst=5e-4, limit=6e-4),), joints=labelled
     )
     assert warning.why == "the counted clearance of joint G (knee) is 0.5 mm, near its limit of 0.6 mm"
-    samples = judged(
-        alarms=(alarm("input_samples", value=0.0972, worst=0.1, limit=0.05),), input_causes=("x",)
-    )
+    samples = judged(alarms=(alarm("input_samples", value=0.0972, limit=0.05),), input_causes=("x",))
     assert samples.why == "the fraction of unusable samples is 0.0972 (limit 0.05): x"
 
 

@@ -163,7 +163,7 @@ def explainer(first: Period, cycles: np.ndarray, sensor: TorqueSensor, scatter: 
     covariance = with_scatter_of(scatter, cycles)
     known = CommissionedTorque(0, no_joint, cycles)
     model = SignatureModel(
-        sensor, np.zeros((0, 2)), nothing, np.zeros((0, 2, 2 * phases)), covariance, len(cycles)
+        sensor, np.zeros((0, 2)), nothing, np.zeros((0, 2, 2 * phases)), covariance, 1.0 / len(cycles)
     )
     return Explainer(model, (), commissioned_baseline(known, nothing, covariance), nuisances)
 

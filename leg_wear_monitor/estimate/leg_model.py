@@ -32,9 +32,9 @@ from leg_wear_monitor.estimate.signature import (
     SignatureModel,
     TorqueSensor,
     ideal_torque,
+    mean_signatures,
     signature_model,
     signature_of_torque,
-    simulated_signatures,
 )
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.spec import Mechanism
@@ -102,7 +102,7 @@ def identified_leg(
     nuisances : sequence of Nuisance
     commissioned : CommissionedTorque
     """
-    means = [simulated_signatures(legs, leg, model.sensor).mean(axis=0) for leg in range(len(legs.torque_nm))]
+    means = mean_signatures(legs, model.sensor)
     bodies, near = len(legs.parameters.mass), legs.parameters
     # friction and compliance are positive, and known to a factor: their logarithms are the unknowns
     before = np.concatenate([near.mass - 1.0, near.length - 1.0, [math.log(near.friction)]])
@@ -115,7 +115,7 @@ def identified_leg(
             np.append(steps, -math.log(STIFFER)),
             np.append(sigma, _LOG_COMPLIANCE),
         )
-    slopes = ((np.array(means[1:]) - means[0]) / steps[:, None]).T
+    slopes = ((means[1:] - means[0]) / steps[:, None]).T
     weighted = np.linalg.solve(_covariance(model, nuisances, commissioned.cycles), slopes)
     information = slopes.T @ weighted + np.diag(sigma**-2.0)
     rest = commissioned.mean - means[0]
@@ -179,7 +179,7 @@ def _covariance(model: SignatureModel, nuisances: Sequence[Nuisance], cycles: in
     """Covariance (F, F) of what a leg's mean signature over some cycles is off its model."""
     phases = model.sensor.phases
     steep = np.hypot(_OF_SIZE * model.sensor.size_nm, _OF_STEP * np.exp(model.mean[phases:]))
-    found = model.covariance * (1.0 / cycles + 1.0 / model.cycles)
+    found = model.covariance * (1.0 / cycles + model.own)
     found = found + np.diag(np.concatenate([steep, np.full(phases, _ROUGHNESS)]) ** 2)
     for one in nuisances:
         found = found + (_SENSOR * one.spread) ** 2 * np.outer(one.column, one.column)
@@ -286,7 +286,7 @@ def explainer_of(
     model = signature_model(reference, sensor)
     found, joints = nuisances(mechanism, reference, sensor), mechanism.clearance_joints
     if commissioned is None:
-        baseline = unknown_baseline(found, sensor, model.covariance / model.cycles)
+        baseline = unknown_baseline(found, sensor, model.own * model.covariance)
     else:
         expected = model.at(commissioned.clearance_m)[0]
         left_out = parts_left_out(model.covariance, commissioned.signatures)

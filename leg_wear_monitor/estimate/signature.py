@@ -223,6 +223,10 @@ def signature_of_torque(torque: Floats, phases: int) -> Floats:
 # of the noise that is added to simulated torques: the same at each start, and another one for each leg, or
 # their covariance would be that of a single leg's cycles
 _SEED = 20261122
+
+# of that noise, for the mean signature of a leg: it is three quarters of the scatter of simulated cycles, and
+# drawing it again costs no simulation
+_DRAWS = 4
 _PART_OF_SAMPLE = 0.618  # by which samples move in each simulated gait cycle
 
 
@@ -265,6 +269,12 @@ class SimulatedSensor:
         torque = scale * self.torque(leg)
         return self.signatures_of(torque + self._sensor.noise_nm * self.noise(leg))
 
+    def draws(self, leg: int) -> Floats:
+        """Signatures (draws, cycles, F) of a leg, each time with other noise; the first are `signatures`."""
+        torque = self.torque(leg)
+        noisy = (torque + self._sensor.noise_nm * self.noise(leg, draw) for draw in range(_DRAWS))
+        return np.array([self.signatures_of(one) for one in noisy])
+
     def signatures_of(self, torque: Floats) -> Floats:
         """Signatures (cycles, F) of averaged samples (n,) [N m]."""
         return signatures_by_phase(*self._phases, torque, np.diff(torque), self._sensor)
@@ -281,9 +291,9 @@ class SimulatedSensor:
         impulse = np.cumsum(torque)[at] + (self._ends - at - 1.0) * torque[at]
         return np.asarray(np.diff(impulse, prepend=0.0) / (self._sensor.together * self._between))
 
-    def noise(self, leg: int) -> Floats:
+    def noise(self, leg: int, draw: int = 0) -> Floats:
         """Noise (n,) of averaged samples of a leg, in standard deviations of a single sample."""
-        noise = np.random.default_rng([_SEED, leg]).standard_normal(self._samples)
+        noise = np.random.default_rng([_SEED, leg, draw]).standard_normal(self._samples)
         return averaged(noise, self._sensor.together)
 
 
@@ -311,8 +321,8 @@ class SignatureModel:
         What each joint changes, at each clearance of the grid.
     covariance : (F, F) array
         Of the signature of one gait cycle.
-    cycles : int
-        Simulated gait cycles of each leg.
+    own : float
+        Variance of the mean signature of a simulated leg, as a part of that of a gait cycle.
     scatter : (k, s) array
         Variance of each change, as a part of that of a gait cycle; 0 where they are exact.
     """
@@ -322,7 +332,7 @@ class SignatureModel:
     mean: Floats
     change: Floats
     covariance: Floats
-    cycles: int
+    own: float
     scatter: Floats = attrs.field()
     _log_grid: Floats = attrs.field(init=False)
     _slopes: Floats = attrs.field(init=False)
@@ -360,48 +370,57 @@ class SignatureModel:
 
 def signature_model(reference: TorqueReference, sensor: TorqueSensor) -> SignatureModel:
     """Model for a sensor, whose noise is added to the simulated torques."""
-    cycles = [len(torque) for torque in reference.torque_nm]
-    sensors = {n: SimulatedSensor(reference, n, sensor) for n in set(cycles)}
-    legs = [sensors[n].signatures(leg) for leg, n in enumerate(cycles)]
-    means = np.array([leg.mean(axis=0) for leg in legs])
-    scatter = np.concatenate([leg - mean for leg, mean in zip(legs, means, strict=True)])
-    covariance = scatter.T @ scatter / (len(scatter) - len(legs))
+    cycles = np.array([len(torque) for torque in reference.torque_nm])
+    sensors = {n: SimulatedSensor(reference, n, sensor) for n in cycles.tolist()}
+    drawn = [sensors[n].draws(leg) for leg, n in enumerate(cycles.tolist())]
+    means = np.array([leg.mean(axis=(0, 1)) for leg in drawn])
+    scatter = np.concatenate([leg[0] - leg[0].mean(axis=0) for leg in drawn])
+    covariance = scatter.T @ scatter / (len(scatter) - len(drawn))
+    own = _part_of_cycle(drawn[0], covariance) / cycles
     # after the expected leg, the legs of each joint follow one another; with the expected one in front, they
     # are the joint's grid, in the order of their clearances
     joints = reference.clearance_m.shape[1]
-    order = np.arange(1, len(legs)).reshape(joints, -1)
+    order = np.arange(1, len(drawn)).reshape(joints, -1)
     grid = np.array([reference.clearance_m[[0, *order[k]], k] for k in range(joints)])
     change = np.array([means[[0, *order[k]]] - means[0] for k in range(joints)])
     variance = np.zeros(grid.shape)
     for k in range(joints):
-        own = np.array([1.0 / cycles[i] for i in order[k]])
-        opening = grid[k, 1:] / grid[k, 0] - 1.0
+        wider = np.log(grid[k, 1:] / grid[k, 0])
         change[k, 1:], variance[k, 1:] = without_scatter(
-            opening, change[k, 1:], covariance, own, 1.0 / cycles[0]
+            wider, change[k, 1:], covariance, own[order[k]], own[0]
         )
     place = np.argsort(grid, axis=1, kind="stable")
     grid, variance = (np.take_along_axis(one, place, 1) for one in (grid, variance))
     change = np.take_along_axis(change, place[:, :, None], 1)
-    return SignatureModel(sensor, grid, means[0], change, covariance, cycles[1], variance)
+    return SignatureModel(sensor, grid, means[0], change, covariance, float(own[1]), variance)
 
 
-_STEEPNESS = np.geomspace(1.0e-4, 1.0e4, 81)  # variances per opening that are tried, of a cycle's variance
+def _part_of_cycle(drawn: Floats, covariance: Floats) -> float:
+    """Variance of a gait cycle over several draws of noise (draws, cycles, F), over that of a single one."""
+    off = (drawn - drawn.mean(axis=0)).reshape(-1, drawn.shape[2])
+    square = float((off * np.linalg.solve(covariance, off.T).T).sum())
+    part = square / ((len(drawn) - 1) * drawn[0].size)
+    return float(1.0 - min(part, 1.0) * (1.0 - 1.0 / len(drawn)))
+
+
+# variances per logarithm of a clearance that are tried, of a cycle's variance
+_STEEPNESS = np.geomspace(1.0e-4, 1.0e4, 81)
 
 
 def without_scatter(
-    opening: Floats, change: Floats, covariance: Floats, own: Floats, common: float
+    wider: Floats, change: Floats, covariance: Floats, own: Floats, common: float
 ) -> tuple[Floats, Floats]:
     """Most probable changes (s, F) of a signature by one clearance, given those of chaotic simulated legs.
 
-    The change is taken for a random walk over the clearance, from zero at the expected one, in units of the
-    scatter of a gait cycle; its steepness is that by which all s changes are most probable. Without this,
-    what simulated means scatter counts as what a clearance changes, and a clearance that the torque does
-    not show seems to be known.
+    The change is taken for a random walk over the clearance's logarithm, from zero at the expected one, in
+    units of the scatter of a gait cycle; its steepness is that by which all s changes are most probable.
+    Without this, what simulated means scatter counts as what a clearance changes, and a clearance that the
+    torque does not show seems to be known.
 
     Parameters
     ----------
-    opening : (s,) array
-        Of the clearance, as a fraction of the expected one; negative where it is narrower.
+    wider : (s,) array
+        Logarithm of the clearance over the expected one; negative where it is narrower.
     change : (s, F) array
     covariance : (F, F) array
         Of a gait cycle.
@@ -418,8 +437,8 @@ def without_scatter(
     """
     square = change @ np.linalg.solve(covariance, change.T)
     scatter = np.diag(own) + common
-    is_alike = np.sign(opening)[:, None] == np.sign(opening)
-    walk = np.where(is_alike, np.minimum(np.abs(opening)[:, None], np.abs(opening)), 0.0)
+    is_alike = np.sign(wider)[:, None] == np.sign(wider)
+    walk = np.where(is_alike, np.minimum(np.abs(wider)[:, None], np.abs(wider)), 0.0)
 
     def unlikely(steepness: float) -> float:
         total = steepness * walk + scatter
@@ -454,6 +473,12 @@ def simulated_signatures(
     """
     simulated = SimulatedSensor(reference, cycles or len(reference.torque_nm[leg]), sensor, offset_rad)
     return simulated.signatures(leg, scale)
+
+
+def mean_signatures(reference: TorqueReference, sensor: TorqueSensor) -> Floats:
+    """Mean signatures (legs, F) of the legs of a reference that were simulated for equally many cycles."""
+    simulated = SimulatedSensor(reference, len(reference.torque_nm[0]), sensor)
+    return np.array([simulated.draws(leg).mean(axis=(0, 1)) for leg in range(len(reference.torque_nm))])
 
 
 def with_noise_of(reference: TorqueReference, sensor: TorqueSensor, measured: Floats) -> TorqueSensor:

@@ -22,7 +22,7 @@ def model(entries: int = F) -> SignatureModel:
     slopes = random.standard_normal((2, entries))
     change = np.log(grid / NEW[0])[:, :, None] * 4.0 * slopes[:, None, :]
     sensor = TorqueSensor(0.005, 1.0, 10.0)
-    return SignatureModel(sensor, grid, random.standard_normal(entries), change, np.eye(entries), 10**9)
+    return SignatureModel(sensor, grid, random.standard_normal(entries), change, np.eye(entries), 1.0e-9)
 
 
 def detector(hours: float = 240.0) -> ChangeDetector:

@@ -23,7 +23,7 @@ def explainer() -> Explainer:
     slopes = 3.0 * random.standard_normal((3, F))
     change = np.log(GRID / NEW[0])[None, :, None] * slopes[:, None, :]
     model = SignatureModel(
-        TorqueSensor(0.005, 1.0, 10.0), np.tile(GRID, (3, 1)), np.zeros(F), change, np.eye(F), 10**6
+        TorqueSensor(0.005, 1.0, 10.0), np.tile(GRID, (3, 1)), np.zeros(F), change, np.eye(F), 1.0e-6
     )
     baseline = Baseline(0.1 * random.standard_normal(F), 1.0e-4 * np.eye(F))
     friction = Nuisance(Cause.FRICTION, "", np.r_[np.ones(F // 2), np.zeros(F // 2)], 0.3)

@@ -10,9 +10,9 @@ from leg_wear_monitor.estimate.ground_load import nuisances
 from leg_wear_monitor.estimate.leg_model import FAR_FROM_FILE, identified_leg, leg_of_ideal_torque, misfit
 from leg_wear_monitor.estimate.signature import (
     CommissionedTorque,
+    SimulatedSensor,
     TorqueSensor,
     signature_model,
-    simulated_signatures,
 )
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
@@ -56,8 +56,8 @@ def of_friction(reference):
 
 
 def commissioned(reference, torque) -> CommissionedTorque:
-    found = simulated_signatures(attrs.evolve(reference, torque_nm=(torque,)), 0, SENSOR)
-    return CommissionedTorque(1, reference.clearance_m[0], found)
+    drawn = SimulatedSensor(attrs.evolve(reference, torque_nm=(torque,)), len(torque), SENSOR).draws(0)
+    return CommissionedTorque(1, reference.clearance_m[0], drawn.reshape(-1, drawn.shape[2]))
 
 
 def test_a_leg_of_its_file_keeps_its_bodies(leg, known) -> None:

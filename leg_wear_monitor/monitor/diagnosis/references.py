@@ -147,7 +147,7 @@ class LegModels:
             raise RuntimeError("the leg is not commissioned yet")
         linkage = build_linkage(reference.parameters.in_air.applied(self._mechanism))
         model, columns = own.explainer.model, own.explainer.nuisances
-        covariance = model.covariance * (1.0 / known.cycles + 1.0 / model.cycles)
+        covariance = model.covariance * (1.0 / known.cycles + model.own)
         return ground_load(linkage, reference, sensor, known.mean, covariance, columns, self._figures)
 
     def fits(self, state: TorqueState) -> bool:

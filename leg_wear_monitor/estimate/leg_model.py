@@ -39,7 +39,7 @@ from leg_wear_monitor.estimate.signature import (
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.reference import LegParameters
-from leg_wear_monitor.twin.torque_reference import HEAVIER, LONGER, ROUGHER, STIFFER, TorqueReference
+from leg_wear_monitor.twin.torque_reference import HEAVIER, LONGER, ROUGHER, STIFFER, TorqueReference, design
 
 # Masses, lengths, friction and the drive's compliance of a commissioned leg, from its drive torque.
 #
@@ -48,9 +48,12 @@ from leg_wear_monitor.twin.torque_reference import HEAVIER, LONGER, ROUGHER, STI
 # makes a reference name wrong joints. So the reference is simulated again with the parameters that explain
 # the torque of the leg when it was commissioned.
 #
-# Simulated legs show what each parameter changes, near the leg that is simulated. Where a leg is far from its
-# file, the torque with ideal joints leads near it: lengths that are 5 % off change that by half of the
-# torque's size.
+# Simulated legs show what each parameter changes, near the leg that is simulated. All parameters are changed
+# at once: with one leg for each, 4 % of a body's mass changed less than the scatter of simulated legs, and
+# slopes of masses were noise.
+#
+# Where a leg is far from its file, the torque with ideal joints leads near it: lengths that are 5 % off
+# change that by half of the torque's size.
 
 
 UNLIKE_FILE = 0.8  # misfit from which on the leg is not that of its file (docs/explanation/diagnosis.md)
@@ -88,6 +91,7 @@ def identified_leg(
     model: SignatureModel,
     nuisances: Sequence[Nuisance],
     commissioned: CommissionedTorque,
+    is_drive_known: bool = False,
 ) -> LegParameters:
     """Most probable parameters of a commissioned leg: one step of Gauss and Newton.
 
@@ -101,6 +105,8 @@ def identified_leg(
     model : SignatureModel
     nuisances : sequence of Nuisance
     commissioned : CommissionedTorque
+    is_drive_known : bool
+        Whether the compliance of the drive stays as it is.
     """
     means = mean_signatures(legs, model.sensor)
     bodies, near = len(legs.parameters.mass), legs.parameters
@@ -109,13 +115,14 @@ def identified_leg(
     far = float(np.sqrt(np.mean(np.square(near.length - 1.0))))
     steps = np.append(np.repeat([HEAVIER, LONGER], bodies), math.log(ROUGHER))
     sigma = np.append(np.repeat([_MASS, np.hypot(_LENGTH, far)], bodies), _LOG_FRICTION)
-    if len(means) > 1 + len(steps):  # its deviation from the compliance of the simulated leg
+    levels = design(len(steps) + bool(near.compliance))[1:]
+    if near.compliance and not is_drive_known:  # its deviation from the compliance of the simulated leg
         before, steps, sigma = (
             np.append(before, 0.0),
             np.append(steps, -math.log(STIFFER)),
             np.append(sigma, _LOG_COMPLIANCE),
         )
-    slopes = ((means[1:] - means[0]) / steps[:, None]).T
+    slopes = means[1:].T @ levels[:, : len(steps)] / (len(levels) * steps)
     weighted = np.linalg.solve(_covariance(model, nuisances, commissioned.cycles), slopes)
     information = slopes.T @ weighted + np.diag(sigma**-2.0)
     rest = commissioned.mean - means[0]

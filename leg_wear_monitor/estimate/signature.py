@@ -370,9 +370,8 @@ class SignatureModel:
 
 def signature_model(reference: TorqueReference, sensor: TorqueSensor) -> SignatureModel:
     """Model for a sensor, whose noise is added to the simulated torques."""
-    cycles = np.array([len(torque) for torque in reference.torque_nm])
-    sensors = {n: SimulatedSensor(reference, n, sensor) for n in cycles.tolist()}
-    drawn = [sensors[n].draws(leg) for leg, n in enumerate(cycles.tolist())]
+    drawn = _drawn(reference, sensor)
+    cycles = np.array([leg.shape[1] for leg in drawn])
     means = np.array([leg.mean(axis=(0, 1)) for leg in drawn])
     scatter = np.concatenate([leg[0] - leg[0].mean(axis=0) for leg in drawn])
     covariance = scatter.T @ scatter / (len(scatter) - len(drawn))
@@ -393,6 +392,13 @@ def signature_model(reference: TorqueReference, sensor: TorqueSensor) -> Signatu
     grid, variance = (np.take_along_axis(one, place, 1) for one in (grid, variance))
     change = np.take_along_axis(change, place[:, :, None], 1)
     return SignatureModel(sensor, grid, means[0], change, covariance, float(own[1]), variance)
+
+
+def _drawn(reference: TorqueReference, sensor: TorqueSensor) -> list[Floats]:
+    """Signatures (draws, cycles, F) of each leg of a reference."""
+    cycles = [len(torque) for torque in reference.torque_nm]
+    sensors = {n: SimulatedSensor(reference, n, sensor) for n in cycles}
+    return [sensors[n].draws(leg) for leg, n in enumerate(cycles)]
 
 
 def _part_of_cycle(drawn: Floats, covariance: Floats) -> float:
@@ -476,9 +482,8 @@ def simulated_signatures(
 
 
 def mean_signatures(reference: TorqueReference, sensor: TorqueSensor) -> Floats:
-    """Mean signatures (legs, F) of the legs of a reference that were simulated for equally many cycles."""
-    simulated = SimulatedSensor(reference, len(reference.torque_nm[0]), sensor)
-    return np.array([simulated.draws(leg).mean(axis=(0, 1)) for leg in range(len(reference.torque_nm))])
+    """Mean signatures (legs, F) of the legs of a reference."""
+    return np.array([leg.mean(axis=(0, 1)) for leg in _drawn(reference, sensor)])
 
 
 def with_noise_of(reference: TorqueReference, sensor: TorqueSensor, measured: Floats) -> TorqueSensor:

@@ -44,9 +44,9 @@ WIDER = (1.2, 1.35, 1.5, 2.0, 3.0, 5.0, 8.0)  # factors on the expected clearanc
 
 WORN, NARROWER = 1.2, 0.8  # a clearance over the new one, and a factor on the others beside it
 
-HEAVIER, LONGER = 0.04, 0.004  # of a body's mass and length, one body at a time
-ROUGHER = 1.5  # factor on the friction in the joints
-STIFFER = 1.08  # factor on the stiffness of a drive that is not rigid: a quarter of its resonance's width
+# of each body's mass and length, and factors on the friction in the joints and on the stiffness of a drive
+# that is not rigid (a quarter of its resonance's width): up and down, all of them at once
+HEAVIER, LONGER, ROUGHER, STIFFER = 0.02, 0.002, 1.25, 1.08
 
 _BEHIND = 2  # legs that are due and not simulated, from which on threads of higher priority help
 _SETTLING = 2  # gait cycles before those that count
@@ -359,7 +359,7 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
             Wear depths [m], as of `begin`.
         """
         if part.is_of_parameters:
-            legs = _changed(part.parameters, part.clearance_m[0])[: len(part.clearance_m)]
+            legs = _changed(part.parameters, part.clearance_m[0])
         else:
             legs = [Leg(part.parameters, clearance_m) for clearance_m in part.clearance_m]
         self._begin(legs, depth, part.profile)
@@ -378,14 +378,9 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
         depth: Floats,
         profile: CrankProfile,
         near: LegParameters,
-        is_drive_known: bool = False,
     ) -> None:
-        """Begin the leg with given parameters, then each body heavier, each longer, and more friction.
-
-        Where its drive is compliant, and not known, a last leg has a stiffer one.
-        """
-        legs = _changed(near, np.maximum(clearance_m, LEAST_CLEARANCE_M))
-        self._begin(legs[:-1] if near.compliance and is_drive_known else legs, depth, profile)
+        """Begin the leg with given parameters, then legs in which all of them are changed, as of `design`."""
+        self._begin(_changed(near, np.maximum(clearance_m, LEAST_CLEARANCE_M)), depth, profile)
 
     def _so_far(self) -> TorqueReference:
         clearance_m = np.array([leg.clearance_m for leg in self._legs])
@@ -395,26 +390,45 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
         return leg.torque.astype(np.float16)
 
     def _cycles_of(self, leg: Leg) -> int:
-        cycles = self._cycles or CYCLES
-        return cycles if (leg.clearance_m != self._legs[0].clearance_m).any() else 2 * cycles
+        cycles, expected = self._cycles or CYCLES, self._legs[0]
+        is_expected = (
+            leg.parameters == expected.parameters and (leg.clearance_m == expected.clearance_m).all()
+        )
+        return 2 * cycles if is_expected else cycles
 
     @property
     def _pace(self) -> int:
         return PACE
 
 
+def design(parameters: int) -> Floats:
+    """Levels (legs, parameters) of parameters in simulated legs: 0 in the first, then all at once, -1 or 1.
+
+    What each of them changes is seen in all legs: their chaotic motion scatters it by a thirty-second of what
+    one leg each leaves (Hotelling, Annals of Mathematical Statistics 15 (1944), 297). As each leg has its
+    opposite, what two parameters change together cancels.
+    """
+    levels = np.ones((1, 1))
+    while len(levels) < parameters:  # Sylvester's matrices: all columns are orthogonal
+        levels = np.kron([[1.0, 1.0], [1.0, -1.0]], levels)
+    levels = levels[:, :parameters]
+    return np.vstack([np.zeros(parameters), levels, -levels])
+
+
 def _changed(near: LegParameters, clearance_m: Floats) -> list[Leg]:
-    """The leg with given parameters, then each body heavier, each longer, more friction, a stiffer drive."""
-    each = np.eye(len(near.mass))
-    changed = [
-        near,
-        *(attrs.evolve(near, mass=near.mass + HEAVIER * one) for one in each),
-        *(attrs.evolve(near, length=near.length + LONGER * one) for one in each),
-        attrs.evolve(near, friction=near.friction * ROUGHER),
-    ]
-    if near.compliance:
-        changed.append(attrs.evolve(near, compliance=near.compliance / STIFFER))
-    return [Leg(parameters, clearance_m) for parameters in changed]
+    """The leg with given parameters, then legs with other masses, lengths, friction, and stiffness if any."""
+    bodies, legs = len(near.mass), []
+    for levels in design(2 * bodies + 1 + bool(near.compliance)):
+        mass, length, (friction, *stiffness) = np.split(levels, [bodies, 2 * bodies])
+        changed = attrs.evolve(
+            near,
+            mass=near.mass + HEAVIER * mass,
+            length=near.length + LONGER * length,
+            friction=near.friction * ROUGHER**friction,
+            compliance=near.compliance * STIFFER ** -sum(stiffness),
+        )
+        legs.append(Leg(changed, clearance_m))
+    return legs
 
 
 def _lower_priority() -> None:

@@ -17,7 +17,7 @@ from leg_wear_monitor.estimate.signature import (
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.twin.reference import POINTS, LegParameters
-from leg_wear_monitor.twin.torque_reference import HEAVIER, LONGER, ROUGHER
+from leg_wear_monitor.twin.torque_reference import HEAVIER, LONGER, ROUGHER, design
 
 SENSOR = TorqueSensor(period_s=0.005, cycle_s=1.0, size_nm=9.2, noise_nm=0.3)
 
@@ -40,14 +40,15 @@ def walked(leg, reference, bodies: LegParameters, number: int = 0):
 
 
 def legs_of(leg, reference):
-    """Legs with each body heavier, then longer, and one with more friction, whose torque is scaled for it."""
-    none = LegParameters.none(leg)
-    changed = [none]
-    changed += [attrs.evolve(none, mass=none.mass + HEAVIER * one) for one in np.eye(len(none.mass))]
-    changed += [attrs.evolve(none, length=none.length + LONGER * one) for one in np.eye(len(none.mass))]
-    torques = tuple(walked(leg, reference, bodies) for bodies in changed)
-    rougher = (torques[0] + math.log(ROUGHER) * of_friction(reference)).astype(np.float16)
-    return attrs.evolve(reference, torque_nm=(*torques, rougher), parameters=none)
+    """Legs in which all bodies are changed at once, and friction, which scales the torque."""
+    none, bodies = LegParameters.none(leg), len(leg.bodies)
+    torques = []
+    for level in design(2 * bodies + 1):
+        mass, length, friction = np.split(level, [bodies, 2 * bodies])
+        own = LegParameters(none.mass + HEAVIER * mass, none.length + LONGER * length)
+        rougher = friction.item() * math.log(ROUGHER) * of_friction(reference)
+        torques.append((walked(leg, reference, own) + rougher).astype(np.float16))
+    return attrs.evolve(reference, torque_nm=tuple(torques), parameters=none)
 
 
 def of_friction(reference):

@@ -367,7 +367,7 @@ class References:
         if part is not None:
             self._running().go_on(part, depth)
         else:
-            self._running().begin_identification(clearance_m, depth, profile, start, self._is_drive_known)
+            self._running().begin_identification(clearance_m, depth, profile, start)
 
     def _continue(
         self, run: TorqueReferenceRun, state: TorqueState, counted_m: Floats, depth: Floats
@@ -442,7 +442,7 @@ class References:
         elif state.commissioned is not None:
             explainer = self._models.explainer(state)
             state.parameters = leg_model.identified_leg(
-                legs, explainer.model, explainer.nuisances, state.commissioned
+                legs, explainer.model, explainer.nuisances, state.commissioned, self._is_drive_known
             )
             self._begin(state.parameters, counted_m, depth, legs.profile)
 

@@ -17,6 +17,7 @@ from leg_wear_monitor.twin.torque_reference import (
     ROUGHER,
     TorqueReference,
     TorqueReferenceRun,
+    design,
 )
 from leg_wear_monitor.wear import SECTORS
 
@@ -124,23 +125,33 @@ def test_a_part_of_an_identification_goes_on_where_it_ended(small, identified, s
         np.testing.assert_array_equal(torque, same)
 
 
-def test_each_body_is_heavier_and_longer_in_turn_and_friction_larger(small, identified, short) -> None:
+def test_masses_lengths_and_friction_are_changed_at_once(small, identified, short) -> None:
     none, found = LegParameters.none(small), identified[0]
     bodies = len(small.bodies)
-    assert len(found.torque_nm) == 2 + 2 * bodies
+    levels = design(2 * bodies + 1)
+    assert len(found.torque_nm) == len(levels)
+    assert [len(torque) for torque in found.torque_nm[:3]] == [2, 1, 1]
     assert (found.clearance_m == 3.0e-4).all()
-    # the second leg of the heavier ones is that with its second body heavier, simulated alone
-    one = np.eye(bodies)[1]
-    for number, alone in (
-        (2, attrs.evolve(none, mass=none.mass + HEAVIER * one)),
-        (2 + bodies, attrs.evolve(none, length=none.length + LONGER * one)),
-        (1 + 2 * bodies, attrs.evolve(none, friction=ROUGHER)),
-    ):
-        other = TorqueReferenceRun(alone.applied(small))
-        other.begin(NEW[:2], UNWORN[:2], STEADY)
-        while not other.snapshot().done:
-            other.advance()
-        np.testing.assert_array_equal(other.snapshot().done[0], found.torque_nm[number])
+    # one of them, simulated alone
+    mass, length, friction = np.split(levels[3], [bodies, 2 * bodies])
+    own = LegParameters(none.mass + HEAVIER * mass, none.length + LONGER * length, ROUGHER ** friction.item())
+    other = TorqueReferenceRun(own.applied(small))
+    other.begin(NEW[:2], UNWORN[:2], STEADY)
+    while not other.snapshot().done:
+        other.advance()
+    np.testing.assert_array_equal(other.snapshot().done[0][:1], found.torque_nm[3])
+
+
+@pytest.mark.parametrize("parameters", [1, 2, 11, 15, 16, 17])
+def test_levels_are_orthogonal_and_each_leg_has_its_opposite(parameters: int) -> None:
+    levels = design(parameters)
+    assert not levels[0].any()
+    assert set(np.abs(levels[1:]).ravel()) == {1.0}
+    np.testing.assert_array_equal(levels.T @ levels, (len(levels) - 1) * np.eye(parameters))
+    assert sorted(map(tuple, levels)) == sorted(map(tuple, -levels))
+    # what two of them change together looks like none of them
+    pairs = levels[:, :, None] * levels[:, None, :]
+    assert not np.einsum("ni,njk->ijk", levels, pairs).any()
 
 
 def test_a_restored_run_continues_bit_for_bit(small, identified, short) -> None:

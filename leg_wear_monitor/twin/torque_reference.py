@@ -408,17 +408,27 @@ def design(parameters: int) -> Floats:
     one leg each leaves (Hotelling, Annals of Mathematical Statistics 15 (1944), 297). As each leg has its
     opposite, what two parameters change together cancels.
     """
-    levels = np.ones((1, 1))
+    levels: Floats = np.ones((1, 1))
     while len(levels) < parameters:  # Sylvester's matrices: all columns are orthogonal
-        levels = np.kron([[1.0, 1.0], [1.0, -1.0]], levels)
+        levels = np.block([[levels, levels], [levels, -levels]])
     levels = levels[:, :parameters]
     return np.vstack([np.zeros(parameters), levels, -levels])
+
+
+def legs_of_identification(near: LegParameters) -> int:
+    """Number of legs that `TorqueReferenceRun.begin_identification` simulates."""
+    return len(design(_parameters(near)))
+
+
+def _parameters(near: LegParameters) -> int:
+    """Number of parameters that are changed: of the leg, and the compliance of its drive if it has any."""
+    return 2 * len(near.mass) + 1 + bool(near.compliance)
 
 
 def _changed(near: LegParameters, clearance_m: Floats) -> list[Leg]:
     """The leg with given parameters, then legs with other masses, lengths, friction, and stiffness if any."""
     bodies, legs = len(near.mass), []
-    for levels in design(2 * bodies + 1 + bool(near.compliance)):
+    for levels in design(_parameters(near)):
         mass, length, (friction, *stiffness) = np.split(levels, [bodies, 2 * bodies])
         changed = attrs.evolve(
             near,

@@ -411,8 +411,7 @@ def _reference_of(
     )
     profile = CrankProfile(speed, *ripple.reshape(2, -1))
     reference = TorqueReference(profile, known.reshape(legs, -1), (expected,), parameters)
-    cycles = len(expected) if reference.is_of_parameters else CYCLES
-    shape = (legs - 1, -1, POINTS) if is_whole else (-1, cycles, POINTS)
+    shape = (legs - 1, -1, POINTS) if is_whole else (-1, CYCLES, POINTS)
     return names, attrs.evolve(reference, torque_nm=(expected, *wider.reshape(shape)))
 
 

@@ -58,9 +58,11 @@ from leg_wear_monitor.twin.torque_reference import HEAVIER, LONGER, ROUGHER, STI
 
 UNLIKE_FILE = 0.8  # misfit from which on the leg is not that of its file (docs/explanation/diagnosis.md)
 
-# misfit from which on a leg is better identified: the scatter of gait cycles alone leaves 0.25 to 0.58. J at
-# 0.45 mm was 0.54 mm where masses left 0.46, and 0.62, or I was taken for it, at 0.68 (2026-11-26)
-WORTH_IDENTIFYING = 0.6
+# misfit from which on a leg is identified, and, as it is not that of its file then, down to which: scatter
+# alone leaves 0.1 to 0.25, and 0.5 to 0.6 where samples fall at the same angles in each gait cycle. J at
+# 0.45 mm was 0.48 to 0.50 mm where 0.39 was left, 0.54 at 0.58, and 0.62, or I was taken for it, at 0.68
+# (2026-11-26)
+WORTH_IDENTIFYING, ONLY_SCATTER = 0.6, 0.45
 
 FAR_FROM_FILE = 20.0  # misfit from which on the ideal torque comes first
 

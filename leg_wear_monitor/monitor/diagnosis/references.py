@@ -314,7 +314,9 @@ class References:
         is_known = not state.rounds and known is not None and known.in_air != none  # not its load alone
         if is_known and self._models.is_of_file(state):
             return False
-        return self._models.misfit(state) >= leg_model.WORTH_IDENTIFYING
+        is_unlike_file = state.rounds > 0 or known not in (None, none)
+        least = leg_model.ONLY_SCATTER if is_unlike_file else leg_model.WORTH_IDENTIFYING
+        return self._models.misfit(state) >= least
 
     def is_load_left_out(self, state: TorqueState) -> bool:
         """Whether the foot surely carries a load, but the configuration has the model walk without one."""

@@ -181,9 +181,10 @@ def test_a_leg_is_identified_until_scatter_is_left_and_one_of_an_earlier_run_whe
         with mock.patch.object(models, "misfit", lambda _: misfit):
             return references.is_to_identify(now)
 
-    assert is_to_identify(0.7, 0, None) and is_to_identify(0.7, ROUNDS - 1, own)
-    assert not is_to_identify(0.5, 0, None) and not is_to_identify(0.7, ROUNDS, own)
+    assert is_to_identify(0.7, 0, None) and not is_to_identify(0.5, 0, None)
+    assert is_to_identify(0.5, ROUNDS - 1, own) and not is_to_identify(0.4, ROUNDS - 1, own)
+    assert not is_to_identify(0.7, ROUNDS, own)
     earlier = attrs.evolve(own, friction=1.2)
     assert not is_to_identify(0.7, 0, earlier) and is_to_identify(0.9, 0, earlier)
     loaded = attrs.evolve(own, load=np.ones((PHASES, 2)))  # its load was found, its bodies were not looked at
-    assert is_to_identify(0.7, 0, loaded) and not is_to_identify(0.5, 0, loaded)
+    assert is_to_identify(0.5, 0, loaded) and not is_to_identify(0.4, 0, loaded)

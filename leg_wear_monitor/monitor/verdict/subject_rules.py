@@ -250,7 +250,7 @@ def departing(situation: Situation) -> Sequence[Hit]:
     used = {each.joint for each in situation.joints if each.is_used}
     return [
         hit if hit.joint in used else attrs.evolve(hit, not_valid=(Figure.FORECAST,))
-        for hit in raised("clearance_departure")(situation)
+        for hit in raised("clearance_departure", least=Level.ERROR)(situation)
     ]
 
 

@@ -127,6 +127,7 @@ CASES = [
     ),
     ({"diagnosis": diagnosis(change(Cause.FRICTION))}, State.WATCH, "FRICTION_CHANGED", ()),
     ({"diagnosis": Diagnosis(state=DiagnosisState.AS_COUNTED)}, State.WATCH, "NOT_OBSERVED", ()),
+    ({"alarms": (alarm("clearance_departure G", Level.WARN),)}, State.WATCH, "ALARM_G", ()),
     (
         {"alarms": (alarm("clearance_departure G"),)},
         State.INSPECT,

@@ -30,6 +30,7 @@ from leg_wear_monitor.estimate.cause import Cause
 from leg_wear_monitor.estimate.explanations import Explainer
 from leg_wear_monitor.estimate.leg_model import (
     FAR_FROM_FILE,
+    ONLY_SCATTER,
     WORTH_IDENTIFYING,
     ChangeDetector,
     best_fit,
@@ -433,7 +434,7 @@ def rounds_of(leg, reference, walk, sensor, noise_nm, draws, file, next_leg=bodi
         explainer, known, healthy = explained(leg, reference, walk, sensor, noise_nm, draws(), commissioned)
         off = None if known is None else misfit(explainer.model, explainer.nuisances, known)
         yield Round(reference, explainer, known, healthy, off)
-        if off is None or off < WORTH_IDENTIFYING or number > ROUNDS:
+        if off is None or number > ROUNDS or off < (WORTH_IDENTIFYING if number == 1 else ONLY_SCATTER):
             return
 
         def identify(reference=reference, explainer=explainer, known=known) -> TorqueReference:

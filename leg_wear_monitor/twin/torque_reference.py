@@ -6,8 +6,8 @@ of them wider in turn. That takes seconds of a processor, so threads of low prio
 on; compiled code does not hold the interpreter's lock. A reference is there a number of evaluation periods
 after it was begun that depends on what is to be simulated alone: a replay gives what the live monitor gave.
 
-It depends on the leg's masses, lengths and friction, too: legs with each body heavier and longer in turn, and
-one with more friction, show which of them a leg has.
+It depends on the leg's masses, lengths and friction, too: legs in which all of them are changed at once show
+what each of them changes.
 """
 
 import os

@@ -397,7 +397,7 @@ def signature_model(reference: TorqueReference, sensor: TorqueSensor) -> Signatu
 def _drawn(reference: TorqueReference, sensor: TorqueSensor) -> list[Floats]:
     """Signatures (draws, cycles, F) of each leg of a reference."""
     cycles = [len(torque) for torque in reference.torque_nm]
-    sensors = {n: SimulatedSensor(reference, n, sensor) for n in cycles}
+    sensors = {n: SimulatedSensor(reference, n, sensor) for n in set(cycles)}
     return [sensors[n].draws(leg) for leg, n in enumerate(cycles)]
 
 

@@ -39,7 +39,14 @@ from leg_wear_monitor.estimate.signature import (
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.reference import LegParameters
-from leg_wear_monitor.twin.torque_reference import HEAVIER, LONGER, ROUGHER, STIFFER, TorqueReference, design
+from leg_wear_monitor.twin.torque_reference import (
+    HEAVIER,
+    LONGER,
+    ROUGHER,
+    STIFFER,
+    TorqueReference,
+    levels_of,
+)
 
 # Masses, lengths, friction and the drive's compliance of a commissioned leg, from its drive torque.
 #
@@ -117,7 +124,7 @@ def identified_leg(
     far = float(np.sqrt(np.mean(np.square(near.length - 1.0))))
     steps = np.append(np.repeat([HEAVIER, LONGER], bodies), math.log(ROUGHER))
     sigma = np.append(np.repeat([_MASS, np.hypot(_LENGTH, far)], bodies), _LOG_FRICTION)
-    levels = design(len(steps) + bool(near.compliance))[1:]
+    levels = levels_of(near)[1:]
     if near.compliance and not is_drive_known:  # its deviation from the compliance of the simulated leg
         before, steps, sigma = (
             np.append(before, 0.0),

@@ -412,20 +412,15 @@ def design(parameters: int) -> Floats:
     return np.vstack([np.zeros(parameters), levels, -levels])
 
 
-def legs_of_identification(near: LegParameters) -> int:
-    """Number of legs that `TorqueReferenceRun.begin_identification` simulates."""
-    return len(design(_parameters(near)))
-
-
-def _parameters(near: LegParameters) -> int:
-    """Number of parameters that are changed: of the leg, and the compliance of its drive if it has any."""
-    return 2 * len(near.mass) + 1 + bool(near.compliance)
+def levels_of(near: LegParameters) -> Floats:
+    """Levels, as of `design`, of masses, lengths, friction, and the compliance of the drive if it has any."""
+    return design(2 * len(near.mass) + 1 + bool(near.compliance))
 
 
 def _changed(near: LegParameters, clearance_m: Floats) -> list[Leg]:
     """The leg with given parameters, then legs with other masses, lengths, friction, and stiffness if any."""
     bodies, legs = len(near.mass), []
-    for levels in design(_parameters(near)):
+    for levels in levels_of(near):
         mass, length, (friction, *stiffness) = np.split(levels, [bodies, 2 * bodies])
         changed = attrs.evolve(
             near,

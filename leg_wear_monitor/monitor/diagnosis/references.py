@@ -27,7 +27,7 @@ from leg_wear_monitor.twin.torque_reference import (
     ReferenceSnapshot,
     TorqueReference,
     TorqueReferenceRun,
-    legs_of_identification,
+    levels_of,
 )
 
 # Models that follow from the state of a `TorqueObserver`: explanations, tests and the misfit.
@@ -427,7 +427,7 @@ class References:
         part = self._part
         if part is None or part.is_of_parameters is not is_of_parameters or part.parameters != own:
             return None
-        if is_of_parameters and len(part.clearance_m) != legs_of_identification(own):  # of an earlier version
+        if is_of_parameters and len(part.clearance_m) != len(levels_of(own)):  # of an earlier version
             return None
         return part if profile.is_like(part.profile) and not _is_far(part, clearance_m) else None
 

@@ -137,6 +137,21 @@ def test_what_the_torque_does_not_show_changes_nothing() -> None:
     assert (scatter < 0.1 * (OWN + COMMON)).all()
 
 
+def test_a_change_of_few_phases_is_kept() -> None:
+    """So does J; and most of its change comes before it is half as wide again."""
+    random, kept = np.random.default_rng(7), []
+    for _ in range(20):
+        true = np.zeros((7, 160))
+        true[:, :16] = np.sign(WIDER)[:, None] * np.minimum(np.abs(WIDER), 0.4)[:, None]
+        true *= 4.0 * random.standard_normal(160)
+        found, _ = without_scatter(
+            WIDER, simulated_changes(random, true, np.eye(160)), np.eye(160), OWN, COMMON
+        )
+        kept.append((found * true).sum(axis=1) / np.square(true).sum(axis=1))
+    # with one steepness for all entries, 0.72 to 0.91
+    assert np.mean(kept, axis=0)[1:].min() > 0.85
+
+
 def test_a_large_change_stays_as_it_is() -> None:
     random = np.random.default_rng(6)
     true = np.abs(WIDER)[:, None] * 20.0 * random.standard_normal(160)

@@ -177,8 +177,8 @@ def watched(
             told = [
                 f"{change.cause.name} {change.subject}" for change in seen.changes if not change.is_corrected
             ]
-            stops = zip(joints, seen.clearance_m, seen.sigma_m, strict=False)
-            told += [f"stop {joint}" for joint, c, sigma in stops if c - 2.0 * sigma >= limit_m]
+            stops = zip(joints, seen.least_m, strict=False)
+            told += [f"stop {joint}" for joint, least_m in stops if least_m >= limit_m]
             if correction is not None:
                 told.append(f"corrected {joints[correction.joint]} {1e3 * correction.clearance_m:.3f} mm")
                 counted = counted.copy()

@@ -136,8 +136,8 @@ class Monitored:
         for change in seen.changes:
             if not change.is_corrected:
                 self._note(f"{change.cause.value} {change.subject}".strip())
-        for joint, c, sigma in zip(self.joints, seen.clearance_m, seen.sigma_m, strict=False):
-            if c - 2.0 * sigma >= limit_m:
+        for joint, least_m in zip(self.joints, seen.least_m, strict=False):
+            if least_m >= limit_m:
                 self._note(f"stop {joint}")
         self.cycle += 1
 

@@ -10,6 +10,7 @@ SURE_LOG_ODDS = 5.0  # 150 to 1
 # another. Under 300 N of load and twice the friction, B had 7 where G was open; right names had 15 and more
 # there, 85 and more in the air (2026-11-25)
 SURE_OF_NAME = 10.0
+SURE_SIGMAS = 2.0  # by which a clearance must be beyond its limit, or below it
 
 
 class Cause(Enum):

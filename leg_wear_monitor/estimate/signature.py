@@ -417,6 +417,7 @@ _STEEPNESS = np.geomspace(1.0e-4, 1.0e4, 81)
 # of what it is at 1.35 and 1.5 times its clearance, with 4 it is 0.88 to 0.95; with 2, three times as much of
 # mere scatter is left of a joint that the torque does not show (2026-11-26)
 _ALIKE = 4.0
+_LEAST_VARIANCE = 1.0e-12  # of the largest: rounding, where fewer cycles than entries were simulated
 
 
 def without_scatter(
@@ -449,7 +450,7 @@ def without_scatter(
     """
     # the symmetric root: an entry stays that of its phase
     variances, axes = np.linalg.eigh(covariance)
-    root = np.sqrt(variances)
+    root = np.sqrt(np.maximum(variances, _LEAST_VARIANCE * variances[-1]))
     measured = change @ (axes / root) @ axes.T
     scatter = np.diag(own) + common
     is_alike = np.sign(wider)[:, None] == np.sign(wider)

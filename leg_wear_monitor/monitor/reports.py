@@ -353,4 +353,4 @@ def with_forecast(
 def shown_by_torque(k: int, diagnosis: Diagnosis) -> KnownClearance | None:
     """The clearance of joint k that the drive torque shows."""
     found = diagnosis.of_joint(k)
-    return KnownClearance("torque", *found) if found else None
+    return KnownClearance("torque", *found, diagnosis.least_m[k]) if found else None

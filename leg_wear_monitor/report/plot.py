@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from leg_wear_monitor.dynamics.result import SimulationResult
-from leg_wear_monitor.estimate.cause import Change
+from leg_wear_monitor.estimate.cause import SURE_SIGMAS, Change
 from leg_wear_monitor.fleet.overview import FleetOverview, LegOverview
 from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.materials import Material
@@ -17,7 +17,7 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms import ADVICE
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, ExplainedTorque
 from leg_wear_monitor.monitor.verdict.decision import decision_of
-from leg_wear_monitor.monitor.verdict.situation import SEEN, SOURCES, SURE_SIGMAS
+from leg_wear_monitor.monitor.verdict.situation import SEEN, SOURCES
 from leg_wear_monitor.monitor.verdict.verdict import EVIDENCE, diagnosis_words, estimate
 from leg_wear_monitor.playback.result import ReplaySummary
 from leg_wear_monitor.playback.summary import ReplayResult

@@ -374,6 +374,7 @@ class TorqueObserver(KeepsSamples):
             cycles=state.fit_cycles,
             clearance_m=tuple(clearance_m.tolist()),
             sigma_m=tuple(sigma_m.tolist()),
+            least_m=state.surely_m(self.config.alarms.on_delay_cycles),
             changes=state.settled + state.changes,
         )
 
@@ -463,6 +464,7 @@ class TorqueObserver(KeepsSamples):
         state.counted_m = np.asarray(counted_m, float).copy()
         state.forget_cycles()
         state.detector, state.changes, state.has_failed, state.carried_n = None, (), False, ()
+        state.least_m = ()
 
     def _follow_load(self) -> None:
         """Commission the leg anew where it carries another load than that of its reference.

@@ -174,6 +174,9 @@ class Diagnosis(Shown):
     clearance_m, sigma_m : tuple of float
         Estimated clearance of each clearance joint and its standard deviation; NaN where it is not
         observable.
+    least_m : tuple of float
+        Clearance that each joint surely has: the least by `SURE_SIGMAS` in the last estimates, as many in a
+        row as an alarm waits for; minus infinity before.
     changes : tuple of Change
         Significant departures, the oldest first: those by which counted clearances were corrected, and, where
         the state is CHANGED, the one that is not settled yet.
@@ -204,6 +207,7 @@ class Diagnosis(Shown):
     cycles_not_used: Mapping[str, int] = attrs.field(factory=dict)
     clearance_m: tuple[float, ...] = ()
     sigma_m: tuple[float, ...] = ()
+    least_m: tuple[float, ...] = ()
     changes: tuple[Change, ...] = ()
     channel: Channel = DIRECT
     bodies: tuple[Body, ...] = ()
@@ -304,6 +308,8 @@ class TorqueState:
         Gait cycles in the fit.
     fit_due : int
         Gait cycles until the next fit.
+    least_m : tuple of (k,) arrays
+        Clearances that joints surely have by the last fits in a row, by their changes where these show more.
     changes : tuple of Change
         Unsettled changes; the last one is being observed.
     settled : tuple of Change
@@ -346,6 +352,7 @@ class TorqueState:
     fit: ClearanceFit | None = None
     fit_cycles: int = 0
     fit_due: int = 0
+    least_m: tuple[Floats, ...] = ()
     changes: tuple[Change, ...] = ()
     settled: tuple[Change, ...] = ()
     not_used: dict[str, int] = attrs.field(factory=dict)
@@ -417,6 +424,13 @@ class TorqueState:
         alike = {one.begin_ns for one in kept if one.profile.is_like(cycle.profile)}
         self.waiting = (*(one for one in kept if one.begin_ns in alike), cycle)
         self.odd = tuple(one for one in kept if one.begin_ns not in alike)
+
+    def surely_m(self, number: int) -> tuple[float, ...]:
+        """Clearances that joints surely have by so many last fits; minus infinity where there are fewer."""
+        least_m = self.least_m[-number:]
+        if len(least_m) < number:
+            return (-math.inf,) * len(self.counted_m)
+        return tuple(np.min(least_m, axis=0).tolist())
 
     def forget_cycles(self, since_ns: int = 0) -> None:
         """Forget the gait cycles that began at a stamp or later, at all cadences."""

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import attrs
 
-from leg_wear_monitor.estimate.cause import NamedCause, TorqueExplanation
+from leg_wear_monitor.estimate.cause import SURE_SIGMAS, NamedCause, TorqueExplanation
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials import BushingLoad
 from leg_wear_monitor.monitor.alarms import Alarm, amount, joint_of, time_words
@@ -29,11 +29,18 @@ class KnownClearance:
         counting and measurements give together.
     clearance_m, sigma_m : float
         Mean radial clearance and its standard deviation; NaN if that is not known.
+    least_m : float
+        Clearance that it surely has; by default, two standard deviations less.
     """
 
     by: str
     clearance_m: float
     sigma_m: float
+    least_m: float = attrs.field()
+
+    @least_m.default
+    def _surely(self) -> float:
+        return self.clearance_m - SURE_SIGMAS * self.sigma_m
 
     @property
     def words(self) -> str:
@@ -174,7 +181,6 @@ class Situation:
 
 COUNTED, MEASURED, BOTH = "counted", "measured", "both"
 SEEN = ("torque", "encoders")
-SURE_SIGMAS = 2.0  # by which an estimated or measured clearance must be beyond its limit, or below it
 SOURCES = {
     COUNTED: "counting",
     MEASURED: "a measurement",
@@ -211,8 +217,8 @@ def surest(seen: Iterable[KnownClearance]) -> KnownClearance | None:
 
 
 def surely_at(limit_m: float, seen: Sequence[KnownClearance]) -> KnownClearance | None:
-    """The surest of the estimates that are beyond a limit by `SURE_SIGMAS`; None without one."""
-    return surest(one for one in seen if one.clearance_m - SURE_SIGMAS * one.sigma_m >= limit_m)
+    """The surest of the estimates that are surely beyond a limit; None without one."""
+    return surest(one for one in seen if one.least_m >= limit_m)
 
 
 def is_surely_below(limit_m: float, clearance_m: float, sigma_m: float) -> bool:

@@ -5,9 +5,9 @@ from collections.abc import Iterable, Sequence
 import attrs
 import numpy as np
 
+from leg_wear_monitor.estimate.cause import SURE_SIGMAS
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.materials import BushingLoad
-from leg_wear_monitor.monitor.verdict.situation import SURE_SIGMAS
 from leg_wear_monitor.playback.result import ReplaySummary
 from leg_wear_monitor.report.figure import opened, time_of
 from leg_wear_monitor.report.page import (

@@ -26,13 +26,6 @@ def agrees(estimate, value, within=0.0):
 
 
 @PLAIN
-def test_the_logistic_map_at_four_has_the_logarithm_of_two():
-    estimate = measured(lambda x: 4.0 * x * (1.0 - x), [[0.1], [0.23], [0.37], [0.41]], 4000)
-    assert agrees(estimate, np.log(2.0), 2.0e-3)
-    assert estimate.error < 0.01
-
-
-@PLAIN
 def test_lorenz_s_flow():
     """0.9056, e.g. Sprott, Chaos and Time-Series Analysis, 2003; Runge and Kutta's fourth order."""
 

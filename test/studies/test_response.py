@@ -32,8 +32,9 @@ def response():
 def test_without_clearance_the_curves_are_the_ideal_ones():
     """Every error falls with the clearance, down to a ten-thousandth of a millimetre and the step's error."""
     errors, forces = [], []
-    for clearance in (1.0e-5, 1.0e-6, 1.0e-7):
-        arrays = run_ensemble(load_mechanism(), PLACE | SHORT | {"clearance_m": clearance})
+    for clearance in (1.0e-5, 1.0e-7):
+        few = {"runs": 2, "cycles": 1, "skip_cycles": 1, "traced_cycles": 1}
+        arrays = run_ensemble(load_mechanism(), PLACE | few | {"clearance_m": clearance})
         errors.append([fraction_of_range(arrays, name) for name in ERRORS])
         force = np.linalg.norm(arrays["example_contact_force_n"][:, 0], axis=1)
         ideal = arrays["ideal_joint_force_n"][:, 6]

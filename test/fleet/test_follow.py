@@ -4,6 +4,7 @@ import pytest
 
 from leg_wear_monitor.bags.mcap_layout import MAGIC
 from leg_wear_monitor.fleet.description import load_fleet
+from leg_wear_monitor.fleet.directory import append_line
 from leg_wear_monitor.fleet.update import PATIENCE, Followed, has_end
 
 pytestmark = pytest.mark.plain
@@ -62,3 +63,10 @@ def test_a_bag_directory_ends_with_its_metadata(tmp_path):
     assert not has_end(tmp_path)
     (tmp_path / "metadata.yaml").touch()
     assert has_end(tmp_path)
+
+
+def test_a_line_that_was_cut_off_is_removed_before_the_next(tmp_path):
+    append_line(tmp_path / "log", "one")
+    (tmp_path / "log").write_bytes(b"one\n" + b"tw" * 5000)
+    append_line(tmp_path / "log", "three")
+    assert (tmp_path / "log").read_text() == "one\nthree\n"

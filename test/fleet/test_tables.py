@@ -17,6 +17,8 @@ from leg_wear_monitor.fleet.update import TABLES
 
 parquet = pytest.importorskip("pyarrow.parquet", reason="the extra 'fleet' is not installed")
 
+pytestmark = pytest.mark.usefixtures("one_twin")
+
 
 @pytest.fixture(scope="module")
 def home(walk, describe, tmp_path_factory):

@@ -1,7 +1,6 @@
 """From measurements to priors of legs: parts, lots, files, and what the forecast reads of them."""
 
 import json
-import math
 
 import attrs
 import pytest
@@ -76,16 +75,6 @@ def fleet():
     return [part for own in (*measured, parts("new", lot="2026-03")) for part in own]
 
 
-def test_the_forecast_of_a_new_leg_begins_with_its_lot(fleet, tmp_path):
-    written = write_learning(tmp_path, fleet, learn(fleet))
-    source = prior_source(MECHANISM, attrs.evolve(SETTINGS, priors=str(written["new"])))
-    prior, following = source.prior("A", 0), source.prior("A", 8)
-    assert prior.basis == "3 parts of lot 2026-03"
-    assert following.basis == "3 parts of other lots"
-    assert 0.4 < prior.mean < math.log(2.0)
-    assert prior.sigma < following.sigma < USUAL.sigma
-
-
 def test_a_measured_leg_gets_what_all_legs_say_together(fleet, tmp_path):
     """Its prior is that of the others, so that its own measurement counts once."""
     written = write_learning(tmp_path, fleet, learn(fleet))
@@ -103,19 +92,6 @@ def test_a_leg_whose_own_part_alone_is_measured_keeps_the_configured_prior():
     assert priors.joints["A"].present.basis == USUAL.basis
     assert priors.joints["A"].present.sigma == USUAL.sigma
     assert priors.joints["B"].present.basis == "1 part of lot 2026-03"
-
-
-def test_without_a_measurement_no_joint_has_a_learned_prior(tmp_path):
-    new = parts("left", lot="2026-03")
-    written = write_learning(tmp_path, new, learn(new))
-    assert json.loads(written["left"].read_text())["joints"] == {}
-    assert json.loads((tmp_path / "learning.json").read_text()) == {
-        "schema_version": 1,
-        "measured": "",
-        "pairs": {},
-    }
-    source = prior_source(MECHANISM, attrs.evolve(SETTINGS, priors=str(written["left"])))
-    assert source.prior("A", 0) == prior_source(MECHANISM, SETTINGS).prior("A", 0)
 
 
 def test_files_are_the_same_in_any_order(fleet, tmp_path):

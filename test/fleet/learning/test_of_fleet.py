@@ -56,7 +56,9 @@ def test_a_new_leg_learns_from_the_ledgers_of_its_lot(tmp_path):
     found = learn_fleet(legs, tmp_path)
     priors, findings = found
     assert findings == ()
-    new, other = (read_priors(str(priors[name])).joints["A"].present for name in ("new", "other"))
+    own, other = (read_priors(str(priors[name])).joints["A"] for name in ("new", "other"))
+    assert own.next == other.next  # of a part that will replace it, the lot is not known
+    new, other = own.present, other.present
     assert (new.basis, other.basis) == ("2 parts of lot 2026-03", "2 parts of other lots")
     assert new.sigma < other.sigma
     # twice the nominal coefficients of bushing and journal, as measured

@@ -122,15 +122,6 @@ def test_what_the_monitor_writes_meanwhile_is_shown_and_its_files_are_left_alone
     assert ledger.keep(entry(22))  # nothing stands in the monitor's way
 
 
-def test_the_verdict_is_the_one_that_was_written(ledger):
-    ledger.note(verdict(3, "inspect", **OPENED))
-    assert ledger.keep(entry(10))
-    found = ledger.last_verdict
-    assert (found.state, found.joints, found.since_ns) == (State.INSPECT, ("G",), 3 * SECOND)
-    assert found.evidence == (Evidence("clearance G", 7e-4, 6e-4, "m"),)
-    assert found.not_valid == (Figure.FORECAST,)
-
-
 def test_a_ledger_of_another_leg_and_no_ledger_are_refused(ledger, tmp_path):
     other = attrs.evolve(CONFIG, hardware_id="right")
     with pytest.raises(LedgerError, match=r"is of hardware id left, not right"):

@@ -3,10 +3,10 @@
 import http.client
 import json
 import math
-import threading
 
 import pytest
 from heard_leg import walk
+from live_browser import wait_for
 
 from leg_wear_monitor.messages.leg_motion import JointMotion, MotionFrame
 
@@ -64,12 +64,7 @@ def test_frames_go_to_who_asks_and_the_viewer_is_forgotten(leg, served):
     answer.close()
     connection.close()
     leg.take_motion(frame(2.0))
-    gone = threading.Event()
-    for _ in range(200):
-        if leg.motion.viewers == 0:
-            break
-        gone.wait(0.1)
-    assert leg.motion.viewers == 0
+    wait_for(lambda: leg.motion.viewers == 0, "nobody to look")
 
 
 def test_the_page_has_the_leg_that_frames_move(leg):

@@ -3,12 +3,12 @@
 import logging
 import re
 import socket
-import threading
 from contextlib import ExitStack, suppress
 from itertools import product
 
 import pytest
 from heard_leg import walk
+from live_browser import wait_for
 
 pytest.importorskip("tornado")
 
@@ -114,12 +114,7 @@ def test_a_word_comes_without_news_and_who_goes_is_forgotten(leg, served, clock)
         assert next(states)["age_s"] == 0.0
         clock.now_s += 3.0
         assert next(state for state in states if state["age_s"] == 3.0)["regions"] == {}
-    gone = threading.Event()
-    for _ in range(200):
-        if dashboard.hub.viewers == 0:
-            break
-        gone.wait(0.1)
-    assert dashboard.hub.viewers == 0
+    wait_for(lambda: dashboard.hub.viewers == 0, "nobody to look")
 
 
 def test_there_are_not_more_viewers_than_it_can_serve(leg, served, monkeypatch):

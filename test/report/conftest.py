@@ -1,13 +1,13 @@
 """Pages of studies small enough for tests."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 
 import pytest
+from matplotlib import pyplot
 
-from leg_wear_monitor.report.page import Page
-from leg_wear_monitor.report.study.page import study_page
+import leg_wear_monitor as lw
 from leg_wear_monitor.studies.execution import parse_settings, run_study
 from leg_wear_monitor.studies.results import StudyResults, load_results
 
@@ -53,7 +53,15 @@ def study(tmp_path_factory) -> Callable[[str], StudyResults]:
     return cache(results)
 
 
+@pytest.fixture
+def closed() -> Iterator[None]:
+    """Pyplot keeps its figures until they are closed."""
+    yield
+    pyplot.close("all")
+
+
 @pytest.fixture(scope="session")
-def drawn(study) -> Callable[[str], Page]:
-    """Its page."""
-    return cache(lambda name: study_page(study(name)))
+def knocking() -> lw.ReplayResult:
+    """Replay of a leg whose knee breaks out."""
+    bag = lw.share_directory() / "bags" / "knocking"
+    return lw.replay(f"{bag}.mcap", f"{bag}.yaml")

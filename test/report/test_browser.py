@@ -9,11 +9,13 @@ import attrs
 import pytest
 from browser import NEEDS_CHROMIUM, WIDTHS, browse, printed
 from made_up_summary import made_up_summary
+from matplotlib.figure import Figure
 
 from leg_wear_monitor.mechanism.loader import load_mechanism, parse_mechanism
 from leg_wear_monitor.report.drawing import drawing_html, drawing_of
 from leg_wear_monitor.report.page import page_html
 from leg_wear_monitor.report.replay.page import replay_page
+from leg_wear_monitor.report.study.page import study_page
 from leg_wear_monitor.studies.kinds import STUDIES
 
 pytestmark = NEEDS_CHROMIUM
@@ -77,13 +79,21 @@ window.addEventListener("load", () => setTimeout(() => {
 """
 
 
+def paint_blank(figure, *arguments, paint=Figure.savefig, **options):
+    """Paint a figure without what is in it, which takes most of the time."""
+    figure.clear()
+    paint(figure, *arguments, **options)
+
+
 @pytest.fixture(
     scope="module", params=[("location",), pytest.param(tuple(STUDIES), marks=pytest.mark.slow)], ids=len
 )
-def seen(request, drawn, tmp_path_factory):
+def seen(request, study, tmp_path_factory):
     """By name of the study and width."""
     names = [(name, width) for name in request.param for width in WIDTHS]
-    pages = [page_html(drawn(name)) for name in request.param]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figure, "savefig", paint_blank)
+        pages = [page_html(study_page(study(name))) for name in request.param]
     found, console = browse(pages, tmp_path_factory.mktemp("browser"), TRY)
     assert console == []
     return dict(zip(names, found, strict=True))

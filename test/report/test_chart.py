@@ -49,8 +49,3 @@ def test_a_page_has_the_chart_s_data_once_and_as_a_link_and_escapes_its_words():
     assert link["download"] == "forces.csv"
     assert rows_of(link["href"])[1:] == [[f"{k}", f"{k}"] for k in range(5)]
     assert "<b>" not in html and [plots["aria-label"] for plots in page.of("div")] == ['"a&b"']
-
-
-def test_columns_of_other_lengths_are_refused():
-    with pytest.raises(ValueError, match="zip"):
-        _ = chart(np.arange(4.0)).csv

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from made_up_fleet import made_up_fleet, random_fleet
 from made_up_summary import made_up_summary
-from matplotlib import pyplot
 
 import leg_wear_monitor as lw
 import leg_wear_monitor.state
@@ -17,16 +16,9 @@ from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState, 
 from leg_wear_monitor.report.plot import notebook_html
 from leg_wear_monitor.state import Figure
 
-pytestmark = pytest.mark.plain
+pytestmark = [pytest.mark.plain, pytest.mark.usefixtures("closed")]
 
 EVIL = "<script>alert(1)</script>"
-
-
-@pytest.fixture(autouse=True)
-def closed():
-    """Pyplot keeps its figures until they are closed."""
-    yield
-    pyplot.close("all")
 
 
 def test_a_mechanism_is_a_picture_and_its_name_is_text():
@@ -141,9 +133,8 @@ def test_a_diagnosis_is_its_torque_with_estimates_and_odds():
     assert "<table" not in Diagnosis(reason="diagnosis.enabled is false")._repr_html_()
 
 
-def test_the_diagnosis_of_a_replay_has_a_torque_that_its_estimates_explain():
-    bag = lw.share_directory() / "bags" / "knocking"
-    found = lw.replay(f"{bag}.mcap", f"{bag}.yaml").monitor.diagnosis
+def test_the_diagnosis_of_a_replay_has_a_torque_that_its_estimates_explain(knocking):
+    found = knocking.monitor.diagnosis
     assert found.joints == tuple("ABGIJ")
     off = [
         np.std(found.torque.measured_nm - each)

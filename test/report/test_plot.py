@@ -10,14 +10,7 @@ import leg_wear_monitor as lw
 from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.state import Figure
 
-pytestmark = pytest.mark.plain
-
-
-@pytest.fixture(autouse=True)
-def closed():
-    """Pyplot keeps its figures until they are closed."""
-    yield
-    pyplot.close("all")
+pytestmark = [pytest.mark.plain, pytest.mark.usefixtures("closed")]
 
 
 def lines(axes):

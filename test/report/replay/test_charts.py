@@ -29,11 +29,7 @@ def summary_with(*figures, **seen):
 
 def shown(observation, departure_m=None, is_other=False):
     return EncoderEvidence(
-        observation=observation,
-        sigma_m=2e-5,
-        departure_m=departure_m,
-        believed=True,
-        is_other=is_other,
+        observation=observation, sigma_m=2e-5, departure_m=departure_m, believed=True, is_other=is_other
     )
 
 

@@ -20,9 +20,8 @@ DATA = re.compile(r'<script type="application/json" class="(data|cycles)">(.*?)<
 
 
 @pytest.fixture(scope="module")
-def knocked():
-    bag = lw.share_directory() / "bags" / "knocking"
-    return lw.replay(f"{bag}.mcap", f"{bag}.yaml").summary()
+def knocked(knocking):
+    return knocking.summary()
 
 
 def played(summary):

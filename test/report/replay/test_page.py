@@ -312,7 +312,3 @@ def test_texts_and_curves_stand_out_from_their_ground(name):
             rf"\.banner\.{look} {{[^}}]*--fill: (#[0-9a-f]{{6}})", template_text("replay/replay.css")
         )
         assert contrast(fill[1], "#ffffff") >= 4.5
-
-
-def test_black_on_white_has_the_greatest_contrast():
-    assert contrast("#000000", "#ffffff") == pytest.approx(21.0)

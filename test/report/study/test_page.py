@@ -1,10 +1,12 @@
 """A study's page says what its data say: numbers, conclusions, and what is missing."""
 
 import re
+from functools import cache
 
 import attrs
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from leg_wear_monitor.report.page import Sentences, Table
 from leg_wear_monitor.report.study import findings
@@ -13,6 +15,14 @@ from leg_wear_monitor.report.study.page import study_page
 from leg_wear_monitor.report.study.text import number, with_spread, zone_text
 from leg_wear_monitor.studies.kinds import STUDIES
 from leg_wear_monitor.studies.plan import Spread, power_law, spread
+
+
+@pytest.fixture(scope="module", autouse=True)
+def page_of(study):
+    """The page of a study by its name; pictures are made but not painted."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figure, "savefig", lambda *_, **__: None)
+        yield cache(lambda name: study_page(study(name)))
 
 
 def parts(page, kind):
@@ -32,8 +42,8 @@ MORE = {"laws", "location", "lubrication", "speed"}
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=slow_if(name in MORE)) for name in STUDIES])
-def test_every_page_has_configuration_versions_conclusions_and_units(study, unpainted, name):
-    page = study_page(study(name))
+def test_every_page_has_configuration_versions_conclusions_and_units(page_of, name):
+    page = page_of(name)
     assert "mechanism: bionic_leg" in page.configuration
     assert {"leg_wear_monitor", "code", "seed"} <= set(page.versions)
     assert parts(page, Sentences)
@@ -43,10 +53,10 @@ def test_every_page_has_configuration_versions_conclusions_and_units(study, unpa
     assert "nan" not in "".join(cell for table in parts(page, Table) for row in table.rows for cell in row)
 
 
-def test_conclusions_are_computed_from_the_data(study, unpainted):
+def test_conclusions_are_computed_from_the_data(study, page_of):
     """Doubling an error doubles what is said of it, whatever that is."""
     results = study("size")
-    text = conclusions(study_page(results))
+    text = conclusions(page_of("size"))
     before = float(re.search(r"toe displacement error goes from ([\d.]+)", text).group(1))
     doubled = tuple(
         {**arrays, "error_toe_position_m": 2.0 * arrays["error_toe_position_m"]} for arrays in results.arrays
@@ -71,14 +81,13 @@ def test_a_superposition_is_called_one_only_where_it_is(study):
     assert findings.superposition(alone, halved).startswith("All at once is not the sum")
 
 
-def test_a_study_without_a_page_of_its_own_shows_its_points(study, monkeypatch):
-    own = study_page(study("multi"))
+def test_a_study_without_a_page_of_its_own_shows_its_points(study, page_of, monkeypatch):
     monkeypatch.delitem(pages._PAGES, "multi")
-    found = study_page(study("multi"))
+    found, own = study_page(study("multi")), page_of("multi")
     assert [section.title for section in found.sections] == [section.title for section in own.sections]
 
 
-def test_points_that_failed_or_are_missing_come_first(study, unpainted):
+def test_points_that_failed_or_are_missing_come_first(study):
     results = study("size")
     arrays = ({"fault": np.array("pushed through")}, {}, *results.arrays[2:])
     page = study_page(attrs.evolve(results, arrays=arrays))

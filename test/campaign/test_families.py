@@ -11,26 +11,10 @@ ROOM = Path(__file__).parent
 NAMES = sorted(path.stem for path in (ROOM / "families").glob("[a-z]*.py"))
 
 
-# Of the first seeds: some of each kind where kinds follow one another from seed to seed.
-FEW = {
-    "configurations": 16,
-    "dashboard": 6,
-    "databases": 19,
-    "fleets": 6,
-    "floods": 2,
-    "kills": 1,
-    "ledgers": 13,
-    "live_kills": 1,
-    "parquet": 10,
-    "recordings": 10,
-    "workers": 2,
-}
-
-
-# Left to `make test-slow` and `make campaign`: other tests hold their laws in less time
-# (test/doors/test_kills.py, test/test_beside.py, test/monitor/inputs/test_bad_input.py, test/bags/,
-# test/fleet/, test/dashboard/test_server.py).
-LONG = {"dashboard", "fleets", "floods", "kills", "live_kills", "recordings", "workers"}
+# So many of the first seeds in `make test`. Other families are left to `make test-slow` and `make campaign`:
+# test/bags/, test/fleet/, test/dashboard/test_server.py, test/doors/test_kills.py and test/test_beside.py hold their
+# laws in less time.
+QUICK = {"configurations": 16, "ledgers": 13}
 
 
 def run(name: str, *how_many: str) -> None:
@@ -48,11 +32,9 @@ def run(name: str, *how_many: str) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.slow if name in LONG else ()) for name in NAMES]
-)
+@pytest.mark.parametrize("name", QUICK)
 def test_nothing_crashes_hangs_or_lies(name: str) -> None:
-    run(name, "--number", str(FEW[name]))
+    run(name, "--number", str(QUICK[name]))
 
 
 @pytest.mark.slow

@@ -1,9 +1,5 @@
 """Fixtures: messages and bags made by the libraries that ours is held against."""
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
-
 import attrs
 import numpy as np
 import pytest
@@ -17,25 +13,18 @@ from leg_wear_monitor.twin.sample import GAIT_SAMPLE
 
 
 @pytest.fixture(scope="session")
-def store() -> Any:
+def store():
     """Types of ROS 2 Jazzy, as rosbags knows them."""
     rosbags_types = pytest.importorskip("rosbags.typesys")
     return rosbags_types.get_typestore(rosbags_types.Stores.ROS2_JAZZY)
 
 
 @pytest.fixture(scope="session")
-def joint_state(store: Any) -> Callable[..., Any]:
+def joint_state(store):
     """Make a sensor_msgs/JointState of rosbags."""
     types = store.types
 
-    def make(
-        name: list[str],
-        position: Any = (),
-        velocity: Any = (),
-        effort: Any = (),
-        stamp_ns: int = 1,
-        frame: str = "",
-    ) -> Any:
+    def make(name, position=(), velocity=(), effort=(), stamp_ns=1, frame=""):
         stamp = types["builtin_interfaces/msg/Time"](*divmod(stamp_ns, 10**9))
         head = types["std_msgs/msg/Header"](stamp=stamp, frame_id=frame)
         values = [np.asarray(numbers, float) for numbers in (position, velocity, effort)]
@@ -45,11 +34,11 @@ def joint_state(store: Any) -> Callable[..., Any]:
 
 
 @pytest.fixture(scope="session")
-def wrench(store: Any) -> Callable[..., Any]:
+def wrench(store):
     """Make a geometry_msgs/WrenchStamped of rosbags."""
     types = store.types
 
-    def make(force: Any, torque: Any, stamp_ns: int = 1, frame: str = "") -> Any:
+    def make(force, torque, stamp_ns=1, frame=""):
         stamp = types["builtin_interfaces/msg/Time"](*divmod(stamp_ns, 10**9))
         vector = types["geometry_msgs/msg/Vector3"]
         body = types["geometry_msgs/msg/Wrench"](vector(*force), vector(*torque))
@@ -59,12 +48,12 @@ def wrench(store: Any) -> Callable[..., Any]:
 
 
 @pytest.fixture(scope="session")
-def foreign() -> Callable[[str, bytes], Any]:
+def foreign():
     """Read a message with mcap-ros2-support."""
     decoder = pytest.importorskip("mcap_ros2.decoder").DecoderFactory()
     schema = pytest.importorskip("mcap.records").Schema
 
-    def read(name: str, raw: bytes) -> Any:
+    def read(name, raw):
         text = definition(name).text
         return decoder.decoder_for("cdr", schema(CODES[name], text.encode(), "ros2msg", name))(raw)
 
@@ -87,10 +76,10 @@ class Sent:
 
 
 @pytest.fixture(scope="session")
-def traffic() -> Callable[..., list[Sent]]:
+def traffic():
     """Messages of a leg: joint_states and drive_torque, and topics that are not ours, in order of time."""
 
-    def make(seconds: float = 2.0, rate_hz: int = 200, seed: int = 0, start_ns: int = START_NS) -> list[Sent]:
+    def make(seconds=2.0, rate_hz=200, seed=0, start_ns=START_NS):
         rng = np.random.default_rng(seed)
         n = round(seconds * rate_hz)
         stamps = start_ns + np.arange(n, dtype=np.int64) * (10**9 // rate_hz)
@@ -111,18 +100,16 @@ def traffic() -> Callable[..., list[Sent]]:
 
 
 @pytest.fixture(scope="session")
-def write_bag() -> Callable[..., Path]:
+def write_bag():
     """Write messages with the mcap library's own writer."""
     writer_module = pytest.importorskip("mcap.writer")
 
-    def write(
-        path: Path, sent: list[Sent], compression: str = "ZSTD", definitions: bool = True, **options: Any
-    ) -> Path:
+    def write(path, sent, compression="ZSTD", definitions=True, **options):
         with path.open("wb") as file:
             kind = writer_module.CompressionType[compression]
             writer = writer_module.Writer(file, **{"chunk_size": 20_000, "compression": kind, **options})
             writer.start("ros2", "test")
-            channels: dict[str, int] = {}
+            channels = {}
             for each in sent:
                 if each.topic not in channels:
                     known = definitions and each.type in CODES
@@ -137,11 +124,11 @@ def write_bag() -> Callable[..., Path]:
 
 
 @pytest.fixture(scope="session")
-def write_database(store: Any) -> Callable[..., Path]:
+def write_database(store):
     """Write messages of known types as a .db3 bag with rosbags' own writer."""
     rosbag2 = pytest.importorskip("rosbags.rosbag2")
 
-    def write(directory: Path, sent: list[Sent]) -> Path:
+    def write(directory, sent):
         with rosbag2.Writer(directory, version=9, storage_plugin=rosbag2.StoragePlugin.SQLITE3) as writer:
             ours = [each for each in sent if each.type in store.types]
             connections = {
@@ -157,10 +144,10 @@ def write_database(store: Any) -> Callable[..., Path]:
 
 
 @pytest.fixture(scope="session")
-def expected() -> Callable[..., Any]:
+def expected():
     """Samples that messages should give, one by one, in order of log time."""
 
-    def make(sent: list[Sent], config: Any = None) -> Any:
+    def make(sent, config=None):
         decoder = Decoder(config or MonitorConfig())
         roles = {"/joint_states": JOINT_STATE, "/drive_torque": WRENCH_STAMPED}
         ours = sorted((each for each in sent if each.topic in roles), key=lambda each: each.log_time_ns)
@@ -170,10 +157,10 @@ def expected() -> Callable[..., Any]:
 
 
 @pytest.fixture(scope="session")
-def read() -> Callable[..., Any]:
+def read():
     """Read a recording to its end: all samples, and the recording with its findings."""
 
-    def all_of(*paths: Path, config: Any = None, **options: Any) -> tuple[Any, Any]:
+    def all_of(*paths, config=None, **options):
         with Recording(paths, config or MonitorConfig(), **options) as recording:
             blocks = [block.samples for block in recording.blocks()]
         return np.concatenate([np.zeros(0, GAIT_SAMPLE), *blocks]), recording

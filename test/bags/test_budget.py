@@ -2,9 +2,6 @@
 
 import os
 import struct
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
 
 import lz4.frame
 import pytest
@@ -18,11 +15,11 @@ BOMB_BYTES = 100_000_000
 
 
 @pytest.fixture(scope="module")
-def sent(traffic: Callable[..., Any]) -> Any:
+def sent(traffic):
     return traffic(0.5)
 
 
-def with_a_chunk(whole: bytes, data: bytes, compression: bytes, size: int, is_cut: bool = False) -> bytes:
+def with_a_chunk(whole, data, compression, size, is_cut=False):
     """A file without an index, and one chunk more at its end."""
     content = whole[: whole.rindex(struct.pack("<BQ", 0x0F, 4))]
     head = struct.pack("<QQQII", 0, 0, size, 0, len(compression)) + compression + struct.pack("<Q", len(data))
@@ -35,15 +32,8 @@ def with_a_chunk(whole: bytes, data: bytes, compression: bytes, size: int, is_cu
 @pytest.mark.parametrize("claimed", [BOMB_BYTES, 1000])
 @pytest.mark.parametrize("compression", ["zstd", "lz4"])
 def test_a_chunk_that_grows_is_left_out_and_told(
-    tmp_path: Path,
-    sent: Any,
-    write_bag: Any,
-    expected: Any,
-    read: Any,
-    compression: str,
-    claimed: int,
-    is_cut: bool,
-) -> None:
+    tmp_path, sent, write_bag, expected, read, compression, claimed, is_cut
+):
     index_types = pytest.importorskip("mcap.writer").IndexType
     whole = write_bag(tmp_path / "whole.mcap", sent, index_types=index_types.NONE).read_bytes()
     compress = zstandard.compress if compression == "zstd" else lz4.frame.compress
@@ -59,7 +49,7 @@ def test_a_chunk_that_grows_is_left_out_and_told(
 
 
 @pytest.mark.parametrize("kind", [".mcap", ".db3"])
-def test_a_file_that_grows_is_refused(tmp_path: Path, read: Any, kind: str) -> None:
+def test_a_file_that_grows_is_refused(tmp_path, read, kind):
     path = tmp_path / f"bomb{kind}.zstd"
     path.write_bytes(zstandard.compress(bytes(BOMB_BYTES)))
     with pytest.raises(RecordingError, match=r"needs larger temporary files than --memory-mb 16 allows"):
@@ -67,8 +57,8 @@ def test_a_file_that_grows_is_refused(tmp_path: Path, read: Any, kind: str) -> N
 
 
 def test_an_index_that_names_a_chunk_again_and_again_is_not_followed(
-    tmp_path: Path, sent: Any, write_bag: Any, expected: Any, read: Any
-) -> None:
+    tmp_path, sent, write_bag, expected, read
+):
     whole = write_bag(tmp_path / "whole.mcap", sent).read_bytes()
     begin = struct.unpack_from("<Q", whole, len(whole) - 28)[0]
     at = whole.index(b"\x08", begin)
@@ -83,9 +73,7 @@ def test_an_index_that_names_a_chunk_again_and_again_is_not_followed(
     assert not recording.is_partial
 
 
-def test_a_hole_that_claims_gigabytes_is_passed_over(
-    tmp_path: Path, sent: Any, write_bag: Any, expected: Any, read: Any
-) -> None:
+def test_a_hole_that_claims_gigabytes_is_passed_over(tmp_path, sent, write_bag, expected, read):
     index_types = pytest.importorskip("mcap.writer").IndexType
     whole = write_bag(tmp_path / "whole.mcap", sent, index_types=index_types.NONE).read_bytes()
     content = whole[: whole.rindex(struct.pack("<BQ", 0x0F, 4))] + struct.pack("<BQ", 0x05, 2**33)
@@ -107,14 +95,12 @@ LAUGHS = "a: &a [x, x]\n" + "".join(
     ("text", "why"),
     [
         (f"{LAUGHS}{METADATA}[x.mcap]\n  compression_mode: *y\n", "contains aliases"),
-        (f"{METADATA}{'[' * 5000}", "is nested more than 20 deep"),
+        (f"{METADATA}{'[' * 1200}", "is nested more than 20 deep"),
         (f"{METADATA}[x.mcap]\n#{'x' * 2**20}", "expected at most 1048576"),
     ],
     ids=["aliases", "brackets", "length"],
 )
-def test_metadata_that_grows_is_not_read(
-    tmp_path: Path, sent: Any, write_bag: Any, expected: Any, read: Any, text: str, why: str
-) -> None:
+def test_metadata_that_grows_is_not_read(tmp_path, sent, write_bag, expected, read, text, why):
     bag = tmp_path / "bag"
     bag.mkdir()
     write_bag(bag / "x.mcap", sent)
@@ -127,7 +113,7 @@ def test_metadata_that_grows_is_not_read(
 
 
 @pytest.mark.parametrize(("name", "in_a_bag"), [("x.mcap", False), ("x.db3", False), ("x.mcap", True)])
-def test_a_pipe_is_refused_without_a_wait(tmp_path: Path, read: Any, name: str, in_a_bag: bool) -> None:
+def test_a_pipe_is_refused_without_a_wait(tmp_path, read, name, in_a_bag):
     home = tmp_path / "bag" if in_a_bag else tmp_path
     home.mkdir(exist_ok=True)
     os.mkfifo(home / name)
@@ -135,15 +121,13 @@ def test_a_pipe_is_refused_without_a_wait(tmp_path: Path, read: Any, name: str, 
         read(home if in_a_bag else home / name)
 
 
-def test_a_device_is_refused(tmp_path: Path, read: Any) -> None:
+def test_a_device_is_refused(tmp_path, read):
     (tmp_path / "x.mcap").symlink_to("/dev/zero")
     with pytest.raises(RecordingError, match="is a device, expected a file"):
         read(tmp_path / "x.mcap")
 
 
-def test_a_directory_that_is_called_like_a_file_is_told(
-    tmp_path: Path, sent: Any, write_bag: Any, expected: Any, read: Any
-) -> None:
+def test_a_directory_that_is_called_like_a_file_is_told(tmp_path, sent, write_bag, expected, read):
     (tmp_path / "a.db3").mkdir()
     write_bag(tmp_path / "b.mcap", sent)
     samples, recording = read(tmp_path)
@@ -154,13 +138,13 @@ def test_a_directory_that_is_called_like_a_file_is_told(
 
 
 @pytest.mark.parametrize("name", ["x" * 300 + ".mcap", "x\0y.mcap"])
-def test_a_name_that_cannot_be_is_refused_in_a_line(tmp_path: Path, read: Any, name: str) -> None:
+def test_a_name_that_cannot_be_is_refused_in_a_line(tmp_path, read, name):
     with pytest.raises(RecordingError, match=r"cannot be read: ") as caught:
         read(tmp_path / name)
     assert str(caught.value).isprintable()
 
 
-def test_the_budget_is_one_for_all() -> None:
+def test_the_budget_is_one_for_all():
     budget = Budget(100.0)
     budget.reserve(60_000_000)
     assert budget.available == 40_000_000
@@ -172,6 +156,6 @@ def test_the_budget_is_one_for_all() -> None:
 
 
 @pytest.mark.parametrize("megabytes", [0.0, -1.0, 15.9, float("nan")])
-def test_a_budget_in_which_nothing_can_be_read_is_refused(megabytes: float) -> None:
+def test_a_budget_in_which_nothing_can_be_read_is_refused(megabytes):
     with pytest.raises(ConfigError, match=r"--memory-mb: .* is too little, expected at least 16 MB"):
         Budget(megabytes)

@@ -1,7 +1,6 @@
 """Several files are one recording of one leg, or are refused; names in them obey nobody."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,15 +14,7 @@ START_NS, RATE_HZ = 1_700_000_000 * 10**9, 200
 ADVICE = "Give one leg at a time, or select its topic with --joint-states"
 
 
-def write(
-    path: Path,
-    *,
-    begin: int = 0,
-    end: int = 400,
-    phase_rad: float = 0.0,
-    topic: str = "/joint_states",
-    names: tuple[str, ...] = ("hip", "crank"),
-) -> Path:
+def write(path, *, begin=0, end=400, phase_rad=0.0, topic="/joint_states", names=("hip", "crank")):
     """Part of a crank's motion, of which each sample is the same in any file that has it."""
     k = np.arange(begin, end, dtype=np.int64)
     stamps = START_NS + k * (10**9 // RATE_HZ)
@@ -38,7 +29,7 @@ def write(
 
 
 @pytest.mark.parametrize("phase_rad", [0.3, np.pi, 5.0])
-def test_other_angles_at_the_same_times_are_another_leg(tmp_path: Path, read: Any, phase_rad: float) -> None:
+def test_other_angles_at_the_same_times_are_another_leg(tmp_path, read, phase_rad):
     left = write(tmp_path / "left.mcap")
     right = write(tmp_path / "right.mcap", begin=100, end=500, phase_rad=phase_rad)
     with pytest.raises(RecordingError, match=r"has other crank angles than .* at the same times") as caught:
@@ -46,7 +37,7 @@ def test_other_angles_at_the_same_times_are_another_leg(tmp_path: Path, read: An
     assert str(caught.value).endswith(ADVICE)
 
 
-def test_another_namespace_is_another_leg_unless_one_is_named(tmp_path: Path, read: Any) -> None:
+def test_another_namespace_is_another_leg_unless_one_is_named(tmp_path, read):
     left = write(tmp_path / "left.mcap")
     right = write(tmp_path / "right.mcap", topic="/right/joint_states")
     with pytest.raises(RecordingError, match=r"right\.mcap: joint_states: has /right/joint_states, where"):
@@ -56,14 +47,14 @@ def test_another_namespace_is_another_leg_unless_one_is_named(tmp_path: Path, re
     assert any("has no topic /right/joint_states" in finding.text for finding in recording.findings)
 
 
-def test_another_name_of_the_crank_is_another_leg(tmp_path: Path, read: Any) -> None:
+def test_another_name_of_the_crank_is_another_leg(tmp_path, read):
     left = write(tmp_path / "left.mcap")
     right = write(tmp_path / "right.mcap", begin=400, end=500, names=("hip", "right_crank"))
     with pytest.raises(RecordingError, match=r"the other files have it: give the recordings of one leg"):
         read(left, right)
 
 
-def test_parts_and_overlaps_of_one_leg_are_one(tmp_path: Path, read: Any) -> None:
+def test_parts_and_overlaps_of_one_leg_are_one(tmp_path, read):
     parts = [
         write(tmp_path / f"{begin}_{end}.mcap", begin=begin, end=end)
         for begin, end in ((0, 200), (150, 300), (300, 400), (0, 400))
@@ -74,7 +65,7 @@ def test_parts_and_overlaps_of_one_leg_are_one(tmp_path: Path, read: Any) -> Non
     assert not recording.is_partial
 
 
-def test_messages_without_the_crank_among_others_are_a_finding(tmp_path: Path, read: Any) -> None:
+def test_messages_without_the_crank_among_others_are_a_finding(tmp_path, read):
     """As where two drivers publish their joints on one topic."""
     arm = write(tmp_path / "arm.mcap", names=("elbow", "wrist\x1b[2J"))
     both = tmp_path / "both.mcap"
@@ -108,14 +99,14 @@ def test_messages_without_the_crank_among_others_are_a_finding(tmp_path: Path, r
         ("x" * 3000, "x" * 2000 + " and 1000 characters more"),
     ],
 )
-def test_what_is_shown_can_be_shown(text: str, shown: str) -> None:
+def test_what_is_shown_can_be_shown(text, shown):
     assert printable(text) == shown
     assert printable(text).isprintable()
     assert str(RecordingError(text, text, text)) == f"{shown}: {shown}: {shown}"
     assert str(Finding(Path("x"), text, Severity.NOTE)) == f"x: {shown}"
 
 
-def test_names_in_a_file_obey_nobody(tmp_path: Path, read: Any) -> None:
+def test_names_in_a_file_obey_nobody(tmp_path, read):
     path = write(tmp_path / "x.mcap", topic="/\x1b]0;owned\x07/states")
     with pytest.raises(RecordingError) as caught:
         read(path)

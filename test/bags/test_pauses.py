@@ -1,47 +1,28 @@
 """A pause between two recordings that are given together is no fault of the input."""
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
-
-import numpy as np
 import pytest
+from short_walk import torque_of_a_cycle, write_walk
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.bags.findings import Severity
-from leg_wear_monitor.bags.mcap_writer import McapWriter
-from leg_wear_monitor.messages import encode
 from leg_wear_monitor.monitor.inputs import Pauses
 
-START_NS, RATE_HZ, SECONDS = 1_700_000_000 * 10**9, 200, 5
-PAUSE_S = 3600.0
+SECONDS, PAUSE_S = 5, 3600.0
 
 
 @pytest.fixture
-def record(tmp_path: Path) -> Callable[[Path, float], Path]:
+def record(tmp_path, leg):
     """Record a steady gait of a few seconds into a file, from a time [s] on."""
-
-    def write(name: Path, begin_s: float) -> Path:
-        n = np.arange(SECONDS * RATE_HZ)
-        stamps = START_NS + round(begin_s * 1.0e9) + n * (10**9 // RATE_HZ)
-        angle = 2.0 * np.pi * n / RATE_HZ + np.random.default_rng(1).normal(0.0, 2.0e-4, len(n))
-        path = tmp_path / name
-        path.parent.mkdir(exist_ok=True)
-        with McapWriter(path, chunk_bytes=20_000) as writer:
-            joints = writer.channel("/joint_states", encode.JOINT_STATE)
-            rows = encode.joint_states(stamps, ["crank"], position=angle[:, None])
-            writer.write_many(joints, stamps, rows)
-        return path
-
-    return write
+    cycle = torque_of_a_cycle(leg)
+    return lambda name, begin_s: write_walk(cycle, tmp_path / name, begin_s, SECONDS, seed=1)
 
 
-def gaps(result: Any) -> list[str]:
+def gaps(result):
     return [alarm.name for _, alarm in result.history.changes if alarm.name == "input_gaps"]
 
 
-def test_a_pause_between_recordings_is_told_and_raises_no_alarm(record: Callable[..., Path]) -> None:
-    paths = [record(Path("a.mcap"), 0.0), record(Path("b.mcap"), SECONDS + PAUSE_S)]
+def test_a_pause_between_recordings_is_told_and_raises_no_alarm(record):
+    paths = [record("a.mcap", 0.0), record("b.mcap", SECONDS + PAUSE_S)]
     config = lw.MonitorConfig()
     result = lw.replay(paths, config)
     lost = result.monitor.lost
@@ -56,17 +37,17 @@ def test_a_pause_between_recordings_is_told_and_raises_no_alarm(record: Callable
     assert status["gait"].values["unmonitored_s"] == lost.unmonitored_s
 
 
-def test_what_is_missing_in_one_bag_is_a_fault_of_the_input(record: Callable[..., Path]) -> None:
+def test_what_is_missing_in_one_bag_is_a_fault_of_the_input(record):
     """The same silence between files of one bag: somebody recorded, and nothing came."""
-    first = record(Path("bag/a_0.mcap"), 0.0)
-    record(Path("bag/a_1.mcap"), SECONDS + 5.0)
+    first = record("bag/a_0.mcap", 0.0)
+    record("bag/a_1.mcap", SECONDS + 5.0)
     result = lw.replay(first.parent, lw.MonitorConfig())
     assert gaps(result)
     assert result.monitor.lost.paused_s == 0.0 and result.monitor.lost.unmonitored_s > 4.0
 
 
 @pytest.mark.plain
-def test_pauses_are_taken_from_the_time_without_a_leg_once_it_is_in_there() -> None:
+def test_pauses_are_taken_from_the_time_without_a_leg_once_it_is_in_there():
     pauses = Pauses().with_pause(10.0, unmonitored_s=2.0)
     assert pauses.passed_s(2.0) == 0.0
     assert pauses.passed_s(12.3) == 10.0

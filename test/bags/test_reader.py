@@ -1,7 +1,6 @@
 """However messages were stored, the same samples come out, in order of log time."""
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import attrs
@@ -18,12 +17,12 @@ from leg_wear_monitor.twin.sample import NO_FAULT
 Read = Callable[..., Any]
 
 
-def losses(recording: Any) -> list[str]:
+def losses(recording):
     return [finding.text for finding in recording.findings if finding.severity is Severity.LOSS]
 
 
 @pytest.fixture(scope="module")
-def sent(traffic: Callable[..., Any]) -> Any:
+def sent(traffic):
     return traffic()
 
 
@@ -42,25 +41,21 @@ def sent(traffic: Callable[..., Any]) -> Any:
     ids=lambda options: "-".join(options) or "usual",
 )
 def test_every_way_to_store_gives_the_same_samples(
-    tmp_path: Path, sent: Any, write_bag: Any, expected: Any, read: Read, compression: str, options: Any
-) -> None:
+    tmp_path, sent, write_bag, expected, read, compression, options
+):
     samples, recording = read(write_bag(tmp_path / "a.mcap", sent, compression, **options))
     assert samples.tobytes() == expected(sent).tobytes()
     assert not recording.is_partial
     assert recording.topics == {"joint_states": "/joint_states", "drive_torque": "/drive_torque"}
 
 
-def test_a_file_without_checksums_is_told_apart(
-    tmp_path: Path, sent: Any, write_bag: Any, read: Read
-) -> None:
+def test_a_file_without_checksums_is_told_apart(tmp_path, sent, write_bag, read):
     for name, crcs in (("with", True), ("without", False)):
         _, recording = read(write_bag(tmp_path / f"{name}.mcap", sent, enable_crcs=crcs))
         assert any("no checksum" in str(finding) for finding in recording.findings) == (not crcs)
 
 
-def test_messages_stored_out_of_order_come_in_order(
-    tmp_path: Path, sent: Any, write_bag: Any, expected: Any, read: Read
-) -> None:
+def test_messages_stored_out_of_order_come_in_order(tmp_path, sent, write_bag, expected, read):
     """Topic after topic, as some tools write: the whole file is one overlap."""
     by_topic = sorted(sent, key=lambda each: each.topic)
     samples, _ = read(write_bag(tmp_path / "a.mcap", by_topic))
@@ -69,9 +64,7 @@ def test_messages_stored_out_of_order_come_in_order(
     assert (samples["kind"][:40] == TORQUE).any() and (samples["kind"][:40] != TORQUE).any()
 
 
-def test_split_bags_and_several_files_are_one_recording(
-    tmp_path: Path, sent: Any, write_bag: Any, expected: Any, read: Read
-) -> None:
+def test_split_bags_and_several_files_are_one_recording(tmp_path, sent, write_bag, expected, read):
     parts = [write_bag(tmp_path / f"run_{i}.mcap", sent[i * 60 : (i + 1) * 60]) for i in range(15)]
     assert sum(len(sent[i * 60 : (i + 1) * 60]) for i in range(15)) >= len(sent)
     for paths in ([tmp_path], parts, parts[::-1]):
@@ -80,9 +73,7 @@ def test_split_bags_and_several_files_are_one_recording(
         assert not recording.is_partial
 
 
-def test_topics_in_files_of_their_own_are_merged(
-    tmp_path: Path, sent: Any, write_bag: Any, expected: Any, read: Read
-) -> None:
+def test_topics_in_files_of_their_own_are_merged(tmp_path, sent, write_bag, expected, read):
     paths = []
     for topic in ("/joint_states", "/drive_torque"):
         only = [each for each in sent if each.topic == topic]
@@ -91,9 +82,7 @@ def test_topics_in_files_of_their_own_are_merged(
     assert np.array_equal(samples["stamp_ns"], expected(sent)["stamp_ns"])
 
 
-def test_a_file_compressed_as_a_whole(
-    tmp_path: Path, sent: Any, write_bag: Any, expected: Any, read: Read
-) -> None:
+def test_a_file_compressed_as_a_whole(tmp_path, sent, write_bag, expected, read):
     zstandard = pytest.importorskip("zstandard")
     plain = write_bag(tmp_path / "a.mcap", sent, "NONE")
     packed = tmp_path / "b.mcap.zstd"
@@ -103,9 +92,7 @@ def test_a_file_compressed_as_a_whole(
     assert recording.files == [packed]
 
 
-def test_a_file_compressed_as_a_whole_and_cut_short(
-    tmp_path: Path, traffic: Any, write_bag: Any, expected: Any, read: Read
-) -> None:
+def test_a_file_compressed_as_a_whole_and_cut_short(tmp_path, traffic, write_bag, expected, read):
     zstandard = pytest.importorskip("zstandard")
     sent = traffic(10.0)
     packed = tmp_path / "b.mcap.zstd"
@@ -126,9 +113,7 @@ def test_a_file_compressed_as_a_whole_and_cut_short(
     [("MCAP", mode) for mode in ("NONE", "STORAGE", "MESSAGE", "FILE")]
     + [("SQLITE3", mode) for mode in ("NONE", "MESSAGE", "FILE")],
 )
-def test_bags_that_rosbags_writes(
-    tmp_path: Path, sent: Any, store: Any, expected: Any, read: Read, storage: str, mode: str
-) -> None:
+def test_bags_that_rosbags_writes(tmp_path, sent, store, expected, read, storage, mode):
     rosbag2 = pytest.importorskip("rosbags.rosbag2")
     writer = rosbag2.Writer(tmp_path / "bag", version=9, storage_plugin=rosbag2.StoragePlugin[storage])
     if mode != "NONE":
@@ -152,7 +137,7 @@ def test_bags_that_rosbags_writes(
         assert read(tmp_path / "bag")[0].tobytes() == samples.tobytes()
 
 
-def test_times_are_those_asked_for(tmp_path: Path, sent: Any, write_bag: Any, read: Read) -> None:
+def test_times_are_those_asked_for(tmp_path, sent, write_bag, read):
     path = write_bag(tmp_path / "a.mcap", sent)
     log = np.array([each.log_time_ns for each in sent if "service" not in each.topic])
     assert np.array_equal(read(path, time="log")[0]["stamp_ns"], log)
@@ -162,7 +147,7 @@ def test_times_are_those_asked_for(tmp_path: Path, sent: Any, write_bag: Any, re
         read(path, time="wall")
 
 
-def test_a_log_time_heals_a_stamp_of_zero(tmp_path: Path, write_bag: Any, traffic: Any, read: Read) -> None:
+def test_a_log_time_heals_a_stamp_of_zero(tmp_path, write_bag, traffic, read):
     sent = [
         attrs.evolve(each, raw=each.raw[:4] + bytes(8) + each.raw[12:])
         for each in traffic(0.2)
@@ -173,7 +158,7 @@ def test_a_log_time_heals_a_stamp_of_zero(tmp_path: Path, write_bag: Any, traffi
     assert (read(path, time="log")[0]["fault"] == NO_FAULT).all()
 
 
-def test_clocks_that_run_apart_are_told(tmp_path: Path, sent: Any, write_bag: Any, read: Read) -> None:
+def test_clocks_that_run_apart_are_told(tmp_path, sent, write_bag, read):
     slow = [attrs.evolve(each, log_time_ns=3 * each.log_time_ns) for each in sent]
     _, recording = read(write_bag(tmp_path / "a.mcap", slow))
     notes = [str(finding) for finding in recording.findings]
@@ -182,9 +167,7 @@ def test_clocks_that_run_apart_are_told(tmp_path: Path, sent: Any, write_bag: An
     assert not recording.findings
 
 
-def test_a_torque_without_header_far_from_the_crank_is_told(
-    tmp_path: Path, sent: Any, store: Any, write_bag: Any, read: Read
-) -> None:
+def test_a_torque_without_header_far_from_the_crank_is_told(tmp_path, sent, store, write_bag, read):
     number = bytes(store.serialize_cdr(store.types["std_msgs/msg/Float64"](2.5), "std_msgs/msg/Float64"))
     bare = [
         attrs.evolve(each, type="std_msgs/msg/Float64", raw=number, log_time_ns=each.log_time_ns)
@@ -201,13 +184,11 @@ def test_a_torque_without_header_far_from_the_crank_is_told(
     assert not recording.findings
 
 
-def renamed(sent: Any, prefix: str) -> Any:
+def renamed(sent, prefix):
     return [attrs.evolve(each, topic=prefix + each.topic) for each in sent]
 
 
-def test_topics_in_a_namespace_are_found_and_several_must_be_named(
-    tmp_path: Path, sent: Any, write_bag: Any, expected: Any, read: Read
-) -> None:
+def test_topics_in_a_namespace_are_found_and_several_must_be_named(tmp_path, sent, write_bag, expected, read):
     path = write_bag(tmp_path / "one.mcap", renamed(sent, "/left"))
     samples, recording = read(path)
     assert recording.topics["joint_states"] == "/left/joint_states"
@@ -221,9 +202,7 @@ def test_topics_in_a_namespace_are_found_and_several_must_be_named(
         read(both, joint_states="/up/joint_states")
 
 
-def test_what_cannot_be_used_is_refused_by_name(
-    tmp_path: Path, sent: Any, write_bag: Any, read: Read
-) -> None:
+def test_what_cannot_be_used_is_refused_by_name(tmp_path, sent, write_bag, read):
     torque_only = [each for each in sent if each.topic == "/drive_torque"]
     with pytest.raises(RecordingError, match=r"a.mcap: joint_states: is not a topic .* it has /drive_torque"):
         read(write_bag(tmp_path / "a.mcap", torque_only))
@@ -236,62 +215,53 @@ def test_what_cannot_be_used_is_refused_by_name(
         read(write_bag(tmp_path / "c.mcap", sent), config=config)
 
 
+@pytest.fixture
+def write_as(tmp_path):
+    """Write topics, times and bytes with any encoding, and one schema for all or none."""
+    writer_module = pytest.importorskip("mcap.writer")
+
+    def write(messages, encoding="cdr", schema=None):
+        with (tmp_path / "a.mcap").open("wb") as file:
+            writer = writer_module.Writer(file)
+            writer.start("ros2", "test")
+            known = writer.register_schema(*schema) if schema else 0
+            topics = {topic for topic, *_ in messages}
+            channels = {topic: writer.register_channel(topic, encoding, known) for topic in topics}
+            for topic, time, raw in messages:
+                writer.add_message(channels[topic], time, raw, 0)
+            writer.finish()
+        return tmp_path / "a.mcap"
+
+    return write
+
+
 @pytest.mark.parametrize("encoding", ["json", "protobuf", ""])
-def test_other_encodings_are_refused(tmp_path: Path, read: Read, encoding: str) -> None:
-    writer_module = pytest.importorskip("mcap.writer")
-    with (tmp_path / "a.mcap").open("wb") as file:
-        writer = writer_module.Writer(file)
-        writer.start("", "test")
-        schema = writer.register_schema(encode.JOINT_STATE, "jsonschema", b"{}")
-        channel = writer.register_channel("/joint_states", encoding, schema)
-        writer.add_message(channel, 1, b"{}", 1)
-        writer.finish()
+def test_other_encodings_are_refused(write_as, read, encoding):
+    path = write_as([("/joint_states", 1, b"{}")], encoding, (encode.JOINT_STATE, "jsonschema", b"{}"))
     with pytest.raises(RecordingError, match=f"/joint_states: is encoded as '{encoding}', expected 'cdr'"):
-        read(tmp_path / "a.mcap")
+        read(path)
 
 
-def test_a_type_of_the_same_name_but_other_fields_is_refused(tmp_path: Path, read: Read) -> None:
-    writer_module = pytest.importorskip("mcap.writer")
-    with (tmp_path / "a.mcap").open("wb") as file:
-        writer = writer_module.Writer(file)
-        writer.start("ros2", "test")
-        text = b"# ours\nstd_msgs/Header header\nstring[] name # with names\nfloat32[] position\n"
-        schema = writer.register_schema(encode.JOINT_STATE, "ros2msg", text)
-        channel = writer.register_channel("/joint_states", "cdr", schema)
-        writer.add_message(channel, 1, b"\0\1\0\0", 1)
-        writer.finish()
+def test_a_type_of_the_same_name_but_other_fields_is_refused(write_as, read):
+    text = b"# ours\nstd_msgs/Header header\nstring[] name # with names\nfloat32[] position\n"
+    path = write_as([("/joint_states", 1, b"\0\1\0\0")], schema=(encode.JOINT_STATE, "ros2msg", text))
     with pytest.raises(RecordingError, match=r"JointState by Header header; string\[\] name; float32\[\] "):
-        read(tmp_path / "a.mcap")
+        read(path)
 
 
-def test_a_topic_without_a_type_is_read_as_what_it_must_be(
-    tmp_path: Path, sent: Any, expected: Any, read: Read
-) -> None:
-    writer_module = pytest.importorskip("mcap.writer")
-    with (tmp_path / "a.mcap").open("wb") as file:
-        writer = writer_module.Writer(file)
-        writer.start("ros2", "test")
-        channels = {
-            topic: writer.register_channel(topic, "cdr", 0) for topic in {each.topic for each in sent}
-        }
-        for each in sent:
-            writer.add_message(channels[each.topic], each.log_time_ns, each.raw, 0)
-        writer.finish()
-    assert read(tmp_path / "a.mcap")[0].tobytes() == expected(sent).tobytes()
+def test_a_topic_without_a_type_is_read_as_what_it_must_be(sent, expected, write_as, read):
+    path = write_as([(each.topic, each.log_time_ns, each.raw) for each in sent])
+    assert read(path)[0].tobytes() == expected(sent).tobytes()
 
 
-def test_an_effort_is_the_torque_where_it_is_asked_for(
-    tmp_path: Path, sent: Any, write_bag: Any, read: Read
-) -> None:
+def test_an_effort_is_the_torque_where_it_is_asked_for(tmp_path, sent, write_bag, read):
     config = MonitorConfig(drive_torque=DriveTorque(source="effort"))
     samples, recording = read(write_bag(tmp_path / "a.mcap", sent), config=config)
     assert recording.topics == {"joint_states": "/joint_states"}
     assert np.isfinite(samples["torque_nm"]).all()
 
 
-def test_a_damaged_metadata_file_is_told_and_done_without(
-    tmp_path: Path, sent: Any, write_bag: Any, expected: Any, read: Read
-) -> None:
+def test_a_damaged_metadata_file_is_told_and_done_without(tmp_path, sent, write_bag, expected, read):
     write_bag(tmp_path / "a.mcap", sent)
     for text in (
         "rosbag2_bagfile_information: [",
@@ -305,7 +275,7 @@ def test_a_damaged_metadata_file_is_told_and_done_without(
         assert ["metadata.yaml: cannot be read" in str(finding) for finding in recording.findings] == [True]
 
 
-def test_a_missing_part_of_a_bag_is_a_loss(tmp_path: Path, sent: Any, write_bag: Any, read: Read) -> None:
+def test_a_missing_part_of_a_bag_is_a_loss(tmp_path, sent, write_bag, read):
     write_bag(tmp_path / "a_0.mcap", sent)
     (tmp_path / "metadata.yaml").write_text(
         "rosbag2_bagfile_information: {relative_file_paths: [a_0.mcap, a_1.mcap]}"
@@ -314,7 +284,7 @@ def test_a_missing_part_of_a_bag_is_a_loss(tmp_path: Path, sent: Any, write_bag:
     assert losses(recording) == ["names a_1.mcap, which does not exist: it is lost"]
 
 
-def test_memory_stays_flat(tmp_path: Path, write_bag: Any, traffic: Any) -> None:
+def test_memory_stays_flat(tmp_path, write_bag, traffic):
     """No block holds more than a few chunks, however long the recording."""
     from leg_wear_monitor.bags.reader import Recording
 

@@ -1,8 +1,6 @@
 """Every message is read as rosbags and mcap-ros2-support read it, in either byte order, whole or not."""
 
 import math
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
@@ -48,12 +46,12 @@ frames = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"
 joints = st.lists(st.sampled_from(["hip", "knee", "a", "", CRANK_NAME, "crank"]), max_size=8)
 
 
-def same(mine: float, theirs: float) -> bool:
+def same(mine, theirs):
     """Bit for bit, but for the sign and the payload of a NaN."""
     return mine == theirs or (math.isnan(mine) and math.isnan(theirs))
 
 
-def expected_crank(message: Any, crank: str) -> tuple[int, float, float, float]:
+def expected_crank(message, crank):
     """What a JointState means, told once more in plain words: fault, position, velocity, effort."""
     nothing = (math.nan, math.nan, math.nan)
     count = len(message.name)
@@ -73,7 +71,7 @@ def expected_crank(message: Any, crank: str) -> tuple[int, float, float, float]:
 
 
 @st.composite
-def joint_states(draw: st.DrawFn) -> dict[str, Any]:
+def joint_states(draw):
     """Parts of a JointState: mostly consistent, at times not."""
     name = draw(joints)
     lengths = st.one_of(st.just(len(name)), st.just(len(name)), st.integers(0, 3))
@@ -86,14 +84,7 @@ def joint_states(draw: st.DrawFn) -> dict[str, Any]:
 
 @given(parts=joint_states(), little=st.booleans(), padding=st.integers(0, 15))
 @example(parts={"name": [], "stamp_ns": 0, "frame": ""}, little=True, padding=0)
-def test_a_joint_state_is_read_as_the_libraries_read_it(
-    store: Any,
-    joint_state: Callable[..., Any],
-    foreign: Callable[[str, bytes], Any],
-    parts: dict[str, Any],
-    little: bool,
-    padding: int,
-) -> None:
+def test_a_joint_state_is_read_as_the_libraries_read_it(store, joint_state, foreign, parts, little, padding):
     raw = bytes(store.serialize_cdr(joint_state(**parts), NAME[JOINT_STATE], little_endian=little))
     assert raw[1] == little
     ours = Decoder(BY_EFFORT).one(raw + bytes(padding), JOINT_STATE)[0]
@@ -117,14 +108,7 @@ def test_a_joint_state_is_read_as_the_libraries_read_it(
     axis=st.sampled_from("xyz"),
     little=st.booleans(),
 )
-def test_a_wrench_is_read_as_the_libraries_read_it(
-    store: Any,
-    wrench: Callable[..., Any],
-    foreign: Callable[[str, bytes], Any],
-    axis: str,
-    little: bool,
-    **parts: Any,
-) -> None:
+def test_a_wrench_is_read_as_the_libraries_read_it(store, wrench, foreign, axis, little, **parts):
     raw = bytes(store.serialize_cdr(wrench(**parts), NAME[WRENCH_STAMPED], little_endian=little))
     ours = Decoder(MonitorConfig(drive_torque=DriveTorque(axis=axis))).one(raw, WRENCH_STAMPED)[0]
     for message in (store.deserialize_cdr(raw, NAME[WRENCH_STAMPED]), foreign(NAME[WRENCH_STAMPED], raw)):
@@ -150,7 +134,7 @@ interface_values = st.one_of(
 )
 
 
-def expected_interface(message: Any) -> tuple[int, float, float]:
+def expected_interface(message):
     """What a DynamicJointState means, told once more in plain words: fault, torque, temperature."""
     names, values = list(message.joint_names), list(message.interface_values)
     if not names or not values:
@@ -184,15 +168,8 @@ def expected_interface(message: Any) -> tuple[int, float, float]:
 @example([CRANK_NAME], [([WARMTH, INTERFACE], [41.0, 2.5])], True, 9, "", True, 1)
 @example(["hip", CRANK_NAME], [([], []), ([INTERFACE], [math.nan])], True, 9, "base_link", False, 30)
 def test_an_interface_is_read_as_the_libraries_read_it(
-    foreign: Callable[[str, bytes], Any],
-    names: list[str],
-    groups: list[tuple[list[str], list[float]]],
-    is_whole: bool,
-    stamp_ns: int,
-    frame: str,
-    little: bool,
-    cut: int,
-) -> None:
+    foreign, names, groups, is_whole, stamp_ns, frame, little, cut
+):
     store, kind = types(), NAME[INTERFACES]
     if is_whole:
         names, groups = names[: len(groups)], groups[: len(names)]
@@ -214,7 +191,7 @@ def test_an_interface_is_read_as_the_libraries_read_it(
 
 
 @given(number=numbers, little=st.booleans())
-def test_a_float64_is_read_and_stamped_with_its_log_time(store: Any, number: float, little: bool) -> None:
+def test_a_float64_is_read_and_stamped_with_its_log_time(store, number, little):
     message = store.types[NAME[FLOAT64]](number)
     raw = bytes(store.serialize_cdr(message, NAME[FLOAT64], little_endian=little))
     ours = Decoder(MonitorConfig(drive_torque=DriveTorque(source="float64"))).one(
@@ -226,9 +203,7 @@ def test_a_float64_is_read_and_stamped_with_its_log_time(store: Any, number: flo
 
 
 @given(parts=joint_states(), data=st.data())
-def test_a_message_cut_short_is_undecodable(
-    store: Any, joint_state: Callable[..., Any], parts: dict[str, Any], data: st.DataObject
-) -> None:
+def test_a_message_cut_short_is_undecodable(store, joint_state, parts, data):
     raw = bytes(store.serialize_cdr(joint_state(**parts), NAME[JOINT_STATE]))
     cut = data.draw(st.integers(0, len(raw) - 1))
     sample = Decoder(MonitorConfig()).one(raw[:cut], JOINT_STATE)[0]
@@ -239,24 +214,20 @@ def test_a_message_cut_short_is_undecodable(
 @given(
     raw=st.binary(max_size=200), kind=st.sampled_from(list(NAME)), start=st.sampled_from([b"", b"\0\1\0\0"])
 )
-def test_any_bytes_give_one_sample_and_no_crash(raw: bytes, kind: int, start: bytes) -> None:
+def test_any_bytes_give_one_sample_and_no_crash(raw, kind, start):
     sample = Decoder(MonitorConfig()).one(start + raw, kind)
     assert sample.shape == (1,)
     assert sample["fault"][0] in FAULTS
 
 
 @pytest.mark.parametrize("kind", [2, 3, 6, 7, 8, 9, 10, 11, 0x0101])
-def test_other_encapsulations_are_not_guessed_at(
-    store: Any, joint_state: Callable[..., Any], kind: int
-) -> None:
+def test_other_encapsulations_are_not_guessed_at(store, joint_state, kind):
     raw = bytes(store.serialize_cdr(joint_state(["crank"], [1.0]), NAME[JOINT_STATE]))
     other = kind.to_bytes(2, "big") + raw[2:]
     assert Decoder(MonitorConfig()).one(other, JOINT_STATE)["fault"][0] == UNDECODABLE
 
 
-def test_a_message_of_another_type_does_not_pass(
-    store: Any, joint_state: Callable[..., Any], wrench: Any
-) -> None:
+def test_a_message_of_another_type_does_not_pass(store, joint_state, wrench):
     joints_raw = bytes(store.serialize_cdr(joint_state(["crank"], [1.0], stamp_ns=9), NAME[JOINT_STATE]))
     wrench_raw = bytes(store.serialize_cdr(wrench((1, 2, 3), (4, 5, 6), 9), NAME[WRENCH_STAMPED]))
     decoder = Decoder(MonitorConfig())
@@ -265,7 +236,7 @@ def test_a_message_of_another_type_does_not_pass(
     assert decoder.one(joints_raw, FLOAT64)["fault"][0] == UNDECODABLE
 
 
-def test_sign_scale_and_offset_are_applied(store: Any, joint_state: Callable[..., Any]) -> None:
+def test_sign_scale_and_offset_are_applied(store, joint_state):
     config = MonitorConfig(
         crank=Crank(sign=-1, gear_ratio=2.0, offset_rad=0.25),
         drive_torque=DriveTorque(source="effort", sign=-1, scale=0.5, gear_ratio=40.0),
@@ -278,9 +249,7 @@ def test_sign_scale_and_offset_are_applied(store: Any, joint_state: Callable[...
 
 
 @given(parts=st.lists(joint_states(), min_size=1, max_size=6), gap=st.integers(0, 9))
-def test_many_at_once_are_as_one_by_one(
-    store: Any, joint_state: Callable[..., Any], parts: list[dict[str, Any]], gap: int
-) -> None:
+def test_many_at_once_are_as_one_by_one(store, joint_state, parts, gap):
     """Wherever messages lie among other bytes, aligned or not."""
     raws = [bytes(store.serialize_cdr(joint_state(**each), NAME[JOINT_STATE])) for each in parts]
     data, messages = b"", np.zeros(len(raws), MESSAGE)
@@ -295,15 +264,12 @@ def test_many_at_once_are_as_one_by_one(
 
 
 ENCODERS_TOO = MonitorConfig(
-    crank_joint=CRANK_NAME,
-    encoders=Encoders(names=("hip", "a"), joints=("B", "G"), signs=(1.0, -1.0)),
+    crank_joint=CRANK_NAME, encoders=Encoders(names=("hip", "a"), joints=("B", "G"), signs=(1.0, -1.0))
 )
 
 
 @given(parts=joint_states(), little=st.booleans())
-def test_further_encoders_are_read_with_the_crank(
-    store: Any, joint_state: Callable[..., Any], parts: dict[str, Any], little: bool
-) -> None:
+def test_further_encoders_are_read_with_the_crank(store, joint_state, parts, little):
     """Absent or no angle, it is no fault of the sample; a faulty sample has none."""
     message = joint_state(**parts)
     raw = bytes(store.serialize_cdr(message, NAME[JOINT_STATE], little_endian=little))

@@ -2,7 +2,6 @@
 
 import math
 from itertools import pairwise
-from typing import Any
 
 import attrs
 import numpy as np
@@ -13,7 +12,6 @@ from leg_wear_monitor.mechanism.position import build_linkage, ideal_motion
 from leg_wear_monitor.mechanism.urdf import joint_positions
 from leg_wear_monitor.messages.encode import CYLINDER, LINE_LIST, LINE_STRIP, SPHERE, TEXT, LegDrawing
 from leg_wear_monitor.messages.leg_markers import LINKAGE, MARKERS, LegMarkers
-from leg_wear_monitor.messages.streams import Output
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.reports import AlarmList, Lost, Reports, SampleReports
 from leg_wear_monitor.state import Level
@@ -26,16 +24,16 @@ START = 1_700_000_000 * SECOND
 
 
 @pytest.fixture(scope="module")
-def monitor(leg: lw.Mechanism) -> lw.WearMonitor:
+def monitor(leg):
     return lw.WearMonitor(leg, lw.MonitorConfig())
 
 
 @pytest.fixture(scope="module")
-def drawing(leg: lw.Mechanism) -> LegDrawing:
+def drawing(leg):
     return LegDrawing(leg)
 
 
-def walk(at_s: np.ndarray, joints: int, eccentricity_m: float = 0.0) -> SampleReports:
+def walk(at_s, joints, eccentricity_m=0.0):
     """One turn a second; nothing is known in the first 0.15 s."""
     angle = np.where(at_s < 0.15, math.nan, 2.0 * math.pi * (at_s % 1.0))
     off = np.zeros((len(at_s), joints, 2))
@@ -51,21 +49,21 @@ def walk(at_s: np.ndarray, joints: int, eccentricity_m: float = 0.0) -> SampleRe
     )
 
 
-def reports(samples: SampleReports, alarms: tuple[AlarmList, ...] = ()) -> Reports:
+def reports(samples, alarms=()):
     lost = Lost(**{**{field.name: 0 for field in attrs.fields(Lost)}, "faulty": {}})
     return Reports(samples, (), alarms, lost)
 
 
-def raised(at_s: float, level: Level, joint: str = "G") -> AlarmList:
+def raised(at_s, level, joint="G"):
     alarm = Alarm(kind="clearance", subject=joint, unit="m", level=level)
     return AlarmList(START + round(at_s * SECOND), (alarm,))
 
 
 @pytest.fixture
-def drawn(store: Any, monitor: lw.WearMonitor, drawing: LegDrawing) -> Any:
+def drawn(store, monitor, drawing):
     """What several reports draw: stamp [s] and markers by name space."""
 
-    def draw(*several: Reports) -> list[tuple[float, dict[str, list[Any]]]]:
+    def draw(*several):
         markers, found = LegMarkers(monitor, drawing), []
         for each in several:
             for outgoing in markers.of(each):
@@ -73,7 +71,7 @@ def drawn(store: Any, monitor: lw.WearMonitor, drawing: LegDrawing) -> Any:
                     continue
                 assert len(outgoing.messages) == 1
                 message = store.deserialize_cdr(outgoing.messages[0].tobytes(), outgoing.output.type)
-                named: dict[str, list[Any]] = {}
+                named = {}
                 for marker in message.markers:
                     stamp = marker.header.stamp
                     assert stamp.sec * SECOND + stamp.nanosec == outgoing.stamp_ns[0]
@@ -85,15 +83,15 @@ def drawn(store: Any, monitor: lw.WearMonitor, drawing: LegDrawing) -> Any:
     return draw
 
 
-def xyz(point: Any) -> list[float]:
+def xyz(point):
     return [point.x, point.y, point.z]
 
 
-def rgb(marker: Any) -> tuple[float, float, float]:
+def rgb(marker):
     return marker.color.r, marker.color.g, marker.color.b
 
 
-def test_the_leg_is_drawn_ten_times_a_second_and_moves(drawn: Any, leg: lw.Mechanism) -> None:
+def test_the_leg_is_drawn_ten_times_a_second_and_moves(drawn, leg):
     found = drawn(reports(walk(np.arange(0.0, 1.0, 0.005), 5)))
     assert [at for at, _ in found] == pytest.approx(np.arange(10) / 10)
     markers = found[-1][1]
@@ -115,7 +113,7 @@ def test_the_leg_is_drawn_ten_times_a_second_and_moves(drawn: Any, leg: lw.Mecha
     assert np.linalg.norm(knee, axis=1) == pytest.approx(math.dist(thigh["B"], thigh["G"]))
 
 
-def test_the_toe_keeps_to_its_path(drawn: Any) -> None:
+def test_the_toe_keeps_to_its_path(drawn):
     found = drawn(reports(walk(np.arange(0.0, 1.0, 0.005), 5)))
     path = np.array([xyz(point) for point in found[-1][1]["toe_path"][0].points])
     assert path[0] == pytest.approx(path[-1])
@@ -125,9 +123,7 @@ def test_the_toe_keeps_to_its_path(drawn: Any) -> None:
         assert apart.min() < 1e-9  # one end of a line of the foot is the toe
 
 
-def test_a_journal_at_its_clearance_touches_its_bushing(
-    drawn: Any, monitor: lw.WearMonitor, drawing: LegDrawing
-) -> None:
+def test_a_journal_at_its_clearance_touches_its_bushing(drawn, monitor, drawing):
     clearance_m = monitor.clearances_m[2]
     _, markers = drawn(reports(walk(np.arange(0.2, 0.4, 0.005), 5, clearance_m)))[-1]
     bushing, journal = markers["bushings"][2], markers["journals"][2]
@@ -145,7 +141,7 @@ def test_a_journal_at_its_clearance_touches_its_bushing(
     assert min(math.dist(one, other) for one, other in pairwise(centres)) > 2.0 * radius
 
 
-def test_a_level_has_a_text_a_colour_and_a_size(drawn: Any) -> None:
+def test_a_level_has_a_text_a_colour_and_a_size(drawn):
     at_s, alarms = np.arange(0.2, 0.7, 0.005), (raised(0.35, Level.WARN), raised(0.45, Level.ERROR))
     found = [markers for _, markers in drawn(reports(walk(at_s, 5), alarms))]
     texts = [markers["values"][2].text for markers in found]
@@ -157,7 +153,7 @@ def test_a_level_has_a_text_a_colour_and_a_size(drawn: Any) -> None:
     assert {rgb(markers["joints"][0]) for markers in found} == {colours[0]}
 
 
-def test_what_is_not_followed_is_grey_where_it_was(drawn: Any) -> None:
+def test_what_is_not_followed_is_grey_where_it_was(drawn):
     at_s = np.concatenate([np.arange(0.0, 0.5, 0.005), np.arange(3.0, 3.195, 0.005)])
     samples = walk(at_s, 5)
     samples.crank_angle_rad[(at_s > 0.395)] = math.nan
@@ -182,9 +178,7 @@ def test_what_is_not_followed_is_grey_where_it_was(drawn: Any) -> None:
 
 
 @pytest.mark.parametrize("cuts", [[], [50], [1, 2, 3, 61, 100, 139]])
-def test_markers_are_the_same_however_reports_are_cut(
-    monitor: lw.WearMonitor, drawing: LegDrawing, cuts: list[int]
-) -> None:
+def test_markers_are_the_same_however_reports_are_cut(monitor, drawing, cuts):
     """A change is reported with the first samples that are as late as it, or before."""
     at_s = np.concatenate([np.arange(50.0, 50.5, 0.005), np.arange(0.2, 0.7, 0.005)])  # the stamps jump back
     whole = walk(at_s, 5)
@@ -195,7 +189,7 @@ def test_markers_are_the_same_however_reports_are_cut(
     ]
     changes += [(140, raised(0.4, Level.WARN))]
 
-    def drawn_from(edges: list[int], *outputs: Output) -> list[bytes]:
+    def drawn_from(edges, *outputs):
         markers, rows = LegMarkers(monitor, drawing), []
         for begin, end in pairwise([0, *edges, len(at_s)]):
             fields = {one.name: getattr(whole, one.name)[begin:end] for one in attrs.fields(SampleReports)}
@@ -212,7 +206,7 @@ def test_markers_are_the_same_however_reports_are_cut(
 
 
 @pytest.mark.parametrize("name", ["andrews", "four_bar", "jansen_leg", "klann_leg", "slider_crank"])
-def test_other_mechanisms_are_drawn_with_all_their_clearance_joints(name: str) -> None:
+def test_other_mechanisms_are_drawn_with_all_their_clearance_joints(name):
     mechanism = lw.load_mechanism(name)
     drawing = LegDrawing(mechanism)
     joints = len(mechanism.clearance_joints)

@@ -2,9 +2,7 @@
 
 import json
 import math
-from collections.abc import Callable
 from itertools import pairwise
-from typing import Any
 
 import attrs
 import numpy as np
@@ -54,8 +52,13 @@ HEALTHY = Finding(code="NONE", state=State.HEALTHY, why="why", do="do")
 PLOTTED = MonitorConfig(publish_scalars=True)
 
 
+def report(kind, **known):
+    """A report with zeros in place of what a test does not look at."""
+    return kind(**{field.name: 0 for field in attrs.fields(kind)} | known)
+
+
 @pytest.fixture(scope="module")
-def reports() -> Reports:
+def reports():
     nan = math.nan
     samples = SampleReports(
         stamp_ns=np.array([10, 20, 30, 40], np.int64),
@@ -66,35 +69,25 @@ def reports() -> Reports:
         measured_torque_nm=np.array([nan, 1.25, nan, 3.25]),
         eccentricity_m=np.full((4, 2, 2), 1e-4),
     )
-    blank = {field.name: 0 for field in attrs.fields(JointReport)}
-    known = {
-        **blank,
-        "forecast": None,
-        "seen": None,
-        "shown": None,
-        "clearance_m": 3e-4,
-        "growth_mps": 1e-15,
-        "peak_force_n": 50.0,
-    }
-    joints = (
-        JointReport(**{**known, "joint": "A"}),
-        JointReport(**{**known, "joint": "G", "growth_mps": None}),
-    )
-    blank = {field.name: 0 for field in attrs.fields(CycleReport)}
-    cycle = CycleReport(**{**blank, "stamp_ns": 35, "joints": joints, "forecast": None})
+    joint = report(
+        JointReport, joint="A", clearance_m=3e-4, growth_mps=1e-15, peak_force_n=50.0, forecast=None,
+        seen=None, shown=None,
+    )  # fmt: skip
+    joints = joint, attrs.evolve(joint, joint="G", growth_mps=None)
+    cycle = report(CycleReport, stamp_ns=35, joints=joints, forecast=None)
     alarm = Alarm(
         kind="clearance", subject="A", unit="m", level=Level.ERROR, present=Level.OK, value=6e-4, limit=5e-4,
         raised_ns=1_700_000_000_123_456_789,
     )  # fmt: skip
-    lost = Lost(**{**{field.name: 0 for field in attrs.fields(Lost)}, "faulty": {}})
+    lost = report(Lost, faulty={})
     state = VerdictReport(37, (HEALTHY,), made_up_state())
     return Reports(samples, (cycle,), (AlarmList(36, (alarm,)),), lost, states=(state,))
 
 
 @pytest.fixture(scope="module")
-def sent(store: Any, reports: Reports) -> dict[str, list[Any]]:
+def sent(store, reports):
     """Messages by the name of their topic, as rosbags reads them."""
-    messages: dict[str, list[Any]] = {}
+    messages = {}
     for outgoing in Messages(MonitorConfig(), CLEARANCE_JOINTS).of(reports):
         assert len(outgoing.stamp_ns) == len(outgoing.messages)
         for stamp, row in zip(outgoing.stamp_ns.tolist(), outgoing.messages, strict=True):
@@ -105,7 +98,7 @@ def sent(store: Any, reports: Reports) -> dict[str, list[Any]]:
     return messages
 
 
-def test_the_state_is_json_with_the_verdict_of_its_findings(sent: dict[str, list[Any]]) -> None:
+def test_the_state_is_json_with_the_verdict_of_its_findings(sent):
     (message,) = sent[STATE.name]
     told, expected = json.loads(message.data), made_up_state().to_dict()
     assert (told["verdict"]["state"], told["clearances"]["A"]["status"]) == ("healthy", "healthy")
@@ -116,26 +109,26 @@ def test_the_state_is_json_with_the_verdict_of_its_findings(sent: dict[str, list
     assert told == expected
 
 
-def test_forces_are_of_the_crank_samples_that_were_followed(sent: dict[str, list[Any]]) -> None:
+def test_forces_are_of_the_crank_samples_that_were_followed(sent):
     forces = sent[IMPACTS.name]
     assert [list(message.name) for message in forces] == [["A_impact", "G_impact"]] * 2
     assert [message.effort.tolist() for message in forces] == [[3.0, 4.0], [5.0, 6.0]]
     assert all(message.header.frame_id == "pelvis" for message in forces)
 
 
-def test_torque_is_of_all_samples_that_were_followed(sent: dict[str, list[Any]]) -> None:
+def test_torque_is_of_all_samples_that_were_followed(sent):
     assert [message.wrench.torque.z for message in sent[TORQUE.name]] == [1.5, 2.5, 3.5]
     assert [message.wrench.torque.x for message in sent[TORQUE.name]] == [0.0] * 3
 
 
-def test_torque_is_about_the_axis_of_the_parameters(store: Any, reports: Reports) -> None:
+def test_torque_is_about_the_axis_of_the_parameters(store, reports):
     config = MonitorConfig(drive_torque=DriveTorque(axis="x"), publish_impact_forces=False)
     (outgoing,) = Messages(config, CLEARANCE_JOINTS).of_samples(reports.samples)
     message = store.deserialize_cdr(outgoing.messages[0].tobytes(), outgoing.output.type)
     assert (message.wrench.torque.x, message.wrench.torque.z) == (1.5, 0.0)
 
 
-def test_a_measured_torque_is_of_all_samples_that_bring_one(store: Any, reports: Reports) -> None:
+def test_a_measured_torque_is_of_all_samples_that_bring_one(store, reports):
     (measured,) = (
         outgoing
         for outgoing in Messages(PLOTTED, CLEARANCE_JOINTS).of_samples(reports.samples)
@@ -146,7 +139,7 @@ def test_a_measured_torque_is_of_all_samples_that_bring_one(store: Any, reports:
     assert [message.wrench.torque.z for message in messages] == [1.25, 3.25]
 
 
-def test_each_known_value_of_a_joint_is_a_number_of_its_own(store: Any, reports: Reports) -> None:
+def test_each_known_value_of_a_joint_is_a_number_of_its_own(store, reports):
     of = Quantiles(1.0, 2.0, 3.0)
     known = JointForecast(answer=Answer.KNOWN, cycles=of, hours=of, days=of, clearance_m=of, measurements=0)
     unknown = attrs.evolve(known, answer=Answer.NO_GROWTH, hours=None)
@@ -174,12 +167,12 @@ def test_each_known_value_of_a_joint_is_a_number_of_its_own(store: Any, reports:
     assert set(sent) < names and "~/joints/G/remaining_p50_h" in names
 
 
-def test_nothing_is_plotted_unless_it_is_asked_for(reports: Reports) -> None:
+def test_nothing_is_plotted_unless_it_is_asked_for(reports):
     messages = Messages(MonitorConfig(), CLEARANCE_JOINTS)
     assert {outgoing.output for outgoing in messages.of(reports)} < set(OUTPUTS) == set(messages.outputs)
 
 
-def test_clearances_are_those_of_the_gait_cycle(sent: dict[str, list[Any]]) -> None:
+def test_clearances_are_those_of_the_gait_cycle(sent):
     (message,) = sent[CLEARANCES.name]
     assert list(message.name) == ["A_clearance", "G_clearance"]
     assert message.position.tolist() == [3e-4, 3e-4]
@@ -187,7 +180,7 @@ def test_clearances_are_those_of_the_gait_cycle(sent: dict[str, list[Any]]) -> N
     assert message.effort.tolist() == [50.0, 50.0]
 
 
-def test_an_alarm_keeps_its_name_and_gives_plain_numbers(sent: dict[str, list[Any]]) -> None:
+def test_an_alarm_keeps_its_name_and_gives_plain_numbers(sent):
     ((status,),) = (message.status for message in sent[ALARMS.name])
     assert status.name == "leg_wear_monitor: clearance A"
     assert (status.level, status.message, status.hardware_id) == (2, "latched", "leg")
@@ -197,7 +190,7 @@ def test_an_alarm_keeps_its_name_and_gives_plain_numbers(sent: dict[str, list[An
     assert float(values["raised_s"]) == pytest.approx(1_700_000_000.123456, abs=1e-5)
 
 
-def test_a_forecast_says_what_is_known(store: Any, reports: Reports) -> None:
+def test_a_forecast_says_what_is_known(store, reports):
     of = Quantiles(1.0, 2.0, 3.0)
     forecast = JointForecast(
         answer=Answer.KNOWN, cycles=of, hours=of, days=of, clearance_m=of, measurements=2
@@ -217,7 +210,7 @@ def test_a_forecast_says_what_is_known(store: Any, reports: Reports) -> None:
     assert (values["clearance_p90_m"], values["measurements"]) == ("3", "2")
 
 
-def test_the_leg_s_forecast_is_a_status_after_those_of_the_joints(store: Any, reports: Reports) -> None:
+def test_the_leg_s_forecast_is_a_status_after_those_of_the_joints(store, reports):
     of = Quantiles(1.0, 2.0, 3.0)
     leg = LegForecast(
         answer=Answer.KNOWN,
@@ -236,7 +229,7 @@ def test_the_leg_s_forecast_is_a_status_after_those_of_the_joints(store: Any, re
     assert (values["A_first_probability"], values["simulated_lives"]) == ("0.75", "9")
 
 
-def test_diagnostics_are_the_monitors_status(store: Any) -> None:
+def test_diagnostics_are_the_monitors_status(store):
     told = (Status("input", Level.WARN, "see: input_gaps", {"crank_rate_hz": 199.5}, "INPUT_GAPS"),)
     raw = Messages(MonitorConfig(hardware_id="left"), CLEARANCE_JOINTS, node="monitor").diagnostics(7, told)
     (status,) = store.deserialize_cdr(raw, DIAGNOSTICS.type).status
@@ -249,17 +242,17 @@ def test_diagnostics_are_the_monitors_status(store: Any) -> None:
     ("value", "text"),
     [(0.0003, "0.0003"), (0.1 + 0.2, "0.3"), (1e6, "1000000"), (math.nan, "nan"), (math.inf, "inf")],
 )
-def test_numbers_are_plain(value: float, text: str) -> None:
+def test_numbers_are_plain(value, text):
     assert plain(value) == text
 
 
-def test_topics_are_of_the_node(store: Callable[..., Any]) -> None:
+def test_topics_are_of_the_node(store):
     assert topic_of(ALARMS, "/robot/leg_wear_monitor") == "/robot/leg_wear_monitor/alarms"
     assert topic_of(DIAGNOSTICS, "/robot/leg_wear_monitor") == "/diagnostics"
 
 
 @pytest.mark.parametrize("cuts", [[], [3], [1, 2, 3, 4, 5, 6, 7]])
-def test_forecasts_are_due_by_stamps_however_reports_are_cut(reports: Reports, cuts: list[int]) -> None:
+def test_forecasts_are_due_by_stamps_however_reports_are_cut(reports, cuts):
     """Seconds of gait cycles and of changes in order of arrival; some changes are told before their time."""
     second, told = 10**9, []
     arrivals = [("cycle", 1), ("change", 2.1), ("cycle", 2), ("cycle", 3), ("cycle", 4), ("change", 5),
@@ -282,9 +275,7 @@ def test_forecasts_are_due_by_stamps_however_reports_are_cut(reports: Reports, c
     ("topic", "node"),
     [("/joint_states", "/leg_wear_monitor"), ("/robot/left/joint_states", "/robot/left/leg_wear_monitor")],
 )
-def test_a_replay_stands_in_for_the_node_beside_the_topic_of_the_crank(
-    store: Any, topic: str, node: str
-) -> None:
+def test_a_replay_stands_in_for_the_node_beside_the_topic_of_the_crank(store, topic, node):
     assert node_beside(topic) == node
     config = MonitorConfig().on_node(node)
     raw = Messages(config, CLEARANCE_JOINTS, node).diagnostics(7, [Status("input", Level.OK, "", {})])

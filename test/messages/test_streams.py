@@ -1,14 +1,12 @@
 """The table of streams: what it says of messages is what ROS and the decoder say."""
 
-import numpy as np
 import pytest
 
 from leg_wear_monitor.messages.cdr import Decoder
 from leg_wear_monitor.messages.streams import STREAMS, streams_read, types
 from leg_wear_monitor.monitor.config.inputs import TORQUE_SOURCES, FootLoad
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.twin import KINDS
-from leg_wear_monitor.twin.sample import GAIT_SAMPLE, LOAD_SOURCES, brings, gait_samples
+from leg_wear_monitor.twin.sample import LOAD_SOURCES
 
 pytestmark = pytest.mark.plain
 
@@ -39,16 +37,3 @@ def test_each_source_of_the_foot_load_adds_one_topic(source):
     assert [stream.topic for stream in added] == ["foot_load"]
     assert {stream.load_source for stream in STREAMS} == {"", *LOAD_SOURCES[1:]}
     assert FootLoad(source=source).source == source
-
-
-def test_codes_differ():
-    assert len({stream.code for stream in STREAMS}) == len(STREAMS)
-
-
-def test_each_kind_has_a_value_that_others_may_bring():
-    for kind, of in KINDS.items():
-        assert GAIT_SAMPLE[of.value].base == np.dtype("f8")
-        other = next(each for each in KINDS if each != kind)
-        samples = gait_samples([1, 2, 3], [kind, other, other])
-        samples[of.value][2] = 1.0
-        assert brings(samples, kind).tolist() == [True, False, True]

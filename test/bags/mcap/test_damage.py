@@ -1,10 +1,7 @@
 """A damaged recording gives what is sound in it and says that something is not: no hang, no wrong number."""
 
 import sqlite3
-from collections.abc import Callable
 from contextlib import closing
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +12,7 @@ from leg_wear_monitor.bags.findings import RecordingError, Severity
 TRUNCATIONS, FLIPS = 8, 40
 
 
-def outcome(read: Callable[..., Any], path: Path) -> tuple[Any, Any]:
+def outcome(read, path):
     """Samples and recording; nothing where the file is refused, in one line."""
     try:
         return read(path)
@@ -26,11 +23,11 @@ def outcome(read: Callable[..., Any], path: Path) -> tuple[Any, Any]:
 
 
 @pytest.fixture(scope="module")
-def sent(traffic: Callable[..., Any]) -> Any:
+def sent(traffic):
     return traffic(3.0)
 
 
-def assert_sound(samples: Any, recording: Any, true: Any) -> None:
+def assert_sound(samples, recording, true):
     """Nothing that was not sent, in its order; and all of it, unless a loss is told."""
     if samples is None:
         return
@@ -44,9 +41,7 @@ def assert_sound(samples: Any, recording: Any, true: Any) -> None:
 
 @pytest.mark.parametrize("compression", ["ZSTD", "LZ4", "NONE"])
 @pytest.mark.parametrize("chunked", [True, False])
-def test_a_truncated_file_gives_what_is_left(
-    tmp_path: Path, sent: Any, write_bag: Any, expected: Any, read: Any, compression: str, chunked: bool
-) -> None:
+def test_a_truncated_file_gives_what_is_left(tmp_path, sent, write_bag, expected, read, compression, chunked):
     whole = write_bag(tmp_path / "whole.mcap", sent, compression, use_chunking=chunked).read_bytes()
     true = expected(sent)
     path = tmp_path / "cut.mcap"
@@ -64,8 +59,8 @@ def test_a_truncated_file_gives_what_is_left(
 @pytest.mark.parametrize("compression", ["ZSTD", "LZ4", "NONE"])
 @pytest.mark.parametrize("options", [{}, {"enable_data_crcs": True, "use_chunking": False}])
 def test_a_flipped_bit_is_seen_or_without_effect(
-    tmp_path: Path, sent: Any, write_bag: Any, expected: Any, read: Any, compression: str, options: Any
-) -> None:
+    tmp_path, sent, write_bag, expected, read, compression, options
+):
     whole = write_bag(tmp_path / "whole.mcap", sent, compression, **options).read_bytes()
     true = expected(sent)
     path = tmp_path / "flipped.mcap"
@@ -80,9 +75,7 @@ def test_a_flipped_bit_is_seen_or_without_effect(
         assert_sound(samples, recording, true)
 
 
-def test_without_checksums_a_damage_may_pass_but_never_unsaid(
-    tmp_path: Path, sent: Any, write_bag: Any, expected: Any, read: Any
-) -> None:
+def test_without_checksums_a_damage_may_pass_but_never_unsaid(tmp_path, sent, write_bag, expected, read):
     whole = write_bag(tmp_path / "whole.mcap", sent, "NONE", enable_crcs=False).read_bytes()
     true = expected(sent)
     path = tmp_path / "flipped.mcap"
@@ -109,9 +102,7 @@ def test_without_checksums_a_damage_may_pass_but_never_unsaid(
     ],
     ids=["empty", "ROS 1", "magic", "magics", "chunk", "message", "schema"],
 )
-def test_what_is_no_recording_is_refused_in_a_line(
-    tmp_path: Path, read: Any, content: bytes, text: str
-) -> None:
+def test_what_is_no_recording_is_refused_in_a_line(tmp_path, read, content, text):
     path = tmp_path / "a.mcap"
     path.write_bytes(content)
     with pytest.raises(RecordingError, match=text):
@@ -123,14 +114,14 @@ def test_what_is_no_recording_is_refused_in_a_line(
     [b"", b"SQLite format 3\0" + bytes(84), b"no database" * 100],
     ids=["empty", "head only", "other"],
 )
-def test_what_is_no_database_is_refused_in_a_line(tmp_path: Path, read: Any, content: bytes) -> None:
+def test_what_is_no_database_is_refused_in_a_line(tmp_path, read, content):
     path = tmp_path / "a.db3"
     path.write_bytes(content)
     with pytest.raises(RecordingError, match=r"a\.db3: is not a readable \.db3 file"):
         read(path)
 
 
-def test_names_that_are_no_recordings_are_refused(tmp_path: Path, read: Any) -> None:
+def test_names_that_are_no_recordings_are_refused(tmp_path, read):
     (tmp_path / "empty").mkdir()
     (tmp_path / "notes.txt").write_text("")
     for name, text in (
@@ -144,9 +135,7 @@ def test_names_that_are_no_recordings_are_refused(tmp_path: Path, read: Any) -> 
         read()
 
 
-def test_a_part_that_cannot_be_opened_is_a_loss(
-    tmp_path: Path, sent: Any, write_bag: Any, expected: Any, read: Any
-) -> None:
+def test_a_part_that_cannot_be_opened_is_a_loss(tmp_path, sent, write_bag, expected, read):
     write_bag(tmp_path / "a_0.mcap", sent)
     (tmp_path / "a_1.mcap").write_bytes(b"")
     samples, recording = read(tmp_path)
@@ -155,7 +144,7 @@ def test_a_part_that_cannot_be_opened_is_a_loss(
     assert losses == [f"{tmp_path / 'a_1.mcap'}: is empty, expected an MCAP file: it is lost"]
 
 
-def test_a_damaged_database(tmp_path: Path, sent: Any, write_database: Any, expected: Any, read: Any) -> None:
+def test_a_damaged_database(tmp_path, sent, write_database, expected, read):
     """Cut short it gives what was sent or nothing; a flipped bit may pass, but not unsaid."""
     path = write_database(tmp_path / "bag", sent)
     whole, true = path.read_bytes(), expected(sent)
@@ -171,9 +160,7 @@ def test_a_damaged_database(tmp_path: Path, sent: Any, write_database: Any, expe
         assert samples is None or any("no checksums" in str(finding) for finding in recording.findings)
 
 
-def test_rows_of_another_kind_are_lost_and_counted(
-    tmp_path: Path, sent: Any, write_database: Any, expected: Any, read: Any
-) -> None:
+def test_rows_of_another_kind_are_lost_and_counted(tmp_path, sent, write_database, expected, read):
     """SQLite takes anything for a time; only what can be one is taken from it."""
     path = write_database(tmp_path / "bag", sent)
     with closing(sqlite3.connect(path)) as database, database:
@@ -187,9 +174,7 @@ def test_rows_of_another_kind_are_lost_and_counted(
     ]
 
 
-def test_claims_of_great_size_do_not_fill_the_memory(
-    tmp_path: Path, sent: Any, write_bag: Any, read: Any
-) -> None:
+def test_claims_of_great_size_do_not_fill_the_memory(tmp_path, sent, write_bag, read):
     """Every length in the head of a chunk made huge in turn, without an index to tell better."""
     index_types = pytest.importorskip("mcap.writer").IndexType
     whole = write_bag(tmp_path / "whole.mcap", sent, index_types=index_types.NONE).read_bytes()

@@ -1,7 +1,5 @@
 """The walk over a chunk finds what the mcap library writes into it, wherever it is cut."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -41,13 +39,13 @@ others = st.builds(mcap_records.DataEnd, st.integers(0, 9)) | st.builds(
 )
 
 
-def written(record: Any) -> bytes:
+def written(record):
     builder = RecordBuilder()
     record.write(builder)
     return bytes(builder.end())
 
 
-def walked(data: bytes) -> tuple[list[tuple[int, ...]], list[int], Any]:
+def walked(data):
     """Messages, positions of definitions, tally."""
     bytes_, counts = np.frombuffer(data, np.uint8), np.zeros(1, COUNTS)
     walk(bytes_, ROLES, np.zeros(0, MESSAGE), np.zeros(0, np.int64), counts)
@@ -58,7 +56,7 @@ def walked(data: bytes) -> tuple[list[tuple[int, ...]], list[int], Any]:
 
 
 @given(records=st.lists(messages | schemas, max_size=8), data=st.data())
-def test_messages_are_found_where_they_were_written(records: list[Any], data: st.DataObject) -> None:
+def test_messages_are_found_where_they_were_written(records, data):
     parts = [written(record) for record in records]
     ends = np.cumsum([0, *map(len, parts)]).tolist()
     cut = data.draw(st.integers(0, ends[-1]))
@@ -79,9 +77,7 @@ def test_messages_are_found_where_they_were_written(records: list[Any], data: st
 
 
 @given(before=st.lists(messages, max_size=3), record=others, after=st.lists(messages, max_size=3))
-def test_other_records_are_counted_and_the_end_of_data_is_the_end(
-    before: list[Any], record: Any, after: list[Any]
-) -> None:
+def test_other_records_are_counted_and_the_end_of_data_is_the_end(before, record, after):
     head = b"".join(map(written, before))
     tail = b"".join(map(written, after))
     _, _, counts = walked(head + written(record) + tail)
@@ -93,6 +89,6 @@ def test_other_records_are_counted_and_the_end_of_data_is_the_end(
 
 
 @given(data=st.binary(max_size=300))
-def test_any_bytes_are_walked_to_an_end(data: bytes) -> None:
+def test_any_bytes_are_walked_to_an_end(data):
     _, _, counts = walked(data)
     assert 0 <= counts["read"] <= len(data)

@@ -1,8 +1,6 @@
 """What we write, the libraries read: message by message, indexed, with sound checksums."""
 
 import resource
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -26,9 +24,7 @@ stamps = st.integers(0, 2**31 * 10**9 - 1)
     given_parts=st.sets(st.sampled_from(["position", "velocity", "effort"])),
     data=st.data(),
 )
-def test_joint_states_are_as_rosbags_writes_them(
-    store: Any, joint_state: Any, stamp_ns: list[int], names: list[str], given_parts: set[str], data: Any
-) -> None:
+def test_joint_states_are_as_rosbags_writes_them(store, joint_state, stamp_ns, names, given_parts, data):
     shape = (len(stamp_ns), len(names))
     values = st.lists(numbers, min_size=shape[0] * shape[1], max_size=shape[0] * shape[1])
     parts = {part: np.reshape(data.draw(values), shape) for part in sorted(given_parts)}
@@ -42,9 +38,7 @@ def test_joint_states_are_as_rosbags_writes_them(
 @given(
     stamp_ns=stamps, torque=st.tuples(numbers, numbers, numbers), frame=st.sampled_from(["", "a", "pelvis"])
 )
-def test_wrenches_are_as_rosbags_writes_them(
-    store: Any, wrench: Any, stamp_ns: int, torque: tuple[float, ...], frame: str
-) -> None:
+def test_wrenches_are_as_rosbags_writes_them(store, wrench, stamp_ns, torque, frame):
     rows = encode.wrenches([stamp_ns], torque=[torque], frame_id=frame)
     expected = store.serialize_cdr(wrench((0, 0, 0), torque, stamp_ns, frame), encode.WRENCH_STAMPED)
     assert rows[0].tobytes() == bytes(expected)
@@ -55,7 +49,7 @@ statuses = st.tuples(texts, st.integers(0, 3), texts, texts, st.dictionaries(tex
 
 
 @given(stamp_ns=stamps, told=st.lists(statuses, max_size=3), frame=texts)
-def test_diagnostics_are_as_rosbags_writes_them(store: Any, stamp_ns: int, told: Any, frame: str) -> None:
+def test_diagnostics_are_as_rosbags_writes_them(store, stamp_ns, told, frame):
     make = store.types
     pair = make["diagnostic_msgs/msg/KeyValue"]
     status = [
@@ -75,7 +69,7 @@ def test_diagnostics_are_as_rosbags_writes_them(store: Any, stamp_ns: int, told:
 
 
 @pytest.fixture
-def written(tmp_path: Path) -> tuple[Path, dict[str, list[tuple[int, bytes]]]]:
+def written(tmp_path):
     """A file of two topics in many chunks, and what is in it."""
     path = tmp_path / "out.mcap"
     times = np.arange(1000, dtype=np.int64) * 1_000_000 + 7
@@ -93,7 +87,7 @@ def written(tmp_path: Path) -> tuple[Path, dict[str, list[tuple[int, bytes]]]]:
     }
 
 
-def test_the_mcap_library_reads_all_of_it(written: Any) -> None:
+def test_the_mcap_library_reads_all_of_it(written):
     path, expected = written
     with path.open("rb") as file:
         reader = mcap_reader.make_reader(file, validate_crcs=True)
@@ -101,7 +95,7 @@ def test_the_mcap_library_reads_all_of_it(written: Any) -> None:
         summary = reader.get_summary()
         assert summary.statistics.message_count == 1010
         assert len(summary.chunk_indexes) == summary.statistics.chunk_count > 5
-        got: dict[str, list[tuple[int, bytes]]] = {topic: [] for topic in expected}
+        got = {topic: [] for topic in expected}
         for schema, channel, message in reader.iter_messages():
             assert (schema.encoding, channel.message_encoding) == ("ros2msg", "cdr")
             assert schema.data.decode() == definition(schema.name).text
@@ -113,7 +107,7 @@ def test_the_mcap_library_reads_all_of_it(written: Any) -> None:
         assert sum(1 for _ in StreamReader(file, validate_crcs=True).records) > 1010
 
 
-def test_rosbags_plays_it_with_its_quality_of_service(written: Any) -> None:
+def test_rosbags_plays_it_with_its_quality_of_service(written):
     path, expected = written
     from rosbags.rosbag2 import Reader
 
@@ -127,7 +121,7 @@ def test_rosbags_plays_it_with_its_quality_of_service(written: Any) -> None:
         )
 
 
-def test_what_was_flushed_is_there_without_an_end(tmp_path: Path) -> None:
+def test_what_was_flushed_is_there_without_an_end(tmp_path):
     from mcap.exceptions import EndOfFile
     from mcap.records import Message
     from mcap.stream_reader import StreamReader
@@ -150,19 +144,19 @@ def test_what_was_flushed_is_there_without_an_end(tmp_path: Path) -> None:
     assert [message.log_time for message in messages] == list(range(1, 11))
 
 
-def test_an_empty_recording_is_a_sound_file(tmp_path: Path) -> None:
+def test_an_empty_recording_is_a_sound_file(tmp_path):
     with McapWriter(tmp_path / "empty.mcap"):
         pass
     with (tmp_path / "empty.mcap").open("rb") as file:
         assert mcap_reader.make_reader(file).get_summary().statistics.message_count == 0
 
 
-def test_a_full_disk_is_said() -> None:
+def test_a_full_disk_is_said():
     with pytest.raises(RecordingError, match="/dev/full: cannot be written: No space left on device"):
         McapWriter("/dev/full")
 
 
-def test_what_fits_on_a_full_disk_stays_sound_and_writing_goes_on(tmp_path: Path) -> None:
+def test_what_fits_on_a_full_disk_stays_sound_and_writing_goes_on(tmp_path):
     raw = encode.joint_states([1], ["crank"], position=[[0.5]])[0].tobytes()
     noise = np.random.default_rng(1).bytes(20000)
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -183,6 +177,6 @@ def test_what_fits_on_a_full_disk_stays_sound_and_writing_goes_on(tmp_path: Path
         assert [message.log_time for _, _, message in messages] == [1, 3]
 
 
-def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+def test_a_place_that_cannot_be_written_is_named(tmp_path):
     with pytest.raises(RecordingError, match="nowhere"):
         McapWriter(tmp_path / "nowhere" / "out.mcap")

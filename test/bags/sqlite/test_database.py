@@ -2,10 +2,8 @@
 
 import shutil
 import sqlite3
-from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -13,24 +11,22 @@ from leg_wear_monitor.bags.findings import RecordingError, Severity
 
 
 @pytest.fixture(scope="module")
-def sent(traffic: Callable[..., Any]) -> Any:
+def sent(traffic):
     return traffic(0.5)
 
 
 @pytest.fixture
-def path(tmp_path: Path, sent: Any, write_database: Any) -> Path:
+def path(tmp_path, sent, write_database):
     """A closed database."""
     return Path(shutil.copy(write_database(tmp_path / "bag", sent), tmp_path / "x.db3"))
 
 
-def losses(recording: Any) -> list[str]:
+def losses(recording):
     return [finding.text for finding in recording.findings if finding.severity is Severity.LOSS]
 
 
 @pytest.mark.parametrize("name", ["a.db3", "a%41.db3", "a?mode=rwc.db3", "a#b.db3", "a b&c.db3"])
-def test_rows_that_wait_in_a_wal_are_read(
-    tmp_path: Path, path: Path, sent: Any, expected: Any, read: Any, name: str
-) -> None:
+def test_rows_that_wait_in_a_wal_are_read(tmp_path, path, sent, expected, read, name):
     """As a recorder leaves them that was killed; what lies there is not touched."""
     home = tmp_path / "left"
     home.mkdir()
@@ -49,9 +45,7 @@ def test_rows_that_wait_in_a_wal_are_read(
     assert {file.name: file.read_bytes() for file in home.iterdir()} == before
 
 
-def test_what_was_not_committed_is_rolled_back(
-    tmp_path: Path, path: Path, sent: Any, expected: Any, read: Any
-) -> None:
+def test_what_was_not_committed_is_rolled_back(tmp_path, path, sent, expected, read):
     with closing(sqlite3.connect(path, isolation_level=None)) as database:
         database.execute("PRAGMA cache_size = 1")
         database.execute("BEGIN")
@@ -66,13 +60,13 @@ def test_what_was_not_committed_is_rolled_back(
 
 
 @pytest.mark.parametrize("name", ["a%41.db3", "a?mode=rwc.db3", "a#b.db3"])
-def test_a_name_is_a_name(path: Path, sent: Any, expected: Any, read: Any, name: str) -> None:
+def test_a_name_is_a_name(path, sent, expected, read, name):
     samples, _ = read(path.rename(path.with_name(name)))
     assert samples.tobytes() == expected(sent).tobytes()
     assert sorted(file.name for file in path.parent.iterdir()) == sorted([name, "bag"])
 
 
-def test_messages_of_no_topic_are_told(path: Path, read: Any) -> None:
+def test_messages_of_no_topic_are_told(path, read):
     with closing(sqlite3.connect(path)) as database, database:
         database.execute("UPDATE messages SET topic_id = 77 WHERE id % 2 = 0")
         (count,) = database.execute("SELECT COUNT(*) FROM messages WHERE topic_id = 77").fetchone()
@@ -91,7 +85,7 @@ def test_messages_of_no_topic_are_told(path: Path, read: Any) -> None:
     ],
     ids=["a view without end", "a column less", "a table less"],
 )
-def test_another_schema_is_refused_and_not_carried_out(path: Path, read: Any, statements: str) -> None:
+def test_another_schema_is_refused_and_not_carried_out(path, read, statements):
     with closing(sqlite3.connect(path)) as database, database:
         database.executescript(statements)
     with pytest.raises(RecordingError, match=r"x\.db3: is not a readable \.db3 file: it(s| has)"):
@@ -136,7 +130,7 @@ _NUMBERS = "WITH RECURSIVE n(i) AS (SELECT 10 UNION ALL SELECT i + 1 FROM n WHER
     ],
     ids=["a view beside a table", "a virtual table", "a name", "names", "topic numbers", "a wide table"],
 )
-def test_a_hostile_schema_is_one_line(path: Path, read: Any, statements: str, fault: str) -> None:
+def test_a_hostile_schema_is_one_line(path, read, statements, fault):
     with closing(sqlite3.connect(path)) as database, database:
         database.executescript(statements)
     with pytest.raises(RecordingError, match=fault) as caught:
@@ -144,7 +138,7 @@ def test_a_hostile_schema_is_one_line(path: Path, read: Any, statements: str, fa
     assert str(caught.value).isprintable()
 
 
-def test_a_tree_whose_branches_meet_again_ends(path: Path, read: Any) -> None:
+def test_a_tree_whose_branches_meet_again_ends(path, read):
     """All branches lead to one: a few pages with more rows than anybody can count."""
     with closing(sqlite3.connect(path)) as database, database:
         database.execute("PRAGMA page_size = 512")
@@ -156,7 +150,7 @@ def test_a_tree_whose_branches_meet_again_ends(path: Path, read: Any) -> None:
     content = bytearray(path.read_bytes())
     size = int.from_bytes(content[16:18], "big")
 
-    def branches(page: int) -> list[int]:
+    def branches(page):
         """Places of the pointers of a page; none of a leaf's."""
         begin = (page - 1) * size
         if content[begin] != 5:
@@ -177,9 +171,7 @@ def test_a_tree_whose_branches_meet_again_ends(path: Path, read: Any) -> None:
         assert "reading it takes more work than its size explains" in str(error)
 
 
-def test_without_an_index_of_time_the_order_is_the_same(
-    path: Path, sent: Any, expected: Any, read: Any
-) -> None:
+def test_without_an_index_of_time_the_order_is_the_same(path, sent, expected, read):
     with closing(sqlite3.connect(path)) as database, database:
         query = "SELECT name FROM sqlite_master WHERE sql LIKE 'CREATE INDEX%'"
         for (name,) in database.execute(query).fetchall():
@@ -188,7 +180,7 @@ def test_without_an_index_of_time_the_order_is_the_same(
     assert samples.tobytes() == expected(sent).tobytes()
 
 
-def test_a_complaint_that_is_no_text_is_one(path: Path, read: Any) -> None:
+def test_a_complaint_that_is_no_text_is_one(path, read):
     """SQLite repeats what it cannot understand, byte by byte."""
     content = path.read_bytes()
     assert b"CREATE TABLE messages(" in content

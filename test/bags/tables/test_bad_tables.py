@@ -1,7 +1,6 @@
 """What is wrong with a table is one line each; what can be read is read."""
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,15 +17,15 @@ GOOD = [f"{0.005 * k + 1.0!r},{(0.03 * k) % 6.283!r},{float(k % 7)!r}" for k in 
 
 
 @pytest.fixture
-def table(tmp_path: Path, read: Read) -> Callable[..., Found]:
+def table(tmp_path, read):
     """Read a file: number of samples, losses, notes."""
 
-    def make(content: str | bytes, name: str = "a.csv", **parameters: Any) -> Found:
+    def make(content, name="a.csv", **parameters):
         path = tmp_path / name
         path.write_bytes(content if isinstance(content, bytes) else content.encode())
         given = {f"input.{key.replace('__', '.')}": value for key, value in parameters.items()}
         samples, recording = read(path, config=config_from(given))
-        found: dict[Severity, list[str]] = {severity: [] for severity in Severity}
+        found = {severity: [] for severity in Severity}
         for finding in recording.findings:
             found[finding.severity].append(finding.text)
         assert recording.is_partial == bool(found[Severity.LOSS])
@@ -35,7 +34,7 @@ def table(tmp_path: Path, read: Read) -> Callable[..., Found]:
     return make
 
 
-def lines(*texts: str, head: str = HEAD) -> str:
+def lines(*texts, head=HEAD):
     return "\n".join([head, *texts]) + "\n"
 
 
@@ -62,13 +61,13 @@ def lines(*texts: str, head: str = HEAD) -> str:
         (lines("1,2,3,4", head=HEAD + ",time"), "column 'time' is there more than once"),
     ],
 )
-def test_nothing_that_can_be_read_is_one_line(table: Any, content: str | bytes, fault: str) -> None:
+def test_nothing_that_can_be_read_is_one_line(table, content, fault):
     with pytest.raises(RecordingError, match=fault) as error:
         table(content)
     assert "\n" not in str(error.value) and "a.csv" in str(error.value)
 
 
-def test_lines_that_cannot_be_read_are_lost_and_the_others_are_not(table: Any) -> None:
+def test_lines_that_cannot_be_read_are_lost_and_the_others_are_not(table):
     bad = ["x,1,2", ",1,2", "5,1", "nan,1,2", '"5', "6,1,y", "7,8,9,10"]
     found, losses, _ = table(lines(*GOOD[:500], *bad, "", *GOOD[500:]))
     assert found == 2 * len(GOOD)
@@ -76,25 +75,25 @@ def test_lines_that_cannot_be_read_are_lost_and_the_others_are_not(table: Any) -
     assert losses[-1] == "2 more lines are lost"
 
 
-def test_a_file_that_was_cut_short_loses_its_last_line(table: Any) -> None:
+def test_a_file_that_was_cut_short_loses_its_last_line(table):
     for cut in (3, 1):  # in a number, and before the line break: the number may go on
         found, losses, _ = table(lines(*GOOD)[:-cut])
         assert found == 2 * len(GOOD) - 2
         assert losses == ["line 1001 is lost: it has no line break at its end, so it may be cut short"]
 
 
-def test_zeros_of_a_computer_that_lost_power_are_no_rows(table: Any) -> None:
+def test_zeros_of_a_computer_that_lost_power_are_no_rows(table):
     found, losses, _ = table(lines(*GOOD).encode() + bytes(5000))
     assert found == 2 * len(GOOD) and len(losses) == 1
 
 
-def test_a_line_without_an_end_does_not_fill_the_memory(table: Any) -> None:
+def test_a_line_without_an_end_does_not_fill_the_memory(table):
     found, losses, _ = table(lines(*GOOD).encode() + b"1" * 5_000_000)
     assert found == 2 * len(GOOD)
     assert losses == ["line 1002 has no end within 2097152 bytes: all from it on is lost"]
 
 
-def test_times_that_go_back_repeat_or_jump_are_notes(table: Any) -> None:
+def test_times_that_go_back_repeat_or_jump_are_notes(table):
     found, losses, notes = table(lines(*GOOD[:300], *GOOD[100:300], GOOD[299], *GOOD[600:]))
     assert found == 2 * (300 + 200 + 1 + 400) and not losses
     assert notes == [
@@ -104,7 +103,7 @@ def test_times_that_go_back_repeat_or_jump_are_notes(table: Any) -> None:
     ]
 
 
-def test_a_time_of_zero_is_a_note(table: Any) -> None:
+def test_a_time_of_zero_is_a_note(table):
     _, losses, notes = table(lines("0,1,2", *GOOD))
     assert not losses
     assert (
@@ -113,20 +112,20 @@ def test_a_time_of_zero_is_a_note(table: Any) -> None:
 
 
 @pytest.mark.parametrize("zero", ["0e99999", "0e99999999999999999999", "-0E+9", "1e-99999999999999999999"])
-def test_a_zero_with_any_exponent_is_a_time_of_zero(table: Any, zero: str) -> None:
+def test_a_zero_with_any_exponent_is_a_time_of_zero(table, zero):
     found, losses, notes = table(lines("1700000000.000000001,1,2", f"{zero},1,2", *GOOD))
     assert found == 2 * (2 + len(GOOD)) and not losses
     assert "the time goes back by 1.7e+09 s at line 3" in notes[0]
 
 
-def test_a_torque_without_an_angle_is_no_effort(tmp_path: Path, read: Read) -> None:
+def test_a_torque_without_an_angle_is_no_effort(tmp_path, read):
     (tmp_path / "a.csv").write_text(lines("1,,2", *GOOD))
     _, recording = read(tmp_path / "a.csv", config=config_from({"drive_torque.source": "effort"}))
     assert recording.is_partial
     assert "1 torques have no angle in their row" in str(recording.findings)
 
 
-def turning(rpm: float, turn: float = 2.0 * np.pi, wrapped: bool = True) -> dict[str, Any]:
+def turning(rpm, turn=2.0 * np.pi, wrapped=True):
     """Ten seconds at 200 Hz of an angle with this turn."""
     times = 1.0 + 0.005 * np.arange(2000)
     angle = turn * rpm / 60.0 * times
@@ -154,9 +153,7 @@ def turning(rpm: float, turn: float = 2.0 * np.pi, wrapped: bool = True) -> dict
         (turning(60.0) | {"v": np.full(2000, -6.3)}, {"columns.crank_speed": "v"}, "or its unit is wrong"),
     ],
 )
-def test_a_column_that_is_likely_in_another_unit_is_doubted(
-    read: Read, columns: Any, parameters: Any, doubt: str
-) -> None:
+def test_a_column_that_is_likely_in_another_unit_is_doubted(read, columns, parameters, doubt):
     config = config_from({f"input.{key}": value for key, value in parameters.items()})
     _, recording = read(columns, config=config)
     losses = [finding.text for finding in recording.findings if finding.severity is Severity.LOSS]
@@ -180,18 +177,18 @@ def test_a_column_that_is_likely_in_another_unit_is_doubted(
         ),
     ],
 )
-def test_arrays_that_are_no_table_are_one_line(read: Read, columns: Any, fault: str) -> None:
+def test_arrays_that_are_no_table_are_one_line(read, columns, fault):
     with pytest.raises(RecordingError, match=f"^table 1: .*{fault}"):
         read(columns, config=config_from({}))
 
 
-def test_a_damaged_parquet_file_is_one_line(table: Any) -> None:
+def test_a_damaged_parquet_file_is_one_line(table):
     pytest.importorskip("pyarrow")
     with pytest.raises(RecordingError, match="is not a readable Parquet file"):
         table(b"PAR1 and no more", "a.parquet")
 
 
-def test_a_parquet_file_of_texts_is_one_line(tmp_path: Path, read: Read) -> None:
+def test_a_parquet_file_of_texts_is_one_line(tmp_path, read):
     pyarrow = pytest.importorskip("pyarrow")
     parquet = pytest.importorskip("pyarrow.parquet")
     columns = {"time": [1.0], "crank_angle": ["x"], "drive_torque": [1.0]}
@@ -200,7 +197,7 @@ def test_a_parquet_file_of_texts_is_one_line(tmp_path: Path, read: Read) -> None
         read(tmp_path / "a.parquet", config=config_from({}))
 
 
-def test_a_group_of_rows_that_is_damaged_is_lost_and_the_others_are_not(tmp_path: Path, read: Read) -> None:
+def test_a_group_of_rows_that_is_damaged_is_lost_and_the_others_are_not(tmp_path, read):
     pandas, parquet = pytest.importorskip("pandas"), pytest.importorskip("pyarrow.parquet")
     path, frame = tmp_path / "a.parquet", pandas.DataFrame(turning(60.0))
     frame.to_parquet(path, row_group_size=500, compression="zstd")
@@ -215,7 +212,7 @@ def test_a_group_of_rows_that_is_damaged_is_lost_and_the_others_are_not(tmp_path
 
 
 @pytest.fixture
-def three_groups(tmp_path: Path) -> Callable[..., Path]:
+def three_groups(tmp_path):
     """Write a Parquet file of 1000, 1001 and 999 rows, with parts of its footer replaced."""
     pyarrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
     times = 1.0 + 0.005 * np.arange(3000)
@@ -226,7 +223,7 @@ def three_groups(tmp_path: Path) -> Callable[..., Path]:
         "other": times,
     }
 
-    def write(*replaced: tuple[bytes, bytes], metadata: dict[str, str] | None = None) -> Path:
+    def write(*replaced, metadata=None):
         table, path = pyarrow.table(columns, metadata=metadata), tmp_path / "a.parquet"
         with parquet.ParquetWriter(path, table.schema, write_statistics=False) as writer:
             for begin, end in ((0, 1000), (1000, 2001), (2001, 3000)):
@@ -243,7 +240,7 @@ def three_groups(tmp_path: Path) -> Callable[..., Path]:
     return write
 
 
-def varint(number: int) -> bytes:
+def varint(number):
     """An integer as a footer has it."""
     rest, found = number << 1, b""
     while rest > 127:
@@ -255,7 +252,7 @@ FEWER = (varint(1001), varint(501))  # as the group's rows and as the values of 
 TOTAL = (varint(3000), varint(2500))
 
 
-def test_a_group_that_hides_rows_is_lost_and_not_shortened(three_groups: Any, read: Read) -> None:
+def test_a_group_that_hides_rows_is_lost_and_not_shortened(three_groups, read):
     samples, recording = read(three_groups(FEWER, TOTAL), config=config_from({}))
     texts = [finding.text for finding in recording.findings]
     assert len(samples) == 2 * (1000 + 999) and recording.is_partial
@@ -279,14 +276,12 @@ def test_a_group_that_hides_rows_is_lost_and_not_shortened(three_groups: Any, re
     ],
     ids=["groups", "rows", "rows of a group", "name", "footer"],
 )
-def test_a_footer_that_contradicts_itself_is_one_line(
-    three_groups: Any, read: Read, replaced: Any, metadata: Any, fault: str
-) -> None:
+def test_a_footer_that_contradicts_itself_is_one_line(three_groups, read, replaced, metadata, fault):
     with pytest.raises(RecordingError, match=f"is not a readable Parquet file: {fault}"):
         read(three_groups(*replaced, metadata=metadata), config=config_from({}))
 
 
-def test_rows_without_a_time_are_counted_and_not_listed(tmp_path: Path, read: Read) -> None:
+def test_rows_without_a_time_are_counted_and_not_listed(tmp_path, read):
     """Fifty million of them, which fit into 300 kB, took minutes one by one."""
     pyarrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
     n = 1_000_000
@@ -301,7 +296,7 @@ def test_rows_without_a_time_are_counted_and_not_listed(tmp_path: Path, read: Re
     ]
 
 
-def test_without_pyarrow_one_line_says_what_to_install(table: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_pyarrow_one_line_says_what_to_install(table, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
     with pytest.raises(LegWearError, match=r"need pyarrow.*pip install 'leg_wear_monitor\[parquet\]'"):
         table(b"PAR1", "a.parquet")

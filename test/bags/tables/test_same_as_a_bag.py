@@ -1,8 +1,7 @@
 """The same values as CSV, as Parquet, as arrays and as MCAP give the same samples, bit for bit."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from decimal import Decimal
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,22 +18,22 @@ FIELDS = ("stamp_ns", "crank_angle_rad", "crank_velocity_radps", "torque_nm")
 
 
 @pytest.fixture(scope="module")
-def sent(traffic: Callable[..., Any]) -> Any:
+def sent(traffic):
     return traffic()
 
 
-def columns_of(samples: Any) -> dict[str, Any]:
+def columns_of(samples):
     """A row a sample, with NaN where it has no value."""
     return {name: samples[field].copy() for name, field in zip(NAMES, FIELDS, strict=True)}
 
 
-def cell(value: Any) -> str:
+def cell(value):
     if isinstance(value, int):
         return str(value)
     return "" if np.isnan(value) else repr(value)
 
 
-def write_csv(path: Path, columns: Mapping[str, Any], separator: str = ",") -> Path:
+def write_csv(path, columns, separator=","):
     rows = zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True)
     lines = [separator.join(columns), *(separator.join(map(cell, row)) for row in rows)]
     path.write_text("\n".join(lines) + "\n")
@@ -42,9 +41,7 @@ def write_csv(path: Path, columns: Mapping[str, Any], separator: str = ",") -> P
 
 
 @pytest.mark.parametrize("separator", [",", ";", "\t", " "])
-def test_a_csv_file_gives_the_samples_of_the_bag(
-    tmp_path: Path, sent: Any, write_bag: Any, read: Read, separator: str
-) -> None:
+def test_a_csv_file_gives_the_samples_of_the_bag(tmp_path, sent, write_bag, read, separator):
     """Their stamps go back now and then, as torques are late: the order of the rows is that of arrival."""
     samples, _ = read(write_bag(tmp_path / "a.mcap", sent))
     columns = columns_of(samples)
@@ -56,9 +53,7 @@ def test_a_csv_file_gives_the_samples_of_the_bag(
     assert any("the time goes back" in finding.text for finding in recording.findings)
 
 
-def test_arrays_frames_and_parquet_give_the_samples_of_the_bag(
-    tmp_path: Path, sent: Any, expected: Any, read: Read
-) -> None:
+def test_arrays_frames_and_parquet_give_the_samples_of_the_bag(tmp_path, sent, expected, read):
     columns = columns_of(expected(sent))
     assert read(columns, config=config_from(NS))[0].tobytes() == expected(sent).tobytes()
     pandas = pytest.importorskip("pandas")
@@ -70,7 +65,7 @@ def test_arrays_frames_and_parquet_give_the_samples_of_the_bag(
     assert read(tmp_path / "a.parquet", config=config_from(NS))[0].tobytes() == expected(sent).tobytes()
 
 
-def test_dates_are_stamps_to_the_nanosecond(tmp_path: Path, sent: Any, expected: Any, read: Read) -> None:
+def test_dates_are_stamps_to_the_nanosecond(tmp_path, sent, expected, read):
     config = config_from(NS | {"input.units.stamp": "date"})
     columns = columns_of(expected(sent))
     dates = columns["time"].view("datetime64[ns]")
@@ -85,9 +80,7 @@ def test_dates_are_stamps_to_the_nanosecond(tmp_path: Path, sent: Any, expected:
 
 @pytest.mark.parametrize(("unit", "power"), [("s", 9), ("ms", 6), ("us", 3), ("ns", 0)])
 @pytest.mark.parametrize("start_ns", [0, 1_700_000_000 * 10**9])
-def test_times_in_any_unit_are_exact(
-    tmp_path: Path, read: Read, unit: str, power: int, start_ns: int
-) -> None:
+def test_times_in_any_unit_are_exact(tmp_path, read, unit, power, start_ns):
     stamps = start_ns + np.random.default_rng(power).integers(1, 10**13, 300)
     lines = [f"{Decimal(int(stamp)).scaleb(-power)},0.5" for stamp in stamps]
     (tmp_path / "a.csv").write_text("\n".join(["time,crank_angle", *lines]) + "\n")
@@ -96,7 +89,7 @@ def test_times_in_any_unit_are_exact(
 
 
 @pytest.mark.parametrize("source", TORQUE_SOURCES)
-def test_a_torque_comes_as_the_parameters_say(read: Read, source: str) -> None:
+def test_a_torque_comes_as_the_parameters_say(read, source):
     config = config_from({"drive_torque.source": source, "drive_torque.axis": "x", "drive_torque.sign": -1})
     columns = {
         "time": np.arange(1.0, 4.0),
@@ -110,7 +103,7 @@ def test_a_torque_comes_as_the_parameters_say(read: Read, source: str) -> None:
     assert torques["stamp_ns"].tolist() == [10**9, 2 * 10**9, 3 * 10**9]
 
 
-def test_units_become_si(read: Read) -> None:
+def test_units_become_si(read):
     config = config_from(
         {
             "input.units.stamp": "ms",
@@ -130,7 +123,7 @@ def test_units_become_si(read: Read) -> None:
     assert samples["stamp_ns"].tolist() == [first_ns, first_ns, first_ns + 10**6, first_ns + 10**6]
 
 
-def test_further_encoders_are_columns_by_their_names(read: Read) -> None:
+def test_further_encoders_are_columns_by_their_names(read):
     config = config_from(
         {"encoders.names": ["knee", "hip"], "encoders.joints": ["C", "B"], "encoders.signs": [1.0, -1.0]}
     )
@@ -148,7 +141,7 @@ def test_further_encoders_are_columns_by_their_names(read: Read) -> None:
     )
 
 
-def test_rows_without_a_time_come_at_their_rate(tmp_path: Path, read: Read) -> None:
+def test_rows_without_a_time_come_at_their_rate(tmp_path, read):
     config = config_from(
         {
             "input.columns.drive_torque": "",
@@ -166,9 +159,7 @@ def test_rows_without_a_time_come_at_their_rate(tmp_path: Path, read: Read) -> N
     ]
 
 
-def test_several_files_and_a_bag_are_one_recording(
-    tmp_path: Path, traffic: Any, write_bag: Any, expected: Any, read: Read
-) -> None:
+def test_several_files_and_a_bag_are_one_recording(tmp_path, traffic, write_bag, expected, read):
     first, second = traffic(), traffic(start_ns=1_700_000_003 * 10**9)
     bag = write_bag(tmp_path / "a.mcap", second)
     table = write_csv(tmp_path / "b.csv", columns_of(expected(first)))
@@ -177,7 +168,7 @@ def test_several_files_and_a_bag_are_one_recording(
     assert any("begins" in finding.text for finding in recording.findings)
 
 
-def test_a_file_larger_than_a_block_is_read_whole(tmp_path: Path, read: Read) -> None:
+def test_a_file_larger_than_a_block_is_read_whole(tmp_path, read):
     stamps = 1 + np.arange(60_000)
     columns = {"time": stamps, "crank_angle": np.random.default_rng(0).normal(size=len(stamps))}
     config = config_from({"input.units.stamp": "ms", "input.columns.drive_torque": ""})
@@ -187,9 +178,7 @@ def test_a_file_larger_than_a_block_is_read_whole(tmp_path: Path, read: Read) ->
     assert np.array_equal(samples["stamp_ns"], stamps * 10**6)
 
 
-def test_a_number_that_is_none_is_a_faulty_sample_and_an_empty_cell_is_no_sample(
-    tmp_path: Path, read: Read
-) -> None:
+def test_a_number_that_is_none_is_a_faulty_sample_and_an_empty_cell_is_no_sample(tmp_path, read):
     (tmp_path / "a.csv").write_text("time,crank_angle,drive_torque\n1.1,nan,\n1.2,0.5,nan\n1.3,,4\n")
     samples, recording = read(tmp_path / "a.csv", config=config_from({}))
     assert samples["stamp_ns"].tolist() == [1_100_000_000, 1_200_000_000, 1_200_000_000, 1_300_000_000]
@@ -200,7 +189,7 @@ def test_a_number_that_is_none_is_a_faulty_sample_and_an_empty_cell_is_no_sample
     ]
 
 
-def test_a_message_of_a_number_is_that_of_the_library(store: Any) -> None:
+def test_a_message_of_a_number_is_that_of_the_library(store):
     kind = store.types["std_msgs/msg/Float64"]
     raw = encode.float64s([1.5, -2.0])
     assert bytes(raw[1]) == bytes(store.serialize_cdr(kind(-2.0), "std_msgs/msg/Float64"))

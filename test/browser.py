@@ -42,12 +42,7 @@ def browse(pages, directory, script):
     wrapper = directory / "wrapper.html"
     text = f'<!doctype html><meta charset="utf-8"><script>{script}</script>{frames}<pre id="found"></pre>'
     wrapper.write_text(text)
-    line = [
-        *_LINE,
-        f"--user-data-dir={directory / 'profile'}",
-        "--enable-logging=stderr",
-        "--window-size=1300,1000",
-    ]
+    line = [*_LINE, f"--user-data-dir={directory / 'profile'}", "--enable-logging=stderr"]
     line += ["--window-size=1300,1000", "--virtual-time-budget=10000", "--dump-dom", wrapper.as_uri()]
     done = subprocess.run(line, capture_output=True, text=True, timeout=240, check=True)
     found = re.search(r'<pre id="found">(.*?)</pre>', done.stdout, re.DOTALL).group(1)

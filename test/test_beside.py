@@ -46,7 +46,7 @@ print(here, curve(3.0), len(line.stats.cache_hits), len(curve.stats.cache_hits))
 @pytest.fixture
 def started(monkeypatch, tmp_path):
     """The second processes that were started; nothing is stored, and there are two processors."""
-    processes: list[subprocess.Popen[bytes]] = []
+    processes = []
     start = workers._started
 
     def noting(*arguments):
@@ -145,7 +145,7 @@ def test_there_is_none_where_it_is_of_no_use(monkeypatch, started, name, value):
 def test_one_process_at_a_time_is_inside_a_lock(tmp_path):
     path = tmp_path / "lock"
 
-    def is_free() -> bool:
+    def is_free():
         with path.open("ab") as other:
             try:
                 fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)

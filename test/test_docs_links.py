@@ -1,7 +1,6 @@
 """Links of the documents: each file and heading that one names is there."""
 
 import re
-from collections.abc import Iterator
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -16,7 +15,7 @@ PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("benc
 pytestmark = pytest.mark.plain
 
 
-def targets(text: str) -> Iterator[str]:
+def targets(text):
     """What its links and pictures name."""
     for block in MarkdownIt().enable("table").parse(text):
         for token in block.children or ():
@@ -24,7 +23,7 @@ def targets(text: str) -> Iterator[str]:
                 yield str(where)
 
 
-def text_of(file: Path) -> str:
+def text_of(file):
     """Text of a page; that of another document where it includes one."""
     text = file.read_text()
     included = re.match(r"```{include} (\S+)", text)
@@ -32,14 +31,14 @@ def text_of(file: Path) -> str:
 
 
 @cache
-def anchors(file: Path) -> set[str]:
+def anchors(file):
     """Headings of a page as a forge links to them."""
     blocks = MarkdownIt().parse(text_of(file))
     heads = [after.content for one, after in pairwise(blocks) if one.type == "heading_open"]
     return {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}
 
 
-def dead(page: Path) -> list[str]:
+def dead(page):
     """Links of a page to what is not there; other sites are not asked."""
     found = []
     for target in targets(page.read_text()):
@@ -53,11 +52,11 @@ def dead(page: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_every_link_leads_somewhere(page: Path) -> None:
+def test_every_link_leads_somewhere(page):
     assert dead(page) == []
 
 
-def test_a_dead_link_would_be_found(tmp_path: Path) -> None:
+def test_a_dead_link_would_be_found(tmp_path):
     page = tmp_path / "page.md"
     page.write_text(
         "# One `x`, two\n[a](#one-x-two) [b](#three) [c](gone.md) ![d](gone.png) [e](https://x.example)\n"

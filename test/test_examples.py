@@ -6,7 +6,6 @@ import re
 import runpy
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 from click.testing import CliRunner
@@ -18,46 +17,42 @@ ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"
 
 
-def examples() -> list[Any]:
+def examples():
     finder = doctest.DocTestFinder(exclude_empty=True)
     found = [test for name in lw.__all__ for test in finder.find(getattr(lw, name), name, globs={})]
     return [test for test in found if test.examples]
 
 
 @pytest.mark.parametrize("example", examples(), ids=lambda test: test.name)
-def test_an_example_runs(example: doctest.DocTest, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_example_runs(example, monkeypatch):
     if example.name == "replay":
         pytest.importorskip("mcap")
     monkeypatch.chdir(ROOT)  # files are named from there
-    said: list[str] = []
+    said = []
     done = doctest.DocTestRunner().run(example, out=said.append)
     assert done.attempted and not done.failed, "".join(said)
 
 
 @pytest.mark.plain
-def test_there_are_examples_of_what_is_used_most() -> None:
+def test_there_are_examples_of_what_is_used_most():
     named = {test.name for test in examples()}
     assert {"WearMonitor", "load_config", "load_mechanism", "plot", "replay", "simulate"} <= named
 
 
-def run_script(path: Path, monkeypatch: pytest.MonkeyPatch, *arguments: str) -> dict[str, Any]:
+def run_script(path, monkeypatch, *arguments):
     """Run a script of examples/ in this process; its names at the end."""
     monkeypatch.setattr(sys, "argv", [str(path), *arguments])
     return runpy.run_path(str(path), run_name="__main__")
 
 
-def test_the_table_of_examples_csv_has_the_verdict_of_its_leg(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_table_of_examples_csv_has_the_verdict_of_its_leg(tmp_path, monkeypatch):
     table = tmp_path / "leg.csv"
     run_script(EXAMPLES / "csv" / "make_table.py", monkeypatch, str(table))
     verdict = lw.replay(table, EXAMPLES / "csv" / "monitor.yaml").summary().verdict
     assert verdict.state.value == "stop" and verdict.joints == ("G",)
 
 
-def test_the_fleet_of_examples_fleet_needs_a_person_at_one_leg(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_fleet_of_examples_fleet_needs_a_person_at_one_leg(tmp_path, monkeypatch, capsys):
     for module in ("mcap", "pandas", "pyarrow"):
         pytest.importorskip(module)
     command = ["fleet", "update", str(EXAMPLES / "fleet" / "fleet.yaml"), "--out", str(tmp_path)]
@@ -68,10 +63,10 @@ def test_the_fleet_of_examples_fleet_needs_a_person_at_one_leg(
     assert left.startswith("left-07: healthy ") and right.startswith("right-07: stop CLEARANCE_SEEN_G; G ")
 
 
-def test_the_cells_of_examples_notebook_run() -> None:
+def test_the_cells_of_examples_notebook_run():
     pytest.importorskip("mcap")
     notebook = json.loads((EXAMPLES / "notebook" / "verdict.ipynb").read_text())
-    names: dict[str, Any] = {}
+    names = {}
     for cell in notebook["cells"]:
         if cell["cell_type"] == "code":
             assert cell["outputs"] == [] and cell["execution_count"] is None
@@ -80,16 +75,14 @@ def test_the_cells_of_examples_notebook_run() -> None:
     assert "<img" in names["summary"]._repr_html_()
 
 
-def test_the_linkage_of_examples_own_linkage_walks(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_linkage_of_examples_own_linkage_walks(monkeypatch, capsys):
     run_script(EXAMPLES / "own_linkage" / "walk.py", monkeypatch)
     ideal, loose = capsys.readouterr().out.splitlines()
     assert ideal.startswith("clearance in none: ") and loose.startswith("clearance in B, C: ")
 
 
 @pytest.mark.plain
-def test_every_example_is_in_the_table_and_no_file_of_it_is_lost() -> None:
+def test_every_example_is_in_the_table_and_no_file_of_it_is_lost():
     page = (EXAMPLES / "README.md").read_text()
     directories = sorted(path.name for path in EXAMPLES.iterdir() if path.is_dir())
     assert re.findall(r"^\| `(\w+)/` \|", page, re.MULTILINE) == directories

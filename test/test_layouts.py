@@ -3,8 +3,6 @@
 import json
 import re
 import subprocess
-from pathlib import Path
-from typing import Any
 
 import layouts
 import pytest
@@ -18,14 +16,14 @@ pytestmark = pytest.mark.plain
 COLOURS = {"#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00"}
 
 
-def leaves(node: Any) -> list[str]:
+def leaves(node):
     if isinstance(node, str):
         return [node]
     assert node["direction"] in ("row", "column") and 0 < node["splitPercentage"] < 100
     return leaves(node["first"]) + leaves(node["second"])
 
 
-def test_every_panel_of_foxglove_s_layout_has_a_place_and_a_title() -> None:
+def test_every_panel_of_foxglove_s_layout_has_a_place_and_a_title():
     layout = layouts.foxglove()
     assert set(layout) == {"configById", "globalVariables", "userNodes", "playbackConfig", "layout"}
     assert sorted(leaves(layout["layout"])) == sorted(layout["configById"])
@@ -33,7 +31,7 @@ def test_every_panel_of_foxglove_s_layout_has_a_place_and_a_title() -> None:
     assert len(titles) == len(layout["configById"])
 
 
-def test_colours_of_curves_can_be_told_apart_and_every_curve_has_a_name() -> None:
+def test_colours_of_curves_can_be_told_apart_and_every_curve_has_a_name():
     for name, panel in layouts.foxglove()["configById"].items():
         if name.startswith("Plot!"):
             assert {one["color"].lower() for one in panel["paths"]} <= COLOURS
@@ -44,13 +42,13 @@ def test_colours_of_curves_can_be_told_apart_and_every_curve_has_a_name() -> Non
     assert {*re.findall(r'color="(.*?)"', text)} <= COLOURS
 
 
-def test_rviz_asks_for_the_quality_of_service_that_markers_have() -> None:
+def test_rviz_asks_for_the_quality_of_service_that_markers_have():
     (display,) = layouts.rviz()["Displays"]
     assert display["Topic"]["Reliability Policy"].lower().replace(" ", "_") == MARKERS.qos.reliability
     assert display["Topic"]["Durability Policy"].lower().replace(" ", "_") == MARKERS.qos.durability
 
 
-def test_the_page_tells_how_a_layout_becomes_that_of_another_namespace(tmp_path: Path) -> None:
+def test_the_page_tells_how_a_layout_becomes_that_of_another_namespace(tmp_path):
     page = (share_directory() / "docs" / "howto" / "tools.md").read_text(encoding="utf-8")
     (script,) = re.findall(r"hardware id `left`:\n\n```\n(.*?)```", page, re.DOTALL)
     for name in (layouts.FOXGLOVE, layouts.PLOTJUGGLER):

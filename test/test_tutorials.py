@@ -5,7 +5,6 @@ import runpy
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -29,15 +28,15 @@ Learnt = Callable[[str], SimpleNamespace]
 
 
 @pytest.fixture
-def learnt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Learnt:
+def learnt(tmp_path, monkeypatch):
     """What a tutorial has in its variables at its end; commands of the terminal run in this process."""
 
-    def typed(command: list[str], cwd: Path, **_: Any) -> SimpleNamespace:
+    def typed(command, cwd, **_):
         assert command[0] == "leg-wear-monitor"
         monkeypatch.chdir(cwd)
         return SimpleNamespace(stdout=CliRunner().invoke(cli, command[1:]).output, stderr="")
 
-    def run(name: str) -> SimpleNamespace:
+    def run(name):
         long, short = SHORTER[name]
         source = (DOCS / "tutorials" / f"{name}.py").read_text()
         assert long in source
@@ -53,7 +52,7 @@ def learnt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Learnt:
 
 @pytest.mark.no_cover
 @pytest.mark.slow  # `make docs` runs the whole lesson
-def test_the_first_recording(learnt: Learnt, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_first_recording(learnt, capsys):
     pytest.importorskip("mcap")
     lesson, said = learnt("1_first_recording"), capsys.readouterr().out
     values, _, _ = said.partition("standard errors")  # a table of the same joints
@@ -74,7 +73,7 @@ def test_the_first_recording(learnt: Learnt, capsys: pytest.CaptureFixture[str])
 
 
 @pytest.mark.no_cover
-def test_your_own_linkage(learnt: Learnt, capsys: pytest.CaptureFixture[str]) -> None:
+def test_your_own_linkage(learnt, capsys):
     lesson, said = learnt("2_your_linkage"), capsys.readouterr().out
     assert "mobility 1, closes, and the crank turns through" in said
     assert "bodies.coupler.mass: 800 kg, usual are 0.0001 to 300 kg; g for kg?" in said
@@ -91,7 +90,7 @@ def test_your_own_linkage(learnt: Learnt, capsys: pytest.CaptureFixture[str]) ->
 @pytest.mark.no_cover
 @pytest.mark.chaotic
 @pytest.mark.slow  # `make docs` runs the whole lesson
-def test_what_clearance_does(learnt: Learnt) -> None:
+def test_what_clearance_does(learnt):
     lesson = learnt("3_what_clearance_does")
     first, later, ideal = (result.joints["G"] for result in (lesson.knee, lesson.later, lesson.ideal))
     assert later.mean_force_n == pytest.approx(first.mean_force_n, rel=0.02)
@@ -112,7 +111,7 @@ def test_what_clearance_does(learnt: Learnt) -> None:
 
 
 @pytest.mark.no_cover
-def test_a_life_and_its_forecast(learnt: Learnt) -> None:
+def test_a_life_and_its_forecast(learnt):
     pytest.importorskip("mcap")
     lesson = learnt("4_a_life")
     ends = [lesson.life.cycles_to(k, lesson.limit_m) for k in range(len(lesson.life.clearance_joints))]
@@ -128,7 +127,7 @@ def test_a_life_and_its_forecast(learnt: Learnt) -> None:
 
 @pytest.mark.no_cover
 @pytest.mark.slow  # `make docs` runs the whole lesson
-def test_a_fleet(learnt: Learnt, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_fleet(learnt, capsys):
     pytest.importorskip("mcap")
     pytest.importorskip("pandas")
     pytest.importorskip("pyarrow")
@@ -142,7 +141,8 @@ def test_a_fleet(learnt: Learnt, capsys: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.no_cover
 @pytest.mark.chaotic
-def test_a_leg_that_carries_a_person(learnt: Learnt) -> None:
+@pytest.mark.slow  # `make docs` runs the whole lesson
+def test_a_leg_that_carries_a_person(learnt):
     """Of five cycles B wears 1.14 times as G in the air, G 1.08 times as B under 600 N.
 
     Sigma 0.041 and 0.019, from 24 starts moved by 1e-12, 2026-11-25; the bounds are 5.3 of them away.
@@ -162,7 +162,7 @@ def test_a_leg_that_carries_a_person(learnt: Learnt) -> None:
 
 
 @pytest.mark.plain
-def test_every_tutorial_is_tested_and_its_links_lead_somewhere() -> None:
+def test_every_tutorial_is_tested_and_its_links_lead_somewhere():
     assert {path.stem for path in TUTORIALS} == set(SHORTER)
     for path in TUTORIALS:
         pages = re.findall(r"<(\S+)\.html>`_", path.read_text())

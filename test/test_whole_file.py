@@ -26,7 +26,7 @@ TOGETHER = """
 import sys
 from pathlib import Path
 from leg_wear_monitor.files import write_whole
-for _ in range(200):
+for _ in range(50):
     write_whole(Path(sys.argv[1]), sys.argv[2].encode() * 20_000)
 """
 

@@ -4,6 +4,7 @@ import attrs
 import numpy as np
 import pytest
 
+from leg_wear_monitor.bags.findings import Severity
 from leg_wear_monitor.bags.reader import Recording
 from leg_wear_monitor.messages import encode
 from leg_wear_monitor.messages.cdr import Decoder
@@ -154,6 +155,11 @@ def expected():
         return np.concatenate([decoder.one(each.raw, roles[each.topic], each.log_time_ns) for each in ours])
 
     return make
+
+
+def losses(recording):
+    """What is said of lost parts of a recording."""
+    return [finding.text for finding in recording.findings if finding.severity is Severity.LOSS]
 
 
 @pytest.fixture(scope="session")

@@ -141,24 +141,6 @@ def test_a_directory_laid_in_advance_by_another_user_is_not_used(shared, tmp_pat
     assert not Path(place).exists()  # gone with the process
 
 
-@as_root
-def test_two_users_have_two_places(shared, tmp_path):
-    """The second user cannot enter the first one's, nor is it led there."""
-    program = (
-        "import os; from leg_wear_monitor.compiled.cache import code_directory\n"
-        f"os.setgroups([]); os.setgid({NOBODY}); os.setuid({NOBODY})\n"
-        "print(code_directory('leaf'))"
-    )
-    ours, _ = where(TMPDIR=str(shared), HOME="/dev/null")
-    theirs, told = where(program, TMPDIR=str(shared), HOME="/dev/null")
-    assert (Path(ours[0]).parents[1].name, Path(theirs[0]).parents[1].name) == (
-        "leg_wear_monitor-0",
-        f"leg_wear_monitor-{NOBODY}",
-    )
-    assert [Path(each[0]).parents[1].stat().st_mode & 0o077 for each in (ours, theirs)] == [0, 0]
-    assert told == ""
-
-
 def test_a_directory_that_was_asked_for_and_is_refused_is_told_once(shared, tmp_path):
     """Child processes go where their parent went and say nothing."""
     (shared / "asked" / "leg_wear_monitor").mkdir(parents=True)

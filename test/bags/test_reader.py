@@ -6,8 +6,9 @@ from typing import Any
 import attrs
 import numpy as np
 import pytest
+from recordings import losses
 
-from leg_wear_monitor.bags.findings import RecordingError, Severity
+from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.messages import encode
 from leg_wear_monitor.monitor.config.inputs import DriveTorque
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -15,10 +16,6 @@ from leg_wear_monitor.twin import TORQUE
 from leg_wear_monitor.twin.sample import NO_FAULT
 
 Read = Callable[..., Any]
-
-
-def losses(recording):
-    return [finding.text for finding in recording.findings if finding.severity is Severity.LOSS]
 
 
 @pytest.fixture(scope="module")

@@ -119,16 +119,6 @@ def test_a_bomb_is_not_unpacked(study, monkeypatch):
         load_results(study)
 
 
-def test_a_label_that_was_moved_to_another_point_is_found(study):
-    """The values hold, but are shown under another name."""
-    changed = manifest(study)
-    first, second = changed["points"][:2]
-    first["label"], second["label"] = second["label"], first["label"]
-    (study / "study.json").write_text(json.dumps(changed))
-    with pytest.raises(ConfigError, match=r"study\.json: it or mechanism\.yaml beside it was altered"):
-        load_results(study)
-
-
 def test_another_leg_beside_the_results_is_found(study):
     text = (study / "mechanism.yaml").read_text()
     (study / "mechanism.yaml").write_text(text.replace("mass: 3.5", "mass: 3.6"))

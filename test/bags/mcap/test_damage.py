@@ -5,15 +5,26 @@ from contextlib import closing
 
 import numpy as np
 import pytest
+from recordings import losses
 
-from leg_wear_monitor.bags.findings import RecordingError, Severity
+from leg_wear_monitor.bags.findings import RecordingError
 
 # every one of these is a file of its own; benchmarks/damaged_bags.py does many more
 TRUNCATIONS, FLIPS = 8, 40
 
 
-def outcome(read, path):
-    """Samples and recording; nothing where the file is refused, in one line."""
+def flipped(whole, seed):
+    """Copies of a file, each with a bit flipped."""
+    rng = np.random.default_rng(seed)
+    for _ in range(FLIPS):
+        content = bytearray(whole)
+        content[rng.integers(len(content))] ^= 1 << int(rng.integers(8))
+        yield content
+
+
+def outcome(read, path, content):
+    """Samples and recording of a file; nothing where it is refused, in one line."""
+    path.write_bytes(content)
     try:
         return read(path)
     except RecordingError as error:
@@ -46,8 +57,7 @@ def test_a_truncated_file_gives_what_is_left(tmp_path, sent, write_bag, expected
     true = expected(sent)
     path = tmp_path / "cut.mcap"
     for cut in np.random.default_rng(1).integers(0, len(whole), TRUNCATIONS).tolist():
-        path.write_bytes(whole[:cut])
-        samples, recording = outcome(read, path)
+        samples, recording = outcome(read, path, whole[:cut])
         assert_sound(samples, recording, true)
         if samples is None:
             assert cut < 25_000  # before the first channel is known
@@ -64,12 +74,8 @@ def test_a_flipped_bit_is_seen_or_without_effect(
     whole = write_bag(tmp_path / "whole.mcap", sent, compression, **options).read_bytes()
     true = expected(sent)
     path = tmp_path / "flipped.mcap"
-    rng = np.random.default_rng(2)
-    for _ in range(FLIPS):
-        content = bytearray(whole)
-        content[rng.integers(len(content))] ^= 1 << int(rng.integers(8))
-        path.write_bytes(content)
-        samples, recording = outcome(read, path)
+    for content in flipped(whole, seed=2):
+        samples, recording = outcome(read, path, content)
         if samples is not None and recording.is_partial and options:
             continue  # one checksum over everything: it is told, but not where
         assert_sound(samples, recording, true)
@@ -79,12 +85,8 @@ def test_without_checksums_a_damage_may_pass_but_never_unsaid(tmp_path, sent, wr
     whole = write_bag(tmp_path / "whole.mcap", sent, "NONE", enable_crcs=False).read_bytes()
     true = expected(sent)
     path = tmp_path / "flipped.mcap"
-    rng = np.random.default_rng(3)
-    for _ in range(FLIPS):
-        content = bytearray(whole)
-        content[rng.integers(len(content))] ^= 1 << int(rng.integers(8))
-        path.write_bytes(content)
-        samples, recording = outcome(read, path)
+    for content in flipped(whole, seed=3):
+        samples, recording = outcome(read, path, content)
         if samples is not None and samples.tobytes() != true.tobytes():
             assert any("checksum" in str(finding) for finding in recording.findings) or recording.is_partial
 
@@ -140,8 +142,8 @@ def test_a_part_that_cannot_be_opened_is_a_loss(tmp_path, sent, write_bag, expec
     (tmp_path / "a_1.mcap").write_bytes(b"")
     samples, recording = read(tmp_path)
     assert samples.tobytes() == expected(sent).tobytes()
-    losses = [str(each) for each in recording.findings if each.severity is Severity.LOSS]
-    assert losses == [f"{tmp_path / 'a_1.mcap'}: is empty, expected an MCAP file: it is lost"]
+    assert losses(recording) == ["is empty, expected an MCAP file: it is lost"]
+    assert recording.findings[0].file == tmp_path / "a_1.mcap"
 
 
 def test_a_damaged_database(tmp_path, sent, write_database, expected, read):
@@ -149,14 +151,9 @@ def test_a_damaged_database(tmp_path, sent, write_database, expected, read):
     path = write_database(tmp_path / "bag", sent)
     whole, true = path.read_bytes(), expected(sent)
     for cut in np.random.default_rng(4).integers(0, len(whole), TRUNCATIONS).tolist():
-        path.write_bytes(whole[:cut])
-        assert_sound(*outcome(read, path), true)
-    rng = np.random.default_rng(5)
-    for _ in range(FLIPS):
-        content = bytearray(whole)
-        content[rng.integers(len(content))] ^= 1 << int(rng.integers(8))
-        path.write_bytes(content)
-        samples, recording = outcome(read, path)
+        assert_sound(*outcome(read, path, whole[:cut]), true)
+    for content in flipped(whole, seed=5):
+        samples, recording = outcome(read, path, content)
         assert samples is None or any("no checksums" in str(finding) for finding in recording.findings)
 
 
@@ -168,10 +165,8 @@ def test_rows_of_another_kind_are_lost_and_counted(tmp_path, sent, write_databas
         database.execute("UPDATE messages SET data = 'text' WHERE id = 7")
     samples, recording = read(path)
     assert len(samples) == len(expected(sent)) - 2
-    losses = [str(each) for each in recording.findings if each.severity is Severity.LOSS]
-    assert losses == [
-        f"{path}: {len(samples)} messages could be read of the {len(samples) + 2} that it counts"
-    ]
+    counted = len(samples) + 2
+    assert losses(recording) == [f"{len(samples)} messages could be read of the {counted} that it counts"]
 
 
 def test_claims_of_great_size_do_not_fill_the_memory(tmp_path, sent, write_bag, read):
@@ -184,6 +179,5 @@ def test_claims_of_great_size_do_not_fill_the_memory(tmp_path, sent, write_bag, 
     for at in (first + 1, first + 9 + 16, first + 9 + 28, first + 9 + 28 + 8):
         content = bytearray(whole)
         content[at + 3 : at + 7] = b"\xff" * 4
-        path.write_bytes(content)
-        samples, recording = outcome(read, path)
+        samples, recording = outcome(read, path, content)
         assert samples is None or recording.is_partial

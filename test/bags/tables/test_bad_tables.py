@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from recordings import losses
 
 from leg_wear_monitor.bags.findings import RecordingError, Severity
 from leg_wear_monitor.errors import LegWearError
@@ -156,9 +157,9 @@ def turning(rpm, turn=2.0 * np.pi, wrapped=True):
 def test_a_column_that_is_likely_in_another_unit_is_doubted(read, columns, parameters, doubt):
     config = config_from({f"input.{key}": value for key, value in parameters.items()})
     _, recording = read(columns, config=config)
-    losses = [finding.text for finding in recording.findings if finding.severity is Severity.LOSS]
-    assert len(losses) == bool(doubt)
-    assert not doubt or doubt in losses[0]
+    told = losses(recording)
+    assert len(told) == bool(doubt)
+    assert not doubt or doubt in told[0]
 
 
 @pytest.mark.parametrize(

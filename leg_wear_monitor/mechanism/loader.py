@@ -313,7 +313,7 @@ def parse_mechanism(document: Any, source: str) -> spec.Mechanism:
 
 
 def read_yaml(path: Path, source: str) -> Any:
-    """Contents of a YAML 1.2 file as plain values; see `yaml_file.read_document`."""
+    """Contents of a YAML 1.2 file as plain values; see `configuration.strict.read_document`."""
     try:
         return read_document(path, source)
     except FileNotFoundError as error:

@@ -45,7 +45,7 @@ from leg_wear_monitor.playback.result import (
 from leg_wear_monitor.shown import Drawable
 from leg_wear_monitor.state import AlarmChange, Figure, Verdict
 from leg_wear_monitor.twin import CRANK, TORQUE
-from leg_wear_monitor.twin.sample import Samples, brings
+from leg_wear_monitor.twin.sample import Samples, has_value_of
 from leg_wear_monitor.wear import BUSHING, JOURNAL
 
 # Condition of the leg at the end of a replay; what the verdict does not believe has no remaining life.
@@ -153,8 +153,8 @@ class ReplayResult(Drawable):
     def count(self, samples: Samples) -> None:
         """Count samples that are passed to the monitor."""
         self.evidence.add_samples(samples)
-        self.crank_samples += int(np.count_nonzero(brings(samples, CRANK)))
-        self.torque_samples += int(np.count_nonzero(brings(samples, TORQUE)))
+        self.crank_samples += int(np.count_nonzero(has_value_of(samples, CRANK)))
+        self.torque_samples += int(np.count_nonzero(has_value_of(samples, TORQUE)))
         stamps = samples["stamp_ns"][samples["fault"] == 0]
         if len(stamps):
             self.begin_ns = self.begin_ns or int(stamps[0])

@@ -135,12 +135,9 @@ def gait_samples(
     return block
 
 
-def brings(samples: Samples, kind: int) -> NDArray[np.bool_]:
-    """Mask (n,) of the samples with a kind's value: those of the kind, and others that contain it."""
-    is_there = np.isfinite(samples[KINDS[kind].value])
-    if is_there.ndim > 1:
-        is_there = is_there.all(axis=1)
-    return np.asarray((samples["kind"] == kind) | is_there)
+def has_value_of(samples: Samples, kind: int) -> NDArray[np.bool_]:
+    """Mask (n,) of the samples of a kind with a single value, and of others that contain such a value."""
+    return np.asarray((samples["kind"] == kind) | np.isfinite(samples[KINDS[kind].value]))
 
 
 # Settings of the twin; `monitor.config` declares them as parameters with units and bounds.

@@ -19,7 +19,15 @@ from leg_wear_monitor.shown import Shown
 from leg_wear_monitor.state import FootLoad
 from leg_wear_monitor.twin import TORQUE
 from leg_wear_monitor.twin.reference import CrankProfile, LegParameters, cycle_profile, mean_profile
-from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples, brings, is_valid, newest, of_crank, within
+from leg_wear_monitor.twin.sample import (
+    GAIT_SAMPLE,
+    Samples,
+    has_value_of,
+    is_valid,
+    newest,
+    of_crank,
+    within,
+)
 from leg_wear_monitor.twin.torque_reference import CADENCES, TorqueReference
 
 # Samples of the crank and of the drive torque, kept until their gait cycle ends.
@@ -38,7 +46,7 @@ class TorqueSamples:
 
     def extended(self, piece: Samples) -> "TorqueSamples":
         """With the valid ones of a piece."""
-        torque = piece[is_valid(piece) & brings(piece, TORQUE) & np.isfinite(piece["torque_nm"])]
+        torque = piece[is_valid(piece) & has_value_of(piece, TORQUE) & np.isfinite(piece["torque_nm"])]
         return TorqueSamples(
             np.concatenate([self.crank, of_crank(piece)]), np.concatenate([self.torque, torque])
         )

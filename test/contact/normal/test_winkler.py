@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.integrate import quad, solve_ivp
+from scipy.integrate import quad
 
-from leg_wear_monitor.contact.arrays import contact_modulus
+from leg_wear_monitor.contact.arrays import contact_modulus, half_angle_under_load
 from leg_wear_monitor.contact.normal import (
     LAWS,
-    delivered_restitution,
     elastic_energy,
     law_coefficient,
     normal_force,
@@ -110,6 +109,12 @@ def test_a_narrow_contact_is_hertz_s_line(psi):
 
 
 @pytest.mark.plain
+@given(psi=st.floats(0.02, 1.4))
+def test_the_half_angle_under_a_load_is_the_one_at_which_the_force_is_it(psi):
+    assert half_angle_under_load(force_at(psi), MODULUS, WIDTH, CLEARANCE) == pytest.approx(psi, rel=1.0e-8)
+
+
+@pytest.mark.plain
 @given(x=st.floats(1.0e-6, 2.9))
 def test_energy_is_the_integral_of_the_force(x):
     def force(delta):
@@ -117,27 +122,6 @@ def test_energy_is_the_integral_of_the_force(x):
 
     wanted = quad(force, 0.0, x * CLEARANCE, epsabs=0.0, epsrel=1.0e-10)[0]
     assert elastic_energy(NUMBER, COEFFICIENT, CLEARANCE, x * CLEARANCE) == pytest.approx(wanted, rel=1.0e-9)
-
-
-@pytest.mark.plain
-@pytest.mark.parametrize("asked", [0.3, 0.6, 0.9])
-def test_dropped_mass_returns_what_the_closed_form_says(asked):
-    """The restitution that a hysteresis factor returns does not ask for the elastic force."""
-    chi, mass, speed = LAWS["winkler"].hysteresis(asked), 0.14, 1.0
-    period = math.sqrt(mass / (4.0 / 3.0 * COEFFICIENT))
-
-    def slope(_t, y):
-        force = normal_force(
-            NUMBER, COEFFICIENT, CLEARANCE, chi / speed, y[0] * speed * period, y[1] * speed
-        )[0]
-        return [y[1], -force * period / (mass * speed)]
-
-    def parts(_t, y):
-        return y[0] if y[1] < 0.0 else 1.0
-
-    parts.terminal, parts.direction = True, -1.0
-    run = solve_ivp(slope, (0.0, 1.0e3), [0.0, 1.0], "DOP853", events=parts, rtol=1.0e-10, atol=1.0e-13)
-    assert -run.y[1, -1] == pytest.approx(delivered_restitution(chi), abs=1.0e-6)
 
 
 def test_hertz_s_stiffness_is_refused():
@@ -191,6 +175,7 @@ DEVIATION = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.chaotic
 def test_both_formulations_have_the_same_means(leg):
     full = moved(FullRun, leg, "AB", 6)[0].mean(axis=0)

@@ -77,16 +77,3 @@ def test_gamma_is_what_the_acceleration_of_phi_lacks(any_linkage, name, data):
     difference[linkage.rows.drive_row] += alpha
     gamma = evaluate(linkage, q, v, (0.0, 0.0, alpha)).gamma
     np.testing.assert_allclose(difference, gamma, atol=1.0e-6)
-
-
-@pytest.mark.parametrize("name", ["bionic_leg", "andrews", "slider_crank", "quick_return"])
-def test_every_closure_has_its_rows(any_linkage, name):
-    """Two rows a joint and one for the drive, as many as coordinates."""
-    linkage = any_linkage(name)
-    rows = linkage.rows
-    assert len(rows.body) == 2 * len(linkage.mechanism.joints) + 1 == 3 * len(linkage.mechanism.bodies)
-    assert sorted(rows.closure) == list(range(-1, len(linkage.mechanism.joints)))
-    taken = [
-        (row, row + (1 if closure == -1 else 2)) for closure, row in zip(rows.closure, rows.row, strict=True)
-    ]
-    assert sorted(r for start, end in taken for r in range(start, end)) == list(range(len(rows.body)))

@@ -71,18 +71,7 @@ def test_kinetic_energy(pulled, q, v):
     assert kinetic == pytest.approx(0.5 * (pulled.mass * v * v).sum(), abs=1.0e-9)
 
 
-@pytest.mark.parametrize(("phase", "force"), list(zip(PHASES, FORCES, strict=True)))
-@pytest.mark.parametrize("turns", [-2, 0, 5])
-def test_load_is_its_table_at_the_knots(pulled, phase, force, turns):
-    assert load_force(pulled, 0, TURN * (turns + phase)) == pytest.approx(force, abs=1.0e-9)
-
-
 @given(phase=st.floats(-3.0, 3.0))
 def test_load_is_linear_between_the_knots_and_periodic(pulled, phase):
     expected = [np.interp(phase % 1.0, PHASES, column, period=1.0) for column in zip(*FORCES, strict=True)]
     assert load_force(pulled, 0, TURN * phase) == pytest.approx(expected, abs=1.0e-7)
-
-
-@given(angle=st.floats(-100.0, 100.0))
-def test_constant_load_is_constant(pulled, angle):
-    assert load_force(pulled, 1, angle) == (3.0, -5.0)

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from leg_wear_monitor import ConfigError, Mechanism, load_mechanism
 from leg_wear_monitor.mechanism.loader import parse_mechanism, shipped_mechanisms
 from leg_wear_monitor.mechanism.spec import (
-    Clearance,
     ConstantLoad,
     Friction,
     PhaseLoad,
@@ -44,9 +43,15 @@ def changed(document: Any, path: tuple[Any, ...], value: Any) -> Any:
     return document
 
 
+@pytest.fixture(scope="module")
+def originals(document):
+    """Documents that are read once, to be copied before a change."""
+    return {name: document(name) for name in ("slider_crank", "andrews", "bionic_leg")}
+
+
 @given(data=st.data())
-def test_whatever_stands_in_a_file_is_taken_or_told_in_one_line(data, document):
-    original = document(data.draw(st.sampled_from(["slider_crank", "andrews", "bionic_leg"])))
+def test_whatever_stands_in_a_file_is_taken_or_told_in_one_line(data, originals):
+    original = originals[data.draw(st.sampled_from(sorted(originals)))]
     broken = changed(original, data.draw(st.sampled_from(places(original))), data.draw(JUNK))
     try:
         assert isinstance(parse_mechanism(broken, "leg.yaml"), Mechanism)
@@ -62,8 +67,8 @@ def test_whatever_a_file_holds_instead_is_told_in_one_line(junk):
 
 
 @given(data=st.data())
-def test_a_key_that_is_not_known_is_never_passed_over(data, document):
-    original = document("bionic_leg")
+def test_a_key_that_is_not_known_is_never_passed_over(data, originals):
+    original = originals["bionic_leg"]
     mappings = [("bodies", "foot"), ("joints", "A"), ("drive",), ("clearances",), ("clearances", "defaults")]
     path = data.draw(st.sampled_from([*mappings, ("clearances", "defaults", "friction")]))
     with pytest.raises(ConfigError) as caught:
@@ -84,18 +89,6 @@ def test_the_default_leg_is_the_bionic_one():
     assert leg.clearance_joints == ("A", "B", "G", "I", "J")
     assert leg.sides("B") == ("thigh", "ground")
     assert leg.toe == ("foot", "toe")
-    assert leg.clearances["A"] == Clearance(
-        bushing_radius=0.010,
-        width=0.020,
-        radial_clearance=0.0003,
-        youngs_modulus=(2.07e11, 2.07e11),
-        poissons_ratio=(0.29, 0.29),
-        normal_law="lankarani-nikravesh",
-        restitution=0.9,
-        friction=Friction(law="ambrosio", coefficient=0.05, ramp=(0.001, 0.01)),
-        wear_coefficient=(1.0e-15, 1.0e-15),
-        material="steel-on-steel-greased-mild",
-    )
     assert leg.clearances["A"].journal_radius == pytest.approx(0.0097, rel=1e-15)
 
 

@@ -1,4 +1,4 @@
-"""Material files: sources, units and their traps, and one line for a bad one."""
+"""Files of materials, and of drives: sources, units and their traps, and one line for a bad one."""
 
 import math
 from pathlib import Path
@@ -22,10 +22,14 @@ def number(value: float, unit: str) -> SourcedValue:
     return SourcedValue(value=value, unit=unit, source="a", conditions="b")
 
 
-@pytest.mark.parametrize("name", lw.materials())
-def test_every_number_of_every_file_has_a_source(name: str) -> None:
+FILES = {"material": (lw.materials(), lw.load_material), "drive": (lw.drives(), lw.load_drive)}
+
+
+@pytest.mark.parametrize(("kind", "name"), [(kind, name) for kind in FILES for name in FILES[kind][0]])
+def test_every_number_of_every_file_has_a_source(kind: str, name: str) -> None:
     """In the text of the file, whatever the classes ask for."""
-    document = YAML(typ="safe").load(lw.materials()[name])
+    paths, load_file = FILES[kind]
+    document = YAML(typ="safe").load(paths[name])
     assert document["name"] == name
 
     def check(part: Any) -> int:
@@ -40,21 +44,23 @@ def test_every_number_of_every_file_has_a_source(name: str) -> None:
             assert part["unit"] in UNITS
         return bool(own) + sum(check(entry) for entry in part.values())
 
-    assert check(document) == len(list(lw.load_material(name).values())) > 0
+    assert check(document) == len(list(load_file(name).values())) > 0
 
 
-def test_at_least_twelve_pairs() -> None:
-    assert len(lw.materials()) >= 12
-
-
-def test_cubic_millimetres_per_newton_metre() -> None:
-    """A cube of 1 mm a N m is 1e-9 m^3 a J."""
-    assert wear(1.0, "mm^3/(N m)") == pytest.approx(1.0e-9)
-
-
-def test_micrometres_per_kilometre_at_a_megapascal() -> None:
-    """Depth over distance and pressure: 1 µm in 1 km at 1 MPa."""
-    assert wear(1.0, "um/km at 1 MPa") == pytest.approx(1.0e-6 / (1.0e3 * 1.0e6)) == pytest.approx(1.0e-15)
+@pytest.mark.parametrize(
+    ("value", "unit", "si"),
+    [
+        (39000, "psi ft/min", 1.36599e6),  # igus prints 1.37 MPa m/s
+        (13050, "psi", 89.9766e6),  # and 90 MPa
+        (196, "ft/min", 0.99568),
+        (1.0, "N/mm^2 m/s", 1.0e6),
+        (1.0, "kgf/mm^2", 9.80665e6),
+        (1.0, "mm^3/(N m)", 1.0e-9),  # a cube of 1 mm a N m, in m^3 a J
+        (1.0, "um/km at 1 MPa", 1.0e-15),  # depth over distance and pressure
+    ],
+)
+def test_units(value: float, unit: str, si: float) -> None:
+    assert number(value, unit).si == pytest.approx(si, rel=1.0e-5)
 
 
 def test_inch_units_of_the_makers_page_are_its_metric_ones() -> None:
@@ -82,32 +88,9 @@ def test_a_k_without_hardness_is_refused_and_hardness_without_a_k() -> None:
         wear(1.0e-15, "1/Pa", number(1.0, "GPa"))
 
 
-@pytest.mark.parametrize(
-    ("value", "unit", "si"),
-    [
-        (39000, "psi ft/min", 1.366e6),  # igus prints 1.37 MPa m/s
-        (13050, "psi", 90.0e6),  # and 90 MPa
-        (196, "ft/min", 1.0),
-        (1.0, "N/mm^2 m/s", 1.0e6),
-        (1.0, "kgf/mm^2", 9.80665e6),
-    ],
-)
-def test_units(value: float, unit: str, si: float) -> None:
-    assert number(value, unit).si == pytest.approx(si, rel=5.0e-3)
-
-
 def test_a_range_stands_for_its_geometric_middle() -> None:
     value = SourcedValue(unit="1", source="a", conditions="b", range=(0.02, 0.25))
     assert value.si == pytest.approx(math.sqrt(0.02 * 0.25))
-
-
-def test_regimes_of_steel_differ_by_a_factor_of_thousands() -> None:
-    severe, mild, greased = (
-        lw.load_material(f"steel-on-steel-{regime}").bushing.wear_coefficient.si
-        for regime in ("dry-severe", "dry-mild", "greased-mild")
-    )
-    assert greased < mild < severe
-    assert severe / greased == pytest.approx(2000.0, rel=0.02)
 
 
 def test_a_pair_with_one_unknown_side_has_no_coefficient() -> None:
@@ -122,11 +105,6 @@ def test_a_side_whose_wear_is_not_counted_has_none() -> None:
     volume, work = 80e-10 * 0.0254**3, 4.4482216152605 * 60.0 * 0.3048
     assert pair.journal.wear_coefficient is None
     assert pair.wear_coefficients == (pytest.approx(volume / work), 0.0)
-
-
-def test_at_least_ten_pairs_with_a_makers_coefficient() -> None:
-    known = [name for name in lw.materials() if lw.load_material(name).wear_coefficients is not None]
-    assert len([name for name in known if not name.startswith("steel-")]) >= 14
 
 
 PAIR = """

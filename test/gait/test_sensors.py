@@ -129,10 +129,3 @@ def test_jitter_never_swaps_two_readings_of_a_sensor() -> None:
     taken = [reading.taken_s for reading in heard(jitter_s=0.01) if reading.kind == CRANK]
     assert (np.diff(taken) > 0.0).all()
     assert np.std(np.diff(taken)) > 1.0e-3
-
-
-def test_samples_carry_stamps_from_the_start_and_nan_for_what_is_not_measured() -> None:
-    block = samples(heard(), 5_000_000_000)
-    assert block["stamp_ns"][0] == 5_005_000_000
-    assert np.isnan(block["torque_nm"][block["kind"] == CRANK]).all()
-    assert np.isnan(block["crank_angle_rad"][block["kind"] == TORQUE]).all()

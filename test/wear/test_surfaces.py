@@ -115,18 +115,6 @@ def test_where_the_ground_lies_does_not_matter(joint, direction, delta, angle_b,
     np.testing.assert_allclose(there.depth, here.depth, atol=1.0e-5 * here.depth.max())
 
 
-@given(sectors=st.integers(-SECTORS, SECTORS), delta=touches, side=st.sampled_from([BUSHING, JOURNAL]))
-def test_a_turned_body_wears_the_same_shape_elsewhere(joint, sectors, delta, side):
-    turn = [0.0, 0.0]
-    turn[side] = sectors * TURN / SECTORS
-    still, turned = fresh_surfaces(joint, True), fresh_surfaces(joint, True)
-    direction = 100.3 * TURN / SECTORS
-    _rub(joint, still, direction, delta, 0.0, 0.0)
-    _rub(joint, turned, direction, delta, *turn)
-    expected = np.roll(still.depth[0, side], -sectors)
-    np.testing.assert_allclose(turned.depth[0, side], expected, atol=1.0e-9 * expected.max())
-
-
 @given(direction=angles, angle_b=angles, angle_j=angles, turn=angles, seed=st.integers(0, 9))
 def test_local_surfaces_ride_on_the_bodies(joint, direction, angle_b, angle_j, turn, seed):
     surfaces = _worn(seed)

@@ -128,20 +128,21 @@ def test_parts_of_a_duty_count_by_their_hours():
 
 
 @pytest.mark.chaotic
-def test_lives_are_those_of_a_whole_life():
+@pytest.mark.parametrize("starts, joints", [(1, "B"), pytest.param(4, "BC", marks=pytest.mark.slow)])
+def test_lives_are_those_of_a_whole_life(starts, joints):
     """The screening supposes that wear spreads over the circumference; a life follows where it goes.
 
-    C is 16 % above the mean of lives from four starts, whose sigma is 3 % each (2026-11-26); B is 4 % above.
+    B is 4 % above, and a life's sigma is 0.1 % (10 starts); C is 16 % above, and it is 3 % (2026-11-26).
     """
     leg = lw.load_mechanism("four_bar")
     fresh_m = leg.clearances["B"].radial_clearance
     limit_m = fresh_m + 1e-4
     choices = tried("pai-on-steel-dry", fresh_m=fresh_m)
     found = lw.design(leg, read_duty("0:8"), choices, limit_m=limit_m)
-    settings = [lw.LifeSettings(cycles=8, seed=seed) for seed in range(4)]
+    settings = [lw.LifeSettings(cycles=8, seed=seed) for seed in range(starts)]
     runs = [lw.LifeRun(leg, one, duty=lw.Duty.parse("0:8")) for one in settings]
     lives = [lw.simulate_life(run, limit_m=limit_m, horizon_cycles=1e12).end(limit_m) for run in runs]
-    for one in found.own:
+    for one in (each for each in found.own if each.joint in joints):
         whole = np.mean([life[one.joint]["hours"] for life in lives])
         assert one.wear_h[1] == pytest.approx(whole, rel=0.2)
 

@@ -16,7 +16,7 @@ from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.life import life as life_module
 from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
 from leg_wear_monitor.life.result import pressure_speed
-from leg_wear_monitor.wear import JumpControl, Surfaces, worn_volume
+from leg_wear_monitor.wear import JumpControl
 
 SHORT = LifeSettings(legs=2, cycles=3, settle_cycles=1)
 
@@ -31,15 +31,6 @@ def lived(leg):
 def test_the_example_in_the_documentation_runs():
     done = doctest.testmod(life_module)
     assert (done.attempted, done.failed) == (5, 0)
-
-
-def test_volume_worn_is_coefficient_times_archard_integral(leg, lived):
-    run, _ = lived
-    setup, last = prepare(leg, clearances=("A", "B"), wear=True), run.points[-1]
-    volume = worn_volume(setup.contacts, Surfaces(last.depth, 1))
-    expected = setup.contacts.wear_coefficient * last.archard_j[:, None]
-    # what is pending when a cycle is counted is worn off in the next one
-    np.testing.assert_allclose(volume, expected, rtol=2e-3)
 
 
 def test_p_v_is_the_archard_integral_over_area_and_period(leg, lived):

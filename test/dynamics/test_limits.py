@@ -1,6 +1,5 @@
 """Small clearances, mirrors, drift: what the motion must do whatever the leg."""
 
-import attrs
 import numpy as np
 import pytest
 
@@ -32,34 +31,10 @@ def test_a_vanishing_clearance_is_an_ideal_joint(leg_cycles, leg, linkage_of):
     assert abs(surplus[-1, 4]) < 0.2 * wanted[4]
 
 
-def _mirrored(mechanism):
-    """The mechanism seen in a mirror: x -> -x, bodies' own frames too, and turning the other way."""
-
-    def points(named):
-        return {name: (-x, y) for name, (x, y) in named.items()}
-
-    def body(spec):
-        return attrs.evolve(spec, com=(-spec.com[0], spec.com[1]), points=points(spec.points))
-
-    start = mechanism.assembly
-    return attrs.evolve(
-        mechanism,
-        gravity=(-mechanism.gravity[0], mechanism.gravity[1]),
-        ground=attrs.evolve(mechanism.ground, points=points(mechanism.ground.points)),
-        bodies={name: body(spec) for name, spec in mechanism.bodies.items()},
-        drive=attrs.evolve(mechanism.drive, speed=-mechanism.drive.speed),
-        assembly=attrs.evolve(
-            start,
-            crank_angle=-start.crank_angle,
-            poses={name: (-x, y, -angle) for name, (x, y, angle) in start.poses.items()},
-        ),
-    )
-
-
-def test_a_mirrored_leg_moves_and_wears_mirrored(leg):
+def test_a_mirrored_leg_moves_and_wears_mirrored(leg, mirrored):
     """Through a hundred impacts: no sign is lost anywhere, so even chaos is the same."""
     runs, surfaces = [], []
-    for mechanism in (leg, _mirrored(leg)):
+    for mechanism in (leg, mirrored(leg)):
         setup = prepare(mechanism)
         run = FullRun(setup)
         run.advance(0.3, new_run_statistics(len(leg.joints)))

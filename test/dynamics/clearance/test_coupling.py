@@ -44,7 +44,9 @@ def torque_by_phase(run: ClearanceRun | FullRun, cycles: int) -> np.ndarray:
 
 
 @pytest.mark.chaotic
-@pytest.mark.parametrize("stiffness, bound", [(200.0, 0.017), (1000.0, 0.006), (5000.0, 0.004)])
+@pytest.mark.parametrize(
+    "stiffness, bound", [(200.0, 0.017), pytest.param(1000.0, 0.006, marks=pytest.mark.slow), (5000.0, 0.004)]
+)
 def test_the_work_of_the_drive_is_lost_in_the_joints_alone(leg, stiffness, bound):
     """A coupling without damper only stores energy; with 16 parts of an interval, not 4 as usual.
 
@@ -76,7 +78,7 @@ def test_a_stiff_coupling_is_a_rigid_drive(leg):
 
 
 @pytest.mark.chaotic
-@pytest.mark.parametrize("stiffness", [200.0, 1000.0])
+@pytest.mark.parametrize("stiffness", [200.0, pytest.param(1000.0, marks=pytest.mark.slow)])
 def test_the_torque_of_a_coupling_is_that_of_full_coordinates(leg, stiffness):
     """There, it is a controller's with the same gains.
 

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.contact.arrays import ContactArrays
-from leg_wear_monitor.dynamics.clearance.basis import Basis, changing_shapes, motion_shapes, views
+from leg_wear_monitor.dynamics.clearance.basis import changing_shapes, motion_shapes, views
 from leg_wear_monitor.dynamics.clearance.tables import COARSER, ClearanceTables, build_tables
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.constraints import applied_forces_at, external_power
 from leg_wear_monitor.mechanism.loader import load_mechanism, parse_mechanism
-from leg_wear_monitor.mechanism.position import TURN, Linkage, evaluate, ideal_motion, one_cycle
+from leg_wear_monitor.mechanism.position import TURN, Linkage, evaluate, ideal_motion
 from leg_wear_monitor.mechanism.spec import ConstantLoad
 
 pytestmark = pytest.mark.plain
@@ -66,41 +66,6 @@ def cases(document):
         tables = build_tables(setup.linkage, setup.contacts, POINTS)
         result[name] = Case(setup.linkage, setup.contacts, tables, name == "four_bar")
     return result
-
-
-@pytest.mark.parametrize("name", LEGS)
-def test_s_opens_one_joint_at_a_time(cases, name):
-    """By finite differences of the closures: column j of S moves eccentricity j and closes all else."""
-    case, nudge = cases[name], 1.0e-6
-    motion = one_cycle(case.linkage, 8, 1.0)
-    s = Basis(case.linkage, case.contacts, motion).s
-    unit = np.eye(len(case.linkage.rows.body))[:, case.rows]
-    for q, angle, columns in zip(motion.q, motion.crank_angle, s, strict=True):
-        for j, column in enumerate(columns.T):
-            phi = []
-            for side in (1.0, -1.0):
-                moved = q.copy()
-                moved[1:] += side * nudge * column.reshape(-1, 3)
-                phi.append(evaluate(case.linkage, moved, np.zeros_like(q), (angle, 0.0, 0.0)).phi)
-            np.testing.assert_allclose((phi[0] - phi[1]) / (2.0 * nudge), unit[:, j], atol=1.0e-8)
-
-
-@pytest.mark.parametrize("name", LEGS)
-def test_s_t_is_the_derivative_of_s(cases, name):
-    """By differences of the fourth order."""
-    basis = Basis(cases[name].linkage, cases[name].contacts, one_cycle(cases[name].linkage, POINTS, 1.0))
-    ahead, behind = ([np.roll(basis.s, -i * side, axis=0) for i in (1, 2)] for side in (1, -1))
-    slope = (8.0 * (ahead[0] - behind[0]) - (ahead[1] - behind[1])) / (12.0 * TURN / POINTS)
-    np.testing.assert_allclose(basis.s_t, slope, atol=3.0e-4 * np.abs(slope).max())
-
-
-@pytest.mark.parametrize("name", LEGS)
-def test_the_mass_of_the_eccentricities_is_symmetric_and_positive(cases, name):
-    case = cases[name]
-    for i in range(0, POINTS, 16):
-        inverse_mass = case.parts(i)["inverse_mass"]
-        np.testing.assert_allclose(inverse_mass, inverse_mass.T, atol=1.0e-10 * inverse_mass.max())
-        assert np.linalg.eigvalsh(inverse_mass).min() > 0.0
 
 
 @pytest.mark.parametrize("name", LEGS)

@@ -104,7 +104,7 @@ def test_means_hold_at_a_tenth_of_the_tolerance(leg_cycles):
     assert_means_agree("ABGIJ", figures_of(fine), figures_of(leg_cycles("ABGIJ", CYCLES)))
 
 
-@pytest.mark.parametrize("clearance_joints", ["G", "AB", "IJ", "ABGIJ"])
+@pytest.mark.parametrize("clearance_joints", ["G", "AB", pytest.param("IJ", marks=pytest.mark.slow), "ABGIJ"])
 def test_energy_with_clearances(leg_cycles, clearance_joints):
     """Every cycle, to a thousandth of what is lost in it: friction and contact together.
 
@@ -147,21 +147,17 @@ def assert_means_agree(clearance_joints: str, one: np.ndarray, other: np.ndarray
     assert (np.abs(difference) < 0.02 + 5.3 * sigma).all(), difference
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    "finer, runs",
-    [
-        pytest.param({"interval_s": 0.5 / 2048}, 8, id="interval"),
-        pytest.param({"interval_s": 0.5 / 2048}, 24, id="interval-long", marks=pytest.mark.slow),
-        pytest.param({"tolerance_m": 0.1 * TOLERANCE_M}, 24, id="tolerance", marks=pytest.mark.slow),
-    ],
+    "finer", [{"interval_s": 0.5 / 2048}, {"tolerance_m": 0.1 * TOLERANCE_M}], ids=["interval", "tolerance"]
 )
-def test_means_hold_at_half_the_interval_and_a_tenth_of_the_tolerance(leg, finer, runs):
+def test_means_hold_at_half_the_interval_and_a_tenth_of_the_tolerance(leg, finer):
     """All five joints' figures, over runs of five cycles."""
     setup = prepare(leg)
     tables = build_tables(setup.linkage, setup.contacts)
     usual, fine = (
         run_statistics_of(
-            lambda options=options: ClearanceStepper(prepare(leg), tables=tables, **options), runs, BLOCK
+            lambda options=options: ClearanceStepper(prepare(leg), tables=tables, **options), 24, BLOCK
         )
         for options in ({}, finer)
     )

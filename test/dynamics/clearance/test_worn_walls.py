@@ -42,9 +42,8 @@ def one_by_one(model, surfaces, now, turned, e, directions, fresh, out):
 
 
 @pytest.mark.parametrize("law", ["hu-guo", "winkler"])
-@pytest.mark.parametrize("joints", ["B", "ABGIJ", "ABCDEFGHIJ"])
-@pytest.mark.parametrize("nearby", [True, False])
-def test_eight_at_once_are_eight_one_by_one(leg, law, joints, nearby):
+@pytest.mark.parametrize("joints", ["B", "ABCDEFGHIJ"])
+def test_eight_at_once_are_eight_one_by_one(leg, law, joints):
     """Walls worn at random, journals inside and outside; directions from the reference and by arc tangent."""
     random, k = np.random.default_rng(len(joints)), len(joints)
     setup = prepare(leg, clearances=tuple(joints), wear=True, normal_law=law)
@@ -56,14 +55,14 @@ def test_eight_at_once_are_eight_one_by_one(leg, law, joints, nearby):
     size = setup.contacts.clearance + np.where(np.arange(k) % 2 == 0, 4.0e-5, -1.0e-5)
     e = np.zeros((2, padded(k)))
     e[:, :k] = size * np.cos(directions), size * np.sin(directions)
-    off = 0.05 if nearby else 2.0
-    before = size * [np.cos(directions + off), np.sin(directions + off)]
-    take_directions(before.T.ravel(), now.toward)
     found, wanted = np.zeros((6, padded(k))), np.zeros((6, k))
-    together(stepper.model, setup.surfaces, now, turned, e, found)
     fresh = stepper.model.law[FRESH_COEFFICIENT]
     one_by_one(stepper.model, setup.surfaces, now, turned, e, directions, fresh, wanted)
     assert (wanted[0, ::2] > 0.0).all() and not (wanted[0, 1::2] > 0.0).any()
     scale = np.abs(wanted).max(axis=1, keepdims=True) + 1.0e-30
-    np.testing.assert_allclose(found[:, :k] / scale, wanted / scale, atol=1.0e-6)
-    assert np.isfinite(found).all()  # joints that are not there neither
+    for off in (0.05, 2.0):  # rad, from where the journals were before: near it, and far away
+        before = size * [np.cos(directions + off), np.sin(directions + off)]
+        take_directions(before.T.ravel(), now.toward)
+        together(stepper.model, setup.surfaces, now, turned, e, found)
+        np.testing.assert_allclose(found[:, :k] / scale, wanted / scale, atol=1.0e-6)
+        assert np.isfinite(found).all()  # joints that are not there neither

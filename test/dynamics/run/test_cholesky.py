@@ -23,23 +23,14 @@ def systems(draw):
 
 
 @given(systems())
-def test_solution_is_numpys(system):
-    first, matrix, b = system
-    lower, x = np.tril(matrix), b.copy()
-    assert factorise(first, lower)
-    substitute(first, lower, x)
-    np.testing.assert_allclose(x, np.linalg.solve(matrix, b), rtol=1.0e-6, atol=1.0e-8)
-
-
-@given(systems())
-def test_nothing_outside_the_envelope_is_read(system):
+def test_solution_is_numpys_and_nothing_outside_the_envelope_is_read(system):
     first, matrix, b = system
     lower, x = np.tril(matrix), b.copy()
     lower[np.arange(len(b))[None, :] < first[:, None]] = np.nan
     lower[np.triu_indices(len(b), 1)] = np.nan
     assert factorise(first, lower)
     substitute(first, lower, x)
-    assert np.isfinite(x).all()
+    np.testing.assert_allclose(x, np.linalg.solve(matrix, b), rtol=1.0e-6, atol=1.0e-8)
 
 
 @given(systems(), st.data())

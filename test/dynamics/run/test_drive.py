@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from leg_wear_monitor.dynamics.run import DEGREE, drive_at, steady_drive
+from leg_wear_monitor.dynamics.run import DEGREE, drive_at
 
 pytestmark = pytest.mark.plain
 
@@ -24,15 +24,3 @@ def test_speed_and_acceleration_are_derivatives_of_the_angle(c, since, t):
     np.testing.assert_allclose(
         drive, wanted, rtol=1.0e-9, atol=1.0e-9 * (1.0 + np.abs(c).sum()) * 10.0**DEGREE
     )
-
-
-@given(
-    angle=st.floats(-10.0, 10.0),
-    speed=st.floats(-100.0, 100.0),
-    since=st.floats(0.0, 10.0),
-    t=st.floats(0.0, 10.0),
-)
-def test_a_steady_drive_is_steady(angle, speed, since, t):
-    drive = np.empty(3)
-    drive_at(steady_drive(angle, speed, since), t, drive)
-    assert drive == pytest.approx([angle + speed * (t - since), speed, 0.0], abs=1.0e-9)

@@ -55,13 +55,6 @@ def test_signed_percentile_divides_the_time_too(samples, fraction):
     assert np.mean(samples < got - slack) <= fraction + 1.0e-9
 
 
-@pytest.mark.parametrize("fraction", [0.01, 0.5, 0.9, 0.99])
-def test_percentile_of_many_samples_is_numpys(fraction):
-    samples = np.random.default_rng(2).lognormal(3.0, 2.0, 20_000)
-    wanted = np.percentile(samples, 100.0 * fraction)
-    assert percentile(_histogram(samples), fraction) == pytest.approx(wanted, rel=BIN - 1.0)
-
-
 def test_percentile_of_nothing_is_nothing():
     assert percentile(_histogram([]), 0.99) == 0.0
     assert signed_percentile(np.zeros((2, 16)), 0.99) == 0.0

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import Mechanism
-from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.twin.digital_twin import DigitalTwin, TwinSnapshot
 from leg_wear_monitor.twin.sample import Samples, gait_samples
@@ -43,14 +42,3 @@ def twin(_made: tuple[DigitalTwin, TwinSnapshot]) -> DigitalTwin:
     one, new = _made
     one.restore(new)
     return one
-
-
-@pytest.fixture(scope="session")
-def refused() -> Callable[..., None]:
-    """Asserts that settings with one value are refused by a line that names it."""
-
-    def check(kind: type, name: str, value: object) -> None:
-        with pytest.raises(LegWearError, match=name):
-            kind(**{name: value})
-
-    return check

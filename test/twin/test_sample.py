@@ -1,11 +1,20 @@
-"""Samples: what is given comes out, and what is no sample is refused."""
+"""Samples and settings: what is given comes out, and what is none is refused."""
+
+import math
 
 import numpy as np
 import pytest
 
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.twin import TORQUE
-from leg_wear_monitor.twin.sample import FAULTS, GAIT_SAMPLE, gait_samples
+from leg_wear_monitor.twin.sample import (
+    FAULTS,
+    GAIT_SAMPLE,
+    SamplingSettings,
+    TrackerSettings,
+    TwinSettings,
+    gait_samples,
+)
 
 
 def test_a_block_holds_what_was_given_and_nan_elsewhere() -> None:
@@ -26,3 +35,24 @@ def test_stamps_must_be_integers_for_a_float_cannot_hold_them() -> None:
 def test_unknown_codes_are_refused(name: str, code: int) -> None:
     with pytest.raises(LegWearError, match=f"{name}: {code} is none of"):
         gait_samples([1], **{name: code})
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize(
+    ("kind", "name", "value", "more"),
+    [
+        (TrackerSettings, "bandwidth_hz", 0.0, {}), (TrackerSettings, "bandwidth_hz", 0.1, {}),
+        (TrackerSettings, "gate_rad", math.nan, {}), (TrackerSettings, "lag_s", -1.0, {}),
+        (TrackerSettings, "commanded_speed_radps", 0.0, {}), (TrackerSettings, "node_interval_s", -0.01, {}),
+        (TrackerSettings, "reorder_window_s", 2.0, {}), (TrackerSettings, "largest_speed_radps", -1.0, {}),
+        (TwinSettings, "wear_acceleration", math.nan, {}), (TwinSettings, "torque_bandwidth_hz", 0.0, {}),
+        (TwinSettings, "load_shape", "round", {}), (TwinSettings, "torque_sampling", "median", {}),
+        (TwinSettings, "load_model", "measured", {"load_source": "none"}),
+        (TwinSettings, "load_model", "measured", {"load_source": "contact"}),
+        *((SamplingSettings, "fraction", each, {}) for each in (0.0, -0.1, 1.1, math.nan)),
+    ],
+)  # fmt: skip
+def test_a_senseless_setting_is_refused_and_named(kind, name, value, more) -> None:
+    named = "sample" if kind is SamplingSettings else name
+    with pytest.raises(LegWearError, match=f"{named}: "):
+        kind(**{name: value, **more})

@@ -45,6 +45,34 @@ def cycles_of(updates: list[TwinUpdate]) -> list[CycleStatistics]:
     return [cycle for update in updates for cycle in update.cycles]
 
 
+@attrs.frozen(eq=False)
+class Replay:
+    """What the sampled twin said of the whole walk, and its state after a half of it and at the end."""
+
+    updates: list[TwinUpdate]
+    middle: TwinSnapshot
+    end: TwinSnapshot
+
+    @property
+    def cycles(self) -> list[CycleStatistics]:
+        return cycles_of(self.updates)
+
+    @property
+    def followed(self) -> np.ndarray:
+        return np.array([each.is_followed for each in self.cycles])
+
+
+@pytest.fixture(scope="module")
+def replay(_sampled, walk) -> Replay:
+    twin, new = _sampled
+    twin.restore(new)
+    half = len(walk) // 2
+    updates = updated(twin, walk[:half], 1000)
+    middle = twin.snapshot()
+    updates += updated(twin, walk[half:], 1000)
+    return Replay(updates, middle, twin.snapshot())
+
+
 def worn(twin: DigitalTwin) -> np.ndarray:
     return twin.depth.sum(axis=1).mean(axis=1)
 
@@ -57,13 +85,13 @@ OFF = np.array([0.013, 0.13, 0.12, 0.16, 0.21])
 
 
 @pytest.mark.chaotic
-def test_the_wear_is_that_of_a_whole_replay(sampled, twin, walk):
-    whole = cycles_of(updated(twin, walk, 1000))
-    found = cycles_of(updated(sampled, walk, 1000))
+def test_the_wear_is_that_of_a_whole_replay(sampled, twin, walk, replay):
+    whole, found = cycles_of(updated(twin, walk, 1000)), replay.cycles
     assert [(each.begin_ns, each.stamp_ns) for each in found] == [(e.begin_ns, e.stamp_ns) for e in whole]
     np.testing.assert_allclose([e.moving_s for e in found], [e.moving_s for e in whole], rtol=1e-3)
+    sampled.restore(replay.end)
     sampled.end_recording()
-    followed = [each.is_followed for each in found]
+    followed = replay.followed
     assert 0.2 < np.mean(followed) < 0.6
     assert sampled.sampling.followed_cycles == sum(followed)
     assert 0.0 <= sampled.sampling.estimated_cycles - (len(found) - sum(followed)) < 1.1  # the last is a part
@@ -72,21 +100,20 @@ def test_the_wear_is_that_of_a_whole_replay(sampled, twin, walk):
     assert (sigma < 0.5 * worn(twin)).all()
     assert (sigma > 0.0).all()
     # until the first jump it is the whole replay, bit for bit
-    first = followed.index(False)
+    first = followed.argmin()
     for one, same in zip(found[:first], whole[:first], strict=True):
         np.testing.assert_array_equal(one.clearance_mean_m[:], same.clearance_mean_m)
         np.testing.assert_array_equal(one.peak_force_n, same.peak_force_n)
 
 
-def test_cycles_that_are_not_followed_have_no_forces(sampled, walk):
-    updates = updated(sampled, walk, 1000)
-    tracked = [each for each in cycles_of(updates) if not each.is_followed]
+def test_cycles_that_are_not_followed_have_no_forces(replay):
+    tracked = [each for each in replay.cycles if not each.is_followed]
     for name in ("peak_force_n", "p99_force_n", "mean_force_n", "growth_mean_m", "archard_j"):
         assert np.isnan([getattr(each, name) for each in tracked]).all()
     assert {each.torque.samples for each in tracked} == {0}
     assert (np.diff([each.clearance_mean_m for each in tracked], axis=0) > -1e-10).all()
     stamps, force, torque, turned = (
-        np.concatenate([getattr(update.samples, name) for update in updates])
+        np.concatenate([getattr(update.samples, name) for update in replay.updates])
         for name in ("stamp_ns", "contact_force_n", "predicted_torque_nm", "crank_angle_rad")
     )
     for each in tracked:
@@ -96,37 +123,31 @@ def test_cycles_that_are_not_followed_have_no_forces(sampled, walk):
 
 
 @pytest.mark.chaotic
-def test_forces_after_a_jump_are_those_of_the_gait(sampled, walk):
+def test_forces_after_a_jump_are_those_of_the_gait(replay):
     """The journals go on where they were left: nothing knocks.
 
     1.15 with a sigma of 0.09 (29 starts moved by 1e-12, 2026-11-23); the largest of ten was 2.5.
     """
-    found = cycles_of(updated(sampled, walk, 1000))
-    followed = np.array([each.is_followed for each in found])
-    peak = np.array([each.peak_force_n for each in found])
+    followed = replay.followed
+    peak = np.array([each.peak_force_n for each in replay.cycles])
     again = np.flatnonzero(~followed[:-1] & followed[1:]) + 1
     assert len(again) >= 1
     assert (peak[again] / np.nanmax(peak[: followed.argmin()], axis=0)).mean() < 2.0
 
 
-def test_blocks_of_samples_do_not_matter(sampled, _sampled, walk):
-    one = cycles_of(updated(sampled, walk, 1000))
-    depth = sampled.depth
-    sampled.restore(_sampled[1])
+def test_blocks_of_samples_do_not_matter(sampled, walk, replay):
     other = cycles_of(updated(sampled, walk, 137))
-    assert len(one) == len(other)
+    depth = sampled.depth
+    sampled.restore(replay.end)
     np.testing.assert_array_equal(depth, sampled.depth)
-    assert [each.is_followed for each in one] == [each.is_followed for each in other]
+    assert [each.is_followed for each in other] == replay.followed.tolist()
 
 
-def test_a_restored_twin_goes_on_bit_for_bit(sampled, walk):
-    half = len(walk) // 2
-    updated(sampled, walk[:half], 1000)
-    kept = sampled.snapshot()
-    updated(sampled, walk[half:], 1000)
+def test_a_restored_twin_goes_on_bit_for_bit(sampled, walk, replay):
+    sampled.restore(replay.middle)
+    updated(sampled, walk[len(walk) // 2 :], 1000)
     depth, sampling = sampled.depth, sampled.sampling
-    sampled.restore(kept)
-    updated(sampled, walk[half:], 1000)
+    sampled.restore(replay.end)
     np.testing.assert_array_equal(sampled.depth, depth)
     for one, same in zip(attrs.astuple(sampled.sampling), attrs.astuple(sampling), strict=True):
         np.testing.assert_array_equal(one, same)

@@ -12,9 +12,8 @@ from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Track, TrackDrive
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.reference import LegParameters
-from leg_wear_monitor.twin.sample import TwinSettings, gait_samples
+from leg_wear_monitor.twin.sample import gait_samples
 
 START_NS, RATE, CYCLES, SETTLING = 1_700_000_000_000_000_000, 200, 12, 4
 STIFFNESS, DAMPING = 1000.0, 1.75  # N m/rad, N m s/rad: 0.05 of the critical damping
@@ -43,9 +42,9 @@ def walk(leg) -> SimpleNamespace:
 
 @pytest.mark.chaotic
 @pytest.mark.parametrize("is_known", [True, False])
-def test_behind_a_coupling_the_torque_is_as_predicted_where_the_coupling_is_known(leg, walk, is_known):
+def test_behind_a_coupling_the_torque_is_as_predicted_where_the_coupling_is_known(leg, twin, walk, is_known):
     """Else the mismatch is the torque's size, and the hip wears half as fast as it does."""
-    twin, limit = DigitalTwin(leg, TwinSettings()), MonitorConfig().limits.torque_mismatch
+    limit = MonitorConfig().limits.torque_mismatch
     if is_known:
         twin.set_parameters(attrs.evolve(LegParameters.none(leg), compliance=1.0 / STIFFNESS))
     cycles = twin.update(walk.samples).cycles[SETTLING:]

@@ -11,7 +11,6 @@ from leg_wear_monitor import Mechanism
 from leg_wear_monitor.dynamics.clearance.stepper import loaded_tables, put_force
 from leg_wear_monitor.dynamics.clearance.tables import POINTS, build_tables
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.arrays import Floats, body_names
 from leg_wear_monitor.mechanism.person import PHASES, nominal_stance, with_toe_force
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
@@ -68,7 +67,7 @@ def test_rows_with_a_force_are_those_of_the_loaded_leg(leg, stance):
         )
 
 
-@pytest.mark.parametrize("rate_hz, error", [(50, 1.6e-3), (100, 5.0e-4), (200, 3.0e-4), (1000, 3.0e-4)])
+@pytest.mark.parametrize("rate_hz, error", [(50, 1.6e-3), (200, 3.0e-4), (1000, 3.0e-4)])
 def test_the_force_is_that_of_its_time(twin, gait, stance, rate_hz, error):
     """Held until the next sample, it would be late by half a period, 10 ms at 50 Hz, and 4 N off on average.
 
@@ -82,38 +81,39 @@ def test_the_force_is_that_of_its_time(twin, gait, stance, rate_hz, error):
     assert abs(wrong[:, 1] @ slope / (slope @ slope)) < 1.0e-4  # s late
 
 
-@pytest.mark.chaotic
-def test_it_carries_and_wears_as_a_leg_in_full_coordinates(leg, twin, gait, stance):
-    """The sensor has 1 % of noise. In the air the ankle carries an eighth of it, and wears a third as fast.
+# Largest deviation of the mean forces, 5.3 sigma and the mean; mean and sigma of Archard's integral of 12 cycles
+# over that of the leg, less 1, by the joint. Starts moved by 1e-12 with other noise each: 12 in full coordinates,
+# 2026-11-25, 30 in clearance coordinates, 2026-11-26. J carries next to nothing in swing, and where the force
+# begins at a sample.
+OFF = {
+    ("full", 3.0): (0.01, [0.003, 0.01, 0.035, 0.01, 0.13], [0.003, 0.034, 0.016, 0.022, 0.05]),
+    ("clearance", 3.0): (0.013, [0.002, 0.020, 0.046, 0.004, 0.186], [0.003, 0.039, 0.018, 0.025, 0.037]),
+    ("clearance", 15.0): (0.03, [0.009, 0.026, 0.049, 0.045, 0.199], [0.008, 0.027, 0.027, 0.053, 0.074]),
+}
 
-    Archard's integral over that of the leg, and the relative sigma of the ratio of 12 cycles: 12 starts moved
-    by 1e-12 with other noise each, 2026-11-25: A 0.997, 0.002; B 1.01, 0.034; G 1.035, 0.016; I 0.99, 0.022;
-    J 1.13, 0.05 (which carries next to nothing in swing, and where the force begins at a sample).
+
+@pytest.mark.chaotic
+@pytest.mark.parametrize(
+    "model, noise_n",
+    [("clearance", 3.0), ("clearance", 15.0), pytest.param("full", 3.0, marks=pytest.mark.slow)],
+)
+def test_it_carries_and_wears_as_the_leg_that_bears_it(leg, twin, gait, stance, model, noise_n):
+    """The sensor has 1 % or 5 % of noise. In the air the ankle carries an eighth, and wears a third as fast.
+
+    Noise of 5 %, unfiltered, wears joint J 3.7 times as fast.
     """
-    bias, sigma = np.array([0.003, 0.01, 0.035, 0.01, 0.13]), np.array([0.003, 0.034, 0.016, 0.022, 0.05])
-    cycles = twin.update(pushed(gait(15.0), stance, 200.0, noise_n=3.0)).cycles[2:]
+    force_off, *archard_off = OFF[model, noise_n]
+    bias, sigma = np.array(archard_off)
+    cycles = twin.update(pushed(gait(15.0), stance, 200.0, noise_n)).cycles[2:]
     mean_n, archard_j = (
         np.mean([getattr(cycle, name) for cycle in cycles], axis=0) for name in ("mean_force_n", "archard_j")
     )
-    truth = lw.simulate(with_toe_force(leg, stance[:: POINTS // 128]), cycles=12, model="full", wear=True)
+    truth = lw.simulate(with_toe_force(leg, stance[:: POINTS // 128]), cycles=12, model=model, wear=True)
     joints = [truth.joints[name] for name in twin.clearance_joints]
-    np.testing.assert_allclose(mean_n, [joint.mean_force_n for joint in joints], rtol=0.01)
+    np.testing.assert_allclose(mean_n, [joint.mean_force_n for joint in joints], rtol=force_off)
     wrong = archard_j / [joint.archard_integral_j_per_cycle for joint in joints] - 1.0
     assert (np.abs(wrong) < 0.01 + bias + 5.3 * sigma).all(), wrong
     assert cycles[-1].torque.load_acting_n == 0.0
-
-
-@pytest.mark.chaotic
-def test_noise_of_the_sensor_does_not_wear(leg, twin, gait, stance):
-    """Noise of 5 % of the peak, unfiltered, wears joint J 3.7 times as fast."""
-    archard_j = []
-    for noise_n in (0.0, 15.0):
-        before = twin.snapshot()
-        cycles = twin.update(pushed(gait(30.0), stance, 200.0, noise_n)).cycles[5:]
-        twin.restore(before)
-        archard_j.append(np.mean([cycle.archard_j for cycle in cycles], axis=0))
-    ratio = archard_j[1] / archard_j[0]
-    assert (ratio < 1.35).all() and (ratio > 0.8).all(), ratio
 
 
 def test_a_row_that_no_sample_reaches_keeps_the_force_of_the_cycle_before(twin, gait, stance):
@@ -172,9 +172,3 @@ def test_other_parameters_leave_the_force_where_it_is(twin, gait, stance):
     twin.set_parameters(attrs.evolve(twin.parameters, friction=1.5, load=estimated))
     for table, wanted in zip(twin._follower._load.tables, before, strict=True):
         np.testing.assert_allclose(table, wanted, rtol=1.0e-6, atol=1.0e-9)
-
-
-@pytest.mark.parametrize("source", ["none", "contact"])
-def test_a_load_without_forces_cannot_be_measured(source):
-    with pytest.raises(LegWearError, match="load_model: 'measured' needs forces"):
-        TwinSettings(load_source=source, load_model="measured")

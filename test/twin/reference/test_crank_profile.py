@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from leg_wear_monitor.mechanism.position import TURN
@@ -22,6 +22,7 @@ def samples(profile: CrankProfile, rate_hz: float = 400.0):
     return time_s, np.array([profile.at(zero + profile.speed * t).angle for t in time_s]), duration
 
 
+@settings(max_examples=15)
 @given(cosine=AMPLITUDES, sine=AMPLITUDES, speed=st.sampled_from([TURN, -TURN, 3.0 * TURN]))
 def test_a_profile_is_found_again(cosine: list[float], sine: list[float], speed: float) -> None:
     h = np.arange(1.0, HARMONICS + 1.0)

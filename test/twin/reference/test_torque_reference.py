@@ -15,15 +15,27 @@ from leg_wear_monitor.twin.torque_reference import (
     HEAVIER,
     LONGER,
     ROUGHER,
+    ReferenceSnapshot,
     TorqueReference,
     TorqueReferenceRun,
     design,
 )
 from leg_wear_monitor.wear import SECTORS
 
-NEW, UNWORN = np.full(5, 3.0e-4), np.zeros((5, 2, SECTORS))
+FRESH_M = 2.0e-4  # of the two clearance joints of `small`
+NEW, UNWORN = np.full(2, FRESH_M), np.zeros((2, 2, SECTORS))
 STEADY = CrankProfile.steady(TURN)
-WIDER = (1.2, 2.0, 8.0)  # fewer than usual
+WIDER = (1.2, 8.0)  # fewer than usual
+CHANGED = 4  # legs of an identification beside the expected one
+
+
+@attrs.frozen
+class Simulated:
+    """What a run found, and a snapshot of it when it was amidst its legs."""
+
+    found: TorqueReference
+    snapshot: ReferenceSnapshot
+    progress: float
 
 
 def finished(run: TorqueReferenceRun) -> TorqueReference:
@@ -32,12 +44,19 @@ def finished(run: TorqueReferenceRun) -> TorqueReference:
     return found
 
 
+def assert_same(one: TorqueReference, other: TorqueReference) -> None:
+    """Bit for bit."""
+    for torque, same in zip(one.torque_nm, other.torque_nm, strict=True):
+        np.testing.assert_array_equal(torque, same)
+
+
 def shorten(patch: pytest.MonkeyPatch) -> None:
-    """Runs of a single gait cycle a leg, and two where there are twice as many; one in each period."""
+    """Runs of few legs: a single gait cycle each, two of the expected one; one in each period."""
     patch.setattr(torque_reference, "CYCLES", 1)
     patch.setattr(torque_reference, "PACE", 1)
     patch.setattr(torque_reference, "_SETTLING", 0)
     patch.setattr(torque_reference, "WIDER", WIDER)
+    patch.setattr(torque_reference, "levels_of", lambda near: design(2 * len(near.mass) + 1)[: 1 + CHANGED])
 
 
 @pytest.fixture
@@ -46,97 +65,82 @@ def short(monkeypatch):
 
 
 @pytest.fixture(scope="module")
-def whole(leg) -> TorqueReference:
-    """A short reference of wider joints."""
-    run = TorqueReferenceRun(leg)
-    with pytest.MonkeyPatch.context() as patch:
-        shorten(patch)
-        run.begin(NEW, UNWORN, STEADY)
-        return finished(run)
-
-
-@pytest.fixture(scope="module")
 def small():
-    """A mechanism with few bodies, of which as many are simulated."""
+    """A mechanism with few bodies and two clearance joints."""
     return load_mechanism("four_bar")
 
 
 @pytest.fixture(scope="module")
-def identified(small):
-    """A short reference of other bodies, and a snapshot of its run amidst a leg with another body."""
-    run = TorqueReferenceRun(small)
-    with pytest.MonkeyPatch.context() as patch:
-        shorten(patch)
-        run.begin_identification(NEW[:2], UNWORN[:2], STEADY, LegParameters.none(small))
+def simulated(small):
+    """A short reference of wider joints, and one of other bodies."""
+
+    def simulate(begin) -> Simulated:
+        run = TorqueReferenceRun(small)
+        begin(run)
         for _ in range(4):
             run.advance()
         snapshot, progress = run.snapshot(), run.progress
-        return finished(run), snapshot, progress
+        return Simulated(finished(run), snapshot, progress)
+
+    none = LegParameters.none(small)
+    with pytest.MonkeyPatch.context() as patch:
+        shorten(patch)
+        return {
+            "wider": simulate(lambda run: run.begin(NEW, UNWORN, STEADY)),
+            "other bodies": simulate(lambda run: run.begin_identification(NEW, UNWORN, STEADY, none)),
+        }
 
 
-def test_each_joint_is_wider_in_turn(leg, whole) -> None:
-    found = whole
-    assert len(found.torque_nm) == 1 + 5 * len(WIDER)
-    assert [len(torque) for torque in found.torque_nm] == [2] + 5 * len(WIDER) * [1]
-    np.testing.assert_allclose(found.clearance_m[1 : 1 + len(WIDER), 0], 3.0e-4 * np.array(WIDER))
-    assert (found.clearance_m[1 : 1 + len(WIDER), 1:] == 3.0e-4).all()
-    np.testing.assert_array_equal(found.parameters.mass, 1.0)
+@pytest.fixture(scope="module")
+def whole(simulated) -> TorqueReference:
+    return simulated["wider"].found
 
 
-def test_a_worn_joint_is_also_new_and_the_others_narrower(leg, short) -> None:
-    worn, run = NEW.copy(), TorqueReferenceRun(leg)
-    worn[2] = 9.0e-4
-    run.begin(worn, UNWORN, STEADY)
+def test_each_joint_is_wider_in_turn(whole) -> None:
+    assert [len(torque) for torque in whole.torque_nm] == [2] + 2 * len(WIDER) * [1]
+    np.testing.assert_allclose(whole.clearance_m[1 : 1 + len(WIDER), 0], FRESH_M * np.array(WIDER))
+    assert (whole.clearance_m[1 : 1 + len(WIDER), 1:] == FRESH_M).all()
+    np.testing.assert_array_equal(whole.parameters.mass, 1.0)
+
+
+def test_a_worn_joint_is_also_new_and_the_others_narrower(small, short) -> None:
+    run = TorqueReferenceRun(small)
+    run.begin(FRESH_M * np.array([1.0, 3.0]), UNWORN, STEADY)
     found = finished(run)
     sizes = len(WIDER) + 1
-    assert len(found.torque_nm) == 1 + 5 * sizes
-    np.testing.assert_allclose(found.clearance_m[3 * sizes, 2], 3.0e-4)
-    np.testing.assert_allclose(found.clearance_m[sizes, 0], 0.8 * 3.0e-4)
+    assert len(found.torque_nm) == 1 + 2 * sizes
+    np.testing.assert_allclose(found.clearance_m[2 * sizes, 1], FRESH_M)
+    np.testing.assert_allclose(found.clearance_m[sizes, 0], 0.8 * FRESH_M)
 
 
-def test_a_part_of_a_reference_goes_on_where_it_ended(leg, whole, short) -> None:
-    first, second = (TorqueReferenceRun(leg) for _ in range(2))
-    first.begin(NEW, UNWORN, STEADY)
-    assert first.part is None
-    for _ in range(12):
-        first.advance()
-    part = first.part
+@pytest.mark.parametrize("what", ["wider", "other bodies"])
+def test_a_restored_run_and_a_part_go_on_bit_for_bit(small, simulated, short, what) -> None:
+    known = simulated[what]
+    restored, later = (TorqueReferenceRun(small) for _ in range(2))
+    assert restored.part is None
+    restored.restore(known.snapshot)
+    assert restored.progress == known.progress
+    part = restored.part
     assert part is not None
-    assert not part.is_whole and not part.is_of_parameters
-    assert 5 < len(part.torque_nm) < 12
-    second.go_on(part, UNWORN)
-    assert second.progress == pytest.approx(first.progress, abs=0.03)
-    other = finished(second)
-    assert other.is_whole
-    assert second.part is None
-    for torque, same in zip(whole.torque_nm, other.torque_nm, strict=True):
-        np.testing.assert_array_equal(torque, same)
+    assert not part.is_whole and part.is_of_parameters == (what == "other bodies")
+    assert 1 < len(part.torque_nm) < len(known.found.torque_nm)
+    later.go_on(part, UNWORN)
+    assert later.progress == pytest.approx(known.progress, abs=0.01)
+    for run in (restored, later):
+        assert_same(finished(run), known.found)
+        assert run.part is None
 
 
-def test_a_part_of_an_identification_goes_on_where_it_ended(small, identified, short) -> None:
-    found, snapshot, progress = identified
-    first, second = (TorqueReferenceRun(small) for _ in range(2))
-    first.restore(snapshot)
-    part = first.part
-    assert part is not None and part.is_of_parameters and len(part.torque_nm) < len(found.torque_nm)
-    second.go_on(part, UNWORN[:2])
-    assert second.progress == pytest.approx(progress, abs=0.06)
-    for torque, same in zip(found.torque_nm, finished(second).torque_nm, strict=True):
-        np.testing.assert_array_equal(torque, same)
-
-
-def test_masses_lengths_and_friction_are_changed_at_once(small, identified, short) -> None:
-    none, found = LegParameters.none(small), identified[0]
-    bodies = len(small.bodies)
-    levels = design(2 * bodies + 1)
-    assert len(found.torque_nm) == len(levels)
-    assert [len(torque) for torque in found.torque_nm[:3]] == [2, 1, 1]
-    assert (found.clearance_m == 3.0e-4).all()
+def test_masses_lengths_and_friction_are_changed_at_once(small, simulated, short) -> None:
+    none, found = LegParameters.none(small), simulated["other bodies"].found
+    assert [len(torque) for torque in found.torque_nm] == [2] + CHANGED * [1]
+    assert (found.clearance_m == FRESH_M).all()
     # one of them, simulated alone
-    mass, length, friction = np.split(levels[3], [bodies, 2 * bodies])
+    bodies = len(small.bodies)
+    mass, length, friction = np.split(design(2 * bodies + 1)[3], [bodies, 2 * bodies])
     own = LegParameters(none.mass + HEAVIER * mass, none.length + LONGER * length, ROUGHER ** friction.item())
     other = TorqueReferenceRun(own.applied(small))
-    other.begin(NEW[:2], UNWORN[:2], STEADY)
+    other.begin(NEW, UNWORN, STEADY)
     while not other.snapshot().done:
         other.advance()
     np.testing.assert_array_equal(other.snapshot().done[0][:1], found.torque_nm[3])
@@ -154,19 +158,16 @@ def test_levels_are_orthogonal_and_each_leg_has_its_opposite(parameters: int) ->
     assert not np.einsum("ni,njk->ijk", levels, pairs).any()
 
 
-def test_a_restored_run_continues_bit_for_bit(small, identified, short) -> None:
-    found, snapshot, progress = identified
-    other = TorqueReferenceRun(small)
-    other.restore(snapshot)
-    assert other.progress == progress
-    for one, same in zip(found.torque_nm, finished(other).torque_nm, strict=True):
-        np.testing.assert_array_equal(one, same)
+@pytest.fixture
+def open_leg(small) -> LegParameters:
+    """Parameters of a leg that does not close."""
+    none, crank = LegParameters.none(small), list(small.bodies).index("crank")
+    return attrs.evolve(none, length=none.length + 50.0 * np.eye(len(small.bodies))[crank])
 
 
-def test_a_leg_that_does_not_close_ends_a_run(leg, short) -> None:
-    none, run, other = LegParameters.none(leg), TorqueReferenceRun(leg), TorqueReferenceRun(leg)
-    crank = np.eye(len(leg.bodies))[list(leg.bodies).index("crank")]
-    run.begin(NEW, UNWORN, STEADY, attrs.evolve(none, length=none.length + 50.0 * crank))
+def test_a_leg_that_does_not_close_ends_a_run(small, short, open_leg) -> None:
+    run, other = TorqueReferenceRun(small), TorqueReferenceRun(small)
+    run.begin(NEW, UNWORN, STEADY, open_leg)
     assert run.advance() is None
     other.restore(run.snapshot())
     for each in (run, other):
@@ -175,13 +176,12 @@ def test_a_leg_that_does_not_close_ends_a_run(leg, short) -> None:
         assert not each.is_busy
 
 
-def test_a_live_run_ends_as_soon_as_a_leg_cannot_be_simulated(leg, short) -> None:
-    none, run, periods = LegParameters.none(leg), TorqueReferenceRun(leg), 0
+def test_a_live_run_ends_as_soon_as_a_leg_cannot_be_simulated(small, short, open_leg) -> None:
+    run, periods = TorqueReferenceRun(small), 0
     run.may_be_late = True
-    crank = np.eye(len(leg.bodies))[list(leg.bodies).index("crank")]
-    run.begin(NEW, UNWORN, STEADY, attrs.evolve(none, length=none.length + 50.0 * crank))
-    run.advance()  # its first leg is due in the second period, all of it in the 17th
-    while run.is_busy and periods < 15:
+    run.begin(NEW, UNWORN, STEADY, open_leg)
+    run.advance()  # its first leg is due in the second period, all of it in the sixth
+    while run.is_busy and periods < 4:
         while not run._ahead[0].done():
             time.sleep(0.01)
         assert run.advance() is None
@@ -189,9 +189,9 @@ def test_a_live_run_ends_as_soon_as_a_leg_cannot_be_simulated(leg, short) -> Non
     assert periods == 1
 
 
-def test_threads_that_are_behind_get_help(leg, short, whole) -> None:
+def test_threads_that_are_behind_get_help(small, short, whole) -> None:
     """Where a machine is busy, threads of low priority got nothing, and the node waited for them."""
-    run, stuck, found = TorqueReferenceRun(leg), Event(), None
+    run, stuck, found = TorqueReferenceRun(small), Event(), None
     for _ in range(run._threads):
         run._pool.submit(stuck.wait)
     try:
@@ -201,13 +201,12 @@ def test_threads_that_are_behind_get_help(leg, short, whole) -> None:
     finally:
         stuck.set()
     assert found is not None
-    for torque, same in zip(whole.torque_nm, found.torque_nm, strict=True):
-        np.testing.assert_array_equal(torque, same)
+    assert_same(found, whole)
 
 
-def test_a_live_run_never_waits(leg, short, whole) -> None:
+def test_a_live_run_never_waits(small, short, whole) -> None:
     """A node whose machine was busy waited 54 s for its threads, and its middleware lost what came."""
-    run, stuck, found = TorqueReferenceRun(leg), Event(), None
+    run, stuck, found = TorqueReferenceRun(small), Event(), None
     run.may_be_late = True
     for pool in (run._pool, run._urgent):
         for _ in range(run._threads):
@@ -227,15 +226,14 @@ def test_a_live_run_never_waits(leg, short, whole) -> None:
         time.sleep(0.001)
     assert not run.is_late
     assert found is not None  # a leg that is simulated while this looks is not one that cannot be
-    for torque, same in zip(whole.torque_nm, found.torque_nm, strict=True):
-        np.testing.assert_array_equal(torque, same)
+    assert_same(found, whole)
 
 
-def test_what_advance_returns_does_not_depend_on_how_long_the_thread_takes(leg, short) -> None:
-    quick, slow = TorqueReferenceRun(leg), TorqueReferenceRun(leg)
+def test_what_advance_returns_does_not_depend_on_how_long_the_thread_takes(small, short) -> None:
+    quick, slow = TorqueReferenceRun(small), TorqueReferenceRun(small)
     for run in (quick, slow):
         run.begin(NEW, UNWORN, STEADY)
-    for _ in range(8):
+    for _ in range(4):
         quick.advance()
         slow.advance()
         time.sleep(0.01)  # its threads are further

@@ -73,7 +73,7 @@ def bursts(rng: np.random.Generator, cycles: int) -> np.ndarray:
     return np.exp(0.3 * noise) * (1.0 + 0.2 * np.arange(cycles) / cycles)
 
 
-@pytest.mark.parametrize("cycles", [1100, 3600])
+@pytest.mark.parametrize("cycles", [1100, pytest.param(3600, marks=pytest.mark.slow)])
 def test_95_percent_lie_within_the_stated_error(cycles):
     rng, held, offs = np.random.default_rng(1), 0, []
     is_fast = np.arange(cycles) // 500 % 2 == 0

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import ConfigError, load_mechanism, simulate
+from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.mechanism.position import TURN, one_cycle
 
 FULL = {"model": "full"}
@@ -152,6 +153,15 @@ def test_the_largest_magnitude_of_the_torque_stands_beside_its_signed_percentile
         torque = simulate(leg, clearances=clearances, cycles=0.5, skip_cycles=0.0).drive_torque_nm
         assert torque.max_abs == max(-torque.min, torque.max) > 0.0
         assert torque.p99 <= torque.max
+
+
+def test_a_mechanism_can_be_given_by_name_and_by_path(leg, tmp_path):
+    (tmp_path / "my leg.yaml").write_text(
+        (share_directory() / "config/mechanisms/bionic_leg.yaml").read_text()
+    )
+    wanted = simulate(leg, clearances=(), cycles=1).to_dict()
+    for given in ("bionic_leg", tmp_path / "my leg.yaml"):
+        assert simulate(given, clearances=(), cycles=1).to_dict() == wanted
 
 
 @pytest.mark.plain

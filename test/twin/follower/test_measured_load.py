@@ -81,10 +81,10 @@ def test_the_force_is_that_of_its_time(twin, gait, stance, rate_hz, error):
     assert abs(wrong[:, 1] @ slope / (slope @ slope)) < 1.0e-4  # s late
 
 
-# Largest deviation of the mean forces, 5.3 sigma and the mean; mean and sigma of Archard's integral of 12 cycles
-# over that of the leg, less 1, by the joint. Starts moved by 1e-12 with other noise each: 12 in full coordinates,
-# 2026-11-25, 30 in clearance coordinates, 2026-11-26. J carries next to nothing in swing, and where the force
-# begins at a sample.
+# Largest deviation of the mean forces, 5.3 sigma and the mean; mean and sigma of Archard's integral of 12
+# cycles over that of the leg, less 1, by the joint. Starts moved by 1e-12 with other noise each: 12 in full
+# coordinates, 2026-11-25, 30 in clearance coordinates, 2026-11-26. J carries next to nothing in swing, and
+# where the force begins at a sample.
 OFF = {
     ("full", 3.0): (0.01, [0.003, 0.01, 0.035, 0.01, 0.13], [0.003, 0.034, 0.016, 0.022, 0.05]),
     ("clearance", 3.0): (0.013, [0.002, 0.020, 0.046, 0.004, 0.186], [0.003, 0.039, 0.018, 0.025, 0.037]),

@@ -3,12 +3,12 @@
 import attrs
 import numpy as np
 import pytest
+from counted_run import counted
 
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceRun
 from leg_wear_monitor.dynamics.full_run import FullRun
 from leg_wear_monitor.dynamics.run import DISSIPATION, FRICTION, POWER, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.dynamics.statistics import energy_balance
 from leg_wear_monitor.mechanism.loader import parse_mechanism
 from leg_wear_monitor.mechanism.position import TURN, one_cycle
 from leg_wear_monitor.mechanism.spec import ConstantLoad, PhaseLoad
@@ -27,10 +27,7 @@ def test_walls_that_wear_away_take_energy_along(leg, model, cycles, bound):
         for name, c in leg.clearances.items()
     }
     run = model(prepare(attrs.evolve(leg, clearances=fast), clearances=tuple("ABGIJ"), wear=True))
-    run.advance(1.0, new_run_statistics(len(leg.joints)))
-    statistics, start = new_run_statistics(len(leg.joints)), run.stored_energy
-    run.advance(1.0 + cycles, statistics)
-    energy = energy_balance(statistics, start, run.stored_energy)
+    statistics, energy = counted(run, 1.0, 1.0 + cycles)
     losses = energy.friction_loss + energy.contact_loss
     assert energy.wear_loss > 4.0e-3 * losses
     assert abs(energy.residual) < bound * losses
@@ -39,62 +36,38 @@ def test_walls_that_wear_away_take_energy_along(leg, model, cycles, bound):
 
 PUSH = 290.0  # N
 STANCE = tuple((0.2 * up, up) for up in (PUSH * max(0.0, np.sin(TURN * i / 16)) for i in range(16)))
-LOADS = {
-    "constant": {"force": (0.0, PUSH)},
-    "stance": {"phase": tuple(i / 16 for i in range(16)), "force": STANCE},
+FOOT = {"body": "foot", "point": "toe"}
+CONSTANT = ConstantLoad(**FOOT, force=(0.0, PUSH))
+STEP = PhaseLoad(**FOOT, phase=tuple(i / 16 for i in range(16)), force=STANCE)
+LIGHT = ConstantLoad(**FOOT, force=(0.0, 100.0))
+
+# Joints, load, friction coefficient, clearance [m], bound of the residual over the losses in ten cycles:
+# some three times what docs/appendix/validation_clearance.md lists, because the cycles of a run scatter. A
+# load does its work where the toe is, which the eccentricities move. Mean and sigma: 1.7e-3, 1.4e-4 at most
+# of the first two (of six cycles); 1.1e-3, 2e-5; -1.3e-3, 1.8e-3; 6.7e-3, 2.1e-3; 0, 7e-5; -1e-4, 2.2e-4
+# (10 moved starts, 2026-11-23)
+CASES = {
+    "A and B, 290 N": ("AB", CONSTANT, 0.05, 3.0e-4, 3.0e-3),
+    "a step": ("ABGIJ", STEP, 0.05, 3.0e-4, 3.0e-3),
+    "100 N": ("ABGIJ", LIGHT, 0.05, 3.0e-4, 3.0e-3),
+    "no friction": ("ABGIJ", None, 0.0, 3.0e-4, 1.5e-2),
+    "no friction, 100 N": ("ABGIJ", LIGHT, 0.0, 3.0e-4, 3.0e-2),
+    "0.04 mm": ("ABGIJ", None, 0.05, 4.0e-5, 1.0e-3),
+    "0.04 mm, friction 0.3": ("ABGIJ", None, 0.3, 4.0e-5, 5.0e-3),
 }
 
 
 @pytest.mark.chaotic
-@pytest.mark.parametrize("clearance_joints", ["AB", "ABGIJ"])
-@pytest.mark.parametrize("load", LOADS)
-def test_energy_of_the_clearance_model_under_a_foot_load(leg, clearance_joints, load):
-    """The load does its work where the toe is, which the eccentricities move.
-
-    Off by 1.7e-3 with a sigma of 1.4e-4 at most (10 starts moved by 1e-12, 2026-11-23).
-    """
-    kind = PhaseLoad if load == "stance" else ConstantLoad
-    pushed = attrs.evolve(leg, loads={"ground": kind(body="foot", point="toe", **LOADS[load])})
-    run = ClearanceRun(prepare(pushed, clearances=tuple(clearance_joints)))
-    run.advance(1.0, new_run_statistics(len(leg.joints)))
-    statistics, start = new_run_statistics(len(leg.joints)), run.stored_energy
-    run.advance(7.0, statistics)
-    energy = energy_balance(statistics, start, run.stored_energy)
-    assert abs(energy.residual) < 3.0e-3 * (energy.friction_loss + energy.contact_loss)
-
-
-def rubbing(leg, coefficient):
-    """The leg with another friction coefficient in its joints."""
+@pytest.mark.parametrize("case", CASES)
+def test_energy_of_the_clearance_model(leg, case):
+    joints, load, coefficient, clearance_m, bound = CASES[case]
     clearances = {
         name: attrs.evolve(one, friction=attrs.evolve(one.friction, coefficient=coefficient))
         for name, one in leg.clearances.items()
     }
-    return attrs.evolve(leg, clearances=clearances)
-
-
-# friction coefficient, force up at the toe [N], clearance [m], bound of the residual over the losses: some
-# three times what docs/appendix/validation_clearance.md lists, because the cycles of a run scatter. Mean and
-# sigma: 1.1e-3, 2e-5; -1.3e-3, 1.8e-3; 6.7e-3, 2.1e-3; 0, 7e-5; -1e-4, 2.2e-4 (10 moved starts, 2026-11-23)
-HARDER = {
-    "100 N": (0.05, 100.0, 3.0e-4, 3.0e-3),
-    "no friction": (0.0, 0.0, 3.0e-4, 1.5e-2),
-    "no friction, 100 N": (0.0, 100.0, 3.0e-4, 3.0e-2),
-    "0.04 mm": (0.05, 0.0, 4.0e-5, 1.0e-3),
-    "0.04 mm, friction 0.3": (0.3, 0.0, 4.0e-5, 5.0e-3),
-}
-
-
-@pytest.mark.chaotic
-@pytest.mark.parametrize("case", HARDER)
-def test_energy_of_the_clearance_model_in_harder_cases(leg, case):
-    coefficient, force, clearance_m, bound = HARDER[case]
-    load = ConstantLoad(body="foot", point="toe", force=(0.0, force))
-    harder = attrs.evolve(rubbing(leg, coefficient), loads={"ground": load})
-    run = ClearanceRun(prepare(harder, clearances=tuple("ABGIJ"), clearance_m=clearance_m))
-    run.advance(1.0, new_run_statistics(len(leg.joints)))
-    statistics, start = new_run_statistics(len(leg.joints)), run.stored_energy
-    run.advance(11.0, statistics)
-    energy = energy_balance(statistics, start, run.stored_energy)
+    other = attrs.evolve(leg, clearances=clearances, loads={"ground": load} if load else {})
+    run = ClearanceRun(prepare(other, clearances=tuple(joints), clearance_m=clearance_m))
+    _, energy = counted(run, 1.0, 11.0)
     assert abs(energy.residual) < bound * (energy.friction_loss + energy.contact_loss)
 
 

@@ -3,6 +3,7 @@
 import attrs
 import numpy as np
 import pytest
+from counted_run import counted
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -53,10 +54,7 @@ def greased(mechanism: Mechanism, viscosity: float, joints=FIVE) -> Mechanism:
 def walked(mechanism, begin, end, wear=False):
     """A run from 0, its statistics and its energy balance from a time to another [s]."""
     run = ClearanceRun(prepare(mechanism, clearances=FIVE, wear=wear))
-    run.advance(begin, new_run_statistics(len(mechanism.joints)))
-    statistics, stored = new_run_statistics(len(mechanism.joints)), run.stored_energy
-    run.advance(end, statistics)
-    return run, statistics, energy_balance(statistics, stored, run.stored_energy)
+    return run, *counted(run, begin, end)
 
 
 def rows_of(run):

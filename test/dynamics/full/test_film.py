@@ -6,11 +6,10 @@ Both limits of the viscosity, and that both formulations find the same, are in c
 import attrs
 import numpy as np
 import pytest
+from counted_run import counted
 
 from leg_wear_monitor.dynamics.full_run import FullRun
-from leg_wear_monitor.dynamics.run import new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.dynamics.statistics import energy_balance
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.loader import load_mechanism, parse_mechanism
 from leg_wear_monitor.mechanism.spec import Film
@@ -31,10 +30,7 @@ def oiled(mechanism, viscosity):
 
 def energy_of(mechanism, **options):
     """Energy balance of a cycle from the start."""
-    run, statistics = FullRun(prepare(mechanism, **options)), new_run_statistics(len(mechanism.joints))
-    stored = run.stored_energy
-    run.advance(CYCLE, statistics)
-    return energy_balance(statistics, stored, run.stored_energy)
+    return counted(FullRun(prepare(mechanism, **options)), 0.0, CYCLE)[1]
 
 
 @pytest.mark.parametrize("viscosity", [0.001, 0.1, 4.0])

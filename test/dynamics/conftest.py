@@ -1,54 +1,37 @@
 """Runs of the leg that several tests look at, each made once."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cache
 
 import attrs
 import numpy as np
 import pytest
+from counted_run import counted
 
 from leg_wear_monitor import Mechanism
 from leg_wear_monitor.dynamics.full_run import TOLERANCE_M, FullRun
 from leg_wear_monitor.dynamics.result import EnergyBalance
-from leg_wear_monitor.dynamics.run import ARCHARD, CONTACT, FORCE, RunStatistics, new_run_statistics
+from leg_wear_monitor.dynamics.run import ARCHARD, CONTACT, FORCE, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.dynamics.statistics import energy_balance
 
 
 @attrs.frozen(eq=False)
-class Cycle:
-    """One gait cycle of the leg at 60 rpm, which takes a second.
+class Cycles:
+    """Counted gait cycles of the leg at 60 rpm, each of which takes a second.
 
     Attributes
     ----------
-    statistics : RunStatistics
-    energy : EnergyBalance
-        Balance over the cycle [J].
-    depth : (k, 2) array
-        Largest wear on bushing and journal of the clearance joints since the start of counting [m].
+    force, archard, contact : (cycles, k) arrays
+        Mean contact force [N], Archard's integral [J] and fraction of the time in contact of each clearance
+        joint.
+    energy : list of EnergyBalance
+        Balance over each cycle [J].
     """
 
-    statistics: RunStatistics
-    energy: EnergyBalance
-    depth: np.ndarray
-
-
-class Cycles:
-    """Counted cycles of the leg with some clearance joints.
-
-    Parameters
-    ----------
-    joints : (k,) array of int
-        The clearance joints.
-    cycles : sequence of Cycle
-    """
-
-    def __init__(self, joints: np.ndarray, cycles: Sequence[Cycle]) -> None:
-        self.cycles = cycles
-        integrals = np.array([cycle.statistics.integral[joints] for cycle in cycles])
-        self.force = integrals[:, :, FORCE]  # mean contact force [N] of each cycle and clearance joint
-        self.archard = integrals[:, :, ARCHARD]  # J
-        self.contact = integrals[:, :, CONTACT]  # fraction of the time
+    force: np.ndarray
+    archard: np.ndarray
+    contact: np.ndarray
+    energy: list[EnergyBalance]
 
 
 def _mirrored(mechanism: Mechanism) -> Mechanism:
@@ -89,14 +72,11 @@ def leg_cycles(leg: Mechanism) -> Callable[..., Cycles]:
         clearance_joints: str, count: int, clearance_m: float = 3.0e-4, tolerance_m: float = TOLERANCE_M
     ) -> Cycles:
         setup = prepare(leg, clearances=tuple(clearance_joints), clearance_m=clearance_m)
-        motion, joints = FullRun(setup, tolerance_m=tolerance_m), len(leg.joints)
-        motion.advance(1.0, new_run_statistics(joints))
-        before, cycles = setup.surfaces.depth.copy(), []
-        for second in range(1, count + 1):
-            statistics, stored = new_run_statistics(joints), motion.stored_energy
-            motion.advance(1.0 + second, statistics)
-            energy = energy_balance(statistics, stored, motion.stored_energy)
-            cycles.append(Cycle(statistics, energy, (setup.surfaces.depth - before).max(axis=2)))
-        return Cycles(setup.contacts.joint, cycles)
+        motion = FullRun(setup, tolerance_m=tolerance_m)
+        motion.advance(1.0, new_run_statistics(len(leg.joints)))
+        cycles = [counted(motion, 0.0, 1.0 + second) for second in range(1, count + 1)]
+        integrals = np.array([statistics.integral[setup.contacts.joint] for statistics, _ in cycles])
+        sums = (integrals[:, :, what] for what in (FORCE, ARCHARD, CONTACT))
+        return Cycles(*sums, [energy for _, energy in cycles])
 
     return run

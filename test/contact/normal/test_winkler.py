@@ -5,6 +5,7 @@ import math
 import attrs
 import numpy as np
 import pytest
+from counted_run import counted
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
@@ -20,7 +21,6 @@ from leg_wear_monitor.dynamics.clearance.stepper import ClearanceRun
 from leg_wear_monitor.dynamics.full_run import FullRun
 from leg_wear_monitor.dynamics.run import ARCHARD, CONTACT, FORCE, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.dynamics.statistics import energy_balance
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.loader import load_mechanism
 
@@ -139,14 +139,11 @@ def moved(model, leg, clearance_joints, cycles, wear=False, pace=1.0):
     }
     mechanism = attrs.evolve(leg, clearances=worn)
     setup = prepare(mechanism, clearances=tuple(clearance_joints), wear=wear, normal_law="winkler")
-    run, integrals, energy = model(setup), [], []
+    run = model(setup)
     run.advance(1.0, new_run_statistics(len(leg.joints)))
-    for cycle in range(cycles):
-        statistics, stored = new_run_statistics(len(leg.joints)), run.stored_energy
-        run.advance(2.0 + cycle, statistics)
-        integrals.append(statistics.integral[setup.contacts.joint])
-        energy.append(energy_balance(statistics, stored, run.stored_energy))
-    return np.array(integrals), energy, setup.surfaces.depth
+    found = [counted(run, 0.0, 2.0 + cycle) for cycle in range(cycles)]
+    integrals = np.array([statistics.integral[setup.contacts.joint] for statistics, _ in found])
+    return integrals, [energy for _, energy in found], setup.surfaces.depth
 
 
 @pytest.mark.chaotic

@@ -110,8 +110,7 @@ def test_energy_with_clearances(leg_cycles, clearance_joints):
 
     Off by 7.5e-5 with a sigma of 3.2e-5 for I and J, by 1e-5 for the others (80 cycles of each, 2026-11-23).
     """
-    for cycle in leg_cycles(clearance_joints, CYCLES).cycles:
-        energy = cycle.energy
+    for energy in leg_cycles(clearance_joints, CYCLES).energy:
         assert energy.friction_loss > 0.0
         assert energy.contact_loss > 0.0
         assert abs(energy.residual) < 1.0e-3 * (energy.friction_loss + energy.contact_loss)

@@ -1,5 +1,6 @@
 """Lives that spread: in each the first joint goes all the way, and their ends fill the room of clearances."""
 
+import json
 from itertools import islice
 
 import numpy as np
@@ -31,6 +32,7 @@ def test_factors_make_up_for_what_joints_grow(begun):
 def test_a_life_as_a_table_is_its_json_row_by_row(begun):
     life = begun.life
     columns, record = life.columns(), life.to_dict()
+    assert json.loads(life.to_json()) == record
     assert columns["joint"] == ["A", "A", "J", "J"]
     assert columns["cycles"] == record["cycles"] * 2
     assert record["joints"]["J"]["worst_sector_deg"][0] is None  # nothing is worn yet

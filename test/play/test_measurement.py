@@ -1,11 +1,14 @@
 """Play of synthetic rocks: how often it is right, and what is refused."""
 
+import json
+
 import numpy as np
 import pytest
 from play.coverage import coverage
 from play.rocks import rocks
 
 from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.play.fit import PlayMeasurement
 from leg_wear_monitor.play.measurement import measure_play
 
 pytestmark = pytest.mark.plain
@@ -53,6 +56,15 @@ def test_a_drift_is_removed_and_named() -> None:
 def test_stiction_that_spoils_the_play_is_named() -> None:
     one = rocks(6, stuck=0.6, counts=50.0, pushes=40, noise=0.0)
     assert any("stiction" in finding for finding in measured(one).findings)
+
+
+def test_json_has_every_field() -> None:
+    found = measured(rocks(7))
+    plain = json.loads(PlayMeasurement(plays=(found,)).to_json())
+    assert plain["schema_version"] == 1
+    assert plain["is_sure"] is True
+    assert plain["plays"][0]["play_rad"] == found.play_rad
+    assert plain["plays"][0]["plateaus"] == list(found.plateaus)
 
 
 def refusal(*arguments, **given) -> str:

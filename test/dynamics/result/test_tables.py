@@ -1,5 +1,7 @@
 """A result's tables have what its JSON has, a value's column named by its path."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -49,6 +51,12 @@ def flat(record, path=""):
         else:
             found[path + key] = value
     return found
+
+
+def test_json_has_lists_and_null(result):
+    record = json.loads(result.to_json())
+    assert record["joints"]["B"]["wear_zone_deg"] == [10.0, 90.0]
+    assert record["impacts"]["B"][1]["end_s"] is None
 
 
 def test_joints(result):

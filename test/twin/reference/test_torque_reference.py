@@ -19,6 +19,7 @@ from leg_wear_monitor.twin.torque_reference import (
     TorqueReference,
     TorqueReferenceRun,
     design,
+    levels_of,
 )
 from leg_wear_monitor.wear import SECTORS
 
@@ -56,7 +57,7 @@ def shorten(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(torque_reference, "PACE", 1)
     patch.setattr(torque_reference, "_SETTLING", 0)
     patch.setattr(torque_reference, "WIDER", WIDER)
-    patch.setattr(torque_reference, "levels_of", lambda near: design(2 * len(near.mass) + 1)[: 1 + CHANGED])
+    patch.setattr(torque_reference, "levels_of", lambda near: levels_of(near)[: 1 + CHANGED])
 
 
 @pytest.fixture
@@ -137,7 +138,7 @@ def test_masses_lengths_and_friction_are_changed_at_once(small, simulated, short
     assert (found.clearance_m == FRESH_M).all()
     # one of them, simulated alone
     bodies = len(small.bodies)
-    mass, length, friction = np.split(design(2 * bodies + 1)[3], [bodies, 2 * bodies])
+    mass, length, friction = np.split(levels_of(none)[3], [bodies, 2 * bodies])
     own = LegParameters(none.mass + HEAVIER * mass, none.length + LONGER * length, ROUGHER ** friction.item())
     other = TorqueReferenceRun(own.applied(small))
     other.begin(NEW, UNWORN, STEADY)

@@ -22,7 +22,14 @@ from leg_wear_monitor.dynamics.clearance.contact import (
     STIFFNESS,
     VECTORS,
 )
-from leg_wear_monitor.dynamics.clearance.film_system import GAMMA, factorise_films, solve_films
+from leg_wear_monitor.dynamics.clearance.film_system import (
+    GAMMA,
+    contact_system,
+    factorise_contacts,
+    factorise_films,
+    solve_contacts,
+    solve_films,
+)
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceRun, ClearanceStepper
 from leg_wear_monitor.dynamics.clearance.tables import COARSER, build_tables
 from leg_wear_monitor.dynamics.full_run import FullRun
@@ -115,6 +122,31 @@ def test_the_system_is_solved(seed, viscosity):
     rates = np.linalg.solve(np.eye(d) + inverse_mass @ whole, pulled)
     np.testing.assert_allclose(x[3], rates, rtol=1.0e-7, atol=1.0e-9 * np.abs(pulled).max())
     np.testing.assert_allclose(x[2], x[0] + g * x[3], rtol=1.0e-12)
+
+
+@pytest.mark.plain
+def test_without_films_it_is_the_system_of_the_contacts():
+    """Dry joints, two of three in contact, one of them on a wall that turns."""
+    random, k, h = np.random.default_rng(3), 3, 1.0e-5
+    d = 2 * k
+    a = random.normal(size=(d, d))
+    inverse_mass, sample = a @ a.T + np.eye(d), np.zeros((SAMPLE_ROWS, padded(k)))
+    for j, angle in enumerate((0.3, 2.0, 4.0)):
+        sample[[NX, NY], j] = np.cos(angle), np.sin(angle)
+        sample[F_N, j], sample[STIFFNESS, j] = (20.0 if j != 1 else 0.0), 2.0e7
+        sample[DAMPING, j], sample[CAM, j] = 500.0, 1.0e-4 * j
+    x, system = np.zeros((VECTORS, 2 * padded(k))), contact_system(k)
+    x[:, :d] = random.normal(size=(VECTORS, d))
+    m = factorise_contacts(h, inverse_mass, TURN, sample, system)
+    factorise_films(
+        h, np.zeros((k, 4)), 5.0e-5, inverse_mass, TURN, sample,
+        system.block, system.stiff, system.push, system.matrix,
+    )  # fmt: skip
+    for stage in (1.0, -1.0, 0.0):
+        solve_contacts(h, system, m, stage, x, 0, 1, 2, 3)
+        solve_films(h, stage, inverse_mass, system.stiff, system.push, system.matrix, x, 0, 1, 4, 5)
+        np.testing.assert_allclose(x[5], x[3], rtol=1.0e-8, atol=1.0e-10)
+        np.testing.assert_allclose(x[4], x[2], rtol=1.0e-8, atol=1.0e-10)
 
 
 # --- energy ---

@@ -35,6 +35,11 @@ _LEAST_CYCLES = 2  # since a change, before it is explained: the first contains 
 _LEAST_CYCLES_UNLIKE = 6  # where the leg is not that of its reference: two strange steps are no change
 _FIT_EVERY = 10  # gait cycles, while nothing changes
 
+# times the detector's threshold, from which on a size does not depend on which cycles were detected. Four
+# cycles of J at 0.55 mm under 300 N gave 1.03 ± 0.17 mm at 2.1 times the threshold; G at 2 mm has 94, and G
+# and I at 0.6 mm, whose sizes are right from the third cycle on, 3 to 7 (2026-11-26)
+_FAR_BEYOND = 4.0
+
 # mean square up to which a leg that was never commissioned fits: 0.4 to 0.9 for legs with masses 4 % off and
 # a joint at 0.36 to 1 mm, from 1.1 on behind a low-pass of 50 Hz or a lag (docs/explanation/diagnosis.md)
 _GOOD = 1.5
@@ -124,7 +129,7 @@ class Evidence:
             state.fit, state.least_m = None, ()
         else:
             self._fit(state, mean, len(cycles), change, explanations if since_ns else ())
-            self._keep_least(state, change, config.alarms.on_delay_cycles)
+            self._keep_least(state, change, config)
 
     def _least_cycles(self, state: TorqueState) -> int:
         """Gait cycles since a change before it is explained."""
@@ -178,21 +183,25 @@ class Evidence:
         state.fit = with_rivals(found, explanations, explainer.joints)
         state.fit_cycles = cycles
 
-    def _keep_least(self, state: TorqueState, change: Change | None, number: int) -> None:
-        """Keep the clearances that joints surely have by the last fits, of some cycles each.
+    def _keep_least(self, state: TorqueState, change: Change | None, config: MonitorConfig) -> None:
+        """Keep the clearances that joints surely have by the last fits, as many as an alarm waits for.
 
-        The first gait cycles of a change are chosen by what they show: of thirteen walks with J at 0.55 mm
-        under 300 N, the first four cycles of one gave 1.03 ± 0.17 mm, five 0.77 ± 0.13 mm (2026-11-26). A
-        fit of as many cycles as settle a change counts as all of them.
+        The first gait cycles of a change are those that made it one, and show too much of it. That is no
+        matter where they are far more than it takes, nor in as many cycles as settle a change: then one fit
+        counts as all of them.
         """
         if state.fit is None:
             return
-        least_m = state.fit.clearance_m - SURE_SIGMAS * state.fit.sigma_m
+        least_m, number = (
+            state.fit.clearance_m - SURE_SIGMAS * state.fit.sigma_m,
+            config.alarms.on_delay_cycles,
+        )
+        is_enough = state.fit_cycles >= SETTLING_CYCLES
         if change is not None and change.cause is Cause.CLEARANCE:
             k = self._models.explainer(state).joints.index(change.subject)
             least_m[k] = max(least_m[k], change.value - SURE_SIGMAS * change.sigma)
-        is_settled = state.fit_cycles >= SETTLING_CYCLES
-        state.least_m = (least_m,) * number if is_settled else (*state.least_m, least_m)[-number:]
+            is_enough |= change.log_odds >= _FAR_BEYOND * self._models.detector(state, config).threshold
+        state.least_m = (least_m,) * number if is_enough else (*state.least_m, least_m)[-number:]
 
 
 def _is_of_reference(explanations: Sequence[Explanation]) -> bool:

@@ -30,7 +30,3 @@ def test_their_sum_is_the_torque_of_the_leg(leg, speed, acceleration) -> None:
     expected = one_cycle(build_linkage(leg), POINTS, speed, acceleration).drive_torque
     found = np.array([1.0, speed, speed**2, acceleration]) @ body_torques(leg).own
     np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
-
-
-def test_they_are_computed_once(leg) -> None:
-    assert body_torques(leg) is body_torques(leg)

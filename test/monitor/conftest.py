@@ -1,6 +1,8 @@
 """Wear to be kept, without a leg that made it."""
 
+import sqlite3
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -9,6 +11,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import Mechanism, WearMonitor
+from leg_wear_monitor import open_ledger as wear_ledger
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.ledger.entry import Binding, Entry, JointWear, WalkedLoad
@@ -57,6 +60,33 @@ def open_ledger(tmp_path: Path, binding: Binding) -> Iterator[Callable[..., Ledg
 
     yield open_
     for ledger in opened:
+        ledger.close()
+
+
+@pytest.fixture
+def rows(tmp_path: Path) -> Callable[[str], list[Any]]:
+    """What a query finds in the ledger of this test."""
+
+    def found(query: str) -> list[Any]:
+        with closing(sqlite3.connect(tmp_path / "wear.ledger")) as db:
+            return db.execute(query).fetchall()
+
+    return found
+
+
+@pytest.fixture
+def begin(leg: Mechanism, tmp_path: Path) -> Iterator[Callable[..., WearMonitor]]:
+    """Begin a run of a monitor of joints A and G on the ledger of this test; all are closed at its end."""
+    begun = []
+
+    def run(values: Mapping[str, Any] = MappingProxyType({})) -> WearMonitor:
+        own = {"ledger.path": str(tmp_path / "wear.ledger"), "clearance_joints": ["A", "G"]}
+        config = config_from(own | dict(values))
+        begun.append(wear_ledger(leg, config))
+        return WearMonitor(leg, config, begun[-1])
+
+    yield run
+    for ledger in begun:
         ledger.close()
 
 

@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 from readings_as_samples import samples
+from told import raised, status_of
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.errors import ConfigError
@@ -55,15 +56,15 @@ def monitored(walk: Samples, model: str = "measured", source: str = "wrench") ->
     return monitor
 
 
-def raised(monitor: lw.WearMonitor) -> set[str]:
+def of_foot_load(monitor: lw.WearMonitor) -> set[str]:
     """Alarms of the foot load's sensor at ERROR."""
-    return {one.name for one in monitor.alarms.alarms if "foot_load" in one.name and one.level is Level.ERROR}
+    return {name for name in raised(monitor) if "foot_load" in name}
 
 
 def test_a_healthy_leg_on_the_ground_is_healthy(walk):
     monitor = monitored(walk)
     assert monitor.verdict.verdict.state.value == "healthy"
-    assert not raised(monitor)
+    assert not of_foot_load(monitor)
     load, stance = monitor.state.load, nominal_stance(build_linkage(lw.load_mechanism("bionic_leg")))
     assert load.source == "measured"
     # ten steps scatter by 10 % in size and by 2 % of a turn in time
@@ -71,15 +72,15 @@ def test_a_healthy_leg_on_the_ground_is_healthy(walk):
     assert load.heel_strike_phase == pytest.approx(stance.heel_strike, abs=0.01 + 5.3 * 0.02 / 10**0.5)
     assert load.toe_off_phase == pytest.approx(stance.toe_off, abs=0.01 + 5.3 * 0.02 / 10**0.5)
     assert 0.0 < load.peak_sigma_n < 0.4 * PEAK_N
-    status = next(one for one in monitor.status() if one.name == "foot_load")
+    status = status_of(monitor, "foot_load")
     assert status.level is Level.OK and status.values["peak_n"] == load.peak_n
 
 
 def test_without_the_sensor_the_torque_shows_a_stance_and_no_mismatch(walk):
     """Until a load that nobody declared could be a stance, this healthy leg had the alarm of a mismatch."""
     monitor = monitored(walk, "none")
-    assert not [one.name for one in monitor.alarms.alarms if one.level]
-    (torque,) = (one.values for one in monitor.status() if one.name == "torque")
+    assert not raised(monitor, Level.WARN)
+    torque = status_of(monitor, "torque").values
     # steps scatter by 10 %, and the load is known from some ten of them
     assert torque["load_acting_n"] == pytest.approx(PEAK_N, rel=0.05 + 5.3 * 0.1 / 10**0.5)
 
@@ -104,25 +105,26 @@ def other_foot(t, force):
     "change, alarm",
     [
         (held, "foot_load_stuck"),
-        (lambda t, force: 0.0 * force, "foot_load_stuck"),
         (lambda t, force: force + np.array([0.0, 50.0]), "foot_load_zero"),
         (lambda t, force: force + 12.0 * t[:, None] * np.array([0.0, 1.0]), "foot_load_zero"),
         (lambda t, force: 10.0 * force, "foot_load_scale"),
-        (lambda t, force: 1000.0 * force, "foot_load_scale"),
         (lambda t, force: 0.001 * force, "foot_load_scale"),
         (other_foot, "foot_load_exchanged"),
         (lambda t, force: -force, "foot_load_sign"),
     ],
-    ids=["stuck", "zeros", "zero", "drift", "ten times", "thousand times", "kN", "other foot", "sign"],
+    ids=["stuck", "zero", "drift", "ten times", "kN", "other foot", "sign"],
 )
-@pytest.mark.parametrize("model", ["measured", "none"])
-def test_each_fault_of_the_sensor_is_named(walk, change, alarm, model):
-    monitor = monitored(changed(change, walk), model)
-    assert raised(monitor) - {"input_rate foot_load", "input_gaps foot_load"} == {alarm}
+def test_each_fault_of_the_sensor_is_named(walk, change, alarm):
+    monitor = monitored(changed(change, walk))
+    assert of_foot_load(monitor) - {"input_rate foot_load", "input_gaps foot_load"} == {alarm}
     found = {finding.code: finding for finding in monitor.verdict.findings}
     assert FOOT_LOAD_WORDS[alarm] in found[alarm.upper()].why
-    status = next(one for one in monitor.status() if one.name == "foot_load")
+    status = status_of(monitor, "foot_load")
     assert status.level is Level.ERROR and FOOT_LOAD_WORDS[alarm] in status.message
+
+
+def test_a_fault_is_named_too_where_the_load_is_not_used(walk):
+    assert of_foot_load(monitored(changed(lambda t, force: 0.0 * force, walk), "none")) == {"foot_load_stuck"}
 
 
 def test_a_wrong_load_does_not_wear(walk):
@@ -149,7 +151,7 @@ def test_missing_samples_are_named_and_the_crank_is_monitored(walk, begin_s, end
         else ((walk["kind"] == LOAD) & (t % 1.0 > 0.3) & (t % 1.0 < 0.7))
     )
     monitor = monitored(walk[~gone])
-    assert f"{alarm} foot_load" in raised(monitor)
+    assert f"{alarm} foot_load" in of_foot_load(monitor)
     assert "FOOT_LOAD_MISSING" in {finding.code for finding in monitor.verdict.findings}
     assert monitor.lost.unmonitored_s < 1.0
 
@@ -161,7 +163,7 @@ def test_a_contact_switch_gives_heel_strike_and_toe_off(walk):
         "contact",
     )
     stance = nominal_stance(build_linkage(lw.load_mechanism("bionic_leg")))
-    assert not raised(monitor)
+    assert not of_foot_load(monitor)
     assert monitor.state.load.peak_n is None
     assert monitor.state.load.heel_strike_phase == pytest.approx(stance.heel_strike, abs=0.05)
     assert monitor.state.load.toe_off_phase == pytest.approx(stance.toe_off, abs=0.05)

@@ -1,48 +1,31 @@
 """A measured clearance beside the counted one: status, alarm and verdict, in a run and the next."""
 
 import pytest
+from told import status_of
 
-from leg_wear_monitor import WearMonitor, open_ledger
-from leg_wear_monitor.monitor.config.parameters import config_from
+from leg_wear_monitor import open_ledger
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.state import Level
 
 START_NS = 1_700_000_000_123_456_789
-LIMIT_M = 6.0e-4
-
-
-@pytest.fixture
-def begin(leg, tmp_path):
-    """Begin a run of a monitor on the ledger of this test."""
-    values = {
-        "ledger.path": str(tmp_path / "wear.ledger"),
-        "clearance_joints": ["A", "G"],
-        "diagnosis.enabled": False,
-        "limits.clearance_m": LIMIT_M,
-    }
-    config = config_from(values)
-    return lambda: WearMonitor(leg, config, open_ledger(leg, config))
-
-
-def status(monitor, joint):
-    return next(one for one in monitor.status() if one.name == f"joint {joint}")
+MEASURED = {"diagnosis.enabled": False, "limits.clearance_m": 6.0e-4}
 
 
 def test_a_measured_clearance_stands_beside_the_counted_one_and_raises_its_alarm(begin, gait) -> None:
-    monitor = begin()
+    monitor = begin(MEASURED)
     monitor.update(gait(2.5))
-    assert status(monitor, "G").level is Level.OK
-    counted_m = status(monitor, "G").values["clearance_m"]
+    assert status_of(monitor, "joint G").level is Level.OK
+    counted_m = status_of(monitor, "joint G").values["clearance_m"]
     found = monitor.measure("G", 5.8e-4, 5e-6, START_NS, "ann", accept=True)
     assert found.measurement.counts
-    told = status(monitor, "G")
+    told = status_of(monitor, "joint G")
     assert (told.level, told.fault_code) == (Level.WARN, "CLEARANCE_G")
     assert "0.58 mm ± 0.005 mm was measured, 0.3 mm is counted" in told.message
     assert told.values["clearance_m"] == counted_m
     assert told.values["measured_clearance_m"] == 5.8e-4
-    assert status(monitor, "A").level is Level.OK
+    assert status_of(monitor, "joint A").level is Level.OK
     monitor.measure("G", 6.1e-4, 5e-6, START_NS, "ann", accept=True)
-    assert status(monitor, "G").level is Level.ERROR
+    assert status_of(monitor, "joint G").level is Level.ERROR
     verdict = monitor.verdict.verdict
     assert (verdict.state.value, verdict.fault_code) == ("stop", "CLEARANCE_G")
     assert verdict.why.startswith("the ")
@@ -50,28 +33,26 @@ def test_a_measured_clearance_stands_beside_the_counted_one_and_raises_its_alarm
     evidence = {each.name: each.value for each in verdict.evidence}
     assert evidence["measured clearance G"] == 6.1e-4
     assert evidence["counted clearance G"] == pytest.approx(counted_m, rel=1e-3)
-    monitor.close()
 
 
 def test_what_contradicts_the_model_raises_the_alarm_too_and_a_new_part_ends_it(begin, gait) -> None:
-    monitor = begin()
+    monitor = begin(MEASURED)
     monitor.update(gait(2.5))
     found = monitor.measure("G", 1.2e-3, 5e-6, START_NS, "ann")
     assert found.contradicts and not found.measurement.counts
-    assert status(monitor, "G").level is Level.ERROR
-    assert "contradicts the model, not in the forecast" in status(monitor, "G").message
+    assert status_of(monitor, "joint G").level is Level.ERROR
+    assert "contradicts the model, not in the forecast" in status_of(monitor, "joint G").message
     assert monitor.verdict.verdict.why.startswith("the measured clearance of joint G (knee) is 1.2 mm")
     monitor.reset_wear("G", START_NS + 1, "ann")
     monitor.update(gait(3.0, begin_s=2.5))
-    assert "measured" not in status(monitor, "G").message
-    told = status(monitor, "G")  # nobody has to acknowledge what was of the old part
+    assert "measured" not in status_of(monitor, "joint G").message
+    told = status_of(monitor, "joint G")  # nobody has to acknowledge what was of the old part
     assert (told.level, told.fault_code) == (Level.WARN, "PART_REPLACED_G")
     assert not any(alarm.level for alarm in monitor.alarms.alarms if alarm.subject == "G")
-    monitor.close()
 
 
 def test_what_was_measured_between_two_runs_is_judged_with_the_first_samples(begin, gait) -> None:
-    first = begin()
+    first = begin(MEASURED)
     first.update(gait(2.5))
     first.close()
     config = first.config
@@ -81,19 +62,18 @@ def test_what_was_measured_between_two_runs_is_judged_with_the_first_samples(beg
     kept.note(Measurement(START_NS, "G", "ann", 7e-4, 5e-6, wear_m, part.cycles, 0, 0.9, True))
     kept.record()
     kept.close()
-    again = begin()
-    assert "was measured" in status(again, "G").message
+    again = begin(MEASURED)
+    assert "was measured" in status_of(again, "joint G").message
     reports = again.update(gait(1.0, begin_s=2.5))
     raised = [alarm.name for alarms in reports.alarms for alarm in alarms.alarms if alarm.level]
     assert "clearance G" in raised
-    assert status(again, "G").level is Level.ERROR
+    assert status_of(again, "joint G").level is Level.ERROR
     again.close()
     kept = open_ledger(first.mechanism, config)
     kept.withdraw(1, START_NS, "ann")
     kept.record()
     kept.close()
-    third = begin()
+    third = begin(MEASURED)
     third.update(gait(3.0, begin_s=3.5))
     third.acknowledge(START_NS)
-    assert status(third, "G").level is Level.OK
-    third.close()
+    assert status_of(third, "joint G").level is Level.OK

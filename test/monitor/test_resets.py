@@ -1,26 +1,16 @@
 """A reset that is taken back: the part was not replaced, and its wear went on."""
 
-import sqlite3
-from contextlib import closing
-
 import numpy as np
 import pytest
 
-from leg_wear_monitor import WearMonitor, open_ledger
+from leg_wear_monitor import WearMonitor
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.monitor.config.parameters import config_from
 
 START_NS = 1_700_000_000_123_456_789
 
 
-@pytest.fixture
-def begin(leg, tmp_path):
-    """Begin a run of a monitor on the ledger of this test."""
-    config = config_from({"ledger.path": str(tmp_path / "wear.ledger"), "clearance_joints": ["A", "G"]})
-    return lambda: WearMonitor(leg, config, open_ledger(leg, config))
-
-
-def test_wear_before_and_since_a_reset_is_of_one_part_once_it_is_taken_back(begin, gait, tmp_path) -> None:
+def test_wear_before_and_since_a_reset_is_of_one_part_once_it_is_taken_back(begin, gait, rows) -> None:
     monitor = begin()
     monitor.update(gait(2.5))
     worn = monitor.wear_of("G")
@@ -41,13 +31,11 @@ def test_wear_before_and_since_a_reset_is_of_one_part_once_it_is_taken_back(begi
     with pytest.raises(LegWearError, match="joint G: the ledger has no reset to undo"):
         monitor.undo_reset("G", START_NS + 8, "bob")
     monitor.close()
-    with closing(sqlite3.connect(tmp_path / "wear.ledger")) as db:
-        audit = db.execute("SELECT id, who, what, undoes FROM audit ORDER BY id").fetchall()
+    audit = rows("SELECT id, who, what, undoes FROM audit ORDER BY id")
     assert audit == [(1, "ann", "reset_wear", None), (2, "bob", "undo_reset", 1)]
     again = begin()
     assert np.array_equal(again.wear_of("G").depth, now.depth)
     assert again.wear_of("G").cycles == now.cycles
-    again.close()
 
 
 def test_without_a_ledger_there_is_nothing_to_take_back(leg) -> None:

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from readings_as_samples import samples
+from told import raised, status_of
 
 from leg_wear_monitor.errors import ConfigError, LegWearError
 from leg_wear_monitor.gait.config import GaitConfig, KnockConfig
@@ -104,10 +105,8 @@ def test_a_gait_cycle_is_reported_as_the_twin_saw_it(monitor, gait):
 
 def test_a_steady_gait_alarms_only_of_what_is_missing(monitor, gait):
     reports = monitor.update(gait(6.0))
-    raised = {
-        alarm.name for change in reports.alarms for alarm in change.alarms if alarm.level is not Level.OK
-    }
-    assert raised == {"input_rate torque"}
+    ever = {alarm.name for change in reports.alarms for alarm in change.alarms if alarm.level}
+    assert ever == {"input_rate torque"}
 
 
 def with_torque(samples, torque_nm):
@@ -145,15 +144,14 @@ def test_a_bushing_that_breaks_out_shows_in_the_torque_within_four_gait_cycles(m
     knock_ns = START + 4 * SECOND
     config = GaitConfig(duration_s=9.5, knock=KnockConfig(joint="A", at_s=4.0))
     reports = monitor.update(samples(readings(SyntheticLeg(config), config), START))
-    raised = [
+    first_ns = next(
         change.stamp_ns
         for change in reports.alarms
         for alarm in change.alarms
         if alarm.name == "torque_mismatch" and alarm.level is Level.ERROR
-    ]
-    assert knock_ns < raised[0] <= knock_ns + 4 * SECOND
-    named = {alarm.name for alarm in monitor.alarms.alarms if alarm.level is not Level.OK}
-    assert named == {"torque_mismatch", "clearance A"}
+    )
+    assert knock_ns < first_ns <= knock_ns + 4 * SECOND
+    assert raised(monitor, Level.WARN) == {"torque_mismatch", "clearance A"}
 
 
 def test_alarms_are_acknowledged(monitor, gait):
@@ -167,24 +165,19 @@ def test_alarms_are_acknowledged(monitor, gait):
     monitor.update(gait(3.0, begin_s=6.0))
     cleared, kept = monitor.acknowledge(0)
     assert {alarm.kind for alarm in cleared} == {"impact_force"}
-    assert {alarm.kind for alarm in kept} == {
-        "clearance",
-        "remaining_life",
-        "input_rate",
-    }  # beyond its limit, a joint has no life left
+    # beyond its limit, a joint has no life left
+    assert {alarm.kind for alarm in kept} == {"clearance", "remaining_life", "input_rate"}
     assert all(alarm.acknowledged for alarm in kept)
-    assert {alarm.name for alarm in monitor.alarms.alarms if alarm.level is not Level.OK} == {
-        alarm.name for alarm in kept
-    }
+    assert raised(monitor, Level.WARN) == {alarm.name for alarm in kept}
 
 
 def test_a_reset_gives_fresh_surfaces_to_one_joint(monitor, gait):
     monitor.update(gait(12.0))
-    before = {status.name: status.values for status in monitor.status()}
+    before = {name: status_of(monitor, f"joint {name}").values["clearance_m"] for name in "AG"}
     monitor.reset_wear("G", START, "ann")
-    after = {status.name: status.values for status in monitor.status()}
-    assert after["joint G"]["clearance_m"] == 3.0e-4 < before["joint G"]["clearance_m"]
-    assert after["joint A"]["clearance_m"] == before["joint A"]["clearance_m"]
+    after = {name: status_of(monitor, f"joint {name}").values["clearance_m"] for name in "AG"}
+    assert after["G"] == 3.0e-4 < before["G"]
+    assert after["A"] == before["A"]
     (cycle,) = monitor.update(gait(1.0, begin_s=12.0)).cycles
     growth = {joint.joint: joint.growth_m_per_cycle for joint in cycle.joints}
     assert growth["G"] is None  # of the new part there is not enough data
@@ -208,31 +201,23 @@ def test_statuses_keep_their_names_and_hold_plain_numbers(monitor, gait):
     assert len(set(names)) == len(names)
 
 
-def test_without_a_ledger_saving_is_refused(monitor):
-    with pytest.raises(LegWearError, match=r"set ledger.path"):
-        monitor.save()
-
-
 def test_limits_change_while_it_runs(monitor, gait):
     monitor.update(gait(3.0))
     monitor.configure(changed(monitor.config, {"limits.clearance_m": 2.0e-4, "alarms.on_delay_cycles": 1}))
     reports = monitor.update(gait(2.0, begin_s=3.0))
-    assert {
-        alarm.subject for alarm in reports.alarms[-1].alarms if alarm.kind == "clearance" and alarm.level
-    } == {*monitor.clearance_joints}
+    found = {one.subject for one in reports.alarms[-1].alarms if one.kind == "clearance" and one.level}
+    assert found == {*monitor.clearance_joints}
 
 
 def test_limits_that_are_not_one_a_joint_change_nothing(monitor):
     before = monitor.config
-    with pytest.raises(
-        ConfigError, match=r"limits.joint_clearance_m: \[0.001\] has 1 values, expected one each"
-    ):
+    with pytest.raises(ConfigError, match=r"limits.joint_clearance_m: \[0.001\] has 1 values"):
         monitor.configure(changed(before, {"limits.joint_clearance_m": [1.0e-3]}))
     assert monitor.config is before
 
 
 @pytest.mark.parametrize(
-    ("values", "rpm", "raised"),
+    ("values", "rpm", "is_raised"),
     [
         ({}, 45.0, True),
         ({}, 63.0, False),
@@ -241,11 +226,10 @@ def test_limits_that_are_not_one_a_joint_change_nothing(monitor):
         ({}, 5.0, True),  # no gait cycle is ever finished
     ],
 )
-def test_another_cadence_than_commanded_is_said(monitor, gait, values, rpm, raised):
+def test_another_cadence_than_commanded_is_said(monitor, gait, values, rpm, is_raised):
     monitor.configure(config_from(values))
-    monitor.update(gait(12.0, rpm=rpm))
-    alarms = {alarm.name: alarm for alarm in monitor.alarms.alarms}
-    assert (alarms["cadence"].level is Level.ERROR) == raised
+    monitor.update(gait(12.0 if rpm == 5.0 else 6.0, rpm=rpm))
+    assert ("cadence" in raised(monitor)) == is_raised
 
 
 def test_a_standing_leg_is_no_alarm(monitor, gait):
@@ -254,13 +238,19 @@ def test_a_standing_leg_is_no_alarm(monitor, gait):
     assert monitor.alarms.level is Level.OK
 
 
+MISMATCH = {"limits.torque_mismatch": 100.0}
 INPUTS = [
-    ("input_rate crank", lambda s: s[::16]),
-    ("input_rate torque", lambda s: s[::2]),
-    ("input_samples", lambda s: np.repeat(s, 2)),
-    ("input_gaps", lambda s: s[(s["stamp_ns"] - s["stamp_ns"][0]) % (2 * SECOND) < SECOND]),
-    ("input_torque", lambda s: changed_torque(s, np.zeros_like)),
-    ("input_torque", lambda s: changed_torque(s, lambda torque: np.clip(torque, -0.5, 0.5))),
+    ("input_rate crank", lambda s: s[::16], {}),
+    ("input_rate torque", lambda s: s[::2], {}),
+    ("input_samples", lambda s: np.repeat(s, 2), {}),
+    ("input_gaps", lambda s: s[(s["stamp_ns"] - s["stamp_ns"][0]) % (2 * SECOND) < SECOND], {}),
+    ("input_torque", lambda s: changed_torque(s, np.zeros_like), {}),
+    ("input_torque", lambda s: changed_torque(s, lambda torque: np.clip(torque, -0.5, 0.5)), {}),
+    (
+        "input_torque",
+        lambda s: changed_torque(s, lambda torque: 5.0 + torque),
+        {"drive_torque.saturation_nm": 4.5},
+    ),
 ]
 
 
@@ -270,36 +260,23 @@ def changed_torque(samples, change):
     return samples
 
 
-@pytest.mark.parametrize(("name", "spoil"), INPUTS, ids=range(len(INPUTS)))
-def test_what_is_wrong_with_the_input_is_named(monitor, gait, name, spoil):
+@pytest.mark.parametrize(("name", "spoil", "values"), INPUTS, ids=range(len(INPUTS)))
+def test_what_is_wrong_with_the_input_is_named(monitor, gait, name, spoil, values):
     samples = gait(6.5)
     good = with_torque(samples, np.sin(samples["crank_angle_rad"]))
-    monitor.configure(config_from({"limits.torque_mismatch": 100.0}))
+    monitor.configure(config_from(MISMATCH | values))
     new = monitor.snapshot()
     monitor.update(good)
     assert monitor.alarms.level is Level.OK
     monitor.restore(new)
     monitor.update(spoil(good))
-    assert name in {alarm.name for alarm in monitor.alarms.alarms if alarm.level is Level.ERROR}
-
-
-def test_a_known_saturation_is_seen(monitor, gait):
-    samples = gait(6.0)
-    stream = with_torque(samples, 5.0 + np.sin(np.arange(len(samples))))
-    monitor.configure(config_from({"drive_torque.saturation_nm": 4.5, "limits.torque_mismatch": 100.0}))
-    monitor.update(stream)
-    assert "input_torque" in {alarm.name for alarm in monitor.alarms.alarms if alarm.level is Level.ERROR}
+    assert name in raised(monitor)
 
 
 def test_the_trackers_defaults_are_the_twins_own():
     ours, its = twin_settings(MonitorConfig()), TwinSettings()
     tracker = attrs.evolve(its.tracker, speed_tolerance=ours.tracker.speed_tolerance)
     assert ours == attrs.evolve(its, tracker=tracker)
-
-
-def test_lag_and_node_interval_are_those_of_the_parameters():
-    found = twin_settings(config_from({"tracker.lag_s": 0.04, "tracker.node_interval_s": 0.01})).tracker
-    assert (found.lag, found.node_interval) == (0.04, 0.01)
 
 
 def test_a_reorder_window_longer_than_a_bridged_gap_is_refused():
@@ -313,14 +290,10 @@ def test_a_program_that_is_late_and_lost_nothing_reports_as_one_that_keeps_up(ne
         one = new_monitor()
         one.note_late(is_late)
         told.append(said([one.update(walk[:600])]))
-        rates.append(rate_of(one))
+        rates.append(status_of(one, "input").values["crank_rate_hz"])
         one.update(walk[600::20])  # most is missing
-        rates.append(rate_of(one))
+        rates.append(status_of(one, "input").values["crank_rate_hz"])
         one.note_late(False)
     assert told[0] == told[1]
     assert rates[0] == rates[2] > 100.0
     assert rates[1] < 20.0 and math.isnan(rates[3])
-
-
-def rate_of(monitor):
-    return {one.name: one for one in monitor.status()}["input"].values["crank_rate_hz"]

@@ -67,12 +67,6 @@ def test_a_least_value_has_its_bad_side_below():
     assert present([60, 50, 40, 43, 45, 54, 56], limit) == [OK, WARN, ERROR, ERROR, WARN, WARN, OK]
 
 
-def test_an_alarm_stays_until_it_is_acknowledged():
-    *_, alarm = course([10, 1])
-    assert (alarm.present, alarm.level, alarm.raised_ns) == (OK, ERROR, 0)
-    assert acknowledged(alarm).level is OK
-
-
 def test_what_is_still_bad_stays_acknowledged_and_clears_by_itself():
     *_, alarm = course([1, 10])
     seen = acknowledged(alarm)
@@ -85,13 +79,6 @@ def test_what_gets_worse_wants_to_be_seen_again():
     *_, alarm = course([9])
     *_, worse = course([1, 2, 10], alarm=attrs.evolve(acknowledged(alarm), beyond=(0, 0)))
     assert (worse.level, worse.acknowledged, worse.raised_ns) == (ERROR, False, 2 * 10**9)
-
-
-def test_an_acknowledged_error_that_became_a_warning_is_a_warning():
-    *_, alarm = course([10, 8.5])
-    assert (alarm.level, alarm.present) == (ERROR, WARN)
-    seen = acknowledged(alarm)
-    assert (seen.level, seen.acknowledged) == (WARN, True)
 
 
 # --- laws ---

@@ -2,15 +2,13 @@
 
 from pathlib import Path
 
-import attrs
 import pytest
 
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.estimate.signature import DriveFigures
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.parameters import config_from
-from leg_wear_monitor.monitor.config.sections import DriveParameters, drive_figures
+from leg_wear_monitor.monitor.config.sections import drive_figures
 
 pytestmark = pytest.mark.plain
 
@@ -30,20 +28,6 @@ load_friction: {value: 0.1, unit: "1", source: a, conditions: b}
 def declared(**values: float | str) -> dict[str, float]:
     config = config_from({f"drive.{name}": value for name, value in values.items()}, "leg.yaml")
     return drive_figures(config.drive, "leg.yaml").declared
-
-
-def test_nothing_is_declared_by_default() -> None:
-    assert declared() == {}
-    assert DriveFigures().declared == {}
-
-
-def test_the_numbers_have_the_names_of_the_figures() -> None:
-    numbers = {field.name for field in attrs.fields(DriveParameters)} - {
-        "type",
-        "gear_ratio",
-        "temperature_interface",
-    }
-    assert numbers == {field.name for field in attrs.fields(DriveFigures)}
 
 
 def test_a_drive_by_name_has_what_its_sources_state() -> None:

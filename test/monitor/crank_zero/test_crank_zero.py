@@ -46,14 +46,6 @@ def test_it_is_found_within_four_turns_and_no_sample_is_lost(
     assert passed.tobytes() == sent.tobytes()
 
 
-def test_nothing_is_passed_on_before(walk: Walk, new_search: Search, feed: Feed) -> None:
-    search = new_search()
-    sent = walk(2.6, 1.0)
-    assert not len(feed(search, sent))
-    assert search.cause == "the crank's zero is being found: 2 of 3 turns"
-    assert search.unmonitored_s == pytest.approx(2.6, abs=0.06)
-
-
 @pytest.mark.parametrize(("stop", "cuts"), [(700, (1, 333)), (1300, ()), (1603, (1400, 1602))])
 def test_it_does_not_depend_on_blocks_nor_on_a_restored_snapshot(
     stop: int, cuts: tuple[int, ...], walk: Walk, new_search: Search, feed: Feed

@@ -6,11 +6,12 @@ from collections.abc import Callable, Iterator
 import attrs
 import numpy as np
 import pytest
+from told import status_of
 
 from leg_wear_monitor import Mechanism, WearMonitor
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.monitor.config.parameters import config_from
-from leg_wear_monitor.monitor.reports import CycleReport, Status
+from leg_wear_monitor.monitor.reports import CycleReport
 from leg_wear_monitor.state import Level, State
 from leg_wear_monitor.twin.sample import Samples
 
@@ -32,11 +33,6 @@ def fresh(leg: Mechanism) -> Callable[[], WearMonitor]:
     return again
 
 
-def status(monitor: WearMonitor, name: str) -> Status:
-    (found,) = [each for each in monitor.status() if each.name == name]
-    return found
-
-
 def cycles_of(monitor: WearMonitor, samples: Samples, block: int = 97) -> Iterator[CycleReport]:
     for piece in np.split(samples, range(block, len(samples), block)):
         yield from monitor.update(piece).cycles
@@ -53,7 +49,7 @@ def test_gait_cycles_and_wear_are_those_of_a_known_zero_bit_for_bit(
 ) -> None:
     samples, monitor = walk(6.5, ZERO_RAD), fresh()
     found = [without_forecast(cycle) for cycle in cycles_of(monitor, samples)]
-    values = status(monitor, "crank zero").values
+    values = status_of(monitor, "crank zero").values
     assert abs(math.remainder(values["offset_rad"] - ZERO_RAD, math.tau)) < 0.02
     known = new_monitor()
     samples["crank_angle_rad"] += values["offset_rad"]  # as the decoder adds a known one
@@ -70,16 +66,16 @@ def test_it_is_said_while_it_is_looked_for(fresh: Callable[[], WearMonitor], wal
     assert [report.verdict.fault_code for report in reports.verdicts] == ["CRANK_ZERO"]
     assert monitor.verdict.verdict.state is State.NOT_MONITORED
     assert monitor.verdict.verdict.why.startswith("the crank's zero is being found: 2 of 3 turns")
-    found = status(monitor, "crank zero")
+    found = status_of(monitor, "crank zero")
     assert (found.level, found.fault_code) == (Level.WARN, "CRANK_ZERO")
     assert (found.values["turns"], found.values["times_found"]) == (2.0, 0.0)
     assert math.isnan(found.values["offset_rad"])
-    assert status(monitor, "gait").fault_code == "CRANK_ZERO"
+    assert status_of(monitor, "gait").fault_code == "CRANK_ZERO"
     # if it ended here, the time walked would not be monitored
     assert monitor.lost.unmonitored_s == pytest.approx(2.5, abs=0.05)
     reports = monitor.update(samples[1000:])
     assert "CRANK_ZERO" not in {report.verdict.fault_code for report in reports.verdicts}
-    found = status(monitor, "crank zero")
+    found = status_of(monitor, "crank zero")
     assert (found.level, found.fault_code, found.values["times_found"]) == (Level.OK, "NONE", 1.0)
     assert found.values["other_mismatch"] > found.values["mismatch"]
     assert monitor.lost.unmonitored_s == pytest.approx(0.1, abs=0.02)  # until the tracker has the crank
@@ -107,10 +103,10 @@ def test_a_drive_that_restarts_loses_the_time_of_its_restart_alone(
         monitor.update(piece)
         is_known.append("CRANK_ZERO" not in {finding.code for finding in monitor.verdict.findings})
     assert np.count_nonzero(np.diff(is_known)) == 3  # found, lost, found again
-    assert status(monitor, "crank zero").values["times_found"] == 2.0
-    assert abs(math.remainder(status(monitor, "crank zero").values["offset_rad"] + 1.0, math.tau)) < 0.02
+    assert status_of(monitor, "crank zero").values["times_found"] == 2.0
+    assert abs(math.remainder(status_of(monitor, "crank zero").values["offset_rad"] + 1.0, math.tau)) < 0.02
     assert monitor.lost.unmonitored_s == pytest.approx(2.0 + 3 * 0.1, abs=0.1)  # and the tracker's lag
-    moving_s = status(monitor, "gait").values["moving_s"]
+    moving_s = status_of(monitor, "gait").values["moving_s"]
     assert moving_s + monitor.lost.unmonitored_s == pytest.approx(12.0, abs=0.2)
     assert monitor.lost.outliers == 0
 

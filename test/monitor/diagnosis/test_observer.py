@@ -22,7 +22,7 @@ from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.monitor.diagnosis.state import UNUSED_CYCLES, DiagnosisState
 from leg_wear_monitor.twin import CRANK, TORQUE, torque_reference
 from leg_wear_monitor.twin.load import load_shape, load_signature
-from leg_wear_monitor.twin.reference import POINTS, CrankProfile, LegSimulation
+from leg_wear_monitor.twin.reference import POINTS, CrankProfile, LegParameters, LegSimulation
 from leg_wear_monitor.twin.sample import GROUND, gait_samples
 from leg_wear_monitor.twin.torque_reference import WIDER
 from leg_wear_monitor.wear import SECTORS
@@ -40,13 +40,15 @@ def reference(leg):
     return shipped_references(leg)[0]
 
 
-@pytest.fixture(autouse=True)
-def short(monkeypatch) -> None:
+@pytest.fixture(scope="module", autouse=True)
+def short():
     """What a test begins to simulate costs little and, as with the usual length, is due after its end."""
-    monkeypatch.setattr(torque_reference, "CYCLES", 1)
-    monkeypatch.setattr(torque_reference, "PACE", 1)
-    for where in (observer_module, evidence):
-        monkeypatch.setattr(where, "COMMISSIONING_CYCLES", COMMISSIONING_CYCLES)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(torque_reference, "CYCLES", 1)
+        patched.setattr(torque_reference, "PACE", 1)
+        for where in (observer_module, evidence):
+            patched.setattr(where, "COMMISSIONING_CYCLES", COMMISSIONING_CYCLES)
+        yield
 
 
 def leg_number(joint: int, factor: float) -> int:
@@ -106,11 +108,48 @@ def observer_of(leg, **changes) -> TorqueObserver:
     return TorqueObserver(leg, MonitorConfig(), SIZE_NM, NEW, **changes)
 
 
-def test_before_the_first_cycles_it_waits_and_reports_why(leg, reference) -> None:
-    observer = observer_of(leg)
+@pytest.fixture(scope="module")
+def new(leg):
+    """Make an observer as new; always the same one: models of signatures take time."""
+    one = observer_of(leg)
+    before = one.snapshot()
+
+    def again():
+        one.restore(before)
+        return one
+
+    return again
+
+
+@pytest.fixture(scope="module")
+def commissioned(new, reference):
+    """Make an observer that has just seen the first gait cycles of a healthy leg; the one of `new`."""
+    observer, block = new(), samples(reference, [0] * COMMISSIONING_CYCLES)
+    # none in the first cycle, as after a start
+    block["temperature_c"][(block["kind"] == TORQUE) & (block["stamp_ns"] > START_NS + 10**9)] = 40.0
+    assert walk(observer, block) == []
+    assert observer.state.commissioned is not None
+    known = observer.snapshot()
+
+    def again():
+        observer.restore(known)
+        return observer
+
+    return again
+
+
+def walk_on(observer, reference, numbers, counted=NEW, **more):
+    """Feed gait cycles that follow those of the commissioning; the corrections that come of it."""
+    block = samples(reference, [0] * COMMISSIONING_CYCLES + numbers, **more)
+    return walk(observer, block, counted, COMMISSIONING_CYCLES)
+
+
+def test_before_the_first_cycles_it_waits_and_reports_why(new, reference) -> None:
+    observer, block = new(), samples(reference, [0] * 12)
+    walk(observer, block[block["kind"] == CRANK], end=8)
     assert observer.diagnosis.state is DiagnosisState.WAITING
     assert "no drive torque" in observer.diagnosis.reason
-    walk(observer, samples(reference, [0] * 4))
+    walk(observer, block, begin=8)
     assert observer.diagnosis.reason == "gait cycles: 4 of 5"
 
 
@@ -128,23 +167,16 @@ def test_the_first_reference_of_a_leg_behind_a_declared_coupling_is_simulated_be
     assert {one.parameters.compliance for one in simulated.legs} == {1.0e-3}
 
 
-def test_the_temperature_of_the_drive_is_that_now_and_that_of_the_baseline(leg, reference) -> None:
-    """A cycle without one, as after a start, takes nothing away; and without any it is None."""
-    observer = observer_of(leg)
-    block = samples(reference, [0] * (COMMISSIONING_CYCLES + 12))
-    cycle = (block["stamp_ns"] - START_NS) // 10**9
-    is_torque = block["kind"] == TORQUE
-    block["temperature_c"][is_torque & (cycle > 0)] = 40.0
-    block["temperature_c"][is_torque & (cycle > COMMISSIONING_CYCLES)] = 55.0
-    walk(observer, block, end=3)
-    assert observer.diagnosis.temperature_c == 40.0
-    assert observer.diagnosis.commissioned_c is None
-    walk(observer, block, begin=3)
+def test_the_temperature_of_the_drive_is_that_now_and_that_of_the_baseline(new, commissioned, reference):
+    """A cycle without one takes nothing away; and without any it is None."""
+    observer, block = commissioned(), samples(reference, [0] * (COMMISSIONING_CYCLES + 12))
+    block["temperature_c"][block["kind"] == TORQUE] = 55.0
+    walk(observer, block, begin=COMMISSIONING_CYCLES)
     assert observer.diagnosis.temperature_c == pytest.approx(55.0)
     assert observer.diagnosis.commissioned_c == pytest.approx(40.0)
-    bare = observer_of(leg)
+    bare = new()
     walk(bare, samples(reference, [0] * 4))
-    assert bare.diagnosis.temperature_c is None
+    assert bare.diagnosis.temperature_c is bare.diagnosis.commissioned_c is None
 
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])
@@ -169,34 +201,12 @@ def test_a_force_that_only_the_reference_knows_is_told(leg, reference, direction
     assert found[GROUND].toe_off_phase == pytest.approx(stance.toe_off % 1.0, abs=0.02)
 
 
-def test_without_torques_it_reports_so(leg, reference) -> None:
-    observer = observer_of(leg)
-    block = samples(reference, [0] * 8)
-    walk(observer, block[block["kind"] == CRANK])
-    assert observer.diagnosis.state is DiagnosisState.WAITING
-    assert "no drive torque" in observer.diagnosis.reason
-
-
-def test_gait_cycles_of_another_cadence_are_reported_as_such(leg, reference) -> None:
-    observer = observer_of(leg)
-    block = samples(reference, [0] * 8)
-    slow = SimpleNamespace(is_steady=True, cadence_rpm=45.0, begin_ns=START_NS, stamp_ns=START_NS + 10**9)
-    for _ in range(4):
-        observer.add_samples(block)
-        observer.ended(slow)
-        observer.end_period(NEW, DEPTH)
-    assert observer.diagnosis.reason == "the cadence is 45 rpm, not the commanded 60 ± 6 rpm"
-    walk(observer, block)
-    assert "cadence" not in observer.diagnosis.reason
-
-
-def test_a_healthy_leg_is_as_counted_and_becomes_commissioned(leg, reference) -> None:
-    observer = observer_of(leg)
-    assert walk(observer, samples(reference, [0] * (COMMISSIONING_CYCLES + 5))) == []
+def test_a_healthy_leg_is_as_counted_once_it_is_commissioned(commissioned, reference) -> None:
+    observer = commissioned()
+    assert walk_on(observer, reference, [0] * 5) == []
     found = observer.diagnosis
     assert found.state is DiagnosisState.AS_COUNTED
     assert found.changes == ()
-    assert observer.state.commissioned is not None
     off = np.abs(np.array(found.clearance_m) - NEW)
     assert (off < 4.0 * np.array(found.sigma_m)).all()
 
@@ -216,9 +226,9 @@ def test_a_reference_of_the_ledger_under_another_crank_motion_is_not_used(leg, r
     np.testing.assert_array_equal(observer.state.reference.profile.sine, 0.0)
 
 
-def test_samples_at_the_same_angles_in_each_cycle_are_reported(leg, reference) -> None:
-    observer = observer_of(leg)
-    walk(observer, samples(reference, [0] * (COMMISSIONING_CYCLES + 1)))
+def test_samples_at_the_same_angles_in_each_cycle_are_reported(commissioned, reference) -> None:
+    observer = commissioned()
+    walk_on(observer, reference, [0])
     assert observer.diagnosis.reason == LOCKED_SAMPLES
     drifting = [cycle._replace(late=0.3 * i % 1.0) for i, cycle in enumerate(observer.state.cycles)]
     observer.state.cycles = tuple(drifting)
@@ -226,11 +236,11 @@ def test_samples_at_the_same_angles_in_each_cycle_are_reported(leg, reference) -
 
 
 @pytest.mark.parametrize("joint", [pytest.param(0, marks=pytest.mark.slow), 3])
-def test_a_joint_that_opens_is_named_and_corrected(leg, reference, joint: int) -> None:
-    observer = observer_of(leg)
+def test_a_joint_that_opens_is_named_and_corrected(commissioned, reference, joint: int) -> None:
+    observer = commissioned()
     number = leg_number(joint, 1.5)
     block = samples(reference, [0] * (COMMISSIONING_CYCLES + 2) + [number] * 25)
-    ((cycle, correction),) = walk(observer, block)[:1]
+    ((cycle, correction),) = walk(observer, block, begin=COMMISSIONING_CYCLES)[:1]
     assert COMMISSIONING_CYCLES + 10 <= cycle <= COMMISSIONING_CYCLES + 24
     assert correction.joint == joint
     assert correction.clearance_m == pytest.approx(4.5e-4, rel=0.06)
@@ -263,10 +273,10 @@ CHANNELS = [
 
 @pytest.mark.parametrize("channel", CHANNELS, ids=lambda one: "_".join(map(str, one.values())))
 def test_a_late_filtered_or_rubbing_torque_names_nothing_before_commissioning_and_the_right_joint_after(
-    leg, reference, channel
+    new, reference, channel
 ) -> None:
     """Seen before: 10 ms of lag on a healthy leg ended in STOP joint I, 0.668 mm."""
-    observer = observer_of(leg)
+    observer = new()
     block = samples(
         reference, [0] * (COMMISSIONING_CYCLES + 5) + [leg_number(2, 1.5)] * 14, angle_noise=1e-3, **channel
     )
@@ -301,9 +311,13 @@ def ground(cycles: int, random) -> np.ndarray:
     return (1.0 + 0.1 * random.standard_normal(cycles))[:, None] * stance
 
 
-def test_a_load_is_commissioned_and_a_joint_that_opens_under_it_is_named(leg, reference) -> None:
+def test_a_load_is_commissioned_and_a_joint_that_opens_under_it_is_named(
+    leg, new, reference, monkeypatch
+) -> None:
     """Seen before: under 100 N *tendon 726 % heavier*, never commissioned, worn joints silent."""
-    observer = observer_of(leg)
+    # bodies that would explain it by ideal joints are not asked for here, and take time to find
+    monkeypatch.setattr(references, "leg_of_ideal_torque", lambda *_: LegParameters.none(leg))
+    observer = new()
     numbers = [0] * (COMMISSIONING_CYCLES + 20) + [leg_number(0, 2.0)] * 14
     block = samples(reference, numbers, added=ground(len(numbers), np.random.default_rng(2)))
     for cycle in range(COMMISSIONING_CYCLES + 19):
@@ -327,8 +341,8 @@ def pushed(leg, peak_n, cycles):
     return sizes[:, None] * torque
 
 
-def test_a_load_that_nobody_asked_for_is_told_and_not_taken_for_masses(leg, reference) -> None:
-    observer = observer_of(leg)
+def test_a_load_that_nobody_asked_for_is_told_and_not_taken_for_masses(leg, new, reference) -> None:
+    observer = new()
     cycles = COMMISSIONING_CYCLES + 12
     walk(observer, samples(reference, [0] * cycles, added=pushed(leg, 300.0, cycles)))
     seen = observer.diagnosis
@@ -346,7 +360,7 @@ def test_on_the_ground_references_are_those_of_the_loaded_leg(leg, reference, mo
     for where, name, value in (
         (torque_reference, "PACE", 1000),
         (torque_reference, "CYCLES", 6),
-        (torque_reference, "WIDER", (1.2, 1.5, 3.0)),
+        (torque_reference, "WIDER", (1.5,)),
         (references, "LOAD_ROUNDS", 2),
         (observer_module, "LOAD_ROUNDS", 2),
     ):
@@ -397,12 +411,12 @@ def test_a_leg_that_carries_another_load_than_its_reference_is_commissioned_anew
     assert state.commissioned is known
 
 
-def test_a_joint_that_is_repaired_without_a_word_is_reported(leg, reference) -> None:
+def test_a_joint_that_is_repaired_without_a_word_is_reported(commissioned, reference) -> None:
     """Seen before: still corrected forty cycles later, and nothing else."""
-    observer = observer_of(leg)
+    observer = commissioned()
     number = leg_number(0, 2.0)
     block = samples(reference, [0] * COMMISSIONING_CYCLES + [number] * 20 + [0] * 20)
-    cycle, correction = walk(observer, block, end=COMMISSIONING_CYCLES + 19)[0]
+    cycle, correction = walk(observer, block, NEW, COMMISSIONING_CYCLES, COMMISSIONING_CYCLES + 19)[0]
     counted = NEW.copy()
     counted[0] = correction.clearance_m
     observer.corrected(correction, counted)
@@ -415,11 +429,11 @@ def test_a_joint_that_is_repaired_without_a_word_is_reported(leg, reference) -> 
     assert abs(now.value - 3.0e-4) < 3.0 * now.sigma
 
 
-def test_the_sigma_of_a_correction_stays_in_the_clearance(leg, reference) -> None:
+def test_the_sigma_of_a_correction_stays_in_the_clearance(commissioned, reference) -> None:
     """Seen before: 1.421 ± 0.022 mm where 2.0 is true, since the baseline hides what a correction is off."""
-    observer = observer_of(leg)
+    observer = commissioned()
     block = samples(reference, [0] * COMMISSIONING_CYCLES + [leg_number(2, 5.0)] * 40)
-    ((cycle, correction),) = walk(observer, block)[:1]
+    ((cycle, correction),) = walk(observer, block, begin=COMMISSIONING_CYCLES)[:1]
     counted = NEW.copy()
     counted[2] = correction.clearance_m
     observer.corrected(correction, counted)
@@ -429,41 +443,38 @@ def test_the_sigma_of_a_correction_stays_in_the_clearance(leg, reference) -> Non
     assert abs(correction.clearance_m - 1.5e-3) < 3.0 * correction.change.sigma
 
 
-@pytest.mark.parametrize("square", [1.0, 3.0])
 def test_other_joints_are_known_after_a_correction_where_the_clearances_explain(
-    leg, reference, square: float
+    commissioned, reference
 ) -> None:
     """Elsewhere others may have changed with it, and its gait cycles become the baseline of all."""
-    observer = observer_of(leg)
-    block = samples(reference, [0] * COMMISSIONING_CYCLES + [leg_number(0, 1.5)] * 25)
-    ((_, correction),) = walk(observer, block)[:1]
-    observer.state.fit = attrs.evolve(observer.state.fit, square=square)
-    counted = NEW.copy()
+    observer = commissioned()
+    ((_, correction),) = walk_on(observer, reference, [leg_number(0, 1.5)] * 25)[:1]
+    counted, before = NEW.copy(), observer.snapshot()
     counted[0] = correction.clearance_m
-    observer.corrected(correction, counted)
-    sigma_m = observer.state.commissioned.sigma_m
-    assert sigma_m[0] == correction.change.sigma
-    np.testing.assert_array_equal(sigma_m[1:], 0.0 if square < 1.5 else NEW[1:])
+    for square, others_m in ((1.0, np.zeros(4)), (3.0, NEW[1:])):
+        observer.restore(before)
+        observer.state.fit = attrs.evolve(observer.state.fit, square=square)
+        observer.corrected(correction, counted)
+        sigma_m = observer.state.commissioned.sigma_m
+        assert sigma_m[0] == correction.change.sigma
+        np.testing.assert_array_equal(sigma_m[1:], others_m)
 
 
-def test_another_leg_is_reported_within_twenty_cycles(leg, reference) -> None:
-    observer = observer_of(leg)
+def test_another_leg_is_reported_within_twenty_cycles(leg, commissioned, reference) -> None:
+    observer = commissioned()
     mass, length = body_torques(leg).at(TURN)
     other = 0.15 * mass[2] - 0.15 * mass[4] + 0.03 * length[1]
     other = np.interp(np.arange(POINTS) / POINTS, np.arange(len(other)) / len(other), other, period=1.0)
     added = np.zeros((COMMISSIONING_CYCLES + 20, POINTS))
     added[COMMISSIONING_CYCLES:] = other
-    walk(observer, samples(reference, [0] * len(added), added=added))
+    walk_on(observer, reference, [0] * 20, added=added)
     assert observer.diagnosis.state is DiagnosisState.CHANGED
     assert observer.diagnosis.changes[-1].cause is not Cause.CLEARANCE
 
 
-def test_a_lag_that_begins_after_commissioning_is_no_clearance(leg, reference) -> None:
-    observer = observer_of(leg)
-    known = samples(reference, [0] * (COMMISSIONING_CYCLES + 15))
-    late = samples(reference, [0] * (COMMISSIONING_CYCLES + 15), delay_s=0.01)
-    walk(observer, known, end=COMMISSIONING_CYCLES)
-    assert walk(observer, late, begin=COMMISSIONING_CYCLES) == []
+def test_a_lag_that_begins_after_commissioning_is_no_clearance(commissioned, reference) -> None:
+    observer = commissioned()
+    assert walk_on(observer, reference, [0] * 15, delay_s=0.01) == []
     (change,) = observer.diagnosis.changes
     assert change.cause in (Cause.LAG, Cause.TIMING)
     if change.cause is Cause.LAG:
@@ -478,8 +489,8 @@ STEPS_NOT_USED = (
 )
 
 
-def test_cycles_that_are_not_used_are_counted_by_reason(leg, reference) -> None:
-    observer = observer_of(leg)
+def test_cycles_that_are_not_used_are_counted_by_reason(new, reference) -> None:
+    observer = new()
     walk(observer, samples(reference, [0] * 10))
     steady = {"is_steady": True, "cadence_rpm": 60.0, "begin_ns": 0, "stamp_ns": 1}
     for changes, wrong in STEPS_NOT_USED:
@@ -491,8 +502,8 @@ def test_cycles_that_are_not_used_are_counted_by_reason(leg, reference) -> None:
     assert "45" in observer.diagnosis.reason
 
 
-def test_irregular_stamps_give_no_signature(leg, reference) -> None:
-    observer, random = observer_of(leg), np.random.default_rng(1)
+def test_irregular_stamps_give_no_signature(new, reference) -> None:
+    observer, random = new(), np.random.default_rng(1)
     block = samples(reference, [0] * 8)
     torque = block["kind"] == TORQUE
     block["stamp_ns"][torque] += random.integers(-2_400_000, 2_400_000, torque.sum())
@@ -502,14 +513,14 @@ def test_irregular_stamps_give_no_signature(leg, reference) -> None:
     assert "irregular" in observer.diagnosis.reason
 
 
-def test_cycles_of_a_wrong_torque_are_withdrawn(leg, reference) -> None:
+def test_cycles_of_a_wrong_torque_are_withdrawn(commissioned, reference) -> None:
     """Seen before: *body shank is 245 % lighter* for 36 s after the repair."""
-    observer = observer_of(leg)
+    observer = commissioned()
     numbers = [0] * (COMMISSIONING_CYCLES + 10)
     block = samples(reference, numbers)
     wrong = samples(reference, numbers)
     wrong["torque_nm"] *= -1.0
-    walk(observer, block, end=COMMISSIONING_CYCLES + 3)
+    walk(observer, block, NEW, COMMISSIONING_CYCLES, COMMISSIONING_CYCLES + 3)
     known = observer.state.commissioned
     walk(observer, wrong, begin=COMMISSIONING_CYCLES + 3, end=COMMISSIONING_CYCLES + 6)
     observer.withdraw(START_NS + (COMMISSIONING_CYCLES + 3) * 10**9)
@@ -521,8 +532,8 @@ def test_cycles_of_a_wrong_torque_are_withdrawn(leg, reference) -> None:
     assert observer.diagnosis.state is DiagnosisState.AS_COUNTED
 
 
-def test_a_leg_that_was_never_healthy_is_not_commissioned(leg, reference) -> None:
-    observer = observer_of(leg)
+def test_a_leg_that_was_never_healthy_is_not_commissioned(new, reference) -> None:
+    observer = new()
     walk(observer, samples(reference, [leg_number(2, 3.0)] * (COMMISSIONING_CYCLES + 5)))
     assert observer.diagnosis.state is DiagnosisState.CHANGED
     (change,) = observer.diagnosis.changes
@@ -560,27 +571,25 @@ def test_each_cadence_has_its_own_baseline_and_reference(leg, reference, monkeyp
     assert not observer.state.changes
 
 
-def test_one_strange_cycle_raises_nothing(leg, reference) -> None:
-    observer = observer_of(leg)
-    numbers = [0] * (COMMISSIONING_CYCLES + 12) + [leg_number(0, 8.0)] + [0] * 8
-    walk(observer, samples(reference, numbers))
+def test_one_strange_cycle_raises_nothing(commissioned, reference) -> None:
+    observer = commissioned()
+    walk_on(observer, reference, [0] * 12 + [leg_number(0, 8.0)] + [0] * 8)
     assert observer.diagnosis.state is DiagnosisState.AS_COUNTED
 
 
-def test_a_restored_observer_continues_bit_for_bit(leg, reference) -> None:
-    block = samples(reference, [0] * (COMMISSIONING_CYCLES + 11) + [leg_number(4, 1.5)] * 12)
-    whole, half = observer_of(leg), observer_of(leg)
-    walk(whole, block)
-    walk(half, block, end=COMMISSIONING_CYCLES + 13)
-    snapshot, other = half.snapshot(), observer_of(leg)
-    other.restore(snapshot)
-    walk(half, block, begin=COMMISSIONING_CYCLES + 13)
-    walk(other, block, begin=COMMISSIONING_CYCLES + 13)
-    assert whole.diagnosis == half.diagnosis == other.diagnosis
+def test_a_restored_observer_continues_bit_for_bit(leg, commissioned, reference) -> None:
+    block = samples(reference, [0] * COMMISSIONING_CYCLES + [leg_number(4, 1.5)] * 12)
+    whole, other, half = commissioned(), observer_of(leg), COMMISSIONING_CYCLES + 3
+    walk(whole, block, NEW, COMMISSIONING_CYCLES, half)
+    other.restore(whole.snapshot())
+    for observer in (whole, other):
+        walk(observer, block, begin=half)
+    assert whole.diagnosis.state is DiagnosisState.CHANGED
+    assert whole.diagnosis == other.diagnosis
 
 
-def test_a_crank_with_another_ripple_waits_for_a_reference_of_its_own(leg, reference) -> None:
-    observer = observer_of(leg)
+def test_a_crank_with_another_ripple_waits_for_a_reference_of_its_own(new, reference) -> None:
+    observer = new()
     block = samples(reference, [0] * 8)
     crank = block["kind"] == CRANK
     block["crank_angle_rad"][crank] += 0.03 * np.sin(2.0 * block["crank_angle_rad"][crank])
@@ -612,29 +621,19 @@ def test_a_reference_that_was_half_simulated_goes_on_in_the_next_run(leg, refere
     assert steady.part_of_reference is None
 
 
-def test_a_replaced_part_is_commissioned_again(leg, reference) -> None:
-    observer = observer_of(leg)
-    walk(observer, samples(reference, [0] * COMMISSIONING_CYCLES))
-    assert observer.state.commissioned is not None
-    observer.replaced(NEW)
-    assert observer.state.commissioned is None
-
-
-def test_a_reference_that_comes_after_a_replacement_leaves_the_noise_as_it_was(leg, reference) -> None:
+def test_a_replaced_part_is_commissioned_again_and_the_noise_stays_as_it_was(commissioned) -> None:
     """There are no gait cycles of the new part yet that it could be found from."""
-    observer = observer_of(leg)
-    walk(observer, samples(reference, [0] * 6))
+    observer = commissioned()
     noise_nm = observer.state.sensor.noise_nm
     assert noise_nm == pytest.approx(0.3, rel=0.2)
     observer.replaced(NEW)
+    assert observer.state.commissioned is None
     observer._evidence.review(observer.state, observer.config)
     assert observer.state.sensor.noise_nm == noise_nm
 
 
-def test_a_stored_baseline_is_used_from_the_first_cycles_on(leg, reference) -> None:
-    first = observer_of(leg)
-    walk(first, samples(reference, [0] * COMMISSIONING_CYCLES))
-    known = first.state.commissioned
+def test_a_stored_baseline_is_used_from_the_first_cycles_on(leg, commissioned, reference) -> None:
+    known = commissioned().state.commissioned
     second = observer_of(leg, commissioned=[known])
     walk(second, samples(reference, [leg_number(4, 1.5)] * 14, seed=2))
     assert second.state.commissioned is known
@@ -642,18 +641,12 @@ def test_a_stored_baseline_is_used_from_the_first_cycles_on(leg, reference) -> N
     assert (change.cause, change.subject) == (Cause.CLEARANCE, "J")
 
 
-def test_a_small_opening_is_reported_and_not_corrected(leg, reference) -> None:
-    observer = observer_of(leg)
-    block = samples(reference, [0] * COMMISSIONING_CYCLES + [leg_number(0, 1.2)] * 20)
-    assert walk(observer, block) == []
+def test_a_small_opening_is_reported_and_not_corrected(commissioned, reference) -> None:
+    observer = commissioned()
+    assert walk_on(observer, reference, [leg_number(0, 1.2)] * 20) == []
     (change,) = observer.diagnosis.changes
     assert (change.subject, change.is_corrected) == ("A", False)
-
-
-def test_a_change_is_explained_anew_at_once_by_another_reference(leg, reference) -> None:
-    """It was not until the next tenth gait cycle, and a worn leg was as counted until then."""
-    observer = observer_of(leg)
-    walk(observer, samples(reference, [0] * COMMISSIONING_CYCLES + [leg_number(0, 1.2)] * 15))
+    # another reference explains it anew at once: until the next tenth gait cycle, the leg was as counted
     observer._evidence.review(observer.state, observer.config)
     (change,) = observer.diagnosis.changes
     assert change.subject == "A"
@@ -668,11 +661,13 @@ def test_a_baseline_of_a_sensor_with_another_rate_is_not_used(leg, reference) ->
     assert observer.state.commissioned.signatures.shape[1] == 160
 
 
-def test_a_commissioned_leg_that_is_not_of_its_file_is_identified(leg, reference, monkeypatch) -> None:
+def test_a_commissioned_leg_that_is_not_of_its_file_is_identified(
+    leg, commissioned, reference, monkeypatch
+) -> None:
     for misfit in ("UNLIKE_FILE", "WORTH_IDENTIFYING"):
         monkeypatch.setattr(leg_model, misfit, 0.0)  # any leg
-    observer = observer_of(leg)
-    walk(observer, samples(reference, [0] * (COMMISSIONING_CYCLES + 4)))
+    observer = commissioned()
+    walk_on(observer, reference, [0] * 4)
     assert "its masses, lengths and friction are being simulated" in observer.diagnosis.reason
     assert observer.state.is_identifying
     restored = observer_of(leg)
@@ -698,19 +693,13 @@ def test_the_reference_of_an_identified_leg_is_used_if_it_explains_the_leg_bette
     assert "do not explain its drive torque" in observer.diagnosis.reason  # nothing is below 0
 
 
-def test_nothing_is_corrected_by_a_reference_of_another_leg(leg, reference, monkeypatch) -> None:
-    monkeypatch.setattr(leg_model, "UNLIKE_FILE", 0.0)
-    observer = observer_of(leg)
-    block = samples(reference, [0] * COMMISSIONING_CYCLES + [leg_number(0, 1.5)] * 25)
-    assert walk(observer, block) == []
-    assert observer.diagnosis.changes[0].subject == "A"
-
-
-def test_nothing_is_corrected_before_the_leg_is_identified(leg, reference, monkeypatch) -> None:
+@pytest.mark.parametrize("misfit", ["UNLIKE_FILE", "WORTH_IDENTIFYING"])
+def test_nothing_is_corrected_by_a_reference_of_another_leg_nor_before_it_is_identified(
+    commissioned, reference, monkeypatch, misfit: str
+) -> None:
     """Seen before: I at 0.45 mm was named J, and corrected as J, after the first of three rounds."""
-    monkeypatch.setattr(leg_model, "WORTH_IDENTIFYING", 0.0)
-    observer = observer_of(leg)
-    block = samples(reference, [0] * COMMISSIONING_CYCLES + [leg_number(0, 1.5)] * 25)
-    assert walk(observer, block) == []
+    monkeypatch.setattr(leg_model, misfit, 0.0)
+    observer = commissioned()
+    assert walk_on(observer, reference, [leg_number(0, 1.5)] * 25) == []
     (change,) = observer.diagnosis.changes
     assert change.subject == "A" and not change.is_corrected

@@ -147,12 +147,6 @@ def test_the_hip_alone_says_nothing_of_the_ankle(model, shape, reference):
 
 
 @pytest.mark.plain
-def test_all_three_sensors_show_all_joints(model, shape, reference):
-    found = watched(model, shape, reference, prior_with(UNKNOWN, FRESH, 1e-3), WORN).fused()
-    assert observations(found) == [ClearanceObservation.SEEN] * 5
-
-
-@pytest.mark.plain
 def test_a_sensor_that_is_added_later_is_commissioned_by_what_is_known_then(model, shape, reference):
     hidden = ClearanceRegression(model, reference, prior_with(UNKNOWN, FRESH, 2e-4))
     for seed in range(30):

@@ -17,13 +17,6 @@ ENCODERS = {"encoders.names": ["knee"], "encoders.joints": ["G"]}
 FOOT_LOAD = {"foot_load.source": "contact"}
 
 
-def test_kinds_are_those_of_the_board():
-    board = AlarmBoard(config_from(ENCODERS | FOOT_LOAD), ("A", "B"))
-    assert set(alarm_specs.KINDS) == {alarm.kind for alarm in board.alarms.values()}
-    assert len(set(alarm_specs.KINDS)) == len(alarm_specs.KINDS)
-    assert set(alarm_specs.INPUT_KINDS) == {kind for kind in alarm_specs.KINDS if kind.startswith("input_")}
-
-
 def test_names_and_their_order_are_a_contract():
     joint = (
         "impact_force {}", "clearance {}", "growth {}", "remaining_life {}", "material_limit {}",

@@ -3,7 +3,6 @@
 import math
 from types import SimpleNamespace
 
-import attrs
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -128,12 +127,3 @@ def test_a_short_lag_is_a_sensors():
 
 def test_without_a_torque_there_are_no_values():
     assert torque_values(SimpleNamespace(torque_samples=0), TorqueRecord(), BOUNDS) == {}
-
-
-def test_bounds_can_be_set():
-    torque = attrs.evolve(CONFIG.drive_torque, max_friction_nm=9.0)
-    limits = attrs.evolve(CONFIG.limits, torque_bias_nm=0.5)
-    bounds = torque_bounds(
-        attrs.evolve(CONFIG, drive_torque=torque, limits=limits), SIZE_NM, torque.max_lag_s
-    )
-    assert (bounds.max_friction_nm, bounds.bias_nm) == (9.0, 0.5)

@@ -143,7 +143,3 @@ def test_a_measured_joint_tells_of_one_that_it_acts_upon(coupling):
     expected = alone(B, SURE, law=no_law(np.array([3e-4]), 0.0)).cycles
     apart = math.log(4.5e-4 / 4e-4)
     assert math.log(expected.p50 / told.p50) == pytest.approx(0.5 * coupling * apart, abs=1e-3)
-
-
-def test_the_same_is_said_of_the_same():
-    assert whole([NOW, B]) == whole([NOW, B])

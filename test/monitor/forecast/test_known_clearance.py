@@ -1,7 +1,6 @@
 """A corrected clearance: the opening that counting had missed says nothing of the wear coefficient."""
 
 import math
-from pathlib import Path
 
 import attrs
 import numpy as np
@@ -9,10 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor import WearMonitor, open_ledger
 from leg_wear_monitor.estimate.cause import Cause, Change
 from leg_wear_monitor.fleet.learning import parts_of
-from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.cycle_report import correct
 from leg_wear_monitor.monitor.diagnosis.observer import Correction
@@ -135,13 +132,7 @@ def test_corrections_are_read_as_written(open_ledger, entry_at) -> None:
     assert open_ledger().corrections == (CORRECTED, other)
 
 
-def test_a_monitor_believes_a_corrected_clearance_now_and_in_its_next_run(leg, gait, tmp_path: Path) -> None:
-    values = {"ledger.path": str(tmp_path / "wear.ledger"), "clearance_joints": ["A", "G"]}
-    config = config_from(values)
-
-    def begin() -> WearMonitor:
-        return WearMonitor(leg, config, open_ledger(leg, config))
-
+def test_a_monitor_believes_a_corrected_clearance_now_and_in_its_next_run(begin, gait) -> None:
     monitor = begin()
     monitor.update(gait(2.5))
     change = Change(
@@ -163,4 +154,3 @@ def test_a_monitor_believes_a_corrected_clearance_now_and_in_its_next_run(leg, g
     again = monitor.update(gait(2.5, begin_s=4.5)).cycles[-1].joints[1]
     assert again.forecast.clearance_m.p50 == pytest.approx(OPENED, abs=0.02 * SIGMA)
     assert again.forecast.clearance_m.p90 - again.forecast.clearance_m.p10 < 3.0 * SIGMA
-    monitor.close()

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from told import raised, status_of
 
 from leg_wear_monitor.monitor.inputs import InputGuard
 from leg_wear_monitor.state import Level
@@ -19,16 +20,6 @@ from leg_wear_monitor.twin.sample import (
 TURN = 2.0 * np.pi
 DEGREES = 180.0 / np.pi
 SECOND = 10**9
-
-
-def status_of(monitor, name="input"):
-    (found,) = [status for status in monitor.status() if status.name == name]
-    return found
-
-
-def level_of(monitor, name):
-    (found,) = [alarm for alarm in monitor.alarms.alarms if alarm.name == name]
-    return found.level
 
 
 def other_source(gait, duration_s=3.0, begin_s=0.0, rate_hz=200.0, *, off_rad=0.5, late_ns=1_700_000):
@@ -67,8 +58,8 @@ SECOND_SOURCES = {
 def test_two_sources_that_disagree_are_named_and_not_counted(monitor, gait, name):
     alone, second = gait(3.0), SECOND_SOURCES[name](gait)
     monitor.update(interleaved(alone, second))
-    assert level_of(monitor, "input_sources") is Level.ERROR
-    told = status_of(monitor)
+    assert "input_sources" in raised(monitor)
+    told = status_of(monitor, "input")
     assert told.level is Level.ERROR
     assert told.message.startswith("two series of crank angles interleave")
     assert status_of(monitor, "gait").level is Level.ERROR
@@ -89,18 +80,18 @@ def test_while_two_sources_send_nothing_wears_and_after_it_goes_on(monitor, gait
     worn = monitor.wear_depth_m - before
     assert worn.sum() < 0.2 * before.sum()
     monitor.update(gait(4.0, begin_s=6.0))
-    assert not status_of(monitor).message.startswith("two series")
+    assert not status_of(monitor, "input").message.startswith("two series")
     assert status_of(monitor, "gait").message == "in step"
     assert monitor.lost.unmonitored_s == pytest.approx(4.0, abs=0.5)
     # shown until somebody has acknowledged it
-    assert level_of(monitor, "input_sources") is Level.ERROR
+    assert "input_sources" in raised(monitor)
     monitor.acknowledge(1)
-    assert level_of(monitor, "input_sources") is Level.OK
+    assert "input_sources" not in raised(monitor, Level.WARN)
 
 
 def test_two_sources_that_agree_are_followed(monitor, gait):
     monitor.update(interleaved(gait(3.0), other_source(gait, off_rad=TURN * 0.0017)))
-    assert level_of(monitor, "input_sources") is Level.OK
+    assert "input_sources" not in raised(monitor, Level.WARN)
     assert monitor.lost.conflicting == 0
 
 
@@ -160,15 +151,15 @@ def test_degrees_are_named_and_wear_nothing(monitor, gait, rate_hz, wrapped):
         samples["crank_angle_rad"] = np.unwrap(samples["crank_angle_rad"])
     samples["crank_angle_rad"] *= DEGREES
     reports = monitor.update(samples)
-    told = status_of(monitor)
+    told = status_of(monitor, "input")
     assert told.level is Level.ERROR
     assert told.message.startswith("the crank's angle runs 57")
     assert "degrees" in told.message
     assert not monitor.wear_depth_m.any()
     assert reports.cycles == ()
     assert monitor.lost.implausible > 0.9 * len(samples)
-    assert level_of(monitor, "input_samples") is Level.ERROR
-    assert level_of(monitor, "impact_force A") is Level.OK
+    assert "input_samples" in raised(monitor)
+    assert "impact_force A" not in raised(monitor, Level.WARN)
 
 
 def test_a_driver_that_changes_to_radians_is_followed_from_then_on(monitor, gait):
@@ -184,35 +175,16 @@ def test_a_gear_that_is_not_set_is_named(monitor, gait):
     samples = gait(2.0)
     samples["crank_angle_rad"] = 10.0 * np.unwrap(samples["crank_angle_rad"])
     monitor.update(samples)
-    assert "crank.gear_ratio" in status_of(monitor).message
-    assert "degrees" not in status_of(monitor).message
+    assert "crank.gear_ratio" in status_of(monitor, "input").message
+    assert "degrees" not in status_of(monitor, "input").message
 
 
-CAUSES = [
-    (ZERO_STAMP, "300 of 400 samples have a zero stamp: set header.stamp"),
-    (EMPTY, "300 of 400 samples have no name or no position"),
-]
-
-
-@pytest.mark.parametrize(("fault", "sentence"), CAUSES)
-def test_why_samples_cannot_be_used_is_said_in_a_sentence(monitor, gait, fault, sentence):
-    stream = gait(2.0)
-    stream["fault"][100:] = fault
-    monitor.update(stream[:400])
-    counted = int(sentence.split(" ")[0])
-    told = status_of(monitor).message
-    number, of, total, rest = told.split(" ", 3)
-    assert of == "of"
-    assert rest.startswith(sentence.split(" ", 3)[3])
-    assert 0 < int(number) <= min(int(total), counted)
-
-
-def test_the_most_frequent_of_several_faults_is_not_taken_for_all(monitor, gait):
+def test_why_samples_cannot_be_used_is_said_and_the_most_frequent_fault_is_not_taken_for_all(monitor, gait):
     """The number of all stands before it, and is that of the alarm's fraction."""
     stream = gait(2.0)
     stream["fault"][100::4], stream["fault"][102::8] = ZERO_STAMP, EMPTY
     monitor.update(stream)
-    told = status_of(monitor)
+    told = status_of(monitor, "input")
     every, first = told.message.split(" samples are not used, ")
     unused, total = (int(number) for number in every.split(" of "))
     assert first.startswith(tuple(f"{n} of {total} samples have a zero stamp" for n in range(1, unused)))
@@ -226,20 +198,20 @@ def test_messages_without_the_crank_are_a_fault_only_if_none_has_it(monitor, gai
     others["fault"] = MISSING_JOINT
     both = np.concatenate([stream, others])
     monitor.update(both[np.argsort(both["stamp_ns"], kind="stable")])
-    told = status_of(monitor)
+    told = status_of(monitor, "input")
     assert told.values["faulty_missing_joint"] == len(others)
     assert told.message == "see: input_rate torque"  # there is none in this gait, and no other fault
-    assert level_of(monitor, "input_samples") is Level.OK
+    assert "input_samples" not in raised(monitor, Level.WARN)
     unnamed = gait(4.0, begin_s=6.0)
     unnamed["fault"] = MISSING_JOINT
     monitor.update(unnamed)
-    assert "samples do not name the crank 'crank': set crank_joint" in status_of(monitor).message
-    assert level_of(monitor, "input_samples") is Level.ERROR
+    assert "samples do not name the crank 'crank': set crank_joint" in status_of(monitor, "input").message
+    assert "input_samples" in raised(monitor)
 
 
 def test_a_cause_that_has_gone_is_not_told_any_more(monitor, gait):
     stream = gait(6.0)
     stream["fault"][100:300] = ZERO_STAMP
     monitor.update(stream)
-    assert status_of(monitor).values["faulty_zero_stamp"] == 200
-    assert "zero stamp" not in status_of(monitor).message
+    assert status_of(monitor, "input").values["faulty_zero_stamp"] == 200
+    assert "zero stamp" not in status_of(monitor, "input").message

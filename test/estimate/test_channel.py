@@ -44,7 +44,7 @@ def test_lag_low_pass_and_load_friction_are_found_in_the_air(known):
     assert found.load_friction_sigma < 0.04
 
 
-@pytest.mark.parametrize("channel", [DIRECT, DRIVE])
+@pytest.mark.parametrize("channel", [pytest.param(DIRECT, marks=pytest.mark.slow), DRIVE])
 def test_a_leg_that_is_commissioned_with_a_worn_joint_has_its_right_channel(known, leg, channel):
     """Lateness, by joints: 1.0 ± 0.1 and 0.8 ± 0.1 ms RMS (25 draws of cycles); 1.9 if as counted."""
     reference, sensor, columns = known

@@ -31,21 +31,21 @@ def explainer() -> Explainer:
     return Explainer(model, JOINTS, baseline, (friction, foot))
 
 
-def measured(explainer: Explainer, clearance, cycles: int, seed: int, extra=0.0):
+def measured(explainer, clearance, cycles: int, seed: int, extra=0.0):
     """Mean signature of some cycles."""
     random = np.random.default_rng(seed)
     noise = random.standard_normal(F) / np.sqrt(cycles)
     return explainer.model.at(np.asarray(clearance))[0] + explainer.baseline.offset + noise + extra
 
 
-def test_the_model_passes_through_its_grid(explainer: Explainer) -> None:
+def test_the_model_passes_through_its_grid(explainer) -> None:
     model = explainer.model
     for i, clearance in enumerate(GRID):
         found = model.at(np.array([NEW[0], clearance, NEW[0]]))[0]
         np.testing.assert_allclose(found, model.change[1, i], atol=1e-12)
 
 
-def test_slopes_are_derivatives_by_the_logarithm(explainer: Explainer) -> None:
+def test_slopes_are_derivatives_by_the_logarithm(explainer) -> None:
     at = np.array([3.3e-4, 5.0e-4, 1.0e-3])
     before, slopes = explainer.model.at(at)
     for k in range(3):
@@ -54,7 +54,7 @@ def test_slopes_are_derivatives_by_the_logarithm(explainer: Explainer) -> None:
         np.testing.assert_allclose((explainer.model.at(more)[0] - before) / 1e-6, slopes[:, k], atol=1e-4)
 
 
-def test_all_clearances_are_found_within_their_standard_deviations(explainer: Explainer) -> None:
+def test_all_clearances_are_found_within_their_standard_deviations(explainer) -> None:
     true = np.array([3.0e-4, 4.0e-4, 5.0e-4])
     off = []
     for seed in range(100):
@@ -64,7 +64,7 @@ def test_all_clearances_are_found_within_their_standard_deviations(explainer: Ex
     assert 0.05 < np.std(off) < 1.3  # the model's own error is in the standard deviation, too
 
 
-def test_a_joint_that_the_torque_does_not_show_is_not_known(explainer: Explainer) -> None:
+def test_a_joint_that_the_torque_does_not_show_is_not_known(explainer) -> None:
     """It keeps its prior, a factor of e, however many gait cycles there are."""
     model = explainer.model
     hidden = attrs.evolve(model, change=model.change * np.array([1.0, 1.0, 0.0])[:, None, None])
@@ -74,7 +74,7 @@ def test_a_joint_that_the_torque_does_not_show_is_not_known(explainer: Explainer
     assert (fit.sigma_m[:2] < 0.1 * NEW[:2]).all()
 
 
-def test_joints_that_explain_a_change_as_well_widen_each_other(explainer: Explainer) -> None:
+def test_joints_that_explain_a_change_as_well_widen_each_other(explainer) -> None:
     """I at 0.45 mm behind a belt looked like G at 0.33 mm, and was told as 0.31 ± 0.01 mm."""
     model = explainer.model
     alike = attrs.evolve(model, change=model.change[[0, 1, 1]])
@@ -89,7 +89,7 @@ def test_joints_that_explain_a_change_as_well_widen_each_other(explainer: Explai
     assert fit.sigma_m[0] == best.sigma_m[0]
 
 
-def test_no_joint_gets_narrower_than_a_new_part_but_a_worn_one_may_have_got_one(explainer: Explainer) -> None:
+def test_no_joint_gets_narrower_than_a_new_part_but_a_worn_one_may_have_got_one(explainer) -> None:
     """Wear only opens: with A and G opened at once, I was found at 0.21 ± 0.02 mm."""
     less = -1.5 * explainer.model.change[0, 1]  # as if it were 0.76 times as wide
     new = fit_clearances(explainer, measured(explainer, NEW, 1, 1, less), 1, NEW, NEW)
@@ -99,7 +99,7 @@ def test_no_joint_gets_narrower_than_a_new_part_but_a_worn_one_may_have_got_one(
     assert abs(renewed.clearance_m[0] - NEW[0]) < 3.0 * renewed.sigma_m[0] < NEW[0]
 
 
-def test_clearances_that_explain_poorly_are_not_known(explainer: Explainer) -> None:
+def test_clearances_that_explain_poorly_are_not_known(explainer) -> None:
     """What several joints change does not add up: G at 0.45 mm was 0.33 ± 0.01 mm beside A."""
     true, other = NEW * np.array([1.5, 1.0, 1.0]), np.random.default_rng(7).standard_normal(F)
     for extra, explains in ((0.0, True), (2.0 * other, False)):
@@ -108,7 +108,7 @@ def test_clearances_that_explain_poorly_are_not_known(explainer: Explainer) -> N
         assert (fit.sigma_m >= fit.clearance_m).all() is np.bool_(not explains)
 
 
-def test_more_cycles_are_better(explainer: Explainer) -> None:
+def test_more_cycles_are_better(explainer) -> None:
     sigma = [
         fit_clearances(explainer, measured(explainer, NEW, n, 1), n, NEW, NEW).sigma_m for n in (2, 10, 60)
     ]
@@ -117,7 +117,7 @@ def test_more_cycles_are_better(explainer: Explainer) -> None:
 
 
 @pytest.mark.parametrize("k", range(3))
-def test_one_wider_joint_is_named_with_its_clearance(explainer: Explainer, k: int) -> None:
+def test_one_wider_joint_is_named_with_its_clearance(explainer, k: int) -> None:
     true = NEW.copy()
     true[k] *= 1.4
     found = explainer.explanations(measured(explainer, true, 10, k), 10, NEW)
@@ -129,7 +129,7 @@ def test_one_wider_joint_is_named_with_its_clearance(explainer: Explainer, k: in
     assert change.since_ns == 5
 
 
-def test_a_heavier_foot_is_a_mass_and_no_clearance(explainer: Explainer) -> None:
+def test_a_heavier_foot_is_a_mass_and_no_clearance(explainer) -> None:
     extra = 0.1 * explainer.nuisances[1].column
     found = explainer.explanations(measured(explainer, NEW, 10, 1, extra), 10, NEW)
     assert (found[0].cause, found[0].subject) == (Cause.MASS, "foot")
@@ -149,22 +149,20 @@ def test_a_name_is_sure_only_where_no_other_joint_explains_nearly_as_much() -> N
         assert other.is_sure is is_sure
 
 
-def test_a_leg_as_counted_has_no_change(explainer: Explainer) -> None:
+def test_a_leg_as_counted_has_no_change(explainer) -> None:
     for seed in range(20):
         found = explainer.explanations(measured(explainer, NEW, 30, seed), 30, NEW)
         assert change_of(found, 5) is None
 
 
-def test_usual_friction_is_no_change_of_clearances(explainer: Explainer) -> None:
+def test_usual_friction_is_no_change_of_clearances(explainer) -> None:
     extra = 0.3 * explainer.nuisances[0].column
     fit = fit_clearances(explainer, measured(explainer, NEW, 60, 1, extra), 60, NEW, NEW)
     assert (np.abs(fit.clearance_m - NEW) < 4.0 * fit.sigma_m).all()
 
 
 @pytest.mark.parametrize(("spreads", "is_told"), [(0.0, False), (1.0, False), (8.0, True)])
-def test_friction_is_a_change_only_where_it_is_unusual(
-    explainer: Explainer, spreads: float, is_told: bool
-) -> None:
+def test_friction_is_a_change_only_where_it_is_unusual(explainer, spreads: float, is_told: bool) -> None:
     """Seen before: friction of -0.005 ± 0.019 N m was told for hours, with odds of e^4."""
     extra = spreads * 0.3 * explainer.nuisances[0].column
     found = explainer.explanations(measured(explainer, NEW, 60, 2, extra), 60, NEW)
@@ -175,7 +173,7 @@ def test_friction_is_a_change_only_where_it_is_unusual(
         assert change.value == pytest.approx(spreads * 0.3, abs=4.0 * change.sigma)
 
 
-def test_what_no_leg_can_have_is_no_cause(explainer: Explainer) -> None:
+def test_what_no_leg_can_have_is_no_cause(explainer) -> None:
     """A foot three times as heavy fits best, and the next best would be a wrong clearance."""
     extra = 2.0 * explainer.nuisances[1].column
     found = explainer.explanations(measured(explainer, NEW, 10, 1, extra), 10, NEW)
@@ -185,7 +183,7 @@ def test_what_no_leg_can_have_is_no_cause(explainer: Explainer) -> None:
     assert (change.cause, change.subject) == (Cause.UNKNOWN, "")
 
 
-def test_another_channel_is_a_lag_and_no_clearance(explainer: Explainer) -> None:
+def test_another_channel_is_a_lag_and_no_clearance(explainer) -> None:
     late = OtherChannel(0.01, 3.0 * np.random.default_rng(8).standard_normal(F))
     own = Explainer(
         explainer.model,
@@ -198,7 +196,7 @@ def test_another_channel_is_a_lag_and_no_clearance(explainer: Explainer) -> None
     assert (found[0].cause, found[0].value) == (Cause.LAG, 0.01)
 
 
-def test_a_channel_that_leaves_as_much_as_it_explains_is_no_lag(explainer: Explainer) -> None:
+def test_a_channel_that_leaves_as_much_as_it_explains_is_no_lag(explainer) -> None:
     """Seen before: G broken out to 2 mm was a lag of 20 ms, which left over more than no cause at all."""
     random = np.random.default_rng(11)
     late = (OtherChannel(0.02, 40.0 * random.standard_normal(F)),)
@@ -210,9 +208,7 @@ def test_a_channel_that_leaves_as_much_as_it_explains_is_no_lag(explainer: Expla
     assert causes[0] is Cause.CLEARANCE
 
 
-def test_where_no_size_fits_those_that_fit_as_badly_are_in_the_standard_deviation(
-    explainer: Explainer,
-) -> None:
+def test_where_no_size_fits_those_that_fit_as_badly_are_in_the_standard_deviation(explainer) -> None:
     """Seen before: G broken out to 2 mm was 0.84 mm with a tenth of it as its standard deviation."""
     random = np.random.default_rng(5)
     change = explainer.model.change.copy()
@@ -251,7 +247,7 @@ def test_misfits_are_those_of_normal_densities() -> None:
         assert found.value[i] == pytest.approx(square + np.linalg.slogdet(own)[1], rel=1e-12)
 
 
-def test_causes_do_not_depend_on_the_order_of_the_joints(explainer: Explainer) -> None:
+def test_causes_do_not_depend_on_the_order_of_the_joints(explainer) -> None:
     model = explainer.model
     turned = attrs.evolve(model, grid_m=model.grid_m[::-1], change=model.change[::-1])
     other = Explainer(turned, JOINTS[::-1], explainer.baseline, explainer.nuisances)

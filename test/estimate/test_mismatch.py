@@ -100,7 +100,7 @@ def remedied(found: TorqueExplanation, **given: Any) -> str:
     [{}, {"bias": 2.0}, {"bias": 0.0}, {"lag": 0.004}, {"offset": 0.02}, {"load": 60.0}, {"factor": 1.03},
      {"noise": 1.0}, {"samples": 50}, {"body": "coupler", "more": 0.1}],
 )  # fmt: skip
-def test_a_sound_torque_has_no_cause(leg: Any, walked: Any, sound: dict[str, Any]) -> None:
+def test_a_sound_torque_has_no_cause(leg, walked, sound) -> None:
     assert explained(leg, walked(**sound)) is None
 
 
@@ -126,9 +126,7 @@ def test_a_sound_torque_has_no_cause(leg: Any, walked: Any, sound: dict[str, Any
         ({"offset": 0.3, "load": -80.0}, {TIMING: -0.3, LOAD: -80.0}),
     ],
 )
-def test_what_is_wrong_is_named_with_its_value(
-    leg: Any, walked: Any, wrong: dict[str, Any], causes: dict[Cause, float]
-) -> None:
+def test_what_is_wrong_is_named_with_its_value(leg, walked, wrong, causes) -> None:
     found = explained(leg, walked(**wrong))
     assert found is not None and found.is_whole and found.after < 0.05
     assert {one.cause for one in found.named} == set(causes)
@@ -142,16 +140,14 @@ def test_what_is_wrong_is_named_with_its_value(
 
 @pytest.mark.parametrize(("bias", "word"), [(-5.0, "drives the crank"), (9.0, "largest friction")])
 @pytest.mark.parametrize("factor", [-1.0, 3.0])
-def test_a_bias_is_told_beside_a_wrong_factor(
-    leg: Any, walked: Any, factor: float, bias: float, word: str
-) -> None:
+def test_a_bias_is_told_beside_a_wrong_factor(leg, walked, factor, bias, word) -> None:
     found = explained(leg, walked(factor=factor, bias=factor * bias))
     assert found is not None
     assert found.bias.value == pytest.approx(bias if bias < 0.0 else bias - ALLOWED.friction_nm, abs=0.2)
     assert word in words(found)
 
 
-def test_at_one_speed_an_offset_and_a_lag_are_both_named(leg: Any, walked: Any) -> None:
+def test_at_one_speed_an_offset_and_a_lag_are_both_named(leg, walked) -> None:
     found = explained(leg, walked(lag=0.05))
     assert found is not None and [one.cause for one in found.named] == [TIMING]
     told = words(found)
@@ -172,7 +168,7 @@ def test_at_one_speed_an_offset_and_a_lag_are_both_named(leg: Any, walked: Any) 
     ],
 )
 def test_at_two_speeds_an_offset_and_a_lag_are_told_apart(
-    leg: Any, walked: Any, wrong: dict[str, Any], cause: Cause, value: float, there: str, absent: str
+    leg, walked, wrong, cause, value, there, absent
 ) -> None:
     found = explained(leg, walked(30, speeds=(57.0, 63.0), **wrong))
     assert found is not None and [one.cause for one in found.named] == [cause]
@@ -181,7 +177,7 @@ def test_at_two_speeds_an_offset_and_a_lag_are_told_apart(
     assert there in told and absent not in told and "cannot be distinguished" not in told
 
 
-def test_a_factor_is_compared_with_known_mistakes(leg: Any, walked: Any) -> None:
+def test_a_factor_is_compared_with_known_mistakes(leg, walked) -> None:
     shaft = explained(leg, walked(factor=1.0 / 9.0))
     assert shaft is not None
     assert "the torque on the joint's shaft; crank.gear_ratio is 9" in words(
@@ -197,7 +193,7 @@ def test_a_factor_is_compared_with_known_mistakes(leg: Any, walked: Any) -> None
     assert large is not None and "in N mm" in words(large) and "scale to 0.001" in remedied(large)
 
 
-def test_a_torque_of_nothing_like_this_leg_has_no_named_cause(leg: Any, walked: Any) -> None:
+def test_a_torque_of_nothing_like_this_leg_has_no_named_cause(leg, walked) -> None:
     found = explained(leg, walked(factor=1.0, extra=lambda angle: 12.0 * np.sin(5.0 * angle)))
     assert found is not None and not found.named and not found.is_input_fault
     told = words(found)
@@ -205,20 +201,20 @@ def test_a_torque_of_nothing_like_this_leg_has_no_named_cause(leg: Any, walked: 
     assert f"{found.after:.3g} ± {found.after_sigma:.3g}" in told
 
 
-def test_a_reversed_sign_on_a_leg_that_does_not_fit_is_named_with_what_remains(leg: Any, walked: Any) -> None:
+def test_a_reversed_sign_on_a_leg_that_does_not_fit_is_named_with_what_remains(leg, walked) -> None:
     found = explained(leg, walked(factor=-1.0, extra=lambda angle: 2.5 * np.sin(7.0 * angle)))
     assert found is not None and [one.cause for one in found.named] == [SIGN] and not found.is_whole
     assert "stays unexplained" in words(found)
 
 
-def test_two_causes_that_explain_alike_are_both_told_and_none_is_sure(leg: Any, walked: Any) -> None:
+def test_two_causes_that_explain_alike_are_both_told_and_none_is_sure(leg, walked) -> None:
     found = explained(leg, walked(body="shank", more=0.5, noise=1.0))
     assert found is not None and len(found.alternatives) > 1 and not found.named and not found.is_input_fault
     told = words(found)
     assert "shank" in told and "times the predicted one" in told and "cannot be distinguished" in told
 
 
-def test_too_few_samples_explain_nothing(leg: Any, walked: Any) -> None:
+def test_too_few_samples_explain_nothing(leg, walked) -> None:
     cycles = walked(factor=-1.0, samples=200)
     for one in cycles:
         one.torque_profile.number[8:] = 0.0

@@ -26,8 +26,12 @@ def config_of(path, correct: bool = True) -> MonitorConfig:
     return attrs.evolve(config, ledger=ledger, diagnosis=attrs.evolve(config.diagnosis, correct=correct))
 
 
-def test_the_twin_walks_on_with_identified_parameters_and_the_ledger_keeps_them(leg, gait, tmp_path, found):
-    config = config_of(tmp_path / "wear.ledger")
+def test_the_twin_walks_on_with_identified_parameters_and_the_ledger_keeps_them(
+    leg, gait, tmp_path, found, monkeypatch
+):
+    """And the reference that was simulated for them."""
+    config, shipped = config_of(tmp_path / "wear.ledger"), shipped_references(leg)[0]
+    monkeypatch.setattr(TorqueObserver, "simulated_references", (shipped,))
     monitor = open_monitor(leg, config)
     monitor.update(gait(2.5))
     assert monitor._parts.twin.parameters == found
@@ -41,16 +45,6 @@ def test_the_twin_walks_on_with_identified_parameters_and_the_ledger_keeps_them(
     again = open_monitor(leg, config)
     assert again._parts.twin.parameters == found
     assert again._parts.torque.state.parameters == found
-    again.close()
-
-
-def test_a_simulated_reference_is_in_the_ledger(leg, gait, tmp_path, monkeypatch):
-    config, shipped = config_of(tmp_path / "wear.ledger"), shipped_references(leg)[0]
-    monkeypatch.setattr(TorqueObserver, "simulated_references", (shipped,))
-    monitor = open_monitor(leg, config)
-    monitor.update(gait(2.5))
-    monitor.close()
-    again = open_monitor(leg, config)
     (kept, *_) = again._parts.torque._references._given
     np.testing.assert_array_equal(kept.torque_nm[3], shipped.torque_nm[3])
     assert kept.parameters == LegParameters.none(leg)

@@ -13,7 +13,7 @@ from leg_wear_monitor.mechanism.loader import shipped_mechanisms
 from leg_wear_monitor.monitor.forecast.forecast import Answer
 from leg_wear_monitor.state import Figure, Level
 
-SECONDS = 16
+SECONDS = 8
 
 
 def leg_with(path: Path, pressure_speed: float | None, material: str = "") -> lw.Mechanism:

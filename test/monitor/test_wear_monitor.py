@@ -16,11 +16,10 @@ from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.sensors import readings
 from leg_wear_monitor.monitor.config.fitting import twin_settings
 from leg_wear_monitor.monitor.config.parameters import changed, config_from
-from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.forecast import Answer
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin import TORQUE
-from leg_wear_monitor.twin.sample import EMPTY, TwinSettings, gait_samples
+from leg_wear_monitor.twin.sample import EMPTY, gait_samples
 
 SECOND = 10**9
 
@@ -271,12 +270,6 @@ def test_what_is_wrong_with_the_input_is_named(monitor, gait, name, spoil, value
     monitor.restore(new)
     monitor.update(spoil(good))
     assert name in raised(monitor)
-
-
-def test_the_trackers_defaults_are_the_twins_own():
-    ours, its = twin_settings(MonitorConfig()), TwinSettings()
-    tracker = attrs.evolve(its.tracker, speed_tolerance=ours.tracker.speed_tolerance)
-    assert ours == attrs.evolve(its, tracker=tracker)
 
 
 def test_a_reorder_window_longer_than_a_bridged_gap_is_refused():

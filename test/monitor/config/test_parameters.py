@@ -22,19 +22,14 @@ pytestmark = pytest.mark.plain
 
 WRONG = [
     ("limits.clearance_m", -1.0, ["-1.0", "above 0 m", "at most 0.1"]),
-    ("limits.clearance_m", 1.0, ["1.0", "at most 0.1 m", "above 0"]),
     ("limits.clearance_m", 1, ["1 is a whole number", "expected 1.0 [m]"]),
     ("limits.clearance_m", "wide", ["'wide'", "not a number [m]", "at most 0.1"]),
     ("limits.clearance_m", None, ["nothing", "not a number [m]"]),
     ("limits.clearance_m", True, ["True", "not a number [m]"]),
     ("limits.clearance_m", float("nan"), ["nan", "not a finite number [m]"]),
-    ("limits.clearance_m", 1.0e999, ["inf", "not a finite number [m]"]),
     ("limits.clearanc_m", 1.0e-3, ["unknown parameter", "did you mean limits.clearance_m?"]),
-    ("limits.clearance_m.A", 1.0e-3, ["unknown parameter", "did you mean limits.clearance_m?"]),
     ("limits", 1.0e-3, ["unknown parameter"]),
-    ("height", 1.0e-3, ["unknown parameter"]),
     ("clearances_m", [3.0e-4, 5.0], ["5.0", "at most 0.1 m"]),
-    ("clearances_m", [3.0e-4, 1], ["whole number", "expected 1.0 [m]"]),
     ("clearances_m", 3.0e-4, ["0.0003", "not a list of numbers [m]"]),
     ("clearance_joints", ["A", 3], ["3", "not a text"]),
     ("cadence.commanded_rpm", 0.0, ["0.0 rpm", "does not turn the crank"]),
@@ -44,15 +39,10 @@ WRONG = [
     ("drive_torque.axis", "w", ["'w'", "not one of x, y, z"]),
     ("drive_torque.source", "odometry", ["'odometry'", "wrench, float64, effort, interface"]),
     ("cadence.commanded_rpm", 5e-324, ["expected a speed of at least 0.1 rpm either way"]),
-    ("cadence.commanded_rpm", 1e-9, ["expected a speed of at least 0.1 rpm either way"]),
-    ("forecast.clearance_sigma_m", 1e-12, ["not at least 1e-09 m"]),
-    ("crank.gear_ratio", 1e-300, ["not at least 0.0001"]),
     ("limits.impact_force_n", 5e-324, ["too close to 0, expected more than 1e-30 N"]),
     ("wear_acceleration", 1e-12, ["not at least 1e-09"]),
-    ("limits.joint_clearance_m", [6e-4, 7.0], ["not at most 0.1 m"]),
     ("limits.growth_m_per_hour", 1e300, ["too large, expected at most"]),
     ("publish_markers", "on", ["'on'", "not true or false"]),
-    ("publish_markers", 1, ["1", "not true or false"]),
     ("hardware_id", "a\nb", ["text on one line"]),
 ]
 
@@ -70,11 +60,9 @@ def test_a_value_that_cannot_be_is_one_line(name, value, said):
 
 FILES = [
     ("limits: {clearance_m: 0.001}", ["is not a ROS parameter file"]),
-    ("[1, 2]", ["is not a ROS parameter file"]),
     ("/**: {ros__parameters: 7}", ["/**.ros__parameters", "7", "mapping"]),
     ("/**: {ros__parameters: {}, limits: {}}", ["/**", "one key ros__parameters"]),
     ("/gait_publisher: {ros__parameters: {}}", ["nothing for the node /leg_wear_monitor", "/gait_publisher"]),
-    ("/**: {ros__parameters: {7: 1}}", ["the key 7", "not a text"]),
     ("/**: {ros__parameters: {limits: {9: 1}}}", ["limits", "the key 9", "not a text"]),
     (
         "/**: {ros__parameters: {limits: {warn_fraction: 0.7}, limits.warn_fraction: 0.6}}",
@@ -108,7 +96,6 @@ def read(text, node="/leg_wear_monitor"):
     ("pattern", "node", "taken"),
     [
         ("/**", "/left/leg_wear_monitor", True),
-        ("/**", "/leg_wear_monitor", True),
         ("leg_wear_monitor", "/leg_wear_monitor", True),
         ("/leg_wear_monitor", "/leg_wear_monitor", True),
         ("/leg_wear_monitor", "/left/leg_wear_monitor", False),

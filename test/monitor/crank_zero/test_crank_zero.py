@@ -12,10 +12,6 @@ from leg_wear_monitor.monitor.evaluation import A_CYCLE, EvaluationPeriods
 from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin.sample import Samples
 
-Walk = Callable[..., Samples]
-Search = Callable[..., CrankZero]
-Feed = Callable[..., Samples]
-
 TOLERANCE_RAD = 0.02
 SECOND = 10**9
 
@@ -26,9 +22,7 @@ def off_rad(search: CrankZero, zero_rad: float) -> float:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_it_is_found_within_four_turns_and_no_sample_is_lost(
-    seed: int, walk: Walk, new_search: Search, feed: Feed
-) -> None:
+def test_it_is_found_within_four_turns_and_no_sample_is_lost(seed: int, walk, new_search, feed) -> None:
     rng = np.random.default_rng(seed)
     rpm = float(rng.choice([-1.0, 1.0]) * rng.uniform(35.0, 90.0))
     zero, begin = float(rng.uniform(-math.pi, math.pi)), float(rng.uniform(0.0, 1.0))
@@ -48,7 +42,7 @@ def test_it_is_found_within_four_turns_and_no_sample_is_lost(
 
 @pytest.mark.parametrize(("stop", "cuts"), [(700, (1, 333)), (1300, ()), (1603, (1400, 1602))])
 def test_it_does_not_depend_on_blocks_nor_on_a_restored_snapshot(
-    stop: int, cuts: tuple[int, ...], walk: Walk, new_search: Search, feed: Feed
+    stop: int, cuts: tuple[int, ...], walk, new_search, feed
 ) -> None:
     sent = np.concatenate([walk(4.0, 1.0), walk(1.5, -2.0, begin_s=4.0, seed=1)])
     whole, parts, other = new_search(), new_search(), new_search()
@@ -107,9 +101,7 @@ UNTOLD = {
 
 
 @pytest.mark.parametrize("name", UNTOLD)
-def test_where_it_cannot_be_told_it_is_said_why_and_found_later(
-    name: str, walk: Walk, new_search: Search, feed: Feed
-) -> None:
+def test_where_it_cannot_be_told_it_is_said_why_and_found_later(name: str, walk, new_search, feed) -> None:
     change, rpm, why = UNTOLD[name]
     search = new_search(rpm)
     periods = EvaluationPeriods(SECOND // A_CYCLE)
@@ -121,9 +113,7 @@ def test_where_it_cannot_be_told_it_is_said_why_and_found_later(
         assert off_rad(search, 1.0) < TOLERANCE_RAD
 
 
-def test_waiting_is_bounded_and_what_waited_too_long_is_not_monitored(
-    walk: Walk, new_search: Search, feed: Feed
-) -> None:
+def test_waiting_is_bounded_and_what_waited_too_long_is_not_monitored(walk, new_search, feed) -> None:
     search = new_search()
     periods = EvaluationPeriods(SECOND // A_CYCLE)
     feed(search, without_torque(walk(40.0, 1.0)), (), periods)
@@ -137,9 +127,7 @@ def test_waiting_is_bounded_and_what_waited_too_long_is_not_monitored(
 
 
 @pytest.mark.parametrize("pause_s", [0.0, 3.0])
-def test_an_encoder_that_restarts_is_found_again(
-    pause_s: float, walk: Walk, new_search: Search, feed: Feed
-) -> None:
+def test_an_encoder_that_restarts_is_found_again(pause_s: float, walk, new_search, feed) -> None:
     first, second = walk(4.0, 1.0), walk(4.0, -2.2, begin_s=4.0 + pause_s, seed=1)
     truths = walk(4.0, 0.0), walk(4.0, 0.0, begin_s=4.0 + pause_s, seed=1)
     search = new_search()
@@ -155,9 +143,7 @@ def test_an_encoder_that_restarts_is_found_again(
     assert off.max() < TOLERANCE_RAD
 
 
-def test_a_gap_in_which_a_counting_encoder_counted_on_changes_nothing(
-    walk: Walk, new_search: Search, feed: Feed
-) -> None:
+def test_a_gap_in_which_a_counting_encoder_counted_on_changes_nothing(walk, new_search, feed) -> None:
     whole = walk(12.0, 1.0)
     time_s = 1.0e-9 * (whole["stamp_ns"] - whole["stamp_ns"][0])
     search = new_search()
@@ -167,7 +153,7 @@ def test_a_gap_in_which_a_counting_encoder_counted_on_changes_nothing(
 
 
 @pytest.mark.parametrize("number", [1, 2])
-def test_a_glitch_is_no_restart(number: int, walk: Walk, new_search: Search, feed: Feed) -> None:
+def test_a_glitch_is_no_restart(number: int, walk, new_search, feed) -> None:
     sent = walk(6.0, 1.0)
     wrong = np.flatnonzero(sent["kind"] == CRANK)[1000 : 1000 + number]
     sent["crank_angle_rad"][wrong] += 2.0
@@ -177,7 +163,7 @@ def test_a_glitch_is_no_restart(number: int, walk: Walk, new_search: Search, fee
     assert len(passed) == len(sent)
 
 
-def test_an_angle_that_goes_nowhere_is_not_waited_for(walk: Walk, new_search: Search, feed: Feed) -> None:
+def test_an_angle_that_goes_nowhere_is_not_waited_for(walk, new_search, feed) -> None:
     sent = walk(12.0, 1.0)
     time_s = 1.0e-9 * (sent["stamp_ns"] - sent["stamp_ns"][0])
     wild = (sent["kind"] == CRANK) & (time_s > 6.0)

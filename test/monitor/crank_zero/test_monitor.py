@@ -15,8 +15,6 @@ from leg_wear_monitor.monitor.reports import CycleReport
 from leg_wear_monitor.state import Level, State
 from leg_wear_monitor.twin.sample import Samples
 
-Walk = Callable[..., Samples]
-
 ZERO_RAD = 2.4
 
 
@@ -44,9 +42,7 @@ def without_forecast(cycle: CycleReport) -> str:
     return repr(attrs.asdict(attrs.evolve(cycle, forecast=None, joints=joints)))
 
 
-def test_gait_cycles_and_wear_are_those_of_a_known_zero_bit_for_bit(
-    fresh: Callable[[], WearMonitor], new_monitor: Callable[..., WearMonitor], walk: Walk
-) -> None:
+def test_gait_cycles_and_wear_are_those_of_a_known_zero_bit_for_bit(fresh, new_monitor, walk) -> None:
     samples, monitor = walk(6.5, ZERO_RAD), fresh()
     found = [without_forecast(cycle) for cycle in cycles_of(monitor, samples)]
     values = status_of(monitor, "crank zero").values
@@ -59,7 +55,7 @@ def test_gait_cycles_and_wear_are_those_of_a_known_zero_bit_for_bit(
     assert monitor.lost == known.lost
 
 
-def test_it_is_said_while_it_is_looked_for(fresh: Callable[[], WearMonitor], walk: Walk) -> None:
+def test_it_is_said_while_it_is_looked_for(fresh, walk) -> None:
     samples, monitor = walk(5.0, ZERO_RAD), fresh()
     reports = monitor.update(samples[:1000])
     assert not len(reports.samples)
@@ -81,7 +77,7 @@ def test_it_is_said_while_it_is_looked_for(fresh: Callable[[], WearMonitor], wal
     assert monitor.lost.unmonitored_s == pytest.approx(0.1, abs=0.02)  # until the tracker has the crank
 
 
-def test_a_restored_snapshot_continues_bit_for_bit(fresh: Callable[[], WearMonitor], walk: Walk) -> None:
+def test_a_restored_snapshot_continues_bit_for_bit(fresh, walk) -> None:
     samples, monitor = walk(5.0, ZERO_RAD), fresh()
     monitor.update(samples[:900])
     half = monitor.snapshot()
@@ -93,9 +89,7 @@ def test_a_restored_snapshot_continues_bit_for_bit(fresh: Callable[[], WearMonit
     assert expected
 
 
-def test_a_drive_that_restarts_loses_the_time_of_its_restart_alone(
-    fresh: Callable[[], WearMonitor], walk: Walk
-) -> None:
+def test_a_drive_that_restarts_loses_the_time_of_its_restart_alone(fresh, walk) -> None:
     first, second = walk(5.0, ZERO_RAD), walk(5.0, 7.0 * math.tau - 1.0, begin_s=7.0, seed=1)
     monitor = fresh()
     is_known = []

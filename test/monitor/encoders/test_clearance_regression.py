@@ -137,10 +137,8 @@ def test_the_hip_alone_says_nothing_of_the_ankle(model, shape, reference):
             hidden.add(crank, angles)
         return hidden.fused()
 
-    assert (
-        observations(by_hip(1e-3))
-        == [ClearanceObservation.SEEN] * 3 + [ClearanceObservation.NOT_OBSERVABLE] * 2
-    )
+    expected = [ClearanceObservation.SEEN] * 3 + [ClearanceObservation.NOT_OBSERVABLE] * 2
+    assert observations(by_hip(1e-3)) == expected
     found = by_hip(2e-5)
     np.testing.assert_allclose(found.clearance_m[3:], FRESH[3:], atol=1e-9)
     np.testing.assert_allclose(found.sigma_m[3:], 2e-5, rtol=1e-3)

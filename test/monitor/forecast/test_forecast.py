@@ -68,12 +68,10 @@ def test_a_measurement_narrows_and_moves_the_forecast():
     before = alone(now)
     after = alone(now, observations=[ClearanceAtWear(3e-4 + 1.5 * 6e-5, 5e-6, 6e-5)])
     assert after.cycles.p50 < 0.75 * before.cycles.p50
-    assert (
-        math.log(after.cycles.p90 / after.cycles.p10) < math.log(before.cycles.p90 / before.cycles.p10) / 3.0
-    )
-    assert after.clearance_m.p90 - after.clearance_m.p10 < 0.2 * (
-        before.clearance_m.p90 - before.clearance_m.p10
-    )
+    lives = [math.log(one.cycles.p90 / one.cycles.p10) for one in (before, after)]
+    assert lives[1] < lives[0] / 3.0
+    widths_m = [one.clearance_m.p90 - one.clearance_m.p10 for one in (before, after)]
+    assert widths_m[1] < 0.2 * widths_m[0]
     assert after.measurements == 1
 
 

@@ -27,12 +27,13 @@ def window(growths, moving_s=1.0, cycles=30):
     return found
 
 
-@given(st.floats(1e-15, 1e-6), st.floats(0.1, 10.0), st.integers(LEAST_CYCLES, 60))
+@given(st.just(0.0) | st.floats(1e-15, 1e-6), st.floats(0.1, 10.0), st.integers(LEAST_CYCLES, 60))
 def test_even_growth_is_known_exactly(growth, period_s, n):
     rate = growth_rate(window([growth] * n, period_s))
     assert rate.per_cycle_m == pytest.approx(growth, rel=1e-12)
     assert rate.per_second_m == pytest.approx(growth / period_s, rel=1e-12)
     assert rate.sampling_m == pytest.approx(0.0, abs=1e-12 * growth)
+    assert rate.error_m(0.03) == pytest.approx(0.03 * growth)  # a model that is off remains
 
 
 @given(st.integers(0, LEAST_CYCLES - 1))
@@ -44,11 +45,6 @@ def test_scatter_as_large_as_the_mean_is_not_enough():
     growths = np.zeros(30)
     growths[7] = 1.0e-12
     assert growth_rate(window(growths)) is None
-
-
-def test_no_wear_is_a_rate_of_zero():
-    rate = growth_rate(window([0.0] * 30))
-    assert rate.per_cycle_m == 0.0
 
 
 def test_only_the_last_cycles_count():
@@ -88,11 +84,6 @@ def test_the_interval_narrows_with_the_square_root_of_the_window():
 
     # 400 standard errors of four degrees of freedom: each scatters by 0.36, their mean by 0.018
     assert width(30) / width(270) == pytest.approx(3.0, rel=4.0 * 0.018 * 2.0**0.5)
-
-
-def test_a_model_that_is_off_remains_where_cycles_do_not_scatter():
-    rate = growth_rate(window([2.0e-11] * 30))
-    assert rate.error_m(0.03) == pytest.approx(6.0e-13)
 
 
 def test_scatter_and_model_are_independent():

@@ -24,14 +24,9 @@ from leg_wear_monitor.monitor.ledger.entry import CorrectedClearance, Measuremen
 FRESH, SETTINGS = 3.0e-4, Forecasting(wear_coefficient_sigma=0.7)
 BEFORE, OPENED, SIGMA = 6.0e-5, 1.0e-3, 4.0e-5  # wear counted before, clearance that the torque shows
 CORRECTED = CorrectedClearance(
-    stamp_ns=5,
-    joint="A",
-    clearance_m=OPENED,
-    sigma_m=SIGMA,
-    before_m=BEFORE,
-    wear_m=OPENED - FRESH,
-    replaced_ns=0,
-)
+    stamp_ns=5, joint="A", clearance_m=OPENED, sigma_m=SIGMA,
+    before_m=BEFORE, wear_m=OPENED - FRESH, replaced_ns=0,
+)  # fmt: skip
 EARLY = ClearanceAtWear(FRESH + 1.8 * BEFORE, 2e-6, BEFORE)  # 1.8 times the nominal wear
 
 
@@ -101,17 +96,9 @@ def test_two_corrections_each_count_from_themselves():
 @pytest.mark.plain
 def test_a_fleet_learns_from_a_corrected_part_what_a_part_that_wore_alike_teaches(leg):
     measured = Measurement(
-        stamp_ns=7,
-        joint="A",
-        who="ann",
-        clearance_m=OPENED + 1.8e-5,
-        sigma_m=2e-6,
-        wear_m=CORRECTED.wear_m + 1e-5,
-        cycles=10,
-        replaced_ns=0,
-        expected_below=0.5,
-        counts=True,
-    )
+        stamp_ns=7, joint="A", who="ann", clearance_m=OPENED + 1.8e-5, sigma_m=2e-6,
+        wear_m=CORRECTED.wear_m + 1e-5, cycles=10, replaced_ns=0, expected_below=0.5, counts=True,
+    )  # fmt: skip
     given = leg, SETTINGS, [measured], {}
     blind, aware = (
         next(p for p in parts_of("left", *given, corrections=each) if p.joint == "A")

@@ -124,16 +124,13 @@ def test_measurements_that_repeat_the_same_model_are_expected_evenly():
 
 
 def test_a_measurement_says_in_words_what_it_taught():
+    assert "it adds little" in found(worn(2e-7), 0.302).words[0]
     told = found(worn(6e-5), 0.42)
     assert not told.contradicts
     assert told.measurement.counts
     (line,) = told.words
     assert line.startswith("the wear coefficient is 1.9")
     assert "times smaller than before" in line
-
-
-def test_too_little_wear_says_little():
-    assert "it adds little" in found(worn(2e-7), 0.302).words[0]
 
 
 def test_a_contradiction_is_said_and_kept_but_does_not_count():
@@ -144,18 +141,15 @@ def test_a_contradiction_is_said_and_kept_but_does_not_count():
     assert told.after.observations == 0
     # and the next one is judged as if it had not been
     assert not found(worn(1e-5), 0.31, [told.measurement]).contradicts
+    asked_for = found(worn(1e-5), 0.9, accept=True)
+    assert (asked_for.measurement.counts, asked_for.after.observations) == (True, 1)
+    assert asked_for.after.mean > 1.0
 
 
 def test_a_clearance_smaller_than_when_new_contradicts_too():
     told = found(worn(6e-5), 0.2)
     assert told.contradicts
     assert "far smaller" in told.words[0]
-
-
-def test_a_contradiction_counts_if_that_is_asked_for():
-    told = found(worn(1e-5), 0.9, accept=True)
-    assert (told.contradicts, told.measurement.counts, told.after.observations) == (True, True, 1)
-    assert told.after.mean > 1.0
 
 
 def test_measurements_of_a_part_that_was_replaced_say_nothing_of_the_new_one():

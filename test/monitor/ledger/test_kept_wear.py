@@ -121,26 +121,6 @@ def test_alarms_stay_latched_over_a_new_start_and_have_a_history(begin, gait, ro
     assert [level for (level,) in history] == [2, 0]
 
 
-def test_a_replaced_part_has_its_history(begin, gait, rows):
-    monitor = begin()
-    cycles_before = len(monitor.update(gait(3.0)).cycles)
-    was = monitor._twin.depth[1]
-    monitor.reset_wear("G", START_NS, "ann")
-    monitor.update(gait(3.0, begin_s=3.0))
-    monitor.close()
-    ((stamp_ns, who, what, joint, cycles, depth),) = rows(
-        "SELECT stamp_ns, who, what, joint, cycles, depth FROM audit"
-    )
-    assert (stamp_ns, who, what, joint, cycles) == (START_NS, "ann", "reset_wear", "G", cycles_before)
-    np.testing.assert_array_equal(np.frombuffer(depth).reshape(2, -1), was)
-    joints = rows("SELECT name, cycles, replaced_ns FROM joint")
-    life = {name: (cycles, replaced_ns) for name, cycles, replaced_ns in joints}
-    assert life["A"][0] == life["G"][0] + cycles_before
-    assert (life["A"][1], life["G"][1]) == (0, START_NS)
-    again = begin()
-    assert again._accounting.joint_wear(1, again._twin.depth).cycles == life["G"][0]
-
-
 def test_a_ledger_that_cannot_be_written_stops_nothing(begin, gait):
     monitor = begin({"ledger.checkpoint_s": 1.0})
     ledger = monitor._accounting.ledger

@@ -66,23 +66,17 @@ def test_a_run_that_was_cut_off_says_how_much_may_be_lost(open_ledger, entry_at)
         found.close()
 
 
-def test_a_run_without_an_entry_is_cut_off_too(open_ledger):
+def test_a_run_without_an_entry_or_with_events_alone_is_cut_off_too(open_ledger):
     open_ledger().close()
-    assert open_ledger().cut_off_s == 5.0
-
-
-def test_events_that_are_recorded_leave_it_known_that_a_run_was_cut_off(open_ledger, entry_at):
-    ledger = open_ledger()
-    ledger.keep(entry_at(2))
-    ledger.close()
     between = open_ledger()
+    assert between.cut_off_s == 5.0
     between.note(ForecastPoint(5, 7, "A", 1.0, 2.0, 3.0))
     between.record()
     between.close()
     assert open_ledger().cut_off_s is not None
 
 
-def test_history_and_audit_trail_are_appended_once(open_ledger, entry_at, tmp_path):
+def test_history_and_audit_trail_are_appended_once(open_ledger, entry_at, rows):
     ledger = open_ledger()
     for second in (1, 2):
         entry = entry_at(second)
@@ -92,10 +86,9 @@ def test_history_and_audit_trail_are_appended_once(open_ledger, entry_at, tmp_pa
         ledger.keep(entry)
     ledger.keep(entry_at(3))
     ledger.close()
-    with closing(sqlite3.connect(tmp_path / "wear.ledger")) as db:
-        audit = db.execute("SELECT stamp_ns, who, what, joint, cycles, depth FROM audit").fetchall()
-        alarms = db.execute("SELECT stamp_ns, kind, level, value FROM alarm_history").fetchall()
-        points = db.execute("SELECT stamp_ns, cycle, joint, clearance_m FROM history").fetchall()
+    audit = rows("SELECT stamp_ns, who, what, joint, cycles, depth FROM audit")
+    alarms = rows("SELECT stamp_ns, kind, level, value FROM alarm_history")
+    points = rows("SELECT stamp_ns, cycle, joint, clearance_m FROM history")
     depth = [entry_at(second).joints[0].depth.tobytes() for second in (1, 2)]
     assert audit == [(s, "ann", "reset_wear", "A", s, depth[s - 1]) for s in (1, 2)]
     assert alarms == [(s, "cadence", 0, None) for s in (1, 2)]  # SQLite keeps a NaN as NULL
@@ -301,14 +294,10 @@ def binding_for(values):
     return binding_of(fitted(load_mechanism(config.mechanism), config), config)
 
 
-@pytest.mark.parametrize("values", SAME)
-def test_what_does_not_make_it_another_part_keeps_the_ledger(values):
-    assert binding_for(values) == binding_for({})
-
-
-@pytest.mark.parametrize("values", OTHER)
-def test_what_makes_it_another_part_does_not(values):
-    assert binding_for(values).as_texts() != binding_for({}).as_texts()
+@pytest.mark.parametrize(("values", "is_same"), [*((v, True) for v in SAME), *((v, False) for v in OTHER)])
+def test_the_ledger_is_kept_unless_it_is_another_part(values, is_same):
+    assert (binding_for(values) == binding_for({})) == is_same
+    assert (binding_for(values).as_texts() == binding_for({}).as_texts()) == is_same
 
 
 def test_a_leg_with_another_mass_is_another_leg(leg):

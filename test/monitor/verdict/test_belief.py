@@ -45,15 +45,8 @@ def verdict(alarm: Alarm, *seen: KnownClearance, joint: JointSituation = COUNTED
 def test_a_stop_stays_while_the_estimate_comes_and_goes() -> None:
     """A break-out went stop, inspect, stop, inspect, stop: 2.05, 1.43, 2.1 mm, and unsure ones between."""
     alarm, states = NEW, []
-    estimates = (
-        BROKEN,
-        None,
-        KnownClearance("torque", 1.43e-3, 0.6e-3),
-        None,
-        KnownClearance("torque", 2.1e-3, 0.2e-3),
-    )
-    for seen in estimates:
-        shown = () if seen is None else (seen,)
+    unsure, again = KnownClearance("torque", 1.43e-3, 0.6e-3), KnownClearance("torque", 2.1e-3, 0.2e-3)
+    for shown in ((BROKEN,), (), (unsure,), (), (again,)):
         alarm = after(alarm, *shown)
         states.append(verdict(alarm, *shown).state)
     assert states == [State.STOP] * 5

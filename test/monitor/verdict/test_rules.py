@@ -219,9 +219,7 @@ CASES = [
 @pytest.mark.parametrize(
     ("changed", "state", "code", "not_valid"), CASES, ids=[f"{i}-{c[2]}" for i, c in enumerate(CASES)]
 )
-def test_each_case_has_its_verdict(
-    changed: dict[str, Any], state: State, code: str, not_valid: tuple[Figure, ...]
-) -> None:
+def test_each_case_has_its_verdict(changed, state, code, not_valid) -> None:
     verdict = judged(**changed)
     assert (verdict.state, verdict.fault_code, verdict.not_valid) == (state, code, not_valid)
     assert verdict.why and verdict.do and "{" not in verdict.words
@@ -286,9 +284,7 @@ SAME = [
 
 
 @pytest.mark.parametrize(("cause", "values", "kind"), SAME, ids=[each[0].name for each in SAME])
-def test_a_cause_has_one_code_and_one_sentence_whoever_finds_it(
-    cause: Cause, values: dict[str, Any], kind: str | None
-) -> None:
+def test_a_cause_has_one_code_and_one_sentence_whoever_finds_it(cause, values, kind) -> None:
     one = NamedCause(cause, sigma=0.01, **values)
     walking: dict[str, Any] = {"cadence_rpm": 60.0}
     by_diagnosis = judged(diagnosis=diagnosis(change(cause, sigma=0.01, counted=0.0, **values)), **walking)
@@ -351,9 +347,7 @@ def test_a_reason_to_stop_is_not_hidden_by_an_input_that_fails() -> None:
     [(Level.OK, 3.0, True), (Level.WARN, 0.9, True), (Level.ERROR, math.nan, False)],
     ids=["past", "warning", "of the ledger"],
 )
-def test_a_raised_alarm_is_told_with_its_worst_value_and_whether_it_is_past(
-    present: Level, value: float, is_past: bool
-) -> None:
+def test_a_raised_alarm_is_told_with_its_worst_value_and_whether_it_is_past(present, value, is_past) -> None:
     verdict = judged(alarms=(alarm("impact_force A", present=present, value=value, worst=1234.5),))
     assert verdict.state is State.INSPECT
     assert "is 1234 N" in verdict.why and "again now" not in verdict.why
@@ -410,9 +404,7 @@ WAITING = Diagnosis(state=DiagnosisState.WAITING, reason="gait cycles: 2 of 5")
     ],
     ids=["torque", "diagnosis"],
 )
-def test_joints_that_encoders_show_need_no_torque_and_no_diagnosis(
-    missing: dict[str, Any], seen_by: str, why: str
-) -> None:
+def test_joints_that_encoders_show_need_no_torque_and_no_diagnosis(missing, seen_by, why) -> None:
     eyes = seen_as_new("encoders")
     every, some = judged(**missing, joints=eyes), judged(**missing, joints=(eyes[0], NEW[1]))
     assert (every.state, some.state) == (State.HEALTHY, State.WATCH)
@@ -444,7 +436,7 @@ situations = st.sampled_from([case[0] for case in CASES if "alarms" not in case[
 
 
 @given(situations, raised_alarms)
-def test_a_further_alarm_never_makes_the_verdict_better(changed: dict[str, Any], alarms: list[Alarm]) -> None:
+def test_a_further_alarm_never_makes_the_verdict_better(changed, alarms) -> None:
     severity, not_valid = -1, set()
     for count in range(len(alarms) + 1):
         verdict = judged(**changed, alarms=tuple(alarms[:count]))
@@ -454,9 +446,7 @@ def test_a_further_alarm_never_makes_the_verdict_better(changed: dict[str, Any],
 
 
 @given(situations, raised_alarms)
-def test_the_verdict_is_the_worst_of_its_findings_and_holds_all_evidence(
-    changed: dict[str, Any], alarms: list[Alarm]
-) -> None:
+def test_the_verdict_is_the_worst_of_its_findings_and_holds_all_evidence(changed, alarms) -> None:
     found = findings(attrs.evolve(HEALTHY, **changed, alarms=tuple(alarms)))
     verdict = verdict_of(found)
     assert verdict.state.severity == max(finding.state.severity for finding in found)

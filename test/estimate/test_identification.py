@@ -19,7 +19,6 @@ from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.twin.reference import POINTS, LegParameters
 from leg_wear_monitor.twin.torque_reference import HEAVIER, LONGER, ROUGHER, design
 
-FEW = 10  # cycles are enough where all legs walk the same ones
 SENSOR = TorqueSensor(period_s=0.005, cycle_s=1.0, size_nm=9.2, noise_nm=0.3)
 
 
@@ -40,15 +39,16 @@ def walked(leg, reference, bodies: LegParameters, number: int = 0):
     return (reference.torque_nm[number].astype(float) + change).astype(np.float16)
 
 
-def legs_of(leg, reference):
-    """Few cycles of legs in which all bodies are changed at once, and friction, which scales the torque."""
-    none, bodies = LegParameters.none(leg), len(leg.bodies)
+@pytest.fixture(scope="module")
+def legs(leg, known):
+    """Legs in which all bodies are changed at once, and friction, which scales the torque."""
+    reference, none, bodies = known[0], LegParameters.none(leg), len(leg.bodies)
     torques = []
     for level in design(2 * bodies + 1):
         mass, length, friction = np.split(level, [bodies, 2 * bodies])
         own = LegParameters(none.mass + HEAVIER * mass, none.length + LONGER * length)
         rougher = friction.item() * math.log(ROUGHER) * of_friction(reference)
-        torques.append((walked(leg, reference, own)[:FEW] + rougher).astype(np.float16))
+        torques.append((walked(leg, reference, own) + rougher).astype(np.float16))
     return attrs.evolve(reference, torque_nm=tuple(torques), parameters=none)
 
 
@@ -62,30 +62,30 @@ def commissioned(reference, torque) -> CommissionedTorque:
     return CommissionedTorque(1, reference.clearance_m[0], drawn.reshape(-1, drawn.shape[2]))
 
 
-def test_a_leg_of_its_file_keeps_its_bodies(leg, known) -> None:
+def test_a_leg_of_its_file_keeps_its_bodies(known, legs) -> None:
     reference, model, found = known
     same = commissioned(reference, reference.torque_nm[0])
     assert misfit(model, found, same) < 0.1
-    bodies = identified_leg(legs_of(leg, reference), model, found, same)
+    bodies = identified_leg(legs, model, found, same)
     np.testing.assert_allclose(np.concatenate([bodies.mass, bodies.length]), 1.0, atol=1e-6)
     assert bodies.friction == pytest.approx(1.0, abs=1e-5)
 
 
-def test_friction_is_identified_from_the_torque(leg, known) -> None:
+def test_friction_is_identified_from_the_torque(known, legs) -> None:
     reference, model, found = known
     torque = (reference.torque_nm[0] + math.log(2.0) * of_friction(reference)).astype(np.float16)
-    other = identified_leg(legs_of(leg, reference), model, found, commissioned(reference, torque))
+    other = identified_leg(legs, model, found, commissioned(reference, torque))
     assert other.friction == pytest.approx(2.0, rel=0.1)
 
 
-def test_other_bodies_are_identified_from_the_torque(leg, known) -> None:
+def test_other_bodies_are_identified_from_the_torque(leg, known, legs) -> None:
     reference, model, found = known
     none = LegParameters.none(leg)
     names = list(leg.bodies)
     truth = attrs.evolve(none, mass=none.mass + 0.05 * (np.array(names) == "shank"))
     truth = attrs.evolve(truth, length=truth.length + 0.008 * (np.array(names) == "thigh"))
     other = commissioned(reference, walked(leg, reference, truth))
-    bodies = identified_leg(legs_of(leg, reference), model, found, other)
+    bodies = identified_leg(legs, model, found, other)
     # only combinations act on the torque: what is judged is the torque of the identified leg
     mean = commissioned(reference, walked(leg, reference, bodies)).mean
     own = misfit(model, found, commissioned(reference, reference.torque_nm[0]))

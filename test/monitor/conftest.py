@@ -64,6 +64,21 @@ def open_ledger(tmp_path: Path, binding: Binding) -> Iterator[Callable[..., Ledg
 
 
 @pytest.fixture
+def reopened(open_ledger: Callable[..., Ledger], entry_at: Callable[[int], Entry]) -> Callable[..., Ledger]:
+    """The ledger of this test after a run that noted something, kept an entry and ended in order."""
+
+    def again(*notes: Any) -> Ledger:
+        ledger = open_ledger()
+        for note in notes:
+            ledger.note(note)
+        ledger.keep(entry_at(1), closed=True)
+        ledger.close()
+        return open_ledger()
+
+    return again
+
+
+@pytest.fixture
 def rows(tmp_path: Path) -> Callable[[str], list[Any]]:
     """What a query finds in the ledger of this test."""
 

@@ -3,6 +3,7 @@
 import attrs
 import numpy as np
 import pytest
+from told import status_of
 
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
@@ -36,7 +37,7 @@ def test_the_twin_walks_on_with_identified_parameters_and_the_ledger_keeps_them(
     monitor.update(gait(2.5))
     assert monitor._parts.twin.parameters == found
     assert [body.mass for body in monitor.diagnosis.bodies] == found.mass.tolist()
-    status = next(one for one in monitor.status() if one.name == "diagnosis")
+    status = status_of(monitor, "diagnosis")
     assert "counted with the masses, lengths and friction" in status.message
     assert status.values["thigh_mass_factor"] == found.mass[list(leg.bodies).index("thigh")]
     assert status.values["joint_friction_factor"] == monitor.diagnosis.friction == 1.5

@@ -40,6 +40,8 @@ WRONG = [
     ("drive_torque.source", "odometry", ["'odometry'", "wrench, float64, effort, interface"]),
     ("cadence.commanded_rpm", 5e-324, ["expected a speed of at least 0.1 rpm either way"]),
     ("limits.impact_force_n", 5e-324, ["too close to 0, expected more than 1e-30 N"]),
+    ("forecast.wear_coefficient_sigma", 3.5, ["3.5", "at most"]),
+    ("forecast.wear_coefficient_sigma", 9e-4, ["0.001"]),
     ("wear_acceleration", 1e-12, ["not at least 1e-09"]),
     ("limits.growth_m_per_hour", 1e300, ["too large, expected at most"]),
     ("publish_markers", "on", ["'on'", "not true or false"]),

@@ -104,6 +104,14 @@ def walk(observer, block, counted=NEW, begin=0, end=None):
     return corrections
 
 
+def correct(observer, correction):
+    """Correct a new leg; its clearances as they are counted then."""
+    counted = NEW.copy()
+    counted[correction.joint] = correction.clearance_m
+    observer.corrected(correction, counted)
+    return counted
+
+
 def observer_of(leg, **changes) -> TorqueObserver:
     return TorqueObserver(leg, MonitorConfig(), SIZE_NM, NEW, **changes)
 
@@ -244,9 +252,7 @@ def test_a_joint_that_opens_is_named_and_corrected(commissioned, reference, join
     change = correction.change
     assert change.cause is Cause.CLEARANCE
     assert abs(change.since_ns - START_NS - (COMMISSIONING_CYCLES + 2) * 10**9) <= 3 * 10**9
-    counted = NEW.copy()
-    counted[joint] = correction.clearance_m
-    observer.corrected(correction, counted)
+    counted = correct(observer, correction)
     assert observer.diagnosis.changes == (attrs.evolve(change, is_corrected=True),)
     walk(observer, block, counted, cycle + 1)
     assert observer.diagnosis.state is not DiagnosisState.CHANGED
@@ -410,9 +416,7 @@ def test_a_joint_that_is_repaired_without_a_word_is_reported(commissioned, refer
     number = leg_number(0, 2.0)
     block = samples(reference, [0] * COMMISSIONING_CYCLES + [number] * 20 + [0] * 20)
     cycle, correction = walk(observer, block, NEW, COMMISSIONING_CYCLES, COMMISSIONING_CYCLES + 19)[0]
-    counted = NEW.copy()
-    counted[0] = correction.clearance_m
-    observer.corrected(correction, counted)
+    counted = correct(observer, correction)
     walk(observer, block, counted, cycle + 1, COMMISSIONING_CYCLES + 20)
     assert observer.diagnosis.state is not DiagnosisState.CHANGED
     walk(observer, block, counted, COMMISSIONING_CYCLES + 20)
@@ -427,9 +431,7 @@ def test_the_sigma_of_a_correction_stays_in_the_clearance(commissioned, referenc
     observer = commissioned()
     block = samples(reference, [0] * COMMISSIONING_CYCLES + [leg_number(2, 5.0)] * 40)
     ((cycle, correction),) = walk(observer, block, begin=COMMISSIONING_CYCLES)[:1]
-    counted = NEW.copy()
-    counted[2] = correction.clearance_m
-    observer.corrected(correction, counted)
+    counted = correct(observer, correction)
     walk(observer, block, counted, cycle + 1)
     found = observer.diagnosis
     assert found.sigma_m[2] >= correction.change.sigma or np.isnan(found.sigma_m[2])
@@ -442,12 +444,11 @@ def test_other_joints_are_known_after_a_correction_where_the_clearances_explain(
     """Elsewhere others may have changed with it, and its gait cycles become the baseline of all."""
     observer = commissioned()
     ((_, correction),) = walk_on(observer, reference, [leg_number(0, 1.5)] * 25)[:1]
-    counted, before = NEW.copy(), observer.snapshot()
-    counted[0] = correction.clearance_m
+    before = observer.snapshot()
     for square, others_m in ((1.0, np.zeros(4)), (3.0, NEW[1:])):
         observer.restore(before)
         observer.state.fit = attrs.evolve(observer.state.fit, square=square)
-        observer.corrected(correction, counted)
+        correct(observer, correction)
         sigma_m = observer.state.commissioned.sigma_m
         assert sigma_m[0] == correction.change.sigma
         np.testing.assert_array_equal(sigma_m[1:], others_m)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from told import raised, status_of
 
 pytest.importorskip("mcap")
 
@@ -85,12 +86,11 @@ def test_it_is_told(monitor, healthy, bias_nm, offset_rad, alarm, cause):
     samples["torque_nm"] += bias_nm
     samples["crank_angle_rad"] += offset_rad
     reports = monitor.update(samples)
-    raised = {one.name: one.level for one in monitor.alarms.alarms if one.level is not Level.OK}
-    assert raised.keys() == ({alarm} if alarm else set())
-    status = {one.name: one for one in monitor.status()}["torque"]
+    assert raised(monitor, Level.WARN) == raised(monitor) == ({alarm} if alarm else set())
+    status = status_of(monitor, "torque")
     assert cause in status.message
     if alarm:
-        assert raised[alarm] is Level.ERROR is status.level
+        assert status.level is Level.ERROR
         assert status.message != "measured as predicted"
     if offset_rad:
         assert status.values["crank_offset_error_rad"] == pytest.approx(offset_rad, rel=0.15)
@@ -108,7 +108,7 @@ def test_a_torque_that_is_wrong_as_received_is_named_and_shows_nothing_of_the_le
     samples["torque_nm"] *= factor
     samples["crank_angle_rad"] += offset_rad
     monitor.update(samples)
-    verdict, status = monitor.verdict.verdict, {one.name: one for one in monitor.status()}["torque"]
+    verdict, status = monitor.verdict.verdict, status_of(monitor, "torque")
     assert verdict.fault_code == code
     assert not any(change.is_corrected for change in monitor.diagnosis.changes)
     assert (
@@ -158,10 +158,10 @@ def test_every_status_of_the_monitor_has_a_fault_code_that_the_pages_list(monito
 
 
 def test_the_diagnosis_is_a_status_with_the_clearances_that_the_torque_shows(monitor, healthy):
-    before = {one.name: one for one in monitor.status()}["diagnosis"]
+    before = status_of(monitor, "diagnosis")
     assert before.message.startswith("waiting; ") and math.isnan(before.values["A_clearance_m"])
     monitor.update(healthy)
-    status, diagnosis = {one.name: one for one in monitor.status()}["diagnosis"], monitor.diagnosis
+    status, diagnosis = status_of(monitor, "diagnosis"), monitor.diagnosis
     assert status.message.startswith("the drive torque shows the counted clearances")
     assert status.values["cycles"] == diagnosis.cycles > 0
     for k, joint in enumerate(monitor.clearance_joints):

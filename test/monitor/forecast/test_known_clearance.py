@@ -108,15 +108,9 @@ def test_a_fleet_learns_from_a_corrected_part_what_a_part_that_wore_alike_teache
 
 
 @pytest.mark.plain
-def test_corrections_are_read_as_written(open_ledger, entry_at) -> None:
-    ledger = open_ledger()
-    assert ledger.corrections == ()
+def test_corrections_are_read_as_written(reopened) -> None:
     other = attrs.evolve(CORRECTED, stamp_ns=9, joint="G", replaced_ns=3)
-    for each in (CORRECTED, other):
-        ledger.note(each)
-    ledger.keep(entry_at(1), closed=True)
-    ledger.close()
-    assert open_ledger().corrections == (CORRECTED, other)
+    assert reopened(CORRECTED, other).corrections == (CORRECTED, other)
 
 
 def test_a_monitor_believes_a_corrected_clearance_now_and_in_its_next_run(begin, gait) -> None:

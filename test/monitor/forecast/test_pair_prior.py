@@ -84,11 +84,3 @@ def test_a_spread_that_is_one_of_repeats_is_doubted(tmp_path):
     assert "spread 0.2 of" in str(doubt)
     assert "of repeats instead of parts?" in str(doubt)
     assert doubts(own_pair(tmp_path, bushing=0.3, journal=0.4)) == ()
-
-
-@pytest.mark.parametrize("sigma", [1e-9, 9e-4, -0.1, 3.5, math.nan])
-def test_a_spread_that_cannot_be_is_one_line(sigma):
-    with pytest.raises(lw.ConfigError) as caught:
-        config_from({"forecast.wear_coefficient_sigma": sigma}, "leg.yaml")
-    assert str(caught.value).startswith("leg.yaml: forecast.wear_coefficient_sigma: ")
-    assert "\n" not in str(caught.value)

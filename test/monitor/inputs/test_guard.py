@@ -188,6 +188,7 @@ def test_why_samples_cannot_be_used_is_said_and_the_most_frequent_fault_is_not_t
     told = status_of(monitor, "input")
     every, first = told.message.split(" samples are not used, ")
     unused, total = (int(number) for number in every.split(" of "))
+    assert "set header.stamp" in first
     assert first.startswith(tuple(f"{n} of {total} samples have a zero stamp" for n in range(1, unused)))
     fraction = next(alarm.value for alarm in monitor.alarms.alarms if alarm.name == "input_samples")
     assert unused / total == pytest.approx(fraction)

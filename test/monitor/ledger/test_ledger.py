@@ -66,10 +66,13 @@ def test_a_run_that_was_cut_off_says_how_much_may_be_lost(open_ledger, entry_at)
         found.close()
 
 
-def test_a_run_without_an_entry_or_with_events_alone_is_cut_off_too(open_ledger):
+def test_a_run_without_an_entry_and_one_before_events_alone_are_cut_off_too(open_ledger, entry_at):
     open_ledger().close()
+    ledger = open_ledger()
+    assert ledger.cut_off_s == 5.0
+    ledger.keep(entry_at(2))
+    ledger.close()
     between = open_ledger()
-    assert between.cut_off_s == 5.0
     between.note(ForecastPoint(5, 7, "A", 1.0, 2.0, 3.0))
     between.record()
     between.close()
@@ -311,18 +314,14 @@ def test_a_leg_with_another_mass_is_another_leg(leg):
 
 @pytest.mark.parametrize("wider_m", [6e-4, 3e-4])
 def test_a_reference_or_an_identification_that_is_not_whole_is_kept_until_it_is(
-    open_ledger, entry_at, wider_m: float
+    reopened, wider_m: float
 ) -> None:
     leg, known = LegParameters(np.ones(1), np.ones(1)), np.array([[3e-4], [wider_m], [wider_m]])
     expected, wider = (np.full((each, POINTS), 1.5, np.float16) for each in (2 * CYCLES, CYCLES))
     whole = TorqueReference(CrankProfile.steady(6.0), known, (expected, wider, wider), leg)
     part = attrs.evolve(whole, torque_nm=whole.torque_nm[:2])
     for kept, has_part in ((part, True), (whole, False)):
-        ledger = open_ledger()
-        ledger.note(SimulatedReference(1, ("thigh",), kept))
-        ledger.keep(entry_at(2), closed=True)
-        ledger.close()
-        found = open_ledger()
+        found = reopened(SimulatedReference(1, ("thigh",), kept))
         (one,) = (kept.reference for kept in found.references)
         assert one.is_whole != has_part
         assert [torque.shape for torque in one.torque_nm] == [torque.shape for torque in kept.torque_nm]
@@ -330,27 +329,24 @@ def test_a_reference_or_an_identification_that_is_not_whole_is_kept_until_it_is(
         found.close()
 
 
-def test_references_and_baselines_are_kept_for_each_cadence(open_ledger, entry_at) -> None:
+def test_references_and_baselines_are_kept_for_each_cadence(reopened) -> None:
     """Those of the same cadence replace each other, and a correction ends the baselines of all."""
     leg, few = LegParameters(np.ones(1), np.ones(1)), np.ones((2 * CYCLES, POINTS), np.float16)
-    ledger = open_ledger()
+    made = []
     for stamp_ns, speed in enumerate((6.0, 4.5, 7.5, 4.51), 10):
         profile = CrankProfile.steady(speed)
         one = TorqueReference(profile, np.full((2, 5), 3e-4), (few, few[:CYCLES]), leg)
-        ledger.note(SimulatedReference(stamp_ns, ("thigh",), one))
+        made.append(SimulatedReference(stamp_ns, ("thigh",), one))
         warm = {"temperature_c": 41.5} if speed == 7.5 else {}  # not measured at the others
-        ledger.note(CommissionedTorque(stamp_ns, np.full(5, 3e-4), np.ones((4, 6)), speed=speed, **warm))
-    ledger.keep(entry_at(2), closed=True)
-    ledger.close()
-    found = open_ledger()
+        made.append(CommissionedTorque(stamp_ns, np.full(5, 3e-4), np.ones((4, 6)), speed=speed, **warm))
+    found = reopened(*made)
     assert [one.reference.profile.speed for one in found.references] == [4.51, 7.5, 6.0]
     assert [one.speed for one in found.commissioned_torques] == [4.51, 7.5, 6.0]
     np.testing.assert_equal([one.temperature_c for one in found.commissioned_torques], [np.nan, 41.5, np.nan])
     sigma_m = np.array([0.0, 0.0, 1e-5, 0.0, 0.0])
-    found.note(CommissionedTorque(20, np.full(5, 3e-4), np.ones((4, 6)), sigma_m, speed=6.0))
-    found.keep(entry_at(3), closed=True)
     found.close()
-    assert [one.stamp_ns for one in open_ledger().commissioned_torques] == [20]
+    corrected = CommissionedTorque(20, np.full(5, 3e-4), np.ones((4, 6)), sigma_m, speed=6.0)
+    assert [one.stamp_ns for one in reopened(corrected).commissioned_torques] == [20]
 
 
 def test_a_measurement_that_is_withdrawn_is_kept_and_told_as_withdrawn(open_ledger):

@@ -26,33 +26,27 @@ VERDICT = Verdict(
 )
 
 
-def test_a_verdict_is_a_row_and_is_read_as_written(open_ledger, entry_at, rows):
-    ledger = open_ledger()
-    assert ledger.last_verdict is None
-    ledger.note(VerdictEvent(7, VERDICT))
-    ledger.keep(entry_at(1), closed=True)
-    ledger.close()
+def test_a_verdict_is_a_row_and_is_read_as_written(reopened, rows):
+    found = reopened(VerdictEvent(7, VERDICT))
+    assert found.last_verdict == VERDICT
+    found.close()
     (row,) = rows("SELECT stamp_ns, state, fault_code, joints, evidence, not_valid FROM verdict")
     evidence = '[{"name": "clearance G", "value": 0.001, "limit": null, "unit": "m"}]'
     assert row == (7, "inspect", "CLEARANCE_CHANGED_G", '["G"]', evidence, '["forecast"]')
-    assert open_ledger().last_verdict == VERDICT
 
 
-def test_an_identified_leg_is_read_as_written_and_the_last_is_in_force(open_ledger, entry_at):
-    ledger = open_ledger()
-    assert ledger.parameters is None
+def test_an_identified_leg_is_read_as_written_and_the_last_is_in_force(reopened):
+    legs = []
     for stamp_ns, mass in ((5, 1.1), (7, 0.9)):
         bodies = np.array([mass, 1.02]), np.array([0.998, 1.001])
         leg = LegParameters(*bodies, 2.0 * mass, 0.5 * mass, 0.1 * mass, mass * LOAD_N, 0.2 * mass)
-        ledger.note(IdentifiedLeg(stamp_ns, ("thigh", "foot"), leg))
-    ledger.keep(entry_at(1), closed=True)
-    ledger.close()
-    found = open_ledger().parameters
-    assert found == IdentifiedLeg(7, ("thigh", "foot"), leg)
+        legs.append(IdentifiedLeg(stamp_ns, ("thigh", "foot"), leg))
+    found = reopened(*legs).parameters
+    assert found == legs[-1]
     assert found.parameters.load_sigma == leg.load_sigma
 
 
-def test_a_simulated_reference_is_read_as_written_and_the_last_is_in_force(open_ledger, entry_at, leg):
+def test_a_simulated_reference_is_read_as_written_and_the_last_is_in_force(reopened, leg):
     shipped = shipped_references(leg)[0]
     factors = 1.0 + 0.01 * np.arange(len(leg.bodies))
     other = attrs.evolve(
@@ -60,13 +54,8 @@ def test_a_simulated_reference_is_read_as_written_and_the_last_is_in_force(open_
         profile=attrs.evolve(shipped.profile, sine=np.linspace(0.0, 0.01, len(shipped.profile.sine))),
         parameters=LegParameters(factors, 2.0 - factors, 1.7, 2.0e-3, 0.08, LOAD_N, 0.2),
     )
-    ledger = open_ledger()
-    assert ledger.references == []
-    for stamp_ns, reference in ((5, shipped), (7, other)):
-        ledger.note(SimulatedReference(stamp_ns, tuple(leg.bodies), reference))
-    ledger.keep(entry_at(1), closed=True)
-    ledger.close()
-    (found,) = open_ledger().references  # of the same cadence
+    made = [SimulatedReference(at, tuple(leg.bodies), one) for at, one in ((5, shipped), (7, other))]
+    (found,) = reopened(*made).references  # of the same cadence
     assert (found.stamp_ns, found.bodies) == (7, tuple(leg.bodies))
     assert found.reference.parameters == other.parameters
     assert found.reference.parameters.load_sigma == other.parameters.load_sigma

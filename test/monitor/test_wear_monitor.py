@@ -200,6 +200,11 @@ def test_statuses_keep_their_names_and_hold_plain_numbers(monitor, gait):
     assert len(set(names)) == len(names)
 
 
+def test_without_a_ledger_saving_is_refused(monitor):
+    with pytest.raises(LegWearError, match=r"set ledger.path"):
+        monitor.save()
+
+
 def test_limits_change_while_it_runs(monitor, gait):
     monitor.update(gait(3.0))
     monitor.configure(changed(monitor.config, {"limits.clearance_m": 2.0e-4, "alarms.on_delay_cycles": 1}))

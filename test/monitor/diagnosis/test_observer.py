@@ -655,12 +655,15 @@ def test_a_baseline_of_a_sensor_with_another_rate_is_not_used(leg, reference) ->
 
 
 def test_a_commissioned_leg_that_is_not_of_its_file_is_identified(
-    leg, commissioned, reference, monkeypatch
+    leg, new, commissioned, reference, monkeypatch
 ) -> None:
     for misfit in ("UNLIKE_FILE", "WORTH_IDENTIFYING", "FAR_FROM_FILE"):
         monkeypatch.setattr(leg_model, misfit, 0.0)  # any leg
     # its bodies by ideal joints, which take time to find
     monkeypatch.setattr(leg_model, "leg_of_ideal_torque", lambda *_: LegParameters.none(leg))
+    early = new()
+    walk(early, samples(reference, [0] * 8))
+    assert not early.state.is_identifying
     observer = commissioned()
     walk_on(observer, reference, [0] * 4)
     assert "its masses, lengths and friction are being simulated" in observer.diagnosis.reason

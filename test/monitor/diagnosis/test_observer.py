@@ -258,6 +258,26 @@ def test_a_joint_that_opens_is_named_and_corrected(commissioned, reference, join
     assert observer.diagnosis.state is not DiagnosisState.CHANGED
 
 
+@pytest.mark.parametrize(("far_beyond", "later"), [(np.inf, 2), (4.0, 0)])
+def test_a_joint_is_surely_at_its_limit_after_three_estimates_or_beyond_doubt(
+    commissioned, reference, monkeypatch, far_beyond: float, later: int
+) -> None:
+    """The first cycles of a change stopped a leg with J at 0.55 mm under 300 N, as 1.03 ± 0.17 mm."""
+    monkeypatch.setattr(evidence, "_FAR_BEYOND", far_beyond)
+    observer, block = (
+        commissioned(),
+        samples(reference, [0] * COMMISSIONING_CYCLES + [leg_number(2, 5.0)] * 9),
+    )
+    limit_m, shown, sure = observer.config.limits.clearance_m, [], []
+    for cycle in range(COMMISSIONING_CYCLES, COMMISSIONING_CYCLES + 9):
+        walk(observer, block, begin=cycle, end=cycle + 1)
+        now = observer.diagnosis
+        (shown if now.clearance_m[2] - 2.0 * now.sigma_m[2] >= limit_m else []).append(cycle)
+        (sure if now.least_m[2] >= limit_m else []).append(cycle)
+    assert shown[:3] == [shown[0], shown[0] + 1, shown[0] + 2]
+    assert sure[0] == shown[0] + later
+
+
 CHANNELS = [
     {"delay_s": 0.01, "bandwidth_hz": 20.0, "load_friction": 0.2},
     *(

@@ -71,6 +71,12 @@ def test_an_estimate_that_is_not_surely_beyond_raises_nothing(by: str) -> None:
     assert verdict(NEW, unsure).state is State.HEALTHY
 
 
+def test_an_estimate_that_did_not_hold_raises_nothing() -> None:
+    first = attrs.evolve(BROKEN, least_m=-math.inf)
+    assert after(NEW, first) is NEW
+    assert verdict(NEW, first).state is State.HEALTHY
+
+
 def test_a_measurement_that_contradicts_ends_the_stop_until_the_estimate_rises_anew() -> None:
     measured = attrs.evolve(COUNTED, measured=KnownClearance("measured", 3.1e-4, 1.0e-5))
     raised = after(NEW, BROKEN)

@@ -7,10 +7,8 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-import rclpy
-from rclpy.parameter import Parameter
+from made_node import made_node
 from rclpy.serialization import serialize_message
-from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import JointState
 
 from leg_wear_monitor.messages.streams import JOINT_STATE
@@ -100,12 +98,7 @@ def test_samples_after_what_is_counted_are_nothing_to_speak_of() -> None:
 def walked(ledger: Path, monkeypatch: pytest.MonkeyPatch, now_ns: int) -> tuple[Epochs, JointWear]:
     """Two turns of the crank, from one second of simulated time on, in a run of the node."""
     monkeypatch.setattr(MonitorNode, "_ros_now_ns", lambda self: now_ns)
-    context = rclpy.Context()
-    rclpy.init(args=["--ros-args", "--log-level", "fatal"], context=context)
-    parameters = {"ledger.path": str(ledger), "clearance_joints": ["G"], "clearances_m": [3.0e-4]}
-    overrides = [Parameter(name, value=value) for name, value in parameters.items()]
-    try:
-        node = MonitorNode(context=context, parameter_overrides=overrides)
+    with made_node(ledger__path=str(ledger), clearance_joints=["G"], clearances_m=[3.0e-4]) as node:
         for k in range(500):
             message = JointState(name=["crank"], position=[2.0 * np.pi * k / 200.0])
             message.header.stamp.sec, rest = divmod(SECOND + 5_000_000 * k, SECOND)
@@ -114,17 +107,12 @@ def walked(ledger: Path, monkeypatch: pytest.MonkeyPatch, now_ns: int) -> tuple[
         while len(node._inbox):
             node._work()
         node.close()
-        wear = node.monitor.wear_of("G")
-        node.destroy_node()
-    finally:
-        try_shutdown(context=context)
-    return node._epochs, wear
+        return node._epochs, node.monitor.wear_of("G")
 
 
 def test_a_node_counts_simulated_time_that_began_anew_and_nothing_that_is_played(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(MonitorNode, "_compile", lambda self, decoder: None)
     ledger = tmp_path / "wear.db"
     _, once = walked(ledger, monkeypatch, now_ns=3 * SECOND)
     assert once.depth.sum() > 0.0

@@ -9,9 +9,7 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-import rclpy
-from rclpy.parameter import Parameter
-from rclpy.utilities import try_shutdown
+from made_node import made_node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
@@ -26,32 +24,26 @@ from leg_wear_monitor.twin import CRANK
 def test_a_walk_is_published_as_it_was_walked(stage, tmp_path: Path, precompute: bool) -> None:
     truth = tmp_path / "truth.json"
     parameters = {
-        "duration_s": 1.0,
+        "duration_s": 0.5,
         "time_scale": 2.0,
         "precompute": precompute,
         "reliable": True,
         "wait_for_subscribers": 1,
         "further_joints": ["hip"],
-        "encoder.wrapped": True,
-        "torque_sensor.source": "float64",
-        "truth.path": str(truth),
+        "encoder__wrapped": True,
+        "torque_sensor__source": "float64",
+        "truth__path": str(truth),
     }
     cranks = stage.listen("/joint_states", JointState, matched=False)
     torques = stage.listen("/drive_torque", Float64, matched=False)
-    context = rclpy.Context()
-    rclpy.init(args=["--ros-args", "--log-level", "error"], context=context)
-    overrides = [Parameter(name, value=value) for name, value in parameters.items()]
-    node = GaitPublisher(context=context, parameter_overrides=overrides)
-    walking = threading.Thread(target=node.walk)
-    walking.start()
-    walking.join()
-    stage.wait_for(lambda: len(cranks) + len(torques) == node.published, "all of the walk")
-    node.close()
-    node.destroy_node()
-    try_shutdown(context=context)
+    with made_node(make=GaitPublisher, **parameters) as node:
+        walking = threading.Thread(target=node.walk)
+        walking.start()
+        walking.join()
+        stage.wait_for(lambda: len(cranks) + len(torques) == node.published, "all of the walk")
 
     config = PublisherConfig(
-        duration_s=1.0,
+        duration_s=0.5,
         encoder=EncoderConfig(wrapped=True),
         torque_sensor=TorqueSensorConfig(source="float64"),
     )

@@ -1,9 +1,9 @@
-"""A clearance measured while the monitor runs in a process of its own: by the command line."""
+"""A clearance measured while the monitor runs: by the command line, in a process of its own, too."""
 
-import signal
 import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -24,37 +24,9 @@ def measure(*arguments: str) -> Result:
     return CliRunner().invoke(cli, ["measure", *arguments])
 
 
-def stop(node: "subprocess.Popen[bytes]") -> None:
-    """End it in order; until then it locks its ledger."""
-    node.send_signal(signal.SIGTERM)
-    assert node.wait(60) == 0
-
-
-@pytest.fixture
-def running(stage, tmp_path: Path):
-    """A monitor in a process of its own: its ledger, and how to end it."""
-    path, log = tmp_path / "wear.ledger", tmp_path / "monitor.log"
-    arguments = ("--ros-args", "-r", "__ns:=/left", "-p", f"ledger.path:={path}")
-    with log.open("wb") as stream:
-        node = subprocess.Popen(
-            [sys.executable, "-m", "leg_wear_monitor", "monitor", *arguments],
-            stdout=stream,
-            stderr=subprocess.STDOUT,
-        )
-    try:
-        stage.wait_for(lambda: b"monitoring joints" in log.read_bytes(), "the monitor")
-        yield path, lambda: stop(node)
-    finally:
-        node.kill()
-        node.wait()
-
-
 def rows(path: Path) -> list[tuple[object, ...]]:
-    db = sqlite3.connect(path)
-    try:
+    with closing(sqlite3.connect(path)) as db:
         return db.execute("SELECT joint, clearance_m, sigma_m, who, counts FROM measurement").fetchall()
-    finally:
-        db.close()
 
 
 def asked(stage, **values):
@@ -66,8 +38,9 @@ def asked_with(stage, parameters):
     return stage.call(SetParametersAtomically, f"{NODE}/measure", request).result
 
 
-def test_a_running_monitor_takes_measured_clearances(stage, running) -> None:
-    ledger, end = running
+def test_a_running_monitor_takes_measured_clearances(stage, tmp_path: Path) -> None:
+    ledger = tmp_path / "wear.ledger"
+    monitor = stage.monitor("left", ledger__path=str(ledger))
     verdicts = stage.listen(f"{NODE}/verdict", DiagnosticArray, latched=True)
     command = [sys.executable, "-m", "leg_wear_monitor", "measure", "A", "0.301", "--sigma", "0.005"]
     alone = subprocess.run([*command, "--node", NODE], capture_output=True, text=True, check=False)
@@ -94,7 +67,7 @@ def test_a_running_monitor_takes_measured_clearances(stage, running) -> None:
         f"error: {NODE}/measure: JOINT: 'Z' is not a clearance joint, expected one of A, B, G, I, J"
     ]
     refuses_in_one_line(stage)
-    end()
+    monitor.stop()
     who = "service ~/measure"
     assert rows(ledger) == [
         ("A", pytest.approx(3.01e-4), pytest.approx(5e-6), who, 1),
@@ -144,7 +117,7 @@ def test_nobody_answers_within_the_time_that_is_said(domain: int) -> None:
 def test_the_forecast_follows_a_measurement_at_once(stage, walk) -> None:
     monitor = stage.monitor("left", wear_acceleration=1.0e5, diagnosis__enabled=False)
     forecasts = stage.listen(f"{NODE}/forecast", DiagnosticArray)
-    stage.legs("/left").play(walk, monitor)
+    stage.legs("/left").play(walk, monitor, end_s=4.0)
     stage.wait_for(lambda: bool(forecasts), "a forecast")
     before = len(forecasts)
     answer = asked(stage, joint="A", clearance_m=3.2e-4, sigma_m=5.0e-6)

@@ -1,4 +1,4 @@
-"""Parameters as ros2 param and rqt_reconfigure ask for them: listed, dumped, edited, loaded."""
+"""Parameters as ros2 param and rqt_reconfigure ask for them: listed, dumped, edited, loaded, refused."""
 
 from pathlib import Path
 from typing import Any
@@ -7,8 +7,8 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-import rclpy
 import yaml
+from made_node import made_node
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterValue
 from rcl_interfaces.srv import (
@@ -20,13 +20,12 @@ from rcl_interfaces.srv import (
     SetParametersAtomically,
 )
 from rclpy.parameter import Parameter, parameter_dict_from_yaml_file, parameter_value_to_python
-from rclpy.utilities import try_shutdown
 from rosgraph_msgs.msg import Clock
 
+from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.monitor.config.parameters import PARAMETERS, load_config
-from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.ros.gait_publisher import GaitPublisher
 from leg_wear_monitor.ros.monitor_node import MonitorNode
-from leg_wear_monitor.ros.running import ClosingNode, Parameters
 
 ME = "/leg_wear_monitor"
 
@@ -70,19 +69,28 @@ def loaded(stage, path: Path) -> dict[str, str]:
     return {one.name: result.reason for one, result in zip(wanted, results, strict=True) if result.reason}
 
 
+def set_to(stage, name: str, value: object) -> Any:
+    """Result of setting one parameter."""
+    request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
+    (result,) = stage.call(SetParameters, f"{ME}/set_parameters", request).results
+    return result
+
+
+def described(stage) -> list[Any]:
+    request = DescribeParameters.Request(names=list(PARAMETERS))
+    return stage.call(DescribeParameters, f"{ME}/describe_parameters", request).descriptors
+
+
 def test_every_parameter_is_listed_and_has_a_value_of_its_type(shared_stage, node) -> None:
     assert set(PARAMETERS) <= set(names_of(shared_stage))
     names = list(PARAMETERS)
     request = GetParameters.Request(names=names)
     values = shared_stage.call(GetParameters, f"{ME}/get_parameters", request).values
-    types = shared_stage.call(
-        GetParameterTypes, f"{ME}/get_parameter_types", GetParameterTypes.Request(names=names)
-    ).types
-    told = shared_stage.call(
-        DescribeParameters, f"{ME}/describe_parameters", DescribeParameters.Request(names=names)
-    ).descriptors
+    request = GetParameterTypes.Request(names=names)
+    types = shared_stage.call(GetParameterTypes, f"{ME}/get_parameter_types", request).types
     kinds = [Parameter.Type[PARAMETERS[name].type.upper()].value for name in names]
-    assert [value.type for value in values] == kinds == list(types) == [one.type for one in told]
+    assert [value.type for value in values] == kinds == list(types)
+    assert [one.type for one in described(shared_stage)] == kinds
 
 
 def test_sections_are_listed_by_prefix_and_depth(shared_stage, node) -> None:
@@ -92,24 +100,14 @@ def test_sections_are_listed_by_prefix_and_depth(shared_stage, node) -> None:
     assert not set(limits) & set(names_of(shared_stage, depth=1))
 
 
-def test_a_dump_starts_the_same_monitor_and_is_read_by_replay(
-    shared_stage, node, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_dump_starts_the_same_monitor_and_is_read_by_replay(shared_stage, node, tmp_path: Path) -> None:
     tree = dumped(shared_stage)
     assert tree["clearance_joints"] == []
     assert tree["encoders"]["names"] == ["knee"]
     tree["limits"]["clearance_m"] = 5.0e-4
     path = written(tree, tmp_path / "dump.yaml")
-    monkeypatch.setattr(MonitorNode, "_compile", lambda self, decoder: None)
-    context = rclpy.Context()
-    rclpy.init(args=["--ros-args", "--params-file", str(path)], context=context)
-    try:
-        again = MonitorNode(context=context)
+    with made_node("--params-file", str(path)) as again:
         config = again.monitor.config
-        again.close()
-        again.destroy_node()
-    finally:
-        try_shutdown(context=context)
     assert config.limits.clearance_m == 5.0e-4
     assert config.encoders == node.monitor.config.encoders
     assert config == load_config(path)
@@ -133,7 +131,7 @@ def test_an_edited_dump_is_loaded_but_for_what_is_read_at_the_start(
 
 
 def test_parameters_are_set_together_or_not_at_all(shared_stage, node) -> None:
-    def set_to(**values: Any) -> Any:
+    def set_both(**values: Any) -> Any:
         parameters = [
             Parameter(name.replace("__", "."), value=value).to_parameter_msg()
             for name, value in values.items()
@@ -141,9 +139,9 @@ def test_parameters_are_set_together_or_not_at_all(shared_stage, node) -> None:
         request = SetParametersAtomically.Request(parameters=parameters)
         return shared_stage.call(SetParametersAtomically, f"{ME}/set_parameters_atomically", request).result
 
-    assert set_to(limits__impact_force_n=9000.0, alarms__deadband=0.1).successful
+    assert set_both(limits__impact_force_n=9000.0, alarms__deadband=0.1).successful
     assert node.monitor.config.limits.impact_force_n == 9000.0
-    refused = set_to(limits__impact_force_n=8000.0, alarms__deadband=7.0)
+    refused = set_both(limits__impact_force_n=8000.0, alarms__deadband=7.0)
     assert not refused.successful
     assert "alarms.deadband" in refused.reason
     assert node.monitor.config.limits.impact_force_n == 9000.0
@@ -178,12 +176,11 @@ def test_a_time_before_0_on_clock_is_ignored(stage) -> None:
     stage.wait_for(lambda: node.get_clock().now().nanoseconds == 7_000_000_000, "the time after it")
 
 
-def test_descriptors_have_the_bounds_as_ranges_and_any_value_between_is_taken(shared_stage, node) -> None:
-    request = DescribeParameters.Request(names=list(PARAMETERS))
-    told = shared_stage.call(DescribeParameters, f"{ME}/describe_parameters", request).descriptors
+def test_descriptors_tell_what_a_parameter_is_and_between_which_bounds(shared_stage, node) -> None:
     ranged = 0
-    for name, one in zip(PARAMETERS, told, strict=True):
-        declared = PARAMETERS[name]
+    for (name, declared), one in zip(PARAMETERS.items(), described(shared_stage), strict=True):
+        assert one.description.startswith(declared.description)
+        assert (one.read_only, one.additional_constraints) == (declared.read_only, declared.bounds)
         ranges = [*one.floating_point_range, *one.integer_range]
         bounds = (declared.above, declared.at_least, declared.at_most)
         is_number = declared.type in ("double", "integer")
@@ -199,36 +196,61 @@ def test_descriptors_have_the_bounds_as_ranges_and_any_value_between_is_taken(sh
                 assert each.from_value == lower
     assert ranged > 40
 
-    def set_to(value: float) -> Any:
-        wanted = Parameter("limits.warn_fraction", value=value).to_parameter_msg()
-        request = SetParameters.Request(parameters=[wanted])
-        return shared_stage.call(SetParameters, f"{ME}/set_parameters", request).results[0]
 
-    assert set_to(0.812345678901).successful
-    for value in (0.0, 1.5, float("nan")):  # the first is excluded, though in the range
-        refused = set_to(value)
-        assert not refused.successful
-        assert "limits.warn_fraction" in refused.reason and "at most 1" in refused.reason
+def test_any_value_between_the_bounds_is_taken(shared_stage, node) -> None:
+    assert set_to(shared_stage, "limits.warn_fraction", 0.812345678901).successful
     assert node.monitor.config.limits.warn_fraction == 0.812345678901
+    assert node.get_parameter("limits.warn_fraction").value == 0.812345678901
 
 
-def test_the_clock_is_kept_while_the_node_runs(shared_stage, node) -> None:
-    request = SetParameters.Request(parameters=[Parameter("use_sim_time", value=True).to_parameter_msg()])
-    (result,) = shared_stage.call(SetParameters, f"{ME}/set_parameters", request).results
+@pytest.mark.parametrize(
+    ("name", "value", "reason"),
+    [
+        (
+            "limits.clearance_m",
+            7.0,
+            "limits.clearance_m: 7.0 is not at most 0.1 m, expected above 0, at most 0.1",
+        ),
+        ("limits.clearance_m", float("nan"), "not a finite number"),
+        ("limits.clearance_m", "wide", "Wrong parameter type"),
+        ("limits.warn_fraction", 0.0, "at most 1"),  # excluded, though in the range
+        ("hardware_id", "other", "read-only"),
+        ("limits.clearence_m", 0.001, "declared"),
+        ("limits.joint_clearance_m", [0.001], "has 1 values, expected one each for A, B, G, I, J"),
+        ("use_sim_time", True, "use_sim_time: is read only at the start"),
+    ],
+)
+def test_a_change_that_cannot_be_is_refused_in_a_line(shared_stage, node, name, value, reason) -> None:
+    before = node.monitor.config
+    result = set_to(shared_stage, name, value)
     assert not result.successful
-    assert result.reason.startswith("use_sim_time: is read only at the start")
-    assert node.get_parameter("use_sim_time").value is False
+    assert reason in result.reason
+    assert "\n" not in result.reason
+    assert node.monitor.config == before
     assert not node.get_clock().ros_time_is_active
 
 
-@pytest.mark.parametrize("text", ["clearance_joints:=[]", "limits.joint_clearance_m:=[]", "clearances_m:=[]"])
-def test_an_empty_list_on_the_command_line_is_an_empty_list(text: str) -> None:
-    context = rclpy.Context()
-    rclpy.init(args=["--ros-args", "-p", text], context=context)
-    try:
-        node = ClosingNode("leg", context=context)
-        assert isinstance(Parameters(node, MonitorConfig).config, MonitorConfig)
-        assert node.get_parameter(text.split(":=")[0]).value == []
-        node.destroy_node()
-    finally:
-        try_shutdown(context=context)
+def test_an_empty_list_on_the_command_line_is_an_empty_list() -> None:
+    names = ("clearance_joints", "limits.joint_clearance_m", "clearances_m")
+    with made_node(*(word for name in names for word in ("-p", f"{name}:=[]"))) as node:
+        assert [node.get_parameter(name).value for name in names] == [[], [], []]
+
+
+@pytest.mark.parametrize(
+    ("node", "parameters", "line"),
+    [
+        (MonitorNode, {"limits.clearance_m": 7.0}, "limits.clearance_m: 7.0 is not at most 0.1 m"),
+        (MonitorNode, {"limits.clearance_m": 1}, "is a whole number to ROS, expected 1.0 [m]"),
+        (MonitorNode, {"limit.clearance_m": 1.0}, "unknown parameter, did you mean limits.clearance_m?"),
+        (MonitorNode, {"mechanism": "no_leg"}, "no_leg: no mechanism of this name"),
+        (MonitorNode, {"record.path": "/no/such/place.mcap"}, "/no/such/place.mcap: cannot be written"),
+        (MonitorNode, {"ledger.path": "/no/such/place.db"}, "/no/such/place.db: cannot be created"),
+        (GaitPublisher, {"pace.ripple": 1.0}, "pace.ripple: 1.0 is not at most 0.9"),
+        (GaitPublisher, {"precompute": True}, "precompute: needs a duration_s above 0 s"),
+    ],
+)
+def test_a_node_with_a_bad_parameter_does_not_start(node, parameters, line) -> None:
+    with pytest.raises(LegWearError) as refused, made_node(make=node, **parameters):
+        pass
+    assert line in str(refused.value)
+    assert "\n" not in str(refused.value)

@@ -12,6 +12,7 @@ import pytest
 pytest.importorskip("rclpy")
 
 import rclpy
+from made_node import made_node
 from rclpy.parameter import Parameter
 from rclpy.utilities import try_shutdown
 
@@ -35,29 +36,17 @@ def allowed(node: str, kind: str, right: str, policy: ElementTree.Element = POLI
 @pytest.mark.parametrize(
     ("make", "own"),
     [
-        (MonitorNode, {"publish_scalars": True, "foot_load.source": "wrench"}),
-        (GaitPublisher, {"foot_load_sensor.source": "wrench"}),
+        (MonitorNode, {"publish_scalars": True, "foot_load__source": "wrench"}),
+        (GaitPublisher, {"foot_load_sensor__source": "wrench"}),
     ],
 )
-def test_a_node_may_do_what_it_does_and_nothing_else(
-    make: Callable[..., Any], own: dict[str, Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(MonitorNode, "_compile", lambda self, decoder: None)
-    context = rclpy.Context()
-    rclpy.init(args=["--ros-args", "--log-level", "fatal"], context=context)
-    overrides = [Parameter("use_sim_time", value=True), Parameter("clearance_joints", value=["G"])]
-    overrides += [Parameter(name, value=value) for name, value in own.items()]
-    try:
-        node = make(context=context, parameter_overrides=overrides)
+def test_a_node_may_do_what_it_does_and_nothing_else(make: Callable[..., Any], own: dict[str, Any]) -> None:
+    with made_node(make=make, use_sim_time=True, clearance_joints=["G"], **own) as node:
         name = node.get_name()
         agrees(node.get_publisher_names_and_types_by_node, name, allowed(name, "topic", "publish"))
         agrees(node.get_subscriber_names_and_types_by_node, name, allowed(name, "topic", "subscribe"))
         agrees(node.get_service_names_and_types_by_node, name, allowed(name, "service", "reply"))
         agrees(node.get_client_names_and_types_by_node, name, allowed(name, "service", "request"))
-        node.close()
-        node.destroy_node()
-    finally:
-        try_shutdown(context=context)
 
 
 def test_an_operator_may_do_what_its_program_does_and_nothing_else() -> None:

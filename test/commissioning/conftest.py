@@ -30,6 +30,9 @@ class Walk:
     torque_nm: Floats
 
 
+MakeWalk = Callable[..., Walk]
+
+
 @attrs.frozen(kw_only=True)
 class Robot:
     """How a robot's sensors show a walk."""
@@ -46,6 +49,9 @@ class Robot:
     is_wrapped: bool = False
     lag_s: float = 0.0
     seed: int = 0
+
+
+Record = Callable[[Path, Robot, Walk], Path]
 
 
 @pytest.fixture(scope="session")
@@ -68,7 +74,7 @@ def model(leg: Mechanism) -> TorqueModel:
 
 
 @pytest.fixture(scope="session")
-def ideal_walk(model: TorqueModel) -> Callable[..., Walk]:
+def ideal_walk(model: TorqueModel) -> MakeWalk:
     """Make a walk without clearances: at some speeds [rpm], one after the other, each for some time."""
 
     def make(*speeds_rpm: float, seconds: float = 15.0, friction_nm: float = 0.0) -> Walk:
@@ -98,7 +104,7 @@ def columns_of(robot: Robot, walk: Walk) -> tuple[Floats, Floats]:
 
 
 @pytest.fixture(scope="session")
-def record() -> Callable[[Path, Robot, Walk], Path]:
+def record() -> Record:
     """Record a robot's walk with a hip that swings, a wheel that turns, and a wrench that is only noise."""
 
     def write(path: Path, robot: Robot, walk: Walk) -> Path:

@@ -11,8 +11,9 @@ from leg_wear_monitor.estimate.torque_model import Series, Start, TorqueModel, m
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 
-from .conftest import Robot, Walk, columns_of
+from .conftest import MakeWalk, Robot, Walk, columns_of
 
+Judge = Callable[[Walk], Sampling]
 FINE = 25  # steps of impacts in a sampling interval of 5 ms
 
 
@@ -38,7 +39,7 @@ def impacts(walk: Walk, size_nm: float, sampling: str, seed: int) -> Floats:
 
 
 @pytest.fixture
-def judged(model: TorqueModel) -> Callable[[Walk], Sampling]:
+def judged(model: TorqueModel) -> Judge:
     """Judge the samples of a walk that is known in all else."""
 
     def judge(walk: Walk) -> Sampling:
@@ -54,7 +55,7 @@ def judged(model: TorqueModel) -> Callable[[Walk], Sampling]:
 @pytest.mark.parametrize("sampling", ["average", "instant"])
 @pytest.mark.parametrize("seed", range(3))
 def test_impacts_tell_averages_from_instants_at_one_cadence(
-    sampling: str, seed: int, ideal_walk: Callable[..., Walk], judged: Callable[[Walk], Sampling]
+    sampling: str, seed: int, ideal_walk: MakeWalk, judged: Judge
 ) -> None:
     walk = ideal_walk(70.0, friction_nm=0.5)
     hit = walk.torque_nm + impacts(walk, 5.0, sampling, seed)
@@ -64,7 +65,7 @@ def test_impacts_tell_averages_from_instants_at_one_cadence(
 
 
 def test_a_change_of_cadence_between_averages_is_not_taken_for_instants(
-    ideal_walk: Callable[..., Walk], judged: Callable[[Walk], Sampling]
+    ideal_walk: MakeWalk, judged: Judge
 ) -> None:
     walk = ideal_walk(40.0, 75.0)
     # a smoothed motion lags behind a sudden change, and with it the leg's torque
@@ -73,22 +74,18 @@ def test_a_change_of_cadence_between_averages_is_not_taken_for_instants(
     assert judged(Walk(walk.time_s, walk.angle_rad, hit)).value == "average"
 
 
-def test_the_sample_recording_has_averages(walked: Walk, judged: Callable[[Walk], Sampling]) -> None:
+def test_the_sample_recording_has_averages(walked: Walk, judged: Judge) -> None:
     assert judged(walked).value == "average"
 
 
-def test_without_impacts_one_cadence_tells_neither(
-    ideal_walk: Callable[..., Walk], judged: Callable[[Walk], Sampling]
-) -> None:
+def test_without_impacts_one_cadence_tells_neither(ideal_walk: MakeWalk, judged: Judge) -> None:
     found = judged(ideal_walk(70.0))
     assert found.value == ""
     assert "shows no strong impacts" in found.why
 
 
 @pytest.mark.parametrize(("sampling", "size_nm"), [("average", 3.0), ("instant", 1.0)])
-def test_noise_hides_impacts(
-    sampling: str, size_nm: float, ideal_walk: Callable[..., Walk], judged: Callable[[Walk], Sampling]
-) -> None:
+def test_noise_hides_impacts(sampling: str, size_nm: float, ideal_walk: MakeWalk, judged: Judge) -> None:
     walk = ideal_walk(70.0)
     noise = 5.0 * np.random.default_rng(4).standard_normal(len(walk.time_s))
     hit = walk.torque_nm + noise + impacts(walk, size_nm, sampling, 5)

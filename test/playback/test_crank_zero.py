@@ -5,13 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from raw_messages import Message, crank_and_torque, write_messages
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.bags.mcap_writer import McapWriter
 from leg_wear_monitor.estimate.torque_model import TorqueModel, torque_model
-from leg_wear_monitor.messages import encode
 from leg_wear_monitor.messages.cdr import Decoder
-from leg_wear_monitor.messages.streams import JOINT_STATE, WRENCH_STAMPED
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 
@@ -31,7 +29,7 @@ def config() -> MonitorConfig:
     return config_from({**crank, "diagnosis.enabled": False})
 
 
-def messages(model: TorqueModel, config: MonitorConfig, start_rad: float, start_s: float) -> list:
+def messages(model: TorqueModel, config: MonitorConfig, start_rad: float, start_s: float) -> list[Message]:
     """Messages of a walk, whose encoder begins at 0."""
     rng, n = np.random.default_rng(round(start_s)), 5 * RATE_HZ
     angle = start_rad + TURN * np.arange(n) / RATE_HZ
@@ -40,32 +38,14 @@ def messages(model: TorqueModel, config: MonitorConfig, start_rad: float, start_
     speed = np.full(n, TURN)
     torque = model.torque(angle - 0.5 * TURN / RATE_HZ, speed, 0.0 * speed)[0] + rng.standard_normal(n)
     stamps = START_NS + round(start_s * 1.0e9) + np.arange(n, dtype=np.int64) * (10**9 // RATE_HZ)
-    still = np.zeros(n)
-    joints = encode.joint_states(stamps, ["hip", "crank"], position=np.stack([still, position], axis=1))
-    wrench = encode.wrenches(stamps, torque=np.stack([still, still, torque], axis=1))
-    found = []
-    for i, stamp in enumerate(stamps.tolist()):
-        found.append((JOINT_STATE, stamp + 100_000, bytes(joints[i])))
-        found.append((WRENCH_STAMPED, stamp + 100_001, bytes(wrench[i])))
-    return found
-
-
-def recorded(path: Path, sent: list) -> Path:
-    with McapWriter(path) as writer:
-        channels = {
-            JOINT_STATE: writer.channel("/joint_states", encode.JOINT_STATE),
-            WRENCH_STAMPED: writer.channel("/drive_torque", encode.WRENCH_STAMPED),
-        }
-        for kind, log_time_ns, raw in sent:
-            writer.write(channels[kind], log_time_ns, raw)
-    return path
+    return crank_and_torque(stamps, position, torque, names=("hip", "crank"))
 
 
 def test_each_boot_has_its_zero_and_a_replay_is_the_live_run(
     leg: lw.Mechanism, model: TorqueModel, config: MonitorConfig, tmp_path: Path
 ) -> None:
     boots = [messages(model, config, *boot) for boot in BOOTS]
-    result = lw.replay([recorded(tmp_path / f"{i}.mcap", boot) for i, boot in enumerate(boots)], config)
+    result = lw.replay([write_messages(tmp_path / f"{i}.mcap", boot) for i, boot in enumerate(boots)], config)
     live, decoder, zeros = lw.WearMonitor(leg, result.monitor.config), Decoder(config), []
     for i, boot in enumerate(boots):
         if i:

@@ -5,16 +5,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from raw_messages import crank_and_torque, messages_of, write_messages
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.bags.findings import RecordingError
-from leg_wear_monitor.bags.mcap_writer import McapWriter
 from leg_wear_monitor.bags.reader import Recording
 from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.messages import encode
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.playback.replay import REPORTS_FILE
+from leg_wear_monitor.playback.summary import ReplayResult
 from leg_wear_monitor.twin import CRANK, LOAD
 
 Columns = dict[str, np.ndarray]
@@ -23,27 +23,22 @@ NS = {"input.units.stamp": "ns"}
 
 @pytest.fixture(scope="module")
 def walked() -> Columns:
-    """The healthy sample recording, a row each 5 ms, and the torque at the crank's times."""
+    """The healthy sample recording's first seconds, a row each 5 ms, and the torque at the crank's times."""
     with Recording([share_directory() / "bags" / "healthy.mcap"], lw.MonitorConfig()) as recording:
         samples = np.concatenate([block.samples for block in recording.blocks()])
     crank, torque = samples[samples["kind"] == CRANK], samples[samples["kind"] != CRANK]
     at = np.interp(crank["stamp_ns"], torque["stamp_ns"], torque["torque_nm"])
-    return {"time": crank["stamp_ns"], "crank_angle": crank["crank_angle_rad"], "drive_torque": at}
+    columns = {"time": crank["stamp_ns"], "crank_angle": crank["crank_angle_rad"], "drive_torque": at}
+    return {name: column[: 7 * 200] for name, column in columns.items()}
 
 
 @pytest.fixture(scope="module")
 def bag(walked: Columns, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("bag") / "walk.mcap"
-    stamps, torque = walked["time"], walked["drive_torque"]
-    joints = encode.joint_states(stamps, ["crank"], position=walked["crank_angle"])
-    wrenches = encode.wrenches(stamps, torque=np.stack([0.0 * torque, 0.0 * torque, torque], axis=1))
-    with McapWriter(path, chunk_bytes=10_000_000) as writer:  # one chunk: a chunk's end is in /diagnostics
-        crank = writer.channel("/joint_states", encode.JOINT_STATE)
-        drive = writer.channel("/drive_torque", encode.WRENCH_STAMPED)
-        for k, stamp in enumerate(stamps.tolist()):
-            writer.write(crank, stamp, bytes(joints[k]))
-            writer.write(drive, stamp, bytes(wrenches[k]))
-    return path
+    columns = (walked["time"], walked["crank_angle"], walked["drive_torque"])
+    sent = crank_and_torque(*columns, arrival_ns=(0, 0))
+    # one chunk: a chunk's end is in /diagnostics
+    return write_messages(path, sent, chunk_bytes=10_000_000)
 
 
 def write_csv(path: Path, columns: Columns) -> Path:
@@ -52,37 +47,33 @@ def write_csv(path: Path, columns: Columns) -> Path:
     return path
 
 
-def reported(path: Path) -> dict[str, list[tuple[int, bytes]]]:
-    """Times and messages of a file by topic."""
-    messages: dict[str, list[tuple[int, bytes]]] = {}
-    with path.open("rb") as file:
-        reader = pytest.importorskip("mcap.reader").make_reader(file)
-        for _, channel, message in reader.iter_messages(log_time_order=False):
-            messages.setdefault(channel.topic, []).append((message.log_time, message.data))
-    return messages
+@pytest.fixture(scope="module")
+def replayed(bag: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[ReplayResult, Path]:
+    """The bag's replay, and the directory with its ledger and its reports."""
+    place = tmp_path_factory.mktemp("replayed")
+    return lw.replay(bag, config_from(NS), out=place, ledger=place / "own.ledger"), place
 
 
-def test_a_csv_file_is_replayed_bit_for_bit_as_the_bag(walked: Columns, bag: Path, tmp_path: Path) -> None:
-    table = write_csv(tmp_path / "walk.csv", walked)
-    config = config_from(NS)
-    kept = {name: tmp_path / f"{name}.ledger" for name in ("bag", "csv")}
-    results = {
-        name: lw.replay(path, config, out=tmp_path / name, ledger=kept[name])
-        for name, path in (("bag", bag), ("csv", table))
-    }
-    told = {name: json.loads(result.summary().to_json()) for name, result in results.items()}
-    assert told["csv"]["verdict"]["state"] == "healthy"
-    assert told["csv"]["recording"].pop("files") == [str(table)]
-    assert told["bag"]["recording"].pop("files") == [str(bag)]
-    told["bag"]["monitor"].pop("ledger", None), told["csv"]["monitor"].pop("ledger", None)
-    assert told["csv"] == told["bag"]
-    assert reported(tmp_path / "csv" / REPORTS_FILE) == reported(tmp_path / "bag" / REPORTS_FILE)
-    assert results["csv"].monitor.wear_depth_m.tobytes() == results["bag"].monitor.wear_depth_m.tobytes()
-    again = lw.replay(table, config, ledger=kept["bag"])
+def test_a_csv_file_is_replayed_bit_for_bit_as_the_bag(
+    walked: Columns, bag: Path, replayed: tuple[ReplayResult, Path], tmp_path: Path
+) -> None:
+    table, config, (expected, place) = write_csv(tmp_path / "walk.csv", walked), config_from(NS), replayed
+    found = lw.replay(table, config, out=tmp_path, ledger=tmp_path / "own.ledger")
+    told, of_bag = (json.loads(result.summary().to_json()) for result in (found, expected))
+    assert told["verdict"]["state"] == "healthy"
+    assert told["recording"].pop("files") == [str(table)]
+    assert of_bag["recording"].pop("files") == [str(bag)]
+    told["monitor"].pop("ledger", None), of_bag["monitor"].pop("ledger", None)
+    assert told == of_bag
+    assert messages_of(tmp_path / REPORTS_FILE) == messages_of(place / REPORTS_FILE)
+    assert found.monitor.wear_depth_m.tobytes() == expected.monitor.wear_depth_m.tobytes()
+    again = lw.replay(bag, config, ledger=tmp_path / "own.ledger")
     assert again.monitor.is_all_counted
 
 
-def test_units_a_sign_and_an_offset_change_no_more_than_rounding(walked: Columns, bag: Path) -> None:
+def test_units_a_sign_and_an_offset_change_no_more_than_rounding(
+    walked: Columns, replayed: tuple[ReplayResult, Path]
+) -> None:
     other = {
         "t": walked["time"] / 1.0e6 - 1.7e12,
         "angle": (np.rad2deg(0.7 - walked["crank_angle"])) % 360.0,
@@ -100,19 +91,11 @@ def test_units_a_sign_and_an_offset_change_no_more_than_rounding(walked: Columns
             "crank.offset_rad": 0.7,
         }
     )
-    found, expected = lw.replay(other, config).summary(), lw.replay(bag).summary()
+    found, expected = lw.replay(other, config).summary(), replayed[0].summary()
     assert found.verdict.state is expected.verdict.state
     assert found.cycles == expected.cycles
     for joint, clearance in expected.clearances.items():
         assert found.clearances[joint].counted_m == pytest.approx(clearance.counted_m, rel=1.0e-6)
-
-
-def test_a_table_in_memory_is_commissioned(walked: Columns) -> None:
-    turned = {**walked, "crank_angle": -walked["crank_angle"] + 1.0}
-    result = lw.commission(turned, config_from(NS))
-    assert result.item("crank.sign").value == -1
-    assert result.item("crank.offset_rad").value == pytest.approx(1.0, abs=0.03)
-    assert result.config is not None and result.config.input == config_from(NS).input
 
 
 @pytest.mark.parametrize("source", ["wrench", "float64", "contact"])

@@ -23,39 +23,29 @@ def test_json_comes_back_as_it_went_out(summary):
     text = summary.to_json()
     again = summary_of(json.loads(text), "summary.json")
     assert again.to_json() == text
-    assert again.joints == summary.joints
-    assert again.alarms == summary.alarms
-    assert (again.verdict, again.clearances, again.life) == (
-        summary.verdict,
-        summary.clearances,
-        summary.life,
-    )
-    assert again.leg == summary.leg and again.leg.joint_words("B") == "B (knee)"
-    assert again.measurements[0].id == 3
+    for part in ("verdict", "clearances", "life", "joints", "alarms", "leg", "measurements"):
+        assert getattr(again, part) == getattr(summary, part), part
     assert again.history.stamp_ns.tolist() == summary.history.stamp_ns.tolist()
     assert np.array_equal(again.history.cycle, summary.history.cycle, equal_nan=True)
 
 
 def test_a_file_of_before_the_leg_was_in_it_is_read(summary):
     record = json.loads(summary.to_json())
+    assert summary.leg.joint_words("B") == "B (knee)"
     del record["leg"]
     assert summary_of(record, "summary.json").leg.joint_words("B") == "B"
 
 
-def test_json_has_a_version_and_null_for_what_is_not_known(summary):
+def test_json_has_null_for_what_is_not_known(summary):
     record = json.loads(summary.to_json())
-    assert list(record)[:3] == ["schema_version", "verdict", "clearances"] and list(record)[-1] == "made_with"
+    assert list(record)[:3] == ["schema_version", "verdict", "clearances"]
     assert record["joints"]["A"]["encoders"]["sigma_m"] is None
     assert record["verdict"]["evidence"][0]["limit"] is None
     assert record["clearances"]["B"]["seen_m"] is None and record["life"]["B"] is None
-    assert record["joints"]["A"]["encoders"]["observation"] == "seen by encoders"
     assert record["joints"]["B"]["peak_force_n"] is None and record["joints"]["B"]["encoders"] is None
-    assert list(record["alarms"]["changes"][0])[:3] == ["stamp_ns", "name", "level"]
-    assert record["alarms"]["now"][0]["level"] == "WARN" and record["alarms"]["now"][0]["worst"] is None
+    assert record["alarms"]["now"][0]["worst"] is None
     assert record["status"][0]["values"] == {"cadence_rpm": None}
     assert record["history"]["cycle"] == [1.0, None]
-    columns = ["stamp_ns", *CYCLE_COLUMNS, *SUMMARY_COLUMNS.values(), "lowest", "highest"]
-    assert list(record["history"]) == columns
 
 
 @pytest.mark.parametrize(
@@ -85,14 +75,10 @@ def test_a_fault_of_the_file_is_named(summary, path, value, fault):
     assert fault in str(caught.value)
 
 
-def test_an_entry_of_a_list_is_named_by_its_number(summary):
-    record = json.loads(summary.to_json()) | {"status": [7]}
-    with pytest.raises(ConfigError, match=r"summary\.json: status\.1: 7 is not a mapping"):
-        summary_of(record, "summary.json")
-
-
-def test_what_is_missing_is_named(summary):
+def test_what_is_missing_and_an_entry_of_a_list_are_named(summary):
     record = json.loads(summary.to_json())
+    with pytest.raises(ConfigError, match=r"summary\.json: status\.1: 7 is not a mapping"):
+        summary_of(record | {"status": [7]}, "summary.json")
     del record["gait"]["missing"]
     with pytest.raises(ConfigError, match=r"^summary.json: gait.missing: is missing$"):
         summary_of(record, "summary.json")
@@ -105,23 +91,17 @@ def test_what_is_no_object_is_refused(record):
 
 
 def test_a_row_of_the_table_has_what_the_json_of_the_joint_has(summary):
-    parts, empty = (summary.clearances, summary.joints), ({}, {})
-    columns, none = (
-        {"joint": list(joints)}
-        | columns_of(JointClearance, list(clearances.values()))
-        | columns_of(ReplayJoint, list(joints.values()))
-        for clearances, joints in (parts, empty)
-    )
-    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-    for row in rows:
-        joint = row.pop("joint")
-        known = {name: value for name, value in row.items() if value is not None}
-        told = summary.to_dict()
+    def table(clearances, joints):
+        return columns_of(JointClearance, list(clearances)) | columns_of(ReplayJoint, list(joints))
+
+    columns, told = table(summary.clearances.values(), summary.joints.values()), summary.to_dict()
+    assert {"forecast.hours.p50", "encoders.is_other", "believed_m"} <= set(columns)
+    assert set(table((), ())) == set(columns)
+    for joint, row in zip(summary.joints, zip(*columns.values(), strict=True), strict=True):
         record = flat(told["clearances"][joint]) | flat(told["joints"][joint])
         record["seen_by"] = ", ".join(record["seen_by"])
+        known = {name: value for name, value in zip(columns, row, strict=True) if value is not None}
         assert known == {name: value for name, value in record.items() if value is not None}
-    assert {"forecast.hours.p50", "encoders.is_other", "believed_m"} <= set(columns)
-    assert set(none) == set(columns)
 
 
 def flat(record, path=""):

@@ -6,8 +6,6 @@ import pytest
 from made_up_fleet import made_up_fleet, made_up_leg
 from made_up_summary import made_up_summary
 
-from leg_wear_monitor.cli import pages as fleet_pages
-
 
 @pytest.fixture
 def fleet(tmp_path):
@@ -42,20 +40,6 @@ def test_it_writes_the_pages_that_have_changed(run, fleet):
     time.sleep(0.02)
     summary.write_bytes(summary.read_bytes())
     assert "changed: 1" in run(*COMMAND).stdout
-
-
-@pytest.mark.slow  # studies/test_run.py holds it for the same workers
-def test_pages_of_workers_are_those_of_one_process(run, fleet, monkeypatch):
-    monkeypatch.setattr(fleet_pages, "_WORTH_WORKERS", 2)
-    other = fleet / "legs" / "b"
-    other.mkdir()
-    (other / "summary.json").write_text(made_up_summary().to_json())
-    assert "changed: 2" in run(*COMMAND, "--workers", "1").stdout
-    pages = {leg: (fleet / "legs" / leg / "report.html").read_bytes() for leg in "ab"}
-    for leg in "ab":
-        (fleet / "legs" / leg / "report.html").unlink()
-    assert "changed: 2" in run(*COMMAND, "--workers", "2").stdout
-    assert {leg: (fleet / "legs" / leg / "report.html").read_bytes() for leg in "ab"} == pages
 
 
 @pytest.mark.parametrize("text", ["{", "{}", '{"schema_version": 99}'])

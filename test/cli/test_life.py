@@ -11,7 +11,7 @@ from leg_wear_monitor.life import life as many_lives
 from leg_wear_monitor.monitor.forecast.forecaster import read_lives
 from leg_wear_monitor.monitor.ledger.entry import fingerprint
 
-ONE = ("life", "--mechanism", "four_bar", "--legs", "1", "--cycles", "2", "--opens-m", "2e-5")
+ONE = ("life", "--mechanism", "four_bar", "--legs", "1", "--cycles", "2", "--opens-m", "5e-5")
 
 
 def test_life_tells_when_each_joint_reaches_its_limit(run, tmp_path):

@@ -31,7 +31,7 @@ def bag(tmp_path_factory):
     return path
 
 
-def test_terminal_page_summary_and_status_agree(run, bag, tmp_path):
+def test_terminal_page_summary_and_status_agree(run, bag, tmp_path, unpainted):
     result = run("replay", str(bag), "--out", "out")
     assert result.exit_code == 0
     record = json.loads((tmp_path / "out" / "summary.json").read_text())

@@ -3,32 +3,16 @@
 import sqlite3
 from contextlib import closing
 
-import attrs
-import numpy as np
 import pytest
 
-from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.config.parameters import load_config
-from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.ledger.entry import Entry, JointWear
-from leg_wear_monitor.monitor.ledger.ledger import open_ledger
 
 pytestmark = pytest.mark.plain
 
 
-def worn_ledger(path, config):
-    """A ledger of the default leg whose joints have opened by 60 µm."""
-    leg = load_mechanism("bionic_leg")
-    kept = open_ledger(leg, attrs.evolve(config, ledger=attrs.evolve(config.ledger, path=str(path))))
-    joints = tuple(JointWear(name, np.full((2, 720), 3e-5), 4000, 4000.0) for name in leg.clearance_joints)
-    kept.keep(Entry(stamp_ns=10**9, joints=joints, totals={"cycles": 4e3, "moving_s": 4e3}), closed=True)
-    kept.close()
-    return path
-
-
 @pytest.fixture
-def ledger(tmp_path):
-    return worn_ledger(tmp_path / "wear.ledger", MonitorConfig())
+def ledger(worn_ledger):
+    return worn_ledger()
 
 
 def rows(path):
@@ -105,18 +89,16 @@ def test_a_dry_run_says_the_same_and_leaves_the_ledger_as_it_is(run, ledger):
     assert dry.stdout.splitlines()[:-1] == run(*arguments).stdout.splitlines()
 
 
-def test_a_dry_run_names_the_ledger_that_is_damaged_and_not_its_copy(refused, tmp_path):
-    (tmp_path / "bad.ledger").write_bytes(b"no ledger" * 100)
-    line = refused("measure", "A", "0.42", "--sigma", "0.005", "--ledger", "bad.ledger", "--dry-run")
-    assert line.startswith("error: bad.ledger: ")
-    assert [path.name for path in tmp_path.iterdir()] == ["bad.ledger"]
-
-
-def test_a_dry_run_creates_no_ledger(run, tmp_path):
+def test_a_dry_run_creates_no_ledger_and_names_the_one_that_is_damaged_and_not_its_copy(
+    run, refused, tmp_path
+):
     (tmp_path / "mine.yaml").write_text("/**: {ros__parameters: {ledger.path: new.ledger}}")
-    result = run("measure", "A", "0.3", "--sigma", "0.005", "--config", "mine.yaml", "--dry-run")
-    assert result.exit_code == 0
+    arguments = ("measure", "A", "0.3", "--sigma", "0.005", "--dry-run")
+    assert run(*arguments, "--config", "mine.yaml").exit_code == 0
     assert [path.name for path in tmp_path.iterdir()] == ["mine.yaml"]
+    (tmp_path / "new.ledger").write_bytes(b"no ledger" * 100)
+    assert refused(*arguments, "--config", "mine.yaml").startswith("error: new.ledger: ")
+    assert {path.name for path in tmp_path.iterdir()} == {"mine.yaml", "new.ledger"}
 
 
 def test_a_withdrawn_measurement_is_kept_and_teaches_nothing(run, ledger):
@@ -168,10 +150,10 @@ def test_a_ledger_has_to_be_named(refused):
     assert "no ledger given" in refused("measure", "A", "0.4", "--sigma", "0.01")
 
 
-def test_a_leg_that_carries_a_person_is_the_one_of_its_ledger(run, tmp_path):
+def test_a_leg_that_carries_a_person_is_the_one_of_its_ledger(run, worn_ledger, tmp_path):
     config = tmp_path / "carries.yaml"
     config.write_text("/**: {ros__parameters: {load.person_kg: 80.0}}\n", encoding="utf-8")
-    ledger = worn_ledger(tmp_path / "wear.ledger", load_config(config))
+    ledger = worn_ledger(load_config(config))
     result = run("measure", "A", "0.42", "--sigma", "0.005", "--ledger", str(ledger), "--config", str(config))
     assert (result.exit_code, result.stderr) == (0, "")
     assert rows(ledger)[0][0] == "A"

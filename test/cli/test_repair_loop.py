@@ -101,6 +101,7 @@ def test_after_the_repair_a_healthy_recording_is_not_to_be_inspected(run, ledger
     assert not any(alarm["level"] != "OK" for alarm in found["alarms"]["now"])
 
 
+@pytest.mark.slow  # monitor/alarms/test_alarm.py holds it for a value, the next test what is kept
 def test_acknowledged_alarms_clear_once_their_values_have_returned(run, ledger, tmp_path):
     first = run("acknowledge", "--ledger", ledger)
     assert (first.exit_code, first.stdout) == (
@@ -115,11 +116,16 @@ def test_acknowledged_alarms_clear_once_their_values_have_returned(run, ledger, 
     assert run("acknowledge", "--ledger", ledger).stdout == "cleared: none; still present: none\n"
 
 
-def test_a_dry_run_acknowledges_nothing(run, ledger, tmp_path):
+def test_acknowledged_alarms_are_kept_as_such_but_not_by_a_dry_run(run, ledger, tmp_path):
     before = (tmp_path / "wear.ledger").read_bytes()
     told = run("acknowledge", "--ledger", ledger, "--dry-run").stdout
     assert told.splitlines()[-1] == "dry run: nothing was written"
     assert (tmp_path / "wear.ledger").read_bytes() == before
+    done = run("acknowledge", "--ledger", ledger)
+    assert done.stdout == "cleared: none; still present: clearance G, torque_mismatch\n"
+    with closing(sqlite3.connect(ledger)) as db:
+        rows = db.execute("SELECT kind, acknowledged FROM alarm WHERE level > 0 ORDER BY kind").fetchall()
+    assert rows == [("clearance", 1), ("torque_mismatch", 1)]
 
 
 @pytest.mark.parametrize("verb", [("acknowledge",), ("reset", "G")])

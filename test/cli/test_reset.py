@@ -10,7 +10,6 @@ import pytest
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.ledger.entry import Entry, JointWear
 from leg_wear_monitor.monitor.ledger.ledger import open_ledger
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.state import Level
@@ -25,24 +24,15 @@ def opened(path):
 
 
 @pytest.fixture
-def ledger(tmp_path):
-    """A ledger of the default leg whose joints have opened by 60 um; G is at its limit, say its alarms."""
-    path = tmp_path / "wear.ledger"
-    _, kept = opened(path)
-    joints = tuple(
-        JointWear(name, np.full((2, 720), 3e-5), 4000, 4000.0, 0, 4e-12) for name in LEG.clearance_joints
-    )
+def ledger(worn_ledger):
+    """A ledger of a worn leg; G is at its limit, say its alarms."""
     raised = {"level": Level.ERROR, "raised_ns": 5}
     alarms = (
         Alarm(kind="clearance", subject="G", present=Level.ERROR, **raised),
         Alarm(kind="impact_force", subject="G", **raised),
         Alarm(kind="clearance", subject="A", **raised),
     )
-    totals = {"cycles": 5e3, "moving_s": 5e3}
-    entry = Entry(stamp_ns=10**9, joints=joints, totals=totals, alarms=alarms, spans=((0, 10**9, 0),))
-    kept.keep(entry, closed=True)
-    kept.close()
-    return path
+    return worn_ledger(alarms=alarms)
 
 
 def content(path):

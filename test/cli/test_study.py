@@ -5,9 +5,6 @@ import shutil
 
 import pytest
 
-from leg_wear_monitor.report.page import page_html
-from leg_wear_monitor.studies.results import load_results
-
 TINY = """\
 joints: [G]
 clearances_m: [0.0001, 0.0003]
@@ -22,7 +19,7 @@ def computed():
 
 
 @pytest.fixture
-def done(run, tmp_path, tmp_path_factory, computed):
+def done(run, unpainted, tmp_path, tmp_path_factory, computed):
     (tmp_path / "tiny.yaml").write_text(TINY)
     if computed:
         shutil.copytree(computed["out"], tmp_path / "out")
@@ -33,7 +30,7 @@ def done(run, tmp_path, tmp_path_factory, computed):
     return computed["result"]
 
 
-def test_a_study_leaves_data_and_a_page_and_goes_on_where_it_was(run, done, unpainted, tmp_path, complaints):
+def test_a_study_leaves_data_and_a_page_and_goes_on_where_it_was(run, done, tmp_path, complaints):
     assert (done.exit_code, complaints(done)) == (0, [])
     assert done.stdout == "points: 2, 2 computed now\nwritten: out/report.html\n"
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
@@ -59,7 +56,7 @@ def test_another_leg_is_an_option(run, tmp_path, unpainted):
     assert json.loads((tmp_path / "out" / "study.json").read_text())["settings"]["mechanism"] == "jansen_leg"
 
 
-def test_points_that_are_missing_are_told_and_the_rest_is_shown(run, done, tmp_path, unpainted):
+def test_points_that_are_missing_are_told_and_the_rest_is_shown(run, done, tmp_path):
     first = json.loads((tmp_path / "out" / "study.json").read_text())["points"][0]["key"]
     (tmp_path / "out" / "points" / f"{first}.npz").unlink()
     result = run("report", "out")
@@ -94,12 +91,3 @@ def test_a_scheduler_that_does_not_answer_is_told(run, tmp_path):
     result = run(*line)
     assert result.exit_code == 2
     assert result.stderr.splitlines()[-1] == "error: --scheduler: frog://nowhere: no scheduler answers there"
-
-
-@pytest.mark.slow  # the page that is drawn again is the same, byte for byte
-def test_the_page_holds_what_was_computed(done, tmp_path):
-    from leg_wear_monitor.report.study.page import study_page
-
-    results = load_results(tmp_path / "out")
-    page = study_page(results)
-    assert page_html(page).encode() == (tmp_path / "out" / "report.html").read_bytes()

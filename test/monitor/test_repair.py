@@ -17,9 +17,12 @@ WAITING = Diagnosis(state=DiagnosisState.WAITING, reason="not enough gait cycles
 
 
 def shown(clearance_m: float, sigma_m: float) -> Diagnosis:
-    """What the drive torque shows: G, and nothing of A."""
+    """What the drive torque shows for some time: G, and nothing of A."""
     return Diagnosis(
-        state=DiagnosisState.CHANGED, clearance_m=(math.nan, clearance_m), sigma_m=(math.nan, sigma_m)
+        state=DiagnosisState.CHANGED,
+        clearance_m=(math.nan, clearance_m),
+        sigma_m=(math.nan, sigma_m),
+        least_m=(math.nan, clearance_m - 2.0 * sigma_m),
     )
 
 

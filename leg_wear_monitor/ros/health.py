@@ -9,7 +9,7 @@ import attrs
 from leg_wear_monitor.monitor import alarm_specs, alarms
 from leg_wear_monitor.monitor.alarms import INPUT_SILENCE, Alarm, Limit, acknowledged, evaluated, has_changed
 from leg_wear_monitor.monitor.reports import AlarmList, Status
-from leg_wear_monitor.ros.inputs import Inbox, InputTopic, misfit, several
+from leg_wear_monitor.ros.inputs import Inbox, InputTopic, refusals, several
 from leg_wear_monitor.ros.outputs import BlackBox
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin import CRANK, KINDS
@@ -361,13 +361,11 @@ def topics_status(topics: Iterable[InputTopic], now_ns: int, started_ns: int) ->
 
 def _faults(topic: InputTopic, silent_s: float, running_s: float) -> Iterator[tuple[Level, str]]:
     """Faults of a topic with their levels."""
-    if other := misfit(topic.publishers, topic.stream.type):
-        yield Level.ERROR, other
-    elif topic.incompatible:
-        yield Level.ERROR, topic.incompatible
+    if refused := refusals(topic.publishers):
+        yield Level.ERROR, refused
     if silent_s > SILENT_FROM_S:
         yield Level.ERROR, f"has been silent since {utc(topic.heard_wall_ns)}: nothing is monitored"
-    elif not topic.publishers.fitting and not topic.publishers.other:
+    elif not topic.publishers.fitting and not topic.publishers.refused:
         yield Level.ERROR if running_s >= NOTHING_FROM_S else Level.WARN, "nobody publishes it"
     elif math.isnan(silent_s) and running_s >= NOTHING_FROM_S:
         yield Level.ERROR, "has a publisher, but no message has arrived yet"

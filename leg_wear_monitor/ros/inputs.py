@@ -12,9 +12,10 @@ import attrs
 import numpy as np
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_policy_name_from_kind
+from rclpy.qos import QoSCompatibility, QoSProfile, ReliabilityPolicy, qos_check_compatible
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.messages.cdr import MESSAGE, Decoder
@@ -95,7 +96,8 @@ class Inbox:
 
     def delay_s(self, now_ns: int) -> float:
         """Waiting time of the oldest message [s]."""
-        return max(0, now_ns - self._waiting[0].log_time_ns) * 1.0e-9 if self._waiting else 0.0
+        with self.lock:
+            return max(0, now_ns - self._waiting[0].log_time_ns) * 1.0e-9 if self._waiting else 0.0
 
     def take(self, most: int, most_bytes: int = TAKEN_BYTES) -> list[Arrival]:
         """Remove and return the oldest messages within both limits; the first one may exceed `most_bytes`."""
@@ -240,17 +242,17 @@ class Publishers:
     Attributes
     ----------
     fitting : tuple of str
-        Full names of the nodes that publish the expected type.
-    other : tuple of (str, str)
-        Full names of the other nodes, and their message types.
+        Full names of the nodes whose messages arrive.
+    refused : tuple of (str, str)
+        Full names of the other nodes, and why none of theirs does.
     """
 
     fitting: tuple[str, ...] = ()
-    other: tuple[tuple[str, str], ...] = ()
+    refused: tuple[tuple[str, str], ...] = ()
 
 
-def publishers_of(node: Node, topic: str, expected: str) -> Publishers:
-    """Publishers of a topic, from the graph: few middlewares raise an event for an incompatible type.
+def publishers_of(node: Node, topic: str, expected: str, qos: QoSProfile) -> Publishers:
+    """Publishers of a topic, from the graph, which tells when one of them is gone; events do not.
 
     Parameters
     ----------
@@ -259,12 +261,25 @@ def publishers_of(node: Node, topic: str, expected: str) -> Publishers:
         Full name of the topic.
     expected : str
         Expected type, such as ``sensor_msgs/msg/JointState``.
+    qos : QoSProfile
+        Of the subscription.
     """
-    found = [(_full_name(one), one.topic_type) for one in node.get_publishers_info_by_topic(topic)]
+    there = node.get_publishers_info_by_topic(topic)
+    found = [(_full_name(one), _refusal(one, expected, qos)) for one in there]
     return Publishers(
-        tuple(sorted(name for name, kind in found if kind == expected)),
-        tuple(sorted((name, kind) for name, kind in found if kind != expected)),
+        tuple(sorted(name for name, why in found if not why)),
+        tuple(sorted((name, why) for name, why in found if why)),
     )
+
+
+def _refusal(publisher: TopicEndpointInfo, expected: str, qos: QoSProfile) -> str:
+    """Why no message of a publisher arrives; empty if they do."""
+    if publisher.topic_type != expected:
+        return f"publishes {publisher.topic_type}, expected {expected}"
+    compatibility, why = qos_check_compatible(publisher.qos_profile, qos)
+    if compatibility != QoSCompatibility.ERROR:
+        return ""
+    return f"has a lower quality of service than this node requests ({why.strip(' ;')}); see qos_overrides"
 
 
 def _full_name(info: object) -> str:
@@ -272,10 +287,11 @@ def _full_name(info: object) -> str:
     return "a publisher without a node" if name in _UNKNOWN else f"{space.rstrip('/')}/{name}"
 
 
-def misfit(publishers: Publishers, expected: str) -> str:
-    """Fault text for publishers of another type; empty if there are none."""
-    listed = _listed(f"{name} publishes {kind}" for name, kind in publishers.other)
-    return f"{listed}, expected {expected}; no message arrives from it" if listed else ""
+def refusals(publishers: Publishers) -> str:
+    """Fault text for publishers of which no message arrives; empty if there are none."""
+    listed = _listed(f"{name} {why}" for name, why in publishers.refused)
+    who = "it" if len(publishers.refused) == 1 else "them"
+    return f"{listed}; no message arrives from {who}" if listed else ""
 
 
 def several(publishers: Publishers) -> str:
@@ -294,6 +310,7 @@ def _listed(names: Iterable[str]) -> str:
 # messages until the node takes them: Fast DDS holds 5000 of them by default, five seconds at 1 kHz, and tells
 # how many more were lost; with a depth below that it would not tell
 DEPTH = 10_000
+BEST_EFFORT = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 @attrs.define
@@ -311,8 +328,6 @@ class InputTopic:
     lost, lost_reported : int
         Messages lost in transport according to the middleware, and how many of them have already been
         reported.
-    incompatible : str
-        Incompatibility of a publisher's quality of service or type; empty if there is none.
     publishers : Publishers
         Publishers at the last query of the graph.
     sources : int
@@ -322,7 +337,9 @@ class InputTopic:
     other_axis : str
         Report on a torque about another axis than the one that is read; empty if there is none.
     shared : int
-        Number of publishers that are known to publish other joints than the crank.
+        Number of different lists of joints without the crank, which stands for that of their publishers.
+    qos : QoSProfile
+        Of the subscription.
     """
 
     name: str
@@ -331,12 +348,12 @@ class InputTopic:
     heard_wall_ns: int = 0
     lost: int = 0
     lost_reported: int = 0
-    incompatible: str = ""
     publishers: Publishers = Publishers()
     sources: int = 1
     without_crank: str = ""
     other_axis: str = ""
     shared: int = 0
+    qos: QoSProfile = BEST_EFFORT
 
 
 class Inputs:
@@ -384,33 +401,20 @@ def _subscribe(node: Node, topic: InputTopic) -> Subscription:
     def lost(event: Any) -> None:
         topic.lost += event.total_count_change
 
-    def misfit(what: str) -> None:
-        topic.incompatible = what
-        node.get_logger().warning(
-            f"{topic.name}: a publisher is incompatible: {what}; no message arrives from it"
-        )
-
-    def quality(event: Any) -> None:
-        policy = qos_policy_name_from_kind(event.last_policy_kind)
-        misfit(f"its {policy.lower()} is lower than this node requests; see qos_overrides")
-
     def come(_raw: Any) -> None:
         raise RuntimeError(f"an executor takes messages of {topic.name}")
 
-    callbacks = SubscriptionEventCallbacks(
-        incompatible_qos=quality,
-        incompatible_type=lambda _: misfit(f"its type is not {topic.stream.type}"),
-        message_lost=lost,
-    )
-    return node.create_subscription(
+    subscription = node.create_subscription(
         message_class(topic.stream.type),
         topic.stream.topic,
         come,
-        QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT),
+        BEST_EFFORT,
         raw=True,
-        event_callbacks=callbacks,
+        event_callbacks=SubscriptionEventCallbacks(message_lost=lost),
         qos_overriding_options=QoSOverridingOptions.with_default_policies(),
     )
+    topic.qos = subscription.qos_profile  # as overridden by parameters
+    return subscription
 
 
 # Check that the drive's torque is on the axis that is read; otherwise report the axis that carries one.

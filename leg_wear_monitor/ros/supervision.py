@@ -248,7 +248,7 @@ class Supervision:
         """Check publishers and contents of the topics; return the values of the alarms of several sources."""
         without, values = self._names.report(), {}
         for topic in self.inputs:
-            topic.publishers = publishers_of(self._node, topic.name, topic.stream.type)
+            topic.publishers = publishers_of(self._node, topic.name, topic.stream.type, topic.qos)
             if topic.stream.kind == CRANK:
                 topic.without_crank = without
                 topic.shared = self._names.others(now_ns - int(_OTHERS_S * 1.0e9))

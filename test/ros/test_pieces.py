@@ -148,7 +148,12 @@ def test_what_is_lost_while_the_node_is_late_was_dropped_by_it() -> None:
         ({}, 11, Level.OK, "connected"),
         ({"publishers": Publishers(), "heard_ns": 0}, 10, Level.WARN, "nobody publishes it"),
         ({"publishers": Publishers(), "heard_ns": 0}, 11, Level.ERROR, "nobody publishes it"),
-        ({"incompatible": "its reliability is less"}, 11, Level.ERROR, "its reliability is less"),
+        (
+            {"publishers": Publishers((), (("/driver", "has a lower quality of service"),))},
+            11,
+            Level.ERROR,
+            "/driver has a lower quality of service; no message arrives from it",
+        ),
         ({"lost": 7}, 11, Level.WARN, "messages are lost on the way to this node"),
         ({"lost": 7, "lost_reported": 7}, 11, Level.OK, "connected"),
         (

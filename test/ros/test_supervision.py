@@ -15,6 +15,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
 from rcl_interfaces.msg import Log
 from rclpy.node import Node
+from rclpy.qos import QoSProfile, qos_profile_sensor_data
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
@@ -27,7 +28,7 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.reports import AlarmList, Status
 from leg_wear_monitor.ros import inputs
 from leg_wear_monitor.ros.health import ClockMonitor, Load, NodeAlarms, Silence, both_clocks
-from leg_wear_monitor.ros.inputs import Arrival, CrankNames, Inbox, Inputs
+from leg_wear_monitor.ros.inputs import Arrival, CrankNames, Inbox, Inputs, Publishers, publishers_of
 from leg_wear_monitor.ros.supervision import AlarmLog, StatusLog
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin import KINDS
@@ -402,6 +403,23 @@ def test_a_topic_of_another_type_is_named_with_node_and_types(stage, walk) -> No
     )
     stage.wait_for(lambda: expected in words(diagnostics, "topics"), "both types")
     assert line(diagnostics, "topics").level == b"\2"
+
+
+def test_a_lower_quality_of_service_is_named_until_it_is_corrected(stage) -> None:
+    """Seen before: the fault stayed until the node was started again."""
+    lower = stage.node.create_publisher(JointState, "joint_states", qos_profile_sensor_data)
+    topic, kind = "joint_states", "sensor_msgs/msg/JointState"
+
+    def seen() -> Publishers:
+        return publishers_of(stage.node, f"/{topic}", kind, QoSProfile(depth=10))
+
+    stage.wait_for(lambda: seen().refused, "the publisher")
+    ((name, why),) = seen().refused
+    assert (name, seen().fitting) == ("/stage", ())
+    assert "Best effort publisher and reliable subscription" in why and "qos_overrides" in why
+    stage.node.destroy_publisher(lower)
+    stage.node.create_publisher(JointState, topic, 10)
+    stage.wait_for(lambda: seen() == Publishers(("/stage",)), "the corrected publisher")
 
 
 def test_two_publishers_of_one_crank_are_named_even_if_they_agree(stage, walk) -> None:

@@ -28,9 +28,17 @@ from leg_wear_monitor.messages.cdr import MESSAGE
 # tables) is executed, and memory and work are bounded.
 
 
-_REQUIRED_COLUMNS = {"topics": {"id", "name", "type"}, "messages": {"id", "topic_id", "timestamp", "data"}}
+_COLUMNS = {
+    "topics": {"id", "name", "type", "serialization_format"},
+    "messages": {"id", "topic_id", "timestamp", "data"},
+    "message_definitions": {
+        "topic_type",
+        "encoding",
+        "encoded_message_definition",
+    },  # may be missing as a whole
+}
 _JOURNALS = ("-wal", "-journal")  # endings of the files of transactions that were not written back
-_LONGEST_ROW = 2**25  # bytes; a longer row needs a larger --memory-mb
+_LEAST_ROW_LIMIT = 2**25  # bytes; a longer row needs a larger --memory-mb
 _TEXT_DIVISOR = 32  # a text of the schema or of a topic may have this part of `Budget.part_limit`
 _MOST_COLUMNS, _LONGEST_SQL = 64, 100_000  # far above those of rosbag2
 # Work is bounded in instructions of SQLite's virtual machine, since a damaged tree whose branches meet again,
@@ -72,7 +80,7 @@ def open_database(
     RecordingError
         If the file cannot be read or is not a rosbag2 database.
     """
-    journals = [each for end in _JOURNALS if _size(each := file.with_name(file.name + end))]
+    journals = _journals_of(file)
     try:
         if journals:
             address = f"file:{quote(str(_private_copy(file, journals, budget, stack)))}?mode=rw"
@@ -88,7 +96,8 @@ def open_database(
         database.execute("PRAGMA trusted_schema = OFF")
         database.set_authorizer(_authorized)
         _check_tables(database)
-        _limit_work(database, _LEAST_INSTRUCTIONS + _INSTRUCTIONS_PER_BYTE * _size(file))
+        size = sum(map(_size, (file, *journals)))
+        _limit_work(database, _LEAST_INSTRUCTIONS + _INSTRUCTIONS_PER_BYTE * size)
     except DamageError as error:
         raise RecordingError(str(path), "", str(error)) from error
     except (*UNREADABLE, OSError) as error:
@@ -99,7 +108,7 @@ def open_database(
 
 def allow_rows(database: sqlite3.Connection, budget: Budget) -> None:
     """Raise the limit of a row from that of texts, which `open_database` sets, to that of messages."""
-    database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, max(_LONGEST_ROW, budget.part_limit // 8 + 2**16))
+    database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, max(_LEAST_ROW_LIMIT, budget.part_limit // 8 + 2**16))
 
 
 def one_line(error: BaseException) -> str:
@@ -144,6 +153,11 @@ def _size(file: Path) -> int:
         return 0
 
 
+def _journals_of(file: Path) -> list[Path]:
+    """Files beside a database with transactions that were not written back to it."""
+    return [each for end in _JOURNALS if _size(each := file.with_name(file.name + end))]
+
+
 def _private_copy(file: Path, journals: list[Path], budget: Budget, stack: ExitStack) -> Path:
     """Copy a database and its journal files to a temporary directory."""
     budget.reserve(sum(_size(each) for each in (file, *journals)))
@@ -158,14 +172,14 @@ def _private_copy(file: Path, journals: list[Path], budget: Budget, stack: ExitS
 def _check_tables(database: sqlite3.Connection) -> None:
     """Check that the tables are plain: a view or a virtual table would execute code when it is read.
 
-    SQLite takes names of any case, and passes over entries that have no text.
+    Names are compared without case, as SQLite does. An entry without a text is refused.
     """
     found: dict[str, list[tuple[str, str]]] = {}
     for name, kind, text in database.execute("SELECT name, type, sql FROM sqlite_master"):
         found.setdefault(str(name).lower(), []).append((str(kind), str(text)))
-    for table, needed in (*_REQUIRED_COLUMNS.items(), ("message_definitions", set())):
+    for table, needed in _COLUMNS.items():
         entries = found.get(table, [])
-        if not entries and not needed:
+        if not entries and table == "message_definitions":
             continue
         if (
             len(entries) != 1
@@ -214,7 +228,7 @@ class SqliteFile:
         self._database, notes = open_database(path, file, budget, stack)
         self.findings += [Finding(path, note, Severity.NOTE) for note in notes]
         try:
-            self.size = file.stat().st_size
+            self.size = sum(map(_size, (file, *_journals_of(file))))
             self.channels = _channels(self._database, budget)
             allow_rows(self._database, budget)
             self._counts = _counts(self._database)
@@ -227,6 +241,8 @@ class SqliteFile:
 
     def pieces(self, types: dict[int, int]) -> Iterator[Due]:
         """Pieces of the requested channels; unreadable messages are skipped.
+
+        Each is loaded before the next one is asked for: that takes its rows off the page.
 
         Parameters
         ----------
@@ -260,7 +276,7 @@ class SqliteFile:
     def _piece(self, rows: deque[_Row], types: dict[int, int], bytes_per_message: int) -> Piece:
         """Read the messages of the next rows, as memory permits; these rows are removed from `rows`.
 
-        `bytes_per_message` is the mean size of a message in the file, for the progress.
+        `bytes_per_message` is the part of the file's size that counts as read with each of them.
         """
         contents: list[bytes] = []
         kept: list[_Row] = []
@@ -326,7 +342,7 @@ def _channels(database: sqlite3.Connection, budget: Budget) -> dict[int, Channel
         If their texts do not fit into memory, or there are more than 65536 topics.
     """
     texts: dict[str, tuple[str, str]] = {}
-    query = "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = 'message_definitions'"
+    is_there = "SELECT 1 FROM sqlite_master WHERE name = 'message_definitions' COLLATE NOCASE"
     size = 0
 
     def rows(query: str) -> Iterator[tuple[object, ...]]:
@@ -338,9 +354,10 @@ def _channels(database: sqlite3.Connection, budget: Budget) -> dict[int, Channel
             budget.check(size)
             yield row
 
-    if database.execute(query).fetchone():
-        query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
-        for name, encoding, text in rows(query):
+    if database.execute(is_there).fetchone():
+        for name, encoding, text in rows(
+            "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
+        ):
             texts[str(name)] = str(encoding), str(text)
     channels = {}
     for number, name, kind, encoding in rows("SELECT id, name, type, serialization_format FROM topics"):

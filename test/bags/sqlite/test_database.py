@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from recordings import losses
 
+from leg_wear_monitor.bags import sqlite
 from leg_wear_monitor.bags.findings import RecordingError
 
 
@@ -40,6 +41,27 @@ def test_rows_that_wait_in_a_wal_are_read(tmp_path, path, sent, expected, read, 
     assert not losses(recording)
     assert any(f"{name}-wal" in finding.text for finding in recording.findings)
     assert {file.name: file.read_bytes() for file in home.iterdir()} == before
+
+
+def test_rows_that_only_a_wal_has_are_no_more_work_than_its_size_explains(
+    tmp_path, path, sent, expected, read, monkeypatch
+):
+    """Seen before: the work that was allowed was that of the database alone, which is nearly empty here."""
+    monkeypatch.setattr(sqlite, "_LEAST_INSTRUCTIONS", 0)
+    monkeypatch.setattr(sqlite, "_INSTRUCTIONS_PER_BYTE", 0.05)
+    monkeypatch.setattr(sqlite, "_INSTRUCTIONS_PER_CHECK", 1)
+    left = tmp_path / "left.db3"
+    with closing(sqlite3.connect(path, isolation_level=None)) as database:
+        rows = database.execute("SELECT * FROM messages").fetchall()
+        database.execute("DELETE FROM messages")
+        database.execute("VACUUM")
+        database.execute("PRAGMA journal_mode = wal")
+        database.executemany("INSERT INTO messages VALUES (?, ?, ?, ?)", rows)
+        for end in ("", "-wal"):
+            shutil.copy(f"{path}{end}", f"{left}{end}")
+    samples, recording = read(left)
+    assert samples.tobytes() == expected(sent).tobytes()
+    assert not losses(recording)
 
 
 def test_what_was_not_committed_is_rolled_back(tmp_path, path, sent, expected, read):

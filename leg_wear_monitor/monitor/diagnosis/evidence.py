@@ -33,9 +33,10 @@ SETTLING_CYCLES = 10  # since a change, before the counted clearances are correc
 
 _LEAST_CYCLES = 2  # since a change, before it is explained: the first contains the change itself
 _LEAST_CYCLES_UNLIKE = 6  # where the leg is not that of its reference: two strange steps are no change
-_FIT_EVERY = 10  # gait cycles, while nothing changes
+_FIT_EVERY = 10  # gait cycles, but for the first ones of a change
 
-# times the detector's threshold, from which on a size does not depend on which cycles were detected. Four
+# times the detector's threshold (both are natural logarithms of odds), from which on it hardly matters that
+# the first cycles of a change were selected by their detection. Four
 # cycles of J at 0.55 mm under 300 N gave 1.03 ± 0.17 mm at 2.1 times the threshold; G at 2 mm has 94, and G
 # and I at 0.6 mm, whose sizes are right from the third cycle on, 3 to 7 (2026-11-26)
 _FAR_BEYOND = 4.0
@@ -72,13 +73,14 @@ class Evidence:
         state.detector, state.changes, state.fit_due = None, (), 0
         for cycle in state.cycles:
             self._test(state, cycle, config)
-        self._explain(state, config, is_due=True)
+        self._explain(state, config)
 
     def _know_sensor(self, state: TorqueState) -> None:
         """Find the noise of the torque sensor, and the channel behind which a commissioned leg is expected.
 
-        Before, a wide joint and a filter could be taken for each other. A baseline after a correction has
-        clearances that are not sure: its channel is that of the one before.
+        Before it is commissioned, a wide joint and a filter could be taken for each other, so there is no
+        channel. A baseline after a correction has an uncertain clearance: its channel is that of the one
+        before.
         """
         known = state.commissioned
         if state.reference is None or state.sensor is None or not (known or state.cycles):
@@ -101,18 +103,17 @@ class Evidence:
         before = state.detector or detector.fresh()
         state.detector = detector.with_cycle(before, cycle.signature, cycle.begin_ns)
 
-    def _explain(self, state: TorqueState, config: MonitorConfig, is_due: bool = False) -> None:
+    def _explain(self, state: TorqueState, config: MonitorConfig) -> None:
         """Renew the clearances, and the change if there is one."""
         detector = self._models.detector(state, config)
         found = detector.detection(state.detector) if state.detector else None
         since_ns = state.changes[-1].since_ns if state.changes else found.since_ns if found else 0
         cycles = [cycle for cycle in state.cycles if cycle.begin_ns >= since_ns]
-        if len(cycles) < self._least_cycles(state) or not (since_ns or state.fit_due <= 0):
+        is_due = state.fit_due <= 0 or (since_ns and len(cycles) <= SETTLING_CYCLES)  # often at first
+        if len(cycles) < self._least_cycles(state) or not is_due:
             state.fit_due -= 1
             return
         state.fit_due = _FIT_EVERY - 1
-        if since_ns and not (is_due or _is_due(len(cycles))):
-            return
         mean, change = np.mean([cycle.signature for cycle in cycles], axis=0), None
         explanations: Sequence[Explanation] = ()
         if since_ns or state.commissioned is None:
@@ -184,11 +185,11 @@ class Evidence:
         state.fit_cycles = cycles
 
     def _keep_least(self, state: TorqueState, change: Change | None, config: MonitorConfig) -> None:
-        """Keep the clearances that joints surely have by the last fits, as many as an alarm waits for.
+        """Keep the lower bounds of the clearances by the last fits, as many as an alarm waits for.
 
-        The first gait cycles of a change are those that made it one, and show too much of it. That is no
-        matter where they are far more than it takes, nor in as many cycles as settle a change: then one fit
-        counts as all of them.
+        The first gait cycles after a detection overstate the change, since they were selected by it. Where
+        the change is far above the threshold, or as many cycles have passed as settle it, one fit is enough:
+        its bound counts as all of them.
         """
         if state.fit is None:
             return
@@ -205,18 +206,13 @@ class Evidence:
 
 
 def _is_of_reference(explanations: Sequence[Explanation]) -> bool:
-    """Whether one clearance at most explains a torque, by its causes, the best first.
+    """Whether a leg as counted, but for one clearance at most, explains a torque better than anything else.
 
-    They include a torque that is late or filtered.
+    The explanations are sorted, the best first; UNKNOWN, the leg as counted, is always among them.
     """
     best = explanations[0]
     own = next(one for one in explanations if one.cause in (Cause.CLEARANCE, Cause.UNKNOWN))
     return own.square <= _GOOD and 0.5 * (own.misfit - best.misfit) < SURE_LOG_ODDS
-
-
-def _is_due(cycles: int) -> bool:
-    """Whether a change is explained again after so many gait cycles: often at first."""
-    return cycles <= SETTLING_CYCLES or cycles % _FIT_EVERY == 0
 
 
 # Why there is no estimate of the clearances yet, or why it is not sure, and what comes next.

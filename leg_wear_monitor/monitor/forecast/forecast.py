@@ -2,7 +2,7 @@
 
 An ensemble of legs over what is believed of every joint's wear coefficient and clearance, over the growth's
 own scatter and the load to come. In each of them all joints grow together by the law of growth, until each
-has reached its limit (`growth_law.py`).
+has reached its limit (`GrowthLaw`, `cycles_to`).
 """
 
 import math
@@ -235,7 +235,7 @@ class Answer(Enum):
 
 @attrs.frozen
 class Quantiles:
-    """Quantiles of what is not known.
+    """Quantiles of an uncertain value.
 
     Attributes
     ----------
@@ -441,6 +441,8 @@ def forecast(
         )
     )
     answer = _leg_answer(answers)
+    # a joint whose growth is not known does not end the leg by a clearance that may be at its limit either
+    ends[[each in _NOT_KNOWN for each in answers]] = np.inf
     life, first = _life(answer, ends.min(axis=0), cycle_s, day), {}
     if life["cycles"] is not None:
         fraction = np.bincount(ends.argmin(axis=0), minlength=len(now)) / MEMBERS
@@ -511,11 +513,14 @@ def _life(answer: Answer, cycles: Floats, cycle_s: float, day: Floats) -> dict[s
     return {"cycles": quantiles(cycles), "hours": quantiles(hours), "days": quantiles(cycles * day)}
 
 
+_NOT_KNOWN = (Answer.NOT_ENOUGH_DATA, Answer.NO_COEFFICIENT)
+
+
 def _leg_answer(joints: Sequence[Answer]) -> Answer:
     for answer in (Answer.AT_LIMIT, Answer.OUTSIDE_VALIDITY):
         if answer in joints:
             return answer
-    unknown = next((each for each in (Answer.NOT_ENOUGH_DATA, Answer.NO_COEFFICIENT) if each in joints), None)
+    unknown = next((each for each in _NOT_KNOWN if each in joints), None)
     if Answer.KNOWN not in joints:
         return unknown or Answer.NO_GROWTH
     return Answer.PARTLY_KNOWN if unknown else Answer.KNOWN
@@ -578,7 +583,7 @@ def three_digits(value: float) -> str:
 
 
 def clearance_mm(value_m: float, p10_m: float, p90_m: float) -> str:
-    """A counted clearance [mm] in the digits that it deserves: the last is that of its standard deviation.
+    """A counted clearance [mm] in two to six digits: the last is the first one of its standard deviation.
 
     Parameters
     ----------

@@ -127,6 +127,16 @@ def test_a_joint_without_a_growth_rate_leaves_the_leg_partly_known():
     assert told.leg.cycles == told.joints[0].cycles
 
 
+def test_a_joint_without_a_growth_rate_does_not_end_the_leg_by_what_its_clearance_may_be():
+    """Seen before: the leg was at its limit now with 10 %, of a joint that is said to be left out."""
+    near = attrs.evolve(B, growth_m=None, wear_m=2.8e-4)
+    unsure = attrs.evolve(SURE, clearance_sigma_m=2e-5)
+    told = whole([NOW, near], unsure)
+    assert told.joints[1].clearance_m.p90 > near.limit_m
+    assert (told.leg.answer, told.leg.cycles) == (Answer.PARTLY_KNOWN, told.joints[0].cycles)
+    assert told.leg.first_probability == {"A": 1.0, "B": 0.0}
+
+
 def test_a_joint_that_does_not_grow_never_ends_the_leg():
     told = whole([NOW, attrs.evolve(B, growth_m=0.0)])
     assert (told.leg.answer, told.leg.cycles) == (Answer.KNOWN, told.joints[0].cycles)

@@ -25,7 +25,8 @@ from leg_wear_monitor.report.page import (
 from leg_wear_monitor.report.replay.joints import counted_mm
 from leg_wear_monitor.state import AlarmChange, Figure
 
-_COLOURS = 7  # of the style sheet
+_COLOURS = 7  # of the style sheet, templates/replay/replay.css
+_MOST_CHANGES = 1000  # of alarms that are drawn
 _STEADY = 0.1  # of the commanded cadence to either side, less does not fill the picture
 _NEAR = 3.0  # a limit beyond so many times the largest value would only flatten the curve
 
@@ -67,13 +68,15 @@ def _openings_chart(summary: ReplaySummary) -> Chart:
 
 def _estimates_chart(summary: ReplaySummary) -> Chart:
     """Clearances that encoders or the drive torque show, with their limit."""
-    limits = [each.limit_m for each in summary.clearances.values()]
+    seen_m = summary.history.seen_m
     series = [
         Series(f"clearance {joint}", "mm", 1.0e3 * values, _colour(k))
-        for k, (joint, values) in enumerate(summary.history.seen_m.items())
+        for k, (joint, values) in enumerate(seen_m.items())
     ]
-    if limits:
-        series.append(_limit("limit", "mm", 1.0e3 * min(limits), series[0].values))
+    limits = {joint: 1.0e3 * each.limit_m for joint, each in summary.clearances.items() if joint in seen_m}
+    is_common = len(set(limits.values())) == 1
+    for joint, limit in list(limits.items())[: 1 if is_common else None]:
+        series.append(_limit("limit" if is_common else f"limit {joint}", "mm", limit, series[0].values))
     caption = (
         "Mean radial clearance of each joint as encoders or the drive torque show it, whatever is "
         "counted; nothing is drawn while they show none."
@@ -157,14 +160,18 @@ def health_chart(summary: ReplaySummary) -> Chart:
 
 
 def alarm_chart(summary: ReplaySummary, changes: Sequence[AlarmChange]) -> Chart:
-    """Level of each alarm that was ever raised; the first of a change holds until the next one."""
-    begin, end = summary.recording.begin_ns, summary.recording.end_ns
+    """Level of each alarm that was ever raised: OK at first, and each change holds until the next one."""
+    begin, end, left = summary.recording.begin_ns, summary.recording.end_ns, len(changes) - _MOST_CHANGES
+    if left > 0:
+        changes, end = changes[:_MOST_CHANGES], changes[_MOST_CHANGES].stamp_ns
     stamps = sorted({begin, end, *(change.stamp_ns for change in changes)})
     names = dict.fromkeys(change.alarm.name for change in changes)
     series = [Series(name, "", _levels(stamps, changes, name), "--careful", "steps") for name in names]
     height, lanes = 80 + 34 * len(series), ("OK", "WARN", "ERROR")
     panels = [Panel("Alarms", series, height=height, lanes=lanes)]
     caption = "Level of each alarm over time: 0 is OK, 1 WARN, 2 ERROR."
+    if left > 0:
+        caption += f" The first {_MOST_CHANGES} changes; {left} later ones are not drawn."
     return _over_time(summary, "alarms", "Levels of alarms", caption, panels, np.array(stamps, np.int64))
 
 

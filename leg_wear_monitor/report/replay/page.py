@@ -50,7 +50,6 @@ from leg_wear_monitor.state import AlarmChange, Figure, LegAlarm, Level
 
 
 MOST_ROWS = 50
-_MOST_DRAWN = 1000  # changes in the chart
 _FIGURES = {
     "impact_force": Figure.IMPACT_FORCES,
     "clearance": Figure.CLEARANCES,
@@ -103,7 +102,7 @@ def change_section(summary: ReplaySummary) -> Section:
         rows=[_row(summary, change) for change in changes[:MOST_ROWS]],
         note=f"{more} more are in summary.json." if more > 0 else "",
     )
-    return Section(title, [alarm_chart(summary, changes[:_MOST_DRAWN]), table], is_folded=True)
+    return Section(title, [alarm_chart(summary, changes), table], is_folded=True)
 
 
 def _row(summary: ReplaySummary, change: AlarmChange) -> tuple[str, ...]:

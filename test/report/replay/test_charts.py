@@ -8,6 +8,7 @@ from made_up_summary import made_up_summary
 from leg_wear_monitor.monitor.angle_regression import ClearanceObservation
 from leg_wear_monitor.playback.result import EncoderEvidence
 from leg_wear_monitor.report.replay.charts import (
+    alarm_chart,
     clearance_section,
     clearance_sentences,
     encoder_sections,
@@ -96,3 +97,33 @@ def test_what_the_verdict_does_not_believe_is_said_and_not_drawn():
 
 def test_a_joint_of_which_nothing_is_known_has_no_chart():
     assert joint_trends(over_time(), "Z") == []
+
+
+def test_each_joint_has_its_own_limit_where_they_differ():
+    """Seen before: the least of all limits was drawn for each of them."""
+    summary = made_up_summary()
+    clearances = {
+        name: attrs.evolve(one, limit_m=limit_m)
+        for (name, one), limit_m in zip(summary.clearances.items(), (5e-4, 6e-4), strict=True)
+    }
+    seen_m = dict.fromkeys(clearances, np.full(len(summary.history.stamp_ns), 4e-4))
+    history = attrs.evolve(summary.history, seen_m=seen_m)
+
+    def limits(of):
+        state = attrs.evolve(summary, history=history, **of)
+        (chart,) = (one for one in clearance_section(state).parts if getattr(one, "name", "") == "estimates")
+        return {one.name: one.values[0] for one in chart.panels[0].series if one.name.startswith("limit")}
+
+    assert limits({"clearances": clearances}) == {"limit A": 0.5, "limit B": 0.6}
+    alike = {name: attrs.evolve(one, limit_m=6e-4) for name, one in clearances.items()}
+    assert limits({"clearances": alike}) == {"limit": 0.6}
+
+
+def test_changes_of_alarms_that_are_not_drawn_are_told():
+    summary = made_up_summary()
+    (first, *_) = summary.alarms.changes
+    changes = [attrs.evolve(first, stamp_ns=summary.recording.begin_ns + i) for i in range(1005)]
+    chart = alarm_chart(summary, changes)
+    assert "5 later ones are not drawn" in chart.caption
+    assert len(chart.panels[0].series[0].values) == 1001  # up to the first that is left out
+    assert "not drawn" not in alarm_chart(summary, changes[:1000]).caption

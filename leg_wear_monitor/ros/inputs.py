@@ -1,4 +1,4 @@
-"""Inputs of the node: subscriptions, what waits in them, names and axes that do not fit."""
+"""Inputs of the node: subscriptions, the queue of messages, checks of joint names and of the torque axis."""
 
 import itertools
 import struct
@@ -37,7 +37,7 @@ TAKEN_BYTES = 8 * 2**20
 class Arrival(NamedTuple):
     """A received message: stream code, time of arrival [ns], serialized bytes."""
 
-    kind: int
+    code: int
     log_time_ns: int
     raw: bytes
 
@@ -72,8 +72,8 @@ class Inbox:
     def __len__(self) -> int:
         return len(self._waiting)
 
-    def add(self, kind: int, raw: bytes, now_ns: int) -> None:
-        """Add a message.
+    def add(self, code: int, raw: bytes, now_ns: int) -> None:
+        """Add a message of a stream that arrived at a time [ns] of the wall clock.
 
         Log times strictly increase. A recording that is read in the order of log time thus keeps the order
         of arrival.
@@ -86,7 +86,7 @@ class Inbox:
                 return
             while len(self._waiting) >= self._limit or self._bytes + len(raw) > self._limit_bytes:
                 self._drop((len(self._waiting) + 1) // 2)
-            self._waiting.append(Arrival(kind, self._last_ns, raw))
+            self._waiting.append(Arrival(code, self._last_ns, raw))
             self._bytes += len(raw)
 
     def _drop(self, number: int) -> None:
@@ -111,7 +111,7 @@ class Inbox:
     def decoded(self, arrivals: list[Arrival]) -> Samples:
         """Decode messages to samples in the same order."""
         messages = np.zeros(len(arrivals), MESSAGE)
-        messages["type"] = [arrival.kind for arrival in arrivals]
+        messages["type"] = [arrival.code for arrival in arrivals]
         messages["log_time_ns"] = messages["publish_time_ns"] = [one.log_time_ns for one in arrivals]
         messages["end"] = np.cumsum([len(arrival.raw) for arrival in arrivals])
         messages["begin"][1:] = messages["end"][:-1]
@@ -146,7 +146,7 @@ class CrankNames:
 
     def note(self, arrivals: Sequence[Arrival], samples: Samples, now_ns: int) -> None:
         """Record messages and the samples decoded from them, at a time [ns] of the monotonic clock."""
-        joint_states = np.array([one.kind == JOINT_STATE for one in arrivals], bool)
+        joint_states = np.array([one.code == JOINT_STATE for one in arrivals], bool)
         unnamed = np.flatnonzero(joint_states & (samples["fault"] == MISSING_JOINT))
         for i in unnamed.tolist()[-_UNNAMED_OF_A_BLOCK:]:
             names = _names(arrivals[i].raw)
@@ -160,7 +160,10 @@ class CrankNames:
         return sum(at_ns >= since_ns for at_ns in self._others.values())
 
     def report(self) -> str:
-        """Report that no message names the crank, and which joints they name; empty if one names it."""
+        """Report that no message since the last call named the crank, and which joints they named.
+
+        Empty if one named it; without any message, the report of the last call.
+        """
         named, unnamed = self._named, self._unnamed
         self._named, self._unnamed = 0, set()
         if named:
@@ -202,7 +205,7 @@ class InterfaceNames:
 
     def note(self, arrivals: Sequence[Arrival], samples: Samples) -> None:
         """Record messages and the samples decoded from them."""
-        of_interfaces = np.array([one.kind == INTERFACES for one in arrivals], bool)
+        of_interfaces = np.array([one.code == INTERFACES for one in arrivals], bool)
         without = np.flatnonzero(of_interfaces & is_without(samples, self._interfaces))
         if of_interfaces.any():
             self._without = arrivals[without[-1]].raw if len(without) else b""
@@ -307,8 +310,8 @@ def _listed(names: Iterable[str]) -> str:
 # Subscriptions of the monitor: serialized messages, and the middleware's events about them.
 
 
-# messages until the node takes them: Fast DDS holds 5000 of them by default, five seconds at 1 kHz, and tells
-# how many more were lost; with a depth below that it would not tell
+# of a subscription's queue: Fast DDS holds 5000 messages by default, five seconds at 1 kHz, and reports the
+# others as lost; with a smaller depth it would drop them without a word
 DEPTH = 10_000
 BEST_EFFORT = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
 
@@ -371,7 +374,7 @@ class Inputs:
     ----------
     topics : tuple of InputTopic
     subscriptions : tuple of Subscription
-        Those of the topics, which no executor may serve.
+        Those of the topics. No executor may serve them: messages are taken from rclpy's own handles.
     """
 
     def __init__(self, node: Node, config: MonitorConfig) -> None:
@@ -382,6 +385,8 @@ class Inputs:
     def taken(self, now_ns: int) -> list[Arrival]:
         """Messages that have come since the last call, in the order of their arrival.
 
+        The caller holds the inbox's lock until it has added them: a thread may take messages, too.
+
         Parameters
         ----------
         now_ns : int
@@ -389,9 +394,9 @@ class Inputs:
         """
         found = []
         for topic, subscription in zip(self.topics, self.subscriptions, strict=True):
-            code, kind, handle = topic.stream.code, subscription.msg_type, subscription.handle
+            code, message_type, handle = topic.stream.code, subscription.msg_type, subscription.handle
             with handle:
-                while (message := handle.take_message(kind, True)) is not None:
+                while (message := handle.take_message(message_type, True)) is not None:  # serialized
                     raw, info = message
                     found.append(Arrival(code, info["received_timestamp"] or now_ns, raw))
         return sorted(found, key=attrgetter("log_time_ns"))
@@ -401,13 +406,13 @@ def _subscribe(node: Node, topic: InputTopic) -> Subscription:
     def lost(event: Any) -> None:
         topic.lost += event.total_count_change
 
-    def come(_raw: Any) -> None:
+    def must_not_be_called(_raw: Any) -> None:
         raise RuntimeError(f"an executor takes messages of {topic.name}")
 
     subscription = node.create_subscription(
         message_class(topic.stream.type),
         topic.stream.topic,
-        come,
+        must_not_be_called,
         BEST_EFFORT,
         raw=True,
         event_callbacks=SubscriptionEventCallbacks(message_lost=lost),
@@ -449,7 +454,7 @@ class WrenchAxis:
         wrenches = [
             one.raw
             for one, fault in zip(arrivals, samples["fault"], strict=True)
-            if one.kind == WRENCH_STAMPED and fault == NO_FAULT
+            if one.code == WRENCH_STAMPED and fault == NO_FAULT
         ]
         for raw in wrenches[-_OF_A_BLOCK:]:
             self._torques.append(_TORQUE[raw[1] & 1].unpack_from(raw, len(raw) - _TORQUE[0].size))

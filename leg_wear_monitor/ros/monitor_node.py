@@ -305,8 +305,8 @@ class MonitorNode(ClosingNode):
         with self._inbox.lock:
             arrivals = inputs.taken(time.time_ns())
             for one in arrivals:
-                self._inbox.add(one.kind, one.raw, one.log_time_ns)
-        last, now_ns = {one.kind: one for one in arrivals}, time.monotonic_ns()
+                self._inbox.add(one.code, one.raw, one.log_time_ns)
+        last, now_ns = {one.code: one for one in arrivals}, time.monotonic_ns()
         for topic in inputs.topics:
             if topic.stream.code in last:
                 newest = last[topic.stream.code]
@@ -326,7 +326,7 @@ class MonitorNode(ClosingNode):
         if self._black_box.takes_inputs:
             names = {topic.stream.code: topic.name for topic in self._supervision.inputs}
             for arrival in arrivals:
-                self._black_box.write(names[arrival.kind], arrival.log_time_ns, arrival.raw)
+                self._black_box.write(names[arrival.code], arrival.log_time_ns, arrival.raw)
         samples = self._inbox.decoded(arrivals)
         self._epochs.check(samples)
         self._monitor.note_late(self._load.is_late(time.monotonic_ns()))

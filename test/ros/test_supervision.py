@@ -15,7 +15,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
 from rcl_interfaces.msg import Log
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, qos_profile_sensor_data
+from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
@@ -290,7 +290,8 @@ def test_what_is_missing_because_the_node_was_late_is_no_fault_of_the_sender(
     stage, walk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The middleware keeps the newest messages only; a node that was late had an alarm of their rate."""
-    monkeypatch.setattr(inputs, "DEPTH", 20)
+    few = QoSProfile(depth=20, reliability=ReliabilityPolicy.BEST_EFFORT)
+    monkeypatch.setattr(inputs, "BEST_EFFORT", few)
     monitor, legs = stage.monitor(diagnostics__period_s=0.1), stage.legs()
     alarms = stage.listen(f"{ME}/alarms", DiagnosticArray)
     diagnostics = stage.listen("/diagnostics", DiagnosticArray)
@@ -453,7 +454,7 @@ def test_inputs_are_taken_at_once_in_the_order_and_with_the_times_of_their_arriv
             publisher.publish(message)  # within a process, it has arrived when this returns
     after_ns = time.time_ns()
     stage.wait_for(lambda: len(taken.extend(inputs.taken(0)) or taken) == 10, "all messages")
-    assert [one.kind for one in taken] == [JOINT_STATE, WRENCH_STAMPED] * 5
+    assert [one.code for one in taken] == [JOINT_STATE, WRENCH_STAMPED] * 5
     times = [one.log_time_ns for one in taken]
     assert times == sorted(times) and before_ns < times[0] < times[-1] < after_ns
     assert inputs.taken(0) == []

@@ -27,7 +27,7 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
 
 MEMBERS = 1021
 _MULTIPLIER = 333
-_TURN = 631  # shifts each dimension by another amount, so that no member lies in a corner of all of them
+_SHIFT = 631  # moves each dimension by another amount, so that no member lies in a corner of all of them
 
 
 @cache
@@ -39,7 +39,9 @@ def even_fractions(dimensions: int) -> Floats:
     are at most 1/15 apart, where 1/34 is the least that could be; of 32 dimensions 1/6 (see the test).
     """
     member = np.arange(MEMBERS)
-    rows = [(member * pow(_MULTIPLIER, axis, MEMBERS) + axis * _TURN) % MEMBERS for axis in range(dimensions)]
+    rows = [
+        (member * pow(_MULTIPLIER, axis, MEMBERS) + axis * _SHIFT) % MEMBERS for axis in range(dimensions)
+    ]
     fractions = (np.array(rows) + 0.5) / MEMBERS
     fractions.flags.writeable = False
     return fractions
@@ -47,7 +49,7 @@ def even_fractions(dimensions: int) -> Floats:
 
 @cache
 def even_normals(dimensions: int) -> Floats:
-    """The same as standard normal numbers."""
+    """The same lattice as standard normal numbers."""
     inverse = np.array([NormalDist().inv_cdf((i + 0.5) / MEMBERS) for i in range(MEMBERS)])
     normals = inverse[np.floor(even_fractions(dimensions) * MEMBERS).astype(int)]
     normals.flags.writeable = False
@@ -88,18 +90,18 @@ class SimulatedLife:
 
 @attrs.frozen(eq=False)
 class GrowthLaw:
-    """Growth over all clearances, relative to that of the same leg at others.
+    """Growth of each joint as a function of all clearances, relative to that at `fresh_m`.
 
     Attributes
     ----------
     coupling : (k, k) array
         B: of ln growth of the row's joint over ln clearance of the column's.
     fresh_m, widest_m : (k,) arrays
-        Clearances when new, and the largest that lives have seen: beyond both, growth stays as it is there.
+        Clearances when new, and the largest of the fitted lives: a clearance outside counts as the nearest.
     sigma : (k,) array
-        Standard deviation of what ln growth is off.
+        Standard deviation of the error of ln growth.
     lives : int
-        It was fitted to.
+        Number of simulated lives that it was fitted to.
     """
 
     coupling: Floats
@@ -109,7 +111,7 @@ class GrowthLaw:
     lives: int = 0
 
     def log_growth(self, clearance_m: Floats) -> Floats:
-        """Logarithm of growth (k, n) at clearances (k, n), but for a_k."""
+        """Logarithm of growth (k, n) at clearances (k, n) over that at `fresh_m`: without a_k."""
         in_range = np.clip(clearance_m, self.fresh_m[:, None], self.widest_m[:, None])
         return np.asarray(self.coupling @ np.log(in_range / self.fresh_m[:, None]))
 
@@ -342,13 +344,13 @@ class JointCondition:
     fresh_m, wear_m, limit_m : float
         Clearance when new, wear since, and limit of the mean clearance.
     wear_sigma_m : float
-        Standard deviation of the wear, because not all gait cycles were followed.
+        Standard deviation of `wear_m` where not all gait cycles were followed.
     growth_m : float or None
-        A cycle; None while there is not enough data.
+        Of the mean clearance in a gait cycle; None while there is not enough data.
     growth_error_m : float
-        Uncertainty of this mean because cycles scatter, and because of the load, which was found for them.
-        What the model is off is the same in all cycles of a leg: it is in the factor of the wear coefficient,
-        which a measured clearance corrects.
+        Standard error of `growth_m`, by the scatter of cycles and the uncertainty of an estimated load. The
+        error of the model is not in it: it is the same in all cycles of a leg, and belongs to the factor of
+        the wear coefficient, which a measured clearance corrects.
     has_coefficient : bool
         Whether its wear coefficient is above 0; without one no wear is counted.
     """

@@ -191,7 +191,7 @@ SOURCES = {
 
 
 def believed_words(one: JointClearance) -> str:
-    """The believed clearance, such as ``1.66 mm ± 0.403 mm according to the drive torque``; empty if none."""
+    """The believed clearance, such as ``1.66 mm ± 0.4 mm according to the drive torque``; empty if none."""
     if one.believed_m is None or one.believed_by is None:
         return ""
     value = amount(one.believed_m, "m")

@@ -299,15 +299,11 @@ class TorqueObserver(KeepsSamples):
     @property
     def parameters(self) -> LegParameters | None:
         """Identified masses, lengths and friction that explain the drive torque; None without any."""
-        state = self.state
-        if (
-            state.parameters is None
-            or state.reference is None
-            or state.reference.parameters != state.parameters
-        ):
+        own, reference = self.state.parameters, self.state.reference
+        if own is None or reference is None or reference.parameters != own:
             return None
-        is_near = self.models.fits if state.parameters.load.size else self.models.is_of_file
-        return state.parameters if is_near(state) else None
+        is_near = self.models.fits if own.load.size else self.models.is_of_file
+        return own if is_near(self.state) else None
 
     @property
     def simulated_references(self) -> tuple[TorqueReference, ...]:
@@ -463,8 +459,8 @@ class TorqueObserver(KeepsSamples):
         state = self.state
         state.counted_m = np.asarray(counted_m, float).copy()
         state.forget_cycles()
-        state.detector, state.changes, state.has_failed, state.carried_n = None, (), False, ()
-        state.least_m = ()
+        state.detector, state.has_failed = None, False
+        state.changes, state.carried_n, state.least_m = (), (), ()
 
     def _follow_load(self) -> None:
         """Commission the leg anew where it carries another load than that of its reference.

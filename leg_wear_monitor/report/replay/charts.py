@@ -169,9 +169,8 @@ def alarm_chart(summary: ReplaySummary, changes: Sequence[AlarmChange]) -> Chart
     series = [Series(name, "", _levels(stamps, changes, name), "--careful", "steps") for name in names]
     height, lanes = 80 + 34 * len(series), ("OK", "WARN", "ERROR")
     panels = [Panel("Alarms", series, height=height, lanes=lanes)]
-    caption = "Level of each alarm over time: 0 is OK, 1 WARN, 2 ERROR."
-    if left > 0:
-        caption += f" The first {_MOST_CHANGES} changes; {left} later ones are not drawn."
+    cut = f" The first {_MOST_CHANGES} changes; {left} later ones are not drawn." if left > 0 else ""
+    caption = f"Level of each alarm over time: 0 is OK, 1 WARN, 2 ERROR.{cut}"
     return _over_time(summary, "alarms", "Levels of alarms", caption, panels, np.array(stamps, np.int64))
 
 

@@ -282,7 +282,8 @@ def _refusal(publisher: TopicEndpointInfo, expected: str, qos: QoSProfile) -> st
     compatibility, why = qos_check_compatible(publisher.qos_profile, qos)
     if compatibility != QoSCompatibility.ERROR:
         return ""
-    return f"has a lower quality of service than this node requests ({why.strip(' ;')}); see qos_overrides"
+    reason = why.removeprefix("ERROR:").strip(" ;")
+    return f"has a lower quality of service than this node requests ({reason}); see qos_overrides"
 
 
 def _full_name(info: object) -> str:
@@ -313,7 +314,11 @@ def _listed(names: Iterable[str]) -> str:
 # of a subscription's queue: Fast DDS holds 5000 messages by default, five seconds at 1 kHz, and reports the
 # others as lost; with a smaller depth it would drop them without a word
 DEPTH = 10_000
-BEST_EFFORT = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+def _best_effort() -> QoSProfile:
+    """Of a subscription before its overrides, which rclpy writes into the profile itself."""
+    return QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 @attrs.define
@@ -356,7 +361,7 @@ class InputTopic:
     without_crank: str = ""
     other_axis: str = ""
     shared: int = 0
-    qos: QoSProfile = BEST_EFFORT
+    qos: QoSProfile = attrs.field(factory=_best_effort)
 
 
 class Inputs:
@@ -409,17 +414,15 @@ def _subscribe(node: Node, topic: InputTopic) -> Subscription:
     def must_not_be_called(_raw: Any) -> None:
         raise RuntimeError(f"an executor takes messages of {topic.name}")
 
-    subscription = node.create_subscription(
+    return node.create_subscription(
         message_class(topic.stream.type),
         topic.stream.topic,
         must_not_be_called,
-        BEST_EFFORT,
+        topic.qos,  # with the overrides of parameters from here on
         raw=True,
         event_callbacks=SubscriptionEventCallbacks(message_lost=lost),
         qos_overriding_options=QoSOverridingOptions.with_default_policies(),
     )
-    topic.qos = subscription.qos_profile  # as overridden by parameters
-    return subscription
 
 
 # Check that the drive's torque is on the axis that is read; otherwise report the axis that carries one.

@@ -96,10 +96,12 @@ def test_a_publisher_that_does_not_fit_is_told_of(stage, walk) -> None:
     stage.legs(reliable=False)
 
     def told() -> bool:
-        return any("reliability" in line.message for message in heard for line in message.status)
+        why = "/joint_states: /stage has a lower quality of service than this node requests (Best effort pub"
+        return any(why in line.message for message in heard for line in message.status)
 
     stage.wait_for(told, "a line about reliability")
     assert levels(heard[-1])["topics"] == 2
+    assert not any("/drive_torque: /stage has" in line.message for line in heard[-1].status)  # it fits
     assert monitor.received == 0
 
 

@@ -15,7 +15,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
 from rcl_interfaces.msg import Log
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
+from rclpy.qos import QoSProfile, qos_profile_sensor_data
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
@@ -290,8 +290,7 @@ def test_what_is_missing_because_the_node_was_late_is_no_fault_of_the_sender(
     stage, walk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The middleware keeps the newest messages only; a node that was late had an alarm of their rate."""
-    few = QoSProfile(depth=20, reliability=ReliabilityPolicy.BEST_EFFORT)
-    monkeypatch.setattr(inputs, "BEST_EFFORT", few)
+    monkeypatch.setattr(inputs, "DEPTH", 20)
     monitor, legs = stage.monitor(diagnostics__period_s=0.1), stage.legs()
     alarms = stage.listen(f"{ME}/alarms", DiagnosticArray)
     diagnostics = stage.listen("/diagnostics", DiagnosticArray)

@@ -31,11 +31,8 @@ from leg_wear_monitor.messages.cdr import MESSAGE
 _COLUMNS = {
     "topics": {"id", "name", "type", "serialization_format"},
     "messages": {"id", "topic_id", "timestamp", "data"},
-    "message_definitions": {
-        "topic_type",
-        "encoding",
-        "encoded_message_definition",
-    },  # may be missing as a whole
+    # as a whole, this one may be missing
+    "message_definitions": {"topic_type", "encoding", "encoded_message_definition"},
 }
 _JOURNALS = ("-wal", "-journal")  # endings of the files of transactions that were not written back
 _LEAST_ROW_LIMIT = 2**25  # bytes; a longer row needs a larger --memory-mb

@@ -36,9 +36,9 @@ _LEAST_CYCLES_UNLIKE = 6  # where the leg is not that of its reference: two stra
 _FIT_EVERY = 10  # gait cycles, but for the first ones of a change
 
 # times the detector's threshold (both are natural logarithms of odds), from which on it hardly matters that
-# the first cycles of a change were selected by their detection. Four
-# cycles of J at 0.55 mm under 300 N gave 1.03 ± 0.17 mm at 2.1 times the threshold; G at 2 mm has 94, and G
-# and I at 0.6 mm, whose sizes are right from the third cycle on, 3 to 7 (2026-11-26)
+# the first cycles of a change were selected by their detection. Four cycles of J at 0.55 mm under 300 N gave
+# 1.03 ± 0.17 mm at 2.1 times the threshold; G at 2 mm has 94, and G and I at 0.6 mm, whose sizes are right
+# from the fourth cycle on, 3 to 7 (2026-11-26)
 _FAR_BEYOND = 4.0
 
 # mean square up to which a leg that was never commissioned fits: 0.4 to 0.9 for legs with masses 4 % off and
@@ -193,10 +193,8 @@ class Evidence:
         """
         if state.fit is None:
             return
-        least_m, number = (
-            state.fit.clearance_m - SURE_SIGMAS * state.fit.sigma_m,
-            config.alarms.on_delay_cycles,
-        )
+        number = config.alarms.on_delay_cycles
+        least_m = state.fit.clearance_m - SURE_SIGMAS * state.fit.sigma_m
         is_enough = state.fit_cycles >= SETTLING_CYCLES
         if change is not None and change.cause is Cause.CLEARANCE:
             k = self._models.explainer(state).joints.index(change.subject)

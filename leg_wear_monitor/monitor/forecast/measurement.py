@@ -7,6 +7,7 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.estimate.cause import SURE_SIGMAS
 from leg_wear_monitor.mechanism.arrays import Floats, body_names
 from leg_wear_monitor.mechanism.person import GROUND_LOAD, heavier_person, with_toe_force
 from leg_wear_monitor.mechanism.plausible import measured_fault, sigma_fault
@@ -73,7 +74,6 @@ CONTRADICTION = "this contradicts the model"
 AGREES = "this agrees with what"
 AT_LIMIT = "the measured clearance is at its limit"
 
-_SURE_SIGMAS = 2.0  # of a measurement and an estimate that still agree
 _SAYS_SOMETHING = 0.9  # of the spread before: what is left after a measurement that says something
 
 
@@ -112,7 +112,7 @@ class MeasurementResult:
     def agrees(self) -> bool:
         """Whether the measurement is what encoders or the drive torque showed."""
         sigma_m = math.hypot(self.measurement.sigma_m, self.shown_sigma_m)
-        return abs(self.measurement.clearance_m - self.shown_m) <= _SURE_SIGMAS * sigma_m  # not with NaN
+        return abs(self.measurement.clearance_m - self.shown_m) <= SURE_SIGMAS * sigma_m  # not with NaN
 
     def _compared(self, limit_m: float) -> list[str]:
         """The measurement against what encoders or the drive torque showed."""
@@ -122,7 +122,7 @@ class MeasurementResult:
         if self.agrees:
             return [f"{AGREES} {self.shown_by} shows, {shown}"]
         line = f"{self.shown_by} showed {shown}, and this measurement contradicts it"
-        if now.clearance_m + _SURE_SIGMAS * now.sigma_m < limit_m <= self.shown_m:
+        if now.clearance_m + SURE_SIGMAS * now.sigma_m < limit_m <= self.shown_m:
             line += f": the alarm clearance {now.joint} is acknowledged with it"
         return [line]
 

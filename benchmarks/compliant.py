@@ -20,9 +20,9 @@ from diagnosis import bodies_of, explained, kept, measured, named, rounds_of
 from disturbed import MASSES, NEW, NOISE_NM, walked
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.estimate.channel import leg_behind_coupling
+from leg_wear_monitor.estimate.change_detector import ChangeDetector
+from leg_wear_monitor.estimate.coupling import leg_behind_coupling
 from leg_wear_monitor.estimate.explanations import Explainer
-from leg_wear_monitor.estimate.leg_model import ChangeDetector
 from leg_wear_monitor.estimate.signature import TorqueSensor
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
 from leg_wear_monitor.mechanism.spec import Mechanism, Track, TrackDrive

@@ -22,7 +22,9 @@ from diagnosis import NEW, kept
 from leg_wear_monitor import MonitorConfig, load_mechanism
 from leg_wear_monitor.commissioning.detection import OPENED, SOON, Walk, joint_detections
 from leg_wear_monitor.estimate.cause import Cause
-from leg_wear_monitor.estimate.leg_model import ChangeDetector, change_of, explainer_of
+from leg_wear_monitor.estimate.change_detector import ChangeDetector
+from leg_wear_monitor.estimate.explanations import change_of
+from leg_wear_monitor.estimate.leg_model import explainer_of
 from leg_wear_monitor.estimate.signature import TorqueSensor
 from leg_wear_monitor.mechanism.position import TURN, build_linkage
 from leg_wear_monitor.monitor.config.fitting import fitted

@@ -36,8 +36,9 @@ from diagnosis import (
 )
 
 from leg_wear_monitor import load_mechanism
+from leg_wear_monitor.estimate.change_detector import ChangeDetector
 from leg_wear_monitor.estimate.explanations import Explainer
-from leg_wear_monitor.estimate.leg_model import ChangeDetector, misfit
+from leg_wear_monitor.estimate.identification import misfit
 from leg_wear_monitor.estimate.signature import TorqueSensor
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle, point_motion
 from leg_wear_monitor.mechanism.spec import Mechanism, PhaseLoad

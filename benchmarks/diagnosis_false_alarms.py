@@ -18,7 +18,8 @@ from diagnosis_conditions import known_reference
 from numba import njit
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.estimate.leg_model import ChangeDetector, DetectorState, explainer_of
+from leg_wear_monitor.estimate.change_detector import ChangeDetector, DetectorState
+from leg_wear_monitor.estimate.leg_model import explainer_of
 from leg_wear_monitor.estimate.signature import CommissionedTorque, TorqueSensor
 from leg_wear_monitor.mechanism.position import TURN, build_linkage
 from leg_wear_monitor.monitor.diagnosis.references import LegModels

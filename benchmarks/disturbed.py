@@ -24,7 +24,7 @@ from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.dynamics.full_run import FullRun
 from leg_wear_monitor.dynamics.run import TORQUE, new_run_statistics, quintic
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.estimate import leg_model
+from leg_wear_monitor.estimate import identification
 from leg_wear_monitor.estimate.signature import TorqueSensor, signatures
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle, point_motion
 from leg_wear_monitor.mechanism.spec import Mechanism, PhaseLoad
@@ -210,7 +210,7 @@ def main() -> None:
     parser.add_argument("--keep", type=Path)
     parser.add_argument("--cycles", type=int, default=7200)
     options = parser.parse_args()
-    references.ROUNDS, leg_model.UNLIKE_FILE = 0, references.NAMED_TO
+    references.ROUNDS, identification.UNLIKE_FILE = 0, references.NAMED_TO
     leg = load_mechanism("bionic_leg")
     mass = np.array([MASSES.get(body, 1.0) for body in leg.bodies])
     real = LegParameters(mass, np.ones(len(mass))).applied(leg)

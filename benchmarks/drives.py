@@ -24,7 +24,7 @@ from diagnosis import NEW, RATE, kept
 from disturbed import COMMISSIONED, HEALTHY, MASSES, WORN, drawn, signed, walked, watched
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.estimate import leg_model
+from leg_wear_monitor.estimate import identification
 from leg_wear_monitor.estimate.signature import TorqueSensor
 from leg_wear_monitor.mechanism.position import TURN, build_linkage
 from leg_wear_monitor.monitor.diagnosis import references
@@ -142,7 +142,7 @@ def main() -> None:
     parser.add_argument("--as-of-file", action="store_true", help="do not identify, correct as if it were")
     options = parser.parse_args()
     if options.as_of_file:
-        references.ROUNDS, leg_model.UNLIKE_FILE = 0, references.NAMED_TO
+        references.ROUNDS, identification.UNLIKE_FILE = 0, references.NAMED_TO
     leg = load_mechanism("bionic_leg")
     mass = np.array([MASSES.get(body, 1.0) for body in leg.bodies])
     real = LegParameters(mass, np.ones(len(mass))).applied(leg)

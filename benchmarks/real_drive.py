@@ -36,7 +36,7 @@ from real_robot import FOLDER as ROBOT
 from real_robot import print_tables
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.estimate import leg_model
+from leg_wear_monitor.estimate import identification
 from leg_wear_monitor.mechanism.position import TURN, build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -197,7 +197,7 @@ def main() -> None:
     parser.add_argument("--as-of-file", action="store_true", help="do not identify, correct as if it were")
     options = parser.parse_args()
     if options.as_of_file:
-        references.ROUNDS, leg_model.UNLIKE_FILE = 0, references.NAMED_TO
+        references.ROUNDS, identification.UNLIKE_FILE = 0, references.NAMED_TO
     found, leg = motors(options.folder), load_mechanism("bionic_leg")
     print_tables(options.folder / ROBOT)
     mass = np.array([MASSES.get(body, 1.0) for body in leg.bodies])

@@ -32,9 +32,9 @@ import one_core  # noqa: F401, before numpy
 import numpy as np
 
 from leg_wear_monitor.estimate.cause import Cause, Change
-from leg_wear_monitor.estimate.explanations import Explainer, Nuisance
-from leg_wear_monitor.estimate.ground_load import commissioned_baseline, with_scatter_of
-from leg_wear_monitor.estimate.leg_model import change_of, threshold
+from leg_wear_monitor.estimate.change_detector import threshold
+from leg_wear_monitor.estimate.explanations import Explainer, Nuisance, change_of
+from leg_wear_monitor.estimate.leg_model import commissioned_baseline, with_scatter_of
 from leg_wear_monitor.estimate.signature import (
     CommissionedTorque,
     PhaseMeans,

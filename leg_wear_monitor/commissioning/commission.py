@@ -31,16 +31,9 @@ from leg_wear_monitor.commissioning.result import CommissioningResult
 from leg_wear_monitor.commissioning.search import Choice, candidates, choose
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.estimate.cause import Cause, NamedCause
+from leg_wear_monitor.estimate.joint_motion import JointMotion, Series, motion_of, why_not_a_crank
 from leg_wear_monitor.estimate.torque_fit import Terms, fit, repeating
-from leg_wear_monitor.estimate.torque_model import (
-    JointMotion,
-    Series,
-    TorqueModel,
-    motion_of,
-    torque_model,
-    why_not_a_crank,
-    with_clearances,
-)
+from leg_wear_monitor.estimate.torque_model import TorqueModel, torque_model, with_clearances
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism

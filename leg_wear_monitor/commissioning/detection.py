@@ -16,8 +16,10 @@ from leg_wear_monitor.bags.reader import Recording
 from leg_wear_monitor.commissioning.result import CommissioningResult, JointDetection
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.estimate.cause import Cause
-from leg_wear_monitor.estimate.explanations import Explainer, opened
-from leg_wear_monitor.estimate.leg_model import ChangeDetector, change_of, explainer_of, misfit
+from leg_wear_monitor.estimate.change_detector import ChangeDetector
+from leg_wear_monitor.estimate.explanations import Explainer, change_of, opened
+from leg_wear_monitor.estimate.identification import misfit
+from leg_wear_monitor.estimate.leg_model import explainer_of
 from leg_wear_monitor.estimate.signature import (
     SAMPLES,
     CommissionedTorque,

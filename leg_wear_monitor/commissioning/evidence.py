@@ -8,12 +8,14 @@ import numpy as np
 from leg_wear_monitor.commissioning.detection import Walk
 from leg_wear_monitor.commissioning.result import CommissioningItem
 from leg_wear_monitor.errors import AssemblyError
-from leg_wear_monitor.estimate.channel import channel_of
-from leg_wear_monitor.estimate.explanations import body_torques, solved
-from leg_wear_monitor.estimate.ground_load import nuisances
-from leg_wear_monitor.estimate.signature import DriveFigures, with_noise_of
+from leg_wear_monitor.estimate.body_torques import body_torques
+from leg_wear_monitor.estimate.channel import DriveFigures, channel_of
+from leg_wear_monitor.estimate.joint_motion import Pair, is_steady, slow_speed
+from leg_wear_monitor.estimate.least_squares import solved
+from leg_wear_monitor.estimate.leg_model import nuisances
+from leg_wear_monitor.estimate.signature import with_noise_of
 from leg_wear_monitor.estimate.torque_fit import BINS, Fit, Terms, fit, repeating
-from leg_wear_monitor.estimate.torque_model import Pair, TorqueModel, is_steady, slow_speed
+from leg_wear_monitor.estimate.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism

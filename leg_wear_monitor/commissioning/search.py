@@ -8,16 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from leg_wear_monitor.bags.series import JointName, TorqueSource
-from leg_wear_monitor.estimate.torque_fit import Fit, fit, repeating, too_alike
-from leg_wear_monitor.estimate.torque_model import (
-    JointMotion,
-    Pair,
-    Series,
-    Start,
-    TorqueModel,
-    paired,
-    steady_stretch,
-)
+from leg_wear_monitor.estimate.joint_motion import JointMotion, Pair, Series, paired, steady_stretch
+from leg_wear_monitor.estimate.torque_fit import Fit, Start, fit, repeating, too_alike
+from leg_wear_monitor.estimate.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.inputs import EFFORT, INTERFACE

@@ -1,29 +1,14 @@
 """What may explain a change of the torque's signature: a clearance, or something else."""
 
-import functools
 import math
-from collections.abc import Callable, Sequence
-from typing import Generic, TypeVar
+from collections.abc import Sequence
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
-from leg_wear_monitor.estimate.cause import Cause, NamedCause
+from leg_wear_monitor.estimate.cause import SURE_LOG_ODDS, Cause, Change, NamedCause
 from leg_wear_monitor.estimate.signature import SignatureModel
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.constraints import applied_forces_at, closures_at
-from leg_wear_monitor.mechanism.position import (
-    TURN,
-    Linkage,
-    build_linkage,
-    drive_column,
-    gammas,
-    jacobians,
-    one_cycle,
-)
-from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.twin.reference import LegParameters
 
 # of what a clearance changes, and of an opening: legs with masses 4 % off show 10 to 27 % less (2026-11-23)
 MODEL_ERROR = 0.2
@@ -366,219 +351,31 @@ def _vertex(x: Floats, y: Floats, best: int) -> tuple[float, float]:
     return float(np.clip(place, x[i - 1], x[i + 1])), float((2.0 / bend) ** 0.5)
 
 
-# Damped Gauss-Newton for least squares, and by how much what was found scatters.
-#
-# A prior is a further row of the residual; a point that cannot be has an infinite residual.
+def change_of(explanations: Sequence[Explanation], since_ns: int) -> Change | None:
+    """The change that explanations, the best first, amount to; None where the leg may be as counted.
 
-
-_ROUNDS = 30
-_SHORTEST = 0.001  # fraction of a step that is tried last
-_LESS = 1.0e-9  # fraction by which the square has to become less
-_SMALL = 1.0e-9  # singular values, as a fraction of the largest, that count as none
-
-
-@attrs.frozen(eq=False)
-class Point:
-    """A model at some values of its parameters.
-
-    Attributes
-    ----------
-    rest : (m,) array
-        Residual in standard deviations.
-    slopes : callable
-        Its derivatives (m, k) by the parameters.
+    Of many causes one always explains a bit more than none.
     """
-
-    rest: Floats
-    slopes: Callable[[], Floats]
-
-    @property
-    def square(self) -> float:
-        """Sum of the squares of the residual."""
-        return float(self.rest @ self.rest)
-
-
-P = TypeVar("P", bound=Point)
-
-
-@attrs.frozen(eq=False)
-class Solution(Generic[P]):
-    """Values (k,) of the parameters with the least square, the model there, and its derivatives (m, k)."""
-
-    x: Floats
-    point: P
-    slopes: Floats
-
-    @property
-    def covariance(self) -> Floats:
-        """Covariance (k, k) of the parameters."""
-        return np.asarray(np.linalg.inv(self.slopes.T @ self.slopes))
-
-
-def gauss_newton(
-    model: Callable[[Floats], P],
-    start: Floats,
-    *,
-    low: Floats | float = -np.inf,
-    high: Floats | float = np.inf,
-    longest: Floats | float = np.inf,
-    done: Floats | float = 0.0,
-) -> Solution[P]:
-    """Least square near a start.
-
-    Parameters
-    ----------
-    model : callable
-        The model at values (k,) of its parameters.
-    start, low, high : (k,) arrays
-        Where to begin, and bounds.
-    longest, done : (k,) arrays
-        Largest step of each parameter, and the one below which the step was the last.
-    """
-    x = np.clip(start, low, high)
-    point = model(x)
-    slopes = point.slopes()
-    for _ in range(_ROUNDS):
-        step = solved(slopes, -point.rest)
-        gain = slopes @ step
-        if float(gain @ gain) < _LESS * point.square:  # by so much the square would become less
-            break
-        step /= max(1.0, float(np.max(np.abs(step) / longest)))
-        length, moved = 1.0, np.clip(x + step, low, high)
-        while not (there := model(moved)).square < (1.0 - _LESS) * point.square:
-            length *= 0.5
-            if length <= _SHORTEST or np.all(length * np.abs(step) < done):
-                return Solution(x, point, slopes)
-            moved = np.clip(x + length * step, low, high)
-        x, point, slopes = moved, there, there.slopes()
-        if np.all(length * np.abs(step) < done):
-            break
-    return Solution(x, point, slopes)
-
-
-def solved(columns: Floats, values: Floats) -> Floats:
-    """Coefficients (k,) of columns (m, k), which may be of very different size, for values (m,).
-
-    With values (m, n) coefficients (k, n).
-    """
-    size = np.linalg.norm(columns, axis=0)
-    size[size < _SMALL * max(float(size.max()), _SMALL)] = np.inf
-    found = np.linalg.lstsq(columns / size, values, rcond=_SMALL)[0]
-    return np.asarray((found.T / size).T)
-
-
-def jackknife(estimate: Callable[[NDArray[np.bool_]], Floats], number: int, parts: int) -> Floats:
-    """Standard deviations of an estimate from some of the data, each of some parts left out in turn.
-
-    Parameters
-    ----------
-    estimate : callable
-        Estimate from the data that are chosen (number,).
-    number, parts : int
-        Number of data, and of parts of neighbours.
-    """
-    part = np.arange(number) * parts // max(number, 1)
-    found = np.array([estimate(part != i) for i in range(parts)])
-    return np.asarray(np.sqrt((parts - 1) * found.var(axis=0)))
-
-
-# Drive torque of ideal joints at any motion of the crank, and what masses and lengths change of it.
-
-
-_POINTS = 240  # of a gait cycle: three in each of 80 phases
-_LONGER = 0.002  # step of the difference by a body's length
-_NEWTON_ROUNDS = 4  # of Newton's method: from lengths that are 0.2 % off, the third is at rounding
-
-
-@attrs.frozen(eq=False)
-class BodyTorques:
-    """Coefficients of the drive torque at equal steps of the crank angle from 0.
-
-    They are those of 1, of the crank's speed, of its square, and of its acceleration.
-
-    Attributes
-    ----------
-    own : (4, points) array
-        Of the whole leg.
-    mass, length : (bodies, 4, points) arrays
-        Derivatives by factors on bodies, in the order of the mechanism's file; a mass with its inertia.
-    """
-
-    own: Floats
-    mass: Floats
-    length: Floats
-
-    def at(self, speed: float) -> tuple[Floats, Floats]:
-        """Derivatives (bodies, points) by masses and by lengths [N m], at a crank speed [rad/s]."""
-        return at_speed(self.mass, speed), at_speed(self.length, speed)
-
-
-def at_speed(coefficients: Floats, speed: float) -> Floats:
-    """Torques (..., points) [N m] of coefficients (..., 4, points), at a constant crank speed [rad/s]."""
-    return np.asarray(np.array([1.0, speed, speed**2, 0.0]) @ coefficients)
-
-
-def body_torques(mechanism: Mechanism) -> BodyTorques:
-    """Drive torque of a mechanism and its derivatives; computed once for each mechanism."""
-    return _computed(_Same(mechanism, id(mechanism)))
-
-
-@attrs.frozen
-class _Same:
-    """A mechanism as a cache key: equal for the same object."""
-
-    mechanism: Mechanism = attrs.field(eq=False)
-    number: int
-
-
-@functools.lru_cache(maxsize=2)
-def _computed(same: _Same) -> BodyTorques:
-    mechanism = same.mechanism
-    linkage, whole = build_linkage(mechanism), LegParameters.none(mechanism)
-    q = one_cycle(linkage, _POINTS, 1.0).q
-    own, mass = torque_coefficients(linkage, q)
-    length = []
-    for one in np.eye(len(whole.length)):
-        longer = build_linkage(attrs.evolve(whole, length=whole.length + _LONGER * one).applied(mechanism))
-        length.append((torque_coefficients(longer, _closed(longer, q))[0] - own) / _LONGER)
-    return BodyTorques(own, mass, np.array(length))
-
-
-def _closed(linkage: Linkage, near: Floats) -> Floats:
-    """Coordinates q (points, n, 3) that close a linkage at equal steps of the crank angle, near others."""
-    q, rows = near.copy(), linkage.rows
-    m, n = len(rows.body), q.shape[1]
-    phi, still = np.empty((len(q), m)), np.zeros((n, 3))
-    cs, blocks, gamma = np.empty((n, 2)), np.zeros((m, 2, 3)), np.empty(m)
-    for _ in range(_NEWTON_ROUNDS):
-        for i, here in enumerate(q):
-            drive = np.array([i * TURN / len(q), 0.0, 0.0])
-            closures_at(linkage.arrays, rows, here, still, drive, cs, phi[i], blocks, gamma)
-        q[:, 1:] -= np.linalg.solve(jacobians(linkage, q), phi[:, :, None]).reshape(len(q), -1, 3)
-    return q
-
-
-def torque_coefficients(linkage: Linkage, q: Floats) -> tuple[Floats, Floats]:
-    """Coefficients (4, points) of the drive torque, and what of them is each body's mass (bodies, 4, points).
-
-    The power of the drive is that of inertia less that of all applied forces; v and a are those of the unit
-    speed.
-
-    Parameters
-    ----------
-    linkage : Linkage
-    q : (points, n, 3) array
-        Coordinates that close it.
-    """
-    arrays, jacobian = linkage.arrays, jacobians(linkage, q)
-    v, a, work = np.zeros_like(q), np.zeros_like(q), np.empty((q.shape[1], 2))
-    v[:, 1:] = np.linalg.solve(jacobian, drive_column(linkage)[:, None]).reshape(len(q), -1, 3)
-    a[:, 1:] = np.linalg.solve(jacobian, gammas(linkage, q, v, 0.0)[:, :, None]).reshape(len(q), -1, 3)
-    resting, moving = np.empty_like(q), np.empty_like(q)
-    applied_forces_at(arrays, q, np.zeros_like(q), work, resting)
-    applied_forces_at(arrays, q, v, work, moving)
-    inertia, reduced = (arrays.mass * a * v).sum(axis=2).T, (arrays.mass * v * v).sum(axis=2).T
-    weight = (arrays.mass[:, :2] * arrays.gravity * v[:, :, :2]).sum(axis=2).T
-    power = np.stack([-resting * v, (resting - moving) * v]).sum(axis=(2, 3))
-    mass = np.stack([-weight, np.zeros_like(weight), inertia, reduced], axis=1)
-    return np.vstack([power, inertia.sum(axis=0), reduced.sum(axis=0)]), mass[1:]
+    best = explanations[0]
+    nothing = next(one for one in explanations if one.cause is Cause.UNKNOWN)
+    log_odds = 0.5 * (nothing.misfit - best.misfit)
+    if log_odds < SURE_LOG_ODDS or not best.explains(nothing.square):
+        if nothing.square <= POOREST:
+            return None
+        return Change(
+            cause=Cause.UNKNOWN, since_ns=since_ns, value=0.0, sigma=0.0, counted=0.0, log_odds=log_odds
+        )
+    fact = (best.cause.fault_code, best.subject)
+    second = next(one for one in explanations if (one.cause.fault_code, one.subject) != fact)
+    runner_up = f"{second.cause.value} {second.subject}".strip()
+    return Change(
+        cause=best.cause,
+        subject=best.subject,
+        since_ns=since_ns,
+        value=best.value,
+        sigma=best.sigma,
+        counted=best.counted,
+        log_odds=log_odds,
+        runner_up="as counted" if second is nothing else runner_up,
+        runner_up_log_odds=0.5 * (second.misfit - best.misfit),
+    )

@@ -11,8 +11,9 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from leg_wear_monitor.estimate.body_torques import at_speed, body_torques
 from leg_wear_monitor.estimate.cause import Cause, NamedCause, TorqueExplanation, beyond_friction
-from leg_wear_monitor.estimate.explanations import at_speed, body_torques, jackknife, solved
+from leg_wear_monitor.estimate.least_squares import jackknife, solved
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism

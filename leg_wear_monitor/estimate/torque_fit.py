@@ -7,11 +7,46 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from leg_wear_monitor.estimate.explanations import Point, gauss_newton, jackknife, solved
+from leg_wear_monitor.estimate.joint_motion import Pair
+from leg_wear_monitor.estimate.least_squares import Point, gauss_newton, jackknife, solved
 from leg_wear_monitor.estimate.signature import Channel
-from leg_wear_monitor.estimate.torque_model import ModelError, Pair, Start, TorqueModel
+from leg_wear_monitor.estimate.torque_model import ModelError, TorqueModel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
+
+# Where a fit starts.
+
+
+@attrs.frozen
+class Start:
+    """A guess of how the crank follows from the joint: ratio * position + offset.
+
+    Attributes
+    ----------
+    ratio : float
+        Turns of the crank per turn of the joint, negative if it turns against it.
+    offset_rad : float
+        Crank angle at joint position 0.
+    torque_sign : int
+    explained : float
+        Fraction of the torque's variance that the model explains.
+    recording : int
+        Recording whose torque was used.
+    lag_s : float
+        Time by which slow changes of the torque are late [s]; it stays unless it is among the terms of the
+        fit.
+    low_pass_s : float
+        What of it is the time constant of a first-order low-pass.
+    """
+
+    ratio: float
+    offset_rad: float
+    torque_sign: int
+    explained: float
+    recording: int
+    lag_s: float = 0.0
+    low_pass_s: float = 0.0
+
 
 # Means over a twelfth of a turn: impacts of joints with clearance average out, the leg's torque stays.
 #

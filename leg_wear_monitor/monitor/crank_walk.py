@@ -7,16 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from leg_wear_monitor.estimate import torque_fit
-from leg_wear_monitor.estimate.torque_model import (
-    PHASE_ERROR_RAD,
-    Pair,
-    Series,
-    Start,
-    TorqueModel,
-    motion_of,
-    paired,
-    series,
-)
+from leg_wear_monitor.estimate.joint_motion import Pair, Series, motion_of, paired, series
+from leg_wear_monitor.estimate.torque_fit import Start
+from leg_wear_monitor.estimate.torque_model import PHASE_ERROR_RAD, TorqueModel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.inputs import Cadence

@@ -11,7 +11,7 @@ from leg_wear_monitor.bags.bag import TABLES, Recordable, find_files, listed
 from leg_wear_monitor.bags.findings import Finding, RecordingError
 from leg_wear_monitor.bags.series import JointName, Signals, TorqueSource, read_signals
 from leg_wear_monitor.errors import ConfigError, LegWearError, did_you_mean
-from leg_wear_monitor.estimate.torque_model import Series
+from leg_wear_monitor.estimate.joint_motion import Series
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.inputs import EFFORT, WRENCH

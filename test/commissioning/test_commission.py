@@ -15,7 +15,8 @@ from leg_wear_monitor.bags.series import JointName, Signals, TorqueSource
 from leg_wear_monitor.commissioning import detection
 from leg_wear_monitor.commissioning.commission import commission, propose
 from leg_wear_monitor.commissioning.result import CommissioningResult
-from leg_wear_monitor.estimate.torque_model import Series, TorqueModel
+from leg_wear_monitor.estimate.joint_motion import Series
+from leg_wear_monitor.estimate.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.inputs import EFFORT, FLOAT64, INTERFACE, WRENCH

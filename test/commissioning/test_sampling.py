@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.commissioning.evidence import Sampling, added_up, sampling_of
-from leg_wear_monitor.estimate.torque_fit import fit
-from leg_wear_monitor.estimate.torque_model import Series, Start, TorqueModel, motion_of, paired
+from leg_wear_monitor.estimate.joint_motion import Series, motion_of, paired
+from leg_wear_monitor.estimate.torque_fit import Start, fit
+from leg_wear_monitor.estimate.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 

@@ -4,7 +4,7 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.estimate.explanations import body_torques
+from leg_wear_monitor.estimate.body_torques import body_torques
 from leg_wear_monitor.mechanism.position import build_linkage, one_cycle
 from leg_wear_monitor.twin.reference import LegParameters
 

@@ -6,9 +6,9 @@ import attrs
 import numpy as np
 import pytest
 
+from leg_wear_monitor.estimate.change_detector import FACTORS, ChangeDetector, excess, threshold
 from leg_wear_monitor.estimate.explanations import Baseline, Explainer
-from leg_wear_monitor.estimate.ground_load import commissioned_baseline, parts_left_out, with_scatter_of
-from leg_wear_monitor.estimate.leg_model import FACTORS, ChangeDetector, excess, threshold
+from leg_wear_monitor.estimate.leg_model import commissioned_baseline, parts_left_out, with_scatter_of
 from leg_wear_monitor.estimate.signature import CommissionedTorque, SignatureModel, TorqueSensor
 
 NEW = np.array([3.0e-4, 3.0e-4])

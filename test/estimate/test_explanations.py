@@ -5,9 +5,16 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.estimate.cause import Cause, Change
-from leg_wear_monitor.estimate.explanations import Baseline, Explainer, Misfits, Nuisance, OtherChannel
-from leg_wear_monitor.estimate.ground_load import with_scatter_of
-from leg_wear_monitor.estimate.leg_model import best_fit, change_of, fit_clearances, starts_of, with_rivals
+from leg_wear_monitor.estimate.clearance_fit import best_fit, fit_clearances, starts_of, with_rivals
+from leg_wear_monitor.estimate.explanations import (
+    Baseline,
+    Explainer,
+    Misfits,
+    Nuisance,
+    OtherChannel,
+    change_of,
+)
+from leg_wear_monitor.estimate.leg_model import with_scatter_of
 from leg_wear_monitor.estimate.signature import SignatureModel, TorqueSensor
 
 JOINTS = ("A", "B", "G")

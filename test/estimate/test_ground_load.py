@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.estimate import ground_load as fits
-from leg_wear_monitor.estimate.ground_load import ground_load, nuisances
+from leg_wear_monitor.estimate.ground_load import ground_load
+from leg_wear_monitor.estimate.leg_model import nuisances
 from leg_wear_monitor.estimate.signature import (
     DIRECT,
     Channel,

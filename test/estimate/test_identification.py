@@ -6,8 +6,13 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.estimate.ground_load import nuisances
-from leg_wear_monitor.estimate.leg_model import FAR_FROM_FILE, identified_leg, leg_of_ideal_torque, misfit
+from leg_wear_monitor.estimate.identification import (
+    FAR_FROM_FILE,
+    identified_leg,
+    leg_of_ideal_torque,
+    misfit,
+)
+from leg_wear_monitor.estimate.leg_model import nuisances
 from leg_wear_monitor.estimate.signature import (
     CommissionedTorque,
     SimulatedSensor,

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from leg_wear_monitor.estimate.explanations import Point, gauss_newton, jackknife, solved
+from leg_wear_monitor.estimate.least_squares import Point, gauss_newton, jackknife, solved
 from leg_wear_monitor.mechanism.arrays import Floats
 
 pytestmark = pytest.mark.plain

@@ -7,15 +7,9 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.estimate.cause import SURE_LOG_ODDS, SURE_SIGMAS, Cause, Change
-from leg_wear_monitor.estimate.explanations import Explanation
-from leg_wear_monitor.estimate.leg_model import (
-    best_fit,
-    change_of,
-    first_changed,
-    start_of,
-    starts_of,
-    with_rivals,
-)
+from leg_wear_monitor.estimate.change_detector import first_changed
+from leg_wear_monitor.estimate.clearance_fit import best_fit, start_of, starts_of, with_rivals
+from leg_wear_monitor.estimate.explanations import Explanation, change_of
 from leg_wear_monitor.estimate.signature import DIRECT, with_noise_of
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN

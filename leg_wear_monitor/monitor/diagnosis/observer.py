@@ -12,9 +12,9 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.estimate.cause import Cause, Change
-from leg_wear_monitor.estimate.channel import compliance_of
+from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
+from leg_wear_monitor.estimate.coupling import compliance_of
 from leg_wear_monitor.estimate.ground_load import stance_phases
-from leg_wear_monitor.estimate.leg_model import ClearanceFit
 from leg_wear_monitor.estimate.signature import DIRECT, CommissionedTorque, TorqueSensor, signatures
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.person import upwards

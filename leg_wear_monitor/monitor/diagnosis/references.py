@@ -11,11 +11,15 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate import leg_model, signature
-from leg_wear_monitor.estimate.channel import leg_behind_coupling, with_channel_of
-from leg_wear_monitor.estimate.explanations import Explainer, body_torques
-from leg_wear_monitor.estimate.ground_load import GroundLoad, ground_load, nuisances
-from leg_wear_monitor.estimate.leg_model import misfit
+from leg_wear_monitor.estimate import identification, signature
+from leg_wear_monitor.estimate.body_torques import body_torques
+from leg_wear_monitor.estimate.change_detector import ChangeDetector
+from leg_wear_monitor.estimate.channel import UNDECLARED, DriveFigures, with_channel_of
+from leg_wear_monitor.estimate.coupling import leg_behind_coupling
+from leg_wear_monitor.estimate.explanations import Explainer
+from leg_wear_monitor.estimate.ground_load import GroundLoad, ground_load
+from leg_wear_monitor.estimate.identification import misfit
+from leg_wear_monitor.estimate.leg_model import explainer_of, nuisances
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
@@ -64,7 +68,7 @@ class _ModelsOfState:
     explainer: Explainer
     misfit: float | None = None
     counted_m: Floats | None = None
-    detector: leg_model.ChangeDetector | None = None
+    detector: ChangeDetector | None = None
 
 
 class LegModels:
@@ -77,7 +81,7 @@ class LegModels:
         Declared values of the drive.
     """
 
-    def __init__(self, mechanism: Mechanism, figures: signature.DriveFigures = signature.UNDECLARED) -> None:
+    def __init__(self, mechanism: Mechanism, figures: DriveFigures = UNDECLARED) -> None:
         self._mechanism, self._figures = mechanism, figures
         self._kept: list[_ModelsOfState] = []
 
@@ -98,12 +102,12 @@ class LegModels:
         expected = (explainer.model.at(each)[0] for each in (state.counted_m, state.fit.clearance_m))
         return ExplainedTorque(*(each[: len(each) // 2] for each in (measured, *expected)))
 
-    def detector(self, state: TorqueState, config: MonitorConfig) -> leg_model.ChangeDetector:
+    def detector(self, state: TorqueState, config: MonitorConfig) -> ChangeDetector:
         """Tests for a change of the counted clearances."""
         own = self._of(state)
         if own.detector is None or own.counted_m is not state.counted_m:
             cycles = 60.0 * abs(config.cadence.commanded_rpm) * config.diagnosis.false_alarm_hours
-            own.detector = leg_model.ChangeDetector(own.explainer, state.counted_m, cycles)
+            own.detector = ChangeDetector(own.explainer, state.counted_m, cycles)
             own.counted_m = state.counted_m
         return own.detector
 
@@ -159,7 +163,7 @@ class LegModels:
         """Whether the commissioned leg is that of the mechanism file, or of the identified parameters."""
         is_loaded = state.reference is not None and state.reference.parameters.load.size > 0
         is_shape = is_loaded and state.rounds >= ROUNDS
-        return self.misfit(state) < (_UNLIKE_ON_GROUND if is_shape else leg_model.UNLIKE_FILE)
+        return self.misfit(state) < (_UNLIKE_ON_GROUND if is_shape else identification.UNLIKE_FILE)
 
     def _of(self, state: TorqueState) -> _ModelsOfState:
         """Models of a state: kept ones if its reference, sensor and baseline are the same, or new ones."""
@@ -170,7 +174,7 @@ class LegModels:
             if one.reference is reference and one.commissioned is known and one.sensor == sensor:
                 return one
         made = _ModelsOfState(
-            reference, sensor, known, leg_model.explainer_of(self._mechanism, reference, sensor, known)
+            reference, sensor, known, explainer_of(self._mechanism, reference, sensor, known)
         )
         self._kept = [made, *self._kept][:_MOST_KEPT]
         return made
@@ -315,7 +319,7 @@ class References:
         if is_known and self._models.is_of_file(state):
             return False
         is_unlike_file = state.rounds > 0 or known not in (None, none)
-        least = leg_model.ONLY_SCATTER if is_unlike_file else leg_model.WORTH_IDENTIFYING
+        least = identification.ONLY_SCATTER if is_unlike_file else identification.WORTH_IDENTIFYING
         return self._models.misfit(state) >= least
 
     def is_load_left_out(self, state: TorqueState) -> bool:
@@ -362,8 +366,10 @@ class References:
                 state.parameters = found
                 self._begin(found, clearance_m, depth, profile)
                 return
-        if is_first and not start.compliance and self._models.misfit(state) >= leg_model.FAR_FROM_FILE:
-            ideal = leg_model.leg_of_ideal_torque(self._mechanism, model, known, profile.speed, start.load)
+        if is_first and not start.compliance and self._models.misfit(state) >= identification.FAR_FROM_FILE:
+            ideal = identification.leg_of_ideal_torque(
+                self._mechanism, model, known, profile.speed, start.load
+            )
             start = attrs.evolve(ideal, load_sigma=start.load_sigma)
         state.is_identifying = True
         part = self._unfinished(start, profile, clearance_m, is_of_parameters=True)
@@ -446,7 +452,7 @@ class References:
                 self._begin(state.parameters, counted_m, depth, legs.profile)
         elif state.commissioned is not None:
             explainer = self._models.explainer(state)
-            state.parameters = leg_model.identified_leg(
+            state.parameters = identification.identified_leg(
                 legs, explainer.model, explainer.nuisances, state.commissioned, self._is_drive_known
             )
             self._begin(state.parameters, counted_m, depth, legs.profile)

@@ -9,8 +9,9 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.estimate.cause import Change
+from leg_wear_monitor.estimate.change_detector import DetectorState
+from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
 from leg_wear_monitor.estimate.ground_load import GroundLoad
-from leg_wear_monitor.estimate.leg_model import ClearanceFit, DetectorState
 from leg_wear_monitor.estimate.signature import DIRECT, Channel, CommissionedTorque, TorqueSensor, averaged
 from leg_wear_monitor.files import finite_or_none
 from leg_wear_monitor.mechanism.arrays import Floats

@@ -6,9 +6,9 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.estimate import leg_model
+from leg_wear_monitor.estimate import identification
+from leg_wear_monitor.estimate.body_torques import body_torques
 from leg_wear_monitor.estimate.cause import Cause
-from leg_wear_monitor.estimate.explanations import body_torques
 from leg_wear_monitor.estimate.signature import CommissionedTorque, TorqueSensor
 from leg_wear_monitor.mechanism.person import nominal_stance
 from leg_wear_monitor.mechanism.position import TURN, build_linkage
@@ -678,9 +678,9 @@ def test_a_commissioned_leg_that_is_not_of_its_file_is_identified(
     leg, new, commissioned, reference, monkeypatch
 ) -> None:
     for misfit in ("UNLIKE_FILE", "WORTH_IDENTIFYING", "FAR_FROM_FILE"):
-        monkeypatch.setattr(leg_model, misfit, 0.0)  # any leg
+        monkeypatch.setattr(identification, misfit, 0.0)  # any leg
     # its bodies by ideal joints, which take time to find
-    monkeypatch.setattr(leg_model, "leg_of_ideal_torque", lambda *_: LegParameters.none(leg))
+    monkeypatch.setattr(identification, "leg_of_ideal_torque", lambda *_: LegParameters.none(leg))
     early = new()
     walk(early, samples(reference, [0] * 8))
     assert not early.state.is_identifying
@@ -698,7 +698,7 @@ def test_the_reference_of_an_identified_leg_is_used_if_it_explains_the_leg_bette
     leg, reference, monkeypatch
 ) -> None:
     for misfit in ("UNLIKE_FILE", "WORTH_IDENTIFYING"):
-        monkeypatch.setattr(leg_model, misfit, 0.0)
+        monkeypatch.setattr(identification, misfit, 0.0)
     monkeypatch.setattr(references, "ROUNDS", 1)
     monkeypatch.setattr(torque_reference, "CYCLES", 8)
     monkeypatch.setattr(torque_reference, "PACE", 6)
@@ -716,7 +716,7 @@ def test_nothing_is_corrected_by_a_reference_of_another_leg_nor_before_it_is_ide
     commissioned, reference, monkeypatch, misfit: str
 ) -> None:
     """Seen before: I at 0.45 mm was named J, and corrected as J, after the first of three rounds."""
-    monkeypatch.setattr(leg_model, misfit, 0.0)
+    monkeypatch.setattr(identification, misfit, 0.0)
     observer = commissioned()
     assert walk_on(observer, reference, [leg_number(0, 1.5)] * 25) == []
     (change,) = observer.diagnosis.changes

@@ -1,0 +1,146 @@
+"""Detects when a leg departs from the one that is counted: one CUSUM test for each joint and size.
+
+A CUSUM adds up, gait cycle by gait cycle, by how much a changed leg explains the signature better, and
+starts again where it falls below zero. Where the likelihoods are what it supposes, the mean time between
+two false alarms of a test is at least exp(threshold) cycles (Lorden 1971).
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from leg_wear_monitor.estimate.explanations import MODEL_ERROR, Explainer, opened
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
+
+# on the counted clearance of one joint; two further tests are for a new part in a worn joint
+FACTORS = (1.08, 1.2, 1.35, 1.5, 2.0, 2.5, 3.3, 5.0, 8.0)  # on the counted clearance of one joint
+
+_LEAST_INFORMATION = 1.0e-6  # of one gait cycle, by which a test can tell anything
+_SIGMAS = 4.0  # by which the baseline may be off
+# of the threshold: what one gait cycle counts at most, so that two alone raise nothing. One of 260 healthy
+# cycles on the ground looked like a wider joint: two in a row come each twenty hours by chance (2026-11-25)
+_MOST = 0.4
+
+
+class DetectorState(NamedTuple):
+    """Sums (tests,), the stamp (tests,) [ns] and the number of cycles (tests,) since each was 0."""
+
+    sums: Floats
+    since_ns: Ints
+    cycles: Ints
+
+
+class Detection(NamedTuple):
+    """A change: the test that raised it, the stamp since when, the cycles since then, and its sum."""
+
+    test: int
+    since_ns: int
+    cycles: int
+    log_odds: float
+
+
+def threshold(false_alarm_cycles: float, tests: int) -> float:
+    """Threshold of each of some tests for a mean number of gait cycles between two false alarms."""
+    return math.log(false_alarm_cycles * tests)
+
+
+def excess(scatter: Floats) -> Floats:
+    """By how much more than expected the statistics (n, tests) of some tests scatter, at least 1.
+
+    They are of gait cycles that the tests do not know, less their mean, in standard deviations.
+    """
+    pairs = len(scatter) // 2
+    if not pairs:
+        return np.ones(scatter.shape[1])
+    # means of two: neighbouring cycles are correlated
+    means = scatter[: 2 * pairs].reshape(pairs, 2, -1).mean(axis=1)
+    return np.asarray(np.maximum(1.0, 2.0 * np.square(means).mean(axis=0)))
+
+
+def _scatter(explainer: Explainer, change: Floats) -> Floats:
+    """Statistics (n, tests) of each part of the commissioned cycles, by tests that the others make."""
+    own, found = explainer.model.covariance, [np.zeros((0, len(change)))]
+    for part in explainer.baseline.left_out:
+        weighted = np.linalg.solve(explainer.covariance(1) + part.covariance - own, change.T).T
+        variance = ((weighted @ part.covariance) * weighted).sum(axis=1) * (1.0 + 1.0 / part.others)
+        found.append(part.departures @ weighted.T / np.sqrt(np.maximum(variance, _LEAST_INFORMATION)))
+    return np.concatenate(found)
+
+
+class ChangeDetector:
+    """CUSUM tests of a leg against one with a wider joint, and against one with a new part.
+
+    Parameters
+    ----------
+    explainer : Explainer
+    counted_m : (k,) array
+        Counted clearances.
+    false_alarm_cycles : float
+        Mean number of gait cycles between two false alarms.
+    """
+
+    def __init__(self, explainer: Explainer, counted_m: Floats, false_alarm_cycles: float) -> None:
+        model = explainer.model
+        expected = model.at(counted_m)[0]
+        changes = []
+        for k in range(len(counted_m)):
+            fresh = min(explainer.fresh_m[k], counted_m[k])
+            sizes = [factor * counted_m[k] for factor in FACTORS] + [fresh, math.sqrt(fresh * counted_m[k])]
+            changes += [model.at(opened(counted_m, k, size))[0] - expected for size in sizes]
+        # for a leg that shows as much less of an opening as the model may be off
+        change = (1.0 - MODEL_ERROR) * np.array(changes)
+        weighted = np.linalg.solve(explainer.covariance(1), change.T).T
+        self._expected = expected + explainer.baseline.offset
+        self._weighted = weighted
+        # the baseline is off by the same in each cycle: that alone must not drive a test upwards
+        drift = np.sqrt(((weighted @ explainer.baseline.covariance) * weighted).sum(axis=1))
+        information = (weighted * change).sum(axis=1)
+        self._half = 0.5 * information + _SIGMAS * drift
+        # a part that is new already cannot be renewed
+        is_possible = information > _LEAST_INFORMATION
+        self._half = np.where(is_possible, self._half, np.inf)
+        self._excess = excess(_scatter(explainer, change))
+        self.threshold = threshold(false_alarm_cycles, len(change))
+        self._step, self._counted_m = (information - self._half) / self._excess, counted_m
+
+    def unseen_m(self, cycles: int) -> Floats:
+        """Widest clearances (k,) [m] that are not expected to be detected within some gait cycles."""
+        steps = self._step.reshape(len(self._counted_m), -1)[:, : len(FACTORS)]
+        factors = np.where(cycles * steps < self.threshold, FACTORS, 1.0)
+        return np.asarray(factors.max(axis=1) * self._counted_m)
+
+    def fresh(self) -> DetectorState:
+        """State before the first gait cycle."""
+        tests = len(self._half)
+        return DetectorState(np.zeros(tests), np.zeros(tests, np.int64), np.zeros(tests, np.int64))
+
+    def with_cycle(self, state: DetectorState, signature: Floats, begin_ns: int) -> DetectorState:
+        """State after one more gait cycle, with its signature (F,) and the stamp of its begin."""
+        ratio = (self._weighted @ (signature - self._expected) - self._half) / self._excess
+        ratio = np.minimum(ratio, _MOST * self.threshold)
+        since = np.where(state.cycles == 0, begin_ns, state.since_ns)
+        sums = state.sums + ratio
+        stays = sums > 0.0
+        return DetectorState(
+            np.where(stays, sums, 0.0), np.where(stays, since, 0), np.where(stays, state.cycles + 1, 0)
+        )
+
+    def detection(self, state: DetectorState) -> Detection | None:
+        """The change that is detected; None where no test exceeds the threshold."""
+        best = int(state.sums.argmax())
+        if not state.sums[best] > self.threshold:
+            return None
+        return Detection(best, int(state.since_ns[best]), int(state.cycles[best]), float(state.sums[best]))
+
+
+def first_changed(explainer: Explainer, signatures: Floats, counted_m: Floats, changed_m: Floats) -> int:
+    """Index of the first of some gait cycles, signatures (n, F), that belongs to a change of clearances.
+
+    It is where the likelihood of the cycles before as counted, and of those after as changed, is largest.
+    """
+    before, after = (explainer.model.at(clearance)[0] for clearance in (counted_m, changed_m))
+    weighted = np.linalg.solve(explainer.covariance(1), after - before)
+    middle = 0.5 * (before + after) + explainer.baseline.offset
+    gain = (signatures - middle) @ weighted
+    return int(np.cumsum(gain[::-1])[::-1].argmax())

@@ -1,0 +1,279 @@
+"""The motion of a joint, and a drive torque with the joint's motion at its samples."""
+
+import math
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.position import TURN
+
+# Values over time: positions of a joint, torques.
+
+
+@attrs.frozen(eq=False)
+class Series:
+    """Values over time, in order of their stamps.
+
+    Attributes
+    ----------
+    time_s : (n,) array
+        Since the first stamp of all recordings [s].
+    value : (n,) array
+    recording : (n,) array of int
+        Index of the recording; an encoder may start anew in each.
+    """
+
+    time_s: Floats
+    value: Floats
+    recording: NDArray[np.int64]
+
+
+def series(stamp_ns: NDArray[np.int64], value: Floats, recording: NDArray[np.int64], first_ns: int) -> Series:
+    """Series of the finite values, in order of their stamps, each stamp once.
+
+    Parameters
+    ----------
+    stamp_ns : (n,) array of int
+        Stamps [ns].
+    value : (n,) array
+    recording : (n,) array of int
+    first_ns : int
+        Stamp of time 0 [ns].
+    """
+    finite = np.isfinite(value)
+    stamp_ns, value, recording = stamp_ns[finite], value[finite], recording[finite]
+    stamps, chosen = np.unique(stamp_ns, return_index=True)
+    return Series(np.asarray(1.0e-9 * (stamps - first_ns), np.float64), value[chosen], recording[chosen])
+
+
+# Motion of a joint that turns on and on: position, speed and acceleration, and noise of its encoder.
+
+
+_WINDOW_S = 0.12  # of the local fit: a twelfth of a turn at 40 rpm, so a ripple of two a turn stays
+_LEAST_WINDOW = 7  # samples, enough for a cubic with three to spare
+_GAP_SAMPLES = 4.0  # sampling intervals without a sample that are not bridged
+_LEAST_TRAVEL_RAD = 1.0
+# A crank that walks forwards and back as far travels twice its range; a joint that swings, once a cycle
+_ROCKING = 0.2
+_NO_VARIANCE = 1.0e-12
+
+
+@attrs.frozen(eq=False)
+class JointMotion:
+    """Smoothed motion of a joint.
+
+    Attributes
+    ----------
+    time_s, position_rad, speed_radps, acceleration_radps2 : (n,) arrays
+        Smoothed; the position counts on over turns.
+    recording : (n,) array of int
+    near : (n,) array of bool
+        Whether samples lie around this time.
+    is_wrapped : bool
+        Whether the encoder's readings are wrapped to a turn.
+    noise_rad : float
+        Standard deviation of the readings about the smoothed position [rad].
+    first_rad : (recordings,) array
+        First reading of each recording [rad].
+    rate_hz : float
+    """
+
+    time_s: Floats
+    position_rad: Floats
+    speed_radps: Floats
+    acceleration_radps2: Floats
+    recording: NDArray[np.int64]
+    near: NDArray[np.bool_]
+    is_wrapped: bool
+    noise_rad: float
+    first_rad: Floats
+    rate_hz: float
+
+
+def why_not_a_crank(joint: Series) -> str:
+    """Why a joint cannot be the crank: it stands, or swings to and fro; empty if it turns on and on."""
+    if len(joint.value) < 4 * _LEAST_WINDOW:
+        return f"has only {len(joint.value)} samples"
+    position = _unwrapped(joint)
+    reach = float(np.ptp(position))
+    if reach < _LEAST_TRAVEL_RAD:
+        return f"moves by {reach:.2g} rad in all"
+    turning_points = position[:: max(1, len(position) // 2000)]  # coarse, so that noise adds no path
+    path = float(np.abs(np.diff(turning_points)).sum())
+    return f"swings to and fro within {reach:.2g} rad" if reach < _ROCKING * path else ""
+
+
+def motion_of(joint: Series) -> JointMotion:
+    """Smoothed motion of a joint for which `why_not_a_crank` is empty."""
+    parts = []
+    for number in np.unique(joint.recording):
+        chosen = joint.recording == number
+        time_s, value = joint.time_s[chosen], _unwrapped_values(joint.value[chosen])
+        if len(time_s) >= 2 * _LEAST_WINDOW:
+            parts.append((number, value[0], *_smoothed(time_s, value)))
+    columns = [np.concatenate([part[i] for part in parts]) for i in range(2, 7)]
+    number = np.concatenate([np.full(len(part[2]), part[0]) for part in parts])
+    return JointMotion(
+        time_s=columns[0],
+        position_rad=columns[1],
+        speed_radps=columns[2],
+        acceleration_radps2=columns[3],
+        recording=number,
+        near=columns[4],
+        is_wrapped=is_wrapped(joint.value),
+        noise_rad=float(np.median([part[7] for part in parts])),
+        first_rad=np.array([part[1] for part in parts]),
+        rate_hz=float(1.0 / np.median(np.diff(joint.time_s))),
+    )
+
+
+def is_wrapped(value: Floats) -> bool:
+    """Whether readings jump by about a turn and stay within one."""
+    jumps = np.abs(np.diff(value)) > math.pi
+    return bool(jumps.any() and np.ptp(value) <= 1.05 * TURN)
+
+
+def _unwrapped_values(value: Floats) -> Floats:
+    return np.asarray(np.unwrap(value)) if is_wrapped(value) else value
+
+
+def _unwrapped(joint: Series) -> Floats:
+    """Positions without jumps, not even from one recording to the next."""
+    value = joint.value.astype(float)
+    if is_wrapped(value):
+        return np.asarray(np.unwrap(value))
+    step = np.diff(value)
+    step[np.diff(joint.recording) != 0] = 0.0
+    return np.concatenate([value[:1], value[0] + np.cumsum(step)])
+
+
+def _smoothed(
+    time_s: Floats, value: Floats
+) -> tuple[Floats, Floats, Floats, Floats, NDArray[np.bool_], float]:
+    """Time, position, speed, acceleration on an even grid; where samples are near; noise."""
+    step = float(np.median(np.diff(time_s)))
+    grid = np.arange(time_s[0], time_s[-1], step)
+    even = np.interp(grid, time_s, value)
+    half = max(_LEAST_WINDOW, round(_WINDOW_S / step)) // 2
+    offsets = step * np.arange(-half, half + 1)
+    rows = np.linalg.pinv(np.vander(offsets, 4, increasing=True))  # a local cubic by least squares
+    position, speed, halved = (np.convolve(even, row[::-1], mode="valid") for row in rows[:3])
+    inner = slice(half, len(grid) - half)
+    left = value - np.interp(time_s, grid[inner], position, left=np.nan, right=np.nan)
+    noise = float(np.nanmedian(np.abs(left)) / 0.6745 / math.sqrt(1.0 - rows[0, half]))
+    acceleration = 2.0 * halved
+    error = 2.0 * noise * float(np.linalg.norm(rows[2]))
+    # an encoder's noise shall not stand in the torque as the leg's inertia
+    acceleration *= max(0.0, 1.0 - error**2 / max(float(acceleration.var()), error**2, _NO_VARIANCE))
+    after = np.searchsorted(time_s, grid[inner]).clip(1, len(time_s) - 1)
+    near = time_s[after] - time_s[after - 1] <= _GAP_SAMPLES * step
+    return grid[inner], position, speed, acceleration, near, noise
+
+
+# A torque and the motion of a joint at the torque's times, while the joint turns.
+
+
+_MOVING = 0.2  # of the usual speed, below which the leg stands or starts
+_SLOW_S = 1.0  # averaging time for a speed without its ripple
+_STEADY = 0.08  # relative width of a speed that counts as one
+
+
+@attrs.frozen(eq=False)
+class Pair:
+    """Torque samples with the joint's motion.
+
+    Attributes
+    ----------
+    time_s, torque, position_rad, speed_radps, acceleration_radps2 : (n,) arrays
+        The torque in its own unit; the motion is the joint's, not the crank's.
+    recording : (n,) array of int
+    interval_s : float
+        Sampling interval of the torque [s].
+    """
+
+    time_s: Floats
+    torque: Floats
+    position_rad: Floats
+    speed_radps: Floats
+    acceleration_radps2: Floats
+    recording: NDArray[np.int64]
+    interval_s: float
+
+    def part(self, which: NDArray[np.bool_] | slice) -> "Pair":
+        """Pair of a subset of the samples."""
+        columns = {name: getattr(self, name)[which] for name in _COLUMNS}
+        return attrs.evolve(self, **columns)
+
+    def earlier(self, by_s: float) -> tuple[Floats, Floats, Floats]:
+        """Position, speed and acceleration, each (n,), some time before each sample [s]."""
+        motion = (self.position_rad, self.speed_radps, self.acceleration_radps2)
+        if by_s == 0.0:
+            return motion
+        moved = np.array(motion)
+        for number in np.unique(self.recording):
+            inside = self.recording == number
+            for row in moved:
+                row[inside] = np.interp(self.time_s[inside] - by_s, self.time_s[inside], row[inside])
+        return moved[0], moved[1], moved[2]
+
+    @property
+    def walks_both_ways(self) -> bool:
+        """Whether at least a tenth of the samples is of either direction."""
+        backwards = float(np.mean(self.speed_radps < 0.0))
+        return 0.1 < backwards < 0.9
+
+
+_COLUMNS = ("time_s", "torque", "position_rad", "speed_radps", "acceleration_radps2", "recording")
+
+
+def paired(motion: JointMotion, torque: Series) -> Pair:
+    """Torque samples at which the joint turns; none if the two have no time in common."""
+    parts = []
+    for number in np.unique(motion.recording):
+        of_joint, of_torque = motion.recording == number, torque.recording == number
+        time_s, times = motion.time_s[of_joint], torque.time_s[of_torque]
+        inside = (times >= time_s[0]) & (times <= time_s[-1])
+        inside[inside] = np.interp(times[inside], time_s, motion.near[of_joint].astype(float)) > 0.5
+        at = times[inside]
+        values = (motion.position_rad, motion.speed_radps, motion.acceleration_radps2)
+        moved = [np.interp(at, time_s, value[of_joint]) for value in values]
+        parts.append((at, torque.value[of_torque][inside], *moved, np.full(len(at), number)))
+    interval_s = float(np.median(np.diff(torque.time_s))) if len(torque.time_s) > 1 else 0.0
+    columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
+    pair = Pair(**dict(zip(_COLUMNS, columns, strict=True)), interval_s=interval_s)
+    speed = np.abs(pair.speed_radps)
+    return pair.part(speed > _MOVING * np.median(speed)) if len(speed) else pair
+
+
+def slow_speed(pair: Pair) -> Floats:
+    """Speed of the joint without the ripple of a turn (n,) [rad/s]."""
+    number = max(1, min(len(pair.time_s) // 4, round(_SLOW_S / max(pair.interval_s, 1.0e-6))))
+    total = np.concatenate([[0.0], np.cumsum(pair.speed_radps)])
+    after = np.minimum(np.arange(len(pair.time_s)) + number // 2 + 1, len(pair.time_s))
+    before = np.maximum(np.arange(len(pair.time_s)) - number // 2, 0)
+    return np.asarray((total[after] - total[before]) / (after - before))
+
+
+def is_steady(pair: Pair) -> NDArray[np.bool_]:
+    """Where the speed without its ripple is about the same half a second before and after (n,)."""
+    speed, at = slow_speed(pair), np.arange(len(pair.time_s))
+    half = round(0.5 * _SLOW_S / max(pair.interval_s, 1.0e-6))
+    before, after = np.maximum(at - half, 0), np.minimum(at + half, len(at) - 1)
+    return np.asarray(np.abs(speed[after] - speed[before]) <= _STEADY * np.abs(speed))
+
+
+def steady_stretch(pair: Pair) -> Pair:
+    """Longest stretch at one speed, in one direction, in one recording."""
+    speed = slow_speed(pair)
+    centres = np.quantile(speed, np.linspace(0.05, 0.95, 19))
+    best = slice(0, 0)
+    for centre in centres:
+        steady = np.abs(speed - centre) <= _STEADY * abs(centre)
+        whole = steady[1:] & steady[:-1] & (np.diff(pair.recording) == 0)
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], whole, [False]]).astype(int)))
+        for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+            if last - first > best.stop - best.start:
+                best = slice(first, last + 1)
+    return pair.part(best)

@@ -7,7 +7,7 @@ The chain is 0, which the compiler does not know.
 import math
 
 from leg_wear_monitor.compiled.kernel import entry
-from leg_wear_monitor.contact.arrays import friction_force
+from leg_wear_monitor.contact.friction import friction_force
 from leg_wear_monitor.contact.normal import normal_force
 from leg_wear_monitor.dynamics.clearance.advance import drive_torque, reactions, toe_deviation
 from leg_wear_monitor.dynamics.clearance.contact import (

@@ -14,6 +14,7 @@ from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
 from leg_wear_monitor.dynamics.run import DONE, new_run_statistics, steady_drive
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.files import share_directory
+from leg_wear_monitor.life.jumps import JumpControl
 from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
 from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.spec import Mechanism
@@ -21,7 +22,6 @@ from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.forecast.forecast import JointCondition, forecast, left_over
 from leg_wear_monitor.monitor.forecast.forecaster import law_of, read_lives
 from leg_wear_monitor.monitor.forecast.wear_coefficients import estimate_coefficient
-from leg_wear_monitor.wear import JumpControl
 
 HASTE = 500.0
 LENGTHS = (1.0e-5, 1.5e-5, 3.0e-5, 6.0e-5, 1.0e-4)

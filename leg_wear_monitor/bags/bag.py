@@ -17,8 +17,8 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 from ruamel.yaml.events import AliasEvent
 
+from leg_wear_monitor.bags.budget import Budget
 from leg_wear_monitor.bags.findings import (
-    Budget,
     DamageError,
     Finding,
     RecordingError,

@@ -12,7 +12,8 @@ from mcap.records import Schema
 from numpy.typing import NDArray
 
 from leg_wear_monitor.bags import mcap_layout
-from leg_wear_monitor.bags.findings import Budget, DamageError, Finding, RecordingError, Severity
+from leg_wear_monitor.bags.budget import Budget
+from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError, Severity
 from leg_wear_monitor.messages.cdr import MESSAGE
 
 # The scan of a file without a usable index, from the first to the last readable record. Its result is a

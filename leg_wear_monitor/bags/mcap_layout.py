@@ -16,7 +16,8 @@ from mcap.records import Channel as ChannelRecord
 from mcap.records import ChunkIndex, Schema, Statistics
 from mcap.stream_reader import StreamReader
 
-from leg_wear_monitor.bags.findings import Budget, DamageError
+from leg_wear_monitor.bags.budget import Budget
+from leg_wear_monitor.bags.findings import DamageError
 from leg_wear_monitor.compiled.kernel import entry, kernel
 
 # Decompression of untrusted data: declared lengths and checksums are verified, sizes are bounded.

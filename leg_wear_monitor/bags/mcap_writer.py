@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.bags.mcap_layout import HEAD, MAGIC
-from leg_wear_monitor.messages.streams import RELIABLE, Qos, definition
+from leg_wear_monitor.messages.qos import RELIABLE, Qos
+from leg_wear_monitor.messages.streams import definition
 
 # An MCAP chunk under construction, and its serialization as records.
 

@@ -7,7 +7,8 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.bags.findings import Budget, DamageError, Finding, RecordingError, Severity
+from leg_wear_monitor.bags.budget import Budget
+from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError, Severity
 from leg_wear_monitor.bags.table_layout import LostLines, Rows, columns_of, places
 from leg_wear_monitor.bags.table_rows import check_kind, rows_of
 from leg_wear_monitor.errors import LegWearError

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from leg_wear_monitor.bags import bag
-from leg_wear_monitor.bags.findings import DEFAULT_MB, Budget, Clocks, Finding, RecordingError, Severity
+from leg_wear_monitor.bags.budget import DEFAULT_MB, Budget
+from leg_wear_monitor.bags.findings import Clocks, Finding, RecordingError, Severity
 from leg_wear_monitor.bags.mcap_file import Piece
 from leg_wear_monitor.bags.table_file import TableFile
 from leg_wear_monitor.bags.table_layout import (

@@ -12,14 +12,8 @@ from urllib.parse import quote
 
 import numpy as np
 
-from leg_wear_monitor.bags.findings import (
-    Budget,
-    DamageError,
-    Finding,
-    RecordingError,
-    Severity,
-    open_regular,
-)
+from leg_wear_monitor.bags.budget import Budget
+from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError, Severity, open_regular
 from leg_wear_monitor.bags.mcap_file import Due, Piece
 from leg_wear_monitor.bags.mcap_layout import Channel
 from leg_wear_monitor.messages.cdr import MESSAGE

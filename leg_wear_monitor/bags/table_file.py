@@ -8,7 +8,8 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.bags.findings import Budget, Finding, RecordingError, Severity
+from leg_wear_monitor.bags.budget import Budget
+from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
 from leg_wear_monitor.bags.mcap_file import Due, Piece
 from leg_wear_monitor.bags.mcap_layout import Channel
 from leg_wear_monitor.bags.table_layout import (

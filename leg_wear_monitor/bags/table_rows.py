@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from leg_wear_monitor.bags import table_layout
-from leg_wear_monitor.bags.findings import Budget, Finding, RecordingError
+from leg_wear_monitor.bags.budget import Budget
+from leg_wear_monitor.bags.findings import Finding, RecordingError
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.config.settings import MonitorConfig

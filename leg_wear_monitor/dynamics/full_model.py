@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from leg_wear_monitor.compiled.kernel import entry, kernel
-from leg_wear_monitor.contact.arrays import ContactArrays, film_force
+from leg_wear_monitor.contact.arrays import ContactArrays
+from leg_wear_monitor.contact.film import film_force
 from leg_wear_monitor.dynamics.joint import (
     DELTA,
     DELTA_DOT,

@@ -7,7 +7,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from leg_wear_monitor.contact.arrays import contact_doubt, half_angle_under_load, is_winkler_form
+from leg_wear_monitor.contact.conformity import contact_doubt, half_angle_under_load, is_winkler_form
 from leg_wear_monitor.dynamics.result import (
     ClearanceResult,
     EnergyBalance,

@@ -32,13 +32,7 @@ from leg_wear_monitor.dynamics.run import (
     stop,
 )
 from leg_wear_monitor.errors import ConfigError, SimulationError
-from leg_wear_monitor.life.result import Duty, Life, LifePoint, life_of
-from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.materials import check_wear_is_known
-from leg_wear_monitor.mechanism.plausible import limit_fault, suspects
-from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.wear import (
+from leg_wear_monitor.life.jumps import (
     JumpControl,
     WearRate,
     jump_error,
@@ -48,6 +42,12 @@ from leg_wear_monitor.wear import (
     wear_rate,
     weighted,
 )
+from leg_wear_monitor.life.result import Duty, Life, LifePoint, life_of
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.materials import check_wear_is_known
+from leg_wear_monitor.mechanism.plausible import limit_fault, suspects
+from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.mechanism.spec import Mechanism
 
 # Checks that a life by cycle jumps ends.
 

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
-from leg_wear_monitor.contact.arrays import contact_doubt, half_angle_of
+from leg_wear_monitor.contact.conformity import contact_doubt, half_angle_of
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.files import data_frame, json_text
+from leg_wear_monitor.life.jumps import WearRate, opening
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials import (
     bushing_of,
@@ -21,7 +22,6 @@ from leg_wear_monitor.mechanism.materials import (
 from leg_wear_monitor.mechanism.person import on_the_ground
 from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
 from leg_wear_monitor.shown import Drawable
-from leg_wear_monitor.wear import WearRate, opening
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -16,7 +16,8 @@ from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.files import finite_or_none, received_json
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.messages import encode
-from leg_wear_monitor.messages.streams import SENSOR_DATA, Output
+from leg_wear_monitor.messages.qos import SENSOR_DATA
+from leg_wear_monitor.messages.streams import Output
 from leg_wear_monitor.monitor.reports import SampleReports
 
 MOTION = Output("~/motion", encode.STRING, SENSOR_DATA)

@@ -13,7 +13,8 @@ from leg_wear_monitor.files import or_nan
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.messages import encode
 from leg_wear_monitor.messages.leg_markers import LINKAGE, MARKERS
-from leg_wear_monitor.messages.streams import LATCHED, SENSOR_DATA, Outgoing, Output, single
+from leg_wear_monitor.messages.qos import LATCHED, SENSOR_DATA
+from leg_wear_monitor.messages.streams import Outgoing, Output, single
 from leg_wear_monitor.monitor.alarms import Alarm, code_of, state_of
 from leg_wear_monitor.monitor.config.parameters import NODE
 from leg_wear_monitor.monitor.config.settings import MonitorConfig

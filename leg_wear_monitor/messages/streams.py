@@ -1,6 +1,6 @@
 """Table of input streams, from which subscriptions, recording topics, decoding and checks are derived.
 
-`cdr` parses the messages of a stream; `twin.kinds` defines the use of its samples.
+`cdr` parses the messages of a stream; `twin` defines the use of its samples.
 """
 
 from collections.abc import Iterator
@@ -11,6 +11,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from leg_wear_monitor.messages.qos import RELIABLE, Qos
 from leg_wear_monitor.monitor.forecast.forecast import Answer
 from leg_wear_monitor.monitor.reports import CycleReport, Reports
 from leg_wear_monitor.twin import CRANK, LOAD, TORQUE
@@ -36,7 +37,7 @@ class Stream:
     fields : tuple of str
         Fields of the type's main definition; names of nested types without their package.
     kind : int
-        Kind of its samples, a key of `twin.kinds.KINDS`.
+        Kind of its samples, a key of `twin.KINDS`.
     torque_source, load_source : str
         Value of `drive_torque.source`, or of `foot_load.source`, for which the stream is read; both are empty
         if it is always read.
@@ -84,50 +85,6 @@ def streams_read(torque_source: str, load_source: str = "none") -> tuple[Stream,
     """Streams that are read with values of `drive_torque.source` and `foot_load.source`."""
     sources = (("", ""), (torque_source, ""), ("", load_source))
     return tuple(stream for stream in STREAMS if (stream.torque_source, stream.load_source) in sources)
-
-
-# Quality of service in the format of rosbag2 (metadata version 9), so that playback uses the original.
-
-
-_FOREVER = {"sec": 9223372036, "nsec": 854775807}
-
-
-@attrs.frozen
-class Qos:
-    """Quality of service offered by a publisher."""
-
-    reliability: str = "reliable"
-    durability: str = "volatile"
-    depth: int = 10
-
-    def profile(self) -> dict[str, object]:
-        """Mapping as in metadata.yaml."""
-        return {
-            "history": "keep_last",
-            "depth": self.depth,
-            "reliability": self.reliability,
-            "durability": self.durability,
-            "deadline": dict(_FOREVER),
-            "lifespan": dict(_FOREVER),
-            "liveliness": "automatic",
-            "liveliness_lease_duration": dict(_FOREVER),
-            "avoid_ros_namespace_conventions": False,
-        }
-
-    def text(self) -> str:
-        """YAML text for a channel's metadata."""
-        lines = []
-        for key, value in self.profile().items():
-            if isinstance(value, dict):
-                lines += [f"{key}:", *(f"  {part}: {number}" for part, number in value.items())]
-            else:
-                lines.append(f"{key}: {str(value).lower()}")
-        return "- " + "\n  ".join(lines)
-
-
-RELIABLE = Qos()
-SENSOR_DATA = Qos(reliability="best_effort", depth=200)
-LATCHED = Qos(durability="transient_local", depth=1)
 
 
 # An output topic of the monitor, and messages for it.

@@ -12,7 +12,7 @@ from leg_wear_monitor.monitor.diagnosis.observer import Correction, TorqueObserv
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, TorqueState
 from leg_wear_monitor.monitor.forecast.forecast import Forecast
 from leg_wear_monitor.monitor.forecast.forecaster import RENEWED_NS
-from leg_wear_monitor.monitor.forecast.measurement import growth_rate
+from leg_wear_monitor.monitor.forecast.growth import growth_rate
 from leg_wear_monitor.monitor.forecast.wear_coefficients import ClearanceAtWear
 from leg_wear_monitor.monitor.ledger.entry import Audit, CorrectedClearance, IdentifiedLeg, SimulatedReference
 from leg_wear_monitor.monitor.parts import Parts

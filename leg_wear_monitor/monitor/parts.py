@@ -31,7 +31,8 @@ from leg_wear_monitor.monitor.evaluation import (
 )
 from leg_wear_monitor.monitor.foot_load import FootLoadCheck
 from leg_wear_monitor.monitor.forecast.forecaster import Forecaster, ForecastState
-from leg_wear_monitor.monitor.forecast.measurement import GrowthWindow, ModelError, model_error
+from leg_wear_monitor.monitor.forecast.growth import GrowthWindow
+from leg_wear_monitor.monitor.forecast.model_error import ModelError, model_error
 from leg_wear_monitor.monitor.gait_evidence import NO_MISMATCH, MismatchWindow, TorqueRecord
 from leg_wear_monitor.monitor.inputs import InputGuard
 from leg_wear_monitor.monitor.ledger.entry import Measurement, SimulatedReference

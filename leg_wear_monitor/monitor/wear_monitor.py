@@ -21,7 +21,8 @@ from leg_wear_monitor.monitor.cycle_report import (
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
 from leg_wear_monitor.monitor.evaluation import EvaluationPeriods
 from leg_wear_monitor.monitor.forecast.forecast import ForecastBasis
-from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult, all_extended
+from leg_wear_monitor.monitor.forecast.growth import all_extended
+from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult
 from leg_wear_monitor.monitor.judgement import (
     evaluate_clearances,
     is_forecast_valid,
@@ -345,7 +346,7 @@ class WearMonitor:
 
     @property
     def used(self) -> dict[str, int]:
-        """How many samples of each kind were used so far, by the names of `twin.kinds.KINDS`."""
+        """How many samples of each kind were used so far, by the names of `twin.KINDS`."""
         return dict(self._twin.intake.used)
 
     @property

@@ -8,7 +8,8 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.bags.bag import Recordable, listed_recordings
-from leg_wear_monitor.bags.findings import DEFAULT_MB, Finding, RecordingError, Severity
+from leg_wear_monitor.bags.budget import DEFAULT_MB
+from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
 from leg_wear_monitor.bags.reader import Block, Recording
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.files import unfinished

@@ -27,7 +27,8 @@ from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.sensors import Reading, readings, stamp_ns
 from leg_wear_monitor.messages.streams import streams_read
 from leg_wear_monitor.ros.inputs import message_class
-from leg_wear_monitor.ros.running import WAKE_S, ClosingNode, Parameters, repeated, run, spin, until_down
+from leg_wear_monitor.ros.parameters import Parameters
+from leg_wear_monitor.ros.running import WAKE_S, ClosingNode, repeated, run, spin, until_down
 from leg_wear_monitor.twin import CRANK, LOAD
 from leg_wear_monitor.twin.sample import (
     EMPTY,

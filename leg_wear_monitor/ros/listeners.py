@@ -27,7 +27,8 @@ from leg_wear_monitor.errors import ConfigError, LegWearError, printable
 from leg_wear_monitor.mechanism.loader import is_file_name, load_mechanism, shipped_mechanisms
 from leg_wear_monitor.messages import outputs
 from leg_wear_monitor.messages.leg_motion import MOTION
-from leg_wear_monitor.messages.streams import LATCHED, Output, Qos, topic_of
+from leg_wear_monitor.messages.qos import LATCHED, Qos
+from leg_wear_monitor.messages.streams import Output, topic_of
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.parameters import PARAMETERS, config_from
 from leg_wear_monitor.playback.result import ReplayStatus

@@ -20,7 +20,8 @@ from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.messages import outputs
 from leg_wear_monitor.messages.cdr import Decoder
 from leg_wear_monitor.messages.outputs import Messages
-from leg_wear_monitor.messages.streams import SENSOR_DATA, STREAMS, ForecastTimes
+from leg_wear_monitor.messages.qos import SENSOR_DATA
+from leg_wear_monitor.messages.streams import STREAMS, ForecastTimes
 from leg_wear_monitor.monitor.alarms import ADVICE, ALREADY_COUNTED, Alarm
 from leg_wear_monitor.monitor.config.fitting import acceleration_doubts, check_limits
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -32,7 +33,8 @@ from leg_wear_monitor.ros.health import Load, load_status, recording_status
 from leg_wear_monitor.ros.inputs import Inbox, Inputs
 from leg_wear_monitor.ros.measure import MeasureRequest, measured, offer_measure
 from leg_wear_monitor.ros.outputs import BlackBox, MarkerTopic, MotionTopic, Outlets
-from leg_wear_monitor.ros.running import ClosingNode, Parameters, release_memory, repeated, run, spin
+from leg_wear_monitor.ros.parameters import Parameters
+from leg_wear_monitor.ros.running import ClosingNode, release_memory, repeated, run, spin
 from leg_wear_monitor.ros.supervision import Supervision
 from leg_wear_monitor.state import Level, State
 from leg_wear_monitor.twin.sample import NO_FAULT, Samples

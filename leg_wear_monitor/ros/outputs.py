@@ -27,7 +27,8 @@ from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.messages.encode import LegDrawing
 from leg_wear_monitor.messages.leg_markers import LINKAGE, MARKERS, SILENT_NS, LegMarkers
 from leg_wear_monitor.messages.leg_motion import MOTION, LegMotion
-from leg_wear_monitor.messages.streams import Outgoing, Output, Qos
+from leg_wear_monitor.messages.qos import Qos
+from leg_wear_monitor.messages.streams import Outgoing, Output
 from leg_wear_monitor.monitor.reports import Reports, SampleReports
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.ros.running import until_down

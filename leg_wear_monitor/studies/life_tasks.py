@@ -13,13 +13,13 @@ from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper, Moment
 from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, build_tables
 from leg_wear_monitor.dynamics.run import DONE, RunStatistics, Setup, new_run_statistics, steady_drive, stop
 from leg_wear_monitor.errors import ConfigError, SimulationError
+from leg_wear_monitor.life.jumps import JumpControl
 from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
 from leg_wear_monitor.mechanism.arrays import Flags, Floats
 from leg_wear_monitor.mechanism.person import on_the_ground
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Film, Mechanism
 from leg_wear_monitor.studies.plan import Arrays
-from leg_wear_monitor.wear import JumpControl
 
 # Sampling grid of the studies.
 

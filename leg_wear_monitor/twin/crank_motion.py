@@ -8,7 +8,7 @@ import math
 
 from leg_wear_monitor.compiled.kernel import kernel
 from leg_wear_monitor.twin import CRANK, LOAD
-from leg_wear_monitor.twin.statistics import (
+from leg_wear_monitor.twin.steps import (
     AHEAD_NS,
     EVALUATE,
     LEAVE,

@@ -41,6 +41,7 @@ from leg_wear_monitor.twin.sampling import (
     condition_of,
     measured_load,
 )
+from leg_wear_monitor.twin.steps import Steps
 from leg_wear_monitor.twin.tracker import CrankTracker, TrackerSnapshot
 
 # A leg that follows blocks of gait cycles only, and whose other cycles wear as those do.
@@ -124,7 +125,7 @@ class SampledFollower(LegFollower):
         if snapshot.sampled is not None:
             self._sampled = copy.deepcopy(snapshot.sampled)
 
-    def _start(self, steps: statistics.Steps, i: int) -> statistics.Event:
+    def _start(self, steps: Steps, i: int) -> statistics.Event:
         self._give_up_cycle()  # after a failure
         event = super()._start(steps, i)
         own, motion = self._sampled, self.state.motion

@@ -16,23 +16,22 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.person import heavier_person_torque
 from leg_wear_monitor.mechanism.position import TURN, Linkage
 from leg_wear_monitor.twin import cycle, follower_state
-from leg_wear_monitor.twin import statistics as step_codes
+from leg_wear_monitor.twin import steps as step_codes
 from leg_wear_monitor.twin.following import CYCLE, LEFT, NEEDS_START, REPORTED, follow
 from leg_wear_monitor.twin.load import FootLoad, force_of, set_force, shape_torque, torque_size
 from leg_wear_monitor.twin.reference import LegParameters, drive_coupling
 from leg_wear_monitor.twin.sample import FOOT_FRAME, GROUND, INSTANT, MEASURED, STANCE, TwinSettings
 from leg_wear_monitor.twin.sampling import SampledState
 from leg_wear_monitor.twin.statistics import (
-    MOVE,
     CycleStatistics,
     Event,
     NotCompared,
     SampleStatistics,
-    Steps,
     TorqueProfile,
     TorqueStatistics,
     TwinEventKind,
 )
+from leg_wear_monitor.twin.steps import MOVE, Steps
 
 _DENT_M = 1.0e-5  # a third of the penetration under 10 kN
 _RUN_IN_S = 0.2

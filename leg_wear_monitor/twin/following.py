@@ -22,7 +22,7 @@ from leg_wear_monitor.twin.follower_state import (
     phase_of,
 )
 from leg_wear_monitor.twin.load import LONGEST_PUSH, in_mechanism, take_push
-from leg_wear_monitor.twin.statistics import EVALUATE, LEAVE, MOVE, PUSH, REPORT, START
+from leg_wear_monitor.twin.steps import EVALUATE, LEAVE, MOVE, PUSH, REPORT, START
 
 # Torque comparison for a sensor that samples instants instead of averages (physics.md section 9).
 #

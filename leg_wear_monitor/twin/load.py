@@ -28,7 +28,7 @@ from leg_wear_monitor.mechanism.person import PHASES, nominal_stance, upwards
 from leg_wear_monitor.mechanism.position import Linkage, one_cycle, point_motion
 from leg_wear_monitor.twin.follower_state import pass_low
 from leg_wear_monitor.twin.sample import GROUND, STANCE
-from leg_wear_monitor.twin.statistics import AHEAD_NS
+from leg_wear_monitor.twin.steps import AHEAD_NS
 
 # A measured force on the toe, at each point of the leg's tables.
 #

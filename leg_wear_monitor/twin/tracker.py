@@ -23,7 +23,7 @@ from leg_wear_monitor.twin.sample import (
     Samples,
     TrackerSettings,
 )
-from leg_wear_monitor.twin.statistics import (
+from leg_wear_monitor.twin.steps import (
     EVALUATE,
     LOST_BY_JUMP,
     LOST_BY_OUTLIERS,

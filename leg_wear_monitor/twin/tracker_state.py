@@ -7,7 +7,7 @@ import numpy as np
 from leg_wear_monitor.compiled.kernel import Record, Records, new_records, record_of
 from leg_wear_monitor.twin import KINDS
 from leg_wear_monitor.twin.sample import FAULTS, GAIT_SAMPLE, TrackerSettings
-from leg_wear_monitor.twin.statistics import SPLINE_NODE
+from leg_wear_monitor.twin.steps import SPLINE_NODE
 
 # State of the crank tracker: settings, counts, clocks, filter, queues.
 

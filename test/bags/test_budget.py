@@ -7,7 +7,8 @@ import lz4.frame
 import pytest
 import zstandard
 
-from leg_wear_monitor.bags.findings import Budget, DamageError, RecordingError
+from leg_wear_monitor.bags.budget import Budget
+from leg_wear_monitor.bags.findings import DamageError, RecordingError
 from leg_wear_monitor.errors import ConfigError
 
 LITTLE_MB = 16.0

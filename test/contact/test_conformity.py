@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.contact.arrays import (
+from leg_wear_monitor.contact.conformity import (
     NARROW_RAD,
     WIDEST_RAD,
     conformity_doubts,

@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from reynolds import film_numbers
 
-from leg_wear_monitor.contact.arrays import (
+from leg_wear_monitor.contact.film import (
     attitude_angle,
     film_damping,
     film_force,

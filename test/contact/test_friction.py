@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.contact.arrays import (
+from leg_wear_monitor.contact.friction import (
     AMBROSIO,
     FRICTION_CODES,
     NONE,

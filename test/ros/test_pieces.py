@@ -16,7 +16,8 @@ from rclpy.serialization import serialize_message
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.gait.sensors import Reading
 from leg_wear_monitor.messages.cdr import Decoder
-from leg_wear_monitor.messages.streams import JOINT_STATE, SENSOR_DATA, STREAMS, WRENCH_STAMPED
+from leg_wear_monitor.messages.qos import SENSOR_DATA
+from leg_wear_monitor.messages.streams import JOINT_STATE, STREAMS, WRENCH_STAMPED
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.ros.gait_publisher import PublisherConfig, sensor_message
 from leg_wear_monitor.ros.health import Load, load_status, recording_status, topics_status

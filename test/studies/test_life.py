@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.errors import SimulationError
+from leg_wear_monitor.life.jumps import JumpControl
 from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
 from leg_wear_monitor.studies.life_tasks import STATES, between, wear_life
-from leg_wear_monitor.wear import BUSHING, JumpControl
+from leg_wear_monitor.wear import BUSHING
 
 SETTINGS = {
     "clearance_joints": ["I", "J"], "clearance_m": 3.0e-4, "speed_rpm": 60.0, "perturb_fraction": 0.3,

@@ -213,7 +213,7 @@ def _mechanism(name: str) -> str:
 
     leg = load_mechanism(name)
     with common.compilation("mechanism", how_long="a few seconds"):
-        from leg_wear_monitor.contact.arrays import conformity_doubts
+        from leg_wear_monitor.contact.conformity import conformity_doubts
         from leg_wear_monitor.dynamics.simulation import prepare
 
         linkage = prepare(leg).linkage

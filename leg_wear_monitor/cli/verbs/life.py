@@ -91,10 +91,10 @@ def _lives(leg: "Mechanism", lives: int, opens_m: float | None, duty: str | None
     import numpy as np
 
     from leg_wear_monitor.contact.arrays import clearance_settings
+    from leg_wear_monitor.life.jumps import JumpControl
     from leg_wear_monitor.life.life import LifeSettings, check_life, simulate_lives
     from leg_wear_monitor.life.result import Duty
     from leg_wear_monitor.mechanism.materials import check_wear_is_known
-    from leg_wear_monitor.wear import JumpControl
 
     # options that were not given have the defaults of LifeSettings
     given = {name: value for name in ("legs", "cycles") if (value := options.pop(name)) is not None}

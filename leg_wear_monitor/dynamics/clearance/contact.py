@@ -30,16 +30,10 @@ from leg_wear_monitor.compiled.vectors import (
     zip_first,
     zip_last,
 )
-from leg_wear_monitor.contact.arrays import (
-    NONE,
-    THRELFALL,
-    ContactArrays,
-    against,
-    ambrosio_ramp,
-    film_force,
-    friction_force,
-    journal_contact,
-)
+from leg_wear_monitor.contact.arrays import ContactArrays
+from leg_wear_monitor.contact.film import film_force
+from leg_wear_monitor.contact.friction import NONE, THRELFALL, against, ambrosio_ramp, friction_force
+from leg_wear_monitor.contact.geometry import journal_contact
 from leg_wear_monitor.contact.normal import (
     LAWS,
     hertz_coefficient,

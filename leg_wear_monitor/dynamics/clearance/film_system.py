@@ -16,7 +16,8 @@ from numba import types
 
 from leg_wear_monitor.compiled.kernel import ByAddress, entry, kernel
 from leg_wear_monitor.compiled.vectors import WIDTH, only, padded, part_at, put_vector, vector_at, where
-from leg_wear_monitor.contact.arrays import ContactArrays, film_damping, film_stiffness
+from leg_wear_monitor.contact.arrays import ContactArrays
+from leg_wear_monitor.contact.film import film_damping, film_stiffness
 from leg_wear_monitor.dynamics.clearance.contact import (
     ADD_FILMS,
     CAM,

@@ -359,17 +359,15 @@ class References:
             return
         start, model, is_first = reference.parameters, self._models.explainer(state).model, not state.rounds
         state.rounds += 1
-        clearance_m, profile = known.clearance_m, reference.profile
+        clearance_m, profile, leg = known.clearance_m, reference.profile, self._mechanism
         if is_first and not (start.compliance or self._is_drive_known or self._is_on_ground):
-            found = leg_behind_coupling(self._mechanism, model.sensor, profile, known.mean)
+            found = leg_behind_coupling(leg, model.sensor, profile, known.mean)
             if found is not None:
                 state.parameters = found
                 self._begin(found, clearance_m, depth, profile)
                 return
         if is_first and not start.compliance and self._models.misfit(state) >= identification.FAR_FROM_FILE:
-            ideal = identification.leg_of_ideal_torque(
-                self._mechanism, model, known, profile.speed, start.load
-            )
+            ideal = identification.leg_of_ideal_torque(leg, model, known, profile.speed, start.load)
             start = attrs.evolve(ideal, load_sigma=start.load_sigma)
         state.is_identifying = True
         part = self._unfinished(start, profile, clearance_m, is_of_parameters=True)

@@ -24,6 +24,8 @@ from leg_wear_monitor.monitor.forecast.forecast import (
     forecast,
     no_law,
 )
+from leg_wear_monitor.monitor.forecast.growth import GrowthRate, GrowthWindow, all_extended, growth_rate
+from leg_wear_monitor.monitor.forecast.model_error import ModelError
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     ClearanceAtWear,
     CoefficientEstimate,
@@ -175,7 +177,7 @@ class ForecastState:
         Of the last forecast that was made.
     """
 
-    growth: tuple[measurement.GrowthWindow, ...]
+    growth: tuple[GrowthWindow, ...]
     coefficient_estimates: tuple[CoefficientEstimate, ...]
     last: Forecast | None = None
     stamp_ns: int = 0
@@ -223,7 +225,7 @@ class Forecaster:
             self._estimate(k, when) for k, when in zip(range(len(self._fresh_m)), replaced_ns, strict=True)
         )
         self.state = ForecastState(
-            tuple(measurement.GrowthWindow() for _ in self._clearance_joints),
+            tuple(GrowthWindow() for _ in self._clearance_joints),
             coefficient_estimates,
             observed=(None,) * len(self._clearance_joints),
         )
@@ -235,7 +237,7 @@ class Forecaster:
         limits_m: Sequence[float],
         is_valid: Callable[[], bool],
         sampling_sigma_m: Floats | None = None,
-        model: measurement.ModelError | None = None,
+        model: ModelError | None = None,
     ) -> Forecast:
         """Forecast after a gait cycle: a new one if it is due, else the last.
 
@@ -255,11 +257,11 @@ class Forecaster:
         """
         state = self.state
         if statistics.is_followed:
-            state.growth = measurement.all_extended(state.growth, statistics, self._settings.window_cycles)
+            state.growth = all_extended(state.growth, statistics, self._settings.window_cycles)
         is_recent = 0 <= statistics.stamp_ns - state.stamp_ns < RENEWED_NS
         if state.last is not None and is_recent and not statistics.is_followed:
             return state.last
-        rates = [measurement.growth_rate(window) for window in state.growth]
+        rates = [growth_rate(window) for window in state.growth]
         if state.last is None or not is_recent or _known(rates) > state.known:
             state.stamp_ns = statistics.stamp_ns
             return self.renewed(wear_m, limits_m, is_valid(), sampling_sigma_m, model)
@@ -271,15 +273,15 @@ class Forecaster:
         limits_m: Sequence[float],
         is_valid: bool,
         sampling_sigma_m: Floats | None = None,
-        model: measurement.ModelError | None = None,
+        model: ModelError | None = None,
     ) -> Forecast:
         """A new forecast from the present state; parameters as in `after`."""
         state = self.state
-        rates = [measurement.growth_rate(window) for window in state.growth]
+        rates = [growth_rate(window) for window in state.growth]
         state.known = _known(rates)
         if sampling_sigma_m is None:
             sampling_sigma_m = np.zeros(len(wear_m))
-        model = model or measurement.ModelError.none(len(wear_m))
+        model = model or ModelError.none(len(wear_m))
         now = [
             JointCondition(
                 joint=joint,
@@ -318,7 +320,7 @@ class Forecaster:
     def replaced(self, joint: str, replaced_ns: int) -> None:
         """Reset the estimate of a joint whose part changed to what is known of this part."""
         k, state = self._clearance_joints.index(joint), self.state
-        state.growth = _with(state.growth, k, measurement.GrowthWindow())
+        state.growth = _with(state.growth, k, GrowthWindow())
         self._update_coefficients(k, self._estimate(k, replaced_ns))
         self._observe(k, None)
 
@@ -429,7 +431,7 @@ class Forecaster:
         )
 
 
-def _known(rates: Sequence[measurement.GrowthRate | None]) -> int:
+def _known(rates: Sequence[GrowthRate | None]) -> int:
     return sum(rate is not None for rate in rates)
 
 

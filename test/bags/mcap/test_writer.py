@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.bags.mcap_writer import McapWriter
 from leg_wear_monitor.messages import encode
-from leg_wear_monitor.messages.streams import LATCHED, SENSOR_DATA, definition
+from leg_wear_monitor.messages.qos import LATCHED, SENSOR_DATA
+from leg_wear_monitor.messages.streams import definition
 
 mcap_reader = pytest.importorskip("mcap.reader")
 

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from leg_wear_monitor.contact.arrays import contact_modulus
+from leg_wear_monitor.contact.geometry import contact_modulus
 from leg_wear_monitor.contact.normal import LAWS, delivered_restitution, law_coefficient, normal_force
 
 pytestmark = pytest.mark.plain

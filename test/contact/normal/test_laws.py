@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.contact.arrays import contact_modulus
+from leg_wear_monitor.contact.geometry import contact_modulus
 from leg_wear_monitor.contact.normal import LAWS, elastic_energy, law_coefficient, normal_force, softening
 from leg_wear_monitor.mechanism import NORMAL_LAWS
 

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from leg_wear_monitor.contact.arrays import contact_modulus, half_angle_under_load
+from leg_wear_monitor.contact.conformity import half_angle_under_load
+from leg_wear_monitor.contact.geometry import contact_modulus
 from leg_wear_monitor.contact.normal import (
     LAWS,
     elastic_energy,

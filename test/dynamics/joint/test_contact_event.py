@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.contact.arrays import journal_contact
+from leg_wear_monitor.contact.geometry import journal_contact
 from leg_wear_monitor.dynamics.joint import DELTA, DELTA_DOT, NEVER, SAMPLE, first_contact_event
 
 pytestmark = pytest.mark.plain

@@ -8,7 +8,7 @@ from leg_wear_monitor import LegWearError, WearMonitor
 from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.forecast.forecast import Answer
 from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
-from leg_wear_monitor.monitor.forecast.measurement import ModelError
+from leg_wear_monitor.monitor.forecast.model_error import ModelError
 from leg_wear_monitor.monitor.forecast.wear_coefficients import ClearanceAtWear
 from leg_wear_monitor.twin.statistics import CycleStatistics
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.monitor.forecast.measurement import (
+from leg_wear_monitor.monitor.forecast.growth import (
     LEAST_CYCLES,
     GrowthRate,
     GrowthWindow,

@@ -6,7 +6,7 @@ import pytest
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.mechanism.person import PERSON_TOLERANCE, on_the_ground, with_person
-from leg_wear_monitor.monitor.forecast.measurement import ModelError, model_error
+from leg_wear_monitor.monitor.forecast.model_error import ModelError, model_error
 from leg_wear_monitor.twin.reference import MASS_TOLERANCE
 
 pytestmark = pytest.mark.plain

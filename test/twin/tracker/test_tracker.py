@@ -12,7 +12,7 @@ from numpy.polynomial import Polynomial
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.twin import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import Samples, TrackerSettings, gait_samples
-from leg_wear_monitor.twin.statistics import (
+from leg_wear_monitor.twin.steps import (
     EVALUATE,
     LEAVE,
     LOST_BY_JUMP,

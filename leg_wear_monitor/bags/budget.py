@@ -1,0 +1,70 @@
+"""Memory limit of a reader: independent of the sizes that a file declares, and with temporary files."""
+
+import attrs
+
+from leg_wear_monitor.bags.findings import DamageError
+from leg_wear_monitor.errors import ConfigError
+
+DEFAULT_MB = 512.0  # default of --memory-mb
+_MIN_MB = 16.0
+_MB = 1_000_000
+
+
+@attrs.define
+class Budget:
+    """Memory limit of a reader, and the bytes reserved until the recording is closed.
+
+    Parameters
+    ----------
+    megabytes : float
+        Memory limit [10⁶ bytes]; at least 16.
+
+    Raises
+    ------
+    ConfigError
+        If the limit is below 16 MB.
+    """
+
+    megabytes: float = DEFAULT_MB
+    reserved: int = attrs.field(init=False, default=0)
+
+    def __attrs_post_init__(self) -> None:
+        if not self.megabytes >= _MIN_MB:
+            text = f"{self.megabytes:g} MB is too little, expected at least {_MIN_MB:g} MB"
+            raise ConfigError("--memory-mb", "", text)
+
+    @property
+    def available(self) -> int:
+        """Bytes that are not reserved yet."""
+        most = min(self.megabytes, 1.0e12)  # infinity, which means no limit, has no integer
+        return max(0, int(most * _MB) - self.reserved)
+
+    @property
+    def part_limit(self) -> int:
+        """Bytes that one part of a file may use while it is read: half, the rest is for queued samples."""
+        return self.available // 2
+
+    def check(self, needed: int) -> None:
+        """Check that a part of a file fits into memory.
+
+        Raises
+        ------
+        DamageError
+            If it needs too much memory; the text is a predicate that follows the name of the part.
+        """
+        if needed > self.part_limit:
+            raise DamageError(
+                f"needs {needed / _MB:.0f} MB to be read, more than the {self.part_limit / _MB:.0f} MB that "
+                f"--memory-mb {self.megabytes:g} leaves for it"
+            )
+
+    def reserve(self, needed: int) -> None:
+        """Reserve bytes until the recording is closed, for example for a temporary file.
+
+        Raises
+        ------
+        DamageError
+        """
+        if needed > self.available:
+            raise DamageError(f"needs larger temporary files than --memory-mb {self.megabytes:g} allows")
+        self.reserved += needed

@@ -1,0 +1,311 @@
+"""Parameters of a node: from a configuration class, and as the tools of ROS 2 set, dump and load them."""
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from typing import Any, Generic, TypeVar
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
+from rclpy.node import Node
+from rclpy.parameter import Parameter as RosParameter
+from rclpy.service import Service
+from rclpy.subscription import Subscription
+from rosgraph_msgs.msg import Clock
+
+from leg_wear_monitor.errors import ConfigError, printable
+from leg_wear_monitor.monitor.config.parameters import (
+    Parameter,
+    changed,
+    parameters_of,
+    structured,
+    values_of,
+)
+
+# A node whose parameters, including empty lists, can be set, dumped, edited and loaded again.
+
+
+_ARRAYS = (
+    RosParameter.Type.BYTE_ARRAY,
+    RosParameter.Type.BOOL_ARRAY,
+    RosParameter.Type.INTEGER_ARRAY,
+    RosParameter.Type.DOUBLE_ARRAY,
+    RosParameter.Type.STRING_ARRAY,
+)
+
+_TYPES = frozenset(one.value for one in RosParameter.Type)
+
+_CLOCK = "use_sim_time"
+_NO_DOT = re.compile(r"[+-]?\d+e[+-]?\d+")  # YAML 1.1 reads it as text; Python prints 0.000001 like this
+
+
+class ParameterNode(Node):
+    """A node that converts values sent by ``ros2 param`` to the declared parameter type.
+
+    An empty list has no type in YAML: rcl passes it as an unset parameter, ``ros2 param`` sends it as a
+    boolean array. rclpy raises an exception for the first and rejects the second. ``ros2 param load`` sends
+    1e-06 as text.
+
+    Attributes
+    ----------
+    fault_of : callable
+        Why parameters cannot be set, empty if they can. It is asked before rclpy, which would name neither
+        unit nor bounds of a value that is out of range.
+    """
+
+    fault_of: Callable[[list[RosParameter]], str] = staticmethod(lambda _: "")
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """Parameter overrides by name, from files, arguments and the constructor; includes unknown names."""
+        return {name: plain(one) for name, one in self._parameter_overrides.items()}
+
+    def create_service(
+        self, srv_type: Any, srv_name: str, callback: Callable[[Any, Any], Any], **options: Any
+    ) -> Service:
+        """Create a service; rclpy creates those for parameters by this function, too.
+
+        Requests with a parameter of a type that does not exist do not reach the callback: rclpy raises an
+        exception for it, which ends the node.
+        """
+        if srv_type is SetParameters:
+            callback = _each_of_a_type(callback)
+        elif srv_type is SetParametersAtomically:
+            callback = _all_of_a_type(callback)
+        return super().create_service(srv_type, srv_name, callback, **options)
+
+    def create_subscription(
+        self, msg_type: Any, topic: str, callback: Callable[[Any], None], *options: Any, **named: Any
+    ) -> Subscription:
+        """Create a subscription; rclpy creates that of ``/clock`` by this function, too.
+
+        A time before 0 does not reach the callback: rclpy raises an exception for it, which ends the node.
+        """
+        if msg_type is Clock:
+            callback = self._times_of(callback)
+        return super().create_subscription(msg_type, topic, callback, *options, **named)
+
+    def _times_of(self, callback: Callable[[Any], None]) -> Callable[[Any], None]:
+        def take(message: Clock) -> None:
+            if message.clock.sec >= 0:
+                callback(message)
+            else:
+                self.get_logger().warning(
+                    f"{_CLOCK}: a time of {message.clock.sec} s on /clock is before 0 and is ignored",
+                    throttle_duration_sec=10.0,
+                )
+
+        return take
+
+    def set_parameters_atomically(self, parameter_list: list[RosParameter]) -> SetParametersResult:
+        """Set parameters, all or none.
+
+        Read-only parameters may be set to their present value, so that a dump can be loaded. The clock cannot
+        be changed either: accounting and audit must not continue with another clock.
+        """
+        wanted = [self._typed(one) for one in parameter_list]
+        changes = [one for one in wanted if not self._stands(one)]
+        if wanted and not changes:
+            return SetParametersResult(successful=True)
+        if any(one.name == _CLOCK for one in changes):
+            reason = f"{_CLOCK}: is read only at the start; start the node again with it"
+            return SetParametersResult(successful=False, reason=reason)
+        if all(map(self._can_be_set, changes)) and (fault := self.fault_of(changes)):
+            return SetParametersResult(successful=False, reason=fault)
+        return super().set_parameters_atomically(changes)
+
+    def _can_be_set(self, one: RosParameter) -> bool:
+        """Whether a parameter is declared, of this type and not read-only; rclpy refuses the others."""
+        if not self.has_parameter(one.name):
+            return False
+        declared = self.describe_parameter(one.name)
+        return declared.type == one.type_.value and not declared.read_only
+
+    def _typed(self, one: RosParameter) -> RosParameter:
+        """The parameter, converted to the declared type where the sender could not know that type."""
+        if not self.has_parameter(one.name):
+            return one
+        declared = RosParameter.Type(self.describe_parameter(one.name).type)
+        if declared in _ARRAYS and one.type_ in _ARRAYS and not len(one.value):
+            return RosParameter(one.name, declared, [])
+        if (
+            declared is RosParameter.Type.DOUBLE
+            and isinstance(one.value, str)
+            and _NO_DOT.fullmatch(one.value)
+        ):
+            return RosParameter(one.name, declared, float(one.value))
+        return one
+
+    def _stands(self, one: RosParameter) -> bool:
+        """Whether a parameter is read-only and already has this value."""
+        if not self.has_parameter(one.name):
+            return False
+        if not self.describe_parameter(one.name).read_only and one.name != _CLOCK:
+            return False
+        now = self.get_parameter(one.name)
+        return now.type_ is one.type_ and plain(now) == plain(one)
+
+
+def _type_fault(parameter: ParameterMessage) -> str:
+    """Why a parameter of a request is none; empty if it is one."""
+    if parameter.value.type in _TYPES:
+        return ""
+    name = printable(parameter.name, 100)
+    return f"{name}: {parameter.value.type} is no type of a parameter, expected 0 to {max(_TYPES)}"
+
+
+def _each_of_a_type(
+    callback: Callable[[SetParameters.Request, SetParameters.Response], SetParameters.Response],
+) -> Callable[[SetParameters.Request, SetParameters.Response], SetParameters.Response]:
+    def answer(request: SetParameters.Request, response: SetParameters.Response) -> SetParameters.Response:
+        for one in request.parameters:
+            if fault := _type_fault(one):
+                response.results.append(SetParametersResult(successful=False, reason=fault))
+            else:
+                callback(SetParameters.Request(parameters=[one]), response)  # appends its result
+        return response
+
+    return answer
+
+
+def _all_of_a_type(
+    callback: Callable[[SetParametersAtomically.Request, SetParametersAtomically.Response], Any],
+) -> Callable[[SetParametersAtomically.Request, SetParametersAtomically.Response], Any]:
+    def answer(
+        request: SetParametersAtomically.Request, response: SetParametersAtomically.Response
+    ) -> SetParametersAtomically.Response:
+        if fault := next(filter(None, map(_type_fault, request.parameters)), ""):
+            response.result = SetParametersResult(successful=False, reason=fault)
+            return response
+        return callback(request, response)
+
+    return answer
+
+
+def plain(parameter: RosParameter) -> Any:
+    """Value as in a parameter file; ROS uses several array types, and passes an empty list as unset."""
+    value = parameter.value
+    if parameter.type_ is RosParameter.Type.NOT_SET:
+        return []
+    return value if isinstance(value, bool | int | float | str) else list(value)
+
+
+# Parameters of a node from a configuration class: reading, validation, description, changes.
+
+
+Config = TypeVar("Config")
+
+# parameters of every node, handled by rclpy itself
+_LARGEST = 2**63 - 1  # of an integer parameter
+_OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides.")
+
+
+class Parameters(Generic[Config]):
+    """Parameters of a node.
+
+    Unknown parameter names are rejected; rclpy would ignore them.
+
+    Parameters
+    ----------
+    node : ParameterNode
+    kind : type
+        Configuration class, such as ``MonitorConfig``.
+    empty : mapping of str to str, optional
+        Values of text parameters that are missing or empty, by name.
+
+    Attributes
+    ----------
+    config
+        Present configuration, an instance of ``kind``.
+
+    Raises
+    ------
+    ConfigError
+        If a value is invalid; the message names node, parameter, value, unit and expectation.
+    """
+
+    def __init__(
+        self, node: ParameterNode, kind: type[Config], empty: Mapping[str, str] | None = None
+    ) -> None:
+        self._source = node.get_fully_qualified_name()
+        given = {name: value for name, value in node.given.items() if not name.startswith(_OF_ROS)}
+        given |= {name: text for name, text in (empty or {}).items() if not given.get(name)}
+        self.config: Config = structured(kind, given, self._source)
+        for name, value in values_of(self.config).items():
+            _declare(node, parameters_of(kind)[name], value)
+
+    def follow(
+        self,
+        node: ParameterNode,
+        changed_to: Callable[[Config], None],
+        check_fit: Callable[[Config], None] = lambda _: None,
+    ) -> None:
+        """Allow parameter changes while the node runs, and report each accepted change.
+
+        Parameters
+        ----------
+        node : ParameterNode
+        changed_to : callable
+        check_fit : callable, optional
+            Raises ConfigError for values that are valid on their own but inconsistent with the node's state.
+        """
+
+        def fault_of(parameters: list[RosParameter]) -> str:
+            try:
+                check_fit(self._with(parameters))
+            except ConfigError as error:
+                return str(error)
+            return ""
+
+        def take(parameters: list[RosParameter]) -> None:
+            self.config = self._with(parameters)
+            changed_to(self.config)
+
+        node.fault_of = fault_of
+        node.add_post_set_parameters_callback(take)
+
+    def _with(self, parameters: list[RosParameter]) -> Config:
+        known = values_of(self.config)
+        changes = {one.name: plain(one) for one in parameters if one.name in known}
+        return changed(self.config, changes, self._source)
+
+
+def _range(parameter: Parameter) -> dict[str, Any]:
+    """Field of a descriptor with the bounds of one number; without bounds, none.
+
+    A lower bound that is excluded is part of the range, which cannot exclude it; it is refused by the check.
+    The step is 0, for any value between.
+    """
+    bounds = (parameter.above, parameter.at_least, parameter.at_most)
+    if parameter.type not in ("double", "integer") or all(bound is None for bound in bounds):
+        return {}
+    least = parameter.above if parameter.at_least is None else parameter.at_least
+    if parameter.type == "double":
+        begin = -math.inf if least is None else float(least)
+        end = math.inf if parameter.at_most is None else float(parameter.at_most)
+        return {"floating_point_range": [FloatingPointRange(from_value=begin, to_value=end, step=0.0)]}
+    first = -_LARGEST if least is None else math.ceil(least)
+    last = _LARGEST if parameter.at_most is None else math.floor(parameter.at_most)
+    return {"integer_range": [IntegerRange(from_value=first, to_value=last, step=0)]}
+
+
+def _declare(node: ParameterNode, parameter: Parameter, value: Any) -> None:
+    unit = f" [{parameter.unit}]" if parameter.unit else ""
+    descriptor = ParameterDescriptor(
+        description=f"{parameter.description}{unit}",
+        additional_constraints=parameter.bounds,
+        read_only=parameter.read_only,
+        **_range(parameter),
+    )
+    if isinstance(value, tuple) and not value:
+        # rclpy treats an empty array as one of bytes; an unset parameter breaks every reply that contains it
+        kind = RosParameter.Type[parameter.type.upper()]
+        node.declare_parameter(parameter.name, kind, ParameterDescriptor(), ignore_override=True)
+        node.set_parameters_atomically([RosParameter(parameter.name, kind, [])])
+        descriptor.type = kind.value
+        node.set_descriptor(parameter.name, descriptor)
+        return
+    node.declare_parameter(
+        parameter.name, list(value) if isinstance(value, tuple) else value, descriptor, ignore_override=True
+    )

@@ -15,6 +15,7 @@ import numpy as np
 
 from leg_wear_monitor.estimate.cause import Cause
 from leg_wear_monitor.estimate.explanations import Nuisance
+from leg_wear_monitor.estimate.least_squares import Point, gauss_newton
 from leg_wear_monitor.estimate.signature import (
     DIRECT,
     Channel,
@@ -78,7 +79,9 @@ UNDECLARED = DriveFigures()
 # tried delays, from an offset of 0.13 rad at 60 rpm to a lag of 40 ms, and low-passes of 100 to 10 Hz
 _DELAYS_S = 0.005 * np.arange(-4, 9)
 _TIME_CONSTANTS_S = (0.0, *(1.0 / (TURN * hz) for hz in (100.0, 70.0, 50.0, 35.0, 25.0, 20.0, 14.0, 10.0)))
-_REFINEMENT_STEPS_S = (0.0025, 0.00125)  # later steps to both sides of the best delay
+_STEP_S = 0.0025  # to both sides of the best of these delays
+# from the best of them on: differences for derivatives, longest steps, and those after which it is enough
+_DIFFERENCE_S, _LONGEST_S, _DONE_S = 0.0005, 0.0025, 0.0001
 _CYCLES = 20  # simulated gait cycles; enough for a mean signature
 # A channel has to lower the mean square of the residual by this much, compared with none: unknown masses and
 # lengths change it by about 0.2 (docs/explanation/diagnosis.md).
@@ -103,7 +106,7 @@ _SPREAD_FACTOR = 5.0  # times `Nuisance.spread`, the usual change of a known leg
 _HARMONICS, _HARMONIC_NM = 16, 100.0
 
 
-@attrs.frozen
+@attrs.frozen(eq=False)
 class ChannelFit:
     """A channel that explains a measured signature.
 
@@ -117,12 +120,15 @@ class ChannelFit:
         unknown load hides it.
     misfit : float
         Minus twice the logarithm of the likelihood, up to a constant; compares hypotheses.
+    rest : (m,) array
+        What is left of the signature, and of the prior, in standard deviations.
     """
 
     channel: Channel
     square: float
     load_friction_sigma: float
     misfit: float
+    rest: Floats = attrs.field(repr=False)
 
 
 def with_channel_of(
@@ -205,7 +211,7 @@ class _Hypothesis:
     """
 
     def __init__(self, covariance: Floats, friction: float, friction_sigma: float) -> None:
-        self._weight = np.linalg.inv(covariance)
+        self._whiten = np.linalg.inv(np.linalg.cholesky(covariance))
         self._friction, self._sigma = friction, friction_sigma
         self._log_size = float(np.linalg.slogdet(covariance)[1])
 
@@ -224,25 +230,34 @@ class _Hypothesis:
         clearances : (k, F) array
             Change by one standard deviation of each clearance.
         """
-        columns = np.vstack([clearances, self._sigma * friction_change])  # unit prior variance
-        residual = residual - self._friction * friction_change
-        information = columns @ self._weight @ columns.T + np.eye(len(columns))
+        # each with a prior variance of 1
+        columns = np.vstack([clearances, self._sigma * friction_change]) @ self._whiten.T
+        residual = self._whiten @ (residual - self._friction * friction_change)
+        information = columns @ columns.T + np.eye(len(columns))
         covariance = np.linalg.inv(information)
-        x = covariance @ (columns @ self._weight @ residual)
+        x = covariance @ (columns @ residual)
         friction = self._friction + self._sigma * float(x[-1])
         sigma = math.hypot(self._sigma * float(covariance[-1, -1]) ** 0.5, _FRICTION_ERROR)
         if not 0.0 <= friction <= _MOST_FRICTION:
             friction = min(max(friction, 0.0), _MOST_FRICTION)
             # the clearances that are best with the friction at its bound
             x += covariance[-1] * ((friction - self._friction) / self._sigma - x[-1]) / covariance[-1, -1]
-        remaining = residual - x @ columns
-        square = float(remaining @ self._weight @ remaining + x @ x)
+        rest = np.concatenate([residual - x @ columns, x])
+        square = float(rest @ rest)
         return ChannelFit(
             channel=attrs.evolve(channel, load_friction=friction),
             square=square / len(residual),
             load_friction_sigma=sigma if self._sigma else math.nan,
             misfit=square + self._log_size + float(np.linalg.slogdet(information)[1]),
+            rest=rest,
         )
+
+
+@attrs.frozen(eq=False)
+class _Tried(Point):
+    """A channel under way."""
+
+    fit: ChannelFit
 
 
 def _best_channel(
@@ -263,8 +278,7 @@ def _best_channel(
         Of the low-passes to try; without 0, a low-pass is declared.
     """
 
-    def fit_of(time_constant_s: float, delay_s: float) -> ChannelFit:
-        channel = Channel(delay_s=delay_s, time_constant_s=time_constant_s)
+    def fit_of(channel: Channel) -> ChannelFit:
         rubbing = attrs.evolve(channel, load_friction=_FRICTION_STEP)
         friction_change = (residual(channel) - residual(rubbing)) / _FRICTION_STEP
         return hypothesis.fit(channel, residual(channel), friction_change, clearances(channel))
@@ -273,21 +287,43 @@ def _best_channel(
         return min(fits, key=lambda fit: fit.square)
 
     # without delay and low-pass: with load friction if it is clearly better
-    direct, none = fit_of(0.0, 0.0), np.zeros_like(residual(DIRECT))
+    direct, none = fit_of(DIRECT), np.zeros_like(residual(DIRECT))
     frictionless = hypothesis.fit(DIRECT, residual(DIRECT), none, clearances(DIRECT))
     if frictionless.square - direct.square < _FRICTION_IMPROVEMENT:
         sigma = direct.load_friction_sigma
         direct = attrs.evolve(frictionless, channel=DIRECT, load_friction_sigma=sigma)
-    # with delay and low-pass: on a grid of delays, then in finer steps about the best one
+    # with delay and low-pass: on a grid of both, then on from the best one
     others = []
     for time_constant_s in time_constants_s:
-        fits = {delay_s: fit_of(time_constant_s, delay_s) for delay_s in _DELAYS_S.tolist()}
-        for step_s in _REFINEMENT_STEPS_S:
-            middle_s = min(fits, key=lambda delay_s: fits[delay_s].square)
-            fits |= {at_s: fit_of(time_constant_s, at_s) for at_s in (middle_s - step_s, middle_s + step_s)}
-        others.append(least(fits.values()))
-    other, is_declared = least(others), 0.0 not in time_constants_s
+        tried = [Channel(delay_s=delay_s, time_constant_s=time_constant_s) for delay_s in _DELAYS_S.tolist()]
+        best = least(fit_of(channel) for channel in tried).channel
+        tried = [attrs.evolve(best, delay_s=best.delay_s + step_s) for step_s in (-_STEP_S, 0.0, _STEP_S)]
+        others.append(least(fit_of(attrs.evolve(channel, load_friction=0.0)) for channel in tried))
+    is_declared = 0.0 not in time_constants_s
+    other = _refined(fit_of, least(others).channel, is_declared)
     return other if is_declared or other.square < direct.square - _CHANNEL_IMPROVEMENT else direct
+
+
+def _refined(fit_of: Callable[[Channel], ChannelFit], near: Channel, is_declared: bool) -> ChannelFit:
+    """The best channel near one of the grid; a low-pass that is declared, and none, stay as they are."""
+    free = 1 if is_declared or near.time_constant_s == 0.0 else 2
+    near = attrs.evolve(near, load_friction=0.0)
+
+    def channel(x: Floats) -> Channel:
+        return attrs.evolve(near, **dict(zip(("delay_s", "time_constant_s"), x.tolist(), strict=False)))
+
+    def at(x: Floats) -> _Tried:
+        fit = fit_of(channel(x))
+
+        def slopes() -> Floats:
+            moved = x + _DIFFERENCE_S * np.eye(free)
+            return np.array([fit_of(channel(one)).rest - fit.rest for one in moved]).T / _DIFFERENCE_S
+
+        return _Tried(fit.rest, slopes, fit)
+
+    start = np.array([near.delay_s, near.time_constant_s])[:free]
+    low = np.array([-np.inf, _DIFFERENCE_S])[:free]
+    return gauss_newton(at, start, low=low, longest=_LONGEST_S, done=_DONE_S).point.fit
 
 
 def _clearance_columns(reference: TorqueReference, sensor: TorqueSensor) -> Floats:

@@ -86,8 +86,9 @@ ALL = Drive(
 )  # fmt: skip
 DRIVES = {
     "none": Drive(),
-    **{f"lag {ms} ms": Drive(lag_s=1e-3 * ms) for ms in (5, 10, 20, 30)},
-    **{f"low-pass {hz} Hz": Drive(hz=float(hz)) for hz in (20, 35, 50)},
+    **{f"lag {ms} ms": Drive(lag_s=1e-3 * ms) for ms in (5, 10, 13, 20, 30)},
+    # the search for the channel begins at 20, 35 and 50 Hz, 5, 10, 20 and 30 ms: others lie between
+    **{f"low-pass {hz:g} Hz": Drive(hz=hz) for hz in (17.0, 20.0, 22.4, 29.6, 35.0, 50.0)},
     **{f"load friction {eta:g}": Drive(load_friction=eta) for eta in (0.1, 0.2, 0.3)},
     "Coulomb 1 N m": Drive(coulomb_nm=1.0),
     "viscous 1.4 N m s": Drive(viscous_nms=1.4),
@@ -99,6 +100,7 @@ DRIVES = {
     "steps of 0.1 N m": Drive(quantum_nm=0.1),
     "2 % lost": Drive(loss=0.02),
     "friction 0.2, 35 Hz, 5 ms": Drive(load_friction=0.2, hz=35.0, lag_s=0.005),
+    "friction 0.2, 29.6 Hz, 7 ms": Drive(load_friction=0.2, hz=29.6, lag_s=0.007),
     "all": ALL,
     **{
         f"{name}, {stiffness:g} N m/rad": attrs.evolve(drive, stiffness_nm_per_rad=stiffness)

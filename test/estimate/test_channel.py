@@ -38,6 +38,16 @@ def test_lag_low_pass_and_load_friction_are_found_in_the_air(known):
     assert found.load_friction_sigma < 0.04
 
 
+@pytest.mark.parametrize(("hz", "delay_s"), [(17.0, 0.0), (22.4, 0.0), (29.6, 0.0072)])
+def test_a_low_pass_is_found_whatever_its_corner_frequency(known, hz, delay_s):
+    """Such corner frequencies are the furthest from those with which the search begins."""
+    reference, sensor, columns = known
+    drive = Channel(delay_s=delay_s, time_constant_s=1.0 / (TURN * hz))
+    found = channel_of(reference, sensor, behind(known, drive), columns).channel
+    assert found.time_constant_s == pytest.approx(drive.time_constant_s, rel=0.05)
+    assert found.lateness_s == pytest.approx(drive.lateness_s, abs=0.0003)
+
+
 @pytest.mark.parametrize("channel", [pytest.param(DIRECT, marks=pytest.mark.slow), DRIVE])
 def test_a_leg_that_is_commissioned_with_a_worn_joint_has_its_right_channel(known, leg, channel):
     """Lateness, by joints: 1.0 ± 0.1 and 0.8 ± 0.1 ms RMS (25 draws of cycles); 1.9 if as counted."""

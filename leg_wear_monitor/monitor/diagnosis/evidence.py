@@ -99,32 +99,46 @@ class Evidence:
 
     def _explain(self, state: TorqueState, config: MonitorConfig) -> None:
         """Renew the clearances, and the change if there is one."""
-        detector = self._models.detector(state, config)
-        found = detector.detection(state.detector) if state.detector else None
-        since_ns = state.changes[-1].since_ns if state.changes else found.since_ns if found else 0
+        # the gait cycles since the change, if there is one: often at first, then now and then
+        since_ns = self._since_ns(state, config)
         cycles = [cycle for cycle in state.cycles if cycle.begin_ns >= since_ns]
-        is_due = state.fit_due <= 0 or (since_ns and len(cycles) <= SETTLING_CYCLES)  # often at first
+        is_due = state.fit_due <= 0 or (since_ns and len(cycles) <= SETTLING_CYCLES)
         if len(cycles) < self._least_cycles(state) or not is_due:
             state.fit_due -= 1
             return
         state.fit_due = _FIT_EVERY - 1
-        mean, change = np.mean([cycle.signature for cycle in cycles], axis=0), None
+        # single causes: of a change, and of a leg that was never commissioned
+        mean = np.mean([cycle.signature for cycle in cycles], axis=0)
         explanations: Sequence[Explanation] = ()
         if since_ns or state.commissioned is None:
             explanations = self._models.explainer(state).explanations(mean, len(cycles), state.counted_m)
-        is_known = bool(state.commissioned or state.changes or self._fits(state, explanations, since_ns))
-        if since_ns and is_known:
-            change = self._change(state, explanations, since_ns)
-        if since_ns:
-            if change is not None:
-                state.changes = (change,)
-            elif len(cycles) >= SETTLING_CYCLES:  # what was detected does not last
-                state.changes, state.detector = (), detector.fresh()
-        if not is_known:
+        # a leg that is not that of the reference has no names and no clearances
+        if not (state.commissioned or state.changes or self._fits(state, explanations, since_ns)):
+            self._tell(state, None, since_ns, len(cycles), config)
             state.fit, state.least_m = None, ()
-        else:
-            self._fit(state, mean, len(cycles), change, explanations if since_ns else ())
-            self._keep_least(state, change, config)
+            return
+        change = self._change(state, explanations, since_ns) if since_ns else None
+        self._tell(state, change, since_ns, len(cycles), config)
+        # all clearances at once
+        self._fit(state, mean, len(cycles), change, explanations if since_ns else ())
+        self._keep_least(state, change, config)
+
+    def _since_ns(self, state: TorqueState, config: MonitorConfig) -> int:
+        """Stamp since when the leg has changed, as told before or as detected now; 0 where it has not."""
+        if state.changes:
+            return state.changes[-1].since_ns
+        detector = self._models.detector(state, config)
+        found = detector.detection(state.detector) if state.detector else None
+        return found.since_ns if found else 0
+
+    def _tell(
+        self, state: TorqueState, change: Change | None, since_ns: int, cycles: int, config: MonitorConfig
+    ) -> None:
+        """Tell a change; where none explains what was detected once it had time to settle, test anew."""
+        if change is not None:
+            state.changes = (change,)
+        elif since_ns and cycles >= SETTLING_CYCLES:
+            state.changes, state.detector = (), self._models.detector(state, config).fresh()
 
     def _least_cycles(self, state: TorqueState) -> int:
         """Gait cycles since a change before it is explained."""

@@ -80,7 +80,13 @@ def gauss_newton(
     point = model(x)
     slopes = point.slopes()
     for _ in range(_ROUNDS):
-        step = solved(slopes, -point.rest)
+        # what is at its bound and would go beyond stays there, or the others would move as if it had gone
+        downhill = -slopes.T @ point.rest
+        free = ~((x <= low) & (downhill < 0.0) | (x >= high) & (downhill > 0.0))
+        if not free.any():
+            break
+        step = np.zeros_like(x)
+        step[free] = solved(slopes[:, free], -point.rest)
         gain = slopes @ step
         if float(gain @ gain) < _LESS * point.square:  # by so much the square would become less
             break

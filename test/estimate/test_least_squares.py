@@ -40,6 +40,19 @@ def test_bounds_hold_and_a_bounded_step_is_shorter() -> None:
     assert one.x.tolist() == [0.5, -0.5]
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_the_least_square_in_a_box_is_found_where_columns_are_correlated(seed: int) -> None:
+    """By its law: downhill is inside only where it is out of the box."""
+    random = np.random.default_rng(seed)
+    matrix = random.standard_normal((40, 4)) @ (np.eye(4) + 0.9)
+    at = linear(matrix, matrix @ random.uniform(-2.0, 2.0, 4) + random.standard_normal(40))
+    found = gauss_newton(at, np.zeros(4), low=-1.0, high=1.0)
+    downhill = -matrix.T @ found.point.rest
+    inside = np.abs(found.x) < 1.0
+    np.testing.assert_allclose(downhill[inside], 0.0, atol=1e-5)
+    assert (downhill * found.x)[~inside].min(initial=0.0) >= 0.0
+
+
 def test_a_point_that_cannot_be_is_not_gone_to() -> None:
     def at(x: Floats) -> Point:
         return Point(np.array([x[0] - 3.0 if x[0] < 2.0 else np.inf]), lambda: np.eye(1))

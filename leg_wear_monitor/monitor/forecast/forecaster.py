@@ -175,6 +175,8 @@ class ForecastState:
         What encoders show of each joint, where the estimate uses it.
     basis : ForecastBasis or None
         Of the last forecast that was made.
+    measurements, corrections : tuples of Measurement, CorrectedClearance
+        Of the ledger, and since.
     """
 
     growth: tuple[GrowthWindow, ...]
@@ -184,6 +186,8 @@ class ForecastState:
     known: int = 0
     observed: tuple[ClearanceAtWear | None, ...] = ()
     basis: ForecastBasis | None = None
+    measurements: tuple[Measurement, ...] = ()
+    corrections: tuple[CorrectedClearance, ...] = ()
 
 
 class Forecaster:
@@ -219,15 +223,16 @@ class Forecaster:
         self._clearances = [mechanism.clearances[joint] for joint in mechanism.clearance_joints]
         self._fresh_m = [clearance.radial_clearance for clearance in self._clearances]
         self._law = law_of(mechanism, settings.life, settings.model_sigma)
-        self._measurements, self._corrections = list(measurements), list(corrections)
         self._priors = prior_source(mechanism, settings)
-        coefficient_estimates = tuple(
-            self._estimate(k, when) for k, when in zip(range(len(self._fresh_m)), replaced_ns, strict=True)
-        )
         self.state = ForecastState(
-            tuple(GrowthWindow() for _ in self._clearance_joints),
-            coefficient_estimates,
+            growth=tuple(GrowthWindow() for _ in self._clearance_joints),
+            coefficient_estimates=(),
             observed=(None,) * len(self._clearance_joints),
+            measurements=tuple(measurements),
+            corrections=tuple(corrections),
+        )
+        self.state.coefficient_estimates = tuple(
+            self._estimate(k, when) for k, when in zip(range(len(self._fresh_m)), replaced_ns, strict=True)
         )
 
     def after(
@@ -310,12 +315,12 @@ class Forecaster:
     @property
     def measurements(self) -> tuple[Measurement, ...]:
         """Of the ledger, and since."""
-        return tuple(self._measurements)
+        return self.state.measurements
 
     def last_measured(self, replaced_ns: Sequence[int]) -> tuple[Measurement | None, ...]:
         """Last measurement of each joint's present part, None without one."""
         parts = zip(self._clearance_joints, replaced_ns, strict=True)
-        return tuple(measurement.last_measured(self._measurements, joint, when) for joint, when in parts)
+        return tuple(measurement.last_measured(self.state.measurements, joint, when) for joint, when in parts)
 
     def replaced(self, joint: str, replaced_ns: int) -> None:
         """Reset the estimate of a joint whose part changed to what is known of this part."""
@@ -326,7 +331,7 @@ class Forecaster:
 
     def corrected(self, correction: CorrectedClearance) -> None:
         """Count the wear of a joint from a corrected clearance on."""
-        self._corrections.append(correction)
+        self.state.corrections += (correction,)
         self.replaced(correction.joint, correction.replaced_ns)
 
     def measured(
@@ -346,7 +351,7 @@ class Forecaster:
             self._settings,
             self._clearances[k],
             wear,
-            self._measurements,
+            self.state.measurements,
             clearance_m=clearance_m,
             sigma_m=sigma_m,
             stamp_ns=stamp_ns,
@@ -354,9 +359,9 @@ class Forecaster:
             kept_ns=kept_ns,
             accept=accept,
             prior=self._priors.prior(wear.name, wear.replaced_ns),
-            corrections=self._corrections,
+            corrections=self.state.corrections,
         )
-        self._measurements.append(found.measurement)
+        self.state.measurements += (found.measurement,)
         self._update_coefficients(k, found.after)
         return found
 
@@ -403,13 +408,13 @@ class Forecaster:
     def _estimate(self, k: int, replaced_ns: int, *further: ClearanceAtWear) -> CoefficientEstimate:
         """Estimate for a part, from its prior, the measurements that count, and further ones."""
         joint = self._clearance_joints[k]
-        observations = measurement.observations_of(self._measurements, joint, replaced_ns)
+        observations = measurement.observations_of(self.state.measurements, joint, replaced_ns)
         return estimate_coefficient(
             self._settings,
             self._fresh_m[k],
             [*observations, *further],
             self._priors.prior(joint, replaced_ns),
-            corrections_of(self._corrections, joint, replaced_ns),
+            corrections_of(self.state.corrections, joint, replaced_ns),
         )
 
     def _observe(self, k: int, observation: ClearanceAtWear | None) -> None:

@@ -10,6 +10,7 @@ from leg_wear_monitor.monitor.forecast.forecast import Answer
 from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
 from leg_wear_monitor.monitor.forecast.model_error import ModelError
 from leg_wear_monitor.monitor.forecast.wear_coefficients import ClearanceAtWear
+from leg_wear_monitor.monitor.ledger.entry import CorrectedClearance
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
 SECOND = 10**9
@@ -128,3 +129,20 @@ def test_the_monitor_forecasts_and_learns(leg, gait):
     assert again == first
     with pytest.raises(LegWearError, match="'Z' is not a clearance joint"):
         monitor.measure("Z", 3e-4, 1e-6, 0, "ann")
+
+
+@pytest.mark.plain
+def test_a_restored_forecaster_knows_nothing_of_a_later_correction(forecaster):
+    def estimated():
+        forecaster.use_estimate(0, ClearanceAtWear(3.4e-4, 2e-5, 3e-5), 0)
+        return forecaster.state.coefficient_estimates[0].known.clearance_m
+
+    snapshot = attrs.evolve(forecaster.state)
+    before = estimated()
+    correction = CorrectedClearance(
+        stamp_ns=1, joint="A", clearance_m=1e-3, sigma_m=1e-4, before_m=1e-5, wear_m=7e-4, replaced_ns=0
+    )
+    forecaster.corrected(correction)
+    assert estimated() == pytest.approx(1e-3)
+    forecaster.state = attrs.evolve(snapshot)
+    assert estimated() == before

@@ -157,8 +157,8 @@ class _Leg:
         self._torques = functools.lru_cache(maxsize=3)(self._torques_of)
         self._direction = math.copysign(1.0, profile.speed)
         # of the torque after its friction, all that the sensor shows is linear: (points, phases)
-        linear, step_s = attrs.evolve(sensor.channel, load_friction=0.0), TURN / abs(profile.speed) / POINTS
-        self._seen = linear.received(np.eye(POINTS), step_s, self._direction) @ _phase_means(sensor.phases)
+        shown = [signature_of_torque(one, sensor, profile.speed) for one in np.eye(POINTS)]
+        self._seen = np.array(shown)[:, : sensor.phases]
 
     def stance(self, x: Floats) -> Stance:
         """When the foot stands."""
@@ -201,12 +201,6 @@ class _Leg:
         mean, sigma = self._friction
         friction = mean + sigma * x[:, 4:5]
         return np.asarray((torque + self._direction * friction * np.abs(torque)) @ self._seen)
-
-
-@functools.cache
-def _phase_means(phases: int) -> Floats:
-    """Means (points, phases) of each phase of a gait cycle, of torques at the points of the tables."""
-    return np.array([signature_of_torque(one, phases)[:phases] for one in np.eye(POINTS)])
 
 
 def _shapes(stance: Stance, points: int) -> tuple[Floats, Floats]:

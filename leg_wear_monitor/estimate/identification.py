@@ -148,7 +148,7 @@ def leg_of_ideal_torque(
 
     def residual(x: Floats) -> Floats:
         torque = ideal_torque(bodies_at(x).applied(mechanism), speed) - of_file
-        left = _harmonics(signature_of_torque(torque, phases)[:phases] - rest)
+        left = _harmonics(signature_of_torque(torque, model.sensor, speed)[:phases] - rest)
         return np.concatenate([left / unit, x])
 
     def at(x: Floats) -> Point:

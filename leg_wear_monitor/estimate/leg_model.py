@@ -8,9 +8,9 @@ from leg_wear_monitor.estimate.cause import Cause
 from leg_wear_monitor.estimate.explanations import Baseline, Explainer, LeftOut, Nuisance, OtherChannel
 from leg_wear_monitor.estimate.signature import (
     CommissionedTorque,
+    SimulatedSensor,
     TorqueSensor,
     signature_model,
-    signature_of_torque,
     simulated_signatures,
 )
 from leg_wear_monitor.mechanism.arrays import Floats
@@ -40,6 +40,7 @@ _ROUGHNESS_ERROR = 0.15
 _SENSOR_TOLERANCE = 5.0  # times the usual changes of friction, scale and lag
 
 _SCALE_STEP, _OFFSET_STEP_RAD, _LOAD_FRICTION_STEP = 0.1, 0.03, 0.05
+_MASS_STEP, _LENGTH_STEP = 0.05, 0.005
 
 _LATER_S = 0.0025 * np.array([*range(-8, 0), *range(1, 13)])
 _SLOWER_S = tuple(1.0 / (TURN * hz) for hz in (70.0, 35.0, 20.0, 10.0))
@@ -66,17 +67,20 @@ def nuisances(mechanism: Mechanism, reference: TorqueReference, sensor: TorqueSe
         Nuisance(Cause.TIMING, "", -shifted, _OFFSET_RAD),
         Nuisance(Cause.LOAD_FRICTION, "", rubbing, _LOAD_FRICTION),
     ]
+    # torques that are added: behind a low-pass they change the roughness, too
+    simulated = SimulatedSensor(reference, len(reference.torque_nm[0]), sensor)
     if mechanism.toe is not None:
-        found += _loads(build_linkage(reference.parameters.in_air.applied(mechanism)), reference, sensor)
+        linkage = build_linkage(reference.parameters.in_air.applied(mechanism))
+        found += _loads(linkage, reference.parameters.load, simulated)
     for name, mass, length in zip(mechanism.bodies, *body_torques(mechanism).at(speed), strict=True):
-        found.append(Nuisance(Cause.MASS, name, signature_of_torque(mass, phases), 0.0))
-        found.append(Nuisance(Cause.LENGTH, name, signature_of_torque(length, phases), 0.0))
+        found.append(Nuisance(Cause.MASS, name, simulated.slope(0, mass, _MASS_STEP), 0.0))
+        found.append(Nuisance(Cause.LENGTH, name, simulated.slope(0, length, _LENGTH_STEP), 0.0))
     return found
 
 
-def _loads(linkage: Linkage, reference: TorqueReference, sensor: TorqueSensor) -> list[Nuisance]:
-    """The ground's force: its size, and for a leg that walks under one its shape, too."""
-    known, usual = reference.parameters.load, [(load_shape(linkage), _LOAD_N)]
+def _loads(linkage: Linkage, known: Floats, simulated: SimulatedSensor) -> list[Nuisance]:
+    """The ground's force: its size, and for a leg that walks under a known one (PHASES, 2) its shape, too."""
+    usual = [(load_shape(linkage), _LOAD_N)]
     if known.size:
         stance = nominal_stance(linkage)
         peak_n = float((known @ stance.up).max())
@@ -85,14 +89,11 @@ def _loads(linkage: Linkage, reference: TorqueReference, sensor: TorqueSensor) -
         usual = [(known / peak_n, _LOAD_FRACTION * peak_n)]
         usual += [(np.outer(one, stance.up), _VERTICAL * peak_n) for one in waves]
         usual += [(np.outer(one, stance.back), _FORE_AFT_CHANGE * peak_n) for one in waves]
-    speed, found = reference.profile.speed, []
-    channel = attrs.evolve(sensor.channel, load_friction=0.0)
-    for torque, (_, spread) in zip(
-        load_signatures(linkage, [force for force, _ in usual]), usual, strict=True
-    ):
-        received = channel.received(torque, TURN / abs(speed) / len(torque), float(np.sign(speed)))
-        found.append(Nuisance(Cause.LOAD, "", signature_of_torque(received, sensor.phases), spread))
-    return found
+    torques = load_signatures(linkage, [force for force, _ in usual])
+    return [
+        Nuisance(Cause.LOAD, "", simulated.slope(0, torque, spread), spread)
+        for torque, (_, spread) in zip(torques, usual, strict=True)
+    ]
 
 
 def other_channels(reference: TorqueReference, sensor: TorqueSensor) -> list[OtherChannel]:

@@ -9,20 +9,17 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from leg_wear_monitor.estimate.body_torques import at_speed, body_torques
 from leg_wear_monitor.estimate.cause import Cause, NamedCause, TorqueExplanation, beyond_friction
 from leg_wear_monitor.estimate.least_squares import jackknife, solved
-from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.arrays import Complex, Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.statistics import CycleStatistics, TorqueProfile
 
 # Curves of the drive torque over a crank turn, as Fourier coefficients: to turn a curve is to multiply them.
 
-
-Complex = NDArray[np.complex128]
 
 # Harmonics that are compared: higher ones are chaotic impacts, and beyond the 10 Hz of the comparison's
 # low-pass filter at 60 rpm. A slow sensor has the second number.

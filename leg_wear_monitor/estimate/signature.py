@@ -8,7 +8,7 @@ import math
 import attrs
 import numpy as np
 
-from leg_wear_monitor.mechanism.arrays import Floats, Ints
+from leg_wear_monitor.mechanism.arrays import Complex, Floats, Ints
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.reference import POINTS
@@ -16,8 +16,9 @@ from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 SAMPLES = 200  # a gait cycle: what comes faster is averaged, since clearances show at these times already
 
-_PHASES = (80, 40, 20, 10)
-_LEAST_IN_PHASE = 2.5  # samples on average
+_PHASES = (80, 64, 48, 40, 32, 24, 20, 16, 10)
+_LEAST_IN_PHASE = 2.2  # samples on average
+_ROUNDING = 1.0e-6  # of a sample: 200 Hz at 60 rpm are 200 samples
 _FLOOR = 1.0e-4  # of the torque's size, below which roughness is rounding
 _CLIP = 8.0  # times the torque's size: a peak counts as at most this
 
@@ -62,9 +63,12 @@ class Channel:
         if self.delay_s == 0.0 and self.time_constant_s == 0.0:
             return torque
         points = torque.shape[-1]
-        omega = TURN * np.fft.rfftfreq(points, step_s)
-        response = np.exp(-1j * omega * self.delay_s) / (1.0 + 1j * omega * self.time_constant_s)
+        response = self.response(np.asarray(TURN * np.fft.rfftfreq(points, step_s), np.float64))
         return np.asarray(np.fft.irfft(np.fft.rfft(torque) * response, points))
+
+    def response(self, omega: Floats) -> Complex:
+        """Frequency response (n,) of delay and low-pass, at angular frequencies (n,) [rad/s]."""
+        return np.asarray(np.exp(-1j * omega * self.delay_s) / (1.0 + 1j * omega * self.time_constant_s))
 
 
 DIRECT = Channel()
@@ -100,7 +104,7 @@ class TorqueSensor:
     @property
     def together(self) -> int:
         """Number of samples that are averaged into one."""
-        return max(1, round(self.cycle_s / SAMPLES / self.period_s))
+        return max(1, math.floor(self.cycle_s / SAMPLES / self.period_s + _ROUNDING))
 
     @property
     def phases(self) -> int:
@@ -111,6 +115,29 @@ class TorqueSensor:
     def samples(self) -> float:
         """Number of samples in a gait cycle, after averaging."""
         return self.cycle_s / (self.period_s * self.together)
+
+    def shown(self, torque: Floats, speed: float) -> Floats:
+        """Torques (..., n) [N m] as the samples show them: behind the channel, and averaged.
+
+        Without the channel's load friction, which is not linear.
+
+        Parameters
+        ----------
+        torque : (..., n) array
+            At equal steps of the crank angle from 0 [N m].
+        speed : float
+            Of the crank [rad/s]; the torque of a crank that turns backwards is in reversed order of time.
+        """
+        points, along = torque.shape[-1], np.sign(speed)
+        omega = along * TURN * np.fft.rfftfreq(points, TURN / abs(speed) / points)
+        response = self.channel.response(omega)
+        # a sample is the mean since the one before, or an instant; then of as many as are averaged
+        if not self.is_instant:
+            half = 0.5 * omega * self.period_s
+            response *= np.sinc(half / math.pi) * np.exp(-1j * half)
+        lags = np.arange(self.together) * self.period_s
+        response *= np.exp(-1j * np.outer(omega, lags)).mean(axis=1)
+        return np.asarray(np.fft.irfft(np.fft.rfft(torque) * response, points))
 
 
 def averaged(values: Floats, together: int) -> Floats:
@@ -210,11 +237,12 @@ def ideal_torque(mechanism: Mechanism, speed: float) -> Floats:
     return one_cycle(build_linkage(mechanism), _POINTS, speed).drive_torque
 
 
-def signature_of_torque(torque: Floats, phases: int) -> Floats:
-    """Signature's change by a torque that is added at equal steps of the crank angle, without roughness."""
+def signature_of_torque(torque: Floats, sensor: TorqueSensor, speed: float) -> Floats:
+    """Signature's change (F,) by a torque that a sensor shows, without roughness; as `TorqueSensor.shown`."""
     angle: Floats = np.linspace(0.0, TURN, len(torque), endpoint=False)
-    first = np.zeros(len(torque), np.int64)
-    return np.concatenate([PhaseMeans(first, angle, (1, phases)).of(torque)[0], np.zeros(phases)])
+    first, phases = np.zeros(len(torque), np.int64), sensor.phases
+    mean = PhaseMeans(first, angle, (1, phases)).of(sensor.shown(torque, speed))[0]
+    return np.concatenate([mean, np.zeros(phases)])
 
 
 # A torque sensor on simulated legs: its samples, and their signatures.
@@ -261,7 +289,7 @@ class SimulatedSensor:
         self._ends = place[sensor.together - 1 :: sensor.together]
         cycle = np.minimum((self._ends / POINTS).astype(np.int64), cycles - 1)
         angle = np.interp(self._ends % POINTS, np.arange(POINTS + 1.0), reference.angle) + offset_rad
-        shape = cycles, sensor.phases
+        self._angle, shape = angle, (cycles, sensor.phases)
         self._phases = PhaseMeans(cycle, angle, shape), PhaseMeans(cycle[1:], angle[1:], shape)
 
     def signatures(self, leg: int, scale: float = 1.0) -> Floats:
@@ -290,6 +318,24 @@ class SimulatedSensor:
         # a mean is the difference of what was received up to the ends of two samples
         impulse = np.cumsum(torque)[at] + (self._ends - at - 1.0) * torque[at]
         return np.asarray(np.diff(impulse, prepend=0.0) / (self._sensor.together * self._between))
+
+    def slope(self, leg: int, torque: Floats, step: float) -> Floats:
+        """Change of the mean signature (F,) of a leg by a torque that is added to its own.
+
+        Parameters
+        ----------
+        leg : int
+        torque : (n,) array
+            At equal steps of the crank angle from 0 [N m].
+        step : float
+            Part of it by which the signature is differenced.
+        """
+        even: Floats = np.linspace(0.0, TURN, len(torque), endpoint=False)
+        shown = self._sensor.shown(torque, self._reference.profile.speed)
+        added = step * np.interp(self._angle % TURN, even, shown, period=TURN)
+        own = self.torque(leg) + self._sensor.noise_nm * self.noise(leg)
+        more, less = (self.signatures_of(own + sign * added).mean(axis=0) for sign in (1.0, -1.0))
+        return np.asarray((more - less) / (2.0 * step))
 
     def noise(self, leg: int, draw: int = 0) -> Floats:
         """Noise (n,) of averaged samples of a leg, in standard deviations of a single sample."""

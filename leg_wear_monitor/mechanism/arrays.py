@@ -10,6 +10,7 @@ from leg_wear_monitor.mechanism import spec
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 Ints = NDArray[np.int64]
+Complex = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 
 REVOLUTE, PRISMATIC = 0, 1

@@ -1,18 +1,26 @@
 """Signatures of gait cycles: laws that hold for any torque."""
 
+import attrs
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor.estimate.signature import (
+    Channel,
     PhaseMeans,
+    SimulatedSensor,
     TorqueSensor,
     averaged,
     quiet_phases,
+    signature_of_torque,
     signatures,
+    simulated_signatures,
     without_scatter,
 )
+from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
+from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 SENSOR = TorqueSensor(period_s=0.005, cycle_s=1.0, size_nm=10.0)
 ANGLE = 2.0 * np.pi * (np.arange(200) + 0.5) / 200
@@ -89,6 +97,36 @@ def test_phase_means_are_those_of_hat_functions(phases: int) -> None:
 def test_sampling_determines_phases(rate_hz: float, together: int, phases: int) -> None:
     sensor = TorqueSensor(period_s=1.0 / rate_hz, cycle_s=1.0, size_nm=10.0)
     assert (sensor.together, sensor.phases) == (together, phases)
+
+
+@pytest.mark.parametrize("rpm", [40.0, 45.0, 55.0, 58.0, 60.5, 61.0, 66.0])
+@pytest.mark.parametrize("rate_hz", [200, 500, 1000])
+def test_a_cadence_beside_that_of_the_benchmarks_has_as_many_phases(rate_hz: float, rpm: float) -> None:
+    assert TorqueSensor(period_s=1.0 / rate_hz, cycle_s=60.0 / rpm, size_nm=10.0).phases == 80
+
+
+@pytest.mark.parametrize("rpm", [60.0, -60.0, 45.0])
+@pytest.mark.parametrize("rate_hz", [50.0, 200.0, 1000.0])
+@pytest.mark.parametrize("is_instant", [False, True])
+@pytest.mark.parametrize("channel", [Channel(), Channel(delay_s=0.01, time_constant_s=0.008)])
+def test_a_torque_that_is_added_is_shown_as_the_leg_s_own_is(leg, rpm, rate_hz, is_instant, channel) -> None:
+    """Late, filtered, averaged; and a crank that turns backwards is late in its own direction."""
+    speed = TURN * rpm / 60.0
+    profile = CrankProfile.steady(speed)
+    reference = TorqueReference(profile, np.full((1, 5), 3.0e-4), (), LegParameters.none(leg))
+    middle = 0.5 * (reference.angle[1:] + reference.angle[:-1])
+
+    def torque(angle):
+        return 10.0 * np.cos(angle) + 4.0 * np.sin(3.0 * angle + 0.5)
+
+    reference = attrs.evolve(reference, torque_nm=(np.tile(torque(middle), (8, 1)),))
+    sensor = TorqueSensor(1.0 / rate_hz, 60.0 / abs(rpm), 10.0, is_instant=is_instant, channel=channel)
+    measured = simulated_signatures(reference, 0, sensor)[1:-1].mean(axis=0)
+    shown = signature_of_torque(torque(np.arange(240) * TURN / 240), sensor, speed)
+    # phases at the ends of a gait cycle have samples of one side only
+    np.testing.assert_allclose(shown[: sensor.phases], measured[: sensor.phases], atol=12.0 / sensor.samples)
+    added = SimulatedSensor(reference, 8, sensor).slope(0, torque(np.arange(240) * TURN / 240), 0.1)
+    np.testing.assert_allclose(added[: sensor.phases], measured[: sensor.phases], atol=12.0 / sensor.samples)
 
 
 def test_averaging_keeps_the_mean_of_whole_groups() -> None:

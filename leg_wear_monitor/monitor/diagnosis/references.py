@@ -28,6 +28,7 @@ from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.monitor.diagnosis.state import AtCadence, ExplainedTorque, TorqueState
 from leg_wear_monitor.twin.reference import UNLIKE, CrankProfile, LegParameters, mean_profile
 from leg_wear_monitor.twin.torque_reference import (
+    LEAST_CLEARANCE_M,
     ReferenceSnapshot,
     TorqueReference,
     TorqueReferenceRun,
@@ -510,7 +511,8 @@ def _start_at_cadence(state: TorqueState, reference: TorqueReference) -> None:
 
 def _is_far(reference: TorqueReference, counted_m: Floats) -> bool:
     """Whether the expected leg of a reference has other clearances than the counted ones (k,) [m]."""
-    return bool((np.abs(reference.clearance_m[0] / counted_m - 1.0) > _FAR_FRACTION).any())
+    expected_m = np.maximum(counted_m, LEAST_CLEARANCE_M)  # no leg is simulated with less
+    return bool((np.abs(reference.clearance_m[0] / expected_m - 1.0) > _FAR_FRACTION).any())
 
 
 def _abandon(state: TorqueState) -> None:

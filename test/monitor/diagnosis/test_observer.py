@@ -19,12 +19,12 @@ from leg_wear_monitor.monitor.diagnosis import observer as observer_module
 from leg_wear_monitor.monitor.diagnosis.evidence import LOCKED_SAMPLES
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
-from leg_wear_monitor.monitor.diagnosis.state import UNUSED_CYCLES, DiagnosisState
+from leg_wear_monitor.monitor.diagnosis.state import UNUSED_CYCLES, DiagnosisState, SignedCycle, TorqueState
 from leg_wear_monitor.twin import CRANK, TORQUE, torque_reference
 from leg_wear_monitor.twin.load import load_shape, load_signature
 from leg_wear_monitor.twin.reference import POINTS, CrankProfile, LegParameters, LegSimulation
 from leg_wear_monitor.twin.sample import GROUND, gait_samples
-from leg_wear_monitor.twin.torque_reference import WIDER
+from leg_wear_monitor.twin.torque_reference import LEAST_CLEARANCE_M, WIDER
 from leg_wear_monitor.wear import SECTORS
 
 NEW = np.full(5, 3.0e-4)
@@ -721,3 +721,23 @@ def test_nothing_is_corrected_by_a_reference_of_another_leg_nor_before_it_is_ide
     assert walk_on(observer, reference, [leg_number(0, 1.5)] * 25) == []
     (change,) = observer.diagnosis.changes
     assert change.subject == "A" and not change.is_corrected
+
+
+@pytest.mark.parametrize("tight_m", [4.0e-5, 2.0e-5])
+def test_a_tight_leg_keeps_the_reference_with_the_least_clearance_that_is_simulated(leg, tight_m) -> None:
+    """It was too far from the counted clearances as soon as it was there, and another one was begun."""
+    clearances = {name: attrs.evolve(one, radial_clearance=tight_m) for name, one in leg.clearances.items()}
+    tight, profile, counted_m = (
+        attrs.evolve(leg, clearances=clearances),
+        CrankProfile.steady(TURN),
+        np.full(5, tight_m),
+    )
+    legs_m = np.full((1, 5), LEAST_CLEARANCE_M)
+    own = torque_reference.TorqueReference(
+        profile, legs_m, (np.zeros((2, POINTS)),), LegParameters.none(tight)
+    )
+    found = references.References(tight, references.LegModels(tight), [own])
+    state = TorqueState(counted_m, reference=own, sensor=TorqueSensor(0.005, 1.0, SIZE_NM))
+    state.cycles = tuple(SignedCycle(i, i + 1, np.zeros(160), profile, 0.0) for i in range(6))
+    found.advance(state, counted_m, DEPTH)
+    assert not found.is_busy

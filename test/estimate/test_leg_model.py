@@ -1,0 +1,43 @@
+"""What changes a torque's signature beside clearances, behind a drive as without one."""
+
+import attrs
+import numpy as np
+import pytest
+
+from leg_wear_monitor.estimate.body_torques import body_torques
+from leg_wear_monitor.estimate.cause import Cause
+from leg_wear_monitor.estimate.leg_model import explainer_of
+from leg_wear_monitor.estimate.signature import (
+    DIRECT,
+    Channel,
+    CommissionedTorque,
+    TorqueSensor,
+    simulated_signatures,
+)
+from leg_wear_monitor.mechanism.position import TURN, build_linkage
+from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
+from leg_wear_monitor.twin.load import torque_size
+
+LATE_AND_SLOW = Channel(delay_s=0.01, time_constant_s=1.0 / (TURN * 20.0))
+
+
+@pytest.mark.parametrize("channel", [DIRECT, LATE_AND_SLOW])
+def test_a_body_that_becomes_heavier_is_named_with_its_mass(leg, channel):
+    """Behind 10 ms and 20 Hz these were the lengths of other bodies, or the sensor's scale."""
+    reference = shipped_references(leg)[0]
+    size_nm = torque_size(build_linkage(leg), TURN)
+    sensor = TorqueSensor(0.005, 1.0, size_nm, noise_nm=0.5, channel=channel)
+    new_m = reference.clearance_m[0]
+    healthy = simulated_signatures(reference, 0, sensor)
+    commissioned = CommissionedTorque(0, new_m, healthy, channel=channel, speed=TURN)
+    explainer = explainer_of(leg, reference, sensor, commissioned)
+    middle = 0.5 * (reference.angle[1:] + reference.angle[:-1])
+    for body, mass in zip(leg.bodies, body_torques(leg).at(TURN)[0], strict=True):
+        if body not in ("thigh", "shank", "foot"):
+            continue
+        more = 0.3 * np.interp(middle, np.arange(len(mass)) * TURN / len(mass), mass, period=TURN)
+        heavier = attrs.evolve(reference, torque_nm=(reference.torque_nm[0].astype(float) + more,))
+        mean = simulated_signatures(heavier, 0, sensor).mean(axis=0)
+        best = explainer.explanations(mean, len(healthy), new_m)[0]
+        assert (best.cause, best.subject) == (Cause.MASS, body)
+        assert best.value == pytest.approx(0.3, abs=0.02)

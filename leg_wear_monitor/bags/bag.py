@@ -43,15 +43,15 @@ _LARGEST = 2**20  # bytes; a bag of 200 topics and 1000 files has some 250 kB
 _DEEPEST = 20
 
 
-def read_metadata(path: Path) -> tuple[list[str], dict[str, Any]]:
+def read_metadata(path: Path) -> tuple[list[str], dict[str, str]]:
     """Read metadata.yaml.
 
     Returns
     -------
     names : list of str
         File names in order, without duplicates.
-    parts : dict
-        ``by_message`` and ``types`` of each `BagFile`.
+    types : dict
+        Message type by topic name.
 
     Raises
     ------
@@ -80,13 +80,11 @@ def _check_simple(text: str) -> None:
             raise DamageError(f"is nested more than {_DEEPEST} deep")
 
 
-def _structured(information: Any) -> tuple[list[str], dict[str, Any]]:
+def _structured(information: Any) -> tuple[list[str], dict[str, str]]:
     names = [Path(name).name for name in information["relative_file_paths"]]
     topics = [topic["topic_metadata"] for topic in information.get("topics_with_message_count", [])]
-    mode = information.get("compression_mode", "")
     types = {topic["name"]: topic["type"] for topic in topics if _is_text(topic["name"], topic["type"])}
-    by_message = isinstance(mode, str) and mode.lower() == "message"
-    return list(dict.fromkeys(names)), {"by_message": by_message, "types": types}
+    return list(dict.fromkeys(names)), types
 
 
 def _is_text(*values: object) -> bool:
@@ -129,8 +127,6 @@ class BagFile:
         `MCAP`, `SQLITE`, `CSV`, `PARQUET`, or `IN_MEMORY`.
     compressed : bool
         Whether the whole file is compressed.
-    by_message : bool
-        Whether each message in the file is compressed on its own.
     types : dict
         Message type by topic name, from metadata.yaml.
     recording : int
@@ -142,7 +138,6 @@ class BagFile:
     path: Path
     storage: str
     compressed: bool = False
-    by_message: bool = False
     types: dict[str, str] = attrs.Factory(dict)
     recording: int = 0
     table: Any = None
@@ -213,27 +208,30 @@ def _mode(path: Path) -> int | None:
         raise RecordingError(str(path), "", f"cannot be read: {why}") from error
 
 
-def _file(path: Path, mode: int, **parts: Any) -> BagFile:
+def _file(path: Path, mode: int, types: dict[str, str] | None = None) -> BagFile:
     match = _NAME.fullmatch(path.name) or _TABLE.fullmatch(path.name)
     if match is None:
         raise RecordingError(str(path), "", f"is no recording by its name, expected {_EXPECTED}")
     if what := irregular_kind(mode):
         raise RecordingError(str(path), "", f"is {what}, expected a file")
-    return BagFile(path, match[1].lower(), match[2] is not None, **parts)
+    return BagFile(path, match[1].lower(), match[2] is not None, types or {})
 
 
 def _directory(path: Path, findings: list[Finding]) -> list[BagFile]:
     """Files of a bag directory, ordered by its metadata; without metadata, ordered by file number."""
     recordings = _recordings(path, findings)
-    named, parts = _metadata(path / METADATA, findings)
+    named, types = _metadata(path / METADATA, findings)
     if named:
         missing = [name for name in named if name not in recordings]
         for name in missing:
             findings.append(Finding(path / METADATA, f"names {name}, which does not exist: it is lost"))
+        for name in recordings:
+            if name not in named:
+                findings.append(Finding(path / name, f"is not named by {METADATA}: it is not read"))
         recordings = [name for name in named if name not in missing]
     if not recordings:
         raise RecordingError(str(path), "", "contains no .mcap or .db3 file")
-    return [_file(path / name, stat.S_IFREG, **parts) for name in recordings]
+    return [_file(path / name, stat.S_IFREG, types) for name in recordings]
 
 
 def _recordings(path: Path, findings: list[Finding]) -> list[str]:
@@ -252,12 +250,12 @@ def _recordings(path: Path, findings: list[Finding]) -> list[str]:
     return names
 
 
-def _metadata(path: Path, findings: list[Finding]) -> tuple[list[str], dict[str, Any]]:
-    """File names and common attributes from the metadata; empty if there is no reliable metadata."""
+def _metadata(path: Path, findings: list[Finding]) -> tuple[list[str], dict[str, str]]:
+    """File names and types of topics from the metadata; empty if there is no reliable metadata."""
     if not os.path.lexists(path):
         return [], {}
     try:
-        listed, parts = read_metadata(path)
+        listed, types = read_metadata(path)
     except DamageError as error:
         findings.append(Finding(path, f"{error}: the directory's files are taken instead", Severity.NOTE))
         return [], {}
@@ -265,7 +263,7 @@ def _metadata(path: Path, findings: list[Finding]) -> tuple[list[str], dict[str,
     if names != listed:
         text = "names other files than .mcap and .db3: they are not read"
         findings.append(Finding(path, text, Severity.NOTE))
-    return names, parts
+    return names, types
 
 
 def _by_number(path: Path) -> tuple[list[tuple[int, str]], str]:
@@ -277,8 +275,21 @@ def _by_number(path: Path) -> tuple[list[tuple[int, str]], str]:
 # Selection of the crank and torque topics of a recording, and check of their types.
 
 
-def find_topic(stream: Stream, given: str | None, topics: Iterable[str], where: str) -> str | None:
-    """Topic of a stream: the given one, else the name in the root, else the name in its only namespace.
+def find_topic(
+    stream: Stream, given: str | None, topics: Iterable[str], where: str, beside: str | None = None
+) -> str | None:
+    """Topic of a stream: the given one, else its name beside the crank's, in the root, or in one namespace.
+
+    Parameters
+    ----------
+    stream : Stream
+    given : str, optional
+    topics : iterable of str
+        Of the recording.
+    where : str
+        File name in errors.
+    beside : str, optional
+        The crank's topic. Where that has a namespace, what stands in another one is of another leg.
 
     Returns
     -------
@@ -296,9 +307,12 @@ def find_topic(stream: Stream, given: str | None, topics: Iterable[str], where: 
         if topic not in recorded:
             raise RecordingError(where, topic, f"is not a topic of the recording, it has {listed(recorded)}")
         return topic
-    name = stream.topic
-    if f"/{name}" in recorded:
-        return f"/{name}"
+    name, namespace = stream.topic, (beside or "").rpartition("/")[0]
+    for topic in (f"{namespace}/{name}", f"/{name}"):
+        if topic in recorded:
+            return topic
+    if namespace:
+        return None
     near = [topic for topic in recorded if topic.endswith(f"/{name}")]
     if len(near) > 1:
         of_torque = stream.kind == TORQUE  # whichever topic brings it
@@ -393,12 +407,18 @@ class Source:
     def pieces(self) -> Iterator[Due]:
         """Pieces of the selected channels, in order of log time."""
         for due in self.file.pieces(self.types):
-            yield attrs.evolve(due, load=partial(self._expanded, due)) if self.bag_file.by_message else due
+            is_table = self.bag_file.storage in TABLES
+            yield due if is_table else attrs.evolve(due, load=partial(self._expanded, due))
 
     def _expanded(self, due: Due) -> Piece | None:
-        """Load a piece and decompress each of its messages."""
+        """Load a piece and decompress those of its messages that are compressed one by one.
+
+        Metadata would tell, but they are written last, and a file may be given without them.
+        """
         piece = due.load()
-        return None if piece is None else _expanded(piece, self.budget.part_limit // 2)
+        if piece is None or not _has_compressed(piece):
+            return piece
+        return _expanded(piece, self.budget.part_limit // 2)
 
 
 def open_sources(
@@ -460,7 +480,7 @@ def assign(
     topics: dict[str, str] = {}
     findings: list[Finding] = []
     for stream in streams_read(config.drive_torque.source, config.foot_load.source):
-        topic = find_topic(stream, given.get(stream.topic), recorded, str(first))
+        topic = find_topic(stream, given.get(stream.topic), recorded, str(first), topics.get("joint_states"))
         if topic is not None:
             topics[stream.topic] = topic
             for source in sources:
@@ -495,18 +515,30 @@ def _open(bag_file: BagFile, config: MonitorConfig, budget: Budget, stack: ExitS
 
 
 def _expanded_file(bag_file: BagFile, budget: Budget, stack: ExitStack) -> Path:
-    """Decompress a file to a temporary file; its size counts as memory."""
-    path = Path(stack.enter_context(tempfile.TemporaryDirectory())) / f"content{bag_file.storage}"
-    with open_regular(bag_file.path) as file, path.open("wb") as content:
-        if file.read(len(ZSTD_MAGIC)) != ZSTD_MAGIC:
-            raise DamageError("is not a zstd file, although its name says so")
-        file.seek(0)
-        for part in expanded(file):
-            budget.reserve(len(part))
-            content.write(part)
-        if not content.tell():
-            raise DamageError("contains nothing that can be decompressed")
+    """Decompress a file to a temporary file; its size counts as memory, unless it does not fit."""
+    reserved = budget.reserved
+    with ExitStack() as failed:
+        directory = Path(failed.enter_context(tempfile.TemporaryDirectory()))
+        failed.callback(setattr, budget, "reserved", reserved)
+        path = directory / f"content{bag_file.storage}"
+        with open_regular(bag_file.path) as file, path.open("wb") as content:
+            if file.read(len(ZSTD_MAGIC)) != ZSTD_MAGIC:
+                raise DamageError("is not a zstd file, although its name says so")
+            file.seek(0)
+            for part in expanded(file):
+                budget.reserve(len(part))
+                content.write(part)
+            if not content.tell():
+                raise DamageError("contains nothing that can be decompressed")
+        stack.push(failed.pop_all())  # it stays until the recording is closed
     return path
+
+
+def _has_compressed(piece: Piece) -> bool:
+    """Whether a message of a piece begins as zstd does, and no CDR message."""
+    chosen = piece.messages[piece.messages["end"] - piece.messages["begin"] >= len(ZSTD_MAGIC)]
+    begins = piece.data[chosen["begin"][:, None] + np.arange(len(ZSTD_MAGIC))]
+    return bool((begins == np.frombuffer(ZSTD_MAGIC, np.uint8)).all(axis=1).any())
 
 
 def _expanded(piece: Piece, most: int) -> Piece:

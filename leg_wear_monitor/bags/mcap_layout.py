@@ -103,6 +103,7 @@ def _join(parts: Iterator[bytes], most: int) -> bytes:
 
 
 SCHEMA, CHANNEL, MESSAGE_RECORD, CHUNK, DATA_END = 0x03, 0x04, 0x05, 0x06, 0x0F
+ATTACHMENT, METADATA_RECORD = 0x09, 0x0C
 RECORD_HEAD = 9  # opcode and length
 _MESSAGE_HEAD = 22  # channel, sequence, log time, publish time
 
@@ -177,7 +178,8 @@ def walk(data, roles, out_messages, out_definitions, out_counts):
             if definitions < out_definitions.shape[0]:
                 out_definitions[definitions] = at
             definitions += 1
-        elif opcode < 0x80:  # above are private records, which may stand anywhere
+        # rosbag2 writes metadata beside the messages of a file without chunks; private records stand anywhere
+        elif opcode not in (ATTACHMENT, METADATA_RECORD) and opcode < 0x80:
             foreign += 1
         at = body + length
     out_counts[0]["wanted"] = wanted

@@ -169,10 +169,14 @@ class JointNames:
     crank_joint : str
     interfaces : mapping of str to str
         As of `wanted_interfaces`.
+    recordings : mapping of Path to int
+        Number of the recording that a file belongs to: a part of one may have no message with the crank.
     """
 
-    def __init__(self, crank_joint: str, interfaces: Mapping[str, str]) -> None:
-        self._crank, self._interfaces = crank_joint, interfaces
+    def __init__(
+        self, crank_joint: str, interfaces: Mapping[str, str], recordings: Mapping[Path, int]
+    ) -> None:
+        self._crank, self._interfaces, self._recordings = crank_joint, interfaces, recordings
         self._files: dict[Path, _Counts] = {}
 
     def add_samples(
@@ -201,9 +205,10 @@ class JointNames:
         Raises
         ------
         RecordingError
-            If messages contain joints but never the crank, or if one file lacks the crank and another has it.
+            If messages contain joints but never the crank, or if one recording lacks it and another has it.
         """
         found = sum(counts.found for counts in self._files.values())
+        with_crank = {self._recordings[path] for path, counts in self._files.items() if counts.found}
         findings = []
         for path, counts in self._files.items():
             if counts.interfaces:
@@ -214,7 +219,7 @@ class JointNames:
             text = (
                 f"is not among the joints of {counts.missing} messages, they have {bag.listed(counts.names)}"
             )
-            if not counts.found:
+            if self._recordings[path] not in with_crank:
                 remedy = "set the crank with --crank-joint (crank_joint in the parameters)"
                 if found:
                     remedy = "the other files have it: give the recordings of one leg at a time"
@@ -357,9 +362,10 @@ class Recording:
         self._clocks = Clocks()
         self._decoder = Decoder(config)
         self._budget = Budget(memory_mb)
-        self._joints = JointNames(config.crank_joint, wanted_interfaces(config))
         self._one_leg = OneLeg()
         bag_files, self._findings = bag.find_files(paths)
+        recordings = {file.path: file.recording for file in bag_files}
+        self._joints = JointNames(config.crank_joint, wanted_interfaces(config), recordings)
         with ExitStack() as stack:
             self._sources, lost = bag.open_sources(bag_files, config, self._budget, stack)
             given = {"joint_states": joint_states, "drive_torque": drive_torque, "foot_load": foot_load}
@@ -367,8 +373,8 @@ class Recording:
             self.topics, missing = bag.assign(self._sources, config, given)
             self._findings += lost + missing + check_topics(self._sources, self.topics, joint_states)
             self._close = stack.pop_all()
-        recordings = [source.bag_file.recording for source in self._sources]
-        self._pauses = Pauses(self.files, recordings, round(config.tracker.gap_limit_s * 1.0e9))
+        numbers = [source.bag_file.recording for source in self._sources]
+        self._pauses = Pauses(self.files, numbers, round(config.tracker.gap_limit_s * 1.0e9))
 
     def __enter__(self) -> "Recording":
         return self

@@ -6,6 +6,7 @@ import struct
 import lz4.frame
 import pytest
 import zstandard
+from recordings import losses
 
 from leg_wear_monitor.bags.budget import Budget
 from leg_wear_monitor.bags.findings import DamageError, RecordingError
@@ -55,6 +56,15 @@ def test_a_file_that_grows_is_refused(tmp_path, read, kind):
     path.write_bytes(zstandard.compress(bytes(BOMB_BYTES)))
     with pytest.raises(RecordingError, match=r"needs larger temporary files than --memory-mb 16 allows"):
         read(path, memory_mb=LITTLE_MB)
+
+
+def test_a_file_that_grows_leaves_the_memory_to_the_others(tmp_path, sent, write_bag, expected, read):
+    good = write_bag(tmp_path / "good.mcap", sent)
+    bomb = tmp_path / "bomb.mcap.zstd"
+    bomb.write_bytes(zstandard.compress(bytes(BOMB_BYTES)))
+    samples, recording = read(bomb, good, memory_mb=LITTLE_MB)
+    assert samples.tobytes() == expected(sent).tobytes()
+    assert losses(recording) == ["needs larger temporary files than --memory-mb 16 allows: it is lost"]
 
 
 def test_an_index_that_names_a_chunk_again_and_again_is_not_followed(

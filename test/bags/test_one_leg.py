@@ -54,6 +54,15 @@ def test_another_name_of_the_crank_is_another_leg(tmp_path, read):
         read(left, right)
 
 
+def test_a_part_of_a_split_bag_may_have_no_crank(tmp_path, read):
+    """Its first message may be of another publisher, and the recording end there."""
+    write(tmp_path / "walk_0.mcap")
+    write(tmp_path / "walk_1.mcap", begin=400, end=401, names=("hip", "knee"))
+    samples, recording = read(tmp_path)
+    assert np.count_nonzero(samples["fault"] == 0) == 400
+    assert any("joint crank is not among the joints of 1 messages" in one.text for one in recording.findings)
+
+
 def test_parts_and_overlaps_of_one_leg_are_one(tmp_path, read):
     parts = [
         write(tmp_path / f"{begin}_{end}.mcap", begin=begin, end=end)

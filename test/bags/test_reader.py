@@ -130,8 +130,7 @@ def test_bags_that_rosbags_writes(tmp_path, sent, store, expected, read, storage
     )
     assert not losses(recording)
     (tmp_path / "bag" / "metadata.yaml").unlink()
-    if mode != "MESSAGE":  # only the metadata knows of it
-        assert read(tmp_path / "bag")[0].tobytes() == samples.tobytes()
+    assert read(tmp_path / "bag")[0].tobytes() == samples.tobytes()
 
 
 def test_times_are_those_asked_for(tmp_path, sent, write_bag, read):
@@ -197,6 +196,20 @@ def test_topics_in_a_namespace_are_found_and_several_must_be_named(tmp_path, sen
     assert read(both, **named)[0].tobytes() == expected(sent).tobytes()
     with pytest.raises(RecordingError, match="/up/joint_states: is not a topic of the recording"):
         read(both, joint_states="/up/joint_states")
+
+
+def test_a_torque_in_the_namespace_of_another_leg_is_not_read(tmp_path, sent, write_bag, expected, read):
+    cranks = [each for each in sent if each.topic == "/joint_states"]
+    torques = [each for each in sent if each.topic == "/drive_torque"]
+    path = write_bag(tmp_path / "apart.mcap", renamed(cranks, "/left") + renamed(torques, "/right"))
+    samples, recording = read(path)
+    assert recording.topics == {"joint_states": "/left/joint_states"}
+    assert samples.tobytes() == expected(cranks).tobytes()
+    assert any("drive_torque: is not a topic" in finding.text for finding in recording.findings)
+    both = write_bag(tmp_path / "two.mcap", renamed(sent, "/left") + renamed(sent, "/right"))
+    samples, recording = read(both, joint_states="/right/joint_states")
+    assert recording.topics["drive_torque"] == "/right/drive_torque"
+    assert samples.tobytes() == expected(sent).tobytes()
 
 
 def test_what_cannot_be_used_is_refused_by_name(tmp_path, sent, write_bag, read):
@@ -279,6 +292,15 @@ def test_a_missing_part_of_a_bag_is_a_loss(tmp_path, sent, write_bag, read):
     )
     _, recording = read(tmp_path)
     assert losses(recording) == ["names a_1.mcap, which does not exist: it is lost"]
+
+
+def test_a_file_that_the_metadata_do_not_name_is_a_loss(tmp_path, sent, write_bag, expected, read):
+    for name in ("a_0.mcap", "a_1.mcap"):
+        write_bag(tmp_path / name, sent)
+    (tmp_path / "metadata.yaml").write_text("rosbag2_bagfile_information: {relative_file_paths: [a_0.mcap]}")
+    samples, recording = read(tmp_path)
+    assert samples.tobytes() == expected(sent).tobytes()
+    assert losses(recording) == ["is not named by metadata.yaml: it is not read"]
 
 
 def test_memory_stays_flat(tmp_path, write_bag, traffic):

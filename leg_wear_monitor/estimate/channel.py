@@ -322,8 +322,9 @@ def _refined(fit_of: Callable[[Channel], ChannelFit], near: Channel, is_declared
         return _Tried(fit.rest, slopes, fit)
 
     start = np.array([near.delay_s, near.time_constant_s])[:free]
-    low = np.array([-np.inf, _DIFFERENCE_S])[:free]
-    return gauss_newton(at, start, low=low, longest=_LONGEST_S, done=_DONE_S).point.fit
+    low = np.array([_DELAYS_S[0], _DIFFERENCE_S])[:free]
+    high = np.array([_DELAYS_S[-1], _TIME_CONSTANTS_S[-1]])[:free]
+    return gauss_newton(at, start, low=low, high=high, longest=_LONGEST_S, done=_DONE_S).point.fit
 
 
 def _clearance_columns(reference: TorqueReference, sensor: TorqueSensor) -> Floats:

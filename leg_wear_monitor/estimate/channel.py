@@ -278,7 +278,8 @@ def _best_channel(
         Of the low-passes to try; without 0, a low-pass is declared.
     """
 
-    def fit_of(channel: Channel) -> ChannelFit:
+    def fit_of(delay_s: float, time_constant_s: float) -> ChannelFit:
+        channel = Channel(delay_s=delay_s, time_constant_s=time_constant_s)
         rubbing = attrs.evolve(channel, load_friction=_FRICTION_STEP)
         friction_change = (residual(channel) - residual(rubbing)) / _FRICTION_STEP
         return hypothesis.fit(channel, residual(channel), friction_change, clearances(channel))
@@ -287,7 +288,7 @@ def _best_channel(
         return min(fits, key=lambda fit: fit.square)
 
     # without delay and low-pass: with load friction if it is clearly better
-    direct, none = fit_of(DIRECT), np.zeros_like(residual(DIRECT))
+    direct, none = fit_of(0.0, 0.0), np.zeros_like(residual(DIRECT))
     frictionless = hypothesis.fit(DIRECT, residual(DIRECT), none, clearances(DIRECT))
     if frictionless.square - direct.square < _FRICTION_IMPROVEMENT:
         sigma = direct.load_friction_sigma
@@ -295,33 +296,28 @@ def _best_channel(
     # with delay and low-pass: on a grid of both, then on from the best one
     others = []
     for time_constant_s in time_constants_s:
-        tried = [Channel(delay_s=delay_s, time_constant_s=time_constant_s) for delay_s in _DELAYS_S.tolist()]
-        best = least(fit_of(channel) for channel in tried).channel
-        tried = [attrs.evolve(best, delay_s=best.delay_s + step_s) for step_s in (-_STEP_S, 0.0, _STEP_S)]
-        others.append(least(fit_of(attrs.evolve(channel, load_friction=0.0)) for channel in tried))
+        best = least(fit_of(delay_s, time_constant_s) for delay_s in _DELAYS_S.tolist())
+        near_s = best.channel.delay_s
+        others += [best, *(fit_of(near_s + step_s, time_constant_s) for step_s in (-_STEP_S, _STEP_S))]
     is_declared = 0.0 not in time_constants_s
     other = _refined(fit_of, least(others).channel, is_declared)
     return other if is_declared or other.square < direct.square - _CHANNEL_IMPROVEMENT else direct
 
 
-def _refined(fit_of: Callable[[Channel], ChannelFit], near: Channel, is_declared: bool) -> ChannelFit:
+def _refined(fit_of: Callable[[float, float], ChannelFit], near: Channel, is_declared: bool) -> ChannelFit:
     """The best channel near one of the grid; a low-pass that is declared, and none, stay as they are."""
     free = 1 if is_declared or near.time_constant_s == 0.0 else 2
-    near = attrs.evolve(near, load_friction=0.0)
+    start = np.array([near.delay_s, near.time_constant_s])[:free]
 
-    def channel(x: Floats) -> Channel:
-        return attrs.evolve(near, **dict(zip(("delay_s", "time_constant_s"), x.tolist(), strict=False)))
+    def fit_at(x: Floats) -> ChannelFit:
+        return fit_of(float(x[0]), float(x[1]) if free == 2 else near.time_constant_s)
 
     def at(x: Floats) -> _Tried:
-        fit = fit_of(channel(x))
+        fit, moved = fit_at(x), x + _DIFFERENCE_S * np.eye(free)
+        return _Tried(
+            fit.rest, lambda: np.array([fit_at(one).rest - fit.rest for one in moved]).T / _DIFFERENCE_S, fit
+        )
 
-        def slopes() -> Floats:
-            moved = x + _DIFFERENCE_S * np.eye(free)
-            return np.array([fit_of(channel(one)).rest - fit.rest for one in moved]).T / _DIFFERENCE_S
-
-        return _Tried(fit.rest, slopes, fit)
-
-    start = np.array([near.delay_s, near.time_constant_s])[:free]
     low = np.array([_DELAYS_S[0], _DIFFERENCE_S])[:free]
     high = np.array([_DELAYS_S[-1], _TIME_CONSTANTS_S[-1]])[:free]
     return gauss_newton(at, start, low=low, high=high, longest=_LONGEST_S, done=_DONE_S).point.fit

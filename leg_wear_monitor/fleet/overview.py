@@ -221,9 +221,9 @@ def leg_overview(
     fault : str
         Why this update could not count all of its recordings.
     """
-    lines = {line["key"]: line for line in directory.lines()}  # the last one of each recording
-    counted = [line for line in lines.values() if line["outcome"] == Outcome.COUNTED.value]
-    health = _health(lines.values(), counted, len(leg.recordings))
+    lines = directory.last_lines()
+    counted = [line for line in lines if line["outcome"] == Outcome.COUNTED.value]
+    health = _health(lines, counted, len(leg.recordings))
     factor = leg.config.wear_acceleration
     now = LegOverview(id=leg.id, lot=leg.lot, recordings=health, fault=fault, wear_acceleration=factor)
     if counted:
@@ -247,8 +247,7 @@ def _used(joint: JointClearance) -> float:
     return used_fraction(clearance_m, joint.new_m, joint.limit_m)
 
 
-def _health(lines: Iterable[Line], counted: list[Line], found: int) -> RecordingHealth:
-    lines = list(lines)
+def _health(lines: list[Line], counted: list[Line], found: int) -> RecordingHealth:
     outcomes = [line["outcome"] for line in lines]
     bad = [
         BadRecording(file=line["file"], outcome=line["outcome"], why=next(iter(line["findings"]), ""))

@@ -63,12 +63,12 @@ _UNREAD: Line = {
     "clearances": {},  # `JointClearance` by joint
     "life": {},  # `LifeHours` of each joint, and of the ``leg``
     "basis": None,  # `ForecastBasis` of its forecast; null without one
-    "knows": "",  # digest of the measurements and priors in it; with others, the forecast is made again
+    "knows": "",  # `LegDirectory.knowledge` in it; with another one, the forecast is made again
 }
 """The line of a recording of which nothing is known."""
 
 
-def line_of(result: ReplayResult, about: Line, is_late: bool, knows: str) -> Line:
+def line_of(result: ReplayResult, about: Line, is_late: bool) -> Line:
     """Line of a replayed recording; `ReplayResult.findings` must be complete.
 
     Parameters
@@ -77,7 +77,6 @@ def line_of(result: ReplayResult, about: Line, is_late: bool, knows: str) -> Lin
     about : dict
         Key, file and settings.
     is_late : bool
-    knows : str
     """
     monitor, texts = result.monitor, [printable(one.text) for one in result.findings]
     outcome, counted = Outcome.COUNTED, dict[str, Any]()
@@ -97,7 +96,6 @@ def line_of(result: ReplayResult, about: Line, is_late: bool, knows: str) -> Lin
             "clearances": state.clearances if result.history.last else {},
             "life": state.life,
             "basis": basis if basis and math.isfinite(basis.cycle_s) else None,
-            "knows": knows,
         }
     read = {
         "outcome": outcome,
@@ -346,10 +344,9 @@ def _counted(leg: FleetLeg, directory: LegDirectory, found: Found, last_ns: int)
 def _replayed(leg: FleetLeg, directory: LegDirectory, found: Found, about: Line, last_ns: int) -> Line:
     """Replay a recording into the ledger; its line."""
     pending, lines = directory.pending(), list[Line]()
-    knows = directory.knowledge()
 
     def finish(result: ReplayResult) -> None:
-        line = line_of(result, about, found.begin_ns < last_ns, knows)
+        line = line_of(result, about, found.begin_ns < last_ns)
         lines.append(line)
         if line["outcome"] == Outcome.COUNTED.value:
             write_parquet(directory.table(found.key), cycle_columns(result, leg.row))
@@ -368,7 +365,10 @@ def _replayed(leg: FleetLeg, directory: LegDirectory, found: Found, about: Line,
     )
     (line,) = lines
     is_done = line["outcome"] == Outcome.ALREADY_COUNTED.value
-    return pending if is_done and pending and pending["key"] == found.key else line
+    if is_done and pending and pending["key"] == found.key:
+        return pending
+    # with the changes of the replay itself, which are in the ledger by now
+    return line | {"knows": directory.knowledge()} if line["verdict"] else line
 
 
 # The recordings of a leg that are to be counted, and the state of the work on them.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.errors import ConfigError, LegWearError, printable
 from leg_wear_monitor.files import remove_parts, write_whole
-from leg_wear_monitor.monitor.ledger.file import measurements_of
+from leg_wear_monitor.monitor.ledger.file import last_changes_of, measurements_of
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS, History
 
 if TYPE_CHECKING:
@@ -149,9 +149,13 @@ class LegDirectory:
         return next((line for line in reversed(self.last_lines()) if line["outcome"] == "counted"), None)
 
     def knowledge(self) -> str:
-        """Digest of what a forecast rests on besides walking: measured clearances, and what is learned."""
+        """Digest of what a record rests on besides walking: what was done to the ledger, and what is learned.
+
+        That is measured clearances, replaced parts, acknowledged alarms; and the verdict after these.
+        """
         learned = self.priors.read_bytes() if self.priors.exists() else b""
-        return hashlib.sha256(measurements_of(self.ledger).encode() + b"\0" + learned).hexdigest()[:20]
+        done = f"{measurements_of(self.ledger)}\0{last_changes_of(self.ledger)}\0"
+        return hashlib.sha256(done.encode() + learned).hexdigest()[:20]
 
     def add(self, line: Line, words: str) -> None:
         """Add the record of a recording, and its line in the log; it is no longer pending."""

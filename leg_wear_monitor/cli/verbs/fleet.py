@@ -153,7 +153,7 @@ def _print_counts(done: "FleetUpdate", out: Path) -> None:
     else:
         click.echo(f"recordings: {done.counted} counted now")
         if done.renewed:
-            click.echo(f"forecasts: {done.renewed} renewed after measurements")
+            click.echo(f"forecasts: {done.renewed} renewed after measurements or repairs")
     overview = load_overview(out)
     states = [f"{number} {state.replace('_', ' ')}" for state, number in overview.counts.items() if number]
     click.echo(f"legs: {', '.join(states)}")

@@ -68,7 +68,7 @@ class RecordingHealth:
     begin_ns, end_ns : int
         First and last stamp of what is counted [ns]; 0 if nothing is.
     counted_h : float
-        Duration of the counted recordings [h].
+        Duration of the counted recordings; time that they have in common is in it once [h].
     cycles : int
         Gait cycles in them.
     unmonitored_s : float
@@ -260,11 +260,20 @@ def _health(lines: list[Line], counted: list[Line], found: int) -> RecordingHeal
         partial=sum(line["is_partial"] for line in counted),
         begin_ns=min((line["begin_ns"] for line in counted), default=0),
         end_ns=max((line["end_ns"] for line in counted), default=0),
-        counted_h=sum(line["duration_s"] for line in counted) / 3600.0,
+        counted_h=_covered_ns(counted) / 3600.0e9,
         cycles=sum(line["cycles"] for line in counted),
         unmonitored_s=sum(line["lost"]["unmonitored_s"] for line in counted),
         bad=tuple(reversed(bad[-_MOST_BAD:])),
     )
+
+
+def _covered_ns(lines: Iterable[Line]) -> int:
+    """Time that recordings cover together; a recording that has grown since is there twice."""
+    total, until = 0, 0
+    for line in sorted(lines, key=lambda line: line["begin_ns"]):
+        total += max(0, line["end_ns"] - max(line["begin_ns"], until))
+        until = max(until, line["end_ns"])
+    return total
 
 
 def _change(now: LegOverview, before: LegOverview | None) -> LegChange:

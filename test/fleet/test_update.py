@@ -226,6 +226,8 @@ def test_what_overlaps_counts_once_and_late_ones_are_said(walk, describe, update
     assert overlapping["outcome"] == "counted"
     assert 0.9 < overlapping["lost"]["already_counted"] / (4.0 * 2 * 200) <= 1.0
     assert sum(line["cycles"] for line in found.values()) <= 4 + 8  # of a second, in 0 to 4 s and 10 to 18 s
+    spans_h = load_overview(out).leg("a").recordings.counted_h
+    assert 3600.0 * spans_h == pytest.approx(4.0 + 8.0, abs=0.1)  # 0 to 4 s and 10 to 18 s
     log = (out / "legs/a/log").read_text()
     assert "a/2.mcap: counted" in log and "s of it are in the ledger already: not counted again" in log
     assert "a/0.mcap: counted" in log and "a later recording was counted before it" in log

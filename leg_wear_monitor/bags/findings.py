@@ -6,6 +6,8 @@ lists the faults; only an unusable recording raises an error.
 
 import os
 import stat
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from enum import Enum
 from pathlib import Path
 from typing import IO
@@ -30,6 +32,26 @@ class RecordingError(ConfigError):
 
     def __init__(self, source: str, key: str, fault: str) -> None:
         super().__init__(printable(source), printable(key), printable(fault))
+
+    @property
+    def is_passing(self) -> bool:
+        """Whether the system is at fault, such as a permission or a network, and not the recording."""
+        return isinstance(self.__cause__, OSError) and bool(self.__cause__.errno)
+
+
+@contextmanager
+def reading(paths: Iterable[Path]) -> Iterator[None]:
+    """What the system reports while recordings are read makes them unusable, such as a bad sector.
+
+    Raises
+    ------
+    RecordingError
+    """
+    try:
+        yield
+    except OSError as error:
+        source = ", ".join(map(str, paths))
+        raise RecordingError(source, "", f"cannot be read: {error.strerror or error}") from error
 
 
 class Severity(Enum):

@@ -10,7 +10,7 @@ from typing import Any
 import attrs
 
 from leg_wear_monitor.bags.bag import find_files
-from leg_wear_monitor.bags.findings import RecordingError
+from leg_wear_monitor.bags.findings import RecordingError, reading
 from leg_wear_monitor.bags.reader import Recording
 from leg_wear_monitor.configuration import part_document
 from leg_wear_monitor.errors import LegWearError, printable
@@ -25,6 +25,7 @@ from leg_wear_monitor.workers import Job, package_digest
 
 
 _MOST_FINDINGS = 20
+_AGAIN = "tried again at the next update"
 
 
 class Outcome(Enum):
@@ -48,7 +49,8 @@ _UNREAD: Line = {
     "key": "",  # digest of its content
     "file": "",  # its name when it was counted
     "outcome": "",  # value of an `Outcome`
-    "settings": "",  # digest of the leg's settings; what was not counted is tried again with others
+    "settings": "",  # digest of the leg's settings; what was not counted is tried again with others, and
+    # what the system could not read at every update: that has none, and is not kept
     "begin_ns": 0,  # first and last stamp; 0 if there are none
     "end_ns": 0,
     "duration_s": 0.0,  # time between them
@@ -61,12 +63,12 @@ _UNREAD: Line = {
     "clearances": {},  # `JointClearance` by joint
     "life": {},  # `LifeHours` of each joint, and of the ``leg``
     "basis": None,  # `ForecastBasis` of its forecast; null without one
-    "knows": "",  # digest of the measurements and priors in it; with others, the forecast is made again
+    "knows": "",  # `LegDirectory.knowledge` in it; with another one, the forecast is made again
 }
 """The line of a recording of which nothing is known."""
 
 
-def line_of(result: ReplayResult, about: Line, is_late: bool, knows: str) -> Line:
+def line_of(result: ReplayResult, about: Line, is_late: bool) -> Line:
     """Line of a replayed recording; `ReplayResult.findings` must be complete.
 
     Parameters
@@ -75,7 +77,6 @@ def line_of(result: ReplayResult, about: Line, is_late: bool, knows: str) -> Lin
     about : dict
         Key, file and settings.
     is_late : bool
-    knows : str
     """
     monitor, texts = result.monitor, [printable(one.text) for one in result.findings]
     outcome, counted = Outcome.COUNTED, dict[str, Any]()
@@ -95,7 +96,6 @@ def line_of(result: ReplayResult, about: Line, is_late: bool, knows: str) -> Lin
             "clearances": state.clearances if result.history.last else {},
             "life": state.life,
             "basis": basis if basis and math.isfinite(basis.cycle_s) else None,
-            "knows": knows,
         }
     read = {
         "outcome": outcome,
@@ -133,6 +133,10 @@ class Found:
         First stamp in it [ns]; 0 if it cannot be read.
     fault : str
         Why it cannot be read; empty if it can.
+    settings : str
+        Digest of the leg's settings that it was read with.
+    is_passing : bool
+        Whether the fault is not in the recording: nothing is kept of it, and each update tries it again.
     """
 
     path: Path
@@ -141,6 +145,8 @@ class Found:
     key: str
     begin_ns: int = 0
     fault: str = ""
+    settings: str = ""
+    is_passing: bool = False
 
 
 def files_of(path: Path) -> list[Path]:
@@ -163,25 +169,34 @@ def state_of(path: Path) -> tuple[int, int]:
     return sum(each.st_size for each in states), max(each.st_mtime_ns for each in states)
 
 
-def known(path: Path, files: Mapping[str, Any]) -> Found | None:
-    """A recording as the index of a leg has it; None if it is not there, or was changed since."""
+def known(path: Path, leg: FleetLeg, files: Mapping[str, Any]) -> Found | None:
+    """A recording as the index of a leg has it; None if it is not there, or was read with other settings.
+
+    None as well if it was changed since.
+    """
+    found = _unchanged(path, files)
+    return found if found and found.settings == leg.settings else None
+
+
+def _unchanged(path: Path, files: Mapping[str, Any]) -> Found | None:
+    """A recording as the index has it, whatever the settings; None if it was changed since."""
     entry = files.get(str(path))
     if entry is None or (entry["size"], entry["changed_ns"]) != state_of(path):
         return None
     return Found(path, **entry)
 
 
-def look(path: Path, leg: FleetLeg) -> Found:
-    """Read what identifies a recording: all of its bytes, and its first stamp."""
+def look(path: Path, leg: FleetLeg, files: Mapping[str, Any]) -> Found:
+    """Read what identifies a recording: its first stamp, and all of its bytes unless the index has them."""
     size, changed_ns = state_of(path)
+    key, begin_ns, fault, is_passing = _text_key(str(path)), 0, "", False
+    same = _unchanged(path, files)
     try:
-        files = files_of(path)
-        key = _digest(files)
-    except (RecordingError, OSError) as error:
-        why = error.strerror if isinstance(error, OSError) else error.fault
-        return Found(path, size, changed_ns, _text_key(str(path)), fault=f"cannot be read: {why}")
-    begin_ns, fault = begin_of(path, leg)
-    return Found(path, size, changed_ns, key, begin_ns, fault)
+        key = same.key if same and not same.fault else _digest(files_of(path))
+        begin_ns = _first_stamp_ns(path, leg)
+    except RecordingError as error:
+        fault, is_passing = _fault(error), error.is_passing
+    return Found(path, size, changed_ns, key, begin_ns, fault, leg.settings, is_passing)
 
 
 def begin_of(path: Path, leg: FleetLeg) -> tuple[int, str]:
@@ -199,13 +214,13 @@ def _fault(error: RecordingError) -> str:
 
 def entry_of(found: Found) -> dict[str, Any]:
     """A recording for the index of its leg."""
-    return attrs.asdict(found, filter=lambda attribute, _: attribute.name != "path")
+    return attrs.asdict(found, filter=lambda attribute, _: attribute.name not in ("path", "is_passing"))
 
 
 def _first_stamp_ns(path: Path, leg: FleetLeg) -> int:
     """First valid stamp; 0 if there is none."""
     topics = {"joint_states": leg.joint_states, "drive_torque": leg.drive_torque}
-    with Recording([path], leg.config, **topics) as recording:  # type: ignore[arg-type]
+    with reading([path]), Recording([path], leg.config, **topics) as recording:  # type: ignore[arg-type]
         for block in recording.blocks():
             stamps = block.samples["stamp_ns"][block.samples["fault"] == 0]
             if len(stamps):
@@ -217,7 +232,7 @@ def _digest(files: list[Path]) -> str:
     """Digest of the content of files, in their order."""
     total = hashlib.sha256()
     for path in files:
-        with path.open("rb") as file:
+        with reading([path]), path.open("rb") as file:
             total.update(hashlib.file_digest(file, "sha256").digest())
     return total.hexdigest()[:_KEY_DIGITS]
 
@@ -235,7 +250,7 @@ def scan(leg: FleetLeg, files: Mapping[str, Any]) -> list[Found]:
     files : mapping
         The index, `LegDirectory.files`.
     """
-    return [known(path, files) or look(path, leg) for path in leg.recordings]
+    return [known(path, leg, files) or look(path, leg, files) for path in leg.recordings]
 
 
 # The line of a recording in a leg's log.
@@ -318,6 +333,10 @@ def _counted(leg: FleetLeg, directory: LegDirectory, found: Found, last_ns: int)
     except RecordingError as error:
         line = _UNREAD | about | {"outcome": Outcome.UNREADABLE.value, "is_partial": True}
         line["findings"] = [printable(_fault(error))]
+        if error.is_passing:
+            line |= {"settings": "", "is_partial": False, "findings": [*line["findings"], _AGAIN]}
+            directory.note([words_of(line)])
+            return line
     directory.add(line, words_of(line))
     return line
 
@@ -325,10 +344,9 @@ def _counted(leg: FleetLeg, directory: LegDirectory, found: Found, last_ns: int)
 def _replayed(leg: FleetLeg, directory: LegDirectory, found: Found, about: Line, last_ns: int) -> Line:
     """Replay a recording into the ledger; its line."""
     pending, lines = directory.pending(), list[Line]()
-    knows = directory.knowledge()
 
     def finish(result: ReplayResult) -> None:
-        line = line_of(result, about, found.begin_ns < last_ns, knows)
+        line = line_of(result, about, found.begin_ns < last_ns)
         lines.append(line)
         if line["outcome"] == Outcome.COUNTED.value:
             write_parquet(directory.table(found.key), cycle_columns(result, leg.row))
@@ -347,7 +365,10 @@ def _replayed(leg: FleetLeg, directory: LegDirectory, found: Found, about: Line,
     )
     (line,) = lines
     is_done = line["outcome"] == Outcome.ALREADY_COUNTED.value
-    return pending if is_done and pending and pending["key"] == found.key else line
+    if is_done and pending and pending["key"] == found.key:
+        return pending
+    # with the changes of the replay itself, which are in the ledger by now
+    return line | {"knows": directory.knowledge()} if line["verdict"] else line
 
 
 # The recordings of a leg that are to be counted, and the state of the work on them.
@@ -371,7 +392,7 @@ class Chain:
     copies : list of str
         Lines about copies that were not known before.
     refused : list of str
-        Recordings that are not counted because another leg has them.
+        Recordings that this update leaves out: another leg has them, or the system could not read them.
     is_renewed : bool
         Whether its forecast was made again, because something was measured.
     fault : str
@@ -418,7 +439,7 @@ class Chain:
         elif pending:
             self._pending = pending["key"]
         files = self.directory.files()
-        found = [known(path, files) for path in self.leg.recordings]
+        found = [known(path, self.leg, files) for path in self.leg.recordings]
         self.found = [each for each in found if each is not None]
         if len(self.found) == len(found):
             return None
@@ -426,14 +447,19 @@ class Chain:
 
     def take(self, found: Iterable[Found]) -> None:
         """Take the recordings that were read; what of them can be read is known from now on."""
-        before = {each.path for each in self.found}
-        self.found = list(found)
+        before, found = {each.path for each in self.found}, list(found)
+        for each in found:
+            if each.is_passing:
+                words = f"{self.leg.shown(each.path)}: {Outcome.UNREADABLE.value}; {each.fault}; {_AGAIN}"
+                self.refused.append(words)
+        self.found = [each for each in found if not each.is_passing]
         first: dict[str, Found] = {}
         for each in sorted(self.found, key=lambda one: (one.path not in before, str(one.path))):
             if first.setdefault(each.key, each) is not each and each.path not in before:
                 original = self.leg.shown(first[each.key].path)
                 self.copies.append(f"{self.leg.shown(each.path)}: is a copy of {original}, counted once")
-        self.directory.note(self.copies)  # before they are known: a kill in between must not lose a line
+        # before they are known: a kill in between must not lose a line
+        self.directory.note([*self.refused, *self.copies])
         self.directory.keep_files({str(each.path): entry_of(each) for each in self.found if each.size})
 
     def plan(self) -> None:
@@ -465,5 +491,8 @@ class Chain:
             self.fault = result
             return
         self.waiting.pop()
+        if not result["settings"]:
+            self.refused.append(words_of(result))
+            return
         self.new.append(result)
         self._last_ns = max(self._last_ns, result["end_ns"])

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.errors import ConfigError, LegWearError, printable
 from leg_wear_monitor.files import remove_parts, write_whole
-from leg_wear_monitor.monitor.ledger.file import measurements_of
+from leg_wear_monitor.monitor.ledger.file import last_changes_of, measurements_of
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS, History
 
 if TYPE_CHECKING:
@@ -115,8 +115,7 @@ class LegDirectory:
 
     def tables(self) -> list[Path]:
         """Files of the gait cycles of all counted recordings, in the order of time."""
-        last = {line["key"]: line for line in self.lines()}
-        lines = sorted(last.values(), key=lambda line: (line["begin_ns"], line["key"]))
+        lines = sorted(self.last_lines(), key=lambda line: (line["begin_ns"], line["key"]))
         return [self.table(line["key"]) for line in lines if line["outcome"] == "counted"]
 
     def lines(self) -> Iterator[Line]:
@@ -134,15 +133,29 @@ class LegDirectory:
                 if line.endswith(b"\n"):  # otherwise it was cut off, and its recording is still pending
                     yield _object(line, f"{self.records}: line {number}")
 
+    def last_lines(self) -> list[Line]:
+        """The last record of each recording, in the order in which these were written.
+
+        What could not be read at first and was counted later stands where it was counted, as in the ledger.
+        """
+        last: dict[str, Line] = {}
+        for line in self.lines():
+            last.pop(line["key"], None)
+            last[line["key"]] = line
+        return list(last.values())
+
     def last_counted(self) -> Line | None:
         """Record of the recording that was counted last, as it is now; None before the first."""
-        lines = {line["key"]: line for line in self.lines()}
-        return next((line for line in reversed(lines.values()) if line["outcome"] == "counted"), None)
+        return next((line for line in reversed(self.last_lines()) if line["outcome"] == "counted"), None)
 
     def knowledge(self) -> str:
-        """Digest of what a forecast rests on besides walking: measured clearances, and what is learned."""
+        """Digest of what a record rests on besides walking: what was done to the ledger, and what is learned.
+
+        That is measured clearances, replaced parts, acknowledged alarms; and the verdict after these.
+        """
         learned = self.priors.read_bytes() if self.priors.exists() else b""
-        return hashlib.sha256(measurements_of(self.ledger).encode() + b"\0" + learned).hexdigest()[:20]
+        done = f"{measurements_of(self.ledger)}\0{last_changes_of(self.ledger)}\0"
+        return hashlib.sha256(done.encode() + learned).hexdigest()[:20]
 
     def add(self, line: Line, words: str) -> None:
         """Add the record of a recording, and its line in the log; it is no longer pending."""
@@ -447,7 +460,7 @@ def _table(columns: dict[str, str], legs: Legs, rows: Callable[[Line], Iterator[
     schema = pyarrow.schema([(name, getattr(pyarrow, kind)()) for name, kind in columns.items()])
     found = []
     for leg, lot, directory in legs:
-        for line in {line["key"]: line for line in directory.lines()}.values():
+        for line in directory.last_lines():
             where = {"leg": leg, "lot": lot, "key": line["key"]}
             found += [where | row for row in rows(line)]
     return pyarrow.Table.from_pylist(found, schema=schema)

@@ -68,7 +68,7 @@ class RecordingHealth:
     begin_ns, end_ns : int
         First and last stamp of what is counted [ns]; 0 if nothing is.
     counted_h : float
-        Duration of the counted recordings [h].
+        Duration of the counted recordings; time that they have in common is in it once [h].
     cycles : int
         Gait cycles in them.
     unmonitored_s : float
@@ -221,9 +221,9 @@ def leg_overview(
     fault : str
         Why this update could not count all of its recordings.
     """
-    lines = {line["key"]: line for line in directory.lines()}  # the last one of each recording
-    counted = [line for line in lines.values() if line["outcome"] == Outcome.COUNTED.value]
-    health = _health(lines.values(), counted, len(leg.recordings))
+    lines = directory.last_lines()
+    counted = [line for line in lines if line["outcome"] == Outcome.COUNTED.value]
+    health = _health(lines, counted, len(leg.recordings))
     factor = leg.config.wear_acceleration
     now = LegOverview(id=leg.id, lot=leg.lot, recordings=health, fault=fault, wear_acceleration=factor)
     if counted:
@@ -247,8 +247,7 @@ def _used(joint: JointClearance) -> float:
     return used_fraction(clearance_m, joint.new_m, joint.limit_m)
 
 
-def _health(lines: Iterable[Line], counted: list[Line], found: int) -> RecordingHealth:
-    lines = list(lines)
+def _health(lines: list[Line], counted: list[Line], found: int) -> RecordingHealth:
     outcomes = [line["outcome"] for line in lines]
     bad = [
         BadRecording(file=line["file"], outcome=line["outcome"], why=next(iter(line["findings"]), ""))
@@ -261,11 +260,20 @@ def _health(lines: Iterable[Line], counted: list[Line], found: int) -> Recording
         partial=sum(line["is_partial"] for line in counted),
         begin_ns=min((line["begin_ns"] for line in counted), default=0),
         end_ns=max((line["end_ns"] for line in counted), default=0),
-        counted_h=sum(line["duration_s"] for line in counted) / 3600.0,
+        counted_h=_covered_ns(counted) / 3600.0e9,
         cycles=sum(line["cycles"] for line in counted),
         unmonitored_s=sum(line["lost"]["unmonitored_s"] for line in counted),
         bad=tuple(reversed(bad[-_MOST_BAD:])),
     )
+
+
+def _covered_ns(lines: Iterable[Line]) -> int:
+    """Time that recordings cover together; a recording that has grown since is there twice."""
+    total, until = 0, 0
+    for line in sorted(lines, key=lambda line: line["begin_ns"]):
+        total += max(0, line["end_ns"] - max(line["begin_ns"], until))
+        until = max(until, line["end_ns"])
+    return total
 
 
 def _change(now: LegOverview, before: LegOverview | None) -> LegChange:

@@ -33,7 +33,7 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     LearnedPriors,
 )
 from leg_wear_monitor.monitor.judgement import joint_clearance, life_of, with_measured
-from leg_wear_monitor.monitor.ledger.entry import Measurement
+from leg_wear_monitor.monitor.ledger.entry import Entry, Measurement
 from leg_wear_monitor.monitor.ledger.file import copy_of, measurements_of
 from leg_wear_monitor.monitor.ledger.ledger import Ledger, open_ledger
 from leg_wear_monitor.monitor.verdict.situation import JointSituation, KnownClearance
@@ -246,11 +246,15 @@ def ledger_copy(mechanism: Mechanism, config: MonitorConfig, path: Path) -> Iter
             yield ledger
 
 
-# Makes the forecast of a leg again, when something was measured after its last recording was counted.
+# Makes the forecast of a leg again, when its ledger was changed after its last recording was counted.
+
+
+_SAME_M = 1e-15
+"""Differences of wear up to this are those of its rounding."""
 
 
 def is_renewal_due(directory: LegDirectory) -> bool:
-    """Whether something was measured, or learned, that the last forecast of a leg does not know."""
+    """Whether something was measured, repaired or learned that the last record of a leg does not know."""
     line = directory.last_counted()
     return line is not None and bool(line.get("basis")) and line["knows"] != directory.knowledge()
 
@@ -258,8 +262,9 @@ def is_renewal_due(directory: LegDirectory) -> bool:
 def renew(leg: FleetLeg, directory: LegDirectory) -> str:
     """Make the forecast of a leg again, in its last record and its summary; why not, empty if it is made.
 
-    Clearances, verdict and remaining life follow the measurements in its ledger and what the fleet has
-    learned. Growth is that at the end of its last recording. The ledger is left as it is.
+    Clearances, verdict and remaining life follow the measurements in its ledger, its replaced parts and
+    acknowledged alarms, and what the fleet has learned. Growth is that at the end of its last recording, and
+    not known of a part that was replaced since. The ledger is left as it is.
     """
     try:
         _renew(leg, directory)
@@ -284,6 +289,7 @@ def _renew(leg: FleetLeg, directory: LegDirectory) -> None:
         forecaster = Forecaster(mechanism, leg.used_config.forecast, *known)
     if now is not None and _differs(now, verdict):
         verdict = now
+    basis, before = _with_parts(entry, mechanism, basis, before)
     told = forecaster.again(basis, replaced_ns)
     forecasts = dict(zip(mechanism.clearance_joints, told.joints, strict=True))
     measured = zip(mechanism.clearance_joints, forecaster.last_measured(replaced_ns), strict=True)
@@ -310,6 +316,29 @@ def _renew(leg: FleetLeg, directory: LegDirectory) -> None:
     write_whole(directory.summary, summary.to_json().encode())
     found = {"verdict": verdict, "clearances": clearances, "life": life, "knows": knows}
     directory.renew({**line, **part_document(found)})
+
+
+def _with_parts(
+    entry: Entry | None, mechanism: Mechanism, basis: ForecastBasis, before: dict[str, JointClearance]
+) -> tuple[ForecastBasis, dict[str, JointClearance]]:
+    """A basis and clearances with the parts that were replaced since: of these, only the wear is known."""
+    parts = {part.name: part for part in entry.joints} if entry else {}
+    conditions, observed, clearances = list(basis.conditions), list(basis.observed), dict(before)
+    for k, condition in enumerate(basis.conditions):
+        joint = condition.joint
+        if joint not in parts or parts[joint].mean_m > condition.wear_m - _SAME_M:
+            continue  # wear never shrinks: it is the same part
+        wear = parts[joint]
+        observed[k] = None
+        worn = {"wear_m": wear.mean_m, "wear_sigma_m": wear.sampling_m2**0.5}
+        conditions[k] = attrs.evolve(condition, **worn, growth_m=None, growth_error_m=0.0)
+        if joint in before:
+            clearances[joint] = JointClearance(
+                counted_m=mechanism.clearances[joint].radial_clearance + wear.mean_m,
+                new_m=before[joint].new_m,
+                limit_m=before[joint].limit_m,
+            )
+    return attrs.evolve(basis, conditions=tuple(conditions), observed=tuple(observed)), clearances
 
 
 def _differs(one: Verdict, other: Verdict) -> bool:

@@ -9,6 +9,7 @@ from contextlib import closing
 import pytest
 
 from leg_wear_monitor.files import share_directory
+from leg_wear_monitor.fleet.overview import load_overview
 
 BAGS = share_directory() / "bags"
 
@@ -99,6 +100,30 @@ def test_after_the_repair_a_healthy_recording_is_not_to_be_inspected(run, ledger
     assert found["verdict"]["state"] in ("watch", "healthy")
     assert found["verdict"]["not_valid"] == []
     assert not any(alarm["level"] != "OK" for alarm in found["alarms"]["now"])
+
+
+def test_a_repair_in_the_ledger_of_a_fleet_shows_at_the_next_update(run, tmp_path):
+    pytest.importorskip("pyarrow", reason="the extra 'fleet' is not installed")
+    leg = f"{{id: a, recordings: {BAGS / 'knocking.mcap'}, config: {BAGS / 'knocking.yaml'}}}"
+    (tmp_path / "fleet.yaml").write_text(f"legs: [{leg}]\n")
+    update = ["fleet", "update", str(tmp_path / "fleet.yaml"), "--workers", "1"]
+    ledger = str(tmp_path / "fleet/legs/a/ledger")
+    assert "legs: 1 stop" in run(*update).stdout
+    assert "everything is in the ledger already" in run(*update).stdout
+    before = load_overview(tmp_path / "fleet").leg("a")
+    assert run("reset", "knee", "--ledger", ledger).exit_code == 0
+    assert "forecasts: 1 renewed" in run(*update).stdout
+    after = load_overview(tmp_path / "fleet").leg("a")
+    with closing(sqlite3.connect(ledger)) as db:
+        (why,) = db.execute("SELECT why FROM verdict ORDER BY id DESC LIMIT 1").fetchone()
+    knee = after.clearances["G"]
+    assert (after.verdict.why, after.state, knee.status.value) == (why, "watch", "watch")  # a new part
+    assert (knee.counted_m, knee.seen_m) == (knee.new_m, None)
+    assert knee.believed_m == pytest.approx(knee.new_m, rel=0.1)
+    assert after.clearances["A"].counted_m == before.clearances["A"].counted_m
+    assert "everything is in the ledger already" in run(*update).stdout
+    assert run("acknowledge", "--ledger", ledger).exit_code == 0
+    assert "forecasts: 1 renewed" in run(*update).stdout
 
 
 @pytest.mark.slow  # monitor/alarms/test_alarm.py holds it for a value, the next test what is kept

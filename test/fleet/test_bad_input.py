@@ -96,6 +96,14 @@ def test_a_column_that_is_missing(lab, command):
     assert code == 1 and expected.removeprefix("a/1.csv: ") in line
 
 
+def test_when_the_parameters_are_mended_it_is_counted(lab, command, tmp_path):
+    lab("a/1.csv", names=["t_ms", "angle_deg", "torque"])
+    assert command("fleet", "update")[0] == 1
+    (tmp_path / "lab.yaml").write_text(CONFIG.replace("torque_Nmm", "torque"))
+    code, told, warned = command("fleet", "update")
+    assert (code, told[0], warned) == (0, "recordings: 1 counted now", [])
+
+
 @pytest.mark.parametrize(("factor", "size"), [(1.0, "only "), (1.0e6, "")])
 def test_a_unit_that_is_wrong_by_1000(lab, command, factor, size):
     lab("a/1.csv", factor=factor)

@@ -1,13 +1,52 @@
 """A recording is taken while others are recorded, once it is complete."""
 
+import inspect
+import signal
+import time
+from contextlib import ExitStack
+
 import pytest
+from click.testing import CliRunner
 
 from leg_wear_monitor.bags.mcap_layout import MAGIC
+from leg_wear_monitor.cli.main import cli
 from leg_wear_monitor.fleet.description import load_fleet
-from leg_wear_monitor.fleet.directory import append_line
+from leg_wear_monitor.fleet.directory import append_line, locked
 from leg_wear_monitor.fleet.update import PATIENCE, Followed, has_end
 
 pytestmark = pytest.mark.plain
+
+
+def test_followed_it_outlasts_another_update_and_a_description_that_is_half_written(
+    tmp_path, describe, monkeypatch
+):
+    pytest.importorskip("pyarrow")
+    (tmp_path / "a").mkdir()
+    path, another = describe(tmp_path, "a"), ExitStack()
+    whole = path.read_text()
+
+    def halves():
+        another.enter_context(locked(tmp_path / "out"))
+        yield
+        yield  # the same once more is not said again
+        another.close()
+        path.write_text(whole[:-4])
+        yield
+        path.write_text(whole)
+        yield
+        raise KeyboardInterrupt
+
+    between_looks = halves()
+    monkeypatch.setattr(time, "sleep", lambda _: next(between_looks))
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
+    old = "mix_stderr" in inspect.signature(CliRunner).parameters  # before click 8.2
+    runner = CliRunner(mix_stderr=False) if old else CliRunner()
+    arguments = ["fleet", "update", str(path), "--out", str(tmp_path / "out"), "--workers", "1", "--follow"]
+    done = runner.invoke(cli, arguments)
+    told = [line for line in done.stderr.splitlines() if "matches no recording" not in line]
+    assert done.exit_code == 0 and len(told) == 2, done.output
+    assert told[0].endswith("is being updated by another process; wait for its end; tried again")
+    assert told[1].startswith(f"warning: {path}: ") and told[1].endswith("; tried again")
 
 
 @pytest.fixture

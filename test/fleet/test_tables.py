@@ -13,6 +13,7 @@ from click.testing import CliRunner
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.cli.main import cli
+from leg_wear_monitor.fleet.directory import LegDirectory
 from leg_wear_monitor.fleet.update import TABLES
 
 parquet = pytest.importorskip("pyarrow.parquet", reason="the extra 'fleet' is not installed")
@@ -57,6 +58,14 @@ def test_cycles_have_a_row_a_gait_cycle(fleet):
         used = np.array(table[f"used_fraction.{joint}"])
         assert used == pytest.approx((np.array(table[f"clearance_m.{joint}"]) - 0.3e-3) / 0.3e-3, abs=1.0e-9)
         assert np.all(np.array(table[f"peak_force_n.{joint}"]) >= np.array(table[f"mean_force_n.{joint}"]))
+
+
+def test_what_was_counted_last_stands_last_though_it_was_found_first(tmp_path):
+    directory = LegDirectory(tmp_path, "a")
+    for key, outcome in (("1", "unreadable"), ("2", "counted"), ("1", "counted"), ("3", "unreadable")):
+        directory.renew({"key": key, "outcome": outcome})
+    assert [line["key"] for line in directory.last_lines()] == ["2", "1", "3"]
+    assert directory.last_counted()["key"] == "1"
 
 
 def test_a_row_a_minute_sums_up_its_gait_cycles(fleet, home, describe, update, tmp_path):

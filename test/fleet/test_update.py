@@ -1,5 +1,6 @@
 """A fleet's tables are the same however it was updated, and each recording counts once."""
 
+import errno
 import json
 import os
 import shutil
@@ -9,6 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 import leg_wear_monitor as lw
+from leg_wear_monitor.bags.reader import Recording
 from leg_wear_monitor.cli.main import cli
 from leg_wear_monitor.errors import ConfigError, LegWearError
 from leg_wear_monitor.fleet.chain import Found, _counted, count_or_fault, scan
@@ -85,6 +87,44 @@ def test_a_damaged_recording_costs_itself_and_is_named(first):
         ("b/trash.mcap", "unreadable"),
     ]
     assert (out / "legs/b/log").read_text().splitlines() == [trash[1], half[1]]
+
+
+def _bad_sector(*_):
+    raise OSError(errno.EIO, "Input/output error")
+
+
+class OnBadDisk(Recording):
+    """A recording in a bad sector."""
+
+    blocks = _bad_sector
+
+
+@pytest.mark.parametrize(
+    ("name", "bad"),
+    [
+        ("hashlib.file_digest", _bad_sector),
+        ("leg_wear_monitor.fleet.chain.Recording", OnBadDisk),
+        ("leg_wear_monitor.playback.replay.Recording", OnBadDisk),
+    ],
+    ids=["content", "begin", "replay"],
+)
+def test_what_the_system_could_not_read_is_named_and_tried_again(
+    walk, describe, update, tmp_path, monkeypatch, name, bad
+):
+    walk(tmp_path / "a/1.mcap")
+    path, out = describe(tmp_path, "a"), tmp_path / "out"
+    with monkeypatch.context() as patch:
+        patch.setattr(name, bad)
+        for _ in range(2):
+            ((leg, text),) = update(path, out).findings
+            assert leg == "a" and text == load_overview(out).leg("a").fault
+            assert text == (
+                "a/1.mcap: unreadable; cannot be read: Input/output error; tried again at the next update"
+            )
+    assert (out / "legs/a/log").read_text().splitlines() == [text]
+    assert update(path, out).counted == 1
+    leg = load_overview(out).leg("a")
+    assert (leg.fault, leg.recordings.counted, leg.recordings.unreadable) == ("", 1, 0)
 
 
 def test_interrupted_between_two_recordings_it_goes_on_there(home, updated, update, tmp_path):
@@ -186,6 +226,8 @@ def test_what_overlaps_counts_once_and_late_ones_are_said(walk, describe, update
     assert overlapping["outcome"] == "counted"
     assert 0.9 < overlapping["lost"]["already_counted"] / (4.0 * 2 * 200) <= 1.0
     assert sum(line["cycles"] for line in found.values()) <= 4 + 8  # of a second, in 0 to 4 s and 10 to 18 s
+    spans_h = load_overview(out).leg("a").recordings.counted_h
+    assert 3600.0 * spans_h == pytest.approx(4.0 + 8.0, abs=0.1)  # 0 to 4 s and 10 to 18 s
     log = (out / "legs/a/log").read_text()
     assert "a/2.mcap: counted" in log and "s of it are in the ledger already: not counted again" in log
     assert "a/0.mcap: counted" in log and "a later recording was counted before it" in log

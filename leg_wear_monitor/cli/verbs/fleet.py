@@ -12,7 +12,7 @@ from leg_wear_monitor.cli import common
 if TYPE_CHECKING:
     from leg_wear_monitor.fleet.chain import Chain
     from leg_wear_monitor.fleet.description import FleetDescription
-    from leg_wear_monitor.fleet.update import FleetUpdate
+    from leg_wear_monitor.fleet.update import FleetUpdate, Followed
 
 
 @click.group(short_help="Monitor many legs from their recordings.")
@@ -100,36 +100,59 @@ def _update(
 
 
 def _follow(description: Path, count: "Callable[[FleetDescription], FleetUpdate]", every_s: float) -> int:
-    """Update again and again; the exit code at the end."""
+    """Update again and again; the exit code at the end.
+
+    Only the first update has to succeed: later on, the description may be half written, or another process
+    may update the fleet, and the next look finds what this one could not.
+    """
     import signal
     import time
+
+    from leg_wear_monitor.errors import LegWearError
+    from leg_wear_monitor.fleet.update import Followed
+
+    signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
+    followed, told, fault = Followed(), set[tuple[str, str]](), ""
+    click.echo("following; ^C ends it")
+    try:
+        _look(description, count, followed, told)
+        while True:
+            time.sleep(every_s)
+            try:
+                _look(description, count, followed, told)
+                fault = ""
+            except LegWearError as error:
+                if str(error) != fault:
+                    fault = str(error)
+                    click.echo(f"warning: {fault}; tried again", err=True)
+    except KeyboardInterrupt:
+        return common.WITH_FINDINGS if told else 0
+
+
+def _look(
+    description: Path,
+    count: "Callable[[FleetDescription], FleetUpdate]",
+    followed: "Followed",
+    told: set[tuple[str, str]],
+) -> None:
+    """Count what is complete, and tell what was not ``told`` yet."""
     import warnings
 
     from leg_wear_monitor.errors import ConfigWarning
     from leg_wear_monitor.fleet.chain import words_of
     from leg_wear_monitor.fleet.description import load_fleet
-    from leg_wear_monitor.fleet.update import Followed
 
-    signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
-    followed, code, told = Followed(), 0, set[tuple[str, str]]()
-    click.echo("following; ^C ends it")
-    try:
-        while True:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", ConfigWarning)  # said at the start
-                legs = followed.complete(load_fleet(description))
-            done = count(legs)
-            for chain in done.chains:
-                for line in chain.new:
-                    click.echo(f"{chain.leg.id}: {words_of(line)}")
-            new = [each for each in done.findings if each not in told]
-            told.update(new)
-            code = common.WITH_FINDINGS if told else 0
-            for leg, text in new:
-                click.echo(f"warning: {leg}: {text}", err=True)
-            time.sleep(every_s)
-    except KeyboardInterrupt:
-        return code
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConfigWarning)  # said at the start
+        legs = followed.complete(load_fleet(description))
+    done = count(legs)
+    for chain in done.chains:
+        for line in chain.new:
+            click.echo(f"{chain.leg.id}: {words_of(line)}")
+    for leg, text in dict.fromkeys(done.findings):
+        if (leg, text) not in told:
+            click.echo(f"warning: {leg}: {text}", err=True)
+    told.update(done.findings)
 
 
 def _compile(chains: Sequence["Chain"]) -> None:
@@ -153,7 +176,7 @@ def _print_counts(done: "FleetUpdate", out: Path) -> None:
     else:
         click.echo(f"recordings: {done.counted} counted now")
         if done.renewed:
-            click.echo(f"forecasts: {done.renewed} renewed after measurements")
+            click.echo(f"forecasts: {done.renewed} renewed after measurements or repairs")
     overview = load_overview(out)
     states = [f"{number} {state.replace('_', ' ')}" for state, number in overview.counts.items() if number]
     click.echo(f"legs: {', '.join(states)}")

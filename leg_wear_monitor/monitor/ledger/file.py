@@ -118,11 +118,21 @@ def measurements_of(path: Path) -> str:
     Where they cannot be read (damaged, of another format, being written), the text says so: opening it
     decides.
     """
+    return _rows_as_text(path, "SELECT * FROM measurement ORDER BY rowid")
+
+
+def last_changes_of(path: Path) -> str:
+    """Numbers of the last changes of parts, alarms and verdict in a ledger, read as by `measurements_of`."""
+    last = (f"(SELECT max(id) FROM {table})" for table in ("audit", "alarm_history", "verdict"))
+    return _rows_as_text(path, f"SELECT {', '.join(last)}")
+
+
+def _rows_as_text(path: Path, query: str) -> str:
     if not path.is_file():
         return ""
     try:
         with closing(_connect(path, "ro")) as db:
-            return "\n".join(map(repr, db.execute("SELECT * FROM measurement ORDER BY rowid")))
+            return "\n".join(map(repr, db.execute(query)))
     except sqlite3.Error as error:
         return f"not readable: {error}"
 

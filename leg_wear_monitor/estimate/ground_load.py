@@ -47,6 +47,9 @@ _FRICTION, _DECLARED_FRICTION = 0.2, 0.03  # load friction of the drive
 _MEAN = 0.02  # error of the model in each phase, of the torque's size
 _SPREADS = {Cause.MASS: 0.05, Cause.LENGTH: 0.005, Cause.FRICTION: 5.0, Cause.SCALE: 0.05, Cause.TIMING: 0.02}
 _SURE, _WORSE = 2.0, 3.0  # standard deviations of a load, and a factor on what is left over without it
+# 3 % of cogging, with all else that drives do, was a load of 13 ± 4 N (2026-11-26); so little of it would
+# hardly change the wear, but keep the leg from being identified
+_LEAST_N = 25.0
 _UNIT_N = 100.0
 _STANDS = 0.05  # of the peak of a force, above which the foot stands
 # of the fit, which has several minima: 69 N and a toe-off later by 0.04 left over 2.5, 100 N left over
@@ -93,7 +96,8 @@ class GroundLoad:
     @property
     def is_sure(self) -> bool:
         """Whether the foot carries a load, and not only masses, friction or scatter."""
-        return self.peak_n > _SURE * self.peak_sigma_n and self.without > _WORSE * max(self.square, 1.0)
+        is_seen = self.peak_n > max(_SURE * self.peak_sigma_n, _LEAST_N)
+        return is_seen and self.without > _WORSE * max(self.square, 1.0)
 
 
 def stance_phases(up: Floats, speed: float) -> tuple[float, float]:

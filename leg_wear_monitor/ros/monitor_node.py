@@ -227,7 +227,8 @@ class MonitorNode(ClosingNode):
         self._epochs = Epochs(self._monitor, boot_id(), self._ros_now_ns, self._report)
         self._messages = Messages(config, self._monitor.clearance_joints, self.get_fully_qualified_name())
         self._is_stop = self._monitor.verdict.verdict.state is State.STOP  # of the ledger: not a new one
-        self._black_box = BlackBox(config.record.path, config.record.stops)
+        report = self.get_logger().info
+        self._black_box = BlackBox(config.record.path, config.record.stops, config.hardware, report)
         self._outlets = Outlets(self, self._messages.outputs, self._black_box)
         self._forecasts = ForecastTimes()
         self._compile(decoder)

@@ -185,12 +185,12 @@ def trigger_on(monitor: str, name: str, wait_s: float, times: int = 1) -> str:
     wait_s : float
         Longest wait for the service, and again for each answer.
     times : int
-        Number of calls; a reset asks to be called twice.
+        Most calls; a reset asks to be called twice.
 
     Returns
     -------
     str
-        The last answer.
+        The first answer of success.
 
     Raises
     ------
@@ -199,7 +199,10 @@ def trigger_on(monitor: str, name: str, wait_s: float, times: int = 1) -> str:
     """
     service = _service_of(monitor, name)
     with _caller(Trigger, service, wait_s) as call:
-        answer = [call(Trigger.Request()) for _ in range(times)][-1]
+        for _ in range(times):
+            answer = call(Trigger.Request())
+            if answer.success:  # somebody else may have asked for it just before
+                break
     if not answer.success:
         raise LegWearError(f"{service}: {answer.message}")
     return str(answer.message)

@@ -6,10 +6,12 @@ import pytest
 
 pytest.importorskip("rclpy")
 
+from click.testing import CliRunner
 from diagnostic_msgs.msg import DiagnosticArray
 from made_node import made_node
 from std_srvs.srv import Trigger
 
+from leg_wear_monitor.cli.main import cli
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.ros.monitor_node import CONFIRM_S, Confirmation
 
@@ -75,6 +77,16 @@ def test_a_part_is_replaced_and_the_ledger_saved(shared_stage, monitor, ledger: 
     answer = trigger(shared_stage, "undo_reset/A")
     assert not answer.success
     assert "has no reset to undo" in answer.message
+
+
+def test_a_reset_by_command_stops_at_its_success(shared_stage, monitor, monkeypatch) -> None:
+    """Somebody has called the service once just before: the first call of the command confirms that."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(shared_stage.domain))
+    assert not trigger(shared_stage, "reset_wear/B").success
+    done = CliRunner().invoke(cli, ["reset", "B", "--node", ME])
+    assert (done.exit_code, done.stderr) == (0, "")
+    assert done.stdout.startswith("joint B: new surfaces")
+    assert "not reset yet" in trigger(shared_stage, "reset_wear/B").message
 
 
 @pytest.mark.plain

@@ -103,6 +103,27 @@ def test_only_a_second_call_in_time_confirms() -> None:
     assert confirmation.is_confirmed("A")
 
 
+@pytest.mark.parametrize("has_ledger", [False, True])
+def test_what_is_not_stored_is_said_and_cannot_be_undone(has_ledger: bool, tmp_path: Path) -> None:
+    ledger, away = tmp_path / "wear.db", tmp_path / "away"
+    with made_node(clearance_joints=["G"], ledger__path=str(ledger) if has_ledger else "") as node:
+        if has_ledger:
+            ledger.rename(away)  # it cannot be written
+        assert "; it is not stored: " in node._acknowledge()
+        with pytest.raises(LegWearError, match="not reset yet"):
+            node._reset_wear("G")
+        reply = node._reset_wear("G")
+        assert reply.startswith("joint G: new surfaces; alarms cleared: ")
+        assert "confirm by walking; it is not stored: " in reply
+        assert "undo" not in reply
+        with pytest.raises(LegWearError):
+            node._undo_reset("G")
+        if has_ledger:
+            away.rename(ledger)
+            assert "not stored" not in node._acknowledge()  # the next entry has what was done meanwhile
+            assert "not stored" not in node._undo_reset("G")
+
+
 def test_without_a_clock_nothing_is_reset() -> None:
     with made_node(use_sim_time=True, clearance_joints=["G"]) as node:
         for act in (node._reset_wear, node._reset_wear, node._undo_reset):

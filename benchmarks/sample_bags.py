@@ -67,6 +67,7 @@ def start(verb: str, parameters: dict[str, object], *further: str) -> subprocess
 
 def record(name: str, path: Path, parameters: Path) -> None:
     """One recording."""
+    path.unlink(missing_ok=True)  # the monitor would keep the former one under another name
     monitor = start("monitor", {"record.path": str(path)}, "--params-file", str(parameters))
     try:
         leg = start("gait-publisher", LEG | BAGS[name])

@@ -230,7 +230,7 @@ def joints_words(names: Sequence[str]) -> str:
 
 
 def trigger(node: str, service: str, wait_s: float, times: int = 1) -> str:
-    """Last reply of a service of a running monitor, which is called so many times.
+    """Reply of a service of a running monitor, which is called at most so many times, until it succeeds.
 
     Raises
     ------

@@ -20,6 +20,7 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 from std_srvs.srv import Trigger
 
 from leg_wear_monitor.errors import ConfigError, LegWearError, did_you_mean, printable
+from leg_wear_monitor.monitor.forecast.measurement import NOT_STORED
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 
 # Service ``~/measure``: a clearance that somebody measured, while the monitor runs.
@@ -106,11 +107,21 @@ def measured(monitor: WearMonitor, wanted: MeasureRequest, stamp_ns: int) -> str
     )
     limit_m = monitor.clearance_limits_m[monitor.clearance_joints.index(found.measurement.joint)]
     lines = found.told(limit_m, monitor.config.limits.warn_fraction, monitor.measurements[:-1])
+    return with_storage("; ".join(lines), not_stored(monitor))
+
+
+def not_stored(monitor: WearMonitor) -> str:
+    """Why the ledger does not contain what an operator did; empty if it does."""
     try:
         monitor.save()
     except LegWearError as error:
-        lines = (*lines, f"it is not stored: {error}")
-    return "; ".join(lines)
+        return str(error)
+    return ""
+
+
+def with_storage(reply: str, fault: str) -> str:
+    """Reply to an operator, with the fault of `not_stored` at its end."""
+    return f"{reply}; {NOT_STORED}: {fault}" if fault else reply
 
 
 def offer_measure(node: Node, act: Callable[[MeasureRequest], str]) -> None:
@@ -185,12 +196,12 @@ def trigger_on(monitor: str, name: str, wait_s: float, times: int = 1) -> str:
     wait_s : float
         Longest wait for the service, and again for each answer.
     times : int
-        Number of calls; a reset asks to be called twice.
+        Most calls; a reset asks to be called twice.
 
     Returns
     -------
     str
-        The last answer.
+        The first answer of success.
 
     Raises
     ------
@@ -199,7 +210,10 @@ def trigger_on(monitor: str, name: str, wait_s: float, times: int = 1) -> str:
     """
     service = _service_of(monitor, name)
     with _caller(Trigger, service, wait_s) as call:
-        answer = [call(Trigger.Request()) for _ in range(times)][-1]
+        for _ in range(times):
+            answer = call(Trigger.Request())
+            if answer.success:  # somebody else may have asked for it just before
+                break
     if not answer.success:
         raise LegWearError(f"{service}: {answer.message}")
     return str(answer.message)

@@ -31,7 +31,7 @@ from leg_wear_monitor.monitor.reports import Reports, Status
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor, open_monitor
 from leg_wear_monitor.ros.health import Load, load_status, recording_status
 from leg_wear_monitor.ros.inputs import Inbox, Inputs
-from leg_wear_monitor.ros.measure import MeasureRequest, measured, offer_measure
+from leg_wear_monitor.ros.measure import MeasureRequest, measured, not_stored, offer_measure, with_storage
 from leg_wear_monitor.ros.outputs import BlackBox, MarkerTopic, MotionTopic, Outlets
 from leg_wear_monitor.ros.parameters import Parameters
 from leg_wear_monitor.ros.running import ClosingNode, release_memory, repeated, run, spin
@@ -227,7 +227,8 @@ class MonitorNode(ClosingNode):
         self._epochs = Epochs(self._monitor, boot_id(), self._ros_now_ns, self._report)
         self._messages = Messages(config, self._monitor.clearance_joints, self.get_fully_qualified_name())
         self._is_stop = self._monitor.verdict.verdict.state is State.STOP  # of the ledger: not a new one
-        self._black_box = BlackBox(config.record.path, config.record.stops)
+        report = self.get_logger().info
+        self._black_box = BlackBox(config.record.path, config.record.stops, config.hardware, report)
         self._outlets = Outlets(self, self._messages.outputs, self._black_box)
         self._forecasts = ForecastTimes()
         self._compile(decoder)
@@ -416,7 +417,8 @@ class MonitorNode(ClosingNode):
         self._markers.operated()
         cleared, kept = (*cleared, *own_cleared), (*kept, *own_kept)
         self._send_state()
-        return f"cleared: {_listed(cleared)}; still present: {_listed(kept)}"
+        reply = f"cleared: {_listed(cleared)}; still present: {_listed(kept)}"
+        return with_storage(reply, not_stored(self._monitor))
 
     def _save(self) -> str:
         self._monitor.save()
@@ -440,16 +442,16 @@ class MonitorNode(ClosingNode):
             raise LegWearError(asked_once(joint, self._monitor.wear_of(joint)))
         done = self._monitor.reset_wear(joint, stamp_ns, "service ~/reset_wear")
         self._send_state_and_forecast()
-        return (
-            f"joint {joint}: new surfaces, history kept; ~/undo_reset/{joint} reverts it; "
-            f"alarms {done.words}; confirm by walking"
-        )
+        fault = not_stored(self._monitor)
+        history = "" if fault else f", history kept; ~/undo_reset/{joint} reverts it"
+        reply = f"joint {joint}: new surfaces{history}; alarms {done.words}; confirm by walking"
+        return with_storage(reply, fault)
 
     def _undo_reset(self, joint: str) -> str:
         stamp_ns = audit_time(self._ros_now_ns())
         was = self._monitor.undo_reset(joint, stamp_ns, "service ~/undo_reset")
         self._send_state_and_forecast()
-        return undone(joint, was)
+        return with_storage(undone(joint, was), not_stored(self._monitor))
 
 
 def _listed(alarms: Sequence[Alarm]) -> str:

@@ -1,11 +1,13 @@
 """Outputs of the node: topics, markers, and the recording of all of them."""
 
+import re
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
 from functools import cached_property
+from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -49,7 +51,11 @@ class StopRecorder:
     Parameters
     ----------
     directory : str
-        Where the files go, one for each STOP, named by the computer's time (UTC).
+        Where the files go, one for each STOP, named by the computer's time (UTC) and the leg.
+    leg : str
+        Hardware id; several legs may write into one directory.
+    report : callable
+        Called with a line for the log.
 
     Raises
     ------
@@ -57,8 +63,9 @@ class StopRecorder:
         If the directory cannot be made; later, if a file cannot be written.
     """
 
-    def __init__(self, directory: str) -> None:
-        self._directory = Path(directory)
+    def __init__(self, directory: str, leg: str, report: Callable[[str], None]) -> None:
+        self._directory, self._report = Path(directory), report
+        self._leg = re.sub(r"[^\w.-]", "_", leg)  # such as robot/left, which would be a directory
         try:
             self._directory.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -88,8 +95,8 @@ class StopRecorder:
         """Begin a file with what is kept; while one is being written, there is no other."""
         if self._writer is not None:
             return
-        at = datetime.fromtimestamp(now_ns * 1.0e-9, UTC).strftime("%Y%m%dT%H%M%SZ")
-        self._writer = _writer(str(self._directory / f"stop-{at}.mcap"))
+        path = self._directory / f"stop-{_utc(now_ns * 1.0e-9)}-{self._leg}.mcap"
+        self._writer = _writer("record.stops", path, self._report)
         self._channels = {name: self._writer.channel(name, *spec) for name, spec in self._topics.items()}
         self._until_ns = now_ns + _AFTER_NS
         for kept in self._kept:
@@ -129,9 +136,13 @@ class BlackBox:
     Parameters
     ----------
     path : str
-        MCAP file; empty disables the recording.
+        MCAP file; empty disables the recording. An earlier recording of this name is kept under another.
     stops : str
         Directory for recordings of the seconds around a STOP; empty for none.
+    leg : str
+        Hardware id, for the names of those.
+    report : callable
+        Called with a line for the log: which file is written, and what became of an earlier one.
 
     Attributes
     ----------
@@ -146,10 +157,10 @@ class BlackBox:
         If the file, or the directory, cannot be created.
     """
 
-    def __init__(self, path: str, stops: str = "") -> None:
+    def __init__(self, path: str, stops: str, leg: str, report: Callable[[str], None]) -> None:
         self.fault, self.recorded = "", 0
-        self._stops = StopRecorder(stops) if stops else None
-        self._writer = _writer(path) if path else None
+        self._stops = StopRecorder(stops, leg, report) if stops else None
+        self._writer = _writer("record.path", Path(path), report) if path else None
         self._channels: dict[str, int] = {}
 
     @property
@@ -217,12 +228,36 @@ class BlackBox:
                 writer.close()
 
 
-def _writer(path: str) -> "McapWriter":
+def _writer(parameter: str, path: Path, report: Callable[[str], None]) -> "McapWriter":
+    """A writer of a file; a recording that the file contains is kept, and the log names both files."""
     try:
         from leg_wear_monitor.bags.mcap_writer import McapWriter
     except ImportError as error:
-        raise LegWearError(f"record.path: {error}; pip install 'leg_wear_monitor[bags]'") from error
-    return McapWriter(path)
+        raise LegWearError(f"{parameter}: {error}; pip install 'leg_wear_monitor[bags]'") from error
+    earlier = _move_aside(parameter, path)
+    writer = McapWriter(path)
+    report(f"recording to {path}" + (f"; the earlier recording is kept as {earlier}" if earlier else ""))
+    return writer
+
+
+def _move_aside(parameter: str, path: Path) -> Path | None:
+    """Rename a file that is not empty by the time of its last change (UTC); its new name.
+
+    A restart with the same parameters must not delete what the former run has recorded.
+    """
+    try:
+        if not path.is_file() or not path.stat().st_size:
+            return None
+        stem = f"{path.stem}-{_utc(path.stat().st_mtime)}"
+        names = (f"{stem}{again}{path.suffix}" for again in chain([""], (f"-{n}" for n in count(2))))
+        return path.rename(next(each for each in map(path.with_name, names) if not each.exists()))
+    except OSError as error:
+        raise LegWearError(f"{parameter}: {path} cannot be renamed: {error.strerror}") from error
+
+
+def _utc(time_s: float) -> str:
+    """Time in the name of a file."""
+    return datetime.fromtimestamp(time_s, UTC).strftime("%Y%m%dT%H%M%SZ")
 
 
 # Output topics of the monitor: serialized messages are published and recorded.

@@ -2,14 +2,17 @@
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any, Generic, TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
+from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
+from rclpy.publisher import Publisher
 from rclpy.service import Service
 from rclpy.subscription import Subscription
 from rosgraph_msgs.msg import Clock
@@ -37,6 +40,8 @@ _ARRAYS = (
 _TYPES = frozenset(one.value for one in RosParameter.Type)
 
 _CLOCK = "use_sim_time"
+_QOS_OVERRIDES = "qos_overrides."
+_MOST_DEPTH = 2**31 - 1  # of DDS
 _NO_DOT = re.compile(r"[+-]?\d+e[+-]?\d+")  # YAML 1.1 reads it as text; Python prints 0.000001 like this
 
 
@@ -52,9 +57,20 @@ class ParameterNode(Node):
     fault_of : callable
         Why parameters cannot be set, empty if they can. It is asked before rclpy, which would name neither
         unit nor bounds of a value that is out of range.
+
+    Raises
+    ------
+    ConfigError
+        For a parameter of rclpy itself, such as ``use_sim_time``, of another type.
     """
 
     fault_of: Callable[[list[RosParameter]], str] = staticmethod(lambda _: "")
+
+    def __init__(self, name: str, **options: Any) -> None:
+        try:
+            super().__init__(name, **options)
+        except ParameterException as error:
+            raise ConfigError(f"/{name}", "", str(error)) from error
 
     @property
     def given(self) -> dict[str, Any]:
@@ -81,10 +97,46 @@ class ParameterNode(Node):
         """Create a subscription; rclpy creates that of ``/clock`` by this function, too.
 
         A time before 0 does not reach the callback: rclpy raises an exception for it, which ends the node.
+
+        Raises
+        ------
+        ConfigError
+            If the quality of service that parameters set for this topic cannot be used.
         """
         if msg_type is Clock:
             callback = self._times_of(callback)
-        return super().create_subscription(msg_type, topic, callback, *options, **named)
+        with self._qos_told(topic):
+            return super().create_subscription(msg_type, topic, callback, *options, **named)
+
+    def create_publisher(self, msg_type: Any, topic: str, *options: Any, **named: Any) -> Publisher:
+        """Create a publisher.
+
+        Raises
+        ------
+        ConfigError
+            If the quality of service that parameters set for this topic cannot be used.
+        """
+        with self._qos_told(topic):
+            return super().create_publisher(msg_type, topic, *options, **named)
+
+    @contextmanager
+    def _qos_told(self, topic: str) -> Iterator[None]:
+        """Name the parameters of a quality of service that cannot be used: rclpy names no value."""
+        of_topic = f"{_QOS_OVERRIDES}{self.resolve_topic_name(topic)}."
+        given = {name: value for name, value in self.given.items() if name.startswith(of_topic)}
+        for name, value in given.items():
+            # the middleware prints lines of its own for it, and rclpy a signature
+            if name.endswith(".depth") and isinstance(value, int) and not 0 <= value <= _MOST_DEPTH:
+                fault = f"{value} is not from 0 to {_MOST_DEPTH} messages"
+                raise ConfigError(self.get_fully_qualified_name(), name, fault)
+        try:
+            yield
+        except (ParameterException, RuntimeError) as error:
+            if not given:
+                raise
+            values = ", ".join(f"{name}: {value}" for name, value in given.items())
+            fault = f"{values} cannot be used: {str(error).split(', at /')[0]}"
+            raise ConfigError(self.get_fully_qualified_name(), "", fault) from error
 
     def _times_of(self, callback: Callable[[Any], None]) -> Callable[[Any], None]:
         def take(message: Clock) -> None:
@@ -196,9 +248,13 @@ def plain(parameter: RosParameter) -> Any:
 
 Config = TypeVar("Config")
 
-# parameters of every node, handled by rclpy itself
 _LARGEST = 2**63 - 1  # of an integer parameter
-_OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides.")
+_OF_ROS = (_CLOCK, "start_type_description_service")
+
+
+def _is_of_ros(name: str) -> bool:
+    """Whether a parameter is one of every node, handled by rclpy itself."""
+    return name in _OF_ROS or name.startswith(_QOS_OVERRIDES)
 
 
 class Parameters(Generic[Config]):
@@ -229,7 +285,7 @@ class Parameters(Generic[Config]):
         self, node: ParameterNode, kind: type[Config], empty: Mapping[str, str] | None = None
     ) -> None:
         self._source = node.get_fully_qualified_name()
-        given = {name: value for name, value in node.given.items() if not name.startswith(_OF_ROS)}
+        given = {name: value for name, value in node.given.items() if not _is_of_ros(name)}
         given |= {name: text for name, text in (empty or {}).items() if not given.get(name)}
         self.config: Config = structured(kind, given, self._source)
         for name, value in values_of(self.config).items():

@@ -9,7 +9,12 @@ from ruamel.yaml import YAML
 
 from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.monitor.config.parameters import parse_config, structured
+from leg_wear_monitor.monitor.config.tables import FORCES
+from leg_wear_monitor.ros import monitor_node
 from leg_wear_monitor.ros.gait_publisher import PublisherConfig
+from leg_wear_monitor.ros.inputs import DEPTH
+
+TAKE_S = monitor_node._TAKE_S  # the nodes of these tests take their messages sooner
 
 
 def flat(mapping: dict[str, Any], prefix: str = "") -> dict[str, Any]:
@@ -83,3 +88,15 @@ def test_the_parameters_for_tools_prevail_where_rviz_is_asked_for() -> None:
             if node.get("exec") == "monitor":
                 files = [one.get("from") for one in node.iter("param") if one.get("from")]
                 assert files == ["$(var params_file)", "$(var shown)"]
+
+
+@pytest.mark.plain
+def test_the_pages_have_the_numbers_and_units_of_the_code() -> None:
+    docs = share_directory() / "docs"
+    reference = (docs / "reference" / "ros.md").read_text(encoding="utf-8")
+    tables = (docs / "howto" / "csv.md").read_text(encoding="utf-8")
+    numbers = {"depth": DEPTH, "at most": monitor_node._AT_ONCE, "At": monitor_node._HELD}
+    for words, number in numbers.items():
+        assert f"{words} {number:,}".replace(",", " ") in reference
+    assert f"{1.0 / TAKE_S:g} times a second the node takes" in reference
+    assert f"`input.units.foot_load` is {' or '.join(f'`{unit}`' for unit in FORCES)}" in tables

@@ -119,6 +119,10 @@ def test_the_forecast_follows_a_measurement_at_once(stage, walk) -> None:
     forecasts = stage.listen(f"{NODE}/forecast", DiagnosticArray)
     stage.legs("/left").play(walk, monitor, end_s=4.0)
     stage.wait_for(lambda: bool(forecasts), "a forecast")
+    done = measure("A", "0.303", "--sigma", "0.005", "--node", NODE)
+    assert done.exit_code == 1  # for this alone
+    assert "contradicts" not in done.stdout and "at its limit" not in done.stdout
+    assert done.stdout.endswith("it is not stored: no ledger is kept; set ledger.path\n")
     before = len(forecasts)
     answer = asked(stage, joint="A", clearance_m=3.2e-4, sigma_m=5.0e-6)
     assert answer.successful

@@ -28,6 +28,9 @@ from leg_wear_monitor.ros.gait_publisher import GaitPublisher
 from leg_wear_monitor.ros.monitor_node import MonitorNode
 
 ME = "/leg_wear_monitor"
+QOS = "qos_overrides./joint_states.subscription"
+LEG = "qos_overrides./joint_states.publisher"
+OUT = f"qos_overrides.{ME}/verdict.publisher"
 
 
 @pytest.fixture(scope="module")
@@ -245,6 +248,14 @@ def test_an_empty_list_on_the_command_line_is_an_empty_list() -> None:
         (MonitorNode, {"mechanism": "no_leg"}, "no_leg: no mechanism of this name"),
         (MonitorNode, {"record.path": "/no/such/place.mcap"}, "/no/such/place.mcap: cannot be written"),
         (MonitorNode, {"ledger.path": "/no/such/place.db"}, "/no/such/place.db: cannot be created"),
+        (MonitorNode, {"use_sim_times": True}, "use_sim_times: unknown parameter"),
+        (MonitorNode, {"use_sim_time": "maybe"}, "/leg_wear_monitor: Trying to set parameter 'use_sim_time'"),
+        (GaitPublisher, {"start_type_description_service": 7}, "expecting type 'BOOL'"),
+        (MonitorNode, {f"{QOS}.reliability": "best"}, f"{QOS}.reliability: best cannot be used: "),
+        (MonitorNode, {f"{QOS}.reliability": 7}, f"{QOS}.reliability: 7 cannot be used: "),
+        (MonitorNode, {f"{QOS}.depth": -1}, f"{QOS}.depth: -1 is not from 0 to 2147483647 messages"),
+        (MonitorNode, {f"{OUT}.depth": 2**31}, f"{OUT}.depth: 2147483648 is not from 0 to 2147483647"),
+        (GaitPublisher, {f"{LEG}.history": "all"}, f"{LEG}.history: all cannot be used: "),
         (GaitPublisher, {"pace.ripple": 1.0}, "pace.ripple: 1.0 is not at most 0.9"),
         (GaitPublisher, {"precompute": True}, "precompute: needs a duration_s above 0 s"),
     ],

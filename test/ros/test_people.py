@@ -6,10 +6,12 @@ import pytest
 
 pytest.importorskip("rclpy")
 
+from click.testing import CliRunner
 from diagnostic_msgs.msg import DiagnosticArray
 from made_node import made_node
 from std_srvs.srv import Trigger
 
+from leg_wear_monitor.cli.main import cli
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.ros.monitor_node import CONFIRM_S, Confirmation
 
@@ -77,6 +79,16 @@ def test_a_part_is_replaced_and_the_ledger_saved(shared_stage, monitor, ledger: 
     assert "has no reset to undo" in answer.message
 
 
+def test_a_reset_by_command_stops_at_its_success(shared_stage, monitor, monkeypatch) -> None:
+    """Somebody has called the service once just before: the first call of the command confirms that."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(shared_stage.domain))
+    assert not trigger(shared_stage, "reset_wear/B").success
+    done = CliRunner().invoke(cli, ["reset", "B", "--node", ME])
+    assert (done.exit_code, done.stderr) == (0, "")
+    assert done.stdout.startswith("joint B: new surfaces")
+    assert "not reset yet" in trigger(shared_stage, "reset_wear/B").message
+
+
 @pytest.mark.plain
 def test_only_a_second_call_in_time_confirms() -> None:
     clock = [100.0]
@@ -89,6 +101,27 @@ def test_only_a_second_call_in_time_confirms() -> None:
     assert not confirmation.is_confirmed("A")
     clock[0] += CONFIRM_S - 0.1
     assert confirmation.is_confirmed("A")
+
+
+@pytest.mark.parametrize("has_ledger", [False, True])
+def test_what_is_not_stored_is_said_and_cannot_be_undone(has_ledger: bool, tmp_path: Path) -> None:
+    ledger, away = tmp_path / "wear.db", tmp_path / "away"
+    with made_node(clearance_joints=["G"], ledger__path=str(ledger) if has_ledger else "") as node:
+        if has_ledger:
+            ledger.rename(away)  # it cannot be written
+        assert "; it is not stored: " in node._acknowledge()
+        with pytest.raises(LegWearError, match="not reset yet"):
+            node._reset_wear("G")
+        reply = node._reset_wear("G")
+        assert reply.startswith("joint G: new surfaces; alarms cleared: ")
+        assert "confirm by walking; it is not stored: " in reply
+        assert "undo" not in reply
+        with pytest.raises(LegWearError):
+            node._undo_reset("G")
+        if has_ledger:
+            away.rename(ledger)
+            assert "not stored" not in node._acknowledge()  # the next entry has what was done meanwhile
+            assert "not stored" not in node._undo_reset("G")
 
 
 def test_without_a_clock_nothing_is_reset() -> None:

@@ -1,5 +1,6 @@
 """Parts of the nodes by themselves: the inbox, the black box, how load is told, malformed messages."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -207,9 +208,11 @@ def test_no_more_bytes_are_taken_than_asked_for_but_one_message_always() -> None
     assert box.take(100, 20) == []
 
 
-def black_box(path: Path | str = "", stops: Path | str = "") -> BlackBox:
+def black_box(
+    path: Path | str = "", stops: Path | str = "", leg: str = "leg", log: list[str] | None = None
+) -> BlackBox:
     """A black box with two topics."""
-    box = BlackBox(str(path), str(stops))
+    box = BlackBox(str(path), str(stops), leg, ([] if log is None else log).append)
     for topic in ("/a", "/b"):
         box.add_topic(topic, "sensor_msgs/msg/JointState", SENSOR_DATA)
     return box
@@ -225,6 +228,28 @@ def test_the_black_box_keeps_bytes_in_their_order(tmp_path: Path) -> None:
     box.close()
     assert messages_of(path) == {"/a": [b"one", b"four"], "/b": [b"two", b"tri"]}
     assert recording_status(box).values["recorded_messages"] == 4.0
+
+
+def test_a_recording_is_never_overwritten(tmp_path: Path) -> None:
+    """A monitor that is started again with the same parameters; an empty file is none."""
+    path, log = tmp_path / "run.mcap", []
+    path.touch()
+    for raw in (b"one", b"two", b"tri"):
+        box = black_box(path, log=log)
+        box.write("/a", 1, raw)
+        box.close()
+        os.utime(path, (50, 50))
+    first, again = tmp_path / "run-19700101T000050Z.mcap", tmp_path / "run-19700101T000050Z-2.mcap"
+    assert {file: messages_of(file)["/a"] for file in tmp_path.iterdir()} == {
+        first: [b"one"],
+        again: [b"two"],
+        path: [b"tri"],
+    }
+    assert log == [
+        f"recording to {path}",
+        f"recording to {path}; the earlier recording is kept as {first}",
+        f"recording to {path}; the earlier recording is kept as {again}",
+    ]
 
 
 def test_a_full_disk_ends_the_recording_and_not_the_node(tmp_path: Path) -> None:
@@ -251,11 +276,26 @@ def test_the_seconds_around_a_stop_are_kept(tmp_path: Path) -> None:
     box.close()
     assert not box.on and box.takes_inputs
     files = sorted((tmp_path / "stops").iterdir())
-    assert [file.name for file in files] == ["stop-19700101T000050Z.mcap", "stop-19700101T000120Z.mcap"]
+    assert [file.name for file in files] == [
+        "stop-19700101T000050Z-leg.mcap",
+        "stop-19700101T000120Z-leg.mcap",
+    ]
     for file, at in zip(files, (50, 80), strict=True):
         found = messages_of(file)
         assert found["/a"] == [f"{second}".encode() for second in range(at - 30, at + 11)]
         assert found["/b"][:2] == [b"one", b"two"]
+
+
+def test_legs_that_stop_at_once_have_a_file_each_also_after_a_restart(tmp_path: Path) -> None:
+    for leg, raw in (("robot/left", b"one"), ("robot/right", b"two"), ("robot/left", b"tri")):
+        box = black_box(stops=tmp_path, leg=leg)
+        box.write("/a", SECOND, raw)
+        box.stop(SECOND)
+        box.close()
+    found = {file.name: messages_of(file)["/a"] for file in tmp_path.iterdir()}
+    assert sorted(found.values()) == [[b"one"], [b"tri"], [b"two"]]
+    at = "stop-19700101T000001Z"
+    assert (found[f"{at}-robot_left.mcap"], found[f"{at}-robot_right.mcap"]) == ([b"tri"], [b"two"])
 
 
 def test_what_is_kept_of_a_stop_is_on_the_disk_after_a_flush(tmp_path: Path) -> None:
@@ -280,7 +320,7 @@ def test_a_clock_that_is_set_back_fills_no_memory(tmp_path: Path) -> None:
 def test_stops_that_cannot_be_written_are_told_and_end_nothing(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(LegWearError, match=r"record\.stops: "):
-        BlackBox("", str(tmp_path / "file" / "stops"))
+        black_box(stops=tmp_path / "file" / "stops")
     box = black_box(stops=tmp_path / "stops")
     (tmp_path / "stops").rmdir()
     box.write("/a", SECOND, b"one")

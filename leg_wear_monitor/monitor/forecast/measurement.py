@@ -68,6 +68,7 @@ CONTRADICTS = 0.00135  # probability of a tail: three standard deviations of a n
 CONTRADICTION = "this contradicts the model"
 AGREES = "this agrees with what"
 AT_LIMIT = "the measured clearance is at its limit"
+NOT_STORED = "it is not stored"
 
 _SAYS_SOMETHING = 0.9  # of the spread before: what is left after a measurement that says something
 
@@ -158,8 +159,8 @@ class MeasurementResult:
 
 
 def asks_to_act(told: str) -> bool:
-    """Whether `MeasurementResult.told` contains a finding, for a program that has the text alone."""
-    return AT_LIMIT in told or CONTRADICTION in told
+    """Whether a node's reply to a measurement contains a finding, or that the measurement is not stored."""
+    return any(words in told for words in (AT_LIMIT, CONTRADICTION, NOT_STORED))
 
 
 def last_measured(measurements: Sequence[Measurement], joint: str, replaced_ns: int) -> Measurement | None:

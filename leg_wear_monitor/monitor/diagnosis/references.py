@@ -138,11 +138,9 @@ class LegModels:
         plain = signature.with_noise_of(reference, attrs.evolve(sensor, channel=signature.DIRECT), known.mean)
         if found == plain:
             return plain
+        leg, model = self._mechanism, signature.signature_model
         with_channel, without = (
-            misfit(
-                signature.signature_model(reference, one), nuisances(self._mechanism, reference, one), known
-            )
-            for one in (found, plain)
+            misfit(model(reference, one), nuisances(leg, reference, one), known) for one in (found, plain)
         )
         return plain if with_channel > _CHANNEL_MISFIT_FACTOR * without else found
 

@@ -1,11 +1,14 @@
 """`measure`: a clearance into the ledger, and what it is told."""
 
+import json
 import sqlite3
 from contextlib import closing
 
 import pytest
 
+from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.parameters import load_config
+from leg_wear_monitor.state import Level
 
 pytestmark = pytest.mark.plain
 
@@ -71,6 +74,66 @@ def test_what_is_near_the_limit_or_at_it_is_said_and_at_it_the_caller_has_to_act
     at = run("measure", "B", "0.451", *arguments)
     assert "contradicts" not in at.stdout
     assert (at.exit_code, "at its limit" in at.stdout) == (1, True)
+
+
+def alarms(path):
+    with closing(sqlite3.connect(path)) as db:
+        now = db.execute("SELECT subject, level, acknowledged, worst, cause FROM alarm").fetchall()
+        changes = db.execute("SELECT subject, level FROM alarm_history").fetchall()
+    return now, changes
+
+
+def verdict(path):
+    with closing(sqlite3.connect(path)) as db:
+        last = "SELECT state, fault_code, evidence FROM verdict ORDER BY id DESC LIMIT 1"
+        state, code, evidence = db.execute(last).fetchone()
+    return state, code, json.loads(evidence)
+
+
+@pytest.mark.parametrize(
+    ("mm", "level", "state", "code"),
+    [("0.7", 2, "stop", "CLEARANCE_G"), ("0.5", 1, "watch", "CLEARANCE_NEAR_G")],
+)
+def test_a_measurement_at_the_limit_or_near_it_raises_alarm_and_verdict(run, ledger, mm, level, state, code):
+    run("measure", "G", mm, "--sigma", "0.02", "--ledger", str(ledger))
+    value = pytest.approx(1e-3 * float(mm))
+    assert alarms(ledger) == ([("G", level, 0, value, "measured")], [("G", level)])
+    now = verdict(ledger)
+    assert (now[0], code in {now[1], "CLEARANCE_NEAR_G"}) == (state, True)
+    # the alarm has the unit of the measurement beside it
+    own = {each["name"]: (each["value"], each["unit"]) for each in now[2]}
+    assert own["clearance G"] == own["measured clearance G"] == (value, "m")
+
+
+def test_a_harmless_measurement_leaves_alarms_and_verdict_as_they_are(run, ledger):
+    before = verdict(ledger)
+    run("measure", "G", "0.4", "--sigma", "0.02", "--ledger", str(ledger))
+    assert (alarms(ledger), verdict(ledger)) == (([], []), before)
+
+
+@pytest.mark.parametrize("present", [Level.OK, Level.ERROR])
+def test_a_withdrawn_measurement_does_not_end_a_stop(run, worn_ledger, present):
+    stop = {"level": Level.ERROR, "worst": 1.7e-3, "limit": 6e-4, "raised_ns": 5, "cause": "torque"}
+    path = worn_ledger(alarms=(Alarm(kind="clearance", subject="G", present=present, sigma=4e-4, **stop),))
+    before = verdict(path)[:2]
+    assert before == ("stop", "CLEARANCE_SEEN_G")
+    for mm in ("0.36", "0.37"):
+        run("measure", "knee", mm, "--sigma", "0.01", "--ledger", str(path))
+        assert verdict(path)[0] != "stop"
+    run("measure", "--withdraw", "1", "--ledger", str(path))
+    assert verdict(path)[0] != "stop"  # the other one says so, too
+    run("measure", "--withdraw", "2", "--ledger", str(path))
+    assert verdict(path)[:2] == before
+    assert alarms(path)[0] == [("G", 2, 0, 1.7e-3, "torque")]
+
+
+def test_an_alarm_by_a_measurement_that_was_wrong_clears_once_it_is_withdrawn_and_acknowledged(run, ledger):
+    kept = ("--ledger", str(ledger))
+    run("measure", "G", "0.7", "--sigma", "0.02", *kept)
+    run("measure", "G", "--withdraw", "last", *kept)
+    assert verdict(ledger)[0] == "stop"  # until somebody has seen to it
+    assert run("acknowledge", *kept).stdout == "cleared: clearance G; still present: none\n"
+    assert verdict(ledger)[0] != "stop"
 
 
 def test_a_dry_run_says_the_same_and_leaves_the_ledger_as_it_is(run, ledger):

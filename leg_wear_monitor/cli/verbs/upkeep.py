@@ -77,10 +77,11 @@ def withdraw(
     joint: str | None, which: str, who: str, config: Path | None, ledger: Path | None, dry_run: bool
 ) -> None:
     """Withdraw a measurement, by its number or the last one of a joint, and print what it is then."""
-    with opened(config, ledger, dry_run) as (kept, _, _):
+    from leg_wear_monitor.monitor.operators import withdraw_in
+
+    with opened(config, ledger, dry_run) as (kept, leg, settings):
         number = _number(kept, joint, which)
-        click.echo(_line(kept.withdraw(number, time.time_ns(), who)))
-        kept.record()
+        click.echo(_line(withdraw_in(kept, leg, settings, number, time.time_ns(), who)))
 
 
 def _number(kept: "Ledger", joint: str | None, which: str) -> int:
@@ -185,7 +186,7 @@ def _reset_in(joint: str, config: Path | None, ledger: Path | None, undo: bool, 
     with opened(config, ledger, dry_run, joint) as (kept, leg, settings):
         joint = leg.clearance_joint(joint)
         if undo:
-            words = wear_words(undo_in(kept, joint, now_ns, who))
+            words = wear_words(undo_in(kept, leg, settings, joint, now_ns, who))
             click.echo(
                 f"joint {joint}: the reset is undone, {words} are counted, including those since the reset"
             )
@@ -284,7 +285,7 @@ def _measured(
     from leg_wear_monitor.monitor.forecast.measurement import measure as evaluate
     from leg_wear_monitor.monitor.forecast.wear_coefficients import prior_source
     from leg_wear_monitor.monitor.ledger.entry import new_part
-    from leg_wear_monitor.monitor.operators import overrule_in, shown_in
+    from leg_wear_monitor.monitor.operators import measured_in, shown_in
     from leg_wear_monitor.monitor.verdict.situation import SOURCES
 
     with opened(config, ledger, dry_run, joint) as (kept, leg, settings):
@@ -312,6 +313,6 @@ def _measured(
             by = SOURCES[shown.by]
             found = attrs.evolve(found, shown_m=shown.clearance_m, shown_sigma_m=shown.sigma_m, shown_by=by)
         kept.note(found.measurement)
-        kept.record(overrule_in(kept, leg, settings, found.measurement))
+        kept.record(measured_in(kept, leg, settings, found.measurement))
     told = found.told(limit_m, settings.limits.warn_fraction, kept.measurements)
     return told, found.has_findings(limit_m)

@@ -189,6 +189,10 @@ def test_a_withdrawn_measurement_is_kept_and_teaches_nothing(run, ledger):
         (("--withdraw", "first"), "'first' is not last, nor a measurement (none)"),
         (("--withdraw", "1", "--list"), "cannot be combined"),
         (("A", "0.4", "--withdraw", "1"), "cannot be combined"),
+        (("A", "--withdraw", "1", "--accept"), "nor used with MM, --sigma or --accept"),
+        (("--list", "--accept"), "nor used with MM, --sigma or --accept"),
+        (("knee", "--withdraw", "last"), "no measurement of joint G can be withdrawn"),
+        (("neck", "--list"), "'neck' is not a clearance joint"),
         (("A", "0.4"), "expected JOINT MM --sigma MM, or --list, or --withdraw"),
         ((), "expected JOINT MM --sigma MM, or --list, or --withdraw"),
         (("A", "0.4", "--sigma", "0.01", "--node", "/leg_wear_monitor"), "--node cannot be combined with"),
@@ -196,6 +200,14 @@ def test_a_withdrawn_measurement_is_kept_and_teaches_nothing(run, ledger):
 )
 def test_what_cannot_be_withdrawn_is_one_line(refused, ledger, arguments, fault):
     assert fault in refused("measure", *arguments, "--ledger", str(ledger))
+
+
+def test_a_label_names_a_joint_in_all_that_is_done_with_its_measurements(run, ledger):
+    kept = ("--ledger", str(ledger))
+    run("measure", "knee", "0.37", "--sigma", "0.01", *kept)
+    assert run("measure", "A", "--list", *kept).stdout == "no clearance was measured yet\n"
+    assert run("measure", "knee", "--list", *kept).stdout.startswith("1: G 0.37 mm")
+    assert run("measure", "knee", "--withdraw", "last", *kept).stdout.startswith("1: G 0.37 mm")
 
 
 def test_a_ledger_has_to_be_named(refused):

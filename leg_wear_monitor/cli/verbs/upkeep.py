@@ -64,13 +64,19 @@ def opened(
             yield there, leg, settings
 
 
-def list_measurements(config: Path | None, ledger: Path | None) -> None:
-    """Print all measurements of a ledger, a line each; the ledger is left as it is."""
-    with opened(config, ledger, dry_run=True) as (kept, _, _):
-        for each in kept.measurements:
+def list_measurements(joint: str | None, config: Path | None, ledger: Path | None) -> None:
+    """Print the measurements of a ledger, or of a joint, a line each; the ledger is left as it is."""
+    with opened(config, ledger, True, joint) as (kept, leg, _):
+        own = _of_joint(kept, leg.clearance_joint(joint) if joint else None)
+        for each in own:
             click.echo(_line(each))
-        if not kept.measurements:
+        if not own:
             click.echo("no clearance was measured yet")
+
+
+def _of_joint(kept: "Ledger", joint: str | None) -> list["Measurement"]:
+    """The measurements of a joint, or of all."""
+    return [each for each in kept.measurements if joint in (None, each.joint)]
 
 
 def withdraw(
@@ -79,14 +85,14 @@ def withdraw(
     """Withdraw a measurement, by its number or the last one of a joint, and print what it is then."""
     from leg_wear_monitor.monitor.operators import withdraw_in
 
-    with opened(config, ledger, dry_run) as (kept, leg, settings):
-        number = _number(kept, joint, which)
+    with opened(config, ledger, dry_run, joint) as (kept, leg, settings):
+        number = _number(kept, leg.clearance_joint(joint) if joint else None, which)
         click.echo(_line(withdraw_in(kept, leg, settings, number, time.time_ns(), who)))
 
 
 def _number(kept: "Ledger", joint: str | None, which: str) -> int:
     """Number of the measurement that is meant."""
-    own = [each for each in kept.measurements if joint in (None, each.joint)]
+    own = _of_joint(kept, joint)
     whose = f"of joint {joint} " if joint else ""
     if which == LAST:
         open_ones = [each.id for each in own if not each.is_withdrawn]
@@ -211,7 +217,9 @@ def _reset_in(joint: str, config: Path | None, ledger: Path | None, undo: bool, 
 @common.dry_run_option
 @common.node_option
 @common.wait_option
-@click.option("--list", "listed", is_flag=True, help="Print the ledger's measurements with their numbers.")
+@click.option(
+    "--list", "listed", is_flag=True, help="Print the measurements with their numbers, of JOINT if given."
+)
 @common.option(
     "--withdraw",
     f"NUMBER|{LAST}",
@@ -238,13 +246,16 @@ def measure(
     if node is not None:
         alone = {name: options[name] for name in ("config", "ledger", "dry_run")}
         common.check_alone(**alone, list=listed, withdraw=withdrawn)
-    if (listed or withdrawn) and (mm is not None or sigma is not None or (listed and withdrawn)):
-        raise click.UsageError("--list and --withdraw cannot be combined, nor used with MM or --sigma")
+    if listed or withdrawn:
+        is_new = mm is not None or sigma is not None or options.pop("accept")
+        if is_new or (listed and withdrawn):
+            raise click.UsageError(
+                "--list and --withdraw cannot be combined, nor used with MM, --sigma or --accept"
+            )
     if listed:
-        list_measurements(options["config"], options["ledger"])
+        list_measurements(joint, options["config"], options["ledger"])
         return 0
     if withdrawn:
-        del options["accept"]
         withdraw(joint, withdrawn, getpass.getuser(), **options)
         return 0
     if joint is None or mm is None or sigma is None:

@@ -439,6 +439,15 @@ def clearance_limits(leg: Mechanism, config: MonitorConfig) -> dict[str, float]:
     return dict(zip(joints, AlarmBoard(config, joints).clearance_limits_m, strict=True))
 
 
+def limit_in(ledger: Ledger, joint: str) -> float | None:
+    """Limit of a joint's clearance [m] when its alarm last changed; None if a ledger does not know it."""
+    name = alarm_specs.CLEARANCE.name(joint)
+    changes = (event.alarm for event in reversed(ledger.alarm_history))
+    alarms = (*(ledger.entry.alarms if ledger.entry else ()), *changes)
+    known = (each.limit for each in alarms if each.name == name and not math.isnan(each.limit))
+    return next(known, None)
+
+
 def note_verdict_of(
     ledger: Ledger,
     entry: Entry,

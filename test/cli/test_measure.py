@@ -127,6 +127,22 @@ def test_a_withdrawn_measurement_does_not_end_a_stop(run, worn_ledger, present):
     assert alarms(path)[0] == [("G", 2, 0, 1.7e-3, "torque")]
 
 
+def test_a_stop_by_a_limit_of_the_leg_is_not_judged_by_another_one(run, refused, worn_ledger, tmp_path):
+    (tmp_path / "mine.yaml").write_text("/**: {ros__parameters: {limits.clearance_m: 0.00045}}")
+    stop = {"level": Level.ERROR, "worst": 5.2e-4, "limit": 4.5e-4, "raised_ns": 5, "cause": "torque"}
+    path = worn_ledger(
+        alarms=(Alarm(kind="clearance", subject="G", present=Level.ERROR, sigma=1e-5, **stop),)
+    )
+    arguments = ("measure", "G", "0.5", "--sigma", "0.01", "--ledger", str(path))
+    told = "the limit of joint G is 0.45 mm in the ledger and 0.6 mm without parameters"
+    assert told in refused(*arguments)
+    assert (rows(path), verdict(path)[0]) == ([], "stop")
+    assert "at its limit" in run(*arguments, "--config", "mine.yaml").stdout
+    assert verdict(path)[0] == "stop"
+    assert told in refused("measure", "--withdraw", "last", "--ledger", str(path))
+    assert run("measure", "--withdraw", "last", "--ledger", str(path), "--config", "mine.yaml").exit_code == 0
+
+
 def test_an_alarm_by_a_measurement_that_was_wrong_clears_once_it_is_withdrawn_and_acknowledged(run, ledger):
     kept = ("--ledger", str(ledger))
     run("measure", "G", "0.7", "--sigma", "0.02", *kept)

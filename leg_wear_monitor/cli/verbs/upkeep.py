@@ -64,6 +64,22 @@ def opened(
             yield there, leg, settings
 
 
+def check_limit(
+    kept: "Ledger", leg: "Mechanism", settings: "MonitorConfig", joint: str, config: Path | None
+) -> float:
+    """Limit of a joint's clearance [m]; that of a leg with a limit of its own is in its parameters only."""
+    from leg_wear_monitor.monitor.operators import clearance_limits, limit_in
+
+    limit_m, known_m = clearance_limits(leg, settings)[joint], limit_in(kept, joint)
+    if config is None and known_m is not None and known_m != limit_m:
+        fault = (
+            f"the limit of joint {joint} is {1e3 * known_m:.4g} mm in the ledger and {1e3 * limit_m:.4g} mm "
+            "without parameters; name the parameter file of this leg"
+        )
+        raise ConfigError("--config", "", fault)
+    return limit_m
+
+
 def list_measurements(joint: str | None, config: Path | None, ledger: Path | None) -> None:
     """Print the measurements of a ledger, or of a joint, a line each; the ledger is left as it is."""
     with opened(config, ledger, True, joint) as (kept, leg, _):
@@ -87,6 +103,8 @@ def withdraw(
 
     with opened(config, ledger, dry_run, joint) as (kept, leg, settings):
         number = _number(kept, leg.clearance_joint(joint) if joint else None, which)
+        (own,) = (each.joint for each in kept.measurements if each.id == number)
+        check_limit(kept, leg, settings, own, config)
         click.echo(_line(withdraw_in(kept, leg, settings, number, time.time_ns(), who)))
 
 
@@ -292,7 +310,6 @@ def _measured(
     dry_run: bool,
 ) -> tuple[tuple[str, ...], bool]:
     """What came of a measurement, a line each, and whether the caller has to act."""
-    from leg_wear_monitor.monitor.evaluation import AlarmBoard
     from leg_wear_monitor.monitor.forecast.measurement import measure as evaluate
     from leg_wear_monitor.monitor.forecast.wear_coefficients import prior_source
     from leg_wear_monitor.monitor.ledger.entry import new_part
@@ -301,8 +318,7 @@ def _measured(
 
     with opened(config, ledger, dry_run, joint) as (kept, leg, settings):
         joint = leg.clearance_joint(joint)
-        limits_m = AlarmBoard(settings, leg.clearance_joints).clearance_limits_m
-        limit_m = limits_m[leg.clearance_joints.index(joint)]
+        limit_m = check_limit(kept, leg, settings, joint, config)
         parts = {wear.name: wear for wear in kept.entry.joints} if kept.entry else {}
         part = parts.get(joint) or new_part(joint)
         found = evaluate(

@@ -87,7 +87,8 @@ print(lives[["leg", "joint", "seen_m", "limit_m", "p10_h", "p50_h"]].to_string(i
 #
 # Somebody measures joint A of *left-07* with a dial, and finds 0.31 mm:
 
-terminal("leg-wear-monitor measure A 0.31 --sigma 0.01 --ledger fleet/legs/left-07/ledger")
+parameters = f"--config {checkout}/bags/healthy.yaml"
+terminal(f"leg-wear-monitor measure A 0.31 --sigma 0.01 {parameters} --ledger fleet/legs/left-07/ledger")
 
 # %%
 # The measurement is in the ledger of this leg.

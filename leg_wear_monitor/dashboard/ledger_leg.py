@@ -3,8 +3,6 @@
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-import attrs
-
 from leg_wear_monitor.dashboard import source as region
 from leg_wear_monitor.dashboard.live_leg import Row, Trends
 from leg_wear_monitor.dashboard.source import (
@@ -21,8 +19,7 @@ from leg_wear_monitor.dashboard.source import (
 )
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.alarm_specs import UNITS
-from leg_wear_monitor.monitor.alarms import Alarm
+from leg_wear_monitor.monitor.alarm_specs import with_its_unit
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.measurement import last_measured
 from leg_wear_monitor.monitor.judgement import joint_clearance, leg_alarm, with_measured
@@ -31,7 +28,7 @@ from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import LedgerContent, read_ledger
 from leg_wear_monitor.monitor.verdict.situation import JointSituation
 from leg_wear_monitor.playback.result import ReplaySummary
-from leg_wear_monitor.state import Figure, JointClearance, LegAlarm, LegAlarms, LegState, LifeHours, Verdict
+from leg_wear_monitor.state import Figure, JointClearance, LegAlarms, LegState, LifeHours, Verdict
 
 OLD_AFTER_S = 60.0  # a monitor of a walking leg writes more often
 
@@ -125,6 +122,7 @@ class LedgerLeg:
         joints = {joint: parts[joint] for joint in self._setup.joints if joint in parts}
         verdict = found.verdict or NO_VERDICT
         is_doubted = Figure.FORECAST in verdict.not_valid
+        alarms = found.entry.alarms if found.entry else ()
         state = LegState(
             verdict=verdict,
             clearances={
@@ -132,7 +130,7 @@ class LedgerLeg:
                 for joint, part in joints.items()
             },
             life={joint: None if is_doubted else _life(found, part) for joint, part in joints.items()},
-            alarms=LegAlarms(now=tuple(map(_shown, found.entry.alarms)) if found.entry else ()),
+            alarms=LegAlarms(now=tuple(leg_alarm(with_its_unit(each)) for each in alarms)),
             life_cycles=int(found.entry.totals.get("cycles", 0.0)) if found.entry else 0,
         )
         history = _trends(found.clearances).history(self._setup.joints)
@@ -176,8 +174,3 @@ def _trends(points: Iterable[ClearancePoint]) -> Trends:
     for stamp_ns, clearances in rows.items():
         trends.add(Row(stamp_ns, {}, {"counted_m": clearances}))
     return trends
-
-
-def _shown(alarm: Alarm) -> LegAlarm:
-    """An alarm with its unit, which a ledger does not keep."""
-    return attrs.evolve(leg_alarm(alarm), unit=UNITS.get(alarm.kind, ""))

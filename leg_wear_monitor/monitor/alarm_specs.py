@@ -354,6 +354,12 @@ INPUT_KINDS = tuple(dict.fromkeys(spec.kind for spec in OF_INPUT))
 KINDS = tuple(dict.fromkeys(spec.kind for spec in ALL))
 UNITS = {spec.kind: spec.unit for spec in ALL}
 
+
+def with_its_unit(alarm: Alarm) -> Alarm:
+    """An alarm of a ledger, which does not keep units, with that of its kind."""
+    return attrs.evolve(alarm, unit=UNITS.get(alarm.kind, ""))
+
+
 QUANTITIES = {
     **{spec.kind: spec.quantity for spec in (*JOINT, *ENCODERS)},
     **{spec.name(): spec.quantity for spec in (*TORQUE, *GAIT, *OF_INPUT, *OF_FOOT_LOAD)},

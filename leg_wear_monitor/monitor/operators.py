@@ -11,7 +11,8 @@ import attrs
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor import alarm_specs
-from leg_wear_monitor.monitor.alarms import Alarm, acknowledged, joint_of
+from leg_wear_monitor.monitor.alarms import Alarm, acknowledged, cleared, joint_of
+from leg_wear_monitor.monitor.cleared_alarms import cleared_at
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult, last_measured
@@ -46,14 +47,16 @@ from leg_wear_monitor.monitor.verdict.situation import (
     JointSituation,
     KnownClearance,
     Situation,
+    alarm_value,
+    is_held,
     is_surely_below,
 )
 from leg_wear_monitor.monitor.verdict.verdict import Finding, dated, verdict_of
-from leg_wear_monitor.state import Level
+from leg_wear_monitor.state import Level, Verdict
 
 
-def last_reset(ledger: Ledger | None, joint: str, now: JointWear) -> tuple[int, JointWear]:
-    """The last reset of a joint that was not taken back: its row, and the joint's wear before it.
+def last_reset(ledger: Ledger | None, joint: str, now: JointWear) -> tuple[Ledger, Audit, JointWear]:
+    """The last reset of a joint that was not taken back, in its ledger, and the joint's wear before it.
 
     Parameters
     ----------
@@ -76,7 +79,7 @@ def last_reset(ledger: Ledger | None, joint: str, now: JointWear) -> tuple[int, 
         raise LegWearError(f"joint {joint}: the ledger has no reset to undo")
     if found.joint.depth.shape != now.depth.shape:
         raise LegWearError(f"joint {joint}: had {found.joint.depth.shape[1]} sectors when it was reset")
-    return found.id, found.joint
+    return ledger, found, found.joint
 
 
 def rested_on(alarms: Iterable[Alarm], joint: str, named: Iterable[str] = ()) -> tuple[str, ...]:
@@ -159,11 +162,16 @@ def reset_wear(parts: Parts, joint: str, stamp_ns: int, who: str) -> Acknowledge
 
 def undo_reset(parts: Parts, joint: str, stamp_ns: int, who: str) -> JointWear:
     """See `WearMonitor.undo_reset`."""
-    accounting = parts.accounting
-    row, before = last_reset(accounting.ledger, joint, accounting.wear_of(joint))
+    accounting, board = parts.accounting, parts.evaluation.board
+    ledger, reset, before = last_reset(accounting.ledger, joint, accounting.wear_of(joint))
     since = accounting.put_back(joint, before)
+    raised = {alarm.name: alarm for alarm in cleared_at(ledger, [reset.stamp_ns], board.alarms)}
+    known = {name: alarm_specs.with_its_unit(raised[name]) for name in raised if name in board.alarms}
+    board.alarms = board.alarms | known
     _part_changed(parts, joint, before.replaced_ns)
-    accounting.note(Audit(stamp_ns, who, "undo_reset", since, undoes=row))
+    accounting.note(Audit(stamp_ns, who, "undo_reset", since, undoes=reset.id))
+    _note_alarms(parts, stamp_ns)
+    update_verdict(parts)
     parts.keep()
     return accounting.wear_of(joint)
 
@@ -191,8 +199,7 @@ def measure(
     if parts.encoders:
         parts.encoders.state.updated_ns = 0  # the next estimate updates the forecast again
     renew_forecast(parts)
-    for change in _compared(parts, joint):
-        accounting.note_alarms(change)
+    _compare(parts, joint, stamp_ns)
     update_verdict(parts)
     parts.keep()
     return found
@@ -223,17 +230,21 @@ def _note_alarms(parts: Parts, stamp_ns: int) -> None:
     parts.accounting.note_alarms(AlarmList(stamp_ns, tuple(parts.evaluation.board.alarms.values())))
 
 
-def _compared(parts: Parts, joint: str) -> tuple[AlarmList, ...]:
+def _compare(parts: Parts, joint: str, stamp_ns: int) -> None:
     """Compare a new measurement with the limit; it ends an alarm of the clearance that it contradicts."""
-    changes, board = evaluate_clearances(parts), parts.evaluation.board
-    name = alarm_specs.CLEARANCE.name(joint)
-    own, before = _situation(parts, joint), board.alarms[name]
-    if own.measured is None or before.cause in ("", COUNTED) or before.level is Level.OK:
-        return changes
-    if is_surely_below(own.limit_m, own.measured.clearance_m, own.measured.sigma_m):
+    for change in evaluate_clearances(parts):
+        parts.accounting.note_alarms(change)
+    board, name = parts.evaluation.board, alarm_specs.CLEARANCE.name(joint)
+    if _ends(_situation(parts, joint), board.alarms[name]):
         board.acknowledge_one(name)
-        changes = (*changes, AlarmList(parts.twin.intake.stamp_ns, tuple(board.alarms.values())))
-    return changes
+        _note_alarms(parts, stamp_ns)  # that of the measurement, by which a withdrawal finds it
+
+
+def _ends(joint: JointSituation, alarm: Alarm) -> bool:
+    """Whether the last measurement of a joint contradicts what the alarm of its clearance rests on."""
+    if joint.measured is None or alarm.cause in ("", COUNTED) or alarm.level is Level.OK:
+        return False
+    return is_surely_below(joint.limit_m, joint.measured.clearance_m, joint.measured.sigma_m)
 
 
 def _part_changed(parts: Parts, joint: str, replaced_ns: int) -> None:
@@ -278,7 +289,9 @@ def reset_in(
     last = ledger.last_verdict
     is_named = last is not None and last.fault_code.startswith("CLEARANCE")
     gone = rested_on(entry.alarms, joint, last.joints if last and is_named else ())
-    entry = attrs.evolve(entry, alarms=tuple(alarm for alarm in entry.alarms if alarm.name not in gone))
+    for alarm in entry.alarms:
+        if alarm.name in gone:
+            entry = _with_alarm(ledger, entry, cleared(alarm), stamp_ns)
     entry = _with_part(entry, attrs.evolve(new_part(joint), replaced_ns=stamp_ns))
     ledger.note(Audit(stamp_ns, who, "reset_wear", was))
     note_verdict_of(ledger, entry, leg, config, stamp_ns)
@@ -316,8 +329,10 @@ def shown_in(ledger: Ledger, joint: str) -> KnownClearance | None:
     return KnownClearance(own.cause, own.worst, own.sigma) if own else None
 
 
-def overrule_in(ledger: Ledger, leg: Mechanism, config: MonitorConfig, found: Measurement) -> Entry | None:
-    """Acknowledge the alarm of a clearance that a measurement contradicts; None if there is none such.
+def measured_in(ledger: Ledger, leg: Mechanism, config: MonitorConfig, found: Measurement) -> Entry | None:
+    """Compare a measurement with the limit of the clearance, as a monitor does; verdict and history follow.
+
+    It raises the alarm of the clearance at once, and ends one that it contradicts.
 
     Parameters
     ----------
@@ -330,22 +345,91 @@ def overrule_in(ledger: Ledger, leg: Mechanism, config: MonitorConfig, found: Me
 
     Returns
     -------
-    Entry
-        To be recorded.
+    Entry or None
+        To be recorded; None if no alarm of the clearance is raised.
     """
-    entry, limits_m = ledger.entry, clearance_limits(leg, config)
-    if entry is None or not is_surely_below(limits_m[found.joint], found.clearance_m, found.sigma_m):
+    entry, known = ledger.entry, (*ledger.measurements, found)
+    if entry is None:
         return None
-    name = alarm_specs.CLEARANCE.name(found.joint)
-    own = next((alarm for alarm in entry.alarms if alarm.name == name), None)
-    if own is None or own.cause in ("", COUNTED):
+    one = _joint_in(_part_in(entry, found.joint), leg, config, known)
+    return _judged(ledger, entry, leg, config, one, known, found.stamp_ns)
+
+
+def withdraw_in(
+    ledger: Ledger, leg: Mechanism, config: MonitorConfig, number: int, stamp_ns: int, who: str
+) -> Measurement:
+    """Withdraw a measurement in a ledger that no monitor uses; what it has ended is raised again.
+
+    Parameters
+    ----------
+    ledger : Ledger
+    leg : Mechanism
+    config : MonitorConfig
+    number : int
+        The `id` of the measurement.
+    stamp_ns : int
+        Not 0.
+    who : str
+
+    Returns
+    -------
+    Measurement
+        The withdrawn measurement.
+
+    Raises
+    ------
+    LedgerError
+        If there is no such measurement, it is withdrawn already, or the ledger cannot be written.
+    """
+    found, entry = ledger.withdraw(number, stamp_ns, who), ledger.entry
+    if entry is not None and found.replaced_ns == _part_in(entry, found.joint).replaced_ns:
+        one = _joint_in(_part_in(entry, found.joint), leg, config, ledger.measurements)
+        name = alarm_specs.CLEARANCE.name(found.joint)
+        now = {alarm.name: alarm for alarm in entry.alarms}
+        stamps = [
+            each.stamp_ns
+            for each in ledger.measurements
+            if each.is_withdrawn and (each.joint, each.replaced_ns) == (found.joint, found.replaced_ns)
+        ]
+        for alarm in cleared_at(ledger, stamps, now):
+            if alarm.name == name and not _ends(one, alarm):  # another measurement may do so as well
+                entry = _with_alarm(ledger, entry, alarm, stamp_ns)
+        entry = _judged(ledger, entry, leg, config, one, ledger.measurements, stamp_ns)
+    ledger.record(entry)
+    return found
+
+
+def _judged(
+    ledger: Ledger,
+    entry: Entry,
+    leg: Mechanism,
+    config: MonitorConfig,
+    one: JointSituation,
+    known: Sequence[Measurement],
+    stamp_ns: int,
+) -> Entry | None:
+    """The entry with the alarm of a clearance evaluated; None if it is not raised, before and after.
+
+    A verdict that is milder than that of the ledger, which knew what the drive torque shows, is noted only
+    if the last measurement contradicts the alarm.
+    """
+    name, board = alarm_specs.CLEARANCE.name(one.joint), AlarmBoard(config, leg.clearance_joints)
+    board.restore(entry.alarms)
+    before, value = board.alarms[name], alarm_value(one, board.alarms[name])
+    is_shown = before.present is Level.ERROR and is_held(before, SEEN)  # only who showed it takes it back
+    if value is not None and not is_shown:
+        sources = {name: (value.sigma_m, value.by)}
+        board.evaluate({name: value.clearance_m}, stamp_ns, config.alarms.on_delay_cycles, sources)
+    is_ended = _ends(one, before)
+    if is_ended:
+        board.acknowledge_one(name)
+    now = board.alarms[name]
+    if Level.OK is before.level is now.level:
         return None
-    present = own.present if own.cause in SEEN else Level.OK  # an earlier measurement does not last
-    now = acknowledged(attrs.evolve(own, present=present))
-    alarms = tuple(now if alarm is own else alarm for alarm in entry.alarms)
-    entry = attrs.evolve(entry, alarms=tuple(alarm for alarm in alarms if alarm.level is not Level.OK))
-    ledger.note(AlarmEvent(found.stamp_ns, now))
-    note_verdict_of(ledger, entry, leg, config, found.stamp_ns, (*ledger.measurements, found))
+    entry = _with_alarm(ledger, entry, now, stamp_ns)
+    last, verdict = ledger.last_verdict, verdict_in(entry, leg, config, stamp_ns, known)
+    if is_ended or last is None or verdict.state.severity >= last.state.severity:
+        ledger.note(VerdictEvent(stamp_ns, verdict))
     return entry
 
 
@@ -353,6 +437,15 @@ def clearance_limits(leg: Mechanism, config: MonitorConfig) -> dict[str, float]:
     """Limit of each clearance joint's clearance [m]."""
     joints = leg.clearance_joints
     return dict(zip(joints, AlarmBoard(config, joints).clearance_limits_m, strict=True))
+
+
+def limit_in(ledger: Ledger, joint: str) -> float | None:
+    """Limit of a joint's clearance [m] when its alarm last changed; None if a ledger does not know it."""
+    name = alarm_specs.CLEARANCE.name(joint)
+    changes = (event.alarm for event in reversed(ledger.alarm_history))
+    alarms = (*(ledger.entry.alarms if ledger.entry else ()), *changes)
+    known = (each.limit for each in alarms if each.name == name and not math.isnan(each.limit))
+    return next(known, None)
 
 
 def note_verdict_of(
@@ -363,32 +456,48 @@ def note_verdict_of(
     stamp_ns: int,
     measurements: Sequence[Measurement] | None = None,
 ) -> None:
-    """Note the verdict of an entry that an operator changed, by the rules of the monitor.
+    """Note the verdict of an entry that an operator changed, see `verdict_in`."""
+    known = ledger.measurements if measurements is None else measurements
+    ledger.note(VerdictEvent(stamp_ns, verdict_in(entry, leg, config, stamp_ns, known)))
+
+
+def verdict_in(
+    entry: Entry, leg: Mechanism, config: MonitorConfig, stamp_ns: int, measurements: Sequence[Measurement]
+) -> Verdict:
+    """The verdict of an entry, by the rules of the monitor.
 
     Nothing is known of the drive torque until the leg walks again.
     """
-    known = ledger.measurements if measurements is None else measurements
-    limits_m = clearance_limits(leg, config)
-    joints = []
-    for part in entry.joints:
-        one = JointSituation(
-            joint=part.name,
-            counted_m=leg.clearances[part.name].radial_clearance + part.mean_m,
-            limit_m=limits_m[part.name],
-            label=leg.joints[part.name].label,
-            replaced_ns=part.replaced_ns,
-            part_cycles=part.cycles,
-        )
-        joints.append(with_measured(one, last_measured(known, part.name, part.replaced_ns)))
     situation = Situation(
-        joints=tuple(joints), alarms=entry.alarms, quantities=alarm_specs.QUANTITIES, mismatch=math.nan
+        joints=tuple(_joint_in(part, leg, config, measurements) for part in entry.joints),
+        alarms=tuple(map(alarm_specs.with_its_unit, entry.alarms)),
+        quantities=alarm_specs.QUANTITIES,
+        mismatch=math.nan,
     )
-    verdict = verdict_of(dated(findings(situation), (), stamp_ns))
-    ledger.note(VerdictEvent(stamp_ns, verdict))
+    return verdict_of(dated(findings(situation), (), stamp_ns))
 
 
-def undo_in(ledger: Ledger, joint: str, stamp_ns: int, who: str) -> JointWear:
+def _joint_in(
+    part: JointWear, leg: Mechanism, config: MonitorConfig, measurements: Sequence[Measurement]
+) -> JointSituation:
+    """What a ledger says of the clearance of a part."""
+    one = JointSituation(
+        joint=part.name,
+        counted_m=leg.clearances[part.name].radial_clearance + part.mean_m,
+        limit_m=clearance_limits(leg, config)[part.name],
+        label=leg.joints[part.name].label,
+        replaced_ns=part.replaced_ns,
+        part_cycles=part.cycles,
+    )
+    return with_measured(one, last_measured(measurements, part.name, part.replaced_ns))
+
+
+def undo_in(
+    ledger: Ledger, leg: Mechanism, config: MonitorConfig, joint: str, stamp_ns: int, who: str
+) -> JointWear:
     """Undo the last reset of a joint in a ledger that no monitor uses.
+
+    The alarms that it has cleared are raised again; the verdict in the ledger follows.
 
     Returns
     -------
@@ -401,10 +510,14 @@ def undo_in(ledger: Ledger, joint: str, stamp_ns: int, who: str) -> JointWear:
         If there is no reset to undo, or the ledger cannot be written.
     """
     entry, since = _entry_with(ledger, joint)
-    row, before = last_reset(ledger, joint, since)
+    _, reset, before = last_reset(ledger, joint, since)
     part = one_part(before, since)
-    ledger.note(Audit(stamp_ns, who, "undo_reset", since, undoes=row))
-    ledger.record(_with_part(entry, part))
+    entry = _with_part(entry, part)
+    for alarm in cleared_at(ledger, [reset.stamp_ns], {alarm.name: alarm for alarm in entry.alarms}):
+        entry = _with_alarm(ledger, entry, alarm, stamp_ns)
+    ledger.note(Audit(stamp_ns, who, "undo_reset", since, undoes=reset.id))
+    note_verdict_of(ledger, entry, leg, config, stamp_ns)
+    ledger.record(entry)
     return part
 
 
@@ -415,10 +528,23 @@ def wear_words(wear: JointWear) -> str:
 
 def _entry_with(ledger: Ledger, joint: str) -> tuple[Entry, JointWear]:
     """The ledger's entry, and the present part of a joint in it."""
-    parts = {part.name: part for part in ledger.entry.joints} if ledger.entry else {}
-    if ledger.entry is None or joint not in parts:
+    if ledger.entry is None:
         raise LegWearError(f"joint {joint}: the ledger contains no wear yet")
-    return ledger.entry, parts[joint]
+    return ledger.entry, _part_in(ledger.entry, joint)
+
+
+def _part_in(entry: Entry, joint: str) -> JointWear:
+    """The present part of a joint: the ledger is bound to the clearance joints of its leg."""
+    return next(part for part in entry.joints if part.name == joint)
+
+
+def _with_alarm(ledger: Ledger, entry: Entry, now: Alarm, stamp_ns: int) -> Entry:
+    """The entry with an alarm as it is now; what operators see of the change is an event."""
+    before = next((each for each in entry.alarms if each.name == now.name), cleared(now))
+    if (before.level, before.acknowledged) != (now.level, now.acknowledged):
+        ledger.note(AlarmEvent(stamp_ns, now))
+    others = tuple(each for each in entry.alarms if each.name != now.name)
+    return attrs.evolve(entry, alarms=(*others, now) if now.level is not Level.OK else others)
 
 
 def _with_part(entry: Entry, part: JointWear) -> Entry:

@@ -15,8 +15,9 @@ from leg_wear_monitor.cli.main import cli
 from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.ledger.entry import Entry, JointWear
+from leg_wear_monitor.monitor.ledger.entry import AlarmEvent, Entry, JointWear
 from leg_wear_monitor.monitor.ledger.ledger import open_ledger
+from leg_wear_monitor.monitor.operators import note_verdict_of
 
 Run = Callable[..., Result]
 
@@ -72,12 +73,16 @@ def worn_ledger(tmp_path: Path) -> Callable[..., Path]:
     """Write a ledger of the default leg whose joints have opened by 60 µm in 4000 of 5000 gait cycles."""
 
     def write(config: MonitorConfig | None = None, alarms: tuple[Alarm, ...] = ()) -> Path:
+        """The alarms were raised at their worst values; the verdict is that of them."""
         config, path, leg = config or MonitorConfig(), tmp_path / "wear.ledger", load_mechanism("bionic_leg")
         kept = open_ledger(leg, attrs.evolve(config, ledger=attrs.evolve(config.ledger, path=str(path))))
         worn = np.full((2, 720), 3.0e-5)
         joints = tuple(JointWear(name, worn, 4000, 4000.0, 0, 4.0e-12) for name in leg.clearance_joints)
         totals = {"cycles": 5e3, "moving_s": 5e3}
         entry = Entry(stamp_ns=10**9, joints=joints, totals=totals, alarms=alarms, spans=((0, 10**9, 0),))
+        for alarm in alarms:
+            kept.note(AlarmEvent(alarm.raised_ns, attrs.evolve(alarm, value=alarm.worst)))
+        note_verdict_of(kept, entry, leg, config, 10**9)
         kept.keep(entry, closed=True)
         kept.close()
         return path

@@ -1,11 +1,14 @@
 """`measure`: a clearance into the ledger, and what it is told."""
 
+import json
 import sqlite3
 from contextlib import closing
 
 import pytest
 
+from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.parameters import load_config
+from leg_wear_monitor.state import Level
 
 pytestmark = pytest.mark.plain
 
@@ -73,6 +76,82 @@ def test_what_is_near_the_limit_or_at_it_is_said_and_at_it_the_caller_has_to_act
     assert (at.exit_code, "at its limit" in at.stdout) == (1, True)
 
 
+def alarms(path):
+    with closing(sqlite3.connect(path)) as db:
+        now = db.execute("SELECT subject, level, acknowledged, worst, cause FROM alarm").fetchall()
+        changes = db.execute("SELECT subject, level FROM alarm_history").fetchall()
+    return now, changes
+
+
+def verdict(path):
+    with closing(sqlite3.connect(path)) as db:
+        last = "SELECT state, fault_code, evidence FROM verdict ORDER BY id DESC LIMIT 1"
+        state, code, evidence = db.execute(last).fetchone()
+    return state, code, json.loads(evidence)
+
+
+@pytest.mark.parametrize(
+    ("mm", "level", "state", "code"),
+    [("0.7", 2, "stop", "CLEARANCE_G"), ("0.5", 1, "watch", "CLEARANCE_NEAR_G")],
+)
+def test_a_measurement_at_the_limit_or_near_it_raises_alarm_and_verdict(run, ledger, mm, level, state, code):
+    run("measure", "G", mm, "--sigma", "0.02", "--ledger", str(ledger))
+    value = pytest.approx(1e-3 * float(mm))
+    assert alarms(ledger) == ([("G", level, 0, value, "measured")], [("G", level)])
+    now = verdict(ledger)
+    assert (now[0], code in {now[1], "CLEARANCE_NEAR_G"}) == (state, True)
+    # the alarm has the unit of the measurement beside it
+    own = {each["name"]: (each["value"], each["unit"]) for each in now[2]}
+    assert own["clearance G"] == own["measured clearance G"] == (value, "m")
+
+
+def test_a_harmless_measurement_leaves_alarms_and_verdict_as_they_are(run, ledger):
+    before = verdict(ledger)
+    run("measure", "G", "0.4", "--sigma", "0.02", "--ledger", str(ledger))
+    assert (alarms(ledger), verdict(ledger)) == (([], []), before)
+
+
+@pytest.mark.parametrize("present", [Level.OK, Level.ERROR])
+def test_a_withdrawn_measurement_does_not_end_a_stop(run, worn_ledger, present):
+    stop = {"level": Level.ERROR, "worst": 1.7e-3, "limit": 6e-4, "raised_ns": 5, "cause": "torque"}
+    path = worn_ledger(alarms=(Alarm(kind="clearance", subject="G", present=present, sigma=4e-4, **stop),))
+    before = verdict(path)[:2]
+    assert before == ("stop", "CLEARANCE_SEEN_G")
+    for mm in ("0.36", "0.37"):
+        run("measure", "knee", mm, "--sigma", "0.01", "--ledger", str(path))
+        assert verdict(path)[0] != "stop"
+    run("measure", "--withdraw", "1", "--ledger", str(path))
+    assert verdict(path)[0] != "stop"  # the other one says so, too
+    run("measure", "--withdraw", "2", "--ledger", str(path))
+    assert verdict(path)[:2] == before
+    assert alarms(path)[0] == [("G", 2, 0, 1.7e-3, "torque")]
+
+
+def test_a_stop_by_a_limit_of_the_leg_is_not_judged_by_another_one(run, refused, worn_ledger, tmp_path):
+    (tmp_path / "mine.yaml").write_text("/**: {ros__parameters: {limits.clearance_m: 0.00045}}")
+    stop = {"level": Level.ERROR, "worst": 5.2e-4, "limit": 4.5e-4, "raised_ns": 5, "cause": "torque"}
+    path = worn_ledger(
+        alarms=(Alarm(kind="clearance", subject="G", present=Level.ERROR, sigma=1e-5, **stop),)
+    )
+    arguments = ("measure", "G", "0.5", "--sigma", "0.01", "--ledger", str(path))
+    told = "the limit of joint G is 0.45 mm in the ledger and 0.6 mm without parameters"
+    assert told in refused(*arguments)
+    assert (rows(path), verdict(path)[0]) == ([], "stop")
+    assert "at its limit" in run(*arguments, "--config", "mine.yaml").stdout
+    assert verdict(path)[0] == "stop"
+    assert told in refused("measure", "--withdraw", "last", "--ledger", str(path))
+    assert run("measure", "--withdraw", "last", "--ledger", str(path), "--config", "mine.yaml").exit_code == 0
+
+
+def test_an_alarm_by_a_measurement_that_was_wrong_clears_once_it_is_withdrawn_and_acknowledged(run, ledger):
+    kept = ("--ledger", str(ledger))
+    run("measure", "G", "0.7", "--sigma", "0.02", *kept)
+    run("measure", "G", "--withdraw", "last", *kept)
+    assert verdict(ledger)[0] == "stop"  # until somebody has seen to it
+    assert run("acknowledge", *kept).stdout == "cleared: clearance G; still present: none\n"
+    assert verdict(ledger)[0] != "stop"
+
+
 def test_a_dry_run_says_the_same_and_leaves_the_ledger_as_it_is(run, ledger):
     before = {path.name: path.read_bytes() for path in ledger.parent.iterdir()}
     arguments = ("measure", "A", "0.42", "--sigma", "0.005", "--ledger", str(ledger))
@@ -126,6 +205,10 @@ def test_a_withdrawn_measurement_is_kept_and_teaches_nothing(run, ledger):
         (("--withdraw", "first"), "'first' is not last, nor a measurement (none)"),
         (("--withdraw", "1", "--list"), "cannot be combined"),
         (("A", "0.4", "--withdraw", "1"), "cannot be combined"),
+        (("A", "--withdraw", "1", "--accept"), "nor used with MM, --sigma or --accept"),
+        (("--list", "--accept"), "nor used with MM, --sigma or --accept"),
+        (("knee", "--withdraw", "last"), "no measurement of joint G can be withdrawn"),
+        (("neck", "--list"), "'neck' is not a clearance joint"),
         (("A", "0.4"), "expected JOINT MM --sigma MM, or --list, or --withdraw"),
         ((), "expected JOINT MM --sigma MM, or --list, or --withdraw"),
         (("A", "0.4", "--sigma", "0.01", "--node", "/leg_wear_monitor"), "--node cannot be combined with"),
@@ -133,6 +216,14 @@ def test_a_withdrawn_measurement_is_kept_and_teaches_nothing(run, ledger):
 )
 def test_what_cannot_be_withdrawn_is_one_line(refused, ledger, arguments, fault):
     assert fault in refused("measure", *arguments, "--ledger", str(ledger))
+
+
+def test_a_label_names_a_joint_in_all_that_is_done_with_its_measurements(run, ledger):
+    kept = ("--ledger", str(ledger))
+    run("measure", "knee", "0.37", "--sigma", "0.01", *kept)
+    assert run("measure", "A", "--list", *kept).stdout == "no clearance was measured yet\n"
+    assert run("measure", "knee", "--list", *kept).stdout.startswith("1: G 0.37 mm")
+    assert run("measure", "knee", "--withdraw", "last", *kept).stdout.startswith("1: G 0.37 mm")
 
 
 def test_a_ledger_has_to_be_named(refused):

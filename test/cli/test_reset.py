@@ -10,6 +10,7 @@ import pytest
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.ledger.entry import AlarmEvent
 from leg_wear_monitor.monitor.ledger.ledger import open_ledger
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.state import Level
@@ -26,9 +27,9 @@ def opened(path):
 @pytest.fixture
 def ledger(worn_ledger):
     """A ledger of a worn leg; G is at its limit, say its alarms."""
-    raised = {"level": Level.ERROR, "raised_ns": 5}
+    raised = {"level": Level.ERROR, "raised_ns": 5, "worst": 1.7e-3, "limit": 6e-4}
     alarms = (
-        Alarm(kind="clearance", subject="G", present=Level.ERROR, **raised),
+        Alarm(kind="clearance", subject="G", present=Level.ERROR, cause="torque", sigma=4e-4, **raised),
         Alarm(kind="impact_force", subject="G", **raised),
         Alarm(kind="clearance", subject="A", **raised),
     )
@@ -40,6 +41,18 @@ def content(path):
     entry, spans = kept.entry, kept.counted_ns.tolist()
     kept.close()
     return entry, spans
+
+
+def last_verdict(path):
+    _, kept = opened(path)
+    verdict = kept.last_verdict
+    kept.close()
+    return verdict
+
+
+def history(path):
+    with closing(sqlite3.connect(path)) as db:
+        return db.execute("SELECT kind, subject, level FROM alarm_history ORDER BY id").fetchall()
 
 
 def audits(path):
@@ -87,6 +100,33 @@ def test_an_undone_reset_is_as_before(run, ledger):
     again = run("reset", "G", "--undo", "--ledger", str(ledger))
     assert (again.exit_code, again.stderr) == (2, "error: joint G: the ledger has no reset to undo\n")
     assert audits(ledger)[1] == ("undo_reset", "G", 0, 0.0, 1)
+
+
+@pytest.mark.plain
+def test_what_a_reset_has_cleared_is_raised_again_once_it_is_undone(run, ledger):
+    before, stopped, rises = content(ledger)[0], last_verdict(ledger), history(ledger)
+    run("reset", "G", "--ledger", str(ledger))
+    assert history(ledger)[len(rises) :] == [("clearance", "G", 0), ("impact_force", "G", 0)]
+    assert "G" not in last_verdict(ledger).joints
+    run("reset", "G", "--undo", "--ledger", str(ledger))
+    for one, other in zip(before.alarms, content(ledger)[0].alarms, strict=True):
+        assert not other.acknowledged
+        for name in ("name", "level", "worst", "limit", "raised_ns", "cause"):
+            assert getattr(one, name) == getattr(other, name)
+    now = last_verdict(ledger)
+    assert (now.state, now.fault_code, now.joints) == (stopped.state, stopped.fault_code, stopped.joints)
+
+
+@pytest.mark.plain
+def test_an_alarm_that_was_seen_to_since_a_reset_is_not_raised_by_its_undoing(run, ledger):
+    run("reset", "G", "--ledger", str(ledger))
+    _, kept = opened(ledger)
+    impact = Alarm(kind="impact_force", subject="G", level=Level.WARN)
+    for stamp_ns, level in ((10**18, Level.WARN), (10**18 + 1, Level.OK)):
+        kept.note(AlarmEvent(stamp_ns, attrs.evolve(impact, level=level)))
+    kept.abandon()
+    run("reset", "G", "--undo", "--ledger", str(ledger))
+    assert {alarm.name for alarm in content(ledger)[0].alarms} == {"clearance A", "clearance G"}
 
 
 @pytest.mark.plain

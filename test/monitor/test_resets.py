@@ -38,6 +38,25 @@ def test_wear_before_and_since_a_reset_is_of_one_part_once_it_is_taken_back(begi
     assert again.wear_of("G").cycles == now.cycles
 
 
+def test_a_stop_returns_once_the_reset_that_ended_it_is_taken_back(begin, gait, rows) -> None:
+    monitor = begin({"diagnosis.enabled": False})
+    monitor.update(gait(2.5))
+    monitor.measure("G", 1.2e-3, 5e-6, START_NS, "ann")
+    stopped = monitor.verdict.verdict
+    monitor.reset_wear("G", START_NS + 1, "ann")
+    assert monitor.verdict.verdict.state.value != "stop"
+    monitor.undo_reset("G", START_NS + 2, "ann")
+    now = monitor.verdict.verdict
+    assert (stopped.state.value, stopped.fault_code) == ("stop", "CLEARANCE_G")
+    assert (now.state, now.fault_code, now.since_ns) == (stopped.state, stopped.fault_code, stopped.since_ns)
+    (alarm,) = (each for each in monitor.alarms.alarms if each.name == "clearance G")
+    assert (alarm.worst, alarm.cause, alarm.unit, alarm.acknowledged) == (1.2e-3, "measured", "m", False)
+    monitor.close()
+    assert rows("SELECT level FROM alarm_history WHERE subject = 'G'") == [(2,), (0,), (2,)]
+    (last,) = rows("SELECT state FROM verdict ORDER BY id DESC LIMIT 1")
+    assert last == ("stop",)
+
+
 def test_without_a_ledger_there_is_nothing_to_take_back(leg) -> None:
     monitor = WearMonitor(leg, config_from({"clearance_joints": ["G"]}))
     monitor.reset_wear("G", START_NS, "ann")

@@ -64,28 +64,53 @@ def opened(
             yield there, leg, settings
 
 
-def list_measurements(config: Path | None, ledger: Path | None) -> None:
-    """Print all measurements of a ledger, a line each; the ledger is left as it is."""
-    with opened(config, ledger, dry_run=True) as (kept, _, _):
-        for each in kept.measurements:
+def check_limit(
+    kept: "Ledger", leg: "Mechanism", settings: "MonitorConfig", joint: str, config: Path | None
+) -> float:
+    """Limit of a joint's clearance [m]; that of a leg with a limit of its own is in its parameters only."""
+    from leg_wear_monitor.monitor.operators import clearance_limits, limit_in
+
+    limit_m, known_m = clearance_limits(leg, settings)[joint], limit_in(kept, joint)
+    if config is None and known_m is not None and known_m != limit_m:
+        fault = (
+            f"the limit of joint {joint} is {1e3 * known_m:.4g} mm in the ledger and {1e3 * limit_m:.4g} mm "
+            "without parameters; name the parameter file of this leg"
+        )
+        raise ConfigError("--config", "", fault)
+    return limit_m
+
+
+def list_measurements(joint: str | None, config: Path | None, ledger: Path | None) -> None:
+    """Print the measurements of a ledger, or of a joint, a line each; the ledger is left as it is."""
+    with opened(config, ledger, True, joint) as (kept, leg, _):
+        own = _of_joint(kept, leg.clearance_joint(joint) if joint else None)
+        for each in own:
             click.echo(_line(each))
-        if not kept.measurements:
+        if not own:
             click.echo("no clearance was measured yet")
+
+
+def _of_joint(kept: "Ledger", joint: str | None) -> list["Measurement"]:
+    """The measurements of a joint, or of all."""
+    return [each for each in kept.measurements if joint in (None, each.joint)]
 
 
 def withdraw(
     joint: str | None, which: str, who: str, config: Path | None, ledger: Path | None, dry_run: bool
 ) -> None:
     """Withdraw a measurement, by its number or the last one of a joint, and print what it is then."""
-    with opened(config, ledger, dry_run) as (kept, _, _):
-        number = _number(kept, joint, which)
-        click.echo(_line(kept.withdraw(number, time.time_ns(), who)))
-        kept.record()
+    from leg_wear_monitor.monitor.operators import withdraw_in
+
+    with opened(config, ledger, dry_run, joint) as (kept, leg, settings):
+        number = _number(kept, leg.clearance_joint(joint) if joint else None, which)
+        (own,) = (each.joint for each in kept.measurements if each.id == number)
+        check_limit(kept, leg, settings, own, config)
+        click.echo(_line(withdraw_in(kept, leg, settings, number, time.time_ns(), who)))
 
 
 def _number(kept: "Ledger", joint: str | None, which: str) -> int:
     """Number of the measurement that is meant."""
-    own = [each for each in kept.measurements if joint in (None, each.joint)]
+    own = _of_joint(kept, joint)
     whose = f"of joint {joint} " if joint else ""
     if which == LAST:
         open_ones = [each.id for each in own if not each.is_withdrawn]
@@ -185,7 +210,7 @@ def _reset_in(joint: str, config: Path | None, ledger: Path | None, undo: bool, 
     with opened(config, ledger, dry_run, joint) as (kept, leg, settings):
         joint = leg.clearance_joint(joint)
         if undo:
-            words = wear_words(undo_in(kept, joint, now_ns, who))
+            words = wear_words(undo_in(kept, leg, settings, joint, now_ns, who))
             click.echo(
                 f"joint {joint}: the reset is undone, {words} are counted, including those since the reset"
             )
@@ -210,7 +235,9 @@ def _reset_in(joint: str, config: Path | None, ledger: Path | None, undo: bool, 
 @common.dry_run_option
 @common.node_option
 @common.wait_option
-@click.option("--list", "listed", is_flag=True, help="Print the ledger's measurements with their numbers.")
+@click.option(
+    "--list", "listed", is_flag=True, help="Print the measurements with their numbers, of JOINT if given."
+)
 @common.option(
     "--withdraw",
     f"NUMBER|{LAST}",
@@ -237,13 +264,16 @@ def measure(
     if node is not None:
         alone = {name: options[name] for name in ("config", "ledger", "dry_run")}
         common.check_alone(**alone, list=listed, withdraw=withdrawn)
-    if (listed or withdrawn) and (mm is not None or sigma is not None or (listed and withdrawn)):
-        raise click.UsageError("--list and --withdraw cannot be combined, nor used with MM or --sigma")
+    if listed or withdrawn:
+        is_new = mm is not None or sigma is not None or options.pop("accept")
+        if is_new or (listed and withdrawn):
+            raise click.UsageError(
+                "--list and --withdraw cannot be combined, nor used with MM, --sigma or --accept"
+            )
     if listed:
-        list_measurements(options["config"], options["ledger"])
+        list_measurements(joint, options["config"], options["ledger"])
         return 0
     if withdrawn:
-        del options["accept"]
         withdraw(joint, withdrawn, getpass.getuser(), **options)
         return 0
     if joint is None or mm is None or sigma is None:
@@ -280,17 +310,15 @@ def _measured(
     dry_run: bool,
 ) -> tuple[tuple[str, ...], bool]:
     """What came of a measurement, a line each, and whether the caller has to act."""
-    from leg_wear_monitor.monitor.evaluation import AlarmBoard
     from leg_wear_monitor.monitor.forecast.measurement import measure as evaluate
     from leg_wear_monitor.monitor.forecast.wear_coefficients import prior_source
     from leg_wear_monitor.monitor.ledger.entry import new_part
-    from leg_wear_monitor.monitor.operators import overrule_in, shown_in
+    from leg_wear_monitor.monitor.operators import measured_in, shown_in
     from leg_wear_monitor.monitor.verdict.situation import SOURCES
 
     with opened(config, ledger, dry_run, joint) as (kept, leg, settings):
         joint = leg.clearance_joint(joint)
-        limits_m = AlarmBoard(settings, leg.clearance_joints).clearance_limits_m
-        limit_m = limits_m[leg.clearance_joints.index(joint)]
+        limit_m = check_limit(kept, leg, settings, joint, config)
         parts = {wear.name: wear for wear in kept.entry.joints} if kept.entry else {}
         part = parts.get(joint) or new_part(joint)
         found = evaluate(
@@ -312,6 +340,6 @@ def _measured(
             by = SOURCES[shown.by]
             found = attrs.evolve(found, shown_m=shown.clearance_m, shown_sigma_m=shown.sigma_m, shown_by=by)
         kept.note(found.measurement)
-        kept.record(overrule_in(kept, leg, settings, found.measurement))
+        kept.record(measured_in(kept, leg, settings, found.measurement))
     told = found.told(limit_m, settings.limits.warn_fraction, kept.measurements)
     return told, found.has_findings(limit_m)

@@ -112,7 +112,7 @@ class MeasurementResult:
 
     def _compared(self, limit_m: float) -> list[str]:
         """The measurement against what encoders or the drive torque showed."""
-        if math.isnan(self.shown_m):
+        if math.isnan(self.shown_m) or math.isnan(self.shown_sigma_m):
             return []
         now, shown = self.measurement, f"{_mm(self.shown_m)} ± {_mm(self.shown_sigma_m)}"
         if self.agrees:

@@ -7,7 +7,7 @@ the wear since the last entry is lost: at most the time between two entries, whi
 
 import os
 import sqlite3
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TypeVar
@@ -19,6 +19,7 @@ from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.ledger import rows
 from leg_wear_monitor.monitor.ledger.entry import (
+    AlarmEvent,
     Audit,
     Binding,
     ClearancePoint,
@@ -32,7 +33,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
     binding_of,
 )
 from leg_wear_monitor.monitor.ledger.file import MOVE, LedgerError, connect, copy_of, create, transaction
-from leg_wear_monitor.state import Verdict
+from leg_wear_monitor.state import Evidence, Verdict
 
 WHOLE_S = 60.0
 """Longest time in motion between two entries that are written with whole surfaces."""
@@ -196,7 +197,30 @@ class Ledger:
         LedgerError
             If the ledger cannot be read now.
         """
-        return self._ask(rows.read_last_verdict)
+        return self._ask(lambda db: next(rows.read_verdicts(db), None))
+
+    def last_evidence(self, name: str) -> Mapping[str, Evidence]:
+        """Evidence by its name, of the last stored verdict that has some of a name; empty if none has.
+
+        Raises
+        ------
+        LedgerError
+            If the ledger cannot be read now.
+        """
+        stored = self._ask(lambda db: tuple(rows.read_verdicts(db)))
+        found = ({each.name: each for each in verdict.evidence} for verdict in stored)
+        return next((evidence for evidence in found if name in evidence), {})
+
+    @property
+    def alarm_history(self) -> tuple[AlarmEvent, ...]:
+        """All stored changes of alarms.
+
+        Raises
+        ------
+        LedgerError
+            If the ledger cannot be read now.
+        """
+        return self._ask(rows.read_alarm_history)
 
     def last_reset(self, joint: str) -> Audit | None:
         """The last stored `reset_wear` of a joint that was not undone, None if there is none.
@@ -373,7 +397,7 @@ def read_ledger(path: Path, binding: Binding) -> LedgerContent:
             last = "id IN (SELECT max(id) FROM forecast GROUP BY joint)"
             return LedgerContent(
                 entry=rows.read_entry(db),
-                verdict=rows.read_last_verdict(db),
+                verdict=next(rows.read_verdicts(db), None),
                 clearances=rows.read_rows(db, ClearancePoint),
                 forecasts={point.joint: point for point in rows.read_rows(db, ForecastPoint, last)},
                 measurements=rows.read_measurements(db),

@@ -2,6 +2,7 @@
 
 import json
 import sqlite3
+from collections.abc import Iterator
 from typing import Any, TypeVar
 
 import attrs
@@ -306,16 +307,37 @@ def read_measurements(db: sqlite3.Connection) -> tuple[Measurement, ...]:
     return tuple(attrs.evolve(each, counts=bool(each.counts)) for each in read_rows(db, Measurement))
 
 
-def read_last_verdict(db: sqlite3.Connection) -> Verdict | None:
-    """The verdict since its last change."""
-    row = db.execute(
+def read_alarm_history(db: sqlite3.Connection) -> tuple[AlarmEvent, ...]:
+    """All changes of alarms, in the order of their entry."""
+    rows = db.execute(
+        "SELECT stamp_ns, kind, subject, level, acknowledged, value, limit_value "
+        "FROM alarm_history ORDER BY id"
+    )
+    return tuple(AlarmEvent(row[0], _alarm_event_of(*row[1:])) for row in rows)
+
+
+def _alarm_event_of(
+    kind: str, subject: str, level: int, acknowledged: int, value: float | None, limit: float | None
+) -> Alarm:
+    """The alarm of `_alarm_event_values`."""
+    return Alarm(
+        kind=kind, subject=subject, level=Level(level), acknowledged=bool(acknowledged),
+        value=or_nan(value), limit=or_nan(limit),
+    )  # fmt: skip
+
+
+def read_verdicts(db: sqlite3.Connection) -> Iterator[Verdict]:
+    """The stored verdicts, the last one first."""
+    rows = db.execute(
         "SELECT state, why, since_ns, to_do, fault_code, joints, evidence, not_valid "
-        "FROM verdict ORDER BY id DESC LIMIT 1"
-    ).fetchone()
-    if row is None:
-        return None
-    state, why, since_ns, to_do, fault_code = row[:5]
-    joints, evidence, not_valid = map(json.loads, row[5:])
+        "FROM verdict ORDER BY id DESC"
+    )
+    return (_verdict_of(*row) for row in rows)
+
+
+def _verdict_of(state: str, why: str, since_ns: int, to_do: str, fault_code: str, *row: str) -> Verdict:
+    """The verdict of `_verdict_values`."""
+    joints, evidence, not_valid = map(json.loads, row)
     return Verdict(
         state=State(state),
         joints=tuple(joints),

@@ -20,7 +20,7 @@ from leg_wear_monitor.state import Figure, Level, State
 
 _ACKNOWLEDGE = "then acknowledge the alarms: `leg-wear-monitor acknowledge --ledger FILE`, or `--node NAME`"
 _COUNTED = "its faults are counted in the status `input` of /diagnostics, and in `lost` of `replay --json`"
-_MEASURE = "`leg-wear-monitor measure {joint} MM --sigma MM --ledger FILE`, or `--node NAME`"
+_MEASURE = "`leg-wear-monitor measure {joint} MM --sigma MM --config FILE --ledger FILE`, or `--node NAME`"
 _ROCK = (
     "stop when it is safe, block the drive and rock joint {joints}; measure its radial clearance and enter "
     f"it: {_MEASURE}"
@@ -128,8 +128,8 @@ RULES = (
         why="the drive torque does not fit the counted leg, so the forecast is not valid: {value} of the "
         "predicted RMS is not explained (limit {limit}){past}{causes}",
         do="stop when it is safe, block the drive and rock each joint; measure the joint with play and enter "
-        "it: `leg-wear-monitor measure JOINT MM --sigma MM --ledger FILE`, or `--node NAME`; if none has "
-        f"play, check the load at the foot and the torque sensor; {_ACKNOWLEDGE}",
+        "it: `leg-wear-monitor measure JOINT MM --sigma MM --config FILE --ledger FILE`, or `--node NAME`; "
+        f"if none has play, check the load at the foot and the torque sensor; {_ACKNOWLEDGE}",
         not_valid=EVERYTHING,
     ),
     _cause("TORQUE_BIAS", "it has a constant part that friction cannot be"),

@@ -44,7 +44,9 @@ class KnownClearance:
 
     @property
     def words(self) -> str:
-        """Such as ``0.62 mm ± 0.03 mm``."""
+        """Such as ``0.62 mm ± 0.03 mm``; without the second if that is not known."""
+        if math.isnan(self.sigma_m):
+            return amount(self.clearance_m, "m")
         return estimate(self.clearance_m, self.sigma_m, "m")
 
 

@@ -143,6 +143,15 @@ def test_a_ledger_that_cannot_be_written_stops_nothing(begin, gait):
     np.testing.assert_array_equal(again._twin.depth, monitor._twin.depth)
 
 
+def test_a_last_entry_that_cannot_be_written_is_told(begin, gait):
+    monitor = begin()
+    monitor.update(gait(2.5))
+    path = monitor._accounting.ledger.path
+    path.rename(path.with_suffix(".away"))
+    with pytest.raises(LegWearError, match=r"moved away.*; nothing of what came after its last entry"):
+        monitor.close()
+
+
 def test_clearances_are_noted_for_the_history(begin, gait, rows):
     monitor = begin()
     monitor.update(gait(4.0))

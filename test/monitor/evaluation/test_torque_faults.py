@@ -124,6 +124,14 @@ def test_a_torque_that_is_wrong_as_received_is_named_and_shows_nothing_of_the_le
     assert status.values["unexplained"] < 0.05
 
 
+@pytest.mark.parametrize(("rpm", "is_stuck"), [(0.0, False), (60.0, True)])
+def test_a_torque_that_does_not_change_is_stuck_unless_the_leg_rests(monitor, gait, rpm, is_stuck):
+    samples = gait(8.0, rpm=rpm)
+    samples["torque_nm"] = 0.0  # as of a drive that is off
+    monitor.update(samples)
+    assert ("input_torque" in raised(monitor)) == is_stuck
+
+
 def test_how_the_samples_are_cut_changes_no_cause(monitor, healthy):
     samples = healthy.copy()
     samples["torque_nm"] *= -1.0

@@ -1,7 +1,7 @@
 """Alarm evaluation of gait cycles and input, once in each evaluation period."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Any
 
 import attrs
@@ -159,9 +159,17 @@ class AlarmBoard:
                 found.append(after)
         return self._set(found, stamp_ns)
 
-    def acknowledge(self) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
-        """Acknowledge all alarms; returns the cleared ones and the remaining ones in their new state."""
-        now = [acknowledged(alarm) for alarm in self.alarms.values() if alarm.level is not Level.OK]
+    def acknowledge(self, unmeasured: Collection[str] = ()) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
+        """Acknowledge all alarms; returns the cleared ones and the remaining ones in their new state.
+
+        Parameters
+        ----------
+        unmeasured : collection of str
+            Alarms whose values are not measured any more. They are normal, for no value can take them back.
+        """
+        gone = {name: attrs.evolve(self.alarms[name], present=Level.OK, beyond=(0, 0)) for name in unmeasured}
+        alarms = (self.alarms | gone).values()
+        now = [acknowledged(alarm) for alarm in alarms if alarm.level is not Level.OK]
         self.alarms |= {alarm.name: alarm for alarm in now}
         normal = tuple(alarm for alarm in now if alarm.level is Level.OK)
         return normal, tuple(alarm for alarm in now if alarm.level is not Level.OK)

@@ -131,7 +131,9 @@ class Acknowledged:
 
 def acknowledge(parts: Parts, stamp_ns: int) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
     """See `WearMonitor.acknowledge`."""
-    cleared, kept = parts.evaluation.board.acknowledge()
+    cleared, kept = parts.evaluation.board.acknowledge(parts.unmeasured)
+    if parts.unmeasured:
+        parts.state.mismatch = NO_MISMATCH
     parts.accounting.state.cut_off_s = None
     _note_alarms(parts, stamp_ns)
     update_verdict(parts)

@@ -13,6 +13,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials import bushing_of
 from leg_wear_monitor.mechanism.person import with_toe_force
 from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor import alarm_specs
 from leg_wear_monitor.monitor.accounting import Accounting, AccountingState
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.fitting import fitted, twin_settings
@@ -253,6 +254,12 @@ class Parts:
         """Whether drive torque or crank angle are wrong as received, by what explains a mismatch."""
         explained = self.state.mismatch.explanation
         return explained is not None and explained.is_input_fault
+
+    @property
+    def unmeasured(self) -> frozenset[str]:
+        """Alarms of the drive torque, if none came in the last gait cycle."""
+        last = self.state.last
+        return alarm_specs.OF_TORQUE if last and not last.torque_samples else frozenset()
 
     @property
     def observers(self) -> tuple[Any, ...]:

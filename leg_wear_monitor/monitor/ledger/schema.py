@@ -122,11 +122,12 @@ CREATE TABLE commissioning (
     id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, encoders TEXT NOT NULL, errors BLOB NOT NULL
 ) STRICT;
 
--- signatures of the drive torque while the clearances were known; the last row is in force. All are float64,
--- little endian: counted clearances of the clearance joints [m], the signature of each gait cycle, and the
--- standard deviations of the clearances [m], above 0 where a correction made them; then the delay, the time
--- constant and the load friction of the drive by them, the mean speed of the crank, 0 where not known, and
--- the temperature of the drive as far as it was measured
+-- signatures of the drive torque while the clearances were known; the last row of each cadence is in force,
+-- and a reset or its undoing deletes all. All are float64, little endian: counted clearances of the
+-- clearance joints [m], the signature of each gait cycle, and the standard deviations of the clearances [m],
+-- above 0 where a correction made them; then the delay, the time constant and the load friction of the drive
+-- by them, the mean speed of the crank, 0 where not known, and the temperature of the drive as far as it was
+-- measured
 CREATE TABLE torque_commissioning (
     id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, cycles INTEGER NOT NULL, clearance_m BLOB NOT NULL,
     signatures BLOB NOT NULL, sigma_m BLOB NOT NULL, delay_s REAL NOT NULL, time_constant_s REAL NOT NULL,

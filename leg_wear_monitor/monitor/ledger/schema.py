@@ -20,8 +20,9 @@ TABLES = """
 -- what the wear belongs to: hardware_id, mechanism, fingerprint, joints, sectors, wear_acceleration
 CREATE TABLE binding (key TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT, WITHOUT ROWID;
 
--- a start of the monitor; closed is 1 once it ended in order, interval_s the longest time between entries,
--- epoch the one of its clock at its end, boot_id the computer's, '' if not known
+-- a start of the monitor; closed is 1 once it ended in order and no loss of an earlier one was left to be
+-- acknowledged, interval_s the longest time between entries, epoch the one of its clock at its end, boot_id
+-- the computer's, '' if not known
 CREATE TABLE run (
     id INTEGER PRIMARY KEY, closed INTEGER NOT NULL, interval_s REAL NOT NULL, epoch INTEGER NOT NULL,
     boot_id TEXT NOT NULL

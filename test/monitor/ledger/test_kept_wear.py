@@ -84,13 +84,18 @@ def test_the_next_start_says_that_wear_was_lost(begin, gait):
     monitor = begin()
     monitor.update(gait(2.0))
     monitor._accounting.ledger.close()
-    second = begin()
-    status = status_of(second, "ledger")
-    assert status.level is Level.WARN
-    assert "interrupted" in status.message
-    assert status.values["cut_off_s"] == 5.0
-    second.acknowledge(0)
-    assert status_of(second, "ledger").level is Level.OK
+    for checkpoint_s in (2.0, 1.0):  # until somebody has acknowledged it
+        second = begin({"ledger.checkpoint_s": checkpoint_s})
+        status = status_of(second, "ledger")
+        assert status.level is Level.WARN
+        assert "interrupted" in status.message
+        assert status.values["cut_off_s"] == 5.0
+        second.close()
+    third = begin({"ledger.checkpoint_s": 1.0})
+    third.acknowledge(0)
+    assert status_of(third, "ledger").level is Level.OK
+    third._accounting.ledger.close()
+    assert begin()._accounting.ledger.cut_off_s < 5.0  # the third was interrupted, too
 
 
 def test_a_standing_leg_writes_nothing(begin, gait):

@@ -38,7 +38,7 @@ from leg_wear_monitor.monitor.gait_evidence import NO_MISMATCH, MismatchWindow, 
 from leg_wear_monitor.monitor.inputs import InputGuard
 from leg_wear_monitor.monitor.ledger.entry import Measurement, SimulatedReference
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
-from leg_wear_monitor.monitor.reports import CycleReport
+from leg_wear_monitor.monitor.reports import AlarmList, CycleReport
 from leg_wear_monitor.monitor.verdict.verdict import Finding
 from leg_wear_monitor.twin.digital_twin import DigitalTwin, TwinSnapshot
 from leg_wear_monitor.twin.reference import LegParameters
@@ -155,7 +155,9 @@ class Parts:
         if self.torque and self.torque.state.parameters and self.config.diagnosis.correct:
             self.twin.set_parameters(self.torque.state.parameters)
         if ledger and ledger.entry:
-            self.evaluation.board.restore(ledger.entry.alarms)
+            board, stamp_ns = self.evaluation.board, ledger.entry.stamp_ns
+            board.restore(ledger.entry.alarms)
+            self.accounting.note_alarms(AlarmList(stamp_ns, tuple(board.alarms.values())))
         self._of_leg = self.twin.parameters, self._model_error()
         self.evaluation_periods = EvaluationPeriods(cycle_ns // periods)
         self._fresh_m = [self.mechanism.clearances[joint].radial_clearance for joint in self.clearance_joints]

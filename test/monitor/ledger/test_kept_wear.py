@@ -2,12 +2,14 @@
 
 from itertools import pairwise
 
+import attrs
 import numpy as np
 import pytest
 from told import raised, status_of
 
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.monitor.accounting import next_point_s
+from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.state import Level
 
 SECOND = 10**9
@@ -124,6 +126,33 @@ def test_alarms_stay_latched_over_a_new_start_and_have_a_history(begin, gait, ro
     second.close()
     history = rows("SELECT level FROM alarm_history WHERE kind = 'impact_force' AND subject = 'A'")
     assert [level for (level,) in history] == [2, 0]
+
+
+@pytest.mark.parametrize("was_acknowledged", [False, True])
+def test_an_alarm_of_encoders_that_are_not_read_any_more_stays_until_it_is_acknowledged(
+    begin, gait, rows, was_acknowledged
+):
+    first = begin()
+    first.update(gait(2.5))
+    first.close()
+    departed = Alarm(
+        kind="clearance_departure", subject="G", level=Level.ERROR, present=Level.ERROR, worst=4e-4,
+        limit=1e-4, raised_ns=START_NS, acknowledged=was_acknowledged,
+    )  # fmt: skip
+    ledger = begin()._accounting.ledger
+    ledger.record(attrs.evolve(ledger.entry, spans=(), alarms=(departed,)))
+    ledger.close()
+    for begin_s in (5.0, 10.0):
+        later = begin()
+        later.update(gait(2.5, begin_s=begin_s))
+        assert (departed.name in raised(later)) != was_acknowledged
+        later.close()
+    last = begin()
+    last.acknowledge(START_NS)
+    assert departed.name not in raised(last)
+    last.close()
+    assert rows("SELECT level FROM alarm_history WHERE kind = 'clearance_departure'") == [(0,)]
+    assert begin().alarms.level is Level.OK
 
 
 def test_a_ledger_that_cannot_be_written_stops_nothing(begin, gait):

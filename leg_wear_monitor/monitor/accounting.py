@@ -99,8 +99,6 @@ class AccountingState:
         Whether the clock began anew in this run, so that nothing that comes is counted already.
     point_due_s : float
         Time in motion over all runs at which the history wants its next point.
-    cut_off_s : float or None
-        What an earlier run lost, until it is acknowledged.
     skipped, skipped_s, skipped_ns : int, float, int
         Samples left out since they are counted, their time, and the stamp of the last.
     shown : mapping of str to (Level, bool)
@@ -123,7 +121,6 @@ class AccountingState:
     past: tuple[tuple[int, int, int], ...] = ()
     anew: bool = False
     point_due_s: float = 0.0
-    cut_off_s: float | None = None
     skipped: int = 0
     skipped_s: float = 0.0
     skipped_ns: int = 0
@@ -164,7 +161,6 @@ class Accounting:
             int(self._before.get("cycles", 0)),
             (PartLife(),) * len(twin.clearance_joints),
             point_due_s=self._before.get(_DUE_KEY, 0.0),
-            cut_off_s=ledger.cut_off_s if ledger else None,
         )
         if entry:
             self.state.commissioned = {

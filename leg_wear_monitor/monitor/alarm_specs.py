@@ -350,6 +350,9 @@ OF_INPUT: "tuple[AlarmSpec[Any], ...]" = (*INPUT, SOURCES)
 OF_FOOT_LOAD: "tuple[AlarmSpec[Any], ...]" = (FOOT_LOAD_RATE, *FOOT_LOAD)
 ALL: "tuple[AlarmSpec[Any], ...]" = (*JOINT, *ENCODERS, *TORQUE, *GAIT, *OF_INPUT, *OF_FOOT_LOAD)
 
+OF_TORQUE = frozenset((*(spec.name() for spec in TORQUE), "input_torque"))
+"""Names of the alarms whose values need a drive torque."""
+
 INPUT_KINDS = tuple(dict.fromkeys(spec.kind for spec in OF_INPUT))
 KINDS = tuple(dict.fromkeys(spec.kind for spec in ALL))
 UNITS = {spec.kind: spec.unit for spec in ALL}

@@ -277,7 +277,7 @@ FAULT_CODES = {
     ENCODERS: "a further encoder gives no usable angles",
     DIAGNOSIS: "the drive torque shows a change; the code of the verdict names it",
     LEDGER_NOT_WRITTEN: "the ledger cannot be written",
-    LEDGER_INTERRUPTED: "the previous run was interrupted",
+    LEDGER_INTERRUPTED: "an earlier run was interrupted",
     SAMPLES_DROPPED: "the node is overloaded: samples were dropped",
     SAMPLES_NOT_PUBLISHED: "the node is overloaded: values of samples are not published",
     TOPICS: "an input topic has no publisher, several, another type, not the crank, a torque about another "

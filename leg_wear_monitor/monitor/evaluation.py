@@ -1,7 +1,7 @@
 """Alarm evaluation of gait cycles and input, once in each evaluation period."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Any
 
 import attrs
@@ -159,9 +159,19 @@ class AlarmBoard:
                 found.append(after)
         return self._set(found, stamp_ns)
 
-    def acknowledge(self) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
-        """Acknowledge all alarms; returns the cleared ones and the remaining ones in their new state."""
-        now = [acknowledged(alarm) for alarm in self.alarms.values() if alarm.level is not Level.OK]
+    def acknowledge(self, unmeasured: Collection[str] = ()) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
+        """Acknowledge all alarms; returns the cleared ones and the remaining ones in their new state.
+
+        Parameters
+        ----------
+        unmeasured : collection of str
+            Alarms whose values are not measured any more, beside those without a limit. They are normal, for
+            no value can take them back.
+        """
+        names = {*unmeasured, *(self.alarms.keys() - self._limits)}
+        gone = {name: attrs.evolve(self.alarms[name], present=Level.OK, beyond=(0, 0)) for name in names}
+        alarms = (self.alarms | gone).values()
+        now = [acknowledged(alarm) for alarm in alarms if alarm.level is not Level.OK]
         self.alarms |= {alarm.name: alarm for alarm in now}
         normal = tuple(alarm for alarm in now if alarm.level is Level.OK)
         return normal, tuple(alarm for alarm in now if alarm.level is not Level.OK)
@@ -175,11 +185,14 @@ class AlarmBoard:
         self.alarms = self.alarms | {name: cleared(self.alarms[name]) for name in names}
 
     def restore(self, alarms: Iterable[Alarm]) -> None:
-        """Restore alarms from another run."""
+        """Restore alarms from another run.
+
+        Those of encoders or of a foot load that are not read any more stay until they are acknowledged.
+        """
         for alarm in alarms:
-            if alarm.name in self.alarms:
-                own = self.alarms[alarm.name]
-                self.alarms[alarm.name] = attrs.evolve(alarm, unit=own.unit)
+            is_done = alarm.acknowledged and alarm.name not in self._limits
+            known = attrs.evolve(alarm, unit=alarm_specs.UNITS.get(alarm.kind, ""))
+            self.alarms[alarm.name] = cleared(known) if is_done else known
 
     def level(self, *names: str) -> Level:
         """Highest shown level of some alarms."""
@@ -486,8 +499,8 @@ class AlarmEvaluation:
 
     def _of_input(self, health: InputHealth) -> dict[str, float]:
         """Values of the input's alarms, by their names."""
-        rate = alarm_specs.FOOT_LOAD_RATE
-        read = (*alarm_specs.INPUT, rate) if rate.name() in self.board.alarms else alarm_specs.INPUT
+        has_load = self.config.foot_load.source != NO_LOAD
+        read = (*alarm_specs.INPUT, alarm_specs.FOOT_LOAD_RATE) if has_load else alarm_specs.INPUT
         return {spec.name(): spec.value(health) for spec in read}
 
     def _evaluate_input(self, skipped: int) -> tuple[AlarmList, ...]:

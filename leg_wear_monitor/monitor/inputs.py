@@ -368,7 +368,7 @@ class InputHealth:
         Fraction of the time in which the leg was not followed.
     stuck_torque_fraction : float
         Fraction of the torque samples that are saturated or repeat the largest or the smallest one; 1 if all
-        are equal.
+        are equal. Unknown where the leg stood in this time: a torque at rest does not change.
     """
 
     duration_s: float
@@ -395,12 +395,13 @@ def input_health(before: Intake, after: Intake, torque: TorqueRange, is_whole: b
     monitored_s = after.moving_s - before.moving_s + after.standing_s - before.standing_s
     others = of_other_joints(before, after)
     received = after.received - before.received - others
+    stood = after.standing_s > before.standing_s
     return InputHealth(
         duration_s=duration_s,
         rate_hz={name: (used - before.used[name]) / duration_s for name, used in after.used.items()},
         bad_fraction=(unused(after) - unused(before) - others) / received if received else math.nan,
         lost_fraction=min(1.0, max(0.0, 1.0 - monitored_s / duration_s)) if is_known else math.nan,
-        stuck_torque_fraction=torque.stuck_fraction,
+        stuck_torque_fraction=math.nan if stood else torque.stuck_fraction,
     )
 
 

@@ -134,11 +134,14 @@ class Acknowledged:
 
 def acknowledge(parts: Parts, stamp_ns: int) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
     """See `WearMonitor.acknowledge`."""
-    cleared, kept = parts.evaluation.board.acknowledge()
-    parts.accounting.state.cut_off_s = None
+    cleared, kept = parts.evaluation.board.acknowledge(parts.unmeasured)
+    if parts.unmeasured:
+        parts.state.mismatch = NO_MISMATCH
+    ledger = parts.accounting.ledger
+    has_lost = ledger is not None and ledger.acknowledge_loss()
     _note_alarms(parts, stamp_ns)
     update_verdict(parts)
-    if cleared or kept:
+    if cleared or kept or has_lost:
         parts.keep()
     return cleared, kept
 
@@ -315,7 +318,7 @@ def acknowledge_in(ledger: Ledger, leg: Mechanism, config: MonitorConfig, stamp_
     entry = attrs.evolve(entry, alarms=tuple(alarm for alarm in now if alarm.level is not Level.OK))
     for alarm in now:
         ledger.note(AlarmEvent(stamp_ns, alarm))
-    ledger.cut_off_s = None
+    ledger.acknowledge_loss()
     note_verdict_of(ledger, entry, leg, config, stamp_ns)
     ledger.record(entry)
     return Acknowledged(cleared, tuple(alarm.name for alarm in entry.alarms))

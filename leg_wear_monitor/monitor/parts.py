@@ -13,6 +13,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials import bushing_of
 from leg_wear_monitor.mechanism.person import with_toe_force
 from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor import alarm_specs
 from leg_wear_monitor.monitor.accounting import Accounting, AccountingState
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.fitting import fitted, twin_settings
@@ -37,7 +38,7 @@ from leg_wear_monitor.monitor.gait_evidence import NO_MISMATCH, MismatchWindow, 
 from leg_wear_monitor.monitor.inputs import InputGuard
 from leg_wear_monitor.monitor.ledger.entry import Measurement, SimulatedReference
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
-from leg_wear_monitor.monitor.reports import CycleReport
+from leg_wear_monitor.monitor.reports import AlarmList, CycleReport
 from leg_wear_monitor.monitor.verdict.verdict import Finding
 from leg_wear_monitor.twin.digital_twin import DigitalTwin, TwinSnapshot
 from leg_wear_monitor.twin.reference import LegParameters
@@ -154,7 +155,9 @@ class Parts:
         if self.torque and self.torque.state.parameters and self.config.diagnosis.correct:
             self.twin.set_parameters(self.torque.state.parameters)
         if ledger and ledger.entry:
-            self.evaluation.board.restore(ledger.entry.alarms)
+            board, stamp_ns = self.evaluation.board, ledger.entry.stamp_ns
+            board.restore(ledger.entry.alarms)
+            self.accounting.note_alarms(AlarmList(stamp_ns, tuple(board.alarms.values())))
         self._of_leg = self.twin.parameters, self._model_error()
         self.evaluation_periods = EvaluationPeriods(cycle_ns // periods)
         self._fresh_m = [self.mechanism.clearances[joint].radial_clearance for joint in self.clearance_joints]
@@ -253,6 +256,12 @@ class Parts:
         """Whether drive torque or crank angle are wrong as received, by what explains a mismatch."""
         explained = self.state.mismatch.explanation
         return explained is not None and explained.is_input_fault
+
+    @property
+    def unmeasured(self) -> frozenset[str]:
+        """Alarms of the drive torque, if none came in the last gait cycle."""
+        last = self.state.last
+        return alarm_specs.OF_TORQUE if last and not last.torque_samples else frozenset()
 
     @property
     def observers(self) -> tuple[Any, ...]:

@@ -329,8 +329,8 @@ def _ledger(accounting: Accounting) -> Status:
     if ledger.fault:
         message = f"not written: {ledger.fault}; trying again"
         return Status("ledger", Level.ERROR, message, values, LEDGER_NOT_WRITTEN)
-    if accounting.state.cut_off_s is not None:
-        values["cut_off_s"] = accounting.state.cut_off_s
+    if ledger.cut_off_s is not None:
+        values["cut_off_s"] = ledger.cut_off_s
         return Status("ledger", Level.WARN, ledger.loss, values, LEDGER_INTERRUPTED)
     message = "is written at the end of the recording" if ledger.at_end else "kept"
     return Status("ledger", Level.OK, message, values)

@@ -390,7 +390,7 @@ class WearMonitor:
         self._accounting.begin_epoch()
         if self._parts.torque:
             self._parts.torque.begin_epoch()
-        self._accounting.note(Audit(stamp_ns, who, "new_epoch"))
+        self._accounting.note(Audit(int(stamp_ns), who, "new_epoch"))
         self._parts.keep()
 
     def status(self) -> tuple[Status, ...]:
@@ -428,12 +428,12 @@ class WearMonitor:
         cleared, kept : tuple of Alarm
             Alarms that had returned to normal, and alarms that stay until they do.
         """
-        return acknowledge(self._parts, stamp_ns)
+        return acknowledge(self._parts, int(stamp_ns))
 
     def note_alarms(self, stamp_ns: int, alarms: Iterable[Alarm]) -> None:
         """Store changed alarms that are not of this monitor in the ledger, such as those of its node."""
         own = {alarm.name for alarm in self.alarms.alarms}
-        changed = [AlarmEvent(stamp_ns, alarm) for alarm in alarms if alarm.name not in own]
+        changed = [AlarmEvent(int(stamp_ns), alarm) for alarm in alarms if alarm.name not in own]
         for event in changed:
             self._accounting.note(event)
         if changed:
@@ -454,7 +454,7 @@ class WearMonitor:
         LegWearError
             For a joint without clearance.
         """
-        return reset_wear(self._parts, joint, stamp_ns, who)
+        return reset_wear(self._parts, joint, int(stamp_ns), who)
 
     def undo_reset(self, joint: str, stamp_ns: int, who: str) -> JointWear:
         """Undo the last `reset_wear` of a joint whose part was not replaced.
@@ -469,7 +469,7 @@ class WearMonitor:
         LegWearError
             For a joint without clearance, or if the ledger has no reset to undo.
         """
-        return undo_reset(self._parts, joint, stamp_ns, who)
+        return undo_reset(self._parts, joint, int(stamp_ns), who)
 
     def measure(
         self, joint: str, clearance_m: float, sigma_m: float, stamp_ns: int, who: str, accept: bool = False
@@ -494,7 +494,7 @@ class WearMonitor:
         LegWearError
             For a joint without clearance, or impossible values.
         """
-        return measure(self._parts, joint, clearance_m, sigma_m, stamp_ns, who, accept)
+        return measure(self._parts, joint, float(clearance_m), float(sigma_m), int(stamp_ns), who, accept)
 
     def end_recording(self) -> None:
         """Count the wear up to the last sample, which a sampled replay does at the end of a gait cycle."""
@@ -535,7 +535,8 @@ class WearMonitor:
         Raises
         ------
         LedgerError
-            If a ledger that is written only at the end could not be written; then nothing is stored.
+            If the last entry could not be written. Of a ledger that is written only at the end, nothing is
+            stored then.
         """
         ledger = self._accounting.ledger
         if ledger is None:
@@ -548,8 +549,9 @@ class WearMonitor:
                 self._accounting.note(VerdictEvent(last.stamp_ns, last.verdict))
         kept = self._parts.keep(closed=True)
         ledger.close()
-        if ledger.at_end and not kept:
-            raise LedgerError(f"{ledger.path}: {ledger.fault}; nothing of this run is in it")
+        if not kept:
+            missing = "this run" if ledger.at_end else "what came after its last entry"
+            raise LedgerError(f"{ledger.path}: {ledger.fault}; nothing of {missing} is in it")
 
     def abandon(self) -> None:
         """Close the ledger without a further entry."""

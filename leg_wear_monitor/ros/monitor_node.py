@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -214,8 +214,8 @@ class MonitorNode(ClosingNode):
         try:
             self._get_ready(parameters)
         except BaseException:  # signals included: the next start must not consider the ledger truncated
-            self._monitor.close()
-            self._in_order.close()
+            with self._in_order:  # whatever the ledger says
+                self._monitor.close()
             raise
 
     def _get_ready(self, parameters: Parameters[MonitorConfig]) -> None:
@@ -274,9 +274,8 @@ class MonitorNode(ClosingNode):
             while len(self._inbox):
                 self._work()
         finally:
-            self._monitor.close()
-            self._in_order.close()
-            self._black_box.close()
+            with closing(self._black_box), self._in_order:  # whatever the ledger says
+                self._monitor.close()
 
     def _compile(self, decoder: Decoder) -> None:
         """Compile the kernels before the first sample."""

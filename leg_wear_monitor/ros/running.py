@@ -208,17 +208,18 @@ def run(
     for number in _SIGNALS:
         signal.signal(number, _stop_making)
     try:
-        _init(list(sys.argv if argv is None else argv))
-        node = make()
-        for number in _SIGNALS:
-            signal.signal(number, lambda *_: asked.set())
+        try:
+            _init(list(sys.argv if argv is None else argv))
+            node = make()
+            for number in _SIGNALS:
+                signal.signal(number, lambda *_: asked.set())
+        except KeyboardInterrupt:  # interrupted before the node started
+            put_in_order()  # the node may be complete but not yet assigned
+            return DONE
         try:
             serve(node, lambda: not asked.is_set())
         finally:
             node.close()
-    except KeyboardInterrupt:  # interrupted before the node started
-        put_in_order()  # the node may be complete but not yet assigned
-        return DONE
     except LegWearError as error:
         _print_error(error)
         return COULD_NOT

@@ -62,3 +62,17 @@ def test_without_a_ledger_there_is_nothing_to_take_back(leg) -> None:
     monitor.reset_wear("G", START_NS, "ann")
     with pytest.raises(LegWearError, match="no ledger is used"):
         monitor.undo_reset("G", START_NS, "ann")
+
+
+def test_stamps_may_be_those_of_samples(begin, gait, rows) -> None:
+    monitor, samples = begin(), gait(2.5)
+    monitor.update(samples)
+    last_ns = samples["stamp_ns"][-1]  # of NumPy, which SQLite would keep as bytes
+    monitor.reset_wear("G", last_ns, "ann")
+    monitor.measure("G", np.float32(3.1e-4), np.float32(1e-5), last_ns, "ann")
+    monitor.undo_reset("G", last_ns, "bob")
+    monitor.acknowledge(last_ns)
+    monitor.begin_epoch(last_ns, "bob")
+    monitor.close()
+    assert rows("SELECT stamp_ns FROM audit") == [(int(last_ns),)] * 3
+    assert rows("SELECT stamp_ns FROM measurement") == [(int(last_ns),)]

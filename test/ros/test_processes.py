@@ -73,6 +73,20 @@ def test_a_signal_between_the_making_and_the_serving_of_a_node_leaves_an_ordered
     assert closed_runs(ledger) == [(1,)]
 
 
+def test_a_node_whose_last_entry_cannot_be_written_says_so_in_one_line(tmp_path: Path) -> None:
+    ledger = tmp_path / "wear.db"
+    for made, end in (("MonitorNode()", "raise KeyboardInterrupt"), ("node = MonitorNode()", "return node")):
+        script = "from pathlib import Path" + STOPPED_THERE.replace(
+            "    MonitorNode()\n    raise KeyboardInterrupt",
+            f"    {made}\n    Path({str(ledger)!r}).rename({str(tmp_path / 'away')!r})\n    {end}",
+        )
+        command = [sys.executable, "-c", script, "--ros-args", "-p", f"ledger.path:={ledger}"]
+        done = subprocess.run(command, check=False, capture_output=True, text=True)
+        assert done.returncode == 2
+        (line,) = [line for line in done.stderr.splitlines() if "[INFO]" not in line]
+        assert "moved away" in line and line.startswith("error: ")
+
+
 @pytest.mark.parametrize(
     ("name", "verb", "module"),
     [

@@ -38,7 +38,7 @@ from leg_wear_monitor.state import Evidence, Verdict
 WHOLE_S = 60.0
 """Longest time in motion between two entries that are written with whole surfaces."""
 
-INTERRUPTED = "the previous run was interrupted, the wear of its last seconds is lost"
+INTERRUPTED = "an earlier run was interrupted, the wear of its last seconds is lost"
 
 _Answer = TypeVar("_Answer")
 
@@ -80,7 +80,8 @@ class Ledger:
     epoch, boot_id : int, str
         Of this run's clock and computer, stored with each entry; until set, those of the previous run.
     cut_off_s : float or None
-        If the last run was interrupted: the longest time of walking whose wear was lost.
+        If a run was interrupted and that is not acknowledged: the longest time of walking whose wear was
+        lost.
     counted_ns : (n, 2) array
         Begin and end [ns] of the time spans counted in earlier runs, in all epochs.
     kept_ns : int
@@ -232,6 +233,11 @@ class Ledger:
         """
         return self._ask(lambda db: rows.read_last_reset(db, joint))
 
+    def acknowledge_loss(self) -> bool:
+        """Tell the interruption of an earlier run no more, from the next entry on; whether there was one."""
+        was, self.cut_off_s = self.cut_off_s, None
+        return was is not None
+
     def keep(self, entry: Entry, closed: bool = False, *, whole: bool = True) -> bool:
         """Write an entry and all events since the last; False if that failed, with the reason in `fault`.
 
@@ -267,9 +273,7 @@ class Ledger:
         LedgerError
             If they could not be written.
         """
-        self._interval_s = max(self._interval_s, self.cut_off_s or 0.0)  # until the loss is acknowledged
-        run = self._run(closed=self.cut_off_s is None)
-        if not self._write(run, entry and attrs.evolve(entry, loads=())):
+        if not self._write(self._run(closed=True), entry and attrs.evolve(entry, loads=())):
             raise LedgerError(f"{self.path}: {self.fault}")
 
     def abandon(self) -> None:
@@ -293,7 +297,9 @@ class Ledger:
             self._db = None
 
     def _run(self, closed: bool) -> Run:
-        return Run(self._number, closed, self._interval_s, self.epoch, self.boot_id)
+        """The row of this run: not closed while the loss of an earlier one is not acknowledged."""
+        closed, interval_s = closed and self.cut_off_s is None, max(self._interval_s, self.cut_off_s or 0.0)
+        return Run(self._number, closed, interval_s, self.epoch, self.boot_id)
 
     def _write(self, run: Run, entry: Entry | None = None, whole: bool = True) -> bool:
         """Write a run, an entry and the events in one transaction; False if that failed, see `fault`."""

@@ -187,7 +187,9 @@ def _loads(db: sqlite3.Connection, which: str, run: int) -> tuple[WalkedLoad, ..
 def write_event(db: sqlite3.Connection, event: Event) -> None:
     """Append an event; to be called within a transaction.
 
-    A measurement that has a row is a withdrawn one: its row says so from then on.
+    A measurement that has a row is a withdrawn one: its row says so from then on. A reset, and its undoing,
+    delete the signatures of the drive torque: they are of other clearances. Stamps do not order them, which
+    may be of recordings, while that of a reset is of the operator's clock.
     """
     match event:
         case Measurement(withdrawn_ns=withdrawn_ns, withdrawn_by=who, id=row) if row:
@@ -202,6 +204,9 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
         case Audit(stamp_ns, who, what, was, undoes):
             state = _audit_values(was) if was else {}
             add(db, "audit", {"stamp_ns": stamp_ns, "who": who, "what": what, **state, "undoes": undoes})
+            if what in ("reset_wear", "undo_reset"):
+                with sealed(db, "torque_commissioning"):
+                    db.execute("DELETE FROM torque_commissioning")
         case Commissioned(stamp_ns, encoders, centre_rad, mean, covariance):
             errors = np.concatenate([centre_rad, mean, covariance.ravel()])
             values = {"stamp_ns": stamp_ns, "encoders": "\n".join(encoders), "errors": _blob(errors)}
@@ -378,15 +383,14 @@ def read_commissioned(db: sqlite3.Connection) -> Commissioned | None:
 
 
 def read_commissioned_torques(db: sqlite3.Connection) -> list[CommissionedTorque]:
-    """Stored signatures of the drive torque since a part was replaced: the last ones of each cadence.
+    """Stored signatures of the drive torque of the present parts: the last ones of each cadence.
 
     Those before a correction were of other clearances.
     """
     found: list[CommissionedTorque] = []
     for row in db.execute(
         "SELECT stamp_ns, cycles, speed_radps, delay_s, time_constant_s, load_friction, clearance_m, "
-        "signatures, sigma_m, temperature_c FROM torque_commissioning "
-        "WHERE stamp_ns > (SELECT coalesce(max(replaced_ns), 0) FROM joint) ORDER BY id DESC"
+        "signatures, sigma_m, temperature_c FROM torque_commissioning ORDER BY id DESC"
     ):
         stamp_ns, cycles, speed, delay_s, time_constant_s, load_friction = row[:6]
         clearance_m, signatures, sigma_m = map(_floats, row[6:9])

@@ -20,8 +20,9 @@ TABLES = """
 -- what the wear belongs to: hardware_id, mechanism, fingerprint, joints, sectors, wear_acceleration
 CREATE TABLE binding (key TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT, WITHOUT ROWID;
 
--- a start of the monitor; closed is 1 once it ended in order, interval_s the longest time between entries,
--- epoch the one of its clock at its end, boot_id the computer's, '' if not known
+-- a start of the monitor; closed is 1 once it ended in order and no loss of an earlier one was left to be
+-- acknowledged, interval_s the longest time between entries, epoch the one of its clock at its end, boot_id
+-- the computer's, '' if not known
 CREATE TABLE run (
     id INTEGER PRIMARY KEY, closed INTEGER NOT NULL, interval_s REAL NOT NULL, epoch INTEGER NOT NULL,
     boot_id TEXT NOT NULL
@@ -122,11 +123,12 @@ CREATE TABLE commissioning (
     id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, encoders TEXT NOT NULL, errors BLOB NOT NULL
 ) STRICT;
 
--- signatures of the drive torque while the clearances were known; the last row is in force. All are float64,
--- little endian: counted clearances of the clearance joints [m], the signature of each gait cycle, and the
--- standard deviations of the clearances [m], above 0 where a correction made them; then the delay, the time
--- constant and the load friction of the drive by them, the mean speed of the crank, 0 where not known, and
--- the temperature of the drive as far as it was measured
+-- signatures of the drive torque while the clearances were known; the last row of each cadence is in force,
+-- and a reset or its undoing deletes all. All are float64, little endian: counted clearances of the
+-- clearance joints [m], the signature of each gait cycle, and the standard deviations of the clearances [m],
+-- above 0 where a correction made them; then the delay, the time constant and the load friction of the drive
+-- by them, the mean speed of the crank, 0 where not known, and the temperature of the drive as far as it was
+-- measured
 CREATE TABLE torque_commissioning (
     id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, cycles INTEGER NOT NULL, clearance_m BLOB NOT NULL,
     signatures BLOB NOT NULL, sigma_m BLOB NOT NULL, delay_s REAL NOT NULL, time_constant_s REAL NOT NULL,

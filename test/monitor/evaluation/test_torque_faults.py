@@ -15,6 +15,7 @@ from leg_wear_monitor.monitor.alarms import FAULT_CODES
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.verdict.rules import RULES
 from leg_wear_monitor.state import Level
+from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin.cycle import LEAST_CYCLES
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import TwinSettings
@@ -122,6 +123,32 @@ def test_a_torque_that_is_wrong_as_received_is_named_and_shows_nothing_of_the_le
         name = "torque_factor" if factor < 0.0 else "torque_factor_size"
         assert status.values[name] == pytest.approx(factor, rel=0.02)
     assert status.values["unexplained"] < 0.05
+
+
+@pytest.mark.parametrize(("rpm", "is_stuck"), [(0.0, False), (60.0, True)])
+def test_a_torque_that_does_not_change_is_stuck_unless_the_leg_rests(monitor, gait, rpm, is_stuck):
+    samples = gait(8.0, rpm=rpm)
+    samples["torque_nm"] = 0.0  # as of a drive that is off
+    monitor.update(samples)
+    assert ("input_torque" in raised(monitor)) == is_stuck
+
+
+def test_alarms_of_a_torque_that_is_gone_clear_when_they_are_acknowledged(monitor, healthy):
+    samples = healthy.copy()
+    samples["torque_nm"] *= -1.0
+    monitor.update(samples)
+    _, kept = monitor.acknowledge(1)
+    assert {alarm.name for alarm in kept} == {"torque_mismatch"}  # the torque is still there, and wrong
+    cranks = healthy[healthy["kind"] == CRANK]
+    cranks["stamp_ns"] += SECONDS * 10**9
+    monitor.update(cranks)
+    assert "torque_mismatch" in raised(monitor)
+    monitor.acknowledge(2)
+    assert raised(monitor) == {"input_rate torque"}
+    assert monitor.verdict.verdict.fault_code == "NO_DRIVE_TORQUE"
+    samples["stamp_ns"] += 2 * SECONDS * 10**9
+    monitor.update(samples)
+    assert monitor.verdict.verdict.fault_code == "TORQUE_SIGN"
 
 
 def test_how_the_samples_are_cut_changes_no_cause(monitor, healthy):

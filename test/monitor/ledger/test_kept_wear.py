@@ -2,12 +2,14 @@
 
 from itertools import pairwise
 
+import attrs
 import numpy as np
 import pytest
 from told import raised, status_of
 
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.monitor.accounting import next_point_s
+from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.state import Level
 
 SECOND = 10**9
@@ -84,13 +86,18 @@ def test_the_next_start_says_that_wear_was_lost(begin, gait):
     monitor = begin()
     monitor.update(gait(2.0))
     monitor._accounting.ledger.close()
-    second = begin()
-    status = status_of(second, "ledger")
-    assert status.level is Level.WARN
-    assert "interrupted" in status.message
-    assert status.values["cut_off_s"] == 5.0
-    second.acknowledge(0)
-    assert status_of(second, "ledger").level is Level.OK
+    for checkpoint_s in (2.0, 1.0):  # until somebody has acknowledged it
+        second = begin({"ledger.checkpoint_s": checkpoint_s})
+        status = status_of(second, "ledger")
+        assert status.level is Level.WARN
+        assert "interrupted" in status.message
+        assert status.values["cut_off_s"] == 5.0
+        second.close()
+    third = begin({"ledger.checkpoint_s": 1.0})
+    third.acknowledge(0)
+    assert status_of(third, "ledger").level is Level.OK
+    third._accounting.ledger.close()
+    assert begin()._accounting.ledger.cut_off_s < 5.0  # the third was interrupted, too
 
 
 def test_a_standing_leg_writes_nothing(begin, gait):
@@ -121,6 +128,33 @@ def test_alarms_stay_latched_over_a_new_start_and_have_a_history(begin, gait, ro
     assert [level for (level,) in history] == [2, 0]
 
 
+@pytest.mark.parametrize("was_acknowledged", [False, True])
+def test_an_alarm_of_encoders_that_are_not_read_any_more_stays_until_it_is_acknowledged(
+    begin, gait, rows, was_acknowledged
+):
+    first = begin()
+    first.update(gait(2.5))
+    first.close()
+    departed = Alarm(
+        kind="clearance_departure", subject="G", level=Level.ERROR, present=Level.ERROR, worst=4e-4,
+        limit=1e-4, raised_ns=START_NS, acknowledged=was_acknowledged,
+    )  # fmt: skip
+    ledger = begin()._accounting.ledger
+    ledger.record(attrs.evolve(ledger.entry, spans=(), alarms=(departed,)))
+    ledger.close()
+    for begin_s in (5.0, 10.0):
+        later = begin()
+        later.update(gait(2.5, begin_s=begin_s))
+        assert (departed.name in raised(later)) != was_acknowledged
+        later.close()
+    last = begin()
+    last.acknowledge(START_NS)
+    assert departed.name not in raised(last)
+    last.close()
+    assert rows("SELECT level FROM alarm_history WHERE kind = 'clearance_departure'") == [(0,)]
+    assert begin().alarms.level is Level.OK
+
+
 def test_a_ledger_that_cannot_be_written_stops_nothing(begin, gait):
     monitor = begin({"ledger.checkpoint_s": 1.0})
     ledger = monitor._accounting.ledger
@@ -141,6 +175,15 @@ def test_a_ledger_that_cannot_be_written_stops_nothing(begin, gait):
     monitor.close()
     again = begin()
     np.testing.assert_array_equal(again._twin.depth, monitor._twin.depth)
+
+
+def test_a_last_entry_that_cannot_be_written_is_told(begin, gait):
+    monitor = begin()
+    monitor.update(gait(2.5))
+    path = monitor._accounting.ledger.path
+    path.rename(path.with_suffix(".away"))
+    with pytest.raises(LegWearError, match=r"moved away.*; nothing of what came after its last entry"):
+        monitor.close()
 
 
 def test_clearances_are_noted_for_the_history(begin, gait, rows):

@@ -349,6 +349,18 @@ def test_references_and_baselines_are_kept_for_each_cadence(reopened) -> None:
     assert [one.stamp_ns for one in reopened(corrected).commissioned_torques] == [20]
 
 
+@pytest.mark.parametrize("what", ["reset_wear", "undo_reset"])
+@pytest.mark.parametrize("reset_ns", [5, 50])
+def test_baselines_are_of_the_parts_since_the_last_reset_whatever_the_clocks_say(
+    reopened, reset_ns, what
+) -> None:
+    former, own = (CommissionedTorque(ns, np.full(5, 3e-4), np.ones((4, 6)), speed=6.0) for ns in (20, 10))
+    for noted, kept in (((former,), [20]), ((Audit(reset_ns, "ann", what),), []), ((own,), [10])):
+        found = reopened(*noted)
+        assert [one.stamp_ns for one in found.commissioned_torques] == kept
+        found.close()
+
+
 def test_a_measurement_that_is_withdrawn_is_kept_and_told_as_withdrawn(open_ledger):
     ledger = open_ledger()
     ledger.note(MEASURED)

@@ -191,7 +191,7 @@ class AlarmBoard:
         """
         for alarm in alarms:
             is_done = alarm.acknowledged and alarm.name not in self._limits
-            known = attrs.evolve(alarm, unit=alarm_specs.UNITS.get(alarm.kind, ""))
+            known = alarm_specs.with_its_unit(alarm)
             self.alarms[alarm.name] = cleared(known) if is_done else known
 
     def level(self, *names: str) -> Level:

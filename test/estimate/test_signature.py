@@ -99,12 +99,6 @@ def test_sampling_determines_phases(rate_hz: float, together: int, phases: int) 
     assert (sensor.together, sensor.phases) == (together, phases)
 
 
-@pytest.mark.parametrize("rpm", [40.0, 45.0, 55.0, 58.0, 60.5, 61.0, 66.0])
-@pytest.mark.parametrize("rate_hz", [200, 500, 1000])
-def test_a_cadence_beside_that_of_the_benchmarks_has_as_many_phases(rate_hz: float, rpm: float) -> None:
-    assert TorqueSensor(period_s=1.0 / rate_hz, cycle_s=60.0 / rpm, size_nm=10.0).phases == 80
-
-
 @pytest.mark.parametrize("rpm", [60.0, -60.0, 45.0])
 @pytest.mark.parametrize("rate_hz", [50.0, 200.0, 1000.0])
 @pytest.mark.parametrize("is_instant", [False, True])

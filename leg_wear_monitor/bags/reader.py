@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.bags import bag
 from leg_wear_monitor.bags.budget import DEFAULT_MB, Budget
-from leg_wear_monitor.bags.findings import Clocks, Finding, RecordingError, Severity
+from leg_wear_monitor.bags.findings import Clocks, Finding, RecordingError, Severity, reading
 from leg_wear_monitor.bags.mcap_file import Piece
 from leg_wear_monitor.bags.table_file import TableFile
 from leg_wear_monitor.bags.table_layout import (
@@ -408,10 +408,12 @@ class Recording:
         Raises
         ------
         RecordingError
-            At the end, if no message contains the crank; immediately, if the files are of two legs.
+            At the end, if no message contains the crank; immediately, if the files are of two legs, or if
+            the system cannot read them any further.
         """
-        for block in self._joined():
-            yield from self._pauses.cut(block)
+        with reading(self.files):
+            for block in self._joined():
+                yield from self._pauses.cut(block)
         self._findings += self._joints.findings()
         notes = self._clocks.notes()
         self._findings += [Finding(self.files[0], text, Severity.NOTE) for text in notes]

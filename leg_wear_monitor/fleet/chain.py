@@ -220,7 +220,7 @@ def entry_of(found: Found) -> dict[str, Any]:
 def _first_stamp_ns(path: Path, leg: FleetLeg) -> int:
     """First valid stamp; 0 if there is none."""
     topics = {"joint_states": leg.joint_states, "drive_torque": leg.drive_torque}
-    with reading([path]), Recording([path], leg.config, **topics) as recording:  # type: ignore[arg-type]
+    with Recording([path], leg.config, **topics) as recording:  # type: ignore[arg-type]
         for block in recording.blocks():
             stamps = block.samples["stamp_ns"][block.samples["fault"] == 0]
             if len(stamps):

@@ -9,7 +9,7 @@ import numpy as np
 
 from leg_wear_monitor.bags.bag import Recordable, listed_recordings
 from leg_wear_monitor.bags.budget import DEFAULT_MB
-from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity, reading
+from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
 from leg_wear_monitor.bags.reader import Block, Recording
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.files import unfinished
@@ -166,7 +166,7 @@ def _run(
     """Process all blocks of a recording."""
     monitor = result.monitor
     first_ns: int | None = None
-    for block in _blocks(recording):
+    for block in recording.blocks():
         first_ns = int(block.log_time_ns[0]) if first_ns is None else first_ns
         result.logged_s = max(result.logged_s, (int(block.log_time_ns[-1]) - first_ns) / 1e9)
         if block.pause_ns:
@@ -179,12 +179,6 @@ def _run(
             progress(block.fraction)
     monitor.end_recording()
     result.history.last = monitor.renew_forecast()
-
-
-def _blocks(recording: Recording) -> Iterator[Block]:
-    """Blocks of a recording; what the system reports of its files is a fault of the recording."""
-    with reading(recording.files):
-        yield from recording.blocks()
 
 
 def _stamps_apart_s(result: ReplayResult, block: Block) -> float:

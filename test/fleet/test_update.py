@@ -96,7 +96,7 @@ def _bad_sector(*_):
 class OnBadDisk(Recording):
     """A recording in a bad sector."""
 
-    blocks = _bad_sector
+    _joined = _bad_sector
 
 
 @pytest.mark.parametrize(

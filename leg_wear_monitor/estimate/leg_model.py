@@ -21,9 +21,6 @@ from leg_wear_monitor.twin.load import load_shape, load_signatures
 from leg_wear_monitor.twin.reference import MASS_TOLERANCE
 from leg_wear_monitor.twin.torque_reference import TorqueReference
 
-# What changes a torque's signature beside clearances: friction, scale, lag, load, bodies.
-
-
 # usual changes of a leg that is all right: friction warms up, sensors drift, the ground differs
 _FRICTION_CHANGE = 0.1  # of the torque's size
 _SCALE = 0.02

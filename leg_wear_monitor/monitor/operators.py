@@ -452,16 +452,11 @@ def limit_in(ledger: Ledger, joint: str) -> float | None:
 
 
 def note_verdict_of(
-    ledger: Ledger,
-    entry: Entry,
-    leg: Mechanism,
-    config: MonitorConfig,
-    stamp_ns: int,
-    measurements: Sequence[Measurement] | None = None,
+    ledger: Ledger, entry: Entry, leg: Mechanism, config: MonitorConfig, stamp_ns: int
 ) -> None:
     """Note the verdict of an entry that an operator changed, see `verdict_in`."""
-    known = ledger.measurements if measurements is None else measurements
-    ledger.note(VerdictEvent(stamp_ns, verdict_in(entry, leg, config, stamp_ns, known)))
+    verdict = verdict_in(entry, leg, config, stamp_ns, ledger.measurements)
+    ledger.note(VerdictEvent(stamp_ns, verdict))
 
 
 def verdict_in(

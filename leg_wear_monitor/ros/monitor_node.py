@@ -206,7 +206,11 @@ class MonitorNode(ClosingNode):
 
     def _open(self, parameters: Parameters[MonitorConfig]) -> None:
         """Open the ledger and set up everything else; close the ledger if that fails."""
-        self._monitor = open_monitor(load_mechanism(parameters.config.mechanism), parameters.config)
+        config = parameters.config
+        kept, log = Path(config.ledger.path).absolute(), self.get_logger()
+        ledger = f"ledger {kept} is {'continued' if kept.exists() else 'begun'}"
+        self._monitor = open_monitor(load_mechanism(config.mechanism), config)
+        log.info(ledger if config.ledger.path else "no ledger: wear is lost at the end")
         self._monitor.go_live()
         # until `close`: a signal may arrive before the caller of the constructor holds this node
         self._in_order = ExitStack()
@@ -253,7 +257,8 @@ class MonitorNode(ClosingNode):
         self.create_timer(_RELEASE_S, release_memory, clock=steady)
         self._in_order.enter_context(repeated(lambda _: self._receive(inputs), _RECEIVE_S))
         joints, leg = ", ".join(self._monitor.clearance_joints), self._monitor.mechanism.name
-        self.get_logger().info(f"monitoring joints {joints} of {leg}")
+        rpm = f"{config.cadence.commanded_rpm:g} rpm"
+        self.get_logger().info(f"monitoring joints {joints} of {leg} at {rpm}, hardware {config.hardware}")
         for doubt in acceleration_doubts(config):
             self.get_logger().warning(str(doubt))
 

@@ -30,7 +30,7 @@ from leg_wear_monitor.monitor.operators import wear_words
 from leg_wear_monitor.monitor.reports import Reports, Status
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor, open_monitor
 from leg_wear_monitor.ros.health import Load, load_status, recording_status
-from leg_wear_monitor.ros.inputs import Inbox, Inputs
+from leg_wear_monitor.ros.inputs import Inbox, Inputs, check_stamps
 from leg_wear_monitor.ros.measure import MeasureRequest, measured, not_stored, offer_measure, with_storage
 from leg_wear_monitor.ros.outputs import BlackBox, MarkerTopic, MotionTopic, Outlets
 from leg_wear_monitor.ros.parameters import Parameters
@@ -199,6 +199,8 @@ class MonitorNode(ClosingNode):
         self.get_logger().info(f"{ADVICE} {NO_COMMANDS}")
         namespace = self.get_namespace().strip("/")
         parameters = Parameters(self, MonitorConfig, empty={"hardware_id": namespace or "leg"})
+        if self.get_parameter("use_sim_time").value:
+            check_stamps(parameters.config, self.get_fully_qualified_name())
         log = self.get_logger()
         log.info("preparing; the first start compiles numerical kernels, half a minute on two processors")
         with repeated(lambda passed_s: log.info(f"preparing: {passed_s:.0f} s")), advance_beside():

@@ -250,6 +250,10 @@ def test_an_empty_list_on_the_command_line_is_an_empty_list() -> None:
         (MonitorNode, {"ledger.path": "/no/such/place.db"}, "/no/such/place.db: cannot be created"),
         (MonitorNode, {"use_sim_times": True}, "use_sim_times: unknown parameter"),
         (MonitorNode, {"use_sim_time": "maybe"}, "/leg_wear_monitor: Trying to set parameter 'use_sim_time'"),
+        (MonitorNode, {"use_sim_time": True, "drive_torque.source": "float64"},
+         "drive_torque.source: the messages of float64 have no stamp, which use_sim_time needs, expected w"),
+        (MonitorNode, {"use_sim_time": True, "foot_load.source": "contact"},
+         "foot_load.source: the messages of contact have no stamp, which use_sim_time needs, expected wre"),
         (GaitPublisher, {"start_type_description_service": 7}, "expecting type 'BOOL'"),
         (MonitorNode, {f"{QOS}.reliability": "best"}, f"{QOS}.reliability: best cannot be used: "),
         (MonitorNode, {f"{QOS}.reliability": 7}, f"{QOS}.reliability: 7 cannot be used: "),
@@ -259,7 +263,7 @@ def test_an_empty_list_on_the_command_line_is_an_empty_list() -> None:
         (GaitPublisher, {"pace.ripple": 1.0}, "pace.ripple: 1.0 is not at most 0.9"),
         (GaitPublisher, {"precompute": True}, "precompute: needs a duration_s above 0 s"),
     ],
-)
+)  # fmt: skip
 def test_a_node_with_a_bad_parameter_does_not_start(node, parameters, line) -> None:
     with pytest.raises(LegWearError) as refused, made_node(make=node, **parameters):
         pass

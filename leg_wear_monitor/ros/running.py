@@ -161,8 +161,10 @@ def _init(argv: list[str]) -> None:
         raise ConfigError(argv[0], "", f"unknown argument {stray[0]!r}, expected --ros-args ...")
 
 
-def _warn_of_files(node: Node, argv: list[str]) -> None:
-    """Name the parameter files with nothing for a node, which ROS ignores without a word."""
+def _warn_of_unused(node: ParameterNode, argv: list[str]) -> None:
+    """Name parameter files and qualities of service that are not for a node: ROS ignores them silently."""
+    for fault in node.unused_qos:
+        node.get_logger().warning(f"no topic of this node has the parameter {printable(fault)}")
     name = node.get_fully_qualified_name()
     for option, path in itertools.pairwise(argv):
         if option != "--params-file":
@@ -229,7 +231,7 @@ def run(
             arguments = list(sys.argv if argv is None else argv)
             _init(arguments)
             node = make()
-            _warn_of_files(node, arguments)
+            _warn_of_unused(node, arguments)
             for number in _SIGNALS:
                 signal.signal(number, lambda *_: asked.set())
         except KeyboardInterrupt:  # interrupted before the node started

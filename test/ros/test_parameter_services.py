@@ -239,6 +239,14 @@ def test_an_empty_list_on_the_command_line_is_an_empty_list() -> None:
         assert [node.get_parameter(name).value for name in names] == [[], [], []]
 
 
+def test_a_quality_of_service_of_no_topic_is_named_with_the_one_that_may_be_meant() -> None:
+    """In a namespace, or of a topic that is remapped, the name in the documents was ignored."""
+    ours, meant = f"/left{ME}/verdict.publisher.depth", "/left/joint_states.subscription.reliability"
+    given = {f"{QOS}.reliability": "reliable", f"qos_overrides.{ours}": 7}
+    with made_node(namespace="left", clearance_joints=["G"], **given) as node:
+        assert node.unused_qos == (f"{QOS}.reliability; did you mean qos_overrides.{meant}?",)
+
+
 @pytest.mark.parametrize(
     ("node", "parameters", "line"),
     [

@@ -33,6 +33,7 @@ setup(
             [
                 "CODE_OF_CONDUCT.md",
                 "CONTRIBUTING.md",
+                "LICENSE",
                 "QUALITY_DECLARATION.md",
                 "README.md",
                 "SECURITY.md",

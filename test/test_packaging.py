@@ -48,7 +48,12 @@ def test_the_docs_that_help_names_are_installed(installed):
     assert {f"{docs}/reference/parameters.md", f"{docs}/decisions/0001-packaging.md"} <= files
     layouts = ("foxglove/leg.json", "plotjuggler/leg.xml", "rviz/leg.rviz")
     assert {f"{fraction}/{layout}" for layout in layouts} <= files
-    assert {f"{fraction}/SECURITY.md", f"{fraction}/README.md", f"{fraction}/launch/demo.launch.xml"} <= files
+    assert {
+        f"{fraction}/LICENSE",
+        f"{fraction}/SECURITY.md",
+        f"{fraction}/README.md",
+        f"{fraction}/launch/demo.launch.xml",
+    } <= files
 
 
 def test_the_citation_has_the_version_of_the_package():

@@ -348,15 +348,6 @@ def print_findings(lines: Sequence[str], rest: str = "") -> None:
         click.echo(f"warning: {len(lines) - _MOST_LINES} more findings{rest}", err=True)
 
 
-@contextmanager
-def bags_installed() -> Iterator[None]:
-    """Name the extra that lacks where a library for recordings is not installed."""
-    try:
-        yield
-    except ModuleNotFoundError as error:
-        raise LegWearError(f"{error.name} is not installed; pip install 'leg_wear_monitor[bags]'") from error
-
-
 def write_file(path: Path, content: bytes) -> None:
     """Write a file such that no one ever sees a part of it; a device or a pipe just gets the bytes.
 

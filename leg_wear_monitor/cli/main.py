@@ -24,6 +24,9 @@ _VERBS = {
 }  # fmt: skip
 """Verbs, and the file in `verbs` of each."""
 
+_EXTRAS = {"lz4": "bags", "mcap": "bags", "rosbags": "bags", "tornado": "dashboard", "zstandard": "bags"}
+"""Modules that are optional, and the extra that installs each."""
+
 
 class Verbs(click.Group):
     """A group: its verbs are imported when they are called, their faults end in one line and an exit code."""
@@ -63,6 +66,12 @@ class Verbs(click.Group):
             code = COULD_NOT
         except LegWearError as error:
             _print_error(str(error))
+            code = COULD_NOT
+        except ModuleNotFoundError as error:
+            module = (error.name or "").partition(".")[0]
+            if module not in _EXTRAS:
+                raise
+            _print_error(f"{module} is not installed; pip install 'leg_wear_monitor[{_EXTRAS[module]}]'")
             code = COULD_NOT
         except click.Abort:
             if sys.stderr.isatty():

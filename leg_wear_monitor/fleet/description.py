@@ -16,7 +16,6 @@ from typing import Any
 
 import attrs
 
-from leg_wear_monitor.bags.bag import is_bag_directory, is_recording_name
 from leg_wear_monitor.configuration import choice, described
 from leg_wear_monitor.configuration.strict import choose, structure
 from leg_wear_monitor.errors import ConfigError, ConfigWarning, printable
@@ -132,6 +131,8 @@ def recordings_of(home: Path, pattern: str) -> list[Path]:
     if not glob.has_magic(pattern):
         path = home / pattern
         return [path] if path.exists() else []
+    from leg_wear_monitor.bags.bag import is_bag_directory, is_recording_name
+
     found = _matches(home, pattern)
     bags = {path for path in found if path.is_dir() and is_bag_directory(path)}
     files = {path for path in found if is_recording_name(path) and path.is_file()}

@@ -289,7 +289,14 @@ def load_mechanism(name_or_path: str | Path = "bionic_leg") -> spec.Mechanism:
     """
     path = Path(name_or_path)
     if is_file_name(path):
-        return parse_mechanism(read_yaml(path, str(path)), str(path))
+        try:
+            document = read_yaml(path, str(path))
+        except ConfigError as error:
+            if path.is_absolute() or path.exists():
+                raise
+            fault = f"{error.fault}; the mechanism's path starts at {Path.cwd()}"
+            raise ConfigError(error.source, error.key, fault) from error
+        return parse_mechanism(document, str(path))
     shipped = shipped_mechanisms()
     if path.name not in shipped:
         raise ConfigError(

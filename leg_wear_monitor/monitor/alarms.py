@@ -299,7 +299,7 @@ CAUSES_OF_ALARMS = {BIAS: Cause.BIAS, DRIFT: Cause.FRICTION, LAG: Cause.TIMING}
 def joint_of(name: str) -> str:
     """Joint of an alarm with a name such as ``clearance A``; empty for one of the leg or an input."""
     kind, _, subject = name.partition(" ")
-    return "" if kind.startswith("input_") else subject
+    return "" if kind.startswith(("input_", "stamps_")) else subject
 
 
 def code_of(alarm: Alarm) -> str:

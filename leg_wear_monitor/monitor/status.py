@@ -17,6 +17,7 @@ from leg_wear_monitor.monitor.alarms import (
     LEDGER_INTERRUPTED,
     LEDGER_NOT_WRITTEN,
     NOT_FOLLOWED,
+    Alarm,
     amount,
     code_of,
     worst_code,
@@ -95,7 +96,7 @@ def statuses(parts: Parts, report: VerdictReport) -> tuple[Status, ...]:
         diagnosis_status(parts.clearance_joints, parts.diagnosis),
         *joints,
         *((_encoders(parts.encoders, parts),) if parts.encoders else ()),
-        _alarms(parts.evaluation),
+        alarms_status(parts.evaluation.board.alarms.values()),
         _ledger(parts.accounting),
         *((_sampling(parts.twin.sampling, parts),) if parts.twin.sampling else ()),
     )
@@ -312,8 +313,9 @@ def _shown(last: CycleReport | None) -> list[str]:
     ]
 
 
-def _alarms(evaluation: AlarmEvaluation) -> Status:
-    raised = [alarm for alarm in evaluation.board.alarms.values() if alarm.level is not Level.OK]
+def alarms_status(alarms: Iterable[Alarm]) -> Status:
+    """The raised alarms of a list by name, and how many are not acknowledged."""
+    raised = [alarm for alarm in alarms if alarm.level is not Level.OK]
     waiting = sum(not alarm.acknowledged for alarm in raised)
     level = max((alarm.level for alarm in raised), default=Level.OK)
     message = f"raised: {', '.join(alarm.name for alarm in raised)}" if raised else f"none; {ADVICE}"

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from leg_wear_monitor.bags.findings import RecordingError
-from leg_wear_monitor.bags.mcap_writer import McapWriter
 from leg_wear_monitor.files import or_nan
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.messages.encode import LegDrawing
@@ -163,6 +162,8 @@ class Sink:
     """
 
     def __init__(self, path: Path, monitor: WearMonitor, node: str = NODE) -> None:
+        from leg_wear_monitor.bags.mcap_writer import McapWriter  # a dashboard is without this library
+
         self._monitor = monitor
         self._messages = Messages(monitor.config, monitor.clearance_joints, node)
         self._writer = McapWriter(path, chunk_bytes=_CHUNK_BYTES)

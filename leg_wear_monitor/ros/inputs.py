@@ -17,7 +17,7 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from leg_wear_monitor.errors import printable
+from leg_wear_monitor.errors import ConfigError, printable
 from leg_wear_monitor.messages.cdr import MESSAGE, Decoder
 from leg_wear_monitor.messages.names import is_without, names_in, without_interface
 from leg_wear_monitor.messages.streams import INTERFACES, JOINT_STATE, WRENCH_STAMPED, Stream, streams_read
@@ -235,6 +235,7 @@ def message_class(name: str) -> Any:
 # Publishers of an input: node names, publishers of another type, several publishers of one crank.
 
 
+_STAMPED = "wrench, effort or interface"
 _UNKNOWN = ("", "_NODE_NAME_UNKNOWN_", "_CREATED_BY_BARE_DDS_APP_")
 
 
@@ -306,6 +307,28 @@ def several(publishers: Publishers) -> str:
 
 def _listed(names: Iterable[str]) -> str:
     return ", ".join(dict.fromkeys(names))
+
+
+# Inputs that simulation time cannot stamp.
+
+
+def check_stamps(config: MonitorConfig, source: str) -> None:
+    """Refuse inputs without stamps, for a node with ``use_sim_time``.
+
+    Wall time of arrival is not the time of the other inputs, and ``/clock`` comes 10 to 100 times a second: a
+    torque stamped by it would be late by more than ``drive_torque.max_lag_s``, and a healthy leg another one.
+
+    Raises
+    ------
+    ConfigError
+        Naming the parameter, and sources that have stamps.
+    """
+    for stream in streams_read(config.drive_torque.source, config.foot_load.source):
+        if not stream.has_stamp:
+            key, stamped = ("foot_load", "wrench") if stream.load_source else ("drive_torque", _STAMPED)
+            value = stream.load_source or stream.torque_source
+            fault = f"the messages of {value} have no stamp, which use_sim_time needs, expected {stamped}"
+            raise ConfigError(source, f"{key}.source", fault)
 
 
 # Subscriptions of the monitor: serialized messages, and the middleware's events about them.

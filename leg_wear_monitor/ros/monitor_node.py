@@ -30,7 +30,7 @@ from leg_wear_monitor.monitor.operators import wear_words
 from leg_wear_monitor.monitor.reports import Reports, Status
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor, open_monitor
 from leg_wear_monitor.ros.health import Load, load_status, recording_status
-from leg_wear_monitor.ros.inputs import Inbox, Inputs
+from leg_wear_monitor.ros.inputs import Inbox, Inputs, check_stamps
 from leg_wear_monitor.ros.measure import MeasureRequest, measured, not_stored, offer_measure, with_storage
 from leg_wear_monitor.ros.outputs import BlackBox, MarkerTopic, MotionTopic, Outlets
 from leg_wear_monitor.ros.parameters import Parameters
@@ -199,6 +199,8 @@ class MonitorNode(ClosingNode):
         self.get_logger().info(f"{ADVICE} {NO_COMMANDS}")
         namespace = self.get_namespace().strip("/")
         parameters = Parameters(self, MonitorConfig, empty={"hardware_id": namespace or "leg"})
+        if self.get_parameter("use_sim_time").value:
+            check_stamps(parameters.config, self.get_fully_qualified_name())
         log = self.get_logger()
         log.info("preparing; the first start compiles numerical kernels, half a minute on two processors")
         with repeated(lambda passed_s: log.info(f"preparing: {passed_s:.0f} s")), advance_beside():
@@ -206,7 +208,11 @@ class MonitorNode(ClosingNode):
 
     def _open(self, parameters: Parameters[MonitorConfig]) -> None:
         """Open the ledger and set up everything else; close the ledger if that fails."""
-        self._monitor = open_monitor(load_mechanism(parameters.config.mechanism), parameters.config)
+        config = parameters.config
+        kept, log = Path(config.ledger.path).absolute(), self.get_logger()
+        ledger = f"ledger {kept} is {'continued' if kept.exists() else 'begun'}"
+        self._monitor = open_monitor(load_mechanism(config.mechanism), config)
+        log.info(ledger if config.ledger.path else "no ledger: wear is lost at the end")
         self._monitor.go_live()
         # until `close`: a signal may arrive before the caller of the constructor holds this node
         self._in_order = ExitStack()
@@ -253,7 +259,8 @@ class MonitorNode(ClosingNode):
         self.create_timer(_RELEASE_S, release_memory, clock=steady)
         self._in_order.enter_context(repeated(lambda _: self._receive(inputs), _RECEIVE_S))
         joints, leg = ", ".join(self._monitor.clearance_joints), self._monitor.mechanism.name
-        self.get_logger().info(f"monitoring joints {joints} of {leg}")
+        rpm = f"{config.cadence.commanded_rpm:g} rpm"
+        self.get_logger().info(f"monitoring joints {joints} of {leg} at {rpm}, hardware {config.hardware}")
         for doubt in acceleration_doubts(config):
             self.get_logger().warning(str(doubt))
 

@@ -17,7 +17,7 @@ from rclpy.service import Service
 from rclpy.subscription import Subscription
 from rosgraph_msgs.msg import Clock
 
-from leg_wear_monitor.errors import ConfigError, printable
+from leg_wear_monitor.errors import ConfigError, did_you_mean, printable
 from leg_wear_monitor.monitor.config.parameters import (
     Parameter,
     changed,
@@ -76,6 +76,16 @@ class ParameterNode(Node):
     def given(self) -> dict[str, Any]:
         """Parameter overrides by name, from files, arguments and the constructor; includes unknown names."""
         return {name: plain(one) for name, one in self._parameter_overrides.items()}
+
+    @property
+    def unused_qos(self) -> tuple[str, ...]:
+        """Given overrides of a quality of service that none of the topics so far has, which rclpy ignores."""
+        known = [name for name in self._parameters if name.startswith(_QOS_OVERRIDES)]
+        return tuple(
+            name + did_you_mean(name, known)
+            for name in self.given
+            if name.startswith(_QOS_OVERRIDES) and name not in known
+        )
 
     def create_service(
         self, srv_type: Any, srv_name: str, callback: Callable[[Any, Any], Any], **options: Any

@@ -1,6 +1,7 @@
 """How a node starts, waits and ends, and its progress messages."""
 
 import ctypes
+import itertools
 import os
 import signal
 import sys
@@ -19,7 +20,8 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.utilities import remove_ros_args, try_shutdown
 
-from leg_wear_monitor.errors import ConfigError, LegWearError, put_in_order, would_be_lost
+from leg_wear_monitor.errors import ConfigError, LegWearError, printable, put_in_order, would_be_lost
+from leg_wear_monitor.monitor.config.parameters import sections_for_others
 from leg_wear_monitor.ros.parameters import ParameterNode
 
 # Progress messages in a node's log during long operations.
@@ -159,6 +161,23 @@ def _init(argv: list[str]) -> None:
         raise ConfigError(argv[0], "", f"unknown argument {stray[0]!r}, expected --ros-args ...")
 
 
+def _warn_of_unused(node: ParameterNode, argv: list[str]) -> None:
+    """Name parameter files and qualities of service that are not for a node: ROS ignores them silently."""
+    for fault in node.unused_qos:
+        node.get_logger().warning(f"no topic of this node has the parameter {printable(fault)}")
+    name = node.get_fully_qualified_name()
+    for option, path in itertools.pairwise(argv):
+        if option != "--params-file":
+            continue
+        try:
+            others = ", ".join(map(printable, sections_for_others(path, name)))
+            fault = f"{path}: nothing in it is used: its sections are for {others}, and this node is {name}"
+        except ConfigError as error:  # ROS has read it
+            others, fault = "unknown", str(error)
+        if others:
+            node.get_logger().warning(fault)
+
+
 def _stop_making(_number: int, frame: FrameType | None) -> None:
     """Abort the construction of a node: by an exception or, where Python would discard it, by exit."""
     for number in _SIGNALS:
@@ -209,8 +228,10 @@ def run(
         signal.signal(number, _stop_making)
     try:
         try:
-            _init(list(sys.argv if argv is None else argv))
+            arguments = list(sys.argv if argv is None else argv)
+            _init(arguments)
             node = make()
+            _warn_of_unused(node, arguments)
             for number in _SIGNALS:
                 signal.signal(number, lambda *_: asked.set())
         except KeyboardInterrupt:  # interrupted before the node started

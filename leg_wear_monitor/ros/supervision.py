@@ -15,7 +15,7 @@ from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.judgement import leg_alarm
 from leg_wear_monitor.monitor.reports import AlarmList, Status, VerdictReport
-from leg_wear_monitor.monitor.status import verdict_status
+from leg_wear_monitor.monitor.status import alarms_status, verdict_status
 from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.situation import Situation
 from leg_wear_monitor.monitor.verdict.verdict import Finding, dated
@@ -156,7 +156,7 @@ class Supervision:
         self._alarms, self._clock = health.NodeAlarms(kinds), health.ClockMonitor()
         self._alarm_log, self._status_log = AlarmLog(node.get_logger()), StatusLog(node.get_logger())
         self._several_since: dict[str, int] = {}
-        self._most_ahead_s, self._other_axis = 0.0, ""
+        self._most_ahead_s, self._other_axis, self._noted_ns = 0.0, "", 0
         self.inputs: Sequence[InputTopic] = ()
 
     @property
@@ -180,7 +180,10 @@ class Supervision:
 
     def _note_stamps(self, samples: Samples) -> None:
         """Record by how much the stamps of each kind are ahead of the clock, at most since the last check."""
-        now_ns = self._now_ns()
+        now_ns, before_ns = self._now_ns(), self._noted_ns
+        self._noted_ns = now_ns
+        if now_ns < before_ns:  # set back, after these samples had come
+            return
         for code, kind in KINDS.items():
             stamps = samples["stamp_ns"][(samples["kind"] == code) & (samples["fault"] == NO_FAULT)]
             if now_ns > 0 and len(stamps) and kind.name in self._ahead_s:
@@ -269,8 +272,11 @@ class Supervision:
             topic.lost_reported = topic.lost
         clock = self._clock.status(ros_ns, now_ns, is_simulated, self._most_ahead_s)
         given = {status.name: status for status in statuses}
-        verdict = verdict_status(self.verdict(self._monitor.verdict).verdict)
-        given[verdict.name] = verdict
+        for own in (
+            verdict_status(self.verdict(self._monitor.verdict).verdict),
+            alarms_status(self._alarms.beside(self._monitor.alarms).alarms),
+        ):
+            given[own.name] = own
         # the given clock status has already been logged at its source
         self._status_log.note((*(one for name, one in given.items() if name != clock.name), topics, clock))
         given[clock.name] = health.both_clocks(given[clock.name], clock) if clock.name in given else clock

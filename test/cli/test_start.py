@@ -99,3 +99,34 @@ def test_linear_algebra_takes_one_thread_if_nothing_else_is_asked_for(given, thr
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, env={**free, **given}
     )
     assert done.stdout.splitlines()[-1] == threads
+
+
+@pytest.mark.plain
+def test_without_the_libraries_of_an_extra_it_is_named_in_a_line(tmp_path):
+    """Only in ``replay`` and ``commission`` before; a live dashboard ended in a traceback, too."""
+    (tmp_path / "leg.mcap").touch()
+    (tmp_path / "fleet.yaml").write_text("legs: [{id: left, recordings: '*.mcap'}]\n")
+    lines = ["check fleet.yaml", "fleet report fleet.yaml", "fleet update fleet.yaml", "demo",
+             "play leg.mcap --joint G", "replay leg.mcap", "commission leg.mcap"]  # fmt: skip
+    code = (
+        "import sys\n"
+        "sys.modules.update(dict.fromkeys(('mcap', 'rosbags', 'zstandard', 'lz4')))\n"
+        "import leg_wear_monitor.dashboard.live_leg, leg_wear_monitor.fleet.description\n"
+        "from leg_wear_monitor.cli import common\n"
+        "from leg_wear_monitor.cli.main import cli\n"
+        "common.need_rclpy = lambda: None\n"
+        f"for line in {lines}:\n"
+        "    try:\n"
+        "        cli(line.split())\n"
+        "    except SystemExit as end:\n"
+        "        print(end.code, file=sys.stderr)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, check=True
+    )
+    said = done.stderr.splitlines()
+    assert said[1::2] == ["2"] * len(lines)
+    for line in said[::2]:
+        assert line.startswith("error: ") and line.endswith(
+            "is not installed; pip install 'leg_wear_monitor[bags]'"
+        )

@@ -8,6 +8,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from leg_wear_monitor.files import share_directory
+from leg_wear_monitor.messages.streams import STREAMS
 from leg_wear_monitor.monitor.config.parameters import parse_config, structured
 from leg_wear_monitor.monitor.config.tables import FORCES
 from leg_wear_monitor.ros import monitor_node
@@ -67,6 +68,26 @@ def test_launch_files_start_what_is_installed() -> None:
         assert node.get("if") == "$(var has_rviz2)"
         layout = node.get("args").removeprefix("-d $(find-pkg-share leg_wear_monitor)/")
         assert (package / layout).is_file()
+
+
+@pytest.mark.plain
+def test_every_input_can_be_remapped_by_the_launch_files() -> None:
+    """A robot with one broadcaster for both legs, or on ros2_control, could not."""
+    topics = {stream.topic for stream in STREAMS}
+    one, two = (
+        ElementTree.parse(share_directory() / "launch" / f"{name}.launch.xml").getroot()
+        for name in ("monitor", "two_legs")
+    )
+    for node in one.iterfind("node"):
+        assert {(each.get("from"), each.get("to")) for each in node.iterfind("remap")} == {
+            (topic, f"$(var {topic})") for topic in topics
+        }
+    for launch, included in ((one, ()), (two, two.findall("include"))):
+        declared = {arg.get("name"): arg.get("default") for arg in launch.iterfind("arg")}
+        for include in included:
+            passed = {arg.get("name"): arg.get("value") for arg in include.iterfind("arg")}
+            assert topics < set(passed) < {arg.get("name") for arg in one.iterfind("arg")}
+            assert {declared[passed[topic][6:-1]] for topic in topics} == topics
 
 
 @pytest.mark.plain

@@ -125,6 +125,7 @@ def test_several_legs_in_namespaces_do_not_hear_each_other(stage, walk) -> None:
         assert f"{leg}/leg_wear_monitor: joint A" in names[leg]
         assert {len(groups_of(name)) for name in names[leg]} == {1}
     assert groups_of("leg_wear_monitor: crank zero") == ["gait"]  # only with crank.zero: at_start
+    assert groups_of("leg_wear_monitor: foot_load") == ["gait"]  # only with foot_load.source
 
 
 SIDES = ("left", "right")

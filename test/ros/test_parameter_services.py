@@ -239,6 +239,14 @@ def test_an_empty_list_on_the_command_line_is_an_empty_list() -> None:
         assert [node.get_parameter(name).value for name in names] == [[], [], []]
 
 
+def test_a_quality_of_service_of_no_topic_is_named_with_the_one_that_may_be_meant() -> None:
+    """In a namespace, or of a topic that is remapped, the name in the documents was ignored."""
+    ours, meant = f"/left{ME}/verdict.publisher.depth", "/left/joint_states.subscription.reliability"
+    given = {f"{QOS}.reliability": "reliable", f"qos_overrides.{ours}": 7}
+    with made_node(namespace="left", clearance_joints=["G"], **given) as node:
+        assert node.unused_qos == (f"{QOS}.reliability; did you mean qos_overrides.{meant}?",)
+
+
 @pytest.mark.parametrize(
     ("node", "parameters", "line"),
     [
@@ -250,6 +258,10 @@ def test_an_empty_list_on_the_command_line_is_an_empty_list() -> None:
         (MonitorNode, {"ledger.path": "/no/such/place.db"}, "/no/such/place.db: cannot be created"),
         (MonitorNode, {"use_sim_times": True}, "use_sim_times: unknown parameter"),
         (MonitorNode, {"use_sim_time": "maybe"}, "/leg_wear_monitor: Trying to set parameter 'use_sim_time'"),
+        (MonitorNode, {"use_sim_time": True, "drive_torque.source": "float64"},
+         "drive_torque.source: the messages of float64 have no stamp, which use_sim_time needs, expected w"),
+        (MonitorNode, {"use_sim_time": True, "foot_load.source": "contact"},
+         "foot_load.source: the messages of contact have no stamp, which use_sim_time needs, expected wre"),
         (GaitPublisher, {"start_type_description_service": 7}, "expecting type 'BOOL'"),
         (MonitorNode, {f"{QOS}.reliability": "best"}, f"{QOS}.reliability: best cannot be used: "),
         (MonitorNode, {f"{QOS}.reliability": 7}, f"{QOS}.reliability: 7 cannot be used: "),
@@ -259,7 +271,7 @@ def test_an_empty_list_on_the_command_line_is_an_empty_list() -> None:
         (GaitPublisher, {"pace.ripple": 1.0}, "pace.ripple: 1.0 is not at most 0.9"),
         (GaitPublisher, {"precompute": True}, "precompute: needs a duration_s above 0 s"),
     ],
-)
+)  # fmt: skip
 def test_a_node_with_a_bad_parameter_does_not_start(node, parameters, line) -> None:
     with pytest.raises(LegWearError) as refused, made_node(make=node, **parameters):
         pass

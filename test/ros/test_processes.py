@@ -19,7 +19,7 @@ pytest.importorskip("rclpy")
 def started(verb: str, log: Path, *arguments: str) -> "subprocess.Popen[bytes]":
     command = [sys.executable, "-m", "leg_wear_monitor", verb, "--ros-args", *arguments]
     with log.open("wb") as stream:
-        return subprocess.Popen(command, stdout=stream, stderr=subprocess.STDOUT)
+        return subprocess.Popen(command, stdout=stream, stderr=subprocess.STDOUT, cwd=log.parent)
 
 
 def closed_runs(ledger: Path) -> list[tuple[int]]:
@@ -28,14 +28,18 @@ def closed_runs(ledger: Path) -> list[tuple[int]]:
 
 
 def test_sigterm_ends_both_nodes_in_order(stage, tmp_path: Path) -> None:
-    ledger, truth = tmp_path / "wear.db", tmp_path / "truth.json"
+    """The monitor has said what it judges by, where it keeps the wear, and which file is none of its."""
+    ledger, truth, other = tmp_path / "wear.db", tmp_path / "truth.json", tmp_path / "other.yaml"
+    other.write_text("monitor: {ros__parameters: {ledger: {path: lost.db}}}\n")
     logs = {"monitor": tmp_path / "monitor.log", "gait-publisher": tmp_path / "leg.log"}
+    unused = "qos_overrides./joint_state.subscription.reliability"
+    own = ("-p", "ledger.path:=wear.db", "-p", f"{unused}:=reliable", "--params-file", str(other))
     nodes = [
-        started("monitor", logs["monitor"], "-p", f"ledger.path:={ledger}"),
+        started("monitor", logs["monitor"], *own),
         started("gait-publisher", logs["gait-publisher"], "-p", f"truth.path:={truth}"),
     ]
     try:
-        for log, word in zip(logs.values(), (b"monitoring joints", b"walking"), strict=True):
+        for log, word in zip(logs.values(), (b"nothing in it is used", b"walking"), strict=True):
             stage.wait_for(lambda log=log, word=word: word in log.read_bytes(), f"{word} in {log}")
         for node in nodes:
             node.send_signal(signal.SIGTERM)
@@ -46,7 +50,15 @@ def test_sigterm_ends_both_nodes_in_order(stage, tmp_path: Path) -> None:
             node.wait()
     assert json.loads(truth.read_text())["walked_s"] > 0.0
     assert closed_runs(ledger) == [(1,)]
-    assert b"The monitor advises." in logs["monitor"].read_bytes()
+    said = logs["monitor"].read_text()
+    for line in (
+        "The monitor advises.",
+        f"ledger {ledger} is begun",
+        "of bionic_leg at 60 rpm, hardware leg",
+        f"no topic of this node has the parameter {unused}; did you mean qos_overrides./joint_states",
+        f"{other}: nothing in it is used: its sections are for /monitor, and this node is /leg_wear_monitor",
+    ):
+        assert line in said
     assert all(b"Traceback" not in log.read_bytes() for log in logs.values())
 
 

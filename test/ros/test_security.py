@@ -34,17 +34,26 @@ def allowed(node: str, kind: str, right: str, policy: ElementTree.Element = POLI
 
 
 @pytest.mark.parametrize(
-    ("make", "own"),
+    ("make", "own", "idle"),
     [
-        (MonitorNode, {"publish_scalars": True, "foot_load__source": "wrench"}),
-        (GaitPublisher, {"foot_load_sensor__source": "wrench"}),
+        (MonitorNode, {"publish_scalars": True, "foot_load__source": "wrench"}, "dynamic_joint_states"),
+        (
+            MonitorNode,
+            {"publish_scalars": True, "foot_load__source": "wrench", "drive_torque__source": "interface"},
+            "drive_torque",
+        ),
+        (GaitPublisher, {"foot_load_sensor__source": "wrench"}, ""),
     ],
 )
-def test_a_node_may_do_what_it_does_and_nothing_else(make: Callable[..., Any], own: dict[str, Any]) -> None:
+def test_a_node_may_do_what_it_does_and_nothing_else(
+    make: Callable[..., Any], own: dict[str, Any], idle: str
+) -> None:
+    """Idle is the input of the torque that another source than the node's reads."""
     with made_node(make=make, use_sim_time=True, clearance_joints=["G"], **own) as node:
         name = node.get_name()
         agrees(node.get_publisher_names_and_types_by_node, name, allowed(name, "topic", "publish"))
-        agrees(node.get_subscriber_names_and_types_by_node, name, allowed(name, "topic", "subscribe"))
+        inputs = allowed(name, "topic", "subscribe") - {f"/{idle}"}
+        agrees(node.get_subscriber_names_and_types_by_node, name, inputs)
         agrees(node.get_service_names_and_types_by_node, name, allowed(name, "service", "reply"))
         agrees(node.get_client_names_and_types_by_node, name, allowed(name, "service", "request"))
 

@@ -13,25 +13,41 @@ pytest.importorskip("rclpy")
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
+from made_node import made_node
 from rcl_interfaces.msg import Log
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, qos_profile_sensor_data
 from rclpy.serialization import serialize_message
+from readings_as_samples import samples
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from visualization_msgs.msg import MarkerArray
 
+from leg_wear_monitor.gait.sensors import Reading
 from leg_wear_monitor.messages.cdr import Decoder
 from leg_wear_monitor.messages.streams import JOINT_STATE, WRENCH_STAMPED
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.reports import AlarmList, Status
+from leg_wear_monitor.monitor.verdict.rules import findings
+from leg_wear_monitor.monitor.verdict.situation import Situation
+from leg_wear_monitor.monitor.verdict.verdict import verdict_of
 from leg_wear_monitor.ros import inputs
-from leg_wear_monitor.ros.health import ClockMonitor, Load, NodeAlarms, Silence, both_clocks
+from leg_wear_monitor.ros.health import (
+    QUANTITIES,
+    SOURCES,
+    ClockMonitor,
+    Load,
+    NodeAlarms,
+    Silence,
+    both_clocks,
+)
 from leg_wear_monitor.ros.inputs import Arrival, CrankNames, Inbox, Inputs, Publishers, publishers_of
 from leg_wear_monitor.ros.supervision import AlarmLog, StatusLog
 from leg_wear_monitor.state import Level
+from leg_wear_monitor.twin import CRANK as KIND
 from leg_wear_monitor.twin import KINDS
+from leg_wear_monitor.twin.sample import NO_FAULT
 
 ME = "/leg_wear_monitor"
 SECOND = 10**9
@@ -170,6 +186,30 @@ def test_alarms_of_the_node_are_listed_while_they_are_raised_and_acknowledged_li
     cleared, kept = node.acknowledge()
     assert [alarm.name for alarm in cleared] == []
     assert [alarm.name for alarm in kept] == ["input_sources"]
+
+
+def test_an_alarm_of_an_input_concerns_no_joint() -> None:
+    """``stamps_ahead crank`` was one of a joint named crank."""
+    node = NodeAlarms(tuple(kind.name for kind in KINDS.values()))
+    node.evaluate(dict.fromkeys(QUANTITIES.keys() - {f"{SOURCES} {CRANK}"}, 9.0), NOON_NS)
+    assert len(node.raised) == 3 * len(KINDS)
+    for alarm in node.raised:
+        verdict = verdict_of(findings(Situation(alarms=(alarm,), quantities=QUANTITIES)))
+        assert (verdict.joints, "joint" in verdict.why) == ((), False), alarm.name
+
+
+def test_samples_that_came_before_the_clock_was_set_back_are_not_ahead_of_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As from a bag that is played in a loop with its clock."""
+    sample = samples([Reading(0.0, 0.0, KIND, NO_FAULT, 0.1, 6.0, math.nan)], NOON_NS)
+    with made_node(clearance_joints=["G"]) as node:
+        supervision, lead_s = node._supervision, []
+        for now_ns in (NOON_NS, NOON_NS - 10 * SECOND, NOON_NS - 9 * SECOND):
+            monkeypatch.setattr(supervision, "_now_ns", lambda now_ns=now_ns: now_ns)
+            supervision._note_stamps(sample)
+            lead_s.append(supervision._ahead_s[CRANK])
+    assert lead_s == [0.0, 0.0, 9.0]
 
 
 def test_a_clock_that_stands_or_is_set_back_is_told() -> None:
@@ -433,6 +473,7 @@ def test_two_publishers_of_one_crank_are_named_even_if_they_agree(stage, walk) -
     expected = "/joint_states: 2 publishers: /simulator, /stage; expected one"
     stage.wait_for(lambda: expected in words(diagnostics, "topics"), "both publishers")
     stage.wait_for(lambda: line(alarms, "input_sources torque") is not None, "the alarm of two torques")
+    stage.wait_for(lambda: "input_sources torque" in words(diagnostics, "alarms"), "it in the status")
     # a node that has just come may yet turn out to publish other joints than the crank
     stage.wait_for(lambda: line(alarms, "input_sources").level == b"\2", "the alarm of two cranks")
     other.destroy_node()

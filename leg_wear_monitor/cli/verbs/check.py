@@ -122,9 +122,8 @@ def _is_table(name: str) -> bool:
 
 def _table(name: str, parameters: str | None) -> str:
     """Read a table, and say what was understood of it."""
-    with common.bags_installed():
-        from leg_wear_monitor.bags.findings import Severity
-        from leg_wear_monitor.bags.reader import understood
+    from leg_wear_monitor.bags.findings import Severity
+    from leg_wear_monitor.bags.reader import understood
     from leg_wear_monitor.monitor.config.parameters import load_config
 
     lines, findings = understood(Path(name), load_config(parameters))

@@ -102,8 +102,8 @@ def _write_reference(file: Path, config: "MonitorConfig", made: "TorqueReference
 def _run(
     recordings: tuple[Path, ...], path: Path | None, reference: Path | None, topics: dict[str, str | None]
 ) -> "CommissioningResult":
-    with common.bags_installed():
-        from leg_wear_monitor.commissioning.commission import commission as propose
+    from leg_wear_monitor.commissioning.commission import commission as propose
+
     with common.compilation("commissioning", "monitor"), common.progress_bar("commissioning") as progress:
         result = propose(recordings, path, **topics, reference=reference, progress=progress)
     for fault in result.faults:
@@ -325,9 +325,9 @@ def _settings(
 def _play(
     recording: Path, settings: "MonitorConfig", joint: str, loads: tuple[str, ...]
 ) -> tuple["Play", bool]:
-    with common.bags_installed():
-        from leg_wear_monitor.bags.findings import Severity
-        from leg_wear_monitor.play.measurement import measure_play, read_rocked
+    from leg_wear_monitor.bags.findings import Severity
+    from leg_wear_monitor.play.measurement import measure_play, read_rocked
+
     with common.compilation("play"), common.progress_bar("reading") as progress:
         read = read_rocked(recording, settings, joint, loads, progress)
     for finding in read.findings:

@@ -83,6 +83,7 @@ def demo(out: Path) -> int:
     monitor again.
     """
     common.need_rclpy()
+    import_module("leg_wear_monitor.bags.mcap_writer")  # rather than in a node, once both are running
     common.check_directory("--out", out)
     out.mkdir(parents=True, exist_ok=True)
     _compile(out)
@@ -277,19 +278,12 @@ def dashboard(
         raise click.UsageError("--node, --ledger and --fleet cannot be combined")
     if fleet and config:
         raise click.UsageError("--config cannot be combined with --fleet")
-    _need_tornado()
+    import_module("tornado")
     from leg_wear_monitor.dashboard.server import listen
 
     with _source(node, ledger, fleet, config) as source:
         _serve(source, listen(host, port))
     return 0
-
-
-def _need_tornado() -> None:
-    try:
-        import_module("tornado")
-    except ImportError as error:
-        raise LegWearError(f"{error}; pip install 'leg_wear_monitor[dashboard]'") from error
 
 
 @contextmanager

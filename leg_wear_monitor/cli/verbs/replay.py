@@ -124,9 +124,9 @@ def _run(
     **options: Any,
 ) -> tuple["ReplayResult", float]:
     """The result, and the time [s] it took once all was compiled."""
-    with common.bags_installed():
-        from leg_wear_monitor.dynamics.clearance.stepper import advance_beside
-        from leg_wear_monitor.playback.replay import replay as run
+    from leg_wear_monitor.dynamics.clearance.stepper import advance_beside
+    from leg_wear_monitor.playback.replay import replay as run
+
     began, took = [0.0], [0.0]
 
     def ready(monitor: Any) -> None:

@@ -282,6 +282,28 @@ def _parameters(entry: Any, source: str, pattern: str) -> dict[Any, Any]:
     return parameters
 
 
+def sections_for_others(path: str | Path, node: str) -> tuple[str, ...]:
+    """Sections of a parameter file, if none of them is for a node; empty if one is.
+
+    Raises
+    ------
+    ConfigError
+        If the file cannot be read.
+    """
+    found = tuple(_sections(read_yaml(Path(path), str(path))))
+    return () if any(_is_for(each, node) for each in found) else found
+
+
+def _sections(document: Any, prefix: str = "") -> Iterator[str]:
+    """Full names of the sections; ROS takes names of namespaces and nodes that are nested, too."""
+    for key, entry in document.items() if isinstance(document, dict) else ():
+        name = f"{prefix}/{str(key).strip('/')}"
+        if isinstance(entry, dict) and MARK in entry:
+            yield name
+        else:
+            yield from _sections(entry, name)
+
+
 def _is_for(pattern: str, node: str) -> bool:
     """Whether a section is for a node: ``*`` stands for one name, ``**`` for any number of them."""
     expression = re.escape("/" + pattern.strip("/"))

@@ -13,6 +13,7 @@ from leg_wear_monitor.monitor.config.parameters import (
     changed,
     config_from,
     parse_config,
+    sections_for_others,
     values_of,
 )
 from leg_wear_monitor.monitor.config.sections import NOT_DECLARED
@@ -111,6 +112,22 @@ def test_sections_are_for_the_nodes_that_ros_means(pattern, node, taken):
     base = "/**: {ros__parameters: {hardware_id: any}}\n" if pattern != "/**" else ""
     config = read(f"{base}{pattern}: {{ros__parameters: {{hardware_id: mine}}}}", node)
     assert config.hardware_id == ("mine" if taken else "any")
+
+
+@pytest.mark.parametrize(
+    ("text", "others"),
+    [
+        ("/**: {ros__parameters: {}}", ()),
+        ("monitor: {ros__parameters: {}}\n/left/leg_wear_monitor: {ros__parameters: {}}", ()),
+        ("/left: {leg_wear_monitor: {ros__parameters: {}}}", ()),
+        ("monitor: {ros__parameters: {ledger.path: wear.db}}", ("/monitor",)),
+        ("/right: {leg_wear_monitor: {ros__parameters: {}}}\n/*: {ros__parameters: {}}",
+         ("/right/leg_wear_monitor", "/*")),
+    ],
+)  # fmt: skip
+def test_a_file_with_nothing_for_a_node_is_known_by_its_sections(tmp_path, text, others):
+    (tmp_path / "monitor.yaml").write_text(text)
+    assert sections_for_others(tmp_path / "monitor.yaml", "/left/leg_wear_monitor") == others
 
 
 def test_nested_and_dotted_names_are_the_same_and_what_every_node_has_is_left_alone():

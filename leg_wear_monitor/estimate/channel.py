@@ -172,7 +172,8 @@ def channel_of(
     known within tolerances, and a leg on the ground under an unknown load, whose first harmonics say nothing.
     """
     variance = np.repeat([_MEAN_SIGMA * sensor.size_nm, _ROUGHNESS_SIGMA], sensor.phases) ** 2
-    variance += np.square(PHASE_ERROR_RAD * _slopes(measured, sensor))
+    if len(reference.torque_nm) == 1:  # what clearances change is not simulated: mostly, they shift phases
+        variance += np.square(PHASE_ERROR_RAD * _slopes(measured, sensor))
     tolerances = [
         max(_SPREADS[one.cause], _SPREAD_FACTOR * one.spread) * one.column
         for one in nuisances

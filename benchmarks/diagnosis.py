@@ -42,7 +42,6 @@ from leg_wear_monitor.estimate.leg_model import explainer_of
 from leg_wear_monitor.estimate.signature import (
     CommissionedTorque,
     TorqueSensor,
-    averaged,
     signatures,
     with_noise_of,
 )
@@ -244,10 +243,14 @@ def measured(walk: np.ndarray, sensor: TorqueSensor, noise_nm: float, random) ->
     if sensor.is_instant:
         taken = walk[np.searchsorted(walk[:, 0], time)]  # of those that are kept
         angle, torque = taken[:, 1], taken[:, 3]
-    torque = averaged(torque + noise_nm * random.standard_normal(len(torque)), sensor.together)
-    angle = angle[sensor.together - 1 :: sensor.together][: len(torque)]
+    torque += noise_nm * random.standard_normal(len(torque))
     cycle = np.floor(angle / TURN - 1e-9).astype(np.int64)
-    return signatures(cycle, angle, torque, np.diff(torque, prepend=np.nan), sensor)[2:-1]
+    # as many as are averaged, from the first of each gait cycle on
+    since = np.arange(len(cycle)) - np.searchsorted(cycle, cycle)
+    ends = np.flatnonzero(since % sensor.together == sensor.together - 1)
+    torque = torque[ends[:, None] - np.arange(sensor.together)].mean(axis=1)
+    step = np.where(since[ends] < sensor.together, np.nan, np.diff(torque, prepend=np.nan))
+    return signatures(cycle[ends], angle[ends], torque, step, sensor)[2:-1]
 
 
 def explained(

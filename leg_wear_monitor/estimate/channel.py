@@ -23,6 +23,7 @@ from leg_wear_monitor.estimate.signature import (
     simulated_signatures,
     with_noise_of,
 )
+from leg_wear_monitor.estimate.torque_model import PHASE_ERROR_RAD
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.twin.torque_reference import TorqueReference
@@ -171,6 +172,8 @@ def channel_of(
     known within tolerances, and a leg on the ground under an unknown load, whose first harmonics say nothing.
     """
     variance = np.repeat([_MEAN_SIGMA * sensor.size_nm, _ROUGHNESS_SIGMA], sensor.phases) ** 2
+    if len(reference.torque_nm) == 1:  # what clearances change is not simulated: mostly, they shift phases
+        variance += np.square(PHASE_ERROR_RAD * _slopes(measured, sensor))
     tolerances = [
         max(_SPREADS[one.cause], _SPREAD_FACTOR * one.spread) * one.column
         for one in nuisances
@@ -202,6 +205,13 @@ def channel_of(
 
     fits = [_best_channel(residual, clearances, each, time_constants_s) for each in (in_air, on_ground)]
     return min(fits, key=lambda fit: fit.misfit)
+
+
+def _slopes(measured: Floats, sensor: TorqueSensor) -> Floats:
+    """Sizes (F,) of a signature's derivatives by the crank angle; those of the torque by its roughness."""
+    rough = measured[sensor.phases :]
+    per_phase = 0.5 * np.abs(np.roll(rough, -1) - np.roll(rough, 1))
+    return np.concatenate([np.exp(rough) * sensor.samples, per_phase * sensor.phases]) / TURN
 
 
 class _Hypothesis:

@@ -158,13 +158,15 @@ def commissioned_baseline(
     expected: Floats,
     covariance: Floats,
     left_out: tuple[LeftOut, ...] = (),
+    places: Floats | float = 0.0,
 ) -> Baseline:
     """Baseline of a commissioned leg; the signature (F,) that is expected, covariance (F, F) of a cycle.
 
-    What the reference of the expected leg is off is in that difference, and cancels.
+    What the reference of the expected leg is off is in that difference, and cancels. What other places of the
+    samples change, with a covariance (F, F) of its own, does not.
     """
     mean = commissioned.mean
-    return Baseline(mean - expected, covariance / commissioned.cycles, left_out)
+    return Baseline(mean - expected, covariance / commissioned.cycles + places, left_out)
 
 
 def unknown_baseline(found: list[Nuisance], sensor: TorqueSensor, covariance: Floats) -> Baseline:
@@ -211,12 +213,12 @@ def explainer_of(
     model = signature_model(reference, sensor)
     found, joints = nuisances(mechanism, reference, sensor), mechanism.clearance_joints
     if commissioned is None:
-        baseline = unknown_baseline(found, sensor, model.own * model.covariance)
+        baseline = unknown_baseline(found, sensor, model.own * model.covariance + model.places)
     else:
         expected = model.at(commissioned.clearance_m)[0]
         left_out = parts_left_out(model.covariance, commissioned.signatures)
         covariance = with_scatter_of(model.covariance, commissioned.signatures)
         model = attrs.evolve(model, covariance=covariance)
-        baseline = commissioned_baseline(commissioned, expected, covariance, left_out)
+        baseline = commissioned_baseline(commissioned, expected, covariance, left_out, model.places)
     fresh_m = np.array([mechanism.clearances[joint].radial_clearance for joint in joints])
     return Explainer(model, joints, baseline, found, other_channels(reference, sensor), fresh_m)

@@ -16,11 +16,8 @@ from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 SAMPLES = 200  # a gait cycle: what comes faster is averaged, since clearances show at these times already
 
-# With other numbers, or fewer samples in a phase, those that come at the same angles again and again fill
-# phases unevenly: of 133 in a gait cycle, 40 phases left a mean square of 0.4, 44 of 2.0, 48 of 4.7
-# (2026-11-26)
-_PHASES = (80, 40, 20, 10)
-_LEAST_IN_PHASE = 2.5  # samples on average
+_MOST_PHASES, _LEAST_PHASES = 80, 10
+_IN_PHASE = 2.5  # samples, at least: with fewer, some phases have one only
 _FLOOR = 1.0e-4  # of the torque's size, below which roughness is rounding
 _CLIP = 8.0  # times the torque's size: a peak counts as at most this
 
@@ -111,7 +108,8 @@ class TorqueSensor:
     @property
     def phases(self) -> int:
         """Number of phases of a signature; 0 where samples are too few for one."""
-        return next((phases for phases in _PHASES if round(self.samples) >= _LEAST_IN_PHASE * phases), 0)
+        phases = min(_MOST_PHASES, int(round(self.samples) / _IN_PHASE))
+        return phases if phases >= _LEAST_PHASES else 0
 
     @property
     def samples(self) -> float:
@@ -258,6 +256,7 @@ _SEED = 20261122
 # drawing it again costs no simulation
 _DRAWS = 4
 _PART_OF_SAMPLE = 0.618  # by which samples move in each simulated gait cycle
+_PLACES = 8  # of samples within their period, that are tried
 
 
 class SimulatedSensor:
@@ -273,26 +272,35 @@ class SimulatedSensor:
     sensor : TorqueSensor
     offset_rad : float
         Added to the crank angle.
+    late : float, optional
+        From the begin of each gait cycle to its first sample, in periods of the sensor; by default another
+        one in each: samples of a real leg fall anywhere, too.
     """
 
     def __init__(
-        self, reference: TorqueReference, cycles: int, sensor: TorqueSensor, offset_rad: float = 0.0
+        self,
+        reference: TorqueReference,
+        cycles: int,
+        sensor: TorqueSensor,
+        offset_rad: float = 0.0,
+        late: float | None = None,
     ) -> None:
         self._reference, self._sensor = reference, sensor
         period = TURN / abs(reference.profile.speed)
-        # another part of a sample each gait cycle: samples of a real leg fall anywhere, too
-        between = period / (period / sensor.period_s + _PART_OF_SAMPLE)
-        place = np.arange(between, period * cycles, between) * (POINTS / period)
-        self._cycles, self._step_s = cycles, period / POINTS
+        each = np.arange(1, cycles + 1) * _PART_OF_SAMPLE % 1.0 if late is None else np.full(cycles, late)
+        # as many as are averaged, from the first of each gait cycle on; the rest at its end is dropped
+        averages = int(period / (sensor.period_s * sensor.together)) + 1
+        last = sensor.period_s * (sensor.together * np.arange(1, averages + 1) - 1)
+        ends = sensor.period_s * each[:, None] + last
+        cycle, which = np.nonzero(ends < period)
+        self._step_s, self._cycles = period / POINTS, cycles
         # places and distances of samples are counted in points of the simulated torque, from its first one
-        self._samples, self._between = len(place), between * (POINTS / period)
-        self._at = np.minimum(place.astype(np.int64), cycles * POINTS - 1)
-        # where each averaged sample ends, and from there its gait cycle and its crank angle
-        self._ends = place[sensor.together - 1 :: sensor.together]
-        cycle = np.minimum((self._ends / POINTS).astype(np.int64), cycles - 1)
+        self._between = sensor.period_s / self._step_s
+        self._ends = cycle * POINTS + ends[cycle, which] / self._step_s
         angle = np.interp(self._ends % POINTS, np.arange(POINTS + 1.0), reference.angle) + offset_rad
-        self._angle, shape = angle, (cycles, sensor.phases)
-        self._phases = PhaseMeans(cycle, angle, shape), PhaseMeans(cycle[1:], angle[1:], shape)
+        self._angle, shape, later = angle, (cycles, sensor.phases), which > 0
+        self._phases = PhaseMeans(cycle, angle, shape), PhaseMeans(cycle[later], angle[later], shape)
+        self._has_step = later
 
     def signatures(self, leg: int, scale: float = 1.0) -> Floats:
         """Signatures (cycles, F) of a leg, with the sensor's noise and a factor on the torque."""
@@ -307,7 +315,8 @@ class SimulatedSensor:
 
     def signatures_of(self, torque: Floats) -> Floats:
         """Signatures (cycles, F) of averaged samples (n,) [N m]."""
-        return signatures_by_phase(*self._phases, torque, np.diff(torque), self._sensor)
+        step = np.diff(torque, prepend=0.0)[self._has_step]
+        return signatures_by_phase(*self._phases, torque, step, self._sensor)
 
     def torque(self, leg: int) -> Floats:
         """Averaged samples (n,) of a leg [N m], without noise."""
@@ -315,11 +324,13 @@ class SimulatedSensor:
         direction = float(np.sign(self._reference.profile.speed))
         torque = self._sensor.channel.received(simulated, self._step_s, direction)
         if self._sensor.is_instant:
-            return averaged(torque[self._at], self._sensor.together)
-        at = np.minimum(self._ends.astype(np.int64), len(torque) - 1)
+            back = np.arange(self._sensor.together) * self._between
+            at = np.maximum(self._ends[:, None] - back, 0.0).astype(np.int64)
+            return np.asarray(torque[at].mean(axis=1))
         # a mean is the difference of what was received up to the ends of two samples
-        impulse = np.cumsum(torque)[at] + (self._ends - at - 1.0) * torque[at]
-        return np.asarray(np.diff(impulse, prepend=0.0) / (self._sensor.together * self._between))
+        since = self._sensor.together * self._between
+        received = _received_until(torque, np.stack([self._ends - since, self._ends]))
+        return np.asarray(np.diff(received, axis=0)[0] / since)
 
     def slope(self, leg: int, torque: Floats, step: float) -> Floats:
         """Change of the mean signature (F,) of a leg by a torque that is added to its own.
@@ -341,8 +352,14 @@ class SimulatedSensor:
 
     def noise(self, leg: int, draw: int = 0) -> Floats:
         """Noise (n,) of averaged samples of a leg, in standard deviations of a single sample."""
-        noise = np.random.default_rng([_SEED, leg, draw]).standard_normal(self._samples)
-        return averaged(noise, self._sensor.together)
+        drawn = np.random.default_rng([_SEED, leg, draw]).standard_normal(len(self._ends))
+        return np.asarray(drawn / math.sqrt(self._sensor.together))
+
+
+def _received_until(torque: Floats, place: Floats) -> Floats:
+    """Sums of a torque (n,) [N m] up to places (...), in its steps; beyond its ends, it is as there."""
+    at = np.clip(place.astype(np.int64), 0, len(torque) - 1)
+    return np.asarray(np.cumsum(torque)[at] + (place - at - 1.0) * torque[at])
 
 
 # Expected signatures over clearances, for a torque sensor, from simulated torque references.
@@ -373,6 +390,8 @@ class SignatureModel:
         Variance of the mean signature of a simulated leg, as a part of that of a gait cycle.
     scatter : (k, s) array
         Variance of each change, as a part of that of a gait cycle; 0 where they are exact.
+    places : (F, F) array
+        Covariance of what changes where samples come at other angles of the crank; 0 where nothing does.
     """
 
     sensor: TorqueSensor
@@ -382,6 +401,7 @@ class SignatureModel:
     covariance: Floats
     own: float
     scatter: Floats = attrs.field()
+    places: Floats = attrs.field()
     _log_grid: Floats = attrs.field(init=False)
     _slopes: Floats = attrs.field(init=False)
 
@@ -404,6 +424,10 @@ class SignatureModel:
     @scatter.default
     def _exact(self) -> Floats:
         return np.zeros(self.grid_m.shape)
+
+    @places.default
+    def _anywhere(self) -> Floats:
+        return np.zeros((len(self.mean), len(self.mean)))
 
     @_log_grid.default
     def _logarithms(self) -> Floats:
@@ -439,7 +463,19 @@ def signature_model(reference: TorqueReference, sensor: TorqueSensor) -> Signatu
     place = np.argsort(grid, axis=1, kind="stable")
     grid, variance = (np.take_along_axis(one, place, 1) for one in (grid, variance))
     change = np.take_along_axis(change, place[:, :, None], 1)
-    return SignatureModel(sensor, grid, means[0], change, covariance, float(own[1]), variance)
+    places = _of_places(reference, sensor)
+    return SignatureModel(sensor, grid, means[0], change, covariance, float(own[1]), variance, places)
+
+
+def _of_places(reference: TorqueReference, sensor: TorqueSensor) -> Floats:
+    """Covariance (F, F) of the mean signature of the expected leg over the places of its samples.
+
+    A drive that has the sensor's clock leaves samples at their angles until one of both is started again, and
+    another clock moves them within minutes or hours.
+    """
+    cycles, places = len(reference.torque_nm[0]), (np.arange(_PLACES) + 0.5) / _PLACES
+    legs = [SimulatedSensor(reference, cycles, sensor, late=place) for place in places]
+    return np.asarray(np.cov(np.array([leg.signatures(0).mean(axis=0) for leg in legs]).T))
 
 
 def _drawn(reference: TorqueReference, sensor: TorqueSensor) -> list[Floats]:

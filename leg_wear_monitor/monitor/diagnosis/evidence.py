@@ -227,14 +227,6 @@ def _is_of_reference(explanations: Sequence[Explanation]) -> bool:
 _UNUSABLE_CYCLES = 3  # in a row: a start has two that are unlike
 _CHANGING_CYCLES, _ALIKE_CYCLES = 5, 3  # in a ramp of 30 rpm a minute, two or three in a row are alike
 
-_ENOUGH_CYCLES, _LOCKED = 20, 0.9  # gait cycles, and the length of their mean phase: 1 if samples never drift
-
-
-LOCKED_SAMPLES = (
-    "the torque samples come at the same crank angles in each gait cycle; after a restart they may come at "
-    "others, which can look like a small change"
-)
-
 
 def missing(state: TorqueState, references: References, config: MonitorConfig) -> str:
     """Why there is no estimate."""
@@ -272,7 +264,7 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
     if not state.is_compared:
         return f"changes at this cadence are not observed yet; at {_cadences(state.set_aside)} they are"
     if models.is_of_file(state):
-        return LOCKED_SAMPLES if _are_locked(state) else ""
+        return ""
     known = "the model does not fit this leg, and the names of joints are not sure: "
     if not state.changes:
         known = "the model does not fit this leg, but nothing has changed since it was commissioned: "
@@ -360,14 +352,3 @@ def _cadences(known: Sequence[AtCadence]) -> str:
     """Cadences in the order of their speeds."""
     speeds = sorted(abs(one.reference.profile.speed) for one in known)
     return f"{', '.join(f'{60.0 * speed / TURN:.3g}' for speed in speeds)} rpm"
-
-
-def _are_locked(state: TorqueState) -> bool:
-    """Whether samples come at the same crank angles in each gait cycle.
-
-    Where several are averaged, their first one is the first of the gait cycle, so none of this matters.
-    """
-    if state.sensor is None or state.sensor.together > 1 or len(state.cycles) < _ENOUGH_CYCLES:
-        return False
-    phases = np.exp(2j * np.pi * np.array([cycle.late for cycle in state.cycles]))
-    return bool(abs(phases.mean()) > _LOCKED)

@@ -140,7 +140,7 @@ def signed_cycle(state: TorqueState, begin_ns: int, end_ns: int) -> SignedCycle 
     signature = signatures(first, torque.angle, torque.torque, torque.step, sensor)[0]
     if not np.isfinite(signature).all():
         return NotUsed.GAP
-    return SignedCycle(begin_ns, end_ns, signature, torque.profile, torque.late, torque.temperature_c)
+    return SignedCycle(begin_ns, end_ns, signature, torque.profile, torque.temperature_c)
 
 
 # by which a load has moved, of its size: the twin's mean over twenty gait cycles is within 1 % of what the

@@ -62,9 +62,8 @@ class CycleTorque(NamedTuple):
 
     ``angle`` (n,) crank angle [rad], ``torque`` (n,) [N m], ``step`` (n,) torque less that of the sample
     before [N m], NaN where that was lost; ``profile`` how the crank turned; ``period_s`` of the sensor;
-    ``late`` from the begin to the first sample, in periods of the sensor; ``jitter`` median departure of the
-    times between samples from that period, as a fraction of it; ``temperature_c`` mean temperature of the
-    drive, NaN where it is not measured.
+    ``jitter`` median departure of the times between samples from that period, as a fraction of it;
+    ``temperature_c`` mean temperature of the drive, NaN where it is not measured.
     """
 
     angle: Floats
@@ -72,7 +71,6 @@ class CycleTorque(NamedTuple):
     step: Floats
     profile: CrankProfile
     period_s: float
-    late: float
     jitter: float
     temperature_c: float
 
@@ -111,11 +109,10 @@ def cycle_torque(kept: TorqueSamples, begin_ns: int, end_ns: int, sensor: Torque
         angle = angle[: len(torque)]
     step = np.diff(torque, prepend=np.nan)
     step[gap] = np.nan
-    late = 1.0e-9 * float(torque_ns[0] - begin_ns) / sensor.period_s
     period_ns = 1.0e9 * sensor.period_s
     jitter = float(np.median(np.abs(np.diff(torque_ns) - period_ns))) / period_ns
     temperature_c = mean_of(torques["temperature_c"])
-    return CycleTorque(angle, torque, step, profile, sensor.period_s, late, jitter, temperature_c)
+    return CycleTorque(angle, torque, step, profile, sensor.period_s, jitter, temperature_c)
 
 
 # What the measured drive torque shows of the clearances, compared with those that the monitor counts.
@@ -243,15 +240,13 @@ UNUSED_CYCLES = 20  # in a row, after which a result is not one of the leg as it
 class SignedCycle(NamedTuple):
     """A gait cycle: stamps of its begin and end [ns], its signature (F,), and how the crank turned.
 
-    ``late`` is the time from its begin to its first torque sample, in periods of the sensor;
-    ``temperature_c`` that of the drive, NaN where it is not measured.
+    ``temperature_c`` is that of the drive, NaN where it is not measured.
     """
 
     begin_ns: int
     end_ns: int
     signature: Floats
     profile: CrankProfile
-    late: float
     temperature_c: float = math.nan
 
 

@@ -16,7 +16,6 @@ from leg_wear_monitor.monitor.config.inputs import Load
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis import evidence, references
 from leg_wear_monitor.monitor.diagnosis import observer as observer_module
-from leg_wear_monitor.monitor.diagnosis.evidence import LOCKED_SAMPLES
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.monitor.diagnosis.state import UNUSED_CYCLES, DiagnosisState, SignedCycle, TorqueState
@@ -229,15 +228,6 @@ def test_a_reference_of_the_ledger_comes_before_the_shipped_one_but_under_anothe
         assert (observer.state.reference is kept) == is_used
         np.testing.assert_array_equal(observer.state.reference.profile.sine, 0.0)
         assert observer.simulated_references == ()  # nothing to store
-
-
-def test_samples_at_the_same_angles_in_each_cycle_are_reported(commissioned, reference) -> None:
-    observer = commissioned()
-    walk_on(observer, reference, [0])
-    assert observer.diagnosis.reason == LOCKED_SAMPLES
-    drifting = [cycle._replace(late=0.3 * i % 1.0) for i, cycle in enumerate(observer.state.cycles)]
-    observer.state.cycles = tuple(drifting)
-    assert observer.diagnosis.reason == ""
 
 
 @pytest.mark.parametrize("joint", [pytest.param(0, marks=pytest.mark.slow), 3])

@@ -42,7 +42,7 @@ IDLE, BUSY = (
 
 def cycles(number: int, rpm: float = 60.0) -> tuple[SignedCycle, ...]:
     profile = CrankProfile.steady(TURN * rpm / 60.0)
-    return tuple(SignedCycle(i, i + 1, np.zeros(160), profile, 0.37 * i % 1.0) for i in range(number))
+    return tuple(SignedCycle(i, i + 1, np.zeros(160), profile) for i in range(number))
 
 
 def of_reference(rpm: float = 60.0) -> SimpleNamespace:

@@ -6,9 +6,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from leg_wear_monitor.estimate.signature import SimulatedSensor, TorqueSensor, signatures
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.monitor.diagnosis.state import WINDOW_CYCLES, SignedCycle, TorqueState
-from leg_wear_monitor.twin.reference import CrankProfile
+from leg_wear_monitor.twin.sample import CRANK, TORQUE, gait_samples
+from leg_wear_monitor.monitor.diagnosis.state import (
+    WINDOW_CYCLES,
+    SignedCycle,
+    TorqueSamples,
+    TorqueState,
+    cycle_torque,
+)
+from leg_wear_monitor.twin.reference import POINTS, CrankProfile, LegParameters
+from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 pytestmark = pytest.mark.plain
 STEADY = CrankProfile.steady(TURN)
@@ -19,7 +28,7 @@ def waited(kinds: list[bool]) -> TorqueState:
     """The state after gait cycles, steady ones or odd ones, of which none has a reference."""
     state = TorqueState(np.full(5, 3.0e-4))
     for i, is_odd in enumerate(kinds):
-        state.wait_with(SignedCycle(i, i + 1, np.zeros(4), ODD if is_odd else STEADY, 0.0))
+        state.wait_with(SignedCycle(i, i + 1, np.zeros(4), ODD if is_odd else STEADY))
     return state
 
 
@@ -36,3 +45,30 @@ def test_all_of_the_last_cycles_are_kept_once_and_those_that_wait_are_alike(kind
     assert [one.begin_ns for one in kept] == list(range(len(kinds)))[-WINDOW_CYCLES:]
     assert all(one.profile.is_like(state.waiting[-1].profile) for one in state.waiting)
     assert not any(one.profile.is_like(state.waiting[-1].profile) for one in state.odd)
+
+
+@pytest.mark.parametrize("rate_hz", [100.0, 200.0, 480.0, 1000.0])
+@pytest.mark.parametrize("rpm", [60.0, 61.0, 45.0])
+def test_a_gait_cycle_has_the_signature_that_a_simulated_one_would(leg, rate_hz: float, rpm: float) -> None:
+    """The same samples, averaged and sorted by phases in the same way, whatever the cadence."""
+    profile, random, cycles, late = CrankProfile.steady(TURN * rpm / 60.0), np.random.default_rng(3), 4, 0.3
+    torque = random.normal(0.0, 5.0, (cycles, POINTS)).astype(np.float16)
+    reference = TorqueReference(profile, np.full((1, 5), 3.0e-4), (torque,), LegParameters.none(leg))
+    period_s, cycle_s = 1.0 / rate_hz, 60.0 / rpm
+    sensor = TorqueSensor(period_s, cycle_s, 5.0)
+    expected = SimulatedSensor(reference, cycles, sensor, late=late).signatures(0)
+    impulse = np.concatenate([[0.0], np.cumsum(torque.astype(float).ravel())]) * cycle_s / POINTS
+    time_of = np.arange(len(impulse)) * cycle_s / POINTS
+    for cycle in range(1, cycles):
+        begin_s = cycle * cycle_s
+        time = begin_s + period_s * (late + np.arange(np.ceil(cycle_s / period_s - late)))
+        mean = (np.interp(time, time_of, impulse) - np.interp(time - period_s, time_of, impulse)) / period_s
+        stamps = np.round(1e9 * time).astype(np.int64)
+        turned = np.linspace(-0.1, TURN + 0.1, 2001)
+        crank_ns = np.round(1e9 * (begin_s + turned / profile.speed)).astype(np.int64)
+        kept = TorqueSamples(
+            gait_samples(crank_ns, CRANK, crank_angle_rad=turned), gait_samples(stamps, TORQUE, torque_nm=mean)
+        )
+        found = cycle_torque(kept, round(1e9 * begin_s), round(1e9 * (begin_s + cycle_s)), sensor)
+        own = signatures(np.zeros(len(found.angle), np.int64), found.angle, found.torque, found.step, sensor)
+        np.testing.assert_allclose(own[0], expected[cycle], atol=2e-3)

@@ -25,6 +25,7 @@ from leg_wear_monitor.messages.streams import STREAMS, ForecastTimes
 from leg_wear_monitor.monitor.alarms import ADVICE, ALREADY_COUNTED, Alarm
 from leg_wear_monitor.monitor.config.fitting import acceleration_doubts, check_limits
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.forecast.forecaster import life_doubts
 from leg_wear_monitor.monitor.ledger.entry import JointWear
 from leg_wear_monitor.monitor.operators import wear_words
 from leg_wear_monitor.monitor.reports import Reports, Status
@@ -254,7 +255,7 @@ class MonitorNode(ClosingNode):
         self._in_order.enter_context(repeated(lambda _: self._receive(inputs), _RECEIVE_S))
         joints, leg = ", ".join(self._monitor.clearance_joints), self._monitor.mechanism.name
         self.get_logger().info(f"monitoring joints {joints} of {leg}")
-        for doubt in acceleration_doubts(config):
+        for doubt in (*acceleration_doubts(config), *life_doubts(config, mechanism)):
             self.get_logger().warning(str(doubt))
 
     @property

@@ -99,7 +99,7 @@ class GrowthLaw:
     fresh_m, widest_m : (k,) arrays
         Clearances when new, and the largest of the fitted lives: a clearance outside counts as the nearest.
     sigma : (k,) array
-        Standard deviation of the error of ln growth.
+        Standard deviation of the error of ln growth, up to `widest_m`.
     lives : int
         Number of simulated lives that it was fitted to.
     """
@@ -114,6 +114,19 @@ class GrowthLaw:
         """Logarithm of growth (k, n) at clearances (k, n) over that at `fresh_m`: without a_k."""
         in_range = np.clip(clearance_m, self.fresh_m[:, None], self.widest_m[:, None])
         return np.asarray(self.coupling @ np.log(in_range / self.fresh_m[:, None]))
+
+    def sigma_to(self, limit_m: Floats, unknown: float) -> Floats:
+        """Standard deviation (k,) of the error of ln growth on the way to limits (k,).
+
+        Beyond `widest_m` growth is assumed constant, as it is everywhere without lives. That is off by
+        ``unknown`` (`forecast.model_sigma`) from new to the limit; its variance counts by the part of this
+        way, in ln clearance, that no life has gone.
+        """
+        beyond = limit_m > self.widest_m
+        way = np.log(limit_m / self.fresh_m, where=beyond, out=np.ones_like(limit_m))
+        part = np.log(limit_m / self.widest_m, where=beyond, out=np.zeros_like(limit_m)) / way
+        more = np.maximum(unknown**2 - np.square(self.sigma), 0.0)
+        return np.asarray(np.sqrt(np.square(self.sigma) + np.square(part) * more))
 
 
 def no_law(fresh_m: Floats, sigma: float) -> GrowthLaw:
@@ -497,7 +510,8 @@ def _legs(
     )
     clearance = np.maximum(known + excess + np.exp(log_factor) * (wear - before), 0.0)
     relative = np.divide(error, growth, out=np.zeros_like(error), where=growth > 0.0)
-    log_rate = log_factor + np.hypot(law.sigma[:, None], relative) * normals[2 * k : 3 * k]
+    sigma = law.sigma_to(np.array([each.limit_m for each in now]), settings.model_sigma)
+    log_rate = log_factor + np.hypot(sigma[:, None], relative) * normals[2 * k : 3 * k]
     log_rate += settings.load_sigma * normals[3 * k]
     # The twin's growth is that at its own clearances. What is believed of a factor is a mean over the part's
     # past, in which the other clearances departed from the twin's by and by: half of their doing is in it.

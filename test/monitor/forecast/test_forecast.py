@@ -57,6 +57,15 @@ def test_what_is_not_known_adds_up_in_squares():
     assert math.log(told.cycles.p90 / told.cycles.p10) == pytest.approx(2.0 * Z * both, rel=0.03)
 
 
+def test_lives_that_end_early_leave_the_rest_of_the_way_unknown():
+    """Lives to 0.31 mm say nothing of 0.6 mm: p10 to p90 are as wide as without lives."""
+    now = np.array([NOW.fresh_m])
+    told = attrs.evolve(SURE, model_sigma=0.4, wear_coefficient_sigma=0.01)
+    law = GrowthLaw(np.zeros((1, 1)), now, np.array([3.1e-4]), np.array([0.01]), lives=5)
+    found, without = (alone(settings=told, law=one).cycles for one in (law, no_law(now, 0.4)))
+    assert np.log(found.p90 / found.p10) == pytest.approx(np.log(without.p90 / without.p10), rel=0.06)
+
+
 @given(st.floats(0.1, 10.0))
 def test_all_wear_faster_by_a_factor_is_life_shorter_by_it(factor):
     fast = attrs.evolve(NOW, growth_m=factor * NOW.growth_m)

@@ -202,10 +202,6 @@ class LifeRun:
         ]
         self._setups = _setups(legs, wear_factor)
         first = self._setups[0]
-        if not first.clearance_joints:
-            raise ConfigError(
-                mechanism.source, "clearances.joints", "no joint has clearance, nothing can wear"
-            )
         self.clearance_joints, self.fresh_m = first.clearance_joints, first.contacts.clearance
         self.radius_m = first.contacts.bushing_radius
         self._steppers = [

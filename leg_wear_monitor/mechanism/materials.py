@@ -325,8 +325,10 @@ def check_wear_is_known(mechanism: Mechanism, joints: Sequence[str]) -> None:
     Raises
     ------
     ConfigError
-        If the pairs of all joints have limits only; it names the first joint.
+        If no joint has clearance, or if the pairs of all joints have limits only; it names the first joint.
     """
+    if not tuple(joints):
+        raise ConfigError(mechanism.source, "clearances.joints", "no joint has clearance, nothing can wear")
     known = [mechanism.clearances[joint] for joint in joints if joint in mechanism.clearances]
     if known and all(lacks_wear(each) and load_material(each.material).rating_life is None for each in known):
         raise ConfigError(

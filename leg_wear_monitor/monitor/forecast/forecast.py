@@ -456,8 +456,8 @@ def forecast(
         )
     )
     answer = _leg_answer(answers)
-    # a joint whose growth is not known does not end the leg by a clearance that may be at its limit either
-    ends[[each in _NOT_KNOWN for each in answers]] = np.inf
+    # a joint of no or of unknown growth does not end the leg, though its clearance may be at the limit
+    ends[[each in (*_NOT_KNOWN, Answer.NO_GROWTH) for each in answers]] = np.inf
     life, first = _life(answer, ends.min(axis=0), cycle_s, day), {}
     if life["cycles"] is not None:
         fraction = np.bincount(ends.argmin(axis=0), minlength=len(now)) / MEMBERS
@@ -518,7 +518,7 @@ def _legs(
     here, twin = law.log_growth(clearance), law.log_growth(fresh + wear)
     log_base = log_rate + 0.5 * (here - twin) - here
     duty = settings.duty_hours_per_day * np.exp(settings.duty_sigma * normals[3 * k + 1])
-    return clearance, np.maximum(growth, 0.0) * np.exp(log_base), duty
+    return clearance, np.maximum(growth, 0.0) * np.exp(log_base), np.minimum(duty, 24.0)
 
 
 def _life(answer: Answer, cycles: Floats, cycle_s: float, day: Floats) -> dict[str, Quantiles | None]:

@@ -146,9 +146,19 @@ def test_a_joint_without_a_growth_rate_does_not_end_the_leg_by_what_its_clearanc
     assert told.leg.first_probability == {"A": 1.0, "B": 0.0}
 
 
-def test_a_joint_that_does_not_grow_never_ends_the_leg():
-    told = whole([NOW, attrs.evolve(B, growth_m=0.0)])
+@pytest.mark.parametrize("wear_m", [0.0, 2.98e-4])
+def test_a_joint_that_does_not_grow_never_ends_the_leg(wear_m):
+    """Nor by a clearance that may be at its limit."""
+    told = whole([NOW, attrs.evolve(B, growth_m=0.0, wear_m=wear_m)])
     assert (told.leg.answer, told.leg.cycles) == (Answer.KNOWN, told.joints[0].cycles)
+    assert told.leg.first_probability == {"A": 1.0, "B": 0.0}
+
+
+def test_a_day_has_24_hours():
+    walking = attrs.evolve(SURE, duty_hours_per_day=24.0, duty_sigma=1.0)
+    told = alone(settings=walking)
+    assert told.days.p10 >= told.hours.p10 / 24.0
+    assert told.days.p50 > told.hours.p50 / 24.0
 
 
 @given(st.floats(-1.0, 1.0))

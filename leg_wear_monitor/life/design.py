@@ -280,11 +280,6 @@ class Design:
         return tuple(sorted(self.own, key=lambda one: (one.limited_by == "unknown", one.sure_h)))
 
     @property
-    def is_loaded(self) -> bool:
-        """Whether the ground pushes in a part of the duty; without, there is no load to change."""
-        return any(part.load_n for part in self.duty)
-
-    @property
     def asked(self) -> str:
         """The duty, and how long each joint should last."""
         duty = ", ".join(

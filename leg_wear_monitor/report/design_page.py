@@ -134,8 +134,9 @@ def _chart(hours: float, known: Sequence[Candidate]) -> bytes:
 
 
 def _sensitivities(result: Design) -> Table:
+    in_the_air = "" if any(part.load_n for part in result.duty) else "in the air"
     rows = [
-        (one.joint, f"{one.load:+.0f} %" if result.is_loaded else "in the air",
+        (one.joint, in_the_air or f"{one.load:+.0f} %",
          *(f"{each:+.0f} %" for each in (one.cadence, one.clearance, one.width)))
         for one in result.sensitivities
     ]  # fmt: skip

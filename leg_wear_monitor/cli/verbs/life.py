@@ -316,7 +316,7 @@ def design_lines(result: "Design", choices: "BushingChoices") -> list[str]:
             told.append(
                 f"  none of {len(choices.materials)} pairs in the sizes tried lasts {result.hours:g} h"
             )
-    in_the_air = "" if result.is_loaded else "in the air"
+    in_the_air = "" if any(part.load_n for part in result.duty) else "in the air"
     told += [
         f"life of {one.joint} now: {in_the_air or f'10 % more load {one.load:+.0f} %'}, "
         f"10 % more cadence {one.cadence:+.0f} %, half the clearance when new {one.clearance:+.0f} %, "

@@ -122,11 +122,9 @@ class GrowthLaw:
         ``unknown`` (`forecast.model_sigma`) from new to the limit; its variance counts by the part of this
         way, in ln clearance, that no life has gone.
         """
-        beyond = limit_m > self.widest_m
-        way = np.log(limit_m / self.fresh_m, where=beyond, out=np.ones_like(limit_m))
-        part = np.log(limit_m / self.widest_m, where=beyond, out=np.zeros_like(limit_m)) / way
-        more = np.maximum(unknown**2 - np.square(self.sigma), 0.0)
-        return np.asarray(np.sqrt(np.square(self.sigma) + np.square(part) * more))
+        way = np.log(limit_m / self.fresh_m, where=limit_m > self.widest_m, out=np.ones_like(limit_m))
+        part = np.log(limit_m / np.minimum(self.widest_m, limit_m)) / way
+        return np.asarray(np.hypot(self.sigma, part * np.sqrt(np.maximum(unknown**2 - self.sigma**2, 0.0))))
 
 
 def no_law(fresh_m: Floats, sigma: float) -> GrowthLaw:
@@ -463,13 +461,9 @@ def forecast(
         fraction = np.bincount(ends.argmin(axis=0), minlength=len(now)) / MEMBERS
         first = {each.joint: float(p) for each, p in zip(now, fraction, strict=True)}
     leg = LegForecast(
-        answer=answer,
-        cycles=life["cycles"],
-        hours=life["hours"],
-        days=life["days"],
-        first_probability=first,
-        simulated_lives=law.lives,
-    )
+        answer=answer, cycles=life["cycles"], hours=life["hours"], days=life["days"],
+        first_probability=first, simulated_lives=law.lives,
+    )  # fmt: skip
     return Forecast(joints=joints, leg=leg)
 
 
@@ -500,9 +494,9 @@ def _legs(
             )
         ]
     )
-    fresh, wear, growth, error = (
+    fresh, wear, growth, error, limit = (
         np.array([[getattr(each, name) or 0.0] for each in now])
-        for name in ("fresh_m", "wear_m", "growth_m", "growth_error_m")
+        for name in ("fresh_m", "wear_m", "growth_m", "growth_error_m", "limit_m")
     )
     known, before = (
         np.array([[getattr(each.known, name)] for each in coefficient_estimates])
@@ -510,8 +504,8 @@ def _legs(
     )
     clearance = np.maximum(known + excess + np.exp(log_factor) * (wear - before), 0.0)
     relative = np.divide(error, growth, out=np.zeros_like(error), where=growth > 0.0)
-    sigma = law.sigma_to(np.array([each.limit_m for each in now]), settings.model_sigma)
-    log_rate = log_factor + np.hypot(sigma[:, None], relative) * normals[2 * k : 3 * k]
+    sigma = law.sigma_to(limit[:, 0], settings.model_sigma)[:, None]
+    log_rate = log_factor + np.hypot(sigma, relative) * normals[2 * k : 3 * k]
     log_rate += settings.load_sigma * normals[3 * k]
     # The twin's growth is that at its own clearances. What is believed of a factor is a mean over the part's
     # past, in which the other clearances departed from the twin's by and by: half of their doing is in it.

@@ -196,12 +196,22 @@ def out_option(text: str) -> Option:
 
 
 def with_clearance_joints(leg: "Mechanism", names: str | None) -> "Mechanism":
-    """The leg with these clearance joints, of comma-separated names; as it is without names."""
+    """The leg with the clearance joints of ``--clearances``, comma-separated names; as it is without names.
+
+    Raises
+    ------
+    ConfigError
+        If a name is unknown or occurs twice.
+    """
+    if names is None:
+        return leg
     import attrs
 
-    return (
-        attrs.evolve(leg, clearance_joints=tuple(name.strip() for name in names.split(","))) if names else leg
-    )
+    from leg_wear_monitor.dynamics.simulation import given_joints
+
+    with options_named():
+        joints = given_joints([name.strip() for name in names.split(",")], leg)
+    return attrs.evolve(leg, clearance_joints=joints)
 
 
 # A node as a verb: its arguments are those of ROS, and without ROS there is one line.

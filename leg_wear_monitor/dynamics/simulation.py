@@ -268,8 +268,9 @@ def simulate(
     normal_law : str, optional
         Normal contact law of all clearance joints.
     trace : int
-        Stored samples per cycle, the first at crank angle 0; 0 for none. They do not change the run. Each
-        is integrated to its own instant: from some hundred per cycle on, they take longer than the run.
+        Stored samples per cycle; 0 for none. The first is where counting begins: at crank angle 0 after whole
+        ``skip_cycles``, and of the ideal leg. They do not change the run. Each is integrated to its own
+        instant: from some hundred per cycle on, they take longer than the run.
     intervals : int, optional
         Resolution of model ``clearance``: intervals of time per gait cycle, `LEAST_INTERVALS` or more;
         default: 2048. Inside them, steps adapt to a local error. 1024 take a tenth less time, and change mean

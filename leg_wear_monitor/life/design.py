@@ -97,17 +97,26 @@ class Candidate:
         return f"{self.material or 'no pair named'}, {mm}, clearance {1e6 * self.clearance_m:g} µm"
 
     @property
+    def excess(self) -> str:
+        """What is beyond a limit of the maker, so that no life holds; empty within the limits."""
+        if self.limited_by in ("wear", "rating life", "unknown"):
+            return ""
+        impact = f"impacts of {1e-6 * self.peak_pressure_pa:.3g} MPa above the limit at rest"
+        return self.load.outside_limits or impact
+
+    @property
     def life_words(self) -> str:
         """Its life, and what ends it."""
+        if self.excess:
+            return f"not valid, {self.excess}"
         if self.limited_by == "wear" and self.wear_h:
             p10, p50, p90 = self.wear_h
+            if math.isinf(p50):
+                return "does not wear: its wear coefficient is 0"
             return f"{_hours(p50)} h by wear ({_hours(p10)} to {_hours(p90)})"
         if self.limited_by == "rating life":
             return f"{_hours(self.rating_h or 0.0)} h by its maker's formula"
-        if self.limited_by == "unknown":
-            return "life not known: the pair gives no wear coefficient and no formula"
-        impact = f"impacts of {1e-6 * self.peak_pressure_pa:.3g} MPa above the limit at rest"
-        return f"not valid, {self.load.outside_limits or impact}"
+        return "life not known: the pair gives no wear coefficient and no formula"
 
     def row(self) -> dict[str, Any]:
         """Plain values of a table's row."""
@@ -267,8 +276,8 @@ class Design:
 
     @property
     def order(self) -> tuple[Candidate, ...]:
-        """The joints with their present bushings, the one that ends first at the head; unknown ones last."""
-        return tuple(sorted(self.own, key=lambda one: one.sure_h if one.sure_h else math.inf))
+        """The joints with their present bushings: those beyond a limit, by their lives, unknown ones last."""
+        return tuple(sorted(self.own, key=lambda one: (one.limited_by == "unknown", one.sure_h)))
 
     @property
     def asked(self) -> str:
@@ -286,12 +295,16 @@ class Design:
     @property
     def first(self) -> str:
         """Which joint to make better first."""
-        head, *others = self.order
-        if not head.sure_h:
+        known = [one for one in self.order if one.limited_by != "unknown"]
+        if not known:
             return "no joint's life is known with its present bushing"
-        more = next((one for one in others if one.sure_h), None)
-        then = f"; then {more.joint}, {_hours(more.sure_h)} h" if more else ""
-        return f"make {head.joint} better first: nine of ten last {_hours(head.sure_h)} h{then}"
+        head, *more = known
+        if math.isinf(head.sure_h):
+            return "no joint whose life is known wears with its present bushing"
+        more = [one for one in more if math.isfinite(one.sure_h)]
+        then = f"; then {more[0].joint}, {more[0].excess or f'{_hours(more[0].sure_h)} h'}" if more else ""
+        why = head.excess or f"nine of ten last {_hours(head.sure_h)} h"
+        return f"make {head.joint} better first: {why}{then}"
 
     def to_dict(self) -> dict[str, Any]:
         """Plain object for JSON."""
@@ -409,6 +422,10 @@ def design(
     largest = max(*choices.clearances_m, *(one.radial_clearance for one in own))
     if not largest < limit_m:
         fault = f"{limit_m:g} m is not above the largest clearance when new, {largest:g} m"
+        raise ConfigError("limit-m", "", fault)
+    radius = min(*(0.5 * one for one in choices.diameters_m), *(one.bushing_radius for one in own))
+    if not limit_m < radius:
+        fault = f"{limit_m:g} m is not below the smallest radius of a bushing, {radius:g} m"
         raise ConfigError("limit-m", "", fault)
     # evenly spaced ratios: forces change most at small clearances
     grid = np.geomspace(smallest, limit_m, _GRID)

@@ -11,6 +11,7 @@ If all wear coefficients are larger by one factor, the life is the same but shor
 depends on coefficient times cycles only. See `monitor.forecast` for different coefficients.
 """
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
 from typing import Any, NamedTuple
@@ -47,7 +48,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials import check_wear_is_known
 from leg_wear_monitor.mechanism.plausible import limit_fault, suspects
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
 
 # Checks that a life by cycle jumps ends.
 
@@ -195,16 +196,12 @@ class LifeRun:
             speed_rpm=speed_rpm,
             wear=True,
         )
-        loaded = duty.mechanisms(mechanism) if duty else [mechanism]
+        loaded = duty.mechanisms(_turned(mechanism, speed_rpm)) if duty else [mechanism]
         legs = [
             leg for one in loaded for leg in _spread_out(attrs.evolve(alike, mechanism=one), self.settings)
         ]
         self._setups = _setups(legs, wear_factor)
         first = self._setups[0]
-        if not first.clearance_joints:
-            raise ConfigError(
-                mechanism.source, "clearances.joints", "no joint has clearance, nothing can wear"
-            )
         self.clearance_joints, self.fresh_m = first.clearance_joints, first.contacts.clearance
         self.radius_m = first.contacts.bushing_radius
         self._steppers = [
@@ -365,6 +362,14 @@ def simulate_life(
         if progress:
             progress(float(min(1.0, max(fractions.max(), run.points[-1].cycles / horizon_cycles))))
     return run.life
+
+
+def _turned(mechanism: Mechanism, speed_rpm: float | None) -> Mechanism:
+    """The mechanism whose drive turns in the direction of a speed: that of a stance."""
+    drive = mechanism.drive
+    if speed_rpm is None or not isinstance(drive, SpeedDrive):
+        return mechanism
+    return attrs.evolve(mechanism, drive=attrs.evolve(drive, speed=math.copysign(drive.speed, speed_rpm)))
 
 
 def _spread_out(leg: Leg, settings: LifeSettings) -> list[Leg]:

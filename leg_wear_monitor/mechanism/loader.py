@@ -191,7 +191,10 @@ def _settings(defaults: dict[str, Any], own: Any, source: str, name: str) -> Cle
     merged: dict[str, Any] = {}
     # a pair named in the defaults, then their values; a pair of the joint's own, then its values
     for given, where in ((defaults, "clearances.defaults"), (own, place)):
-        merged = _over(_over(merged, _of_pair(given, source, where)), given)
+        of_pair = _of_pair(given, source, where)
+        if given is own or "material" not in own:  # nothing of another pair than its own
+            merged = _over(merged, of_pair)
+        merged = _over(merged, given)
     try:
         settings: Clearance = structure(merged, Clearance, source, "")
     except ConfigError as error:

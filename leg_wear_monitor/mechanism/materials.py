@@ -325,8 +325,10 @@ def check_wear_is_known(mechanism: Mechanism, joints: Sequence[str]) -> None:
     Raises
     ------
     ConfigError
-        If the pairs of all joints have limits only; it names the first joint.
+        If no joint has clearance, or if the pairs of all joints have limits only; it names the first joint.
     """
+    if not tuple(joints):
+        raise ConfigError(mechanism.source, "clearances.joints", "no joint has clearance, nothing can wear")
     known = [mechanism.clearances[joint] for joint in joints if joint in mechanism.clearances]
     if known and all(lacks_wear(each) and load_material(each.material).rating_life is None for each in known):
         raise ConfigError(
@@ -337,12 +339,13 @@ def check_wear_is_known(mechanism: Mechanism, joints: Sequence[str]) -> None:
         )
 
 
-def regimes(mechanism: Mechanism, joints: Sequence[str]) -> dict[str, list[str]]:
-    """The joints by what their wear holds for: a pair and its regime, or a bare coefficient."""
+def regimes(mechanism: Mechanism, joints: Sequence[str], wear_factor: float = 1.0) -> dict[str, list[str]]:
+    """The joints by what their wear holds for: pair and regime, or a bare coefficient, times a factor."""
+    times = "" if wear_factor == 1.0 else f", times {wear_factor:g}"
     found: dict[str, list[str]] = {}
     for joint in joints:
         settings = mechanism.clearances[joint]
-        wear = " and ".join(f"{k:.3g}" for k in dict.fromkeys(settings.wear_coefficient)) + " 1/Pa"
+        wear = " and ".join(f"{k:.3g}" for k in dict.fromkeys(settings.wear_coefficient)) + f" 1/Pa{times}"
         wear = "not known: not counted" if lacks_wear(settings) else wear
         found.setdefault(f"{regime_of(settings)}, wear coefficient {wear}", []).append(joint)
     return found

@@ -64,7 +64,12 @@ def _own(result: Design) -> Table:
         for one in result.order
     ]
     head = ("joint", "bushing", "life", f"lasts {result.hours:g} h")
-    return Table(caption="Present bushings, the first to end first.", head=head, rows=rows, is_text=True)
+    return Table(
+        caption="Present bushings: those beyond a limit, then the first to end first.",
+        head=head,
+        rows=rows,
+        is_text=True,
+    )
 
 
 def _joint(mechanism: Mechanism, result: Design, joint: str) -> Section:
@@ -129,10 +134,12 @@ def _chart(hours: float, known: Sequence[Candidate]) -> bytes:
 
 
 def _sensitivities(result: Design) -> Table:
+    in_the_air = "" if any(part.load_n for part in result.duty) else "in the air"
     rows = [
-        (one.joint, *(f"{each:+.0f} %" for each in (one.load, one.cadence, one.clearance, one.width)))
+        (one.joint, in_the_air or f"{one.load:+.0f} %",
+         *(f"{each:+.0f} %" for each in (one.cadence, one.clearance, one.width)))
         for one in result.sensitivities
-    ]
+    ]  # fmt: skip
     head = ("joint", "10 % more load", "10 % more cadence", "half the clearance when new", "10 % wider")
     return Table(caption="Change of the life by wear with the present bushing.", head=head, rows=rows)
 

@@ -25,6 +25,7 @@ from leg_wear_monitor.messages.streams import STREAMS, ForecastTimes
 from leg_wear_monitor.monitor.alarms import ADVICE, ALREADY_COUNTED, Alarm
 from leg_wear_monitor.monitor.config.fitting import acceleration_doubts, check_limits
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.forecast.forecaster import life_doubts
 from leg_wear_monitor.monitor.ledger.entry import JointWear
 from leg_wear_monitor.monitor.operators import wear_words
 from leg_wear_monitor.monitor.reports import Reports, Status
@@ -261,7 +262,7 @@ class MonitorNode(ClosingNode):
         joints, leg = ", ".join(self._monitor.clearance_joints), self._monitor.mechanism.name
         rpm = f"{config.cadence.commanded_rpm:g} rpm"
         self.get_logger().info(f"monitoring joints {joints} of {leg} at {rpm}, hardware {config.hardware}")
-        for doubt in acceleration_doubts(config):
+        for doubt in (*acceleration_doubts(config), *life_doubts(config, mechanism)):
             self.get_logger().warning(str(doubt))
 
     @property

@@ -258,7 +258,7 @@ class Lubrication(OnePlace):
 
     def points(self) -> list[Point]:
         """The dry joints, then each viscosity."""
-        points = [self.response("dry")]
+        points = [self.response("dry", film=None)]
         for viscosity in self.viscosities_pa_s:
             film = {"viscosity_pa_s": viscosity, "roughness_m": self.roughness_m}
             points.append(self.response(f"{viscosity:g} Pa s", film=film))

@@ -158,7 +158,7 @@ def _follow(leg: life_tasks.ObservedLeg, settings: dict[str, Any]) -> dict[str, 
     cycles: list[dict[str, Floats]] = []
     for cycle in range(settings["cycles"]):
         if cycle < settings["traced_cycles"]:
-            cycles.append(_curves(list(leg.moments(statistics)), shift))
+            cycles.append(_curves(list(leg.moments(statistics)), shift, setup.speed > 0.0))
         else:
             leg.advance(life_tasks.SAMPLES, statistics)
         largest.append(statistics.response.copy())
@@ -191,8 +191,8 @@ def _impact_speed(statistics: RunStatistics, clearance_joints: list[int]) -> Flo
     return np.array([row[row[:, BEGIN] >= 0.0, SPEED].mean() if len(row) else 0.0 for row in rows])
 
 
-def _curves(moments: list[Moment], shift: int) -> dict[str, Floats]:
-    """Curves (s, ...) of one cycle from crank angle 0 on; the states begin at the sample ``shift``."""
+def _curves(moments: list[Moment], shift: int, turns_forwards: bool) -> dict[str, Floats]:
+    """Curves (s, ...) of one cycle by the crank angle from 0 on; the states begin at the sample ``shift``."""
     deviation = np.array([moment.deviation for moment in moments])
     curves = {
         "toe_position_m": deviation[:, 0],
@@ -203,6 +203,8 @@ def _curves(moments: list[Moment], shift: int) -> dict[str, Floats]:
         "eccentricity_rate_mps": np.array([moment.rate for moment in moments]),
         "contact_force_n": np.array([moment.force for moment in moments]),
     }
+    if not turns_forwards:  # angles descend
+        curves, shift = {name: curve[::-1] for name, curve in curves.items()}, shift + 1
     return {name: np.roll(curve, shift, axis=0) for name, curve in curves.items()}
 
 

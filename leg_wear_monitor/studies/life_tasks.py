@@ -1,5 +1,6 @@
 """Tasks over many cycles: ensembles, lives, exponents of Lyapunov, sections of Poincaré."""
 
+import math
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
@@ -85,8 +86,10 @@ class ObservedLeg:
 # Ensembles: legs with equal parameters that differ in the initial positions of crank and journals.
 
 
-def with_contact(mechanism: Mechanism, friction: dict[str, Any], film: dict[str, float]) -> Mechanism:
-    """The mechanism with changed fields of the friction, and with a film, in all its joints.
+def with_contact(mechanism: Mechanism, settings: dict[str, Any]) -> Mechanism:
+    """The mechanism with what a setting ``friction`` changes, and with its ``film`` or without.
+
+    A film of None removes it; without the setting, each joint keeps its own.
 
     Raises
     ------
@@ -96,8 +99,10 @@ def with_contact(mechanism: Mechanism, friction: dict[str, Any], film: dict[str,
     clearances = {}
     for name, own in mechanism.clearances.items():
         try:
-            changed = attrs.evolve(own, friction=attrs.evolve(own.friction, **friction))
-            clearances[name] = attrs.evolve(changed, film=Film(**film)) if film else changed
+            changed = attrs.evolve(own, friction=attrs.evolve(own.friction, **settings.get("friction", {})))
+            if "film" in settings:
+                changed = attrs.evolve(changed, film=settings["film"] and Film(**settings["film"]))
+            clearances[name] = changed
         except FieldError as error:
             where = f"clearances.joints.{name}.{error.key}"
             raise ConfigError(mechanism.source, where, error.fault) from error
@@ -105,8 +110,16 @@ def with_contact(mechanism: Mechanism, friction: dict[str, Any], film: dict[str,
 
 
 def loaded(mechanism: Mechanism, settings: dict[str, Any]) -> Mechanism:
-    """The mechanism under the force of the ground, its vertical peak ``ground_n`` [N] if that is given."""
-    return on_the_ground(mechanism, settings["ground_n"]) if settings.get("ground_n") else mechanism
+    """The mechanism under the force of the ground, its vertical peak ``ground_n`` [N] if that is given.
+
+    0 N takes the place of a load of the ground that the mechanism has, too.
+    """
+    return on_the_ground(mechanism, settings["ground_n"]) if "ground_n" in settings else mechanism
+
+
+def speed_rpm_of(mechanism: Mechanism, settings: dict[str, Any]) -> float:
+    """Crank speed ``speed_rpm`` in the direction of the mechanism's own drive, negative for clockwise."""
+    return math.copysign(settings["speed_rpm"], getattr(mechanism.drive, "speed", 1.0))
 
 
 def start_angles(runs: int, seed: int) -> list[float]:
@@ -124,17 +137,15 @@ def ensemble(mechanism: Mechanism, settings: dict[str, Any]) -> list[Leg]:
     mechanism : Mechanism
     settings : dict
         ``clearance_joints``, ``clearance_m`` [m], ``speed_rpm``, ``runs``, ``seed``, ``perturb_fraction`` (of
-        the smallest clearance); optional ``normal_law``, ``friction``, ``film`` and ``ground_n`` [N].
+        the smallest clearance); optional ``normal_law``, ``friction``, ``film`` (None for dry) and
+        ``ground_n`` [N].
 
     Returns
     -------
     list of Leg
         One for each run.
     """
-    friction, film = settings.get("friction", {}), settings.get("film", {})
-    if friction or film:
-        mechanism = with_contact(mechanism, friction, film)
-    mechanism = loaded(mechanism, settings)
+    mechanism = loaded(with_contact(mechanism, settings), settings)
     clearance_joints, clearance_m = settings["clearance_joints"], settings["clearance_m"]
     smallest = min(c.radial_clearance for c in clearance_settings(mechanism, clearance_joints, clearance_m))
     return [
@@ -142,7 +153,7 @@ def ensemble(mechanism: Mechanism, settings: dict[str, Any]) -> list[Leg]:
             mechanism=mechanism,
             clearances=clearance_joints,
             clearance_m=clearance_m,
-            speed_rpm=settings["speed_rpm"],
+            speed_rpm=speed_rpm_of(mechanism, settings),
             normal_law=settings.get("normal_law"),
             crank_angle_rad=angle,
             perturb_m=settings["perturb_fraction"] * smallest,
@@ -228,7 +239,7 @@ def _life(mechanism: Mechanism, settings: dict[str, Any], member: int) -> dict[s
         ),
         clearances=settings["clearance_joints"],
         clearance_m=settings["clearance_m"],
-        speed_rpm=settings["speed_rpm"],
+        speed_rpm=speed_rpm_of(mechanism, settings),
     )
     life = simulate_life(run, limit_m=run.fresh_m + settings["opens_m"], horizon_cycles=np.inf)
     opened = (life.clearance_m - run.fresh_m).max(axis=1)

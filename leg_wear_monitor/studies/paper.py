@@ -42,21 +42,35 @@ class Effect:
         return float(np.copysign(np.inf, self.value)) if self.value else 0.0
 
 
+_OF_WEAR = (DEPTH, "zone_deg", "zone_centre_deg")
+
+
 def of_runs(leg: Arrays, name: str, where: Names, joint: str = "") -> Floats:
-    """A statistic (r,) of a leg in every run with clearance there; of a joint, if it has one."""
+    """A statistic (r,) of a leg in every run with clearance there; of a joint, if it has one.
+
+    NaN of wear that is not counted, as without a wear coefficient.
+    """
     values = leg[f"set{SETS.index(where)}_{name}"]
-    return np.asarray(values[:, where.index(joint)] if joint else values, dtype=float)
+    found = np.asarray(values[:, where.index(joint)] if joint else values, dtype=float)
+    if name in _OF_WEAR and not leg[f"set{SETS.index(where)}_{DEPTH}"][:, where.index(joint)].any():
+        return np.full_like(found, np.nan)
+    return found
 
 
 def log_ratio(x: Floats, y: Floats, paired: bool) -> Effect:
     """Logarithm of mean x over mean y, (r,) each; ``paired`` if they are of the same runs."""
-    mean_x, mean_y = max(x.mean(), _TINY), max(y.mean(), _TINY)
-    return Effect(float(np.log(mean_x / mean_y)), _error(x / mean_x, y / mean_y, paired))
+    mean_x, mean_y = np.maximum(x.mean(), _TINY), np.maximum(y.mean(), _TINY)
+    return _effect(float(np.log(mean_x / mean_y)), _error(x / mean_x, y / mean_y, paired))
 
 
 def difference(x: Floats, y: Floats, paired: bool) -> Effect:
     """Mean x minus mean y."""
-    return Effect(float(x.mean() - y.mean()), _error(x, y, paired))
+    return _effect(float(x.mean() - y.mean()), _error(x, y, paired))
+
+
+def _effect(value: float, error: float) -> Effect:
+    """An effect; 0, which decides nothing, where the value is not known."""
+    return Effect(value, error) if np.isfinite(value) else Effect(0.0, 0.0)
 
 
 def _error(x: Floats, y: Floats, paired: bool) -> float:

@@ -74,14 +74,19 @@ def clearances_field() -> Any:
     )
 
 
+_DIRECTION = "in the direction of the mechanism's drive"
+
+
 def speed_field() -> Any:
     """The crank's speed."""
-    return quantity("rpm", "speed of the crank", at_least=0.1, at_most=10_000.0, default=60.0)
+    what = f"speed of the crank, {_DIRECTION}"
+    return quantity("rpm", what, at_least=0.1, at_most=10_000.0, default=60.0)
 
 
 def speeds_field() -> Any:
     """Speeds, one per point."""
-    return quantity("rpm", "speeds of the crank", at_least=0.1, at_most=10_000.0, check=check_rising)
+    what = f"speeds of the crank, {_DIRECTION}"
+    return quantity("rpm", what, at_least=0.1, at_most=10_000.0, check=check_rising)
 
 
 def clearance_joints_field() -> Any:

@@ -20,6 +20,7 @@ def test_each_joint_is_told_as_it_is_and_with_the_smallest_that_lasts(result, tm
     smallest = "smallest that lasts: pai-on-steel-dry, pin 10 mm, width 5 mm, clearance "
     assert result.stdout.count(smallest) == 2
     assert "make " in result.stdout.splitlines()[-4]
+    assert "life of B now: in the air, 10 % more cadence -" in result.stdout
     document = json.loads((tmp_path / "out" / "design.json").read_text())
     assert {one["joint"] for one in document["own"]} == {"B", "C"}
     with (tmp_path / "out" / "design.csv").open() as file:

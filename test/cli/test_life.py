@@ -77,6 +77,11 @@ def test_life_tells_regime_limits_and_the_makers_own_life(run, refused, shipped,
     assert told in result.stdout  # the formula knows nothing of a coefficient
 
 
+def test_a_factor_on_the_wear_is_told_beside_the_coefficient(run):
+    result = run(*ONE, "--limit-m", "5.2e-4", "--wear-factor", "100")
+    assert "wear coefficient 1e-15 1/Pa, times 100\n" in result.stdout
+
+
 def test_life_under_a_duty_tells_hours_days_and_growth_by_load(run):
     few = ("--clearances", "A,G", "--legs", "1", "--cycles", "2", "--limit-m", "3.1e-4")
     result = run("life", *few, "--duty", "0:2,600:6", "--json", "life.json")

@@ -36,3 +36,10 @@ def test_a_parameter_file_in_order_is_told_in_one_line(run, tmp_path):
     assert line.startswith("mine.yaml")
     for part in ("bionic_leg, clearance joints G", "-30 rpm", "leg-7"):
         assert part in line
+
+
+def test_lives_that_end_before_the_limit_are_told_by_check_and_at_the_start_of_a_replay(run, tmp_path):
+    (tmp_path / "mine.yaml").write_text(BEGIN + "limits: {clearance_m: 0.0008}")
+    for line in (("check", "mine.yaml"), ("replay", "none.mcap", "--config", "mine.yaml")):
+        told = run(*line).stderr.splitlines()[0]
+        assert told.startswith("warning: mine.yaml: forecast.life: the lives of this leg that come with")

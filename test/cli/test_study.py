@@ -56,6 +56,18 @@ def test_another_leg_is_an_option(run, tmp_path, unpainted):
     assert json.loads((tmp_path / "out" / "study.json").read_text())["settings"]["mechanism"] == "jansen_leg"
 
 
+def test_a_pair_without_wear_coefficient_is_told(run, shipped, tmp_path, unpainted, complaints):
+    limits_only = shipped("four_bar").replace("wear_coefficient: 1.0e-15", "material: du-on-steel-dry")
+    (tmp_path / "limits.yaml").write_text(limits_only)
+    (tmp_path / "tiny.yaml").write_text(TINY.replace("[G]", "[B]").replace("0.0001, ", ""))
+    result = run("study", "size", "--config", "tiny.yaml", "--mechanism", "limits.yaml", "--out", "out")
+    (line,) = complaints(result)
+    assert result.exit_code == 0
+    assert line.startswith("warning: limits.yaml: clearances (A, B, C, D): material: du-on-steel-dry gives ")
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "Wear of B is not counted: the pair gives no wear coefficient." in page
+
+
 def test_points_that_are_missing_are_told_and_the_rest_is_shown(run, done, tmp_path):
     first = json.loads((tmp_path / "out" / "study.json").read_text())["points"][0]["key"]
     (tmp_path / "out" / "points" / f"{first}.npz").unlink()

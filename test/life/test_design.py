@@ -90,6 +90,38 @@ def test_what_ends_a_life_is_told(material, width, limited_by):
 
 
 @pytest.mark.plain
+def test_a_joint_beyond_a_limit_comes_first_and_one_that_is_not_known_last():
+    """Nobody knows how soon a pin beyond its maker's limit ends; one that does not wear never does."""
+
+    def told(*present):
+        made = lw.Design(
+            mechanism="", duty=read_duty("0:8"), hours=1.0, limit_m=6e-4, loads=STEADY, own=present,
+            pairs=(), candidates=(), sensitivities=(),
+        )  # fmt: skip
+        return [one.joint for one in made.order], made.first
+
+    def joint(name, material="", width=0.02, **changes):
+        pair = next(tried(material, width).bushings(LEG.clearances["A"])) if material else LEG.clearances["A"]
+        return attrs.evolve(candidate(LEG, STEADY, 0, attrs.evolve(pair, **changes), 6e-4), joint=name)
+
+    unknown, sound, beyond = (
+        joint("U", "brass-on-steel-dry"),
+        joint("S"),
+        joint("X", "iglidur-j-on-steel", 3e-4),
+    )
+    still = joint("N", material="", wear_coefficient=(0.0, 0.0))
+    order, first = told(unknown, sound, still, beyond)
+    assert order == ["X", "S", "N", "U"]
+    hours = f"{float(f'{sound.sure_h:.3g}'):.0f}"
+    assert first.startswith("make X better first: outside the limits of iglidur-j-on-steel: p ")
+    assert first.endswith(f"; then S, {hours} h")
+    assert told(unknown, sound)[1] == f"make S better first: nine of ten last {hours} h"
+    assert told(unknown)[1] == "no joint's life is known with its present bushing"
+    assert told(still, unknown)[1] == "no joint whose life is known wears with its present bushing"
+    assert still.life_words == "does not wear: its wear coefficient is 0"
+
+
+@pytest.mark.plain
 def test_another_pair_does_not_inherit_a_wear_coefficient():
     beside = attrs.evolve(LEG.clearances["A"], wear_coefficient=(1e-12, 1e-12))
     (one,) = tried("pai-on-steel-dry").bushings(beside)
@@ -153,3 +185,13 @@ def test_a_limit_below_the_clearance_when_new_is_refused():
         lw.ConfigError, match=r"limit-m: 0\.0006 m is not above the largest clearance when new"
     ):
         lw.design(LEG, read_duty("0:8"), tried("pai-on-steel-dry", fresh_m=1e-3))
+
+
+@pytest.mark.plain
+def test_a_limit_beyond_the_smallest_bushing_is_refused():
+    """The clearance would be wider than the bushing, whose radius is that of the pin here."""
+    thin = attrs.evolve(tried("pai-on-steel-dry"), diameters_m=(0.008, 0.02))
+    with pytest.raises(
+        lw.ConfigError, match=r"limit-m: 0\.005 m is not below the smallest radius of a bushing, 0\.004 m"
+    ):
+        lw.design(LEG, read_duty("0:8"), thin, limit_m=5e-3)

@@ -1,5 +1,6 @@
 """A life under a duty: each load has its share of the gait cycles, at the same surfaces."""
 
+import attrs
 import numpy as np
 import pytest
 
@@ -31,6 +32,16 @@ def test_a_duty_of_one_load_is_the_life_under_it(leg, peak_n):
     for name in ARRAYS:
         np.testing.assert_array_equal(getattr(found, name), getattr(alone, name), err_msg=name)
     np.testing.assert_array_equal(found.part_growth_m_per_cycle[:, 0], found.growth_m_per_cycle)
+
+
+def test_a_stance_is_that_of_the_direction_asked_for(leg):
+    """A leg that is turned clockwise by the option is the one whose file says so, bit for bit."""
+    own = attrs.evolve(leg, drive=attrs.evolve(leg.drive, speed=-leg.drive.speed))
+    options = {"clearances": ("G",), "speed_rpm": -60.0, "duty": lw.Duty({600.0: 5.0})}
+    by_file, by_option = (
+        lw.LifeRun(each, lw.LifeSettings(legs=1, cycles=2), **options).life for each in (own, leg)
+    )
+    np.testing.assert_array_equal(by_option.growth_m_per_cycle, by_file.growth_m_per_cycle)
 
 
 def test_growth_is_that_of_the_loads_by_their_hours(leg):

@@ -25,7 +25,7 @@ from leg_wear_monitor.studies.leg_tasks import (
     run_ensemble,
 )
 from leg_wear_monitor.studies.paper import CLAIMS, Effect, difference, greatest, least, log_ratio
-from leg_wear_monitor.studies.plan import ERRORS, Point, largest_error, of_joint
+from leg_wear_monitor.studies.plan import DEPTH, ERRORS, Point, largest_error, of_joint
 from leg_wear_monitor.studies.results import FAILS, HOLDS, UNDECIDED, decide, evaluate, holm, load_results
 
 
@@ -264,6 +264,20 @@ def test_the_file_s_leg_wears_deeper_at_a_than_at_b(results):
     depth = leg[f"set{SETS.index(HIP)}_wear_depth_m_per_cycle"].mean(axis=0)
     assert claims["a_shallow"].file_leg.value == pytest.approx(np.log(depth[1] / depth[0]))
     assert claims["a_shallow"].file_leg.value < 0.0
+
+
+def test_wear_that_is_not_counted_decides_nothing(results):
+    """Without a wear coefficient of A, it is not the joint that wears least, nor in the widest zone."""
+    leg = dict(results.of("leg")[0][1])
+    for i, joints in enumerate(SETS):
+        if "A" in joints:
+            for name, value in ((DEPTH, 0.0), ("zone_deg", 360.0), ("zone_centre_deg", 180.0)):
+                leg[f"set{i}_{name}"] = leg[f"set{i}_{name}"].copy()
+                leg[f"set{i}_{name}"][:, joints.index("A")] = value
+    effects = {claim.key: claim.measure(leg) for claim in CLAIMS}
+    for key in ("a_shallow", "b_zone", "a_worse", "a_wide"):
+        assert decide(effects[key], runs=2) == UNDECIDED, key
+    assert effects["a_worst"].value <= 0.0
 
 
 @pytest.mark.plain

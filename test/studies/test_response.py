@@ -1,5 +1,6 @@
 """What an ensemble's numbers are held against: the ideal leg, full coordinates, and laws of their own."""
 
+import attrs
 import numpy as np
 import pytest
 
@@ -8,7 +9,9 @@ from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
 from leg_wear_monitor.dynamics.full_run import FullRun
 from leg_wear_monitor.dynamics.run import TORQUE_ERROR, new_run_statistics, steady_drive
 from leg_wear_monitor.dynamics.simulation import prepare
+from leg_wear_monitor.mechanism.person import on_the_ground
 from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.mechanism.spec import Film
 from leg_wear_monitor.studies.leg_tasks import run_ensemble
 from leg_wear_monitor.studies.life_tasks import SAMPLES, ensemble, observed_legs, start_angles
 from leg_wear_monitor.studies.plan import ERRORS, fraction_of_range
@@ -47,6 +50,44 @@ def test_without_clearance_the_curves_are_the_ideal_ones():
     assert velocity < 1.0e-4
     assert acceleration < 0.2
     assert max(torque, forces[-1]) < 0.04
+
+
+def clockwise(leg):
+    return attrs.evolve(leg, drive=attrs.evolve(leg.drive, speed=-leg.drive.speed))
+
+
+def test_a_crank_turns_as_in_its_file_and_curves_are_by_its_angle():
+    """The force in a joint with hardly any clearance is that of the ideal leg, at each angle."""
+    leg, few = clockwise(load_mechanism()), {"runs": 2, "cycles": 1, "skip_cycles": 1, "traced_cycles": 1}
+    settings = PLACE | few | {"clearance_m": 1.0e-6}
+    assert ensemble(leg, settings)[0].speed_rpm == -60.0
+    arrays = run_ensemble(leg, settings)
+    force = np.linalg.norm(arrays["example_contact_force_n"][:, 0], axis=1)
+    off = [np.square(one - arrays["ideal_joint_force_n"][:, 6]).mean() for one in (force, force[::-1])]
+    assert off[0] < 0.1 * off[1]
+
+
+def test_a_point_in_the_air_or_dry_has_no_load_or_film_of_the_file(tiny):
+    """0 N and dry are settings, too: they take the place of what the mechanism has, which stays without."""
+    leg = on_the_ground(load_mechanism(), 600.0)
+    film = Film(viscosity_pa_s=0.1, roughness_m=1.6e-6)
+    films = {name: attrs.evolve(each, film=film) for name, each in leg.clearances.items()}
+    leg = attrs.evolve(leg, clearances=films)
+
+    def peak_n(point):
+        settings = point.settings | {"runs": 1}
+        return max(up for _, up in ensemble(leg, settings)[0].mechanism.loads["ground"].force)
+
+    in_the_air, _, _, loaded, *_ = tiny("load", joints=["G"], loads_n=[0, 300]).points()
+    assert [peak_n(point) for point in (in_the_air, loaded)] == [0.0, pytest.approx(300.0, rel=1.0e-3)]
+    dry, oiled = tiny("lubrication", joints=["G"], viscosities_pa_s=[0.01]).points()
+    assert peak_n(dry) == pytest.approx(600.0, rel=1.0e-3)
+    (own,) = tiny("size", joints=["G"], clearances_m=[3.0e-4]).points()
+    found = [
+        ensemble(leg, point.settings | {"runs": 1})[0].mechanism.clearances["G"].film
+        for point in (dry, oiled, own)
+    ]
+    assert found == [None, Film(viscosity_pa_s=0.01, roughness_m=1.6e-6), film]
 
 
 def test_curves_stay_within_the_largest_errors(response):

@@ -1,6 +1,7 @@
 """Descriptions of studies: what comes with the package is whole, what cannot be is told in one line."""
 
 import attrs
+import numpy as np
 import pytest
 
 from leg_wear_monitor import load_mechanism
@@ -93,5 +94,5 @@ def test_a_load_is_on_the_leg_of_its_response_its_life_and_its_exponent(tiny):
     assert [point.task for point in points] == ["response", "life", "exponent"] * 2
     leg = load_mechanism()
     air, ground = (ensemble(leg, point.settings | {"runs": 1})[0].mechanism for point in points[::3])
-    assert air is leg
+    assert not np.any(air.loads["ground"].force)
     assert max(y for _, y in ground.loads["ground"].force) == pytest.approx(300.0, rel=1e-3)

@@ -251,6 +251,7 @@ def play(
     joints are not told apart, or if a part of a recording is lost.
     """
     from leg_wear_monitor.cli.pages import lines
+    from leg_wear_monitor.mechanism.loader import load_mechanism
 
     common.check_file("--json", json_file)
     if mechanism is None and (encoder or crank_angles or clearances):
@@ -258,24 +259,13 @@ def play(
     if mechanism is not None and len(crank_angles) != len(recordings):
         fault = f"{len(crank_angles)} given for {len(recordings)} recordings, expected one for each"
         raise ConfigError("--crank-angle", "", fault)
-    leg = None if mechanism is None else _leg(mechanism, clearances)
+    leg = None if mechanism is None else common.with_clearance_joints(load_mechanism(mechanism), clearances)
     plays, is_lossy = _plays(recordings, crank_angles, **options)
     encoder = encoder or options["joint"]
     result = _measurement(plays, leg, encoder)
     printed = lines(result, leg.name if leg else "", encoder)
     common.say(json_file, printed, common.write_json(json_file, result.to_json()))
     return common.WITH_FINDINGS if is_lossy or not result.is_sure else 0
-
-
-def _leg(mechanism: str, clearances: str | None) -> "Mechanism":
-    from leg_wear_monitor.dynamics.simulation import given_joints
-    from leg_wear_monitor.mechanism.loader import load_mechanism
-
-    leg = load_mechanism(mechanism)
-    if clearances is None:
-        return leg
-    names = [name.strip() for name in clearances.split(",")]
-    return attrs.evolve(leg, clearance_joints=given_joints(names, leg))
 
 
 def _plays(

@@ -82,7 +82,7 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
         written += common.write_directory(out, files)
     not_counted = [joint for joint in leg.clearance_joints if lacks_wear(leg.clearances[joint])]
     printed = life_lines(result, options["limit_m"], not_counted)
-    common.say(json_file, [*printed, *_remarks(leg, result)], written)
+    common.say(json_file, [*printed, *_remarks(leg, result, options["wear_factor"])], written)
 
 
 def _lives(leg: "Mechanism", lives: int, opens_m: float | None, duty: str | None, **options: Any) -> "Lives":
@@ -126,12 +126,12 @@ def _document(leg: "Mechanism", lives: "Lives", limit_m: float) -> dict[str, Any
     }
 
 
-def _remarks(leg: "Mechanism", result: "Life") -> list[str]:
+def _remarks(leg: "Mechanism", result: "Life", wear_factor: float) -> list[str]:
     """The wear regime of each joint, and its limits of load and speed, rating life and wide contacts."""
     from leg_wear_monitor.life.result import contact_doubts, pressure_speed, rating_hours
     from leg_wear_monitor.mechanism.materials import bushing_of, load_material, regimes
 
-    found = regimes(leg, result.clearance_joints).items()
+    found = regimes(leg, result.clearance_joints, wear_factor).items()
     remarks = [f"holds for {', '.join(joints)}: {what}" for what, joints in found]
     for joint, load in pressure_speed(leg, result).items():
         settings = leg.clearances[joint]
@@ -316,9 +316,11 @@ def design_lines(result: "Design", choices: "BushingChoices") -> list[str]:
             told.append(
                 f"  none of {len(choices.materials)} pairs in the sizes tried lasts {result.hours:g} h"
             )
+    in_the_air = "" if any(part.load_n for part in result.duty) else "in the air"
     told += [
-        f"life of {one.joint} now: 10 % more load {one.load:+.0f} %, 10 % more cadence {one.cadence:+.0f} %, "
-        f"half the clearance when new {one.clearance:+.0f} %, 10 % wider {one.width:+.0f} %"
+        f"life of {one.joint} now: {in_the_air or f'10 % more load {one.load:+.0f} %'}, "
+        f"10 % more cadence {one.cadence:+.0f} %, half the clearance when new {one.clearance:+.0f} %, "
+        f"10 % wider {one.width:+.0f} %"
         for one in result.sensitivities
     ]
     return [*told, result.first]

@@ -156,11 +156,14 @@ def _run(
 def _config(path: Path | None, crank_joint: str | None, node: str | None) -> "MonitorConfig":
     import attrs
 
-    from leg_wear_monitor.monitor.config.fitting import acceleration_doubts
+    from leg_wear_monitor.mechanism.loader import load_mechanism
+    from leg_wear_monitor.monitor.config.fitting import acceleration_doubts, fitted
     from leg_wear_monitor.monitor.config.parameters import load_config
+    from leg_wear_monitor.monitor.forecast.forecaster import life_doubts
 
-    config = load_config(path, node)
-    common.warn_of(str(path or "parameters"), acceleration_doubts(config))
+    config, source = load_config(path, node), str(path or "parameters")
+    leg = fitted(load_mechanism(config.mechanism), config, source)
+    common.warn_of(source, (*acceleration_doubts(config), *life_doubts(config, leg)))
     return config if crank_joint is None else attrs.evolve(config, crank_joint=crank_joint)
 
 

@@ -71,6 +71,7 @@ def _compute(
     from leg_wear_monitor.dynamics.clearance.stepper import motion_beside
     from leg_wear_monitor.dynamics.simulation import simulate
     from leg_wear_monitor.mechanism.loader import load_mechanism
+    from leg_wear_monitor.mechanism.plausible import doubts
     from leg_wear_monitor.studies.execution import run_study
 
     leg = load_mechanism(settings.mechanism)
@@ -86,6 +87,7 @@ def _compute(
             scheduler=scheduler,
             progress=progress,
         )
+    common.warn_of(leg.source, doubts(leg))  # what fails names them itself, in its one line
     return computed, len(settings.points())
 
 

@@ -79,8 +79,7 @@ def check_limits(config: MonitorConfig, mechanism: Mechanism, source: str = "par
         given = getattr(limits, name)
         if given and len(given) != len(clearance_joints):
             raise _wrong_length(source, f"limits.{name}", given, clearance_joints, "")
-    key = "limits.joint_clearance_m" if limits.joint_clearance_m else "limits.clearance_m"
-    each = limits.joint_clearance_m or (limits.clearance_m,) * len(clearance_joints)
+    key, each = limits.of_clearances(len(clearance_joints))
     for joint, limit in zip(clearance_joints, each, strict=True):
         clearance = mechanism.clearances[joint]
         fault = limit_fault(joint, clearance.radial_clearance, clearance.bushing_radius, limit)
@@ -221,9 +220,7 @@ def acceleration_doubts(config: MonitorConfig, most: float = MOST_ACCELERATION) 
 
 
 def _limits(config: MonitorConfig, leg: Mechanism) -> Iterator[Doubt]:
-    limits = config.limits
-    key = "limits.joint_clearance_m" if limits.joint_clearance_m else "limits.clearance_m"
-    each = limits.joint_clearance_m or (limits.clearance_m,) * len(leg.clearance_joints)
+    key, each = config.limits.of_clearances(len(leg.clearance_joints))
     for joint, limit in zip(leg.clearance_joints, each, strict=True):
         fresh = leg.clearances[joint].radial_clearance
         if limit <= fresh:

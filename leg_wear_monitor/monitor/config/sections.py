@@ -135,7 +135,7 @@ class Forecasting:
     model_sigma: float = quantity(
         "",
         "standard deviation of the logarithm of the growth, which is assumed constant without simulated "
-        "lives (docs/explanation/forecast.md)",
+        "lives, and beyond them (docs/explanation/forecast.md)",
         at_least=0.0,
         at_most=3.0,
         default=0.4,

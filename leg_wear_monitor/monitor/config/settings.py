@@ -129,6 +129,12 @@ class Limits:
         "", "fraction of the time that was not monitored", above=0.0, at_most=1.0, default=0.05, metadata=LIVE
     )
 
+    def of_clearances(self, joints: int) -> tuple[str, tuple[float, ...]]:
+        """The parameter that limits the clearances, and the limit of each of so many clearance joints [m]."""
+        if self.joint_clearance_m:
+            return "limits.joint_clearance_m", self.joint_clearance_m
+        return "limits.clearance_m", (self.clearance_m,) * joints
+
 
 @attrs.frozen(kw_only=True)
 class Alarms:

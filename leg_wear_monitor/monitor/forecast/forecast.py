@@ -99,7 +99,7 @@ class GrowthLaw:
     fresh_m, widest_m : (k,) arrays
         Clearances when new, and the largest of the fitted lives: a clearance outside counts as the nearest.
     sigma : (k,) array
-        Standard deviation of the error of ln growth.
+        Standard deviation of the error of ln growth, up to `widest_m`.
     lives : int
         Number of simulated lives that it was fitted to.
     """
@@ -114,6 +114,17 @@ class GrowthLaw:
         """Logarithm of growth (k, n) at clearances (k, n) over that at `fresh_m`: without a_k."""
         in_range = np.clip(clearance_m, self.fresh_m[:, None], self.widest_m[:, None])
         return np.asarray(self.coupling @ np.log(in_range / self.fresh_m[:, None]))
+
+    def sigma_to(self, limit_m: Floats, unknown: float) -> Floats:
+        """Standard deviation (k,) of the error of ln growth on the way to limits (k,).
+
+        Beyond `widest_m` growth is assumed constant, as it is everywhere without lives. That is off by
+        ``unknown`` (`forecast.model_sigma`) from new to the limit; its variance counts by the part of this
+        way, in ln clearance, that no life has gone.
+        """
+        way = np.log(limit_m / self.fresh_m, where=limit_m > self.widest_m, out=np.ones_like(limit_m))
+        part = np.log(limit_m / np.minimum(self.widest_m, limit_m)) / way
+        return np.asarray(np.hypot(self.sigma, part * np.sqrt(np.maximum(unknown**2 - self.sigma**2, 0.0))))
 
 
 def no_law(fresh_m: Floats, sigma: float) -> GrowthLaw:
@@ -443,20 +454,16 @@ def forecast(
         )
     )
     answer = _leg_answer(answers)
-    # a joint whose growth is not known does not end the leg by a clearance that may be at its limit either
-    ends[[each in _NOT_KNOWN for each in answers]] = np.inf
+    # a joint of no or of unknown growth does not end the leg, though its clearance may be at the limit
+    ends[[each in (*_NOT_KNOWN, Answer.NO_GROWTH) for each in answers]] = np.inf
     life, first = _life(answer, ends.min(axis=0), cycle_s, day), {}
     if life["cycles"] is not None:
         fraction = np.bincount(ends.argmin(axis=0), minlength=len(now)) / MEMBERS
         first = {each.joint: float(p) for each, p in zip(now, fraction, strict=True)}
     leg = LegForecast(
-        answer=answer,
-        cycles=life["cycles"],
-        hours=life["hours"],
-        days=life["days"],
-        first_probability=first,
-        simulated_lives=law.lives,
-    )
+        answer=answer, cycles=life["cycles"], hours=life["hours"], days=life["days"],
+        first_probability=first, simulated_lives=law.lives,
+    )  # fmt: skip
     return Forecast(joints=joints, leg=leg)
 
 
@@ -487,9 +494,9 @@ def _legs(
             )
         ]
     )
-    fresh, wear, growth, error = (
+    fresh, wear, growth, error, limit = (
         np.array([[getattr(each, name) or 0.0] for each in now])
-        for name in ("fresh_m", "wear_m", "growth_m", "growth_error_m")
+        for name in ("fresh_m", "wear_m", "growth_m", "growth_error_m", "limit_m")
     )
     known, before = (
         np.array([[getattr(each.known, name)] for each in coefficient_estimates])
@@ -497,14 +504,15 @@ def _legs(
     )
     clearance = np.maximum(known + excess + np.exp(log_factor) * (wear - before), 0.0)
     relative = np.divide(error, growth, out=np.zeros_like(error), where=growth > 0.0)
-    log_rate = log_factor + np.hypot(law.sigma[:, None], relative) * normals[2 * k : 3 * k]
+    sigma = law.sigma_to(limit[:, 0], settings.model_sigma)[:, None]
+    log_rate = log_factor + np.hypot(sigma, relative) * normals[2 * k : 3 * k]
     log_rate += settings.load_sigma * normals[3 * k]
     # The twin's growth is that at its own clearances. What is believed of a factor is a mean over the part's
     # past, in which the other clearances departed from the twin's by and by: half of their doing is in it.
     here, twin = law.log_growth(clearance), law.log_growth(fresh + wear)
     log_base = log_rate + 0.5 * (here - twin) - here
     duty = settings.duty_hours_per_day * np.exp(settings.duty_sigma * normals[3 * k + 1])
-    return clearance, np.maximum(growth, 0.0) * np.exp(log_base), duty
+    return clearance, np.maximum(growth, 0.0) * np.exp(log_base), np.minimum(duty, 24.0)
 
 
 def _life(answer: Answer, cycles: Floats, cycle_s: float, day: Floats) -> dict[str, Quantiles | None]:

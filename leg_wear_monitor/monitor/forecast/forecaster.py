@@ -7,12 +7,14 @@ from typing import Any, TypeVar
 import attrs
 import numpy as np
 
+from leg_wear_monitor.configuration import Doubt
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.files import read_json, share_directory
 from leg_wear_monitor.life.result import SCHEMA_VERSION
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.sections import Forecasting
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast import measurement
 from leg_wear_monitor.monitor.forecast.forecast import (
     Forecast,
@@ -64,6 +66,30 @@ def law_of(mechanism: Mechanism, path: str, sigma: float) -> GrowthLaw:
         fresh = [mechanism.clearances[joint].radial_clearance for joint in mechanism.clearance_joints]
         return no_law(np.array(fresh), sigma)
     return fitted_law(lives, sigma)
+
+
+def life_doubts(config: MonitorConfig, leg: Mechanism) -> tuple[Doubt, ...]:
+    """Simulated lives that end before the limit of a clearance.
+
+    Raises
+    ------
+    ConfigError
+        If the file of lives cannot be used.
+    """
+    given = config.forecast.life
+    ends_m = float(law_of(leg, given, config.forecast.model_sigma).widest_m.max(initial=0.0))
+    joints = leg.clearance_joints
+    limits = dict(zip(joints, config.limits.of_clearances(len(joints))[1], strict=True))
+    joint = max(joints, key=lambda name: limits[name])
+    if limits[joint] <= ends_m:
+        return ()
+    lives = f"the lives of {given}" if given else "the lives of this leg that come with the package"
+    text = (
+        f"{lives} end at {1e3 * ends_m:.3g} mm, below the limit of joint {joint}, "
+        f"{1e3 * limits[joint]:g} mm; the forecast takes growth for constant beyond, expected those of "
+        f"`leg-wear-monitor life --limit-m {limits[joint]:g}`"
+    )
+    return (Doubt("forecast.life", text),)
 
 
 def read_lives(path: str, mechanism: Mechanism) -> Sequence[SimulatedLife]:

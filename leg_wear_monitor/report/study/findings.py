@@ -229,13 +229,20 @@ def superposition(alone: Found, whole: Arrays) -> str:
     )
 
 
-def _times(before: Arrays, after: Arrays, name: str, joint: str) -> str:
+def _times(before: float, after: float) -> str:
+    """How many times a statistic is what it was; a dash where it was 0, as without a wear coefficient."""
+    return f"× {number(after / before) if before > 0.0 else '–'}"
+
+
+def _joint_times(before: Arrays, after: Arrays, name: str, joint: str) -> str:
     """How many times a joint's statistic is what it was."""
-    return f"× {number(of_joint(after, name, joint).mean / of_joint(before, name, joint).mean)}"
+    return _times(of_joint(before, name, joint).mean, of_joint(after, name, joint).mean)
 
 
 def _joint_against_alone(joint: str, alone: Arrays, whole: Arrays) -> str:
-    force, volume, depth = (_times(alone, whole, name, joint) for name in ("peak_force_n", VOLUME, DEPTH))
+    force, volume, depth = (
+        _joint_times(alone, whole, name, joint) for name in ("peak_force_n", VOLUME, DEPTH)
+    )
     return (
         f"Joint {joint}, all at once against its place alone: largest contact force {force}, "
         f"worn volume {volume}, greatest depth {depth}."
@@ -292,14 +299,18 @@ def _wear_and_life(arrays: Arrays) -> str:
     """The joints by wear of the bushing, the largest first, and the life of the first one."""
     depths = {joint: of_joint(arrays, DEPTH, joint) for joint in _order(arrays, DEPTH)}
     worn = [joint for joint in depths if depths[joint].mean > 0.0]
+    # surfaces that rub without wear have no coefficient; the others, a film carries
+    rubbing = [joint for joint in depths if joint not in worn and of_joint(arrays, VOLUME, joint).mean > 0.0]
+    not_counted = f"wear of {joined(rubbing)} is not counted, without a wear coefficient" if rubbing else ""
     if not worn:
-        return "the films carry everything, and no joint wears."
+        return f"{not_counted}." if rubbing else "the films carry everything, and no joint wears."
     texts = [f"{joint} {with_spread(depths[joint], PICO)}" for joint in worn]
     first = depths[worn[0]]
     cycles = _OPENS_M / first.mean
     scatter = cycles * first.deviation / first.mean
-    rest = [joint for joint in clearance_joints_of(arrays) if joint not in worn]
+    rest = [joint for joint in clearance_joints_of(arrays) if joint not in [*worn, *rubbing]]
     idle = f"; {joined(rest)} {'does' if len(rest) == 1 else 'do'} not wear" if rest else ""
+    idle += f"; {not_counted}" if rubbing else ""
     return (
         f"greatest depth of the bushings [pm a cycle]: {', '.join(texts)}{idle}. At this rate {worn[0]} is "
         f"{1.0e3 * _OPENS_M:g} mm deep after {number(MILLIONTH * cycles)} ± {number(MILLIONTH * scatter)} "
@@ -332,9 +343,9 @@ def load(found: Found) -> list[str]:
         )
         sentences.append(
             f"Joint {joint}, from {first.label} to {last.label}: mean force {' to '.join(force)} N "
-            f"({_times(before, after, 'mean_force_n', joint)}), worn volume "
-            f"{_times(before, after, VOLUME, joint)}, greatest depth {' to '.join(depth)} pm a cycle "
-            f"({_times(before, after, DEPTH, joint)})."
+            f"({_joint_times(before, after, 'mean_force_n', joint)}), worn volume "
+            f"{_joint_times(before, after, VOLUME, joint)}, greatest depth {' to '.join(depth)} pm a cycle "
+            f"({_joint_times(before, after, DEPTH, joint)})."
         )
     head = "zone that holds half of the bushing's wear"
     return sentences + _of_each_joint(
@@ -350,7 +361,7 @@ def lives(found: Found) -> list[str]:
         opened = 1.0e3 * (mean[:, -1] - mean[:, 0]).mean(axis=0)
         rates = arrays["rate_m_per_cycle"][:, :, :, BUSHING].mean(axis=(0, 3), dtype=float)
         opens = [f"{joint} {number(each)} mm" for joint, each in zip(names, opened, strict=True)]
-        faster = [f"{joint} × {number(rates[END, k] / rates[NEW, k])}" for k, joint in enumerate(names)]
+        faster = [f"{joint} {_times(rates[NEW, k], rates[END, k])}" for k, joint in enumerate(names)]
         sets = f"{point.label}: " if len(found) > 1 else ""
         cycles = with_spread(spread(arrays["cycles"][:, -1]), MILLIONTH)
         sentences.append(

@@ -9,6 +9,7 @@ import attrs
 import numpy as np
 from ruamel.yaml import YAML
 
+from leg_wear_monitor.mechanism.materials import lacks_wear
 from leg_wear_monitor.mechanism.position import build_linkage, one_cycle
 from leg_wear_monitor.mechanism.reach import Reach
 from leg_wear_monitor.mechanism.spec import Mechanism
@@ -157,6 +158,9 @@ def _asked(results: StudyResults) -> Section:
         "example."
     )
     joints = list(dict.fromkeys(name for point in results.points for name in point.clearance_joints))
+    lacking = [joint for joint in joints if lacks_wear(results.mechanism.clearances[joint])]
+    if lacking:
+        text += f" Wear of {joined(lacking)} is not counted: the pair gives no wear coefficient."
     names = ", ".join(results.mechanism.joints)
     leg = Picture(
         image=png(leg_picture(results.mechanism, joints)),

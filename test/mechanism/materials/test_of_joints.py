@@ -77,6 +77,23 @@ def test_a_pair_with_limits_only_does_not_take_the_coefficient_of_another() -> N
     assert "clearances.joints.G.wear_coefficient: is missing for a life: du-on-steel-dry" in line
 
 
+def test_a_pair_without_modulus_does_not_take_that_of_another() -> None:
+    """The pair of the defaults is of other joints: what its own does not give stands beside it."""
+    document = copy.deepcopy(DOCUMENT)
+    for key in ("youngs_modulus", "poissons_ratio"):
+        del document["clearances"]["defaults"][key]
+    document["clearances"]["joints"] = {"A": {}, "G": {"material": "dp4b-on-steel-dry"}}
+    with pytest.raises(lw.ConfigError, match=r"leg\.yaml: clearances\.joints\.G\.youngs_modulus: is missing"):
+        parse_mechanism(document, "leg.yaml")
+    document["clearances"]["joints"]["G"] |= {
+        "youngs_modulus": [3.0e9, 2.07e11],
+        "poissons_ratio": [0.4, 0.29],
+    }
+    found = parse_mechanism(document, "leg.yaml").clearances
+    assert found["G"].youngs_modulus == (3.0e9, 2.07e11)
+    assert found["A"].youngs_modulus == (2.07e11, 2.07e11)
+
+
 def test_joints_that_swing_have_limits_of_their_own() -> None:
     """iglidur H: 196 ft/min where it turns, 137 ft/min where it swings; A and B are the crank's."""
     limited = leg({"material": "iglidur-h-on-steel"})

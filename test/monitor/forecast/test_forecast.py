@@ -57,6 +57,15 @@ def test_what_is_not_known_adds_up_in_squares():
     assert math.log(told.cycles.p90 / told.cycles.p10) == pytest.approx(2.0 * Z * both, rel=0.03)
 
 
+def test_lives_that_end_early_leave_the_rest_of_the_way_unknown():
+    """Lives to 0.31 mm say nothing of 0.6 mm: p10 to p90 are as wide as without lives."""
+    now = np.array([NOW.fresh_m])
+    told = attrs.evolve(SURE, model_sigma=0.4, wear_coefficient_sigma=0.01)
+    law = GrowthLaw(np.zeros((1, 1)), now, np.array([3.1e-4]), np.array([0.01]), lives=5)
+    found, without = (alone(settings=told, law=one).cycles for one in (law, no_law(now, 0.4)))
+    assert np.log(found.p90 / found.p10) == pytest.approx(np.log(without.p90 / without.p10), rel=0.06)
+
+
 @given(st.floats(0.1, 10.0))
 def test_all_wear_faster_by_a_factor_is_life_shorter_by_it(factor):
     fast = attrs.evolve(NOW, growth_m=factor * NOW.growth_m)
@@ -137,9 +146,19 @@ def test_a_joint_without_a_growth_rate_does_not_end_the_leg_by_what_its_clearanc
     assert told.leg.first_probability == {"A": 1.0, "B": 0.0}
 
 
-def test_a_joint_that_does_not_grow_never_ends_the_leg():
-    told = whole([NOW, attrs.evolve(B, growth_m=0.0)])
+@pytest.mark.parametrize("wear_m", [0.0, 2.98e-4])
+def test_a_joint_that_does_not_grow_never_ends_the_leg(wear_m):
+    """Nor by a clearance that may be at its limit."""
+    told = whole([NOW, attrs.evolve(B, growth_m=0.0, wear_m=wear_m)])
     assert (told.leg.answer, told.leg.cycles) == (Answer.KNOWN, told.joints[0].cycles)
+    assert told.leg.first_probability == {"A": 1.0, "B": 0.0}
+
+
+def test_a_day_has_24_hours():
+    walking = attrs.evolve(SURE, duty_hours_per_day=24.0, duty_sigma=1.0)
+    told = alone(settings=walking)
+    assert told.days.p10 >= told.hours.p10 / 24.0
+    assert told.days.p50 > told.hours.p50 / 24.0
 
 
 @given(st.floats(-1.0, 1.0))

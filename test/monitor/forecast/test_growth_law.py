@@ -92,6 +92,16 @@ def test_beyond_what_lives_have_seen_growth_stays_as_it_is_there():
     np.testing.assert_array_equal(law.log_growth(LIMIT[:, None]), law.log_growth(law.widest_m[:, None]))
 
 
+def test_what_lives_have_not_seen_is_as_uncertain_as_without_lives():
+    """From the law's own sigma, where they go to the limit, to that of a leg without lives, where nowhere."""
+    law, k = attrs.evolve(LAW, sigma=np.full(3, 0.02)), len(FRESH)
+    np.testing.assert_array_equal(law.sigma_to(law.widest_m, 0.4), 0.02)
+    np.testing.assert_allclose(attrs.evolve(law, widest_m=FRESH).sigma_to(LIMIT, 0.4), 0.4)
+    halfway = attrs.evolve(law, widest_m=np.sqrt(FRESH * LIMIT)).sigma_to(LIMIT, 0.4)
+    np.testing.assert_allclose(halfway, np.sqrt(0.02**2 + 0.25 * (0.4**2 - 0.02**2)))
+    np.testing.assert_array_equal(no_law(FRESH, 0.4).sigma_to(LIMIT, 0.4), np.full(k, 0.4))
+
+
 def test_the_law_is_found_again_in_its_own_lives():
     law = fitted_law([lived(f) for f in SPREAD], sigma=0.3)
     np.testing.assert_allclose(law.coupling, COUPLING, atol=0.03)

@@ -9,7 +9,9 @@ import pytest
 from leg_wear_monitor import ConfigError
 from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.life.life import LifeRun, LifeSettings
-from leg_wear_monitor.monitor.forecast.forecaster import law_of, read_lives
+from leg_wear_monitor.monitor.config.sections import Forecasting
+from leg_wear_monitor.monitor.config.settings import Limits, MonitorConfig
+from leg_wear_monitor.monitor.forecast.forecaster import law_of, life_doubts, read_lives
 from leg_wear_monitor.monitor.ledger.entry import fingerprint
 
 SHIPPED = share_directory() / "config" / "lives" / "bionic_leg.json"
@@ -76,6 +78,22 @@ def test_another_version_is_refused(leg, tmp_path):
     del older["schema_version"]
     (tmp_path / "older.json").write_text(json.dumps(older))
     assert law_of(leg, str(tmp_path / "older.json"), 0.5).lives == law_of(leg, "", 0.5).lives
+
+
+@pytest.mark.plain
+def test_lives_that_end_before_a_limit_are_doubtful(leg, tmp_path):
+    limits, file = Limits(joint_clearance_m=(6e-4, 6e-4, 8e-4, 6e-4, 6e-4)), changed(tmp_path)
+    assert life_doubts(MonitorConfig(forecast=Forecasting(life=file)), leg) == ()
+    (shipped,) = map(str, life_doubts(MonitorConfig(limits=limits), leg))
+    assert shipped == (
+        "forecast.life: the lives of this leg that come with the package end at 0.616 mm, below the limit of "
+        "joint G, 0.8 mm; the forecast takes growth for constant beyond, expected those of "
+        "`leg-wear-monitor life --limit-m 0.0008`"
+    )
+    (own,) = map(str, life_doubts(MonitorConfig(limits=limits, forecast=Forecasting(life=file)), leg))
+    assert own == shipped.replace("this leg that come with the package", file)
+    other = attrs.evolve(leg, clearance_joints=("A", "B"))  # no lives at all: nothing ends
+    assert life_doubts(MonitorConfig(limits=Limits(clearance_m=8e-4)), other) == ()
 
 
 @pytest.mark.chaotic

@@ -14,7 +14,7 @@ from leg_wear_monitor.report.study import page as pages
 from leg_wear_monitor.report.study.page import study_page
 from leg_wear_monitor.report.study.text import number, with_spread, zone_text
 from leg_wear_monitor.studies.kinds import STUDIES
-from leg_wear_monitor.studies.plan import Spread, power_law, spread
+from leg_wear_monitor.studies.plan import DEPTH, Spread, power_law, spread
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -79,6 +79,26 @@ def test_a_superposition_is_called_one_only_where_it_is(study):
     assert findings.superposition(alone, summed).startswith("All at once is the sum of the places alone")
     halved = {**summed, "error_toe_velocity_mps": 0.5 * summed["error_toe_velocity_mps"]}
     assert findings.superposition(alone, halved).startswith("All at once is not the sum")
+
+
+def test_wear_that_is_not_counted_is_not_told_as_none(study):
+    """Without wear coefficients depths are 0 while surfaces rub: a ratio of them is a dash."""
+    results = study("multi")
+    unworn = [(point, {**arrays, DEPTH: 0.0 * arrays[DEPTH]}) for point, arrays in results.of("response")]
+    *alone, (_, whole) = unworn
+    told = "\n".join(findings.several_at_once(alone, whole))
+    assert told.count("greatest depth × –") == 3
+    dry = findings.lubrication(unworn[:1])[0]
+    assert dry == "G: wear of G is not counted, without a wear coefficient."
+    one = {**whole, DEPTH: whole[DEPTH].copy()}
+    one[DEPTH][:, 0] = 1.0e-12
+    mixed = findings.lubrication([(results.points[-1], one)])[0]
+    assert "G 1.00; wear of I and J is not counted, without a wear coefficient. At this rate G" in mixed
+    assert "not counted" not in findings.lubrication([(results.points[-1], results.of("response")[-1][1])])[0]
+    (point, life), *_ = study("wear").of("life")
+    held = {**life, "rate_m_per_cycle": life["rate_m_per_cycle"].copy()}
+    held["rate_m_per_cycle"][:, :, 1] = 0.0
+    assert ", J × –; largest" in findings.lives([(point, held)])[0]
 
 
 def test_a_study_without_a_page_of_its_own_shows_its_points(study, page_of, monkeypatch):

@@ -92,9 +92,12 @@ def test_phase_means_are_those_of_hat_functions(phases: int) -> None:
 
 @pytest.mark.parametrize(
     ("rate_hz", "rpm", "together", "phases"),
-    [(1000, 60, 5, 80), (200, 60, 1, 80), (100, 60, 1, 40), (50, 60, 1, 20), (25, 60, 1, 10), (20, 60, 1, 0)]
-    # beside 60 rpm, hardly fewer than there
-    + [(1000, 61, 5, 78), (200, 61, 1, 78), (1000, 45, 7, 76), (1000, 40, 8, 75), (100, 45, 1, 53)],
+    [
+        *((1000, 60, 5, 80), (200, 60, 1, 80), (100, 60, 1, 40), (50, 60, 1, 20), (25, 60, 1, 10)),
+        (20, 60, 1, 0),
+        # beside 60 rpm, hardly fewer than there
+        *((1000, 61, 5, 78), (200, 61, 1, 78), (1000, 45, 7, 76), (1000, 40, 8, 75), (100, 45, 1, 53)),
+    ],
 )
 def test_sampling_determines_phases(rate_hz: float, rpm: float, together: int, phases: int) -> None:
     sensor = TorqueSensor(period_s=1.0 / rate_hz, cycle_s=60.0 / rpm, size_nm=10.0)

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 from leg_wear_monitor.estimate.signature import SimulatedSensor, TorqueSensor, signatures
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.twin.sample import CRANK, TORQUE, gait_samples
 from leg_wear_monitor.monitor.diagnosis.state import (
     WINDOW_CYCLES,
     SignedCycle,
@@ -17,6 +16,7 @@ from leg_wear_monitor.monitor.diagnosis.state import (
     cycle_torque,
 )
 from leg_wear_monitor.twin.reference import POINTS, CrankProfile, LegParameters
+from leg_wear_monitor.twin.sample import CRANK, TORQUE, gait_samples
 from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 pytestmark = pytest.mark.plain
@@ -66,9 +66,8 @@ def test_a_gait_cycle_has_the_signature_that_a_simulated_one_would(leg, rate_hz:
         stamps = np.round(1e9 * time).astype(np.int64)
         turned = np.linspace(-0.1, TURN + 0.1, 2001)
         crank_ns = np.round(1e9 * (begin_s + turned / profile.speed)).astype(np.int64)
-        kept = TorqueSamples(
-            gait_samples(crank_ns, CRANK, crank_angle_rad=turned), gait_samples(stamps, TORQUE, torque_nm=mean)
-        )
+        crank = gait_samples(crank_ns, CRANK, crank_angle_rad=turned)
+        kept = TorqueSamples(crank, gait_samples(stamps, TORQUE, torque_nm=mean))
         found = cycle_torque(kept, round(1e9 * begin_s), round(1e9 * (begin_s + cycle_s)), sensor)
         own = signatures(np.zeros(len(found.angle), np.int64), found.angle, found.torque, found.step, sensor)
         np.testing.assert_allclose(own[0], expected[cycle], atol=2e-3)

@@ -447,6 +447,11 @@ def since_words(summary: ReplaySummary, stamp_ns: int) -> str:
     return f"{time_words(stamp_ns)}, {duration((stamp_ns - begin) / 1.0e9)} after the recording's begin"
 
 
+def is_of_recording(summary: ReplaySummary) -> bool:
+    """Whether the verdict was known at the recording's end: nothing was measured or entered later."""
+    return summary.verdict.since_ns <= summary.recording.end_ns
+
+
 def duration(seconds: float) -> str:
     """A time in a unit that suits it."""
     if seconds < 120.0:

@@ -1,8 +1,10 @@
 """The page of a replay, from its summary: a first screen that answers, and the rest folded below it."""
 
+import math
+
 import attrs
 
-from leg_wear_monitor.files import share_directory
+from leg_wear_monitor.files import or_nan, share_directory
 from leg_wear_monitor.monitor.alarms import joint_of, raised_words, time_words
 from leg_wear_monitor.monitor.verdict.decision import decision_of, figures_of
 from leg_wear_monitor.monitor.verdict.situation import COUNTED
@@ -25,6 +27,7 @@ from leg_wear_monitor.report.page import (
     Table,
     Text,
     duration,
+    is_of_recording,
     not_valid,
     reason,
     render,
@@ -94,7 +97,7 @@ def change_section(summary: ReplaySummary) -> Section:
     """Chart and table of the changes."""
     title, changes = "Changes of alarms", summary.alarms.changes
     if not changes:
-        return Section(title, [Text("No alarm was raised.")], is_folded=True)
+        return Section(title, [Text("No alarm was raised in the recording.")], is_folded=True)
     more = len(changes) - MOST_ROWS
     table = Table(
         caption=title,
@@ -250,7 +253,7 @@ def _input(summary: ReplaySummary) -> _Card:
 def _torque(summary: ReplaySummary) -> _Card:
     status = _status(summary, "torque")
     if status is None:
-        return "Torque", Level.ERROR, ["unknown"]
+        return "Torque", Level.ERROR, [summary.diagnosis.reason or "unknown"]
     is_compared = status.values.get("mismatch") is not None
     return "Torque", status.level if is_compared else Level.ERROR, status.message.split("; ")
 
@@ -287,6 +290,8 @@ def _model(summary: ReplaySummary) -> _Card:
         why = [reason(summary.verdict), "not valid: " + ", ".join(each.words for each in invalid)]
     elif not why[0]:
         level, why = Level.WARN, ["no measurement is compared with it"]
+    elif _unexplained(summary) > summary.monitor.limits.torque_mismatch:
+        level = Level.WARN
     if gait.doubtful_cycles:
         level = max(level, Level.WARN)
         why.append(f"{gait.doubtful_cycles} gait cycles do not fit this leg")
@@ -299,19 +304,33 @@ def _model(summary: ReplaySummary) -> _Card:
 
 def _explained(summary: ReplaySummary) -> str:
     """What of the drive torque the model explains; empty if that is not known."""
-    torque = _status(summary, "torque")
-    mismatch = torque.values.get("mismatch") if torque else None
-    if mismatch is None:
+    mismatch = _unexplained(summary)
+    if math.isnan(mismatch):
         return ""
     limit = 100.0 * summary.monitor.limits.torque_mismatch
     rest = f"{100.0 * mismatch:.2g}" if mismatch >= _LEAST_REST else "less than 1"
     return f"{rest} % of the drive torque is not explained (limit {limit:.3g} %)"
 
 
+def _unexplained(summary: ReplaySummary) -> float:
+    """Part of the drive torque that the model does not explain; NaN if that is not known."""
+    torque = _status(summary, "torque")
+    return or_nan(torque.values.get("mismatch")) if torque else math.nan
+
+
+def _entered(summary: ReplaySummary) -> list[Part]:
+    """That the verdict is later than what was recorded; nothing if it is not."""
+    if is_of_recording(summary):
+        return []
+    words = "The verdict rests on what was entered or measured after this recording"
+    return [Text(f"{words}; input, torque, cadence, growth and forces are those of the recording.")]
+
+
 def replay_page(summary: ReplaySummary) -> Page:
     """The page of a replay."""
     recording, monitor = summary.recording, summary.monitor
-    sections = [_joints(summary), Section("Are these values valid?", [Fragment(belief(summary))])]
+    valid = [*_entered(summary), Fragment(belief(summary))]
+    sections = [_joints(summary), Section("Are these values valid?", valid)]
     raised = raised_alarms(summary, otherwise="No alarm is raised at the end.")
     sections += [Section("Alarms", [Fragment(raised)]), *motion_section(summary)]
     shown = len(sections)

@@ -10,7 +10,7 @@ import pytest
 from html_reader import read
 from made_up_summary import made_up_summary
 
-from leg_wear_monitor.playback.result import ReplayLeg, WornDepth
+from leg_wear_monitor.playback.result import ReplayLeg, ReplayStatus, WornDepth
 from leg_wear_monitor.report.page import page_html, template_text
 from leg_wear_monitor.report.replay.joints import joint_rows, joint_views
 from leg_wear_monitor.report.replay.page import replay_page
@@ -63,6 +63,13 @@ def test_the_first_screen_has_the_load_of_a_leg_that_carries_one():
     measured = attrs.evolve(load, source="measured", peak_sigma_n=None)
     assert "Measured: 289 N at its peak." in visible(page_of(attrs.evolve(made_up_summary(), load=measured)))
     assert "Foot load" not in visible(page_of(attrs.evolve(made_up_summary(), load=FootLoad())))
+
+
+@pytest.mark.parametrize(("mismatch", "answer"), [(0.05, "✓ yes"), (0.22, "▲ in part")])
+def test_a_model_that_explains_too_little_is_not_said_to_be_valid(mismatch, answer):
+    torque = ReplayStatus(name="torque", level=Level.OK, message="m", values={"mismatch": mismatch})
+    text = visible(page_of(attrs.evolve(doubted(), status=(torque,))))
+    assert f"Model: {answer}" in " ".join(text.split())
 
 
 def test_the_joint_that_the_verdict_names_has_the_first_row():

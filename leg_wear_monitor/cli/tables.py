@@ -293,18 +293,21 @@ def _print_verdict(console: Console, state: "LegState", joint_words: Callable[[s
 
 
 def _joints(result: "ReplayResult") -> Table:
-    """Counted clearance, growth and peak force."""
+    """Counted clearance, growth and peak force, as far as the verdict believes them."""
+    from leg_wear_monitor.state import Figure
+
+    doubted = result.monitor.verdict.verdict.not_valid
     columns = ("\njoint", "counted clearance\nmm", "growth\npm/cycle", "±\npm/cycle", "peak\nN")
     table = plain_table(columns, 1)
     peaks = np.fmax.reduce(result.history.joint_column("peak_force_n"))
     last = result.history.last
     for joint, peak in zip(last.joints if last else (), peaks, strict=True):
+        growth = [_known(1.0e12, each) for each in (joint.growth_m_per_cycle, joint.growth_error_m_per_cycle)]
         table.add_row(
             result.monitor.mechanism.joint_words(joint.joint),
             _counted(joint),
-            _known(1.0e12, joint.growth_m_per_cycle),
-            _known(1.0e12, joint.growth_error_m_per_cycle),
-            figure(float(peak)),
+            *([NOT_VALID, "-"] if Figure.GROWTH in doubted else growth),
+            NOT_VALID if Figure.IMPACT_FORCES in doubted else figure(float(peak)),
         )
     return table
 

@@ -261,7 +261,9 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
 
     raised = [alarm for alarm in monitor.alarms.alarms if alarm.level]
     for alarm in raised:
-        words = raised_words(state_of(alarm), alarm.worst, alarm.limit, alarm.unit, alarm.raised_ns)
+        words = raised_words(
+            state_of(alarm), alarm.worst, alarm.limit, alarm.unit, alarm.raised_ns, alarm.cause
+        )
         console.print(f"{alarm.level.name:<6} {alarm.name}: {words}", soft_wrap=True)
     if not raised:
         console.print("no alarm is raised at the end")

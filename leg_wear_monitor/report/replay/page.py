@@ -5,7 +5,7 @@ import math
 import attrs
 
 from leg_wear_monitor.files import or_nan, share_directory
-from leg_wear_monitor.monitor.alarms import joint_of, raised_words, time_words
+from leg_wear_monitor.monitor.alarms import amount, joint_of, raised_words, time_words
 from leg_wear_monitor.monitor.verdict.decision import decision_of, figures_of
 from leg_wear_monitor.monitor.verdict.situation import COUNTED
 from leg_wear_monitor.monitor.verdict.verdict import guide_to
@@ -72,7 +72,9 @@ def _raised(summary: ReplaySummary, alarm: LegAlarm) -> dict[str, str]:
     symbol, look = LEVEL_LOOKS[alarm.level]
     joint = joint_of(alarm.name)
     name = f"{alarm.name.removesuffix(joint)}{summary.leg.joint_words(joint)}" if joint else alarm.name
-    words = raised_words(alarm.state, alarm.worst, alarm.limit, alarm.unit, alarm.raised_ns)
+    known = summary.clearances.get(joint) if alarm.name == f"clearance {joint}" else None
+    by = known.believed_by if known and known.believed_m == alarm.worst else None
+    words = raised_words(alarm.state, alarm.worst, alarm.limit, alarm.unit, alarm.raised_ns, by)
     doubt = _alarm_doubt(summary, alarm)
     return {
         "symbol": symbol,
@@ -116,8 +118,8 @@ def _row(summary: ReplaySummary, change: AlarmChange) -> tuple[str, ...]:
         alarm.name,
         alarm.level.name,
         alarm.state,
-        value(1.0, alarm.value) if is_valid else NOT_VALID,
-        f"{value(1.0, alarm.limit)} {alarm.unit}".strip(),
+        amount(or_nan(alarm.value), alarm.unit) if is_valid else NOT_VALID,
+        amount(or_nan(alarm.limit), alarm.unit),
     )
 
 

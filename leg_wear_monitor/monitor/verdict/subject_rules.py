@@ -381,11 +381,12 @@ def other_cadence(situation: Situation) -> Sequence[Hit]:
         "commanded": amount(situation.commanded_rpm, "rpm"),
         "tolerance": amount(situation.tolerance_rpm, "rpm"),
     }
-    evidence = Evidence("cadence_rpm", situation.cadence_rpm, situation.commanded_rpm, "rpm")
-    since_ns = alarms[0].since_ns if alarms else 0
-    return [
-        Hit(words=words, since_ns=since_ns, evidence=(evidence, *(e for a in alarms for e in a.evidence)))
-    ]
+    evidence = (
+        Evidence("cadence_rpm", situation.cadence_rpm, math.nan, "rpm"),
+        Evidence("commanded_cadence_rpm", situation.commanded_rpm, math.nan, "rpm"),
+        *(each for alarm in alarms for each in alarm.evidence),
+    )
+    return [Hit(words=words, since_ns=alarms[0].since_ns if alarms else 0, evidence=evidence)]
 
 
 def encoder_faults(situation: Situation) -> Sequence[Hit]:

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from leg_wear_monitor.dashboard.source import evidence_words
 from leg_wear_monitor.estimate.cause import Cause, Change, NamedCause, TorqueExplanation
 from leg_wear_monitor.monitor import alarm_specs
 from leg_wear_monitor.monitor.alarms import (
@@ -346,6 +347,17 @@ def test_an_alarm_of_the_lag_that_is_past_gives_no_value_to_set() -> None:
     verdict = judged(alarms=(alarm("torque_lag", present=Level.OK),), cadence_rpm=60.0)
     assert verdict.why.endswith("is 2 s (limit 1 s) (since 0.000 s; now within its limit)")
     assert "correct crank.offset_rad if its angle is wrong" in verdict.do
+
+
+def test_the_commanded_cadence_is_no_limit() -> None:
+    """A leg at 59.9 rpm was shown with a limit of 60 rpm."""
+    departs = alarm("cadence", value=20.0, worst=20.0, limit=6.0)
+    verdict = judged(alarms=(departs,), cadence_rpm=59.9, commanded_rpm=60.0, tolerance_rpm=6.0)
+    assert list(map(evidence_words, verdict.evidence)) == [
+        "cadence 59.9 rpm",
+        "commanded cadence 60 rpm",
+        "departure from the commanded cadence 20 rpm (limit 6 rpm)",
+    ]
 
 
 def test_a_reason_to_stop_is_not_hidden_by_an_input_that_fails() -> None:

@@ -98,6 +98,24 @@ def test_the_page_of_the_stop_shows_the_estimates_and_links_the_guide(knocked):
         assert re.search(f'{name}="#?guide-a-joint-is-at-its-limit"', page)
 
 
+GUIDES = (
+    "howto/repair.md",
+    "howto/verdict/joint_at_limit.md",
+    "howto/fleet.md",
+    "explanation/diagnosis.md",
+)
+
+
+@pytest.mark.parametrize("guide", GUIDES)
+def test_what_the_guides_say_of_this_recording_is_about_what_it_gives(knocked, guide):
+    joint = json.loads((knocked[0] / "out" / "summary.json").read_text())["clearances"]["G"]
+    value, sigma = (1e3 * joint[name] for name in ("believed_m", "believed_sigma_m"))
+    text = (share_directory() / "docs" / guide).read_text(encoding="utf-8")
+    (told,) = re.findall(r"(1\.\d+) mm ± (0\.\d+) mm", text)
+    assert abs(float(told[0]) - value) < 0.5 * sigma
+    assert float(told[1]) == pytest.approx(sigma, rel=0.3)
+
+
 def test_a_measurement_is_compared_with_what_the_torque_shows(run, ledger):
     agrees = run("measure", "knee", "2.0", "--sigma", "0.05", "--ledger", ledger)
     assert agrees.exit_code == 1  # it is at its limit

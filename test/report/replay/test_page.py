@@ -12,7 +12,7 @@ from made_up_summary import made_up_summary
 
 from leg_wear_monitor.playback.result import ReplayLeg, ReplayStatus, WornDepth
 from leg_wear_monitor.report.page import page_html, template_text
-from leg_wear_monitor.report.replay.joints import joint_rows, joint_views
+from leg_wear_monitor.report.replay.joints import joint_rows, joint_views, leg_drawing
 from leg_wear_monitor.report.replay.page import replay_page
 from leg_wear_monitor.state import AlarmChange, Figure, FootLoad, Level, State
 
@@ -187,6 +187,20 @@ def test_the_marks_of_the_drawing_say_how_much_of_the_limit_is_used():
     assert drawing["aria-label"] == "The leg leg: joint A 67 % used; joint B (knee) 33 % used"
     drawing = next(svg for svg in page_of(doubted(*Figure)).of("svg") if svg.get("role") == "img")
     assert drawing["aria-label"] == "The leg leg: joint A 67 % used; joint B (knee) not valid"
+
+
+@pytest.mark.parametrize("label", ["hip bearing, thigh side, outer", "M" * 30, "knee", ""])
+def test_a_long_label_has_several_lines_beside_the_drawing(label):
+    """It ended at the edge of the drawing, without the part that tells two bearings apart."""
+    summary = made_up_summary()
+    joints = {name: attrs.evolve(joint, label=label) for name, joint in summary.leg.joints.items()}
+    summary = attrs.evolve(summary, leg=attrs.evolve(summary.leg, joints=joints))
+    drawn = leg_drawing(summary, joint_views(summary))
+    lines = re.findall(r'<tspan class="label"[^>]*>([^<]*)<', drawn)
+    assert max(map(len, lines), default=0) <= 17
+    assert "".join(lines).replace(" ", "") == 2 * label.replace(" ", "")
+    rows = [float(y) for y in re.findall(r'<text class="(?:name|words)" x="[\d.]+" y="([\d.]+)"', drawn)]
+    assert min(np.diff(rows)) >= 16.9  # one below the other
 
 
 def test_a_summary_without_the_leg_s_shape_has_a_page():

@@ -87,7 +87,9 @@ def _raised(summary: ReplaySummary, alarm: LegAlarm) -> dict[str, str]:
 
 
 def _alarm_doubt(summary: ReplaySummary, alarm: LegAlarm) -> str:
-    """Why the value of an alarm does not hold; empty if it does: that of an estimate does."""
+    """Why the value of an alarm does not hold; empty if it does: an estimate, or the reason of a verdict."""
+    if alarm.name in (each.name for each in summary.verdict.evidence[:1]):
+        return ""
     kind, _, subject = alarm.name.partition(" ")
     figure, clearance = _FIGURES.get(kind), summary.clearances.get(subject)
     if figure is Figure.CLEARANCES and clearance and clearance.believed_by not in (None, COUNTED):

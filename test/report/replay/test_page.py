@@ -13,8 +13,8 @@ from made_up_summary import made_up_summary
 from leg_wear_monitor.playback.result import ReplayLeg, ReplayStatus, WornDepth
 from leg_wear_monitor.report.page import page_html, template_text
 from leg_wear_monitor.report.replay.joints import joint_rows, joint_views, leg_drawing
-from leg_wear_monitor.report.replay.page import replay_page
-from leg_wear_monitor.state import AlarmChange, Figure, FootLoad, Level, State
+from leg_wear_monitor.report.replay.page import raised_alarms, replay_page
+from leg_wear_monitor.state import AlarmChange, Evidence, Figure, FootLoad, Level, State
 
 pytestmark = pytest.mark.plain
 
@@ -130,6 +130,19 @@ def test_every_raised_alarm_is_unfolded_with_its_level():
         assert f"ERROR {name}" in re.sub(r"\s+", " ", text)
     assert "ERROR impact_force" in text and "ERROR growth" in text
     assert "input_gaps" not in text
+
+
+def test_what_the_verdict_gives_as_its_reason_is_not_hidden_beside_the_alarm():
+    summary = doubted(
+        Figure.IMPACT_FORCES, Figure.GROWTH, evidence=(Evidence("impact_force A", 1e4, 5e3, "N"),)
+    )
+    alarm, unit = summary.alarms.now[0], {"level": Level.ERROR, "worst": 1e4, "limit": 5e3, "unit": "N"}
+    raised = tuple(attrs.evolve(alarm, name=name, **unit) for name in ("impact_force A", "impact_force B"))
+    summary = attrs.evolve(summary, alarms=attrs.evolve(summary.alarms, now=raised))
+    of_a, of_b = re.findall("<li.*?</li>", raised_alarms(summary, otherwise=""))
+    assert "worst 10000 N" in of_a and "not valid" not in of_a
+    assert "worst" not in of_b and "not valid" in of_b
+    assert "impact forces: see the verdict" not in visible(page_of(summary))  # in the verdict itself
 
 
 def test_what_the_verdict_does_not_believe_is_greyed_and_no_number():

@@ -47,7 +47,7 @@ from leg_wear_monitor.report.replay.charts import (
 from leg_wear_monitor.report.replay.forecast_section import forecast_section, wear_section
 from leg_wear_monitor.report.replay.joints import joints_and_leg
 from leg_wear_monitor.report.replay.motion import motion_section
-from leg_wear_monitor.state import AlarmChange, Figure, LegAlarm, Level
+from leg_wear_monitor.state import AlarmChange, Figure, JointClearance, LegAlarm, Level
 
 # Alarms: those that are raised at the end, and all changes over time.
 
@@ -72,8 +72,7 @@ def _raised(summary: ReplaySummary, alarm: LegAlarm) -> dict[str, str]:
     symbol, look = LEVEL_LOOKS[alarm.level]
     joint = joint_of(alarm.name)
     name = f"{alarm.name.removesuffix(joint)}{summary.leg.joint_words(joint)}" if joint else alarm.name
-    known = summary.clearances.get(joint) if alarm.name == f"clearance {joint}" else None
-    by = known.believed_by if known and known.believed_m == alarm.worst else None
+    by = _source(summary.clearances.get(joint), alarm.worst) if alarm.name == f"clearance {joint}" else None
     words = raised_words(alarm.state, alarm.worst, alarm.limit, alarm.unit, alarm.raised_ns, by)
     doubt = _alarm_doubt(summary, alarm)
     return {
@@ -84,6 +83,14 @@ def _raised(summary: ReplaySummary, alarm: LegAlarm) -> dict[str, str]:
         "doubt": doubt,
         "since": f"since {since_words(summary, alarm.raised_ns)}",
     }
+
+
+def _source(known: JointClearance | None, clearance_m: float | None) -> str | None:
+    """Who says that a joint has a clearance: the verdict may rest on another one by now."""
+    if known is None or clearance_m is None:
+        return None
+    sources = [(known.believed_m, known.believed_by), *((known.seen_m, by) for by in known.seen_by)]
+    return next((by for value_m, by in sources if value_m == clearance_m), None)
 
 
 def _alarm_doubt(summary: ReplaySummary, alarm: LegAlarm) -> str:

@@ -132,6 +132,20 @@ def test_every_raised_alarm_is_unfolded_with_its_level():
     assert "input_gaps" not in text
 
 
+@pytest.mark.parametrize("by", ["believed", "seen"])
+def test_the_last_estimate_of_a_clearance_is_not_called_the_worst(by):
+    """Also where the verdict rests on what somebody measured since."""
+    values = {"believed_m": 3e-4, "believed_by": "measured", "seen_m": None, "seen_by": ()}
+    values |= {f"{by}_m": 1.65e-3, f"{by}_by": "torque" if by == "believed" else ("torque",)}
+    summary = doubted()
+    clearances = summary.clearances | {"A": attrs.evolve(summary.clearances["A"], **values)}
+    alarm = {"name": "clearance A", "level": Level.ERROR, "worst": 1.65e-3, "limit": 6e-4, "unit": "m"}
+    now = (attrs.evolve(summary.alarms.now[0], **alarm),)
+    alarms = attrs.evolve(summary.alarms, now=now)
+    told = raised_alarms(attrs.evolve(summary, clearances=clearances, alarms=alarms), otherwise="")
+    assert "last estimate 1.65 mm, limit 0.6 mm" in told and "worst" not in told
+
+
 def test_what_the_verdict_gives_as_its_reason_is_not_hidden_beside_the_alarm():
     summary = doubted(
         Figure.IMPACT_FORCES, Figure.GROWTH, evidence=(Evidence("impact_force A", 1e4, 5e3, "N"),)

@@ -336,7 +336,7 @@ class LegAlarm:
     limit : float or None
         Limit of the level ERROR, in ``unit``.
     worst : float or None
-        Worst value since it was raised, in ``unit``.
+        Worst value since it was raised, in ``unit``; of estimates and measurements of a clearance, the last.
     unit : str
         Unit of the values, SI; empty for a fraction.
     raised_ns : int

@@ -261,7 +261,9 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
 
     raised = [alarm for alarm in monitor.alarms.alarms if alarm.level]
     for alarm in raised:
-        words = raised_words(state_of(alarm), alarm.worst, alarm.limit, alarm.unit, alarm.raised_ns)
+        words = raised_words(
+            state_of(alarm), alarm.worst, alarm.limit, alarm.unit, alarm.raised_ns, alarm.cause
+        )
         console.print(f"{alarm.level.name:<6} {alarm.name}: {words}", soft_wrap=True)
     if not raised:
         console.print("no alarm is raised at the end")
@@ -293,18 +295,21 @@ def _print_verdict(console: Console, state: "LegState", joint_words: Callable[[s
 
 
 def _joints(result: "ReplayResult") -> Table:
-    """Counted clearance, growth and peak force."""
+    """Counted clearance, growth and peak force, as far as the verdict believes them."""
+    from leg_wear_monitor.state import Figure
+
+    doubted = result.monitor.verdict.verdict.not_valid
     columns = ("\njoint", "counted clearance\nmm", "growth\npm/cycle", "±\npm/cycle", "peak\nN")
     table = plain_table(columns, 1)
     peaks = np.fmax.reduce(result.history.joint_column("peak_force_n"))
     last = result.history.last
     for joint, peak in zip(last.joints if last else (), peaks, strict=True):
+        growth = [_known(1.0e12, each) for each in (joint.growth_m_per_cycle, joint.growth_error_m_per_cycle)]
         table.add_row(
             result.monitor.mechanism.joint_words(joint.joint),
             _counted(joint),
-            _known(1.0e12, joint.growth_m_per_cycle),
-            _known(1.0e12, joint.growth_error_m_per_cycle),
-            figure(float(peak)),
+            *([NOT_VALID, "-"] if Figure.GROWTH in doubted else growth),
+            NOT_VALID if Figure.IMPACT_FORCES in doubted else figure(float(peak)),
         )
     return table
 

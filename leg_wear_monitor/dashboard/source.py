@@ -12,6 +12,7 @@ import numpy as np
 from leg_wear_monitor.dashboard.motion import MotionFeed
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.alarm_specs import QUANTITIES
 from leg_wear_monitor.monitor.alarms import ADVICE, amount
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
@@ -228,8 +229,8 @@ def with_evidence(banner: Banner, evidence: Sequence[Evidence]) -> Banner:
 
 
 def evidence_words(evidence: Evidence) -> str:
-    """A value and its limit, such as ``clearance G 0.62 mm (limit 0.6 mm)``."""
-    name = evidence.name.replace("_", " ").removesuffix(f" {evidence.unit}")
+    """A value and its limit, such as ``clearance G 0.62 mm (limit 0.6 mm)``; an alarm's, by its noun."""
+    name = QUANTITIES.get(evidence.name) or evidence.name.replace("_", " ").removesuffix(f" {evidence.unit}")
     value = "unknown" if evidence.value is None else amount(evidence.value, evidence.unit)
     limit = "" if evidence.limit is None else f" (limit {amount(evidence.limit, evidence.unit)})"
     return f"{name} {value}{limit}"

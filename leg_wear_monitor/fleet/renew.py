@@ -3,7 +3,7 @@
 import hashlib
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
@@ -19,10 +19,11 @@ from leg_wear_monitor.fleet.directory import LegDirectory, json_object
 from leg_wear_monitor.fleet.learning import LearnedPair, LearnedPart, Part, learn, parts_of
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.alarm_specs import CLEARANCE
+from leg_wear_monitor.monitor.alarm_specs import CLEARANCE, with_its_unit
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.diagnosis.state import DiagnosisState
 from leg_wear_monitor.monitor.forecast.forecast import ForecastBasis, JointForecast
 from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
@@ -32,14 +33,16 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     LearnedJoint,
     LearnedPriors,
 )
-from leg_wear_monitor.monitor.judgement import joint_clearance, life_of, with_measured
+from leg_wear_monitor.monitor.judgement import answers, joint_clearance, leg_alarm, life_of, with_measured
 from leg_wear_monitor.monitor.ledger.entry import Entry, Measurement
 from leg_wear_monitor.monitor.ledger.file import copy_of, measurements_of
 from leg_wear_monitor.monitor.ledger.ledger import Ledger, open_ledger
+from leg_wear_monitor.monitor.status import verdict_status
 from leg_wear_monitor.monitor.verdict.situation import JointSituation, KnownClearance
-from leg_wear_monitor.playback.result import summary_of
+from leg_wear_monitor.monitor.verdict.verdict import has_changed
+from leg_wear_monitor.playback.result import ReplayStatus, summary_of
 from leg_wear_monitor.playback.summary import joint_forecast, leg_forecast
-from leg_wear_monitor.state import JointClearance, Verdict
+from leg_wear_monitor.state import Figure, JointClearance, LegAlarm, Level, TorqueDiagnosis, Verdict
 
 # What a fleet has learned, as files: ``learning.json``, and for each leg the file of ``forecast.priors``.
 
@@ -262,9 +265,9 @@ def is_renewal_due(directory: LegDirectory) -> bool:
 def renew(leg: FleetLeg, directory: LegDirectory) -> str:
     """Make the forecast of a leg again, in its last record and its summary; why not, empty if it is made.
 
-    Clearances, verdict and remaining life follow the measurements in its ledger, its replaced parts and
-    acknowledged alarms, and what the fleet has learned. Growth is that at the end of its last recording, and
-    not known of a part that was replaced since. The ledger is left as it is.
+    Clearances, alarms, verdict and remaining life follow the measurements in its ledger, its replaced parts
+    and acknowledged alarms, and what the fleet has learned. Growth and torque are those at the end of its
+    last recording, and not known after a part was replaced. The ledger is left as it is.
     """
     try:
         _renew(leg, directory)
@@ -287,9 +290,13 @@ def _renew(leg: FleetLeg, directory: LegDirectory) -> None:
         replaced_ns = [replaced.get(joint, 0) for joint in mechanism.clearance_joints]
         known = ledger.measurements, replaced_ns, ledger.corrections
         forecaster = Forecaster(mechanism, leg.used_config.forecast, *known)
-    if now is not None and _differs(now, verdict):
+    if now is not None and has_changed(verdict, now):
         verdict = now
+    if Figure.FORECAST in verdict.not_valid:
+        basis = attrs.evolve(basis, is_valid=False)
+    recorded = before
     basis, before = _with_parts(entry, mechanism, basis, before)
+    new_parts = tuple(joint for joint in before if before[joint] is not recorded[joint])
     told = forecaster.again(basis, replaced_ns)
     forecasts = dict(zip(mechanism.clearance_joints, told.joints, strict=True))
     measured = zip(mechanism.clearance_joints, forecaster.last_measured(replaced_ns), strict=True)
@@ -305,13 +312,22 @@ def _renew(leg: FleetLeg, directory: LegDirectory) -> None:
         summary,
         verdict=verdict,
         joints={
-            joint: attrs.evolve(one, forecast=joint_forecast(forecasts[joint], verdict))
+            joint: attrs.evolve(
+                one,
+                forecast=joint_forecast(forecasts[joint], verdict),
+                **(_NEW_PART if joint in new_parts else {}),
+            )
             for joint, one in summary.joints.items()
         },
         clearances=clearances,
         life=life,
+        life_answers=answers(forecasts, told.leg),
+        first_probability={} if Figure.FORECAST in verdict.not_valid else told.leg.first_probability,
         forecast=leg_forecast(told.leg, verdict),
         measurements=forecaster.measurements,
+        alarms=attrs.evolve(summary.alarms, now=_alarms(entry, summary.alarms.now)),
+        diagnosis=_diagnosis(new_parts) if new_parts else summary.diagnosis,
+        status=_status(summary.status, verdict, mechanism.clearance_joints, new_parts),
     )
     write_whole(directory.summary, summary.to_json().encode())
     found = {"verdict": verdict, "clearances": clearances, "life": life, "knows": knows}
@@ -341,9 +357,45 @@ def _with_parts(
     return attrs.evolve(basis, conditions=tuple(conditions), observed=tuple(observed)), clearances
 
 
-def _differs(one: Verdict, other: Verdict) -> bool:
-    """Whether two verdicts say something else; the values of their evidence may be of another time."""
-    return (one.state, one.fault_code, one.joints) != (other.state, other.fault_code, other.joints)
+# what is not known yet of a part that was replaced since the recording
+_NEW_PART: dict[str, Any] = dict.fromkeys(
+    ("opened_m", "growth_m_per_cycle", "growth_error_m_per_cycle", "growth_mps", "encoders")
+)
+
+
+def _alarms(entry: Entry | None, before: Iterable[LegAlarm]) -> tuple[LegAlarm, ...]:
+    """All alarms of a leg as its ledger has them now: it keeps those that are raised, without last values."""
+    raised = {alarm.name: leg_alarm(with_its_unit(alarm)) for alarm in (entry.alarms if entry else ())}
+    gone: dict[str, Any] = {"level": Level.OK, "state": "OK", "value": None, "worst": None, "raised_ns": 0}
+    now = []
+    for alarm in before:
+        if one := raised.pop(alarm.name, None):
+            is_same = one.raised_ns == alarm.raised_ns
+            now.append(attrs.evolve(one, value=alarm.value if is_same else None))
+        else:
+            now.append(alarm if alarm.level is Level.OK else attrs.evolve(alarm, **gone))
+    return (*now, *raised.values())
+
+
+def _diagnosis(new_parts: Sequence[str]) -> TorqueDiagnosis:
+    """The drive torque has shown nothing of new parts yet."""
+    words = f"joint {', '.join(new_parts)} was replaced after the recording"
+    return TorqueDiagnosis(state=DiagnosisState.WAITING.value, reason=words)
+
+
+def _status(
+    before: Iterable[ReplayStatus], verdict: Verdict, joints: Iterable[str], new_parts: Sequence[str]
+) -> tuple[ReplayStatus, ...]:
+    """The verdict's line, and those of the recording that still hold: of its input, gait and load.
+
+    Alarms, clearances and lives are in the summary itself.
+    """
+    gone = {"verdict", "alarms", *(f"joint {joint}" for joint in joints)}
+    if new_parts:
+        gone |= {"torque", "diagnosis", "encoders"}
+    told = verdict_status(verdict)
+    line = ReplayStatus(**{name: getattr(told, name) for name in attrs.fields_dict(ReplayStatus)})
+    return (line, *(status for status in before if status.name not in gone))
 
 
 def _clearance(

@@ -356,7 +356,12 @@ def state_of(alarm: Alarm) -> str:
     return f"{present}, acknowledged" if alarm.acknowledged else present
 
 
-def raised_words(state: str, worst: float | None, limit: float | None, unit: str, raised_ns: int) -> str:
+_LAST = {"torque": "last estimate", "encoders": "last estimate", "measured": "last measured"}
+
+
+def raised_words(
+    state: str, worst: float | None, limit: float | None, unit: str, raised_ns: int, by: str | None = None
+) -> str:
     """Description of a raised alarm, such as ``latched, worst 0.42, limit 0.05, since ...``.
 
     Parameters
@@ -368,9 +373,11 @@ def raised_words(state: str, worst: float | None, limit: float | None, unit: str
     unit : str
     raised_ns : int
         Stamp at which it was raised.
+    by : str, optional
+        Source of a clearance: of estimates and measurements, the last one is kept, not the worst.
     """
     words = [state]
-    for name, value in (("worst", worst), ("limit", limit)):
+    for name, value in ((_LAST.get(by or "", "worst"), worst), ("limit", limit)):
         if value is not None and not math.isnan(value):
             words.append(f"{name} {amount(value, unit)}")
     return ", ".join([*words, f"since {time_words(raised_ns)}"])

@@ -213,7 +213,9 @@ def leg_state(parts: Parts, findings: Sequence[Finding]) -> LegState:
         load=_load(parts.foot_load.load if parts.foot_load else FootLoad(), diagnosis),
         diagnosis=_diagnosis(last, diagnosis, explained),
         alarms=LegAlarms(now=tuple(map(leg_alarm, alarms.values()))),
-        life_answers=_answers(last),
+        life_answers=answers({joint.joint: joint.forecast for joint in last.joints}, last.forecast)
+        if last
+        else {},
         first_probability=last.forecast.first_probability
         if last and last.forecast and Figure.FORECAST not in verdict.not_valid
         else {},
@@ -281,14 +283,9 @@ def life_of(
     return {name: life_hours(each.hours) if each else None for name, each in told.items()}
 
 
-def _answers(last: CycleReport | None) -> dict[str, str]:
-    """What the last forecast can say of each joint and of the leg."""
-    if last is None:
-        return {}
-    told: dict[str, JointForecast | LegForecast | None] = {
-        **{joint.joint: joint.forecast for joint in last.joints},
-        "leg": last.forecast,
-    }
+def answers(joints: Mapping[str, JointForecast | None], leg: LegForecast | None) -> dict[str, str]:
+    """What their forecasts can say of each joint and of the ``leg``."""
+    told: dict[str, JointForecast | LegForecast | None] = {**joints, "leg": leg}
     return {name: each.answer.value for name, each in told.items() if each is not None}
 
 

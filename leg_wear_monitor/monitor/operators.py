@@ -204,6 +204,7 @@ def measure(
     renew_forecast(parts)
     _compare(parts, joint, stamp_ns)
     update_verdict(parts)
+    renew_forecast(parts)  # without a remaining life, if the verdict rests on what it does not use
     parts.keep()
     return found
 

@@ -505,7 +505,8 @@ class ReplaySummary(LegState, Drawable):
     walked : tuple of WalkedLoad
         Walking since the start of the ledger, or of the replay without one, by the foot load that acted.
     status : tuple of ReplayStatus
-        Lines of /diagnostics at the end.
+        Lines of /diagnostics at the end; after a measurement or a repair in the ledger of a fleet's leg, the
+        verdict's, and those of the recording that still hold.
     lost : Lost
         Samples and time that were not used.
     sampling : ReplaySampling or None

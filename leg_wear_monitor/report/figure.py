@@ -173,6 +173,7 @@ def life_picture(life: Life) -> bytes:
     grid = figure.add_gridspec(2, 2 * joints, height_ratios=(1.2, 1.0))
     clearance, peak = figure.add_subplot(grid[0, :joints]), figure.add_subplot(grid[0, joints:])
     draw_life(clearance, life)
+    clearance.plot([], [], color=INK, ls="--", lw=0.7, label="deepest")
     for k in range(joints):
         peak.plot(life.cycles, 1e-3 * life.peak_force_n[:, k], color=_colour(k))
         _profiles(figure.add_subplot(grid[1, 2 * k : 2 * k + 2]), life, k, _colour(k))
@@ -210,7 +211,8 @@ def _profiles(axes: Axes, life: Life, k: int, colour: str) -> None:
         at = int(np.abs(life.cycles - time).argmin())
         axes.plot(angle, 1e6 * life.depth[at, k, 0], color=colour, alpha=shade / _PROFILES, lw=0.9)
     axes.set(xlim=(0.0, 360.0), xticks=(0.0, 180.0, 360.0))
-    axes.set_title(f"{life.clearance_joints[k]}: bushing [µm] by angle [°]", fontsize=SMALL, color=INK)
+    title = f"{life.clearance_joints[k]}: bushing [µm] by angle [°],\nat fifths of the life, darker later"
+    axes.set_title(title, fontsize=SMALL, color=INK)
     tidy(axes)
 
 

@@ -423,6 +423,7 @@ def template_text(name: str) -> str:
 
 
 NOT_VALID = "not valid"
+_SEE_VERDICT = "see the verdict"
 
 
 def not_valid(verdict: Verdict, *figures: Figure) -> str:
@@ -436,7 +437,7 @@ def reason(verdict: Verdict) -> str:
     """Why the values of a verdict's list are not valid, in general words."""
     if Figure.CLEARANCES in verdict.not_valid:
         return "leg differs from its model"
-    return "leg not monitored" if verdict.state is State.NOT_MONITORED else "see the verdict"
+    return "leg not monitored" if verdict.state is State.NOT_MONITORED else _SEE_VERDICT
 
 
 def since_words(summary: ReplaySummary, stamp_ns: int) -> str:
@@ -445,6 +446,11 @@ def since_words(summary: ReplaySummary, stamp_ns: int) -> str:
     if not begin <= stamp_ns <= end:
         return time_words(stamp_ns)
     return f"{time_words(stamp_ns)}, {duration((stamp_ns - begin) / 1.0e9)} after the recording's begin"
+
+
+def is_of_recording(summary: ReplaySummary) -> bool:
+    """Whether the verdict was known at the recording's end: nothing was measured or entered later."""
+    return summary.verdict.since_ns <= summary.recording.end_ns
 
 
 def duration(seconds: float) -> str:
@@ -491,7 +497,8 @@ def verdict_banner(summary: ReplaySummary, guide: str, certainty: str) -> Banner
         notes.append(("Since", since_words(summary, verdict.since_ns)))
     if verdict.not_valid:
         figures = ", ".join(figure.words for figure in verdict.not_valid)
-        notes.append(("Not valid", f"{figures}: {reason(verdict)}"))
+        why = reason(verdict)
+        notes.append(("Not valid", figures if why == _SEE_VERDICT else f"{figures}: {why}"))
     links = {"Do": ("step by step", guide)}
     if figures_of(summary):
         links[HOW_SURE] = ("measured on what", certainty)

@@ -4,10 +4,13 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from leg_wear_monitor import load_mechanism
+from leg_wear_monitor.cli.verbs.life import life_lines
 from leg_wear_monitor.life import life as many_lives
+from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.monitor.forecast.forecaster import read_lives
 from leg_wear_monitor.monitor.ledger.entry import fingerprint
 
@@ -97,6 +100,21 @@ def test_life_under_a_duty_tells_hours_days_and_growth_by_load(run):
         assert f"{end['hours']:.3g} h, {end['days']:.3g} days of 8 h" in result.stdout
         assert (end["hours"], end["days"]) == pytest.approx((end["cycles"] / 3600.0, end["cycles"] / 28800.0))
     assert found["end"]["leg"] == min((found["end"][joint] for joint in "AG"), key=lambda end: end["cycles"])
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("points", [1, 2, 3, 11, 12, 40])
+def test_the_table_of_a_life_has_its_first_and_its_last_point(points):
+    """With fewer than 12 points, its end was missing: the worn leg."""
+    column, nothing = np.linspace(3e-4, 6e-4, points)[:, None], np.zeros((points, 1))
+    life = Life(
+        clearance_joints=("A",), cycles=np.arange(points) + 1.0, clearance_m=column, clearance_max_m=column,
+        worst_sector_deg=nothing, peak_force_n=nothing, growth_m_per_cycle=nothing,
+        growth_error_m_per_cycle=nothing, error_m=np.zeros(points), depth=np.zeros((points, 1, 2, 4)),
+        rubbing_j_per_cycle=nothing, period_s=1.0, duty=None, part_growth_m_per_cycle=nothing[:, None],
+    )  # fmt: skip
+    rows = [int(line.split()[0]) for line in life_lines(life, 1.0, ["A"])[2:-2]]
+    assert (rows[0], rows[-1], len(set(rows))) == (1, points, min(points, 12))
 
 
 def test_life_refuses_what_cannot_be(run):

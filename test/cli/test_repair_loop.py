@@ -10,6 +10,7 @@ import pytest
 
 from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.fleet.overview import load_overview
+from leg_wear_monitor.state import Level
 
 BAGS = share_directory() / "bags"
 
@@ -66,6 +67,20 @@ def test_the_verdict_in_the_ledger_names_the_same_value(knocked):
     assert (why, worst) == (found["verdict"]["why"], found["clearances"]["G"]["believed_m"])
 
 
+def _alarms(ledger):
+    """Raised alarms in a ledger: level, and whether somebody has acknowledged it."""
+    with closing(sqlite3.connect(ledger)) as db:
+        rows = db.execute("SELECT kind || ' ' || subject, level, acknowledged FROM alarm").fetchall()
+    return {name.strip(): (Level(level).name, bool(seen)) for name, level, seen in rows}
+
+
+def _alarms_in(home):
+    """The same of the summary that a leg of the fleet has."""
+    now = json.loads((home / "fleet/legs/a/summary.json").read_text())["alarms"]["now"]
+    raised = [each for each in now if each["level"] != "OK"]
+    return {each["name"]: (each["level"], "acknowledged" in each["state"]) for each in raised}
+
+
 def _ends(column):
     return column, column[::-1]
 
@@ -81,6 +96,24 @@ def test_the_page_of_the_stop_shows_the_estimates_and_links_the_guide(knocked):
     assert "Clearances by estimate" in page
     for name in ("href", "id"):  # the guide is in the page
         assert re.search(f'{name}="#?guide-a-joint-is-at-its-limit"', page)
+
+
+GUIDES = (
+    "howto/repair.md",
+    "howto/verdict/joint_at_limit.md",
+    "howto/fleet.md",
+    "explanation/diagnosis.md",
+)
+
+
+@pytest.mark.parametrize("guide", GUIDES)
+def test_what_the_guides_say_of_this_recording_is_about_what_it_gives(knocked, guide):
+    joint = json.loads((knocked[0] / "out" / "summary.json").read_text())["clearances"]["G"]
+    value, sigma = (1e3 * joint[name] for name in ("believed_m", "believed_sigma_m"))
+    text = (share_directory() / "docs" / guide).read_text(encoding="utf-8")
+    (told,) = re.findall(r"(1\.\d+) mm ± (0\.\d+) mm", text)
+    assert abs(float(told[0]) - value) < 0.5 * sigma
+    assert float(told[1]) == pytest.approx(sigma, rel=0.3)
 
 
 def test_a_measurement_is_compared_with_what_the_torque_shows(run, ledger):
@@ -107,10 +140,11 @@ def test_a_repair_in_the_ledger_of_a_fleet_shows_at_the_next_update(run, tmp_pat
     leg = f"{{id: a, recordings: {BAGS / 'knocking.mcap'}, config: {BAGS / 'knocking.yaml'}}}"
     (tmp_path / "fleet.yaml").write_text(f"legs: [{leg}]\n")
     update = ["fleet", "update", str(tmp_path / "fleet.yaml"), "--workers", "1"]
-    ledger = str(tmp_path / "fleet/legs/a/ledger")
+    ledger, config = str(tmp_path / "fleet/legs/a/ledger"), ("--config", str(BAGS / "knocking.yaml"))
     assert "legs: 1 stop" in run(*update).stdout
     assert "everything is in the ledger already" in run(*update).stdout
     before = load_overview(tmp_path / "fleet").leg("a")
+    assert _alarms(ledger) == _alarms_in(tmp_path) != {}
     assert run("reset", "knee", "--ledger", ledger).exit_code == 0
     assert "forecasts: 1 renewed" in run(*update).stdout
     after = load_overview(tmp_path / "fleet").leg("a")
@@ -121,6 +155,21 @@ def test_a_repair_in_the_ledger_of_a_fleet_shows_at_the_next_update(run, tmp_pat
     assert (knee.counted_m, knee.seen_m) == (knee.new_m, None)
     assert knee.believed_m == pytest.approx(knee.new_m, rel=0.1)
     assert after.clearances["A"].counted_m == before.clearances["A"].counted_m
+    assert _alarms(ledger) == _alarms_in(tmp_path) == {}  # those of the old part stayed on the page
+    found = json.loads((tmp_path / "fleet/legs/a/summary.json").read_text())
+    lines = {line["name"]: line for line in found["status"]}
+    assert lines["verdict"]["message"].startswith("watch joint G") and "input" in lines
+    assert not {"joint G", "alarms", "torque", "diagnosis"} & lines.keys()
+    assert (found["diagnosis"]["state"], found["joints"]["G"]["growth_mps"]) == ("waiting", None)
+    assert run("measure", "B", "0.63", "--sigma", "0.006", "--ledger", ledger, *config).exit_code == 1
+    assert "forecasts: 1 renewed" in run(*update).stdout
+    assert _alarms(ledger) == _alarms_in(tmp_path) == {"clearance B": ("ERROR", False)}
+    found = json.loads((tmp_path / "fleet/legs/a/summary.json").read_text())
+    assert found["verdict"]["fault_code"] == "CLEARANCE_B" and set(found["life"].values()) == {None}
+    assert found["status"][0]["level"] == "ERROR"
+    assert run("fleet", "report", str(tmp_path / "fleet.yaml")).exit_code == 0
+    page = (tmp_path / "fleet/legs/a/report.html").read_text()
+    assert "ERROR clearance B" in page and "The verdict rests on what was entered" in page
     assert "everything is in the ledger already" in run(*update).stdout
     assert run("acknowledge", "--ledger", ledger).exit_code == 0
     assert "forecasts: 1 renewed" in run(*update).stdout

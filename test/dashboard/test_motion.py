@@ -70,5 +70,6 @@ def test_frames_go_to_who_asks_and_the_viewer_is_forgotten(leg, served):
 def test_the_page_has_the_leg_that_frames_move(leg):
     content = leg.content()
     assert 'id="leg-slider"' in content.regions["motion"]
+    assert "No whole gait cycle since this page was opened." in content.regions["motion"]  # of its torque
     assert "<style" not in content.regions["motion"]  # the page's policy has its own style only
     assert "EventSource" in content.html and "prefers-reduced-motion" in content.html

@@ -58,10 +58,11 @@ def messages(path: Path, decoder: Any = None) -> Iterator[tuple[str, str, Any]]:
 
 @attrs.frozen
 class Replayed:
-    """A recording, its exit code, the directory that was written, its summary, and what it should be."""
+    """A recording, its exit code, what was printed and written, its summary, and what it should be."""
 
     path: Path
     code: int
+    printed: str
     out: Path
     found: dict[str, Any]
     expected: dict[str, Any]
@@ -76,7 +77,7 @@ def bag(request: pytest.FixtureRequest, run, tmp_path_factory: pytest.TempPathFa
     path, out = BAGS / f"{request.param}.mcap", tmp_path_factory.mktemp(request.param)
     done = run("replay", path, "--config", path.with_suffix(".yaml"), "--out", out, "--fail-on", "verdict")
     found = json.loads((out / "summary.json").read_text())
-    return Replayed(path, done.code, out, found, json.loads(path.with_suffix(".json").read_text()))
+    return Replayed(path, done.code, done.out, out, found, json.loads(path.with_suffix(".json").read_text()))
 
 
 def test_every_message_is_taken_or_counted(bag: Replayed) -> None:
@@ -120,6 +121,17 @@ def test_the_verdict_is_the_one_that_is_written_beside(bag: Replayed) -> None:
         is_at_limit = joint["believed_m"] is not None and joint["believed_m"] >= joint["limit_m"]
         assert is_at_limit == (expected["state"] == "stop" and name in verdict["joints"])
         assert 0.99 * joint["new_m"] < joint["counted_m"] < joint["limit_m"]
+
+
+def test_the_terminal_gives_no_number_that_the_verdict_does_not_believe(bag: Replayed) -> None:
+    not_valid = bag.found["verdict"]["not_valid"]
+    (row,) = (line for line in bag.printed.splitlines() if line.startswith("A (hip, drive side)  "))
+    clearance, *others = re.split(r"\s{2,}", row)[1:]
+    assert (clearance == "not valid") == ("clearances" in not_valid)
+    if clearance != "not valid":
+        growth, _, peak = others
+        assert (growth == "not valid") == ("growth" in not_valid)
+        assert (peak == "not valid") == ("impact_forces" in not_valid)
 
 
 def test_the_summary_has_no_fields_but_those_that_are_kept(bag: Replayed, unknown) -> None:

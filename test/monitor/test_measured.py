@@ -4,8 +4,9 @@ import pytest
 from told import status_of
 
 from leg_wear_monitor import open_ledger
+from leg_wear_monitor.monitor.forecast.forecast import Answer
 from leg_wear_monitor.monitor.ledger.entry import Measurement
-from leg_wear_monitor.state import Level
+from leg_wear_monitor.state import Figure, Level
 
 START_NS = 1_700_000_000_123_456_789
 MEASURED = {"diagnosis.enabled": False, "limits.clearance_m": 6.0e-4}
@@ -43,6 +44,9 @@ def test_what_contradicts_the_model_raises_the_alarm_too_and_a_new_part_ends_it(
     assert status_of(monitor, "joint G").level is Level.ERROR
     assert "contradicts the model, not in the forecast" in status_of(monitor, "joint G").message
     assert monitor.verdict.verdict.why.startswith("the measured clearance of joint G (knee) is 1.2 mm")
+    assert monitor.verdict.verdict.not_valid == (Figure.FORECAST,)  # no 4000 h beside a stop
+    assert set(monitor.state.life.values()) == {None}
+    assert set(monitor.state.life_answers.values()) == {Answer.OUTSIDE_VALIDITY.value}
     monitor.reset_wear("G", START_NS + 1, "ann")
     monitor.update(gait(3.0, begin_s=2.5))
     assert "measured" not in status_of(monitor, "joint G").message

@@ -8,6 +8,7 @@ from matplotlib import pyplot
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.life.result import Life
+from leg_wear_monitor.report import figure
 from leg_wear_monitor.state import Figure
 
 pytestmark = [pytest.mark.plain, pytest.mark.usefixtures("closed")]
@@ -51,6 +52,13 @@ def test_forces_of_every_joint_without_a_trace():
 def test_clearances_of_a_life(life):
     drawn = lines(lw.plot(life))
     assert drawn["A"].tolist() == pytest.approx(np.array([[0.0, 300.0], [1e6, 500.0]]))
+
+
+def test_the_picture_of_a_life_says_what_each_line_is(life, monkeypatch):
+    monkeypatch.setattr(figure, "png", lambda drawn: drawn)
+    clearance, _, profile = figure.life_picture(life).axes
+    assert [text.get_text() for text in clearance.get_legend().get_texts()] == ["A", "deepest"]
+    assert "at fifths of the life, darker later" in profile.get_title()
 
 
 def test_openings_of_a_replay():

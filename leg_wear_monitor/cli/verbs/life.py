@@ -164,9 +164,8 @@ def _rating_life(hours: float, load: float, period_s: float, constants: "RatingL
 def life_lines(result: "Life", limit_m: float, not_counted: Sequence[str]) -> list[str]:
     """The life as a table of some of its points, and when each joint reaches the limit."""
     points = len(result.cycles)
-    shown = sorted(
-        {round(i * (points - 1) / max(1, _TABLE_ROWS - 1)) for i in range(min(_TABLE_ROWS, points))}
-    )
+    rows = min(_TABLE_ROWS, points)
+    shown = [round(i * (points - 1) / max(1, rows - 1)) for i in range(rows)]
     head = "".join(f"{joint:>22}" for joint in result.clearance_joints)
     table = [
         f"{'cycles':>10}{head}",

@@ -304,10 +304,11 @@ def _clock(stamp_ns: int, kept_ns: int) -> list[str]:
 def _contradiction(accept: bool, below: float, joint: str) -> list[str]:
     more = "larger" if below > 0.5 else "smaller"
     done = "it counts, as requested" if accept else "it is kept in the ledger, but does not count"
+    last = "" if accept else "; if the measurement is correct, use --accept"
     return [
         f"{CONTRADICTION}: the clearance of {joint} is far {more} than possible; {done}",
         "measure again; if the part was replaced, reset its wear first; if load or clearance when new are "
-        "other than configured, correct that; if the measurement is correct, use --accept",
+        f"other than configured, correct that{last}",
     ]
 
 

@@ -60,8 +60,9 @@ CREATE TABLE load (
     mean_n REAL NOT NULL, sigma_n REAL NOT NULL, PRIMARY KEY (run, about_n)
 ) STRICT, WITHOUT ROWID;
 
--- alarms that are not OK: they stay latched over a new start; worst and limit as far as they are known, with
--- the standard deviation of worst and its source or cause, '' if it has none
+-- alarms that are not OK: they stay latched over a new start; worst (of estimates and measurements of a
+-- clearance, the last) and limit as far as they are known, with the standard deviation of worst and its
+-- source or cause, '' if it has none
 CREATE TABLE alarm (
     kind TEXT NOT NULL, subject TEXT NOT NULL, level INTEGER NOT NULL, present INTEGER NOT NULL,
     acknowledged INTEGER NOT NULL, raised_ns INTEGER NOT NULL, worst REAL, limit_value REAL, sigma REAL,

@@ -176,9 +176,20 @@ def believed_at_limit(situation: Situation) -> Sequence[Hit]:
 
 
 def counted_at_limit(situation: Situation) -> Sequence[Hit]:
-    """Alarms of clearances that are at their limit as counted or as measured."""
+    """Alarms of clearances that are at their limit as counted or as measured.
+
+    The forecast is valid only if it has the joint at its limit as well: not beside a measurement that it does
+    not use, or believes in part only, nor beside an alarm that is only latched.
+    """
     alarms = (alarm for alarm in situation.alarms if alarm.kind == "clearance" and alarm.cause not in SEEN)
-    return [hit_of(alarm, situation) for alarm in alarms if alarm.level is Level.ERROR]
+    hits = [hit_of(alarm, situation) for alarm in alarms if alarm.level is Level.ERROR]
+    below = {each.joint for each in situation.joints if not _forecast_m(each) >= each.limit_m}  # NaN, too
+    return [attrs.evolve(hit, not_valid=(Figure.FORECAST,)) if hit.joint in below else hit for hit in hits]
+
+
+def _forecast_m(each: JointSituation) -> float:
+    """What the forecast takes for a joint's clearance; by counting alone, it only follows a minute later."""
+    return each.believed_m if each.is_used or each.is_measurement_used else each.counted_m
 
 
 def near_limit(situation: Situation) -> Sequence[Hit]:
@@ -370,11 +381,12 @@ def other_cadence(situation: Situation) -> Sequence[Hit]:
         "commanded": amount(situation.commanded_rpm, "rpm"),
         "tolerance": amount(situation.tolerance_rpm, "rpm"),
     }
-    evidence = Evidence("cadence_rpm", situation.cadence_rpm, situation.commanded_rpm, "rpm")
-    since_ns = alarms[0].since_ns if alarms else 0
-    return [
-        Hit(words=words, since_ns=since_ns, evidence=(evidence, *(e for a in alarms for e in a.evidence)))
-    ]
+    evidence = (
+        Evidence("cadence_rpm", situation.cadence_rpm, math.nan, "rpm"),
+        Evidence("commanded_cadence_rpm", situation.commanded_rpm, math.nan, "rpm"),
+        *(each for alarm in alarms for each in alarm.evidence),
+    )
+    return [Hit(words=words, since_ns=alarms[0].since_ns if alarms else 0, evidence=evidence)]
 
 
 def encoder_faults(situation: Situation) -> Sequence[Hit]:

@@ -1,6 +1,7 @@
 """The clearance joints of a replay: a row each, and their marks in a drawing of the leg."""
 
 import math
+import textwrap
 from collections.abc import Sequence
 from typing import Any
 
@@ -291,7 +292,8 @@ def _note(views: Sequence[JointView], most_m: float, life: tuple[int, int] | Non
 
 _DRAWING, _LABELS = 400.0, 176.0  # width of the drawing, and of the column of labels at its right
 _MARGIN, _TALLEST = 20.0, 400.0
-_LABEL_HEIGHT = 40.0
+_LABEL_HEIGHT, _LINE = 40.0, 17.0  # with one line of the joint's label, and of each further one
+_LETTERS, _CAPITALS = 17, 11  # of a label that fit into a line
 _APART = 11.0  # joints at one place are drawn side by side
 _NEAR_M = 1.0e-3
 
@@ -325,7 +327,8 @@ def leg_drawing(summary: ReplaySummary, views: Sequence[JointView]) -> str:
     bodies = sorted(leg.bodies_m.values(), key=_size, reverse=True)
     drawing = {
         "width": _DRAWING,
-        "height": max([height, *(mark["label_y"] + _LABEL_HEIGHT / 2.0 for mark in marks)]),
+        "height": max([height, *(mark["label_y"] + mark["more"] + _LABEL_HEIGHT / 2.0 for mark in marks)]),
+        "line": _LINE,
         "label_x": _DRAWING - _LABELS + 14.0,
         "bodies": [[at(place) for place in shape] for shape in bodies],
         "supports": sorted({at(joint.place_m) for joint in leg.joints.values() if joint.is_on_ground}),
@@ -340,12 +343,23 @@ def leg_drawing(summary: ReplaySummary, views: Sequence[JointView]) -> str:
 def _marks(placed: Sequence[tuple[JointView, float, float]], height: float) -> list[dict[str, Any]]:
     """Marks with their labels in a column, from the highest joint to the lowest, and not over each other."""
     marks, below = [], 0.0
-    room = max(0.0, height - _LABEL_HEIGHT * len(placed))
-    for k, (view, x, y) in enumerate(sorted(placed, key=lambda each: each[2])):
-        label_y = max(below + _LABEL_HEIGHT / 2.0, min(y, room + _LABEL_HEIGHT * (k + 0.5)))
-        below = label_y + _LABEL_HEIGHT / 2.0
-        marks.append({"view": view, "x": x, "y": y, "label_y": label_y, "words": _words(view)})
+    lines = {view.joint: _lines(view.label) for view, _, _ in placed}
+    more = {joint: 0.5 * _LINE * max(0, len(each) - 1) for joint, each in lines.items()}
+    above = max(0.0, height - sum(_LABEL_HEIGHT + 2.0 * each for each in more.values()))
+    for view, x, y in sorted(placed, key=lambda each: each[2]):
+        half = more[view.joint] + _LABEL_HEIGHT / 2.0
+        label_y = max(below + half, min(y, above + half))
+        below, above = label_y + half, above + 2.0 * half
+        marks.append({
+            "view": view, "x": x, "y": y, "label_y": label_y, "words": _words(view),
+            "lines": lines[view.joint], "more": more[view.joint],
+        })  # fmt: skip
     return marks
+
+
+def _lines(label: str) -> list[str]:
+    """A joint's label in lines that fit beside the drawing."""
+    return textwrap.wrap(label, _CAPITALS if label.isupper() else _LETTERS)
 
 
 def _size(shape: Sequence[Place]) -> float:

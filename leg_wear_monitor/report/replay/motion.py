@@ -14,7 +14,14 @@ from leg_wear_monitor.messages.leg_motion import PHASES, CycleMotion
 from leg_wear_monitor.playback.result import ReplayLeg, ReplaySummary
 from leg_wear_monitor.report.figure import BODY_COLOURS
 from leg_wear_monitor.report.leg_slider import drawn_pin, millimetres, picture_data
-from leg_wear_monitor.report.page import Fragment, Section, render, since_words, template_text
+from leg_wear_monitor.report.page import (
+    Fragment,
+    Section,
+    is_of_recording,
+    render,
+    since_words,
+    template_text,
+)
 from leg_wear_monitor.state import JointClearance, State
 
 TITLE = "A gait cycle to play"
@@ -28,7 +35,8 @@ def motion_section(summary: ReplaySummary) -> list[Section]:
     cycles = summary.motion if _is_found_later(summary) else summary.motion[-1:]
     names = ["before the finding", "after the finding"] if len(cycles) > 1 else ["the last one"]
     new = {joint: attrs.evolve(each, believed_m=each.counted_m) for joint, each in clearances.items()}
-    runs = [_run(each, clearances if each is cycles[-1] else new) for each in cycles]
+    known = clearances if is_of_recording(summary) else new
+    runs = [_run(each, known if each is cycles[-1] else new) for each in cycles]
     forces = [
         f for run in runs for pin in run.values() for f in (*pin["hit"], *starmap(math.hypot, pin["f"]))
     ]
@@ -49,10 +57,13 @@ def motion_section(summary: ReplaySummary) -> list[Section]:
 
 
 def _is_found_later(summary: ReplaySummary) -> bool:
-    """Whether the verdict asks for something that was found after the first of the kept gait cycles."""
+    """Whether the verdict asks for something that was found between the first and the last kept gait cycle.
+
+    What was measured after the recording is in none of them.
+    """
     verdict = summary.verdict
     is_found = verdict.state not in (State.HEALTHY, State.NOT_MONITORED)
-    return is_found and verdict.since_ns > summary.motion[0].stamp_ns
+    return is_found and summary.motion[0].stamp_ns < verdict.since_ns <= summary.motion[-1].stamp_ns
 
 
 def _run(shown: CycleMotion, clearances: Mapping[str, JointClearance]) -> dict[str, Any]:

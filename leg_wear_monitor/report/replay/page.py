@@ -1,9 +1,11 @@
 """The page of a replay, from its summary: a first screen that answers, and the rest folded below it."""
 
+import math
+
 import attrs
 
-from leg_wear_monitor.files import share_directory
-from leg_wear_monitor.monitor.alarms import joint_of, raised_words, time_words
+from leg_wear_monitor.files import or_nan, share_directory
+from leg_wear_monitor.monitor.alarms import amount, joint_of, raised_words, time_words
 from leg_wear_monitor.monitor.verdict.decision import decision_of, figures_of
 from leg_wear_monitor.monitor.verdict.situation import COUNTED
 from leg_wear_monitor.monitor.verdict.verdict import guide_to
@@ -25,6 +27,7 @@ from leg_wear_monitor.report.page import (
     Table,
     Text,
     duration,
+    is_of_recording,
     not_valid,
     reason,
     render,
@@ -44,7 +47,7 @@ from leg_wear_monitor.report.replay.charts import (
 from leg_wear_monitor.report.replay.forecast_section import forecast_section, wear_section
 from leg_wear_monitor.report.replay.joints import joints_and_leg
 from leg_wear_monitor.report.replay.motion import motion_section
-from leg_wear_monitor.state import AlarmChange, Figure, LegAlarm, Level
+from leg_wear_monitor.state import AlarmChange, Figure, JointClearance, LegAlarm, Level
 
 # Alarms: those that are raised at the end, and all changes over time.
 
@@ -69,7 +72,8 @@ def _raised(summary: ReplaySummary, alarm: LegAlarm) -> dict[str, str]:
     symbol, look = LEVEL_LOOKS[alarm.level]
     joint = joint_of(alarm.name)
     name = f"{alarm.name.removesuffix(joint)}{summary.leg.joint_words(joint)}" if joint else alarm.name
-    words = raised_words(alarm.state, alarm.worst, alarm.limit, alarm.unit, alarm.raised_ns)
+    by = _source(summary.clearances.get(joint), alarm.worst) if alarm.name == f"clearance {joint}" else None
+    words = raised_words(alarm.state, alarm.worst, alarm.limit, alarm.unit, alarm.raised_ns, by)
     doubt = _alarm_doubt(summary, alarm)
     return {
         "symbol": symbol,
@@ -81,8 +85,18 @@ def _raised(summary: ReplaySummary, alarm: LegAlarm) -> dict[str, str]:
     }
 
 
+def _source(known: JointClearance | None, clearance_m: float | None) -> str | None:
+    """Who says that a joint has a clearance: the verdict may rest on another one by now."""
+    if known is None or clearance_m is None:
+        return None
+    sources = [(known.believed_m, known.believed_by), *((known.seen_m, by) for by in known.seen_by)]
+    return next((by for value_m, by in sources if value_m == clearance_m), None)
+
+
 def _alarm_doubt(summary: ReplaySummary, alarm: LegAlarm) -> str:
-    """Why the value of an alarm does not hold; empty if it does: that of an estimate does."""
+    """Why the value of an alarm does not hold; empty if it does: an estimate, or the reason of a verdict."""
+    if alarm.name in (each.name for each in summary.verdict.evidence[:1]):
+        return ""
     kind, _, subject = alarm.name.partition(" ")
     figure, clearance = _FIGURES.get(kind), summary.clearances.get(subject)
     if figure is Figure.CLEARANCES and clearance and clearance.believed_by not in (None, COUNTED):
@@ -94,7 +108,7 @@ def change_section(summary: ReplaySummary) -> Section:
     """Chart and table of the changes."""
     title, changes = "Changes of alarms", summary.alarms.changes
     if not changes:
-        return Section(title, [Text("No alarm was raised.")], is_folded=True)
+        return Section(title, [Text("No alarm was raised in the recording.")], is_folded=True)
     more = len(changes) - MOST_ROWS
     table = Table(
         caption=title,
@@ -113,8 +127,8 @@ def _row(summary: ReplaySummary, change: AlarmChange) -> tuple[str, ...]:
         alarm.name,
         alarm.level.name,
         alarm.state,
-        value(1.0, alarm.value) if is_valid else NOT_VALID,
-        f"{value(1.0, alarm.limit)} {alarm.unit}".strip(),
+        amount(or_nan(alarm.value), alarm.unit) if is_valid else NOT_VALID,
+        amount(or_nan(alarm.limit), alarm.unit),
     )
 
 
@@ -250,7 +264,7 @@ def _input(summary: ReplaySummary) -> _Card:
 def _torque(summary: ReplaySummary) -> _Card:
     status = _status(summary, "torque")
     if status is None:
-        return "Torque", Level.ERROR, ["unknown"]
+        return "Torque", Level.ERROR, [summary.diagnosis.reason or "unknown"]
     is_compared = status.values.get("mismatch") is not None
     return "Torque", status.level if is_compared else Level.ERROR, status.message.split("; ")
 
@@ -287,6 +301,8 @@ def _model(summary: ReplaySummary) -> _Card:
         why = [reason(summary.verdict), "not valid: " + ", ".join(each.words for each in invalid)]
     elif not why[0]:
         level, why = Level.WARN, ["no measurement is compared with it"]
+    elif _unexplained(summary) > summary.monitor.limits.torque_mismatch:
+        level = Level.WARN
     if gait.doubtful_cycles:
         level = max(level, Level.WARN)
         why.append(f"{gait.doubtful_cycles} gait cycles do not fit this leg")
@@ -299,19 +315,33 @@ def _model(summary: ReplaySummary) -> _Card:
 
 def _explained(summary: ReplaySummary) -> str:
     """What of the drive torque the model explains; empty if that is not known."""
-    torque = _status(summary, "torque")
-    mismatch = torque.values.get("mismatch") if torque else None
-    if mismatch is None:
+    mismatch = _unexplained(summary)
+    if math.isnan(mismatch):
         return ""
     limit = 100.0 * summary.monitor.limits.torque_mismatch
     rest = f"{100.0 * mismatch:.2g}" if mismatch >= _LEAST_REST else "less than 1"
     return f"{rest} % of the drive torque is not explained (limit {limit:.3g} %)"
 
 
+def _unexplained(summary: ReplaySummary) -> float:
+    """Part of the drive torque that the model does not explain; NaN if that is not known."""
+    torque = _status(summary, "torque")
+    return or_nan(torque.values.get("mismatch")) if torque else math.nan
+
+
+def _entered(summary: ReplaySummary) -> list[Part]:
+    """That the verdict is later than what was recorded; nothing if it is not."""
+    if is_of_recording(summary):
+        return []
+    words = "The verdict rests on what was entered or measured after this recording"
+    return [Text(f"{words}; input, torque, cadence, growth and forces are those of the recording.")]
+
+
 def replay_page(summary: ReplaySummary) -> Page:
     """The page of a replay."""
     recording, monitor = summary.recording, summary.monitor
-    sections = [_joints(summary), Section("Are these values valid?", [Fragment(belief(summary))])]
+    valid = [*_entered(summary), Fragment(belief(summary))]
+    sections = [_joints(summary), Section("Are these values valid?", valid)]
     raised = raised_alarms(summary, otherwise="No alarm is raised at the end.")
     sections += [Section("Alarms", [Fragment(raised)]), *motion_section(summary)]
     shown = len(sections)

@@ -144,6 +144,7 @@ def test_a_contradiction_is_said_and_kept_but_does_not_count():
     asked_for = found(worn(1e-5), 0.9, accept=True)
     assert (asked_for.measurement.counts, asked_for.after.observations) == (True, 1)
     assert asked_for.after.mean > 1.0
+    assert "--accept" in told.words[1] and "--accept" not in " ".join(asked_for.words)
 
 
 def test_a_clearance_smaller_than_when_new_contradicts_too():

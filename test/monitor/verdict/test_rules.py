@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from leg_wear_monitor.dashboard.source import evidence_words
 from leg_wear_monitor.estimate.cause import Cause, Change, NamedCause, TorqueExplanation
 from leg_wear_monitor.monitor import alarm_specs
 from leg_wear_monitor.monitor.alarms import (
@@ -99,13 +100,26 @@ def seen(by: str, clearance_m: float, sigma_m: float, **more: Any) -> tuple[Join
     return (NEW[0], attrs.evolve(NEW[1], seen=(KnownClearance(by, clearance_m, sigma_m),), **more))
 
 
+def at_limit(**more: Any) -> tuple[JointSituation, ...]:
+    return (NEW[0], attrs.evolve(NEW[1], counted_m=6.1e-4, **more))
+
+
 ALL, OF_THE_WALK = tuple(Figure), (Figure.GROWTH, Figure.IMPACT_FORCES)
 CASES = [
     ({}, State.HEALTHY, "NONE", ()),
-    (raised("clearance G"), State.STOP, "CLEARANCE_G", ()),
+    (raised("clearance G") | {"joints": at_limit()}, State.STOP, "CLEARANCE_G", ()),
+    *(  # what stops the leg is not in the forecast
+        (raised("clearance G") | {"joints": joints}, State.STOP, "CLEARANCE_G", (Figure.FORECAST,))
+        for joints in (NEW, at_limit(is_measurement_used=True, believed_m=5.0e-4))
+    ),
     (raised("clearance G", Level.WARN), State.WATCH, "CLEARANCE_NEAR_G", ()),
     (raised("growth G", Level.WARN), State.WATCH, "ALARM_G", ()),
-    ({"alarms": (alarm("clearance A"), alarm("clearance G"))}, State.STOP, "CLEARANCE_A_G", ()),
+    (
+        {"alarms": (alarm("clearance A"), alarm("clearance G"))},
+        State.STOP,
+        "CLEARANCE_A_G",
+        (Figure.FORECAST,),
+    ),
     ({"joints": seen("torque", 6.7e-4, 3.0e-5)}, State.STOP, "CLEARANCE_SEEN_G", ALL),
     ({"joints": (attrs.evolve(NEW[0], replaced_ns=1, part_cycles=19),)}, State.WATCH, "PART_REPLACED_A", ()),
     ({"joints": (attrs.evolve(NEW[0], replaced_ns=1, part_cycles=20),)}, State.HEALTHY, "NONE", ()),
@@ -335,8 +349,20 @@ def test_an_alarm_of_the_lag_that_is_past_gives_no_value_to_set() -> None:
     assert "correct crank.offset_rad if its angle is wrong" in verdict.do
 
 
+def test_the_commanded_cadence_is_no_limit() -> None:
+    """A leg at 59.9 rpm was shown with a limit of 60 rpm."""
+    departs = alarm("cadence", value=20.0, worst=20.0, limit=6.0)
+    verdict = judged(alarms=(departs,), cadence_rpm=59.9, commanded_rpm=60.0, tolerance_rpm=6.0)
+    assert list(map(evidence_words, verdict.evidence)) == [
+        "cadence 59.9 rpm",
+        "commanded cadence 60 rpm",
+        "departure from the commanded cadence 20 rpm (limit 6 rpm)",
+    ]
+
+
 def test_a_reason_to_stop_is_not_hidden_by_an_input_that_fails() -> None:
-    verdict = judged(alarms=(alarm("clearance G"),), unfollowed="the crank has not been followed for 4 s")
+    fault = "the crank has not been followed for 4 s"
+    verdict = judged(joints=at_limit(), alarms=(alarm("clearance G"),), unfollowed=fault)
     assert verdict.state is State.STOP
     assert verdict.why.endswith("the leg is not monitored now: the crank has not been followed for 4 s")
     assert verdict.not_valid == (Figure.GROWTH, Figure.IMPACT_FORCES)

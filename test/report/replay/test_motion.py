@@ -53,6 +53,14 @@ def test_a_healthy_leg_has_one_gait_cycle_to_play(knocked):
     assert run["label"] == "the last one"
 
 
+def test_what_was_measured_after_the_recording_is_in_none_of_its_gait_cycles(knocked):
+    """The last one stood there as "after the finding", its pin stretched to what was measured days later."""
+    later = attrs.evolve(knocked.verdict, since_ns=knocked.recording.end_ns + 1)
+    (run,) = played(attrs.evolve(knocked, verdict=later))["data"]["runs"]
+    assert run["label"] == "the last one"
+    assert run["pins"]["G"]["gap"] == played(knocked)["data"]["runs"][0]["pins"]["G"]["gap"]
+
+
 def test_the_leg_is_where_the_mechanism_is():
     """By a turn and a way of each body alone, at each position of the crank."""
     mechanism = lw.load_mechanism("bionic_leg")

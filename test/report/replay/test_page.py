@@ -10,11 +10,11 @@ import pytest
 from html_reader import read
 from made_up_summary import made_up_summary
 
-from leg_wear_monitor.playback.result import ReplayLeg, WornDepth
+from leg_wear_monitor.playback.result import ReplayLeg, ReplayStatus, WornDepth
 from leg_wear_monitor.report.page import page_html, template_text
-from leg_wear_monitor.report.replay.joints import joint_rows, joint_views
-from leg_wear_monitor.report.replay.page import replay_page
-from leg_wear_monitor.state import AlarmChange, Figure, FootLoad, Level, State
+from leg_wear_monitor.report.replay.joints import joint_rows, joint_views, leg_drawing
+from leg_wear_monitor.report.replay.page import raised_alarms, replay_page
+from leg_wear_monitor.state import AlarmChange, Evidence, Figure, FootLoad, Level, State
 
 pytestmark = pytest.mark.plain
 
@@ -63,6 +63,13 @@ def test_the_first_screen_has_the_load_of_a_leg_that_carries_one():
     measured = attrs.evolve(load, source="measured", peak_sigma_n=None)
     assert "Measured: 289 N at its peak." in visible(page_of(attrs.evolve(made_up_summary(), load=measured)))
     assert "Foot load" not in visible(page_of(attrs.evolve(made_up_summary(), load=FootLoad())))
+
+
+@pytest.mark.parametrize(("mismatch", "answer"), [(0.05, "✓ yes"), (0.22, "▲ in part")])
+def test_a_model_that_explains_too_little_is_not_said_to_be_valid(mismatch, answer):
+    torque = ReplayStatus(name="torque", level=Level.OK, message="m", values={"mismatch": mismatch})
+    text = visible(page_of(attrs.evolve(doubted(), status=(torque,))))
+    assert f"Model: {answer}" in " ".join(text.split())
 
 
 def test_the_joint_that_the_verdict_names_has_the_first_row():
@@ -125,6 +132,33 @@ def test_every_raised_alarm_is_unfolded_with_its_level():
     assert "input_gaps" not in text
 
 
+@pytest.mark.parametrize("by", ["believed", "seen"])
+def test_the_last_estimate_of_a_clearance_is_not_called_the_worst(by):
+    """Also where the verdict rests on what somebody measured since."""
+    values = {"believed_m": 3e-4, "believed_by": "measured", "seen_m": None, "seen_by": ()}
+    values |= {f"{by}_m": 1.65e-3, f"{by}_by": "torque" if by == "believed" else ("torque",)}
+    summary = doubted()
+    clearances = summary.clearances | {"A": attrs.evolve(summary.clearances["A"], **values)}
+    alarm = {"name": "clearance A", "level": Level.ERROR, "worst": 1.65e-3, "limit": 6e-4, "unit": "m"}
+    now = (attrs.evolve(summary.alarms.now[0], **alarm),)
+    alarms = attrs.evolve(summary.alarms, now=now)
+    told = raised_alarms(attrs.evolve(summary, clearances=clearances, alarms=alarms), otherwise="")
+    assert "last estimate 1.65 mm, limit 0.6 mm" in told and "worst" not in told
+
+
+def test_what_the_verdict_gives_as_its_reason_is_not_hidden_beside_the_alarm():
+    summary = doubted(
+        Figure.IMPACT_FORCES, Figure.GROWTH, evidence=(Evidence("impact_force A", 1e4, 5e3, "N"),)
+    )
+    alarm, unit = summary.alarms.now[0], {"level": Level.ERROR, "worst": 1e4, "limit": 5e3, "unit": "N"}
+    raised = tuple(attrs.evolve(alarm, name=name, **unit) for name in ("impact_force A", "impact_force B"))
+    summary = attrs.evolve(summary, alarms=attrs.evolve(summary.alarms, now=raised))
+    of_a, of_b = re.findall("<li.*?</li>", raised_alarms(summary, otherwise=""))
+    assert "worst 10000 N" in of_a and "not valid" not in of_a
+    assert "worst" not in of_b and "not valid" in of_b
+    assert "impact forces: see the verdict" not in visible(page_of(summary))  # in the verdict itself
+
+
 def test_what_the_verdict_does_not_believe_is_greyed_and_no_number():
     summary = doubted(*Figure, joints=())
     seen = attrs.evolve(summary.clearances["A"], seen_by=("torque",), believed_by="torque")
@@ -180,6 +214,20 @@ def test_the_marks_of_the_drawing_say_how_much_of_the_limit_is_used():
     assert drawing["aria-label"] == "The leg leg: joint A 67 % used; joint B (knee) 33 % used"
     drawing = next(svg for svg in page_of(doubted(*Figure)).of("svg") if svg.get("role") == "img")
     assert drawing["aria-label"] == "The leg leg: joint A 67 % used; joint B (knee) not valid"
+
+
+@pytest.mark.parametrize("label", ["hip bearing, thigh side, outer", "M" * 30, "knee", ""])
+def test_a_long_label_has_several_lines_beside_the_drawing(label):
+    """It ended at the edge of the drawing, without the part that tells two bearings apart."""
+    summary = made_up_summary()
+    joints = {name: attrs.evolve(joint, label=label) for name, joint in summary.leg.joints.items()}
+    summary = attrs.evolve(summary, leg=attrs.evolve(summary.leg, joints=joints))
+    drawn = leg_drawing(summary, joint_views(summary))
+    lines = re.findall(r'<tspan class="label"[^>]*>([^<]*)<', drawn)
+    assert max(map(len, lines), default=0) <= 17
+    assert "".join(lines).replace(" ", "") == 2 * label.replace(" ", "")
+    rows = [float(y) for y in re.findall(r'<text class="(?:name|words)" x="[\d.]+" y="([\d.]+)"', drawn)]
+    assert min(np.diff(rows)) >= 16.9  # one below the other
 
 
 def test_a_summary_without_the_leg_s_shape_has_a_page():

@@ -173,7 +173,7 @@ def _covariance(model: SignatureModel, nuisances: Sequence[Nuisance], cycles: in
     """Covariance (F, F) of what a leg's mean signature over some cycles is off its model."""
     phases = model.sensor.phases
     steep = np.hypot(_OF_SIZE * model.sensor.size_nm, _OF_STEP * np.exp(model.mean[phases:]))
-    found = model.covariance * (1.0 / cycles + model.own) + model.places
+    found = model.covariance * (1.0 / cycles + model.own)
     found = found + np.diag(np.concatenate([steep, np.full(phases, _ROUGHNESS)]) ** 2)
     for one in nuisances:
         found = found + (_SENSOR * one.spread) ** 2 * np.outer(one.column, one.column)

@@ -37,7 +37,7 @@ from leg_wear_monitor.dynamics.clearance.contact import (
     add_film_reactions,
     film_torque,
     integrate_films,
-    total_force,
+    joint_force,
 )
 from leg_wear_monitor.dynamics.clearance.model import (
     ACCELERATION,
@@ -413,9 +413,7 @@ def _finish(model, surfaces, state, statistics, work):
             statistics.worn_energy[0] += deposit_pending(
                 model.contacts, surfaces, k, sample, now, here, amid, work.pending, work.weight
             )
-        force = math.sqrt(sample[F_N, k] ** 2 + sample[F_T, k] ** 2)
-        if model.film.settings.shape[0] > 0:
-            force = total_force(k, sample)
+        force = joint_force(model.film.settings, k, sample)
         statistics.force_time[joint[k], bin_of(force)] += interval
     torque = work.drive_start[WHOLE]
     statistics.torque_time[1 if torque > 0.0 else 0, bin_of(abs(torque))] += interval

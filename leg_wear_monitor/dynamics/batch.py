@@ -327,7 +327,8 @@ def _simulate(
 ) -> SimulationResult:
     """Result of one leg."""
     if not setup.clearance_joints:
-        return ideal_result(setup, cycles, 0)
+        begin = (leg.crank_angle_rad + skip_cycles * math.copysign(TURN, setup.speed)) / TURN
+        return ideal_result(setup, cycles, 0, begin)
     stepper = ClearanceStepper(setup, length_of(setup, intervals), tables=tables.get())
     leg.start(stepper)
     joints = len(setup.linkage.mechanism.joints)

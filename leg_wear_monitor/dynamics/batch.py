@@ -117,7 +117,8 @@ def prepare_legs(legs: Sequence[Leg]) -> list[Setup | AssemblyError]:
     known: dict[str, Setup | AssemblyError] = {}
     setups = []
     for leg in legs:
-        key = repr(attrs.evolve(leg, crank_angle_rad=0.0, seed=0))
+        # as a dict, for the text of a mechanism leaves out materials and labels, which results name
+        key = repr(attrs.asdict(attrs.evolve(leg, crank_angle_rad=0.0, seed=0)))
         if key not in known:
             try:
                 known[key] = leg.prepare()
@@ -326,7 +327,8 @@ def _simulate(
 ) -> SimulationResult:
     """Result of one leg."""
     if not setup.clearance_joints:
-        return ideal_result(setup, cycles, 0)
+        begin = (leg.crank_angle_rad + skip_cycles * math.copysign(TURN, setup.speed)) / TURN
+        return ideal_result(setup, cycles, 0, begin)
     stepper = ClearanceStepper(setup, length_of(setup, intervals), tables=tables.get())
     leg.start(stepper)
     joints = len(setup.linkage.mechanism.joints)

@@ -182,7 +182,7 @@ def _accept(model, surfaces, state, h, toe, statistics, work):
             statistics.worn_energy[0] += wear_joint(
                 contacts, surfaces, k, ex, ey, q[b, 2], q[j, 2], here, integral, work.weight
             )
-    changed = update_contacts(
+    changed, _ = update_contacts(
         contacts.joint, contacts.speed_floor, state.clock[0], h, work.start, scratch.contact,
         state.approach, state.recent, statistics.peak, statistics.impact, statistics.impacts,
     )  # fmt: skip

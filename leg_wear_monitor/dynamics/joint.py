@@ -24,6 +24,9 @@ CONTACT_EVENT = 1.0e-11  # penetration [m] at which a contact counts as just beg
 NEVER = 2.0
 
 _CLOSE = 1.0e-14  # tolerance of a crossing, as a fraction of the step
+# of a joint's largest force so far: from which on a maximum counts as large. With all maxima, the largest
+# reactions of the default leg's ideal joints are the same
+_LARGE = 0.25
 
 
 @kernel
@@ -87,9 +90,14 @@ def update_contacts(joint, speed_floor, t, h, start, end, approach, recent, peak
     """Process the contacts after a step from t to t + h [s]: beginnings, ends, and force peaks.
 
     Changes approach (k,) [m/s] and recent (k, 4), the last two samples of time [s] and normal force [N] of
-    each joint, and the run statistics' peak, impact and impacts. Returns whether a contact began or ended.
+    each joint, and the run statistics' peak, impact and impacts.
+
+    Returns
+    -------
+    changed, peaked
+        Whether a contact began or ended, and whether a force passed a large maximum at the step's start.
     """
-    changed = False
+    changed, peaked = False, False
     for k in range(approach.shape[0]):
         rate, force = end[DELTA_DOT, k], end[F_N, k]
         if approach[k] == 0.0:
@@ -102,13 +110,14 @@ def update_contacts(joint, speed_floor, t, h, start, end, approach, recent, peak
         top = force
         if recent[k, 3] >= force and recent[k, 3] >= recent[k, 1] and recent[k, 0] < recent[k, 2]:
             top = parabola_peak(recent[k, 0], recent[k, 1], recent[k, 2], recent[k, 3], t + h, force)
+            peaked = peaked or top > _LARGE * peak[joint[k]]
         raise_peak(peak, impact, impacts, joint[k], top)
         recent[k, 0], recent[k, 1], recent[k, 2], recent[k, 3] = recent[k, 2], recent[k, 3], t + h, force
         if end[DELTA, k] <= 0.0 and rate < 0.0:
             end_impact(impact, impacts, joint[k], t + h * _crossing(0.0, 1.0, False, h, k, start, end))
             approach[k] = 0.0
             changed = True
-    return changed
+    return changed, peaked
 
 
 @kernel

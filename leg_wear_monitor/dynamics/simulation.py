@@ -1,6 +1,7 @@
 """Offline simulation of a leg with clearances."""
 
 import math
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from numbers import Integral, Real
 from pathlib import Path
@@ -20,10 +21,12 @@ from leg_wear_monitor.dynamics.statistics import (
     energy_balance,
     first_impacts,
     joint_statistics,
+    open_balance,
     toe_errors,
     trace_of,
 )
-from leg_wear_monitor.errors import AssemblyError, ConfigError, SimulationError, did_you_mean
+from leg_wear_monitor.errors import AssemblyError, ConfigError, ConfigWarning, SimulationError, did_you_mean
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.mechanism.plausible import suspects
 from leg_wear_monitor.mechanism.position import (
@@ -116,14 +119,18 @@ def check_kinds(**values: object) -> None:
 
 
 _POINTS = 1440
+_MOST_WHOLE = 100  # whole cycles beside which a part of one is counted; beside more it hardly weighs
 
 
-def ideal_result(setup: Setup, cycles: float, trace: int) -> SimulationResult:
-    """Result of the ideal motion, from the statistics of one cycle: all cycles are equal."""
+def ideal_result(setup: Setup, cycles: float, trace: int, begin: float = 0.0) -> SimulationResult:
+    """Result of the ideal motion over a number of cycles from a crank angle on, in turns."""
     mechanism = setup.linkage.mechanism
     motion = one_cycle(setup.linkage, _POINTS, setup.speed)
-    torque = motion.drive_torque
-    force = np.linalg.norm(motion.joint_force, axis=2)
+    is_whole = max(1, round(cycles * _POINTS)) % _POINTS == 0  # all cycles are equal
+    length = 1.0 if is_whole else cycles % 1.0 + min(cycles // 1.0, _MOST_WHOLE)
+    counted = _passed(length, begin, setup.speed, _POINTS) % _POINTS
+    torque = motion.drive_torque[counted]
+    force = np.linalg.norm(motion.joint_force, axis=2)[counted]
     return SimulationResult(
         mechanism=mechanism.name,
         model="ideal",
@@ -150,20 +157,26 @@ def ideal_result(setup: Setup, cycles: float, trace: int) -> SimulationResult:
             )
             for i, name in enumerate(mechanism.joints)
         },
-        trace=_trace(setup, one_cycle(setup.linkage, trace, setup.speed), cycles) if trace else None,
+        trace=_trace(setup, one_cycle(setup.linkage, trace, setup.speed), cycles, begin) if trace else None,
     )
 
 
-def _trace(setup: Setup, motion: IdealMotion, cycles: float) -> Trace:
+def _passed(cycles: float, begin: float, speed: float, points: int) -> Ints:
+    """Points of a turn that a crank passes in a number of cycles from an angle on, in turns; continuous."""
+    passed = np.arange(max(1, round(cycles * points)))
+    return np.asarray(round(begin * points) % points + (passed if speed > 0.0 else -passed))
+
+
+def _trace(setup: Setup, motion: IdealMotion, cycles: float, begin: float) -> Trace:
     """Trace of all cycles, from the samples of one cycle in the crank's direction of rotation."""
     mechanism = setup.linkage.mechanism
     points = len(motion.crank_angle)
-    turns = np.arange(round(cycles * points))
-    pick = (turns if setup.speed > 0.0 else -turns) % points
+    turns = _passed(cycles, begin, setup.speed, points)
+    pick = turns % points
     force = np.linalg.norm(motion.joint_force, axis=2)[pick]
     toe = None if mechanism.toe is None else point_motion(motion, setup.linkage, *mechanism.toe)[0][pick]
     return Trace(
-        crank_angle_rad=np.sign(setup.speed) * turns * (TURN / points),
+        crank_angle_rad=np.asarray(turns * (TURN / points), float),
         toe_x_m=None if toe is None else toe[:, 0],
         toe_y_m=None if toe is None else toe[:, 1],
         drive_torque_nm=motion.drive_torque[pick],
@@ -179,6 +192,10 @@ LEAST_RPM = 0.01  # least crank speed: below it a gait cycle takes hours
 LEAST_INTERVALS, MOST_INTERVALS = 1024, 65536
 
 _REPORTS_A_CYCLE = 20
+
+# way of a crank over its net turn, from which on it swings: one that turns may step back; turns that may be
+# rounding
+_MOST_PATH, _ROUNDING = 1.1, 1.0e-9
 
 
 def default_model(mechanism: Mechanism) -> str:
@@ -319,12 +336,15 @@ def simulate(
     _check_intervals(intervals, model)
     skipped, counted = _spans(setup, cycles, duration_s, skip_cycles, trace)
     if not setup.clearance_joints and isinstance(mechanism.drive, SpeedDrive):
-        return ideal_result(setup, counted * abs(setup.speed) / TURN, trace)
+        return ideal_result(setup, counted * abs(setup.speed) / TURN, trace, skipped * setup.speed / TURN)
     try:
         run = ClearanceRun(setup, intervals) if intervals else MODELS[model](setup)
-        return _run(setup, run, model, skipped, counted, trace, progress)
+        result = _run(setup, run, model, skipped, counted, trace, progress)
     except SimulationError as error:
         raise SimulationError(f"{error}{suspects(mechanism)}") from error
+    if fault := open_balance(result):
+        warnings.warn(f"{mechanism.source}: {fault}", ConfigWarning, stacklevel=2)
+    return result
 
 
 def _check_intervals(intervals: int | None, model: str) -> None:
@@ -394,13 +414,15 @@ def _run(
         report(t / (skipped + counted))
     statistics = new_run_statistics(joints)
     tracer = Tracer(run, joints, skipped, skipped + counted, period / trace if trace else math.inf)
-    angle = run.sample().crank_angle
+    is_steady, angles = isinstance(mechanism.drive, SpeedDrive), [run.sample().crank_angle]
     stored, depth = run.stored_energy, setup.surfaces.depth.copy()
     scatter = CycleScatter(setup, statistics, stored)
     # the run is advanced to the same instants with and without a trace, so its results are the same
     for i, t in enumerate(_instants(skipped, skipped + counted, period / _REPORTS_A_CYCLE), start=1):
         tracer.look_ahead(t)
         run.advance(t, statistics)
+        if not is_steady:
+            angles.append(run.sample().crank_angle)
         if i % _REPORTS_A_CYCLE == 0:
             scatter.end_cycle(statistics, run.stored_energy)
         report(t / (skipped + counted))
@@ -408,18 +430,19 @@ def _run(
         raise ConfigError(
             "duration", "", f"{counted:g} s is too short for this model; expected more, or model full"
         )
-    counted_cycles = counted / period
-    if not isinstance(mechanism.drive, SpeedDrive):
-        counted_cycles = abs(run.sample().crank_angle - angle) / TURN
+    turned = math.copysign(counted / period, setup.speed)
+    if not is_steady:
+        turned = _turned(mechanism.source, np.array(angles) / TURN)
+    counted_cycles = abs(turned)
     return SimulationResult(
         mechanism=mechanism.name,
         model=model,
-        speed_rpm=60.0 * counted_cycles / counted * math.copysign(1.0, setup.speed),
+        speed_rpm=60.0 * counted_cycles / counted * math.copysign(1.0, turned),
         cycles=counted_cycles,
         simulated_s=skipped + counted,
         drive_torque_nm=drive_torque(statistics),
         energy_j=energy_balance(statistics, stored, run.stored_energy),
-        toe=toe_errors(statistics) if mechanism.toe and isinstance(mechanism.drive, SpeedDrive) else None,
+        toe=toe_errors(statistics) if mechanism.toe and is_steady else None,
         joints=joint_statistics(setup, statistics, setup.surfaces.depth - depth, counted_cycles),
         impacts=first_impacts(setup, statistics),
         trace=trace_of(setup, tracer.samples) if trace else None,
@@ -427,6 +450,16 @@ def _run(
         clearance_joints=setup.clearance_joints,
         surfaces=setup.surfaces,
     )
+
+
+def _turned(source: str, angles: Floats) -> float:
+    """Net turns of a crank from its angles (n,) [turns]; warns of one that swings."""
+    turned, path = float(angles[-1] - angles[0]), float(np.abs(np.diff(angles)).sum())
+    if path > _MOST_PATH * abs(turned) + _ROUNDING:
+        fault = f"the crank swings, {path:.3g} turns to and fro for {abs(turned):.3g} turns in all"
+        text = f"{source}: {fault}; values per gait cycle are those of no gait"
+        warnings.warn(text, ConfigWarning, stacklevel=4)
+    return turned
 
 
 def _instants(start: float, end: float, step: float) -> Iterator[float]:

@@ -130,13 +130,8 @@ def _joints(mechanism: spec.Mechanism) -> Iterator[Doubt]:
 
 def _clearance(c: spec.Clearance) -> Iterator[Doubt]:
     yield from unusual(c)
-    ratio = c.radial_clearance / c.bushing_radius
-    if _beyond(ratio, 1.0e-5, 0.25):
-        yield Doubt(
-            "radial_clearance",
-            f"{c.radial_clearance:g} m is {100.0 * ratio:.3g} % of the bushing's radius of "
-            f"{c.bushing_radius:g} m, usual are 0.01 to 5 %; another unit than the radius?",
-        )
+    if fault := ratio_fault(c.radial_clearance, c.bushing_radius):
+        yield Doubt("radial_clearance", fault)
     if lacks_wear(c):
         fault = "gives no wear coefficient, so wear is not counted; expected wear_coefficient beside it"
         yield Doubt("material", f"{c.material} {fault}")
@@ -144,6 +139,17 @@ def _clearance(c: spec.Clearance) -> Iterator[Doubt]:
     if spread is not None and spread < _LEAST_SPREAD:
         fault = f"spread {spread:.2g} of {c.material} is below {_LEAST_SPREAD}; of repeats instead of parts?"
         yield Doubt("material", fault)
+
+
+def ratio_fault(clearance_m: float, radius_m: float) -> str | None:
+    """What is unusual of a radial clearance [m] beside its bushing's radius [m]; None if nothing is."""
+    ratio = clearance_m / radius_m
+    if not _beyond(ratio, 1.0e-5, 0.25):
+        return None
+    return (
+        f"{clearance_m:g} m is {100.0 * ratio:.3g} % of the bushing's radius of {radius_m:g} m, "
+        "usual are 0.01 to 5 %; another unit than the radius?"
+    )
 
 
 def _loads(mechanism: spec.Mechanism) -> Iterator[Doubt]:

@@ -4,9 +4,8 @@ import math
 
 from leg_wear_monitor.compiled.kernel import entry, kernel
 from leg_wear_monitor.dynamics.clearance.advance import ADVANCE
-from leg_wear_monitor.dynamics.clearance.contact import F_T
+from leg_wear_monitor.dynamics.clearance.contact import joint_force
 from leg_wear_monitor.dynamics.clearance.model import ANGLE, SPEED, blend, move_time_origin
-from leg_wear_monitor.dynamics.joint import F_N
 from leg_wear_monitor.dynamics.run import DONE, TORQUE, TORQUE_SQUARED
 from leg_wear_monitor.twin.follower_state import (
     COUNTED,
@@ -340,7 +339,7 @@ def follow(
     """Follow steps from index ``first`` to n; ``stepper`` is the ClearanceState, ``state`` the FollowerState.
 
     ``sensors`` (1,) contains the torque sensor, ``load`` the `LoadRows`. Values at samples are written to
-    ``evaluated`` (n,) from index m on, contact forces [N] to ``forces`` (n, k) and eccentricities [m] to
+    ``evaluated`` (n,) from index m on, joint forces [N] to ``forces`` (n, k) and eccentricities [m] to
     ``eccentricities`` (n, 2 k), NaN while the leg does not run or does not count.
 
     Returns
@@ -375,7 +374,7 @@ def follow(
                 squares = statistics.drive_integral[TORQUE_SQUARED] - squares
                 _add_torque(leg.torque, impulse, squares, statistics.time[0] - time)
                 for j in range(force.shape[0]):
-                    force[j] = math.hypot(work.start[F_N, j], work.start[F_T, j])
+                    force[j] = joint_force(model.film.settings, j, work.start)
             if status != DONE:
                 motion.runs, motion.lost = 0, 1
                 motion.failures += 1

@@ -192,7 +192,7 @@ class TrackerSettings:
         Tracking is lost at a higher crank speed, or at an acceleration above its square; 0 selects three
         times the commanded speed.
     stop_speed_radps, stop_hold_s : float
-        A crank slower than this for this time has stopped.
+        A crank slower than this, or than a fifth of the commanded speed, for this time has stopped.
     speed_tolerance : float
         Largest deviation of a speed in step, as a fraction of the commanded speed.
     settle_s : float
@@ -236,6 +236,11 @@ class TrackerSettings:
     def largest_speed(self) -> float:
         """The largest plausible crank speed [rad/s]."""
         return self.largest_speed_radps or 3.0 * abs(self.commanded_speed_radps)
+
+    @property
+    def stop_speed(self) -> float:
+        """The speed in use below which a crank has stopped [rad/s]."""
+        return min(self.stop_speed_radps, 0.2 * abs(self.commanded_speed_radps))
 
     @property
     def lag(self) -> float:

@@ -183,7 +183,7 @@ def tracker_model(settings: TrackerSettings) -> Records:
     model.longest_spread = 1.0 / w
     model.gate = s.gate_rad
     model.velocity_gate = s.velocity_gate_radps
-    model.stop_speed = s.stop_speed_radps
+    model.stop_speed = s.stop_speed
     model.slowest = speed * (1.0 - s.speed_tolerance)
     model.fastest = speed * (1.0 + s.speed_tolerance)
     model.commanded_speed = s.commanded_speed_radps

@@ -25,6 +25,7 @@ BROKEN = [
     ("gravity: [0.0, -9.81]", "gravity: down", ["gravity", "'down'", "2 numbers [m/s^2]"]),
     ("speed: 6.283185307179586", "speed: 0", ["drive.speed", "0.0 rad/s", "expected another speed"]),
     ("restitution: 0.9", "restitution: 1.9", ["clearances.defaults.restitution", "1.9", "at most 1"]),
+    ("restitution: 0.9", "restitution: 0.01", ["clearances.defaults.restitution", "0.01", "at least 0.02"]),
     ("[0.29, 0.29]", "[0.29, 0.79]", ["clearances.defaults.poissons_ratio", "0.79", "at most 0.5"]),
     ("radial_clearance: 0.0003", "radial_clearance: 0.3", ["defaults.radial_clearance", "0.3", "0.01 m"]),
     ("normal_law: lankarani-nikravesh", "normal_law: herz", ["defaults.normal_law", "'herz'", "hertz, "]),

@@ -118,6 +118,15 @@ def test_a_bug_keeps_its_traceback(run, never):
 
 
 @pytest.mark.plain
+def test_a_clearance_that_is_doubtful_in_a_file_is_so_as_an_option(run, complaints):
+    result = run("simulate", "--clearance-m", "0.0079", *SHORT[1:])
+    assert result.exit_code == 0
+    (line,) = complaints(result)
+    assert line.startswith("warning: --clearance-m: 0.0079 m is ")
+    assert "% of the bushing's radius" in line
+
+
+@pytest.mark.plain
 def test_a_restitution_that_the_law_does_not_give_is_warned_of_once(run, complaints, shipped, tmp_path):
     (tmp_path / "soft.yaml").write_text(shipped("four_bar").replace("restitution: 0.9", "restitution: 0.5"))
     result = run("simulate", "--mechanism", "soft.yaml", "--duration", "0.001")

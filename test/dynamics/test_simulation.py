@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import ConfigError, load_mechanism, simulate
+from leg_wear_monitor.errors import ConfigWarning
 from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.mechanism.position import TURN, one_cycle
+from leg_wear_monitor.mechanism.spec import TorqueDrive
 
 FULL = {"model": "full"}
 
@@ -120,6 +122,58 @@ def test_an_impact_of_the_first_cycle_can_be_counted():
     result = simulate(load_mechanism("slider_crank"), duration_s=3.0e-4, **FULL)
     assert len(result.impacts["B"]) == 1
     assert result.impacts["B"][0].begin_s == pytest.approx(2.2729e-4, abs=1.0e-8)
+
+
+def test_the_joint_on_the_crank_bears_the_largest_drive_torque(leg):
+    """About a hinge without clearance, the torque of every instant is that of the coupler and the weight."""
+    result, crank = simulate(leg, clearances=("G", "I", "J"), cycles=2), leg.bodies["crank"]
+    needed = result.drive_torque_nm.max_abs - 9.81 * crank.mass * math.hypot(*crank.com)
+    arm = math.dist(crank.points["A"], crank.points["C"])
+    assert result.joints["C"].max_force_n * arm > 0.97 * needed
+
+
+def test_a_part_of_an_ideal_cycle_is_counted_as_such(leg, linkage_of):
+    """Backwards as well, after a part that is skipped; and beside whole cycles."""
+    motion = one_cycle(linkage_of("bionic_leg"), 1440, -TURN)
+    torque = motion.drive_torque[np.arange(1440 - 180, 1440 - 180 - 360, -1)]
+    part = {"clearances": (), "skip_cycles": 0.125, "speed_rpm": -60.0}
+    result = simulate(leg, cycles=0.25, trace=8, **part)
+    assert result.drive_torque_nm.mean == pytest.approx(torque.mean(), abs=1.0e-9)
+    assert result.drive_torque_nm.max == pytest.approx(torque.max(), abs=1.0e-9)
+    assert result.trace.crank_angle_rad == pytest.approx(TURN * np.array([7, 6]) / 8)
+    more = simulate(leg, cycles=2.25, **part).drive_torque_nm.mean
+    assert more == pytest.approx((8.0 * motion.drive_torque.mean() + torque.mean()) / 9.0, abs=1.0e-9)
+    whole = simulate(leg, cycles=1, **part)
+    assert whole.drive_torque_nm.mean == pytest.approx(motion.drive_torque.mean(), abs=1.0e-9)
+
+
+def test_an_energy_that_does_not_close_is_told(leg):
+    """With clearances of a third of the radius; not with one cycle, which has no standard error."""
+    with pytest.warns(ConfigWarning, match=r"bionic_leg.yaml: the energy does not close, .*--model full"):
+        simulate(leg, clearance_m=3.0e-3, cycles=6)
+    simulate(leg, clearance_m=3.0e-3, cycles=1)
+
+
+def test_an_energy_with_hardly_any_losses_closes(leg):
+    """At 0.6 rpm, sliding is too slow for friction, and a residual of no weight is beyond the losses."""
+    energy = simulate(leg, speed_rpm=0.6, cycles=2).energy_j
+    assert abs(energy.residual) > 0.02 * (energy.friction_loss + energy.contact_loss)
+
+
+def by_torque(leg, torque_nm, **changes):
+    """The leg with a constant torque at its crank, from rest."""
+    return attrs.evolve(leg, drive=TorqueDrive(body="crank", torque=torque_nm), **changes)
+
+
+def test_a_torque_turns_the_crank_its_own_way(leg):
+    speeds = [simulate(by_torque(leg, torque), duration_s=0.1).speed_rpm for torque in (-30.0, 30.0)]
+    assert speeds[0] < -10.0
+    assert speeds[1] > 10.0
+
+
+def test_a_crank_that_swings_has_no_gait_cycle(leg):
+    with pytest.warns(ConfigWarning, match=r"the crank swings, .* turns to and fro for .* in all"):
+        simulate(by_torque(leg, 0.0), duration_s=2.0)
 
 
 def test_a_torque_drive_has_no_cycles():

@@ -13,7 +13,8 @@ from leg_wear_monitor.mechanism.person import (
     upwards,
     with_toe_force,
 )
-from leg_wear_monitor.mechanism.position import build_linkage, one_cycle, point_motion
+from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle, point_motion
+from leg_wear_monitor.mechanism.spec import SpeedDrive, Track, TrackDrive
 
 POINTS = 1024
 
@@ -46,9 +47,16 @@ def test_the_foot_brakes_then_pushes_while_the_toe_moves_backwards(name):
     assert (along[soon % POINTS] > 0.0).all()
 
 
-def test_reversed_the_leg_walks_the_other_way():
+@pytest.mark.parametrize(
+    "drive",
+    [
+        SpeedDrive(body="crank", speed=-TURN),
+        TrackDrive(body="crank", track=Track(speed_radps=-TURN, kp_nm_per_rad=4000.0)),
+    ],
+)
+def test_reversed_the_leg_walks_the_other_way(drive):
     mechanism = load_mechanism("bionic_leg")
-    back = attrs.evolve(mechanism, drive=attrs.evolve(mechanism.drive, speed=-mechanism.drive.speed))
+    back = attrs.evolve(mechanism, drive=drive)
     there, other = (nominal_stance(build_linkage(one)) for one in (mechanism, back))
     assert (other.heel_strike, other.toe_off) == (there.toe_off, there.heel_strike)
     assert other.back == pytest.approx(-there.back)

@@ -2,6 +2,7 @@
 
 import math
 import time
+import warnings
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from leg_wear_monitor.cli import common
-from leg_wear_monitor.errors import ConfigError, LegWearError, printable
+from leg_wear_monitor.errors import ConfigError, ConfigWarning, LegWearError, printable
 from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.mechanism import NORMAL_LAWS
 
@@ -334,13 +335,17 @@ def simulate(mechanism: str, json_file: Path | None, out: Path | None, **options
     if options["cycles"] is not None and options["duration"] is not None:
         raise click.UsageError("--cycles and --duration cannot be combined")
     from leg_wear_monitor.mechanism.loader import load_mechanism
-    from leg_wear_monitor.mechanism.plausible import doubts
+    from leg_wear_monitor.mechanism.plausible import doubts, ratio_fault
 
     leg = load_mechanism(mechanism)
     common.check_outputs(json_file, out)
     with common.options_named():
         result, wall_s = _run(leg, _keywords(**options))
     common.warn_of(leg.source, doubts(leg))  # what fails names them itself, in its one line
+    if (given := options["clearance_m"]) is not None:
+        for radius in sorted({leg.clearances[name].bushing_radius for name in result.clearance_joints}):
+            if fault := ratio_fault(given, radius):
+                warnings.warn(f"--clearance-m: {fault}", ConfigWarning, stacklevel=2)
     written = _write(leg, result, wall_s, json_file, out)
     if json_file != common.STDOUT:
         from leg_wear_monitor.cli.tables import print_result

@@ -37,7 +37,7 @@ from leg_wear_monitor.dynamics.clearance.contact import (
     add_film_reactions,
     film_torque,
     integrate_films,
-    total_force,
+    joint_force,
 )
 from leg_wear_monitor.dynamics.clearance.model import (
     ACCELERATION,
@@ -187,7 +187,9 @@ def _along_toe(row, now, x):
     return vector_sum(position), vector_sum(velocity), vector_sum(acceleration)
 
 
-RENEWAL = 2  # intervals between two evaluations of the ideal joints' reactions, which change slowly
+# intervals between two evaluations of the ideal joints' reactions; their maxima are evaluated in impacts, and
+# means over all steps would make a gait cycle of five clearance joints an eighth longer
+RENEWAL = 2
 WEARING = 8  # intervals after which pending wear is deposited, to spread its cost over many steps
 
 MOST_TRIALS = 20000  # trial steps in a part of an interval before the run stops
@@ -371,10 +373,13 @@ def _accept(model, surfaces, state, t, h, turned, statistics, work):
     for k in range(0, work.added.shape[1], WIDTH):
         for r in range(JOINT_RATES):
             put_vector(work.sums, (r, k), vector_at(work.sums, (r, k)) + vector_at(work.added, (r, k)))
-    update_contacts(
+    _, peaked = update_contacts(
         contacts.joint, contacts.speed_floor, t, h, start, end,
         state.approach, state.recent, statistics.peak, statistics.impact, statistics.impacts,
     )  # fmt: skip
+    if peaked and model.coupling.law[STIFFNESS] == 0.0:  # behind a coupling, the crank's acceleration follows
+        reactions(model.tables, state.drive[ANGLE], now, x, start, work.by, work.reaction)
+        _add_reactions(model.tables.reaction_joint, work.reaction, 0.0, statistics)
     shift_start(now, x)
     copy_array(end, start)
     statistics.worn_energy[0] += deposit_due(
@@ -413,9 +418,7 @@ def _finish(model, surfaces, state, statistics, work):
             statistics.worn_energy[0] += deposit_pending(
                 model.contacts, surfaces, k, sample, now, here, amid, work.pending, work.weight
             )
-        force = math.sqrt(sample[F_N, k] ** 2 + sample[F_T, k] ** 2)
-        if model.film.settings.shape[0] > 0:
-            force = total_force(k, sample)
+        force = joint_force(model.film.settings, k, sample)
         statistics.force_time[joint[k], bin_of(force)] += interval
     torque = work.drive_start[WHOLE]
     statistics.torque_time[1 if torque > 0.0 else 0, bin_of(abs(torque))] += interval

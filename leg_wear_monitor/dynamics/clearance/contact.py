@@ -455,8 +455,16 @@ def _power(k, sample):
 
 
 @kernel
-def total_force(k, sample):
-    """Force [N] of contact and film together in clearance joint k; without a film, that of the contact."""
+def joint_force(films, k, sample):
+    """Force [N] of contact and film in clearance joint k; ``films``: settings of the leg's films."""
+    if films.shape[0] > 0:
+        return _total_force(k, sample)
+    return math.sqrt(sample[F_N, k] ** 2 + sample[F_T, k] ** 2)
+
+
+@kernel
+def _total_force(k, sample):
+    """As `joint_force`, with films."""
     f_n, f_t = sample[F_N, k], sample[F_T, k]
     fx = sample[FILM_X, k] - f_n * sample[NX, k] - f_t * sample[NY, k]
     fy = sample[FILM_Y, k] - f_n * sample[NY, k] + f_t * sample[NX, k]
@@ -473,8 +481,8 @@ def integrate_films(settings, joint, h, start, end, out_added, out_peak):
         if settings[k, VISCOSITY] > 0.0:
             for end_of_step in range(2):
                 sample = end if end_of_step else start
-                total, contact = total_force(k, sample), sample[F_N, k] ** 2 + sample[F_T, k] ** 2
+                total, contact = _total_force(k, sample), sample[F_N, k] ** 2 + sample[F_T, k] ** 2
                 out_added[FORCE, k] += 0.5 * h * (total - math.sqrt(contact))
                 out_added[FORCE_SQUARED, k] += 0.5 * h * (total * total - contact)
                 out_added[DISSIPATION, k] += 0.5 * h * _power(k, sample)
-            out_peak[joint[k]] = max(out_peak[joint[k]], total_force(k, end))
+            out_peak[joint[k]] = max(out_peak[joint[k]], _total_force(k, end))

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from leg_wear_monitor import AssemblyError, ConfigError, SimulationError, load_mechanism, simulate
-from leg_wear_monitor.dynamics.batch import Leg, advance_batch, simulate_batch
+from leg_wear_monitor.dynamics.batch import Leg, advance_batch, prepare_legs, simulate_batch
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
 from leg_wear_monitor.dynamics.clearance.tables import build_basis, build_tables
 from leg_wear_monitor.dynamics.run import DONE, INVALID_DRIVE, new_run_statistics, steady_drive
@@ -199,6 +199,14 @@ def test_the_starting_phase_is_forgotten(leg):
         [result.joints[name].mean_force_n for name in "ABG"] for result in simulate_batch(legs, cycles=5)
     ])  # fmt: skip
     np.testing.assert_allclose(forces, np.tile(forces.mean(axis=0), (4, 1)), rtol=0.03)
+
+
+@pytest.mark.plain
+def test_legs_that_differ_in_their_material_alone_keep_it(leg):
+    """The text of a mechanism, by which legs are prepared once, leaves it out."""
+    pairs = ("ds-on-steel-greased", "graphite-bronze-oil-on-steel")
+    setups = prepare_legs([Leg(mechanism=with_joint(leg, "A", material=pair)) for pair in pairs])
+    assert [setup.linkage.mechanism.clearances["A"].material for setup in setups] == list(pairs)
 
 
 @pytest.mark.plain

@@ -101,7 +101,10 @@ def cycle_torque(kept: TorqueSamples, begin_ns: int, end_ns: int, sensor: Torque
     since_s = np.asarray(1.0e-9 * (crank_ns - begin_ns), dtype=np.float64)
     profile = cycle_profile(since_s, turned, 1.0e-9 * (end_ns - begin_ns))
     gap = np.diff(torque_ns, prepend=torque_ns[0]) > _LOST * 1.0e9 * sensor.period_s
-    angle = np.interp(torque_ns, crank_ns, turned)
+    # the ends are passages of zero, which torques may be nearer to than the first and the last crank angle
+    ends = TURN * np.round(turned[[0, -1]] / TURN)
+    place = np.concatenate([[begin_ns], crank_ns, [end_ns]])
+    angle = np.interp(torque_ns, place, np.concatenate([ends[:1], turned, ends[1:]]))
     if sensor.together > 1:
         angle = angle[sensor.together - 1 :: sensor.together]
         torque = averaged(torque, sensor.together)

@@ -264,7 +264,13 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
     if not state.is_compared:
         return f"changes at this cadence are not observed yet; at {_cadences(state.set_aside)} they are"
     if models.is_of_file(state):
-        return ""
+        if state.fit is None or state.commissioned is None or state.fit.explains or state.changes:
+            return ""
+        return (
+            "the drive torque is not that of the commissioned leg, and no clearances explain it; they are "
+            "estimated again when its noise, scale and lost samples are as they were. If the sensor was "
+            "changed, reset a joint and undo it: the leg is commissioned again"
+        )
     known = "the model does not fit this leg, and the names of joints are not sure: "
     if not state.changes:
         known = "the model does not fit this leg, but nothing has changed since it was commissioned: "

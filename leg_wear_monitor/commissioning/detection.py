@@ -56,6 +56,7 @@ from leg_wear_monitor.twin.torque_reference import CYCLES, PACE, WIDER, TorqueRe
 # A recording as the monitor sees it with the proposed parameters: gait cycles with their torques.
 
 
+from leg_wear_monitor.twin.sample import NONE
 LEAST_CYCLES = 8  # without which the scatter of a gait cycle is not known
 _SETTLING = 1  # gait cycles at the start of a walk, after which the joints move as in all others
 
@@ -361,10 +362,10 @@ def with_detections(
 
 def _known(walk: Walk) -> tuple[TorqueReference | None, str]:
     """A reference of this leg for the recorded motion of its crank, and where it is from."""
-    path = walk.config.diagnosis.reference
+    path, is_in_air = walk.config.diagnosis.reference, walk.config.load.model == NONE
     given = read_references(Path(path), walk.mechanism) if path else ()
     for one in (*given, *shipped_references(walk.mechanism)):
-        if walk.profile.is_like(one.profile):
+        if walk.profile.is_like(one.profile) and not (is_in_air and one.parameters.load.size):
             return one, path if any(one is each for each in given) else "the one that comes with the package"
     return None, ""
 

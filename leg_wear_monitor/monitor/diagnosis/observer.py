@@ -202,7 +202,10 @@ class TorqueObserver(KeepsSamples):
         if parameters is None:  # those that files and unfinished references were made with
             own = LegParameters.none(mechanism)
             made = (one.parameters for one in references if not one.is_of_parameters)
-            parameters = next((one for one in made if one != own), None)
+            known = (one for one in made if self._is_on_ground or not one.load.size)
+            parameters = next((one for one in known if one != own), None)
+        if parameters is not None and not self._is_on_ground:  # another load.model than when it was found
+            parameters = parameters.in_air
         if is_drive_known:
             whole_leg = parameters or LegParameters.none(mechanism)
             parameters = attrs.evolve(whole_leg, compliance=compliance_of(figures.stiffness_nm_per_rad))

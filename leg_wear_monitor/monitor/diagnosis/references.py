@@ -201,6 +201,7 @@ class References:
     mechanism : Mechanism
     models : LegModels
     given : sequence of TorqueReference, optional
+        Ones that were simulated under a load are for a leg on the ground.
         References known beforehand: of files first, then of the ledger. Those of the package follow them.
     part : TorqueReference or None
         Unfinished reference of an earlier run, which is continued if it fits.
@@ -233,7 +234,8 @@ class References:
     ) -> None:
         self._mechanism, self._models, self._part = mechanism, models, part
         self._is_drive_known, self._is_on_ground = is_drive_known, is_on_ground
-        self._given = (*given, *shipped_references(mechanism))
+        usable = (one for one in given if is_on_ground or not one.parameters.load.size)
+        self._given = (*usable, *shipped_references(mechanism))
         self._run: TorqueReferenceRun | None = None
 
     @property

@@ -34,7 +34,6 @@ from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.parameters import config_from, values_of
 from leg_wear_monitor.monitor.config.sections import drive_figures
 from leg_wear_monitor.monitor.config.settings import LedgerFile, MonitorConfig
-from leg_wear_monitor.monitor.diagnosis.observer import find_sensor, signed_cycle
 from leg_wear_monitor.monitor.diagnosis.reference_file import (
     read_references,
     shipped_references,
@@ -42,15 +41,22 @@ from leg_wear_monitor.monitor.diagnosis.reference_file import (
 )
 from leg_wear_monitor.monitor.diagnosis.references import (
     COMMISSIONING_CYCLES,
-    FIRST_CYCLES,
     NAMED_TO,
     LegModels,
 )
-from leg_wear_monitor.monitor.diagnosis.state import NotUsed, SignedCycle, TorqueState
+from leg_wear_monitor.monitor.diagnosis.state import (
+    FIRST_CYCLES,
+    NotUsed,
+    SignedCycle,
+    TorqueState,
+    find_sensor,
+    signed_cycle,
+)
 from leg_wear_monitor.monitor.reports import CycleReport
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.twin.load import torque_size
 from leg_wear_monitor.twin.reference import CrankProfile, mean_profile
+from leg_wear_monitor.twin.sample import NONE
 from leg_wear_monitor.twin.torque_reference import CYCLES, PACE, WIDER, TorqueReference
 
 # A recording as the monitor sees it with the proposed parameters: gait cycles with their torques.
@@ -126,7 +132,8 @@ def walk_of(
     quiet = attrs.evolve(config.diagnosis, enabled=False)
     config = attrs.evolve(config, diagnosis=quiet, ledger=LedgerFile())
     mechanism = fitted(load_mechanism(config.mechanism), config)
-    monitor, cycles, mismatch = WearMonitor(load_mechanism(config.mechanism), config), [], []
+    monitor, mismatch = WearMonitor(load_mechanism(config.mechanism), config), []
+    cycles: list[SignedCycle] = []
     size_nm = torque_size(build_linkage(mechanism), config.cadence.commanded_rpm / 60.0 * TURN)
     state = TorqueState(np.zeros(len(mechanism.clearance_joints)))
     with Recording(recordings, config, joint_states=joint_states, drive_torque=drive_torque) as recording:
@@ -134,20 +141,30 @@ def walk_of(
             state.samples = state.samples.extended(block.samples)
             for one in monitor.update(block.samples).cycles:
                 mismatch.append(one.torque_mismatch)
-                cycles += _signed(state, one, config, size_nm)
+                before, is_short = state.sensor, len(cycles) < LEAST_CYCLES
+                found = _signed(state, one, config, size_nm, is_short)
+                cycles = [*(cycles if state.sensor is before else ()), *found]
                 state.samples = state.samples.after(one.stamp_ns)
     return Walk(mechanism, config, np.array(mismatch), tuple(cycles[_SETTLING:]), state.sensor)
 
 
 def _signed(
-    state: TorqueState, report: CycleReport, config: MonitorConfig, size_nm: float
+    state: TorqueState, report: CycleReport, config: MonitorConfig, size_nm: float, is_short: bool
 ) -> list[SignedCycle]:
-    """A gait cycle, if it was walked as commanded, without gaps, and has a signature."""
+    """A gait cycle, if it was walked as commanded, without gaps, and has a signature.
+
+    All are of one sensor, whose rate may be found anew while there are few.
+    """
     if not config.cadence.allows(report.cadence_rpm) or report.bridged_s > 0.0:
         return []
-    find_sensor(state, report.begin_ns, report.stamp_ns, config, size_nm)
+    if is_short:
+        find_sensor(state, report.begin_ns, report.stamp_ns, config, size_nm)
     found = signed_cycle(state, report.begin_ns, report.stamp_ns)
-    return [] if isinstance(found, NotUsed) else [found]
+    if isinstance(found, NotUsed):
+        state.leave_out(found)
+        return []
+    state.unused = ()
+    return [found]
 
 
 OPENED = (1.5, 2.0)  # 0.45 and 0.60 mm of the default leg's joints
@@ -361,10 +378,10 @@ def with_detections(
 
 def _known(walk: Walk) -> tuple[TorqueReference | None, str]:
     """A reference of this leg for the recorded motion of its crank, and where it is from."""
-    path = walk.config.diagnosis.reference
+    path, is_in_air = walk.config.diagnosis.reference, walk.config.load.model == NONE
     given = read_references(Path(path), walk.mechanism) if path else ()
     for one in (*given, *shipped_references(walk.mechanism)):
-        if walk.profile.is_like(one.profile):
+        if walk.profile.is_like(one.profile) and not (is_in_air and one.parameters.load.size):
             return one, path if any(one is each for each in given) else "the one that comes with the package"
     return None, ""
 

@@ -625,6 +625,12 @@ class CommissionedTorque:
         Mean speed of the crank [rad/s]; 0 where it is not known.
     temperature_c : float
         Mean temperature of the drive [°C]; NaN where it was not measured.
+    period_s : float
+        Of the sensor that measured it; NaN where it is not known.
+    together : int
+        Number of its samples that were averaged into one.
+    is_instant : bool
+        As of `TorqueSensor`.
     """
 
     stamp_ns: int
@@ -634,6 +640,9 @@ class CommissionedTorque:
     channel: Channel = DIRECT
     speed: float = 0.0
     temperature_c: float = math.nan
+    period_s: float = math.nan
+    together: int = 1
+    is_instant: bool = False
 
     @sigma_m.default
     def _as_counted(self) -> Floats:
@@ -648,6 +657,17 @@ class CommissionedTorque:
     def cycles(self) -> int:
         """Number of gait cycles."""
         return len(self.signatures)
+
+    def measured_by(self, sensor: TorqueSensor) -> "CommissionedTorque":
+        """The same of a sensor."""
+        period_s, together, is_instant = sensor.period_s, sensor.together, sensor.is_instant
+        return attrs.evolve(self, period_s=period_s, together=together, is_instant=is_instant)
+
+    def is_of(self, sensor: TorqueSensor) -> bool:
+        """Whether a sensor measured it in the same way; one that is not known, in as many phases."""
+        own = self.period_s, self.together, self.is_instant
+        is_same = own == (sensor.period_s, sensor.together, sensor.is_instant)
+        return (is_same or math.isnan(self.period_s)) and self.signatures.shape[1] == 2 * sensor.phases
 
     @property
     def mean(self) -> Floats:

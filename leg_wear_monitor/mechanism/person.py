@@ -2,6 +2,7 @@
 
 import csv
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import NamedTuple
 import attrs
 import numpy as np
 
-from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.errors import ConfigError, ConfigWarning
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN, Linkage, build_linkage, one_cycle, point_motion
 from leg_wear_monitor.mechanism.spec import GROUND, Body, Mechanism, PhaseLoad, TrackDrive, Vector
@@ -124,6 +125,7 @@ GROUND_LOAD = "ground"  # name of the load in a mechanism
 
 _OF_FORCE = ("crank_angle", "foot_load", "foot_load_along")  # columns of a file with the force on the toe
 _LEAST_ROWS = 11  # after the first one
+_USUAL_PEAK_N = 10.0, 5000.0  # of the vertical force: a child's step, and a run of 150 kg
 
 
 @attrs.frozen
@@ -210,11 +212,13 @@ def read_toe_force(path: Path) -> Floats:
     Its columns are those of a table that `replay` reads, ``crank_angle`` [rad], ``foot_load`` (up) and, where
     there is one, ``foot_load_along`` (along x) [N]; between its rows the force is linear.
 
+    Warns of a force that is far outside the usual.
+
     Raises
     ------
     ConfigError
-        If the file cannot be read, lacks a column, has a value that is no finite number, or has a crank that
-        does not turn in one direction, by at most a turn.
+        If the file cannot be read, lacks a column, has a value that is no finite number, has a crank that
+        does not turn once in one direction, without wide gaps, or a ground that pulls.
     """
     try:
         with path.open(encoding="utf-8", newline="") as file:
@@ -227,6 +231,17 @@ def read_toe_force(path: Path) -> Floats:
     if len(way) < _LEAST_ROWS or not ((way > 0.0).all() or (way < 0.0).all()) or np.ptp(angle) > TURN:
         fault = f"expected at least {_LEAST_ROWS + 1} rows of one gait cycle, in the order of their angles"
         raise ConfigError(str(path), _OF_FORCE[0], fault)
+    widest = max(float(np.abs(way).max()), TURN - float(np.ptp(angle)))
+    if widest > TURN / _LEAST_ROWS:
+        fault = f"no rows over {widest:.3g} rad of the turn, expected at most {TURN / _LEAST_ROWS:.2g} rad"
+        raise ConfigError(str(path), _OF_FORCE[0], fault)
+    peak_n, (least_n, most_n) = float(up.max()), _USUAL_PEAK_N
+    if peak_n <= -float(up.min()):
+        fault = f"{peak_n:.3g} N at most and {up.min():.3g} N at least, expected a ground that pushes up"
+        raise ConfigError(str(path), _OF_FORCE[1], fault)
+    if not least_n <= peak_n <= most_n:
+        fault = f"{peak_n:.3g} N at most, usual are {least_n:g} to {most_n:g} N; another unit than N?"
+        warnings.warn(f"{path}: {_OF_FORCE[1]}: {fault}", ConfigWarning, stacklevel=2)
     at = np.arange(PHASES) * (TURN / PHASES)
     return np.stack([np.interp(at, angle, force, period=TURN) for force in (along, up)], axis=1)
 

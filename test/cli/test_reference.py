@@ -1,13 +1,15 @@
 """`reference` writes a file that a parameter file can name."""
 
 import math
+import warnings
 from pathlib import Path
 
+import attrs
 import numpy as np
 import pytest
 
 from leg_wear_monitor.mechanism.loader import load_mechanism
-from leg_wear_monitor.mechanism.person import nominal_stance
+from leg_wear_monitor.mechanism.person import nominal_stance, read_toe_force
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.monitor.diagnosis import reference_file
 from leg_wear_monitor.twin import torque_reference
@@ -68,6 +70,14 @@ def test_a_reference_under_a_load_is_of_a_leg_that_carries_it(run, tmp_path: Pat
         (TABLE + "0.1,2\n", "stance.csv: foot_load_along: row 1: None is not a finite number"),
         (TABLE + "0.1,2,3\n" * 20, "at least 12 rows of one gait cycle, in the order of their angles"),
         (TABLE + "".join(f"{0.5 * i},2,3\n" for i in range(20)), "rows of one gait cycle"),
+        (
+            TABLE + "".join(f"{0.017 * i},300,0\n" for i in range(36)),
+            "stance.csv: crank_angle: no rows over 5.69 rad of the turn, expected at most 0.57 rad",
+        ),
+        (
+            TABLE + "".join(f"{0.5 * i},{-300 * (i % 2)},0\n" for i in range(13)),
+            "stance.csv: foot_load: 0 N at most and -300 N at least, expected a ground that pushes up",
+        ),
         ("", "expected at least 12 rows"),
     ],
 )  # fmt: skip
@@ -77,6 +87,32 @@ def test_a_load_that_is_no_gait_cycle_is_refused(run, tmp_path: Path, text: str,
     assert result.exit_code == 2
     assert fault in result.stderr
     assert len(result.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize(("peak", "shown"), [("0.3", "0.3 N"), ("3e6", "3e+06 N"), ("300", "")])
+def test_a_load_in_another_unit_is_warned_of(tmp_path: Path, peak: str, shown: str) -> None:
+    (tmp_path / "stance.csv").write_text(TABLE + "".join(f"{0.5 * i},{peak},0\n" for i in range(13)))
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        read_toe_force(tmp_path / "stance.csv")
+    usual = f"foot_load: {shown} at most, usual are 10 to 5000 N; another unit than N?"
+    assert [str(each.message).split(": ", 1)[1] for each in found] == ([usual] if shown else [])
+
+
+def test_the_load_of_references_is_told(run, tmp_path: Path) -> None:
+    leg = load_mechanism("bionic_leg")
+    (shipped,) = reference_file.shipped_references(leg)
+    few = attrs.evolve(shipped, torque_nm=tuple(torque[:1] for torque in shipped.torque_nm))
+    load = 300.0 * nominal_stance(build_linkage(leg)).force()
+    loaded = attrs.evolve(few, parameters=attrs.evolve(few.parameters, load=load))
+    with (tmp_path / "leg.npz").open("wb") as file:
+        reference_file.write_references(file, leg, [few, loaded])
+    told = ", references at 60, 60 rpm, 1 of 2 under 300 N on the foot"
+    for model, end in (("none", ", not used with load.model none\n"), ("ground", "\n")):
+        (tmp_path / "monitor.yaml").write_text(
+            f"/**: {{ros__parameters: {{load: {{model: {model}}}, diagnosis: {{reference: leg.npz}}}}}}"
+        )
+        assert told + end in run("check", "monitor.yaml").stdout
 
 
 @pytest.mark.parametrize(

@@ -10,18 +10,24 @@ from leg_wear_monitor.estimate.cause import SURE_LOG_ODDS, SURE_SIGMAS, Cause, C
 from leg_wear_monitor.estimate.change_detector import first_changed
 from leg_wear_monitor.estimate.clearance_fit import best_fit, start_of, starts_of, with_rivals
 from leg_wear_monitor.estimate.explanations import Explanation, change_of
-from leg_wear_monitor.estimate.signature import DIRECT, with_noise_of
+from leg_wear_monitor.estimate.signature import DIRECT, CommissionedTorque, TorqueSensor, with_noise_of
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.references import (
     COMMISSIONING_CYCLES,
-    FIRST_CYCLES,
     UNLIKE_CYCLES,
     LegModels,
     References,
 )
-from leg_wear_monitor.monitor.diagnosis.state import AtCadence, NotUsed, SignedCycle, TorqueState
+from leg_wear_monitor.monitor.diagnosis.state import (
+    FIRST_CYCLES,
+    UNUSABLE_CYCLES,
+    AtCadence,
+    NotUsed,
+    SignedCycle,
+    TorqueState,
+)
 
 SETTLING_CYCLES = 10  # since a change, before the counted clearances are corrected by it
 
@@ -224,7 +230,10 @@ def _is_of_reference(explanations: Sequence[Explanation]) -> bool:
 # Why there is no estimate of the clearances yet, or why it is not sure, and what comes next.
 
 
-_UNUSABLE_CYCLES = 3  # in a row: a start has two that are unlike
+_IRREGULAR = (
+    "the stamps of the drive torque are too irregular, or have another rate than before: a step between two "
+    "samples has no known time"
+)
 _CHANGING_CYCLES, _ALIKE_CYCLES = 5, 3  # in a ramp of 30 rpm a minute, two or three in a row are alike
 
 
@@ -237,10 +246,8 @@ def missing(state: TorqueState, references: References, config: MonitorConfig) -
             f"{own.commanded_rpm:.3g} ± {own.tolerance_rpm:.3g} rpm"
         )
     if state.unused and state.unused[-1] is NotUsed.JITTER:
-        return (
-            "the stamps of the drive torque are too irregular: a step between two samples has no known time"
-        )
-    if state.sensor is None or state.unused[-_UNUSABLE_CYCLES:] == (NotUsed.GAP,) * _UNUSABLE_CYCLES:
+        return _IRREGULAR
+    if state.sensor is None or state.unused[-UNUSABLE_CYCLES:] == (NotUsed.GAP,) * UNUSABLE_CYCLES:
         return "no drive torque with enough samples in a gait cycle"
     if not state.sensor.phases:
         return "the drive torque has too few samples in a gait cycle"
@@ -261,10 +268,18 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
     """Why an estimate is not sure; empty if it is."""
     if _is_unlike(state):
         return _other_cadence(state, references)
+    if state.unused[-UNUSABLE_CYCLES:] == (NotUsed.JITTER,) * UNUSABLE_CYCLES:
+        return _IRREGULAR
     if not state.is_compared:
         return f"changes at this cadence are not observed yet; at {_cadences(state.set_aside)} they are"
     if models.is_of_file(state):
-        return ""
+        if state.fit is None or state.commissioned is None or state.fit.explains or state.changes:
+            return ""
+        return (
+            "the drive torque is not that of the commissioned leg, and no clearances explain it; they are "
+            "estimated again when its noise, scale and lost samples are as they were. If the sensor was "
+            "changed, reset a joint and undo it: the leg is commissioned again"
+        )
     known = "the model does not fit this leg, and the names of joints are not sure: "
     if not state.changes:
         known = "the model does not fit this leg, but nothing has changed since it was commissioned: "
@@ -283,9 +298,29 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
     return f"{known}masses, lengths and friction near those of the file do not explain its drive torque"
 
 
+def other_sensor(state: TorqueState) -> str:
+    """That a baseline is of another sensor, until there is one of the present sensor; empty otherwise."""
+    sensor = state.sensor
+    if sensor is None or state.commissioned is not None:
+        return ""
+    other = next((one for one in state.baselines if not one.is_of(sensor)), None)
+    if other is None:
+        return ""
+    now = _sampled(sensor, sensor.phases)
+    then = "unknown" if math.isnan(other.period_s) else _sampled(other, other.signatures.shape[1] // 2)
+    return f"the baseline is of another torque sensor ({then}; now {now}): the leg is commissioned again"
+
+
+def _sampled(one: TorqueSensor | CommissionedTorque, phases: int) -> str:
+    """How a torque is sampled, such as ``1000 Hz, means, 5 averaged, 80 phases``."""
+    together = f", {one.together} averaged" if one.together > 1 else ""
+    kind = "instants" if one.is_instant else "means"
+    return f"{1.0 / one.period_s:.0f} Hz, {kind}{together}, {phases} phases"
+
+
 def _is_unlike(state: TorqueState) -> bool:
     """Whether the crank turns otherwise than in all references, and not only as it starts or stops."""
-    return state.unused[-_UNUSABLE_CYCLES:] == (NotUsed.UNLIKE,) * _UNUSABLE_CYCLES
+    return state.unused[-UNUSABLE_CYCLES:] == (NotUsed.UNLIKE,) * UNUSABLE_CYCLES
 
 
 def _is_changing(state: TorqueState) -> bool:

@@ -15,13 +15,20 @@ from leg_wear_monitor.estimate.cause import Cause, Change
 from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
 from leg_wear_monitor.estimate.coupling import compliance_of
 from leg_wear_monitor.estimate.ground_load import stance_phases
-from leg_wear_monitor.estimate.signature import DIRECT, CommissionedTorque, TorqueSensor, signatures
+from leg_wear_monitor.estimate.signature import DIRECT, CommissionedTorque
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.person import upwards
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.sections import drive_figures
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.diagnosis.evidence import SETTLING_CYCLES, Evidence, doubt, missing, next_step
+from leg_wear_monitor.monitor.diagnosis.evidence import (
+    SETTLING_CYCLES,
+    Evidence,
+    doubt,
+    missing,
+    next_step,
+    other_sensor,
+)
 from leg_wear_monitor.monitor.diagnosis.references import (
     COMMISSIONING_CYCLES,
     LOAD_ROUNDS,
@@ -30,21 +37,21 @@ from leg_wear_monitor.monitor.diagnosis.references import (
     References,
 )
 from leg_wear_monitor.monitor.diagnosis.state import (
+    FIRST_CYCLES,
     UNUSED_CYCLES,
     WINDOW_CYCLES,
     Diagnosis,
     DiagnosisState,
     NotUsed,
-    SignedCycle,
     TorqueSamples,
     TorqueState,
-    cycle_torque,
-    sensor_period_s,
+    find_sensor,
+    signed_cycle,
     temperature_of,
 )
 from leg_wear_monitor.state import FootLoad
 from leg_wear_monitor.twin.reference import LegParameters
-from leg_wear_monitor.twin.sample import GROUND, INSTANT, MEASURED, KeepsSamples
+from leg_wear_monitor.twin.sample import GROUND, MEASURED, KeepsSamples
 from leg_wear_monitor.twin.statistics import CycleStatistics
 from leg_wear_monitor.twin.torque_reference import ReferenceSnapshot, TorqueReference
 
@@ -98,55 +105,19 @@ def settle(state: TorqueState, correction: Correction, counted_m: Floats) -> Non
         state.profile.speed,
         temperature_of(state.cycles),
     )
-    state.settled = (*state.settled, attrs.evolve(change, is_corrected=True))
-
-
-# Gait cycles with the signature of their torque, from the samples that an observer keeps.
-
-
-# of the sensor's period: steps between samples at times that are more irregular say nothing of its roughness
-_JITTER = 0.15
-
-
-def find_sensor(
-    state: TorqueState, begin_ns: int, end_ns: int, config: MonitorConfig, size_nm: float
-) -> None:
-    """Find the sensor's period in the first gait cycle with torques."""
     if state.sensor is not None:
-        return
-    period_s = sensor_period_s(state.samples, begin_ns, end_ns)
-    if math.isnan(period_s):
-        return
-    # as commanded: a reference, and all of its signatures, are for one cadence
-    cycle_s = 60.0 / abs(config.cadence.commanded_rpm)
-    is_instant = config.drive_torque.sampling == INSTANT
-    state.sensor = TorqueSensor(float(f"{period_s:.2g}"), cycle_s, size_nm, is_instant)
-    # those of a sensor with another rate do not count: the leg is commissioned anew
-    size = 2 * state.sensor.phases
-    state.baselines = tuple(one for one in state.baselines if one.signatures.shape[1] == size)
-
-
-def signed_cycle(state: TorqueState, begin_ns: int, end_ns: int) -> SignedCycle | NotUsed:
-    """A gait cycle between two stamps, or why it has no signature."""
-    sensor = state.sensor
-    if sensor is None or not sensor.phases:
-        return NotUsed.GAP
-    torque = cycle_torque(state.samples, begin_ns, end_ns, sensor)
-    if torque is None:
-        return NotUsed.GAP
-    if torque.jitter > _JITTER:
-        return NotUsed.JITTER
-    first = np.zeros(len(torque.angle), np.int64)
-    signature = signatures(first, torque.angle, torque.torque, torque.step, sensor)[0]
-    if not np.isfinite(signature).all():
-        return NotUsed.GAP
-    return SignedCycle(begin_ns, end_ns, signature, torque.profile, torque.temperature_c)
+        state.commissioned = state.commissioned.measured_by(state.sensor)
+    state.settled = (*state.settled, attrs.evolve(change, is_corrected=True))
 
 
 # by which a load has moved, of its size: the twin's mean over twenty gait cycles is within 1 % of what the
 # foot carries, and where its shape was found under 100 N up to 23 % above it (2026-11-25)
 _MOVED, _LEAST_LOAD_N = 0.3, 100.0
 _ESTIMATED_M, _ESTIMATED = 1.0e-4, 0.2  # largest standard deviation of an observable clearance; of it
+
+
+def _joined(*reasons: str) -> str:
+    return "; ".join(filter(None, reasons))
 
 
 TorqueObserverSnapshot = tuple[TorqueState, ReferenceSnapshot | None]
@@ -202,7 +173,10 @@ class TorqueObserver(KeepsSamples):
         if parameters is None:  # those that files and unfinished references were made with
             own = LegParameters.none(mechanism)
             made = (one.parameters for one in references if not one.is_of_parameters)
-            parameters = next((one for one in made if one != own), None)
+            known = (one for one in made if self._is_on_ground or not one.load.size)
+            parameters = next((one for one in known if one != own), None)
+        if parameters is not None and not self._is_on_ground:  # another load.model than when it was found
+            parameters = parameters.in_air
         if is_drive_known:
             whole_leg = parameters or LegParameters.none(mechanism)
             parameters = attrs.evolve(whole_leg, compliance=compliance_of(figures.stiffness_nm_per_rad))
@@ -360,13 +334,13 @@ class TorqueObserver(KeepsSamples):
             commissioned_c=known.temperature_c if known else None,
         )
         if state.fit is None or state.detector is None or is_old:
-            reason = missing(state, self._references, self.config)
+            reason = _joined(missing(state, self._references, self.config), other_sensor(state))
             return attrs.evolve(found, state=DiagnosisState.WAITING, reason=reason)
         clearance_m, sigma_m = self._observed(state.fit)
         return attrs.evolve(
             found,
             state=DiagnosisState.CHANGED if state.changes else DiagnosisState.AS_COUNTED,
-            reason=doubt(state, self._references, self.models),
+            reason=_joined(doubt(state, self._references, self.models), other_sensor(state)),
             cycles=state.fit_cycles,
             clearance_m=tuple(clearance_m.tolist()),
             sigma_m=tuple(sigma_m.tolist()),
@@ -437,7 +411,10 @@ class TorqueObserver(KeepsSamples):
             state.turn_to(other)
         state.unused = ()
         state.cycles = (*state.cycles, cycle)[-WINDOW_CYCLES:]
-        self._evidence.add(state, cycle, self.config)
+        if state.sensor and state.sensor.noise_nm:
+            self._evidence.add(state, cycle, self.config)
+        elif len(state.cycles) >= FIRST_CYCLES:  # of a sensor whose noise is not known yet
+            self._evidence.review(state, self.config)
         self._commission()
 
     def _commission(self) -> None:
@@ -445,13 +422,16 @@ class TorqueObserver(KeepsSamples):
         state = self.state
         if state.commissioned is not None or state.changes or len(state.cycles) < COMMISSIONING_CYCLES:
             return
-        state.commissioned = CommissionedTorque(
+        if state.sensor is None:
+            raise RuntimeError("there are no samples yet")
+        known = CommissionedTorque(
             state.cycles[-1].end_ns,
             state.counted_m,
             state.signatures,
             speed=state.profile.speed,
             temperature_c=temperature_of(state.cycles),
         )
+        state.commissioned = known.measured_by(state.sensor)
         self._evidence.review(state, self.config)
 
     def _restart(self, counted_m: Floats) -> None:

@@ -25,8 +25,8 @@ from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
-from leg_wear_monitor.monitor.diagnosis.state import AtCadence, ExplainedTorque, TorqueState
-from leg_wear_monitor.twin.reference import UNLIKE, CrankProfile, LegParameters, mean_profile
+from leg_wear_monitor.monitor.diagnosis.state import FIRST_CYCLES, AtCadence, ExplainedTorque, TorqueState
+from leg_wear_monitor.twin.reference import CrankProfile, LegParameters, mean_profile
 from leg_wear_monitor.twin.torque_reference import (
     LEAST_CLEARANCE_M,
     ReferenceSnapshot,
@@ -182,7 +182,6 @@ class LegModels:
 # The choice of the reference, its simulation in the background, and the identification of the leg.
 
 
-FIRST_CYCLES = 5  # gait cycles before the first reference is chosen
 # gait cycles alike without a reference until one is made for them; a change of the cadence has fewer
 UNLIKE_CYCLES = 20
 
@@ -202,6 +201,7 @@ class References:
     models : LegModels
     given : sequence of TorqueReference, optional
         References known beforehand: of files first, then of the ledger. Those of the package follow them.
+        Ones that were simulated under a load are for a leg on the ground.
     part : TorqueReference or None
         Unfinished reference of an earlier run, which is continued if it fits.
     is_drive_known : bool
@@ -233,7 +233,8 @@ class References:
     ) -> None:
         self._mechanism, self._models, self._part = mechanism, models, part
         self._is_drive_known, self._is_on_ground = is_drive_known, is_on_ground
-        self._given = (*given, *shipped_references(mechanism))
+        usable = (one for one in given if is_on_ground or not one.parameters.load.size)
+        self._given = (*usable, *shipped_references(mechanism))
         self._run: TorqueReferenceRun | None = None
 
     @property
@@ -495,16 +496,14 @@ def _turn_to(state: TorqueState, profile: CrankProfile) -> None:
 def _start_at_cadence(state: TorqueState, reference: TorqueReference) -> None:
     """Begin a new cadence with the gait cycles that waited for its reference.
 
-    It has a baseline of its own, from the ledger if there is one, because forces of inertia depend on the
-    speed: compared with the baseline of 60 rpm, a healthy leg at 57 rpm had a wide joint A.
+    It has a baseline of its own, from the ledger if there is one.
     """
     if state.sensor is None:
         raise RuntimeError("there are no samples yet")
-    speed = reference.profile.speed
-    own = [one for one in state.baselines if not one.speed or abs(one.speed / speed - 1.0) <= UNLIKE]
+    own = state.take_baseline(reference.profile.speed)
     cycles = [one for one in state.waiting if one.profile.is_like(reference.profile)]
-    state.turn_to(AtCadence(reference, state.sensor, own[0] if own else None, tuple(cycles)))
-    state.baselines, state.waiting = tuple(one for one in state.baselines if one not in own[:1]), ()
+    state.turn_to(AtCadence(reference, state.sensor, own, tuple(cycles)))
+    state.waiting = ()
 
 
 def _is_far(reference: TorqueReference, counted_m: Floats) -> bool:

@@ -12,16 +12,31 @@ from leg_wear_monitor.estimate.cause import Change
 from leg_wear_monitor.estimate.change_detector import DetectorState
 from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
 from leg_wear_monitor.estimate.ground_load import GroundLoad
-from leg_wear_monitor.estimate.signature import DIRECT, Channel, CommissionedTorque, TorqueSensor, averaged
+from leg_wear_monitor.estimate.signature import (
+    DIRECT,
+    Channel,
+    CommissionedTorque,
+    TorqueSensor,
+    averaged,
+    signatures,
+)
 from leg_wear_monitor.files import finite_or_none
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.shown import Shown
 from leg_wear_monitor.state import FootLoad
 from leg_wear_monitor.twin import TORQUE
-from leg_wear_monitor.twin.reference import CrankProfile, LegParameters, cycle_profile, mean_profile
+from leg_wear_monitor.twin.reference import (
+    UNLIKE,
+    CrankProfile,
+    LegParameters,
+    cycle_profile,
+    mean_profile,
+)
 from leg_wear_monitor.twin.sample import (
     GAIT_SAMPLE,
+    INSTANT,
     Samples,
     has_value_of,
     is_valid,
@@ -75,10 +90,16 @@ class CycleTorque(NamedTuple):
     temperature_c: float
 
 
-def sensor_period_s(kept: TorqueSamples, begin_ns: int, end_ns: int) -> float:
-    """Median time between the torque samples of a gait cycle; NaN where there are fewer than three."""
-    stamps = within(kept.torque, begin_ns, end_ns)["stamp_ns"]
-    return float(np.median(np.diff(stamps))) * 1.0e-9 if len(stamps) > 2 else float("nan")
+def sensor_period_s(kept: TorqueSamples, begin_ns: int, end_ns: int) -> tuple[float, float]:
+    """Median time between the torque samples of a gait cycle, and the median departure, as a fraction of it.
+
+    NaN where there are fewer than three.
+    """
+    between = np.diff(within(kept.torque, begin_ns, end_ns)["stamp_ns"])
+    if len(between) < 2:
+        return math.nan, math.nan
+    period_ns = float(np.median(between))
+    return 1.0e-9 * period_ns, float(np.median(np.abs(between - period_ns))) / period_ns
 
 
 def mean_of(values: Floats) -> float:
@@ -101,7 +122,10 @@ def cycle_torque(kept: TorqueSamples, begin_ns: int, end_ns: int, sensor: Torque
     since_s = np.asarray(1.0e-9 * (crank_ns - begin_ns), dtype=np.float64)
     profile = cycle_profile(since_s, turned, 1.0e-9 * (end_ns - begin_ns))
     gap = np.diff(torque_ns, prepend=torque_ns[0]) > _LOST * 1.0e9 * sensor.period_s
-    angle = np.interp(torque_ns, crank_ns, turned)
+    # the ends are passages of zero, which torques may be nearer to than the first and the last crank angle
+    ends = TURN * np.round(turned[[0, -1]] / TURN)
+    place = np.concatenate([[begin_ns], crank_ns, [end_ns]])
+    angle = np.interp(torque_ns, place, np.concatenate([ends[:1], turned, ends[1:]]))
     if sensor.together > 1:
         angle = angle[sensor.together - 1 :: sensor.together]
         torque = averaged(torque, sensor.together)
@@ -234,6 +258,8 @@ class Diagnosis(Shown):
 
 WINDOW_CYCLES = 60  # that are kept at a cadence, and that clearances are estimated from
 LAST_CYCLES = 10  # whose mean temperature is that of the drive now
+FIRST_CYCLES = 5  # gait cycles before the first reference is chosen
+UNUSABLE_CYCLES = 3  # in a row: a start has two that are unlike
 UNUSED_CYCLES = 20  # in a row, after which a result is not one of the leg as it walks now
 
 
@@ -288,7 +314,7 @@ class TorqueState:
     due : tuple of (int, int)
         Begin and end [ns] of ended gait cycles that are not evaluated yet.
     sensor : TorqueSensor or None
-        As found in the first gait cycle with torques.
+        As found in the first gait cycle with torques, or where its rate has changed.
     waiting : tuple of SignedCycle
         The last gait cycles alike whose motion of the crank has no reference.
     odd : tuple of SignedCycle
@@ -305,7 +331,7 @@ class TorqueState:
     set_aside : tuple of AtCadence
         Other cadences, the last one first.
     baselines : tuple of CommissionedTorque
-        Those of the ledger whose cadence was not walked yet.
+        Those of the ledger whose cadence was not walked yet, and those of other sensors.
     detector : DetectorState or None
     fit : ClearanceFit or None
     fit_cycles : int
@@ -419,6 +445,27 @@ class TorqueState:
         self.reference, self.sensor, self.commissioned = one.reference, one.sensor, one.commissioned
         self.cycles, self.is_final, self.fit_due = one.cycles, one.is_final, 0
 
+    def take_baseline(self, speed: float) -> CommissionedTorque | None:
+        """The baseline of the sensor at a speed of the crank, which is not among the others any more.
+
+        Forces of inertia depend on the speed: compared with the baseline of 60 rpm, a healthy leg at 57 rpm
+        had a wide joint A. Roughness depends on the rate, and on how many samples are averaged.
+        """
+        alike = (one for one in self.baselines if not one.speed or abs(one.speed / speed - 1.0) <= UNLIKE)
+        own = next((one for one in alike if self.sensor and one.is_of(self.sensor)), None)
+        self.baselines = tuple(one for one in self.baselines if one is not own)
+        return own
+
+    def measure_with(self, sensor: TorqueSensor) -> None:
+        """Go on with another sensor; baselines, gait cycles and what they show are of the former one."""
+        self.baselines, known = self.all_commissioned, self.known
+        self.forget_cycles()
+        self.sensor, self.reference, self.set_aside = sensor, None, ()
+        self.detector, self.fit, self.changes, self.least_m = None, None, (), ()
+        for one in reversed(known):
+            baseline = self.take_baseline(one.reference.profile.speed)
+            self.turn_to(AtCadence(one.reference, sensor, baseline, is_final=one.is_final))
+
     def wait_with(self, cycle: SignedCycle) -> None:
         """Keep a gait cycle for a reference that is to be made, with those before that are like it.
 
@@ -456,3 +503,55 @@ class TorqueState:
             attrs.evolve(one, commissioned=rest(one.commissioned)) for one in self.set_aside
         )
         self.baselines = tuple(one for one in self.baselines if rest(one))
+
+
+# Gait cycles with the signature of their torque, from the samples that an observer keeps.
+
+
+# of the sensor's period: steps between samples at times that are more irregular say nothing of its roughness
+_JITTER = 0.15
+
+# of the period: one so near the border between two rounded ones may be either of them in another run
+_ROUNDED = (1.0, 0.995, 1.005)
+
+
+def find_sensor(
+    state: TorqueState, begin_ns: int, end_ns: int, config: MonitorConfig, size_nm: float
+) -> None:
+    """Find the sensor's period in the first gait cycle with torques, and again where its rate has changed.
+
+    What is known of the leg is not given up for a short disturbance, nor a change that was found.
+    """
+    own = state.sensor
+    is_known = state.reference is not None or len(state.waiting) >= FIRST_CYCLES
+    last = (NotUsed.JITTER,) * (UNUSED_CYCLES if is_known else UNUSABLE_CYCLES)
+    if own is not None and (state.changes or state.unused[-len(last) :] != last):
+        return
+    period_s, jitter = sensor_period_s(state.samples, begin_ns, end_ns)
+    if math.isnan(period_s) or (own is not None and jitter > _JITTER):
+        return
+    near = [float(f"{part * period_s:.2g}") for part in _ROUNDED]
+    known = {one.period_s for one in state.baselines}
+    period_s = next((one for one in near if one in known), near[0])
+    # as commanded: a reference, and all of its signatures, are for one cadence
+    cycle_s = 60.0 / abs(config.cadence.commanded_rpm)
+    if own is None or own.period_s != period_s:
+        is_instant = config.drive_torque.sampling == INSTANT
+        state.measure_with(TorqueSensor(period_s, cycle_s, size_nm, is_instant))
+
+
+def signed_cycle(state: TorqueState, begin_ns: int, end_ns: int) -> SignedCycle | NotUsed:
+    """A gait cycle between two stamps, or why it has no signature."""
+    sensor = state.sensor
+    if sensor is None or not sensor.phases:
+        return NotUsed.GAP
+    torque = cycle_torque(state.samples, begin_ns, end_ns, sensor)
+    if torque is None:
+        return NotUsed.GAP
+    if torque.jitter > _JITTER:
+        return NotUsed.JITTER
+    first = np.zeros(len(torque.angle), np.int64)
+    signature = signatures(first, torque.angle, torque.torque, torque.step, sensor)[0]
+    if not np.isfinite(signature).all():
+        return NotUsed.GAP
+    return SignedCycle(begin_ns, end_ns, signature, torque.profile, torque.temperature_c)

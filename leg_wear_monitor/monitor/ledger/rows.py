@@ -255,11 +255,12 @@ def _baseline_values(baseline: CommissionedTorque) -> dict[str, Any]:
         "clearance_m": _blob(baseline.clearance_m),
         "signatures": _blob(baseline.signatures),
         "sigma_m": _blob(baseline.sigma_m),
-        "delay_s": baseline.channel.delay_s,
-        "time_constant_s": baseline.channel.time_constant_s,
-        "load_friction": baseline.channel.load_friction,
+        **attrs.asdict(baseline.channel),
         "speed_radps": baseline.speed,
         "temperature_c": finite_or_none(baseline.temperature_c),
+        "period_s": finite_or_none(baseline.period_s),
+        "averaged": baseline.together,
+        "is_instant": int(baseline.is_instant),
     }
 
 
@@ -371,9 +372,8 @@ def read_last_reset(db: sqlite3.Connection, joint: str) -> Audit | None:
 
 def read_commissioned(db: sqlite3.Connection) -> Commissioned | None:
     """Stored errors of further encoders, None if none were commissioned."""
-    row = db.execute(
-        "SELECT stamp_ns, encoders, errors FROM commissioning ORDER BY id DESC LIMIT 1"
-    ).fetchone()
+    query = "SELECT stamp_ns, encoders, errors FROM commissioning ORDER BY id DESC LIMIT 1"
+    row = db.execute(query).fetchone()
     if row is None:
         return None
     encoders, errors = tuple(row[1].split("\n")), _floats(row[2])
@@ -390,14 +390,16 @@ def read_commissioned_torques(db: sqlite3.Connection) -> list[CommissionedTorque
     found: list[CommissionedTorque] = []
     for row in db.execute(
         "SELECT stamp_ns, cycles, speed_radps, delay_s, time_constant_s, load_friction, clearance_m, "
-        "signatures, sigma_m, temperature_c FROM torque_commissioning ORDER BY id DESC"
+        "signatures, sigma_m, temperature_c, period_s, averaged, is_instant FROM torque_commissioning "
+        "ORDER BY id DESC"
     ):
         stamp_ns, cycles, speed, delay_s, time_constant_s, load_friction = row[:6]
         clearance_m, signatures, sigma_m = map(_floats, row[6:9])
         channel = Channel(delay_s=delay_s, time_constant_s=time_constant_s, load_friction=load_friction)
         one = CommissionedTorque(
-            stamp_ns, clearance_m, signatures.reshape(cycles, -1), sigma_m, channel, speed, or_nan(row[9])
-        )
+            stamp_ns, clearance_m, signatures.reshape(cycles, -1), sigma_m, channel, speed,
+            or_nan(row[9]), or_nan(row[10]), row[11], bool(row[12]),
+        )  # fmt: skip
         if not any(abs(one.speed - other.speed) <= UNLIKE * abs(other.speed) for other in found):
             found.append(one)
         if not one.is_as_counted or not one.speed or len(found) == CADENCES:

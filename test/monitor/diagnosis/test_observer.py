@@ -16,6 +16,7 @@ from leg_wear_monitor.monitor.config.inputs import Load
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis import evidence, references
 from leg_wear_monitor.monitor.diagnosis import observer as observer_module
+from leg_wear_monitor.monitor.diagnosis import state as state_module
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.monitor.diagnosis.state import UNUSED_CYCLES, DiagnosisState, SignedCycle, TorqueState
@@ -662,6 +663,85 @@ def test_a_baseline_of_a_sensor_with_another_rate_is_not_used(leg, reference) ->
     assert observer.diagnosis.state is DiagnosisState.AS_COUNTED
     assert observer.state.commissioned is not None
     assert observer.state.commissioned.signatures.shape[1] == 160
+
+
+def test_a_baseline_is_of_one_sensor_and_what_is_done_is_told(leg, commissioned, reference) -> None:
+    """With as many phases at 1 kHz, averaged, a healthy leg had changed, and a wide joint had no name."""
+    known = commissioned().state.commissioned
+    assert (known.period_s, known.together, known.is_instant) == (0.005, 1, False)
+    sensor, faster = TorqueSensor(0.005, 1.0, SIZE_NM), TorqueSensor(0.001, 1.0, SIZE_NM)
+    assert sensor.phases == faster.phases and known.is_of(sensor)
+    others = (faster, attrs.evolve(sensor, is_instant=True), attrs.evolve(sensor, cycle_s=2.0))
+    assert not any(known.is_of(other) for other in others)
+    second = observer_of(leg, commissioned=[known.measured_by(faster)])
+    walk(second, samples(reference, [0] * (COMMISSIONING_CYCLES + 1)), end=8)
+    told = "another torque sensor (1000 Hz, means, 5 averaged, 80 phases; now 200 Hz, means, 80 phases)"
+    assert second.state.commissioned is None and told in second.diagnosis.reason
+    assert second.diagnosis.reason.endswith("the leg is commissioned again")
+    assert second.diagnosis.clearance_m  # as of any leg that was not commissioned
+    second.state.commissioned = second.state.sensor and known
+    assert "another torque sensor" not in second.diagnosis.reason
+
+
+def test_references_under_a_load_are_for_a_leg_that_walks_under_one(leg, reference) -> None:
+    """Under load.model none, a healthy leg in the air was not that of the reference, and never corrected."""
+    load = 300.0 * load_shape(build_linkage(leg), GROUND)
+    loaded = attrs.evolve(reference, parameters=attrs.evolve(reference.parameters, load=load))
+    in_air = observer_of(leg, references=[loaded])
+    walk(in_air, samples(reference, [0] * 6))
+    assert in_air.state.parameters is None and not in_air.state.load_rounds
+    assert in_air.state.reference is not None and not in_air.state.reference.parameters.load.size
+    of_ledger = observer_of(leg, parameters=loaded.parameters)
+    assert of_ledger.state.parameters == reference.parameters
+    grounded = TorqueObserver(leg, MonitorConfig(load=Load(model=GROUND)), SIZE_NM, NEW, references=[loaded])
+    assert grounded.state.parameters == loaded.parameters
+    walk(grounded, samples(reference, [0] * 6))
+    assert grounded.state.reference is loaded
+
+
+def thinned(block, until_s: float, of: int):
+    """Samples of which only every so many torques arrive until a time after the start."""
+    torque = np.flatnonzero(block["kind"] == TORQUE)
+    early = torque[block["stamp_ns"][torque] < START_NS + round(1e9 * until_s)]
+    return np.delete(block, [at for i, at in enumerate(early) if i % of])
+
+
+def test_the_rate_is_found_again_where_the_first_gait_cycles_had_another(leg, commissioned, reference):
+    """As at a start over WiFi: 38 s of regular stamps were called irregular, until the node was restarted."""
+    known = commissioned().state.commissioned
+    observer = observer_of(leg, commissioned=[known])
+    walk(observer, thinned(samples(reference, [0] * 12), 2.05, of=3))
+    assert observer.state.sensor.period_s == 0.005
+    assert observer.diagnosis.cycles_not_used == {"jitter": 3}
+    assert observer.state.commissioned is known
+    assert observer.diagnosis.state is DiagnosisState.AS_COUNTED and not observer.diagnosis.reason
+
+
+def test_what_is_known_of_a_leg_is_given_up_for_another_rate_only_where_it_stays(
+    commissioned, reference, monkeypatch
+) -> None:
+    monkeypatch.setattr(state_module, "UNUSED_CYCLES", 4)
+    observer = commissioned()
+    known, seen = observer.state.commissioned, observer.state.reference
+
+    def at(begin: int, cycles: int, of: int) -> None:
+        block = thinned(samples(reference, [0] * cycles, seed=3), cycles, of)
+        block["stamp_ns"] += begin * 10**9
+        walk(observer, block, begin=begin, end=begin + cycles)
+
+    at(COMMISSIONING_CYCLES, 4, of=2)
+    assert observer.state.commissioned is known and "another rate than before" in observer.diagnosis.reason
+    at(COMMISSIONING_CYCLES + 4, 7, of=2)
+    assert observer.state.sensor.period_s == 0.01 and observer.state.reference is seen
+    assert observer.state.commissioned is None
+    assert "now 100 Hz, means, 40 phases" in observer.diagnosis.reason
+    later = SimpleNamespace(since_ns=2 * START_NS)
+    observer.state.changes = (later,)  # a change that was found stays
+    at(COMMISSIONING_CYCLES + 11, 6, of=1)
+    assert observer.state.sensor.period_s == 0.01
+    observer.state.changes = ()
+    at(COMMISSIONING_CYCLES + 17, 7, of=1)
+    assert observer.state.commissioned is known and not observer.diagnosis.reason
 
 
 def test_a_commissioned_leg_that_is_not_of_its_file_is_identified(

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import load_mechanism
+from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
 from leg_wear_monitor.estimate.ground_load import GroundLoad
 from leg_wear_monitor.estimate.signature import CommissionedTorque, TorqueSensor
 from leg_wear_monitor.mechanism.person import PHASES
@@ -130,6 +131,21 @@ def test_a_ramp_is_recognised_and_a_start_raises_no_doubt() -> None:
     )
     ramp.unused = (NotUsed.STANDSTILL, NotUsed.UNLIKE, NotUsed.UNLIKE)
     assert doubt(ramp, IDLE, models) == ""
+
+
+def test_a_torque_that_no_clearances_explain_is_told_with_what_to_do() -> None:
+    """Twice the noise, half the scale or lost samples: nothing was observed, without a reason."""
+    models = SimpleNamespace(is_of_file=lambda _: True)
+    fits = [ClearanceFit(NEW, np.eye(5), square, 0.0) for square in (1.0, 4.0)]
+    known_leg = {"reference": of_reference(), "cycles": cycles(50), "commissioned": known()}
+    explained, other = (state(**known_leg, fit=fit) for fit in fits)
+    assert doubt(explained, IDLE, models) == ""
+    assert doubt(other, IDLE, models).startswith(
+        "the drive torque is not that of the commissioned leg, and no clearances explain it; they are "
+    )
+    assert doubt(other, IDLE, models).endswith("the leg is commissioned again")
+    other.commissioned = None
+    assert doubt(other, IDLE, models) == ""
 
 
 def test_a_healthy_leg_is_told_how_well_it_is_known_and_what_comes_next() -> None:

@@ -71,3 +71,18 @@ def test_a_gait_cycle_has_the_signature_that_a_simulated_one_would(leg, rate_hz:
         found = cycle_torque(kept, round(1e9 * begin_s), round(1e9 * (begin_s + cycle_s)), sensor)
         own = signatures(np.zeros(len(found.angle), np.int64), found.angle, found.torque, found.step, sensor)
         np.testing.assert_allclose(own[0], expected[cycle], atol=2e-3)
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+@pytest.mark.parametrize("phase", [0.0, 0.4])
+def test_torques_beside_the_passages_of_zero_have_their_own_angles(direction: float, phase: float) -> None:
+    """Beyond the crank's first and last sample of a cycle, which may be 20 ms away, all had one angle."""
+    time, torque_s = (np.arange(50) + phase) / 50.0, (np.arange(200) + 0.5) / 200.0
+    crank_ns, torque_ns = (np.round(1e9 * at).astype(np.int64) + 10**9 for at in (time, torque_s))
+    kept = TorqueSamples(
+        gait_samples(crank_ns, CRANK, crank_angle_rad=direction * TURN * time),
+        gait_samples(torque_ns, TORQUE, torque_nm=np.sin(TURN * torque_s)),
+    )
+    found = cycle_torque(kept, 10**9, 2 * 10**9, TorqueSensor(0.005, 1.0, 9.2))
+    off = (found.angle - direction * TURN * torque_s + 0.5 * TURN) % TURN - 0.5 * TURN
+    assert np.abs(off).max() < 1e-6

@@ -338,11 +338,14 @@ def test_references_and_baselines_are_kept_for_each_cadence(reopened) -> None:
         one = TorqueReference(profile, np.full((2, 5), 3e-4), (few, few[:CYCLES]), leg)
         made.append(SimulatedReference(stamp_ns, ("thigh",), one))
         warm = {"temperature_c": 41.5} if speed == 7.5 else {}  # not measured at the others
+        warm |= {"period_s": 0.001, "together": 5, "is_instant": True} if speed == 7.5 else {}
         made.append(CommissionedTorque(stamp_ns, np.full(5, 3e-4), np.ones((4, 6)), speed=speed, **warm))
     found = reopened(*made)
     assert [one.reference.profile.speed for one in found.references] == [4.51, 7.5, 6.0]
     assert [one.speed for one in found.commissioned_torques] == [4.51, 7.5, 6.0]
     np.testing.assert_equal([one.temperature_c for one in found.commissioned_torques], [np.nan, 41.5, np.nan])
+    sensors = [(one.period_s, one.together, one.is_instant) for one in found.commissioned_torques]
+    np.testing.assert_equal(sensors, [(np.nan, 1, False), (0.001, 5, True), (np.nan, 1, False)])
     sigma_m = np.array([0.0, 0.0, 1e-5, 0.0, 0.0])
     found.close()
     corrected = CommissionedTorque(20, np.full(5, 3e-4), np.ones((4, 6)), sigma_m, speed=6.0)

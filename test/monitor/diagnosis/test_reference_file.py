@@ -8,6 +8,7 @@ import pytest
 
 from leg_wear_monitor import ConfigError, WearMonitor, load_mechanism
 from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.monitor.config.inputs import Load
 from leg_wear_monitor.monitor.config.settings import MonitorConfig, TorqueDiagnosis
 from leg_wear_monitor.monitor.diagnosis import reference_file
 from leg_wear_monitor.monitor.diagnosis.reference_file import (
@@ -18,6 +19,7 @@ from leg_wear_monitor.monitor.diagnosis.reference_file import (
 )
 from leg_wear_monitor.twin import torque_reference
 from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
+from leg_wear_monitor.twin.sample import GROUND
 from leg_wear_monitor.twin.torque_reference import TorqueReferenceRun
 from leg_wear_monitor.wear import SECTORS
 
@@ -115,11 +117,13 @@ def test_a_missing_file_is_one_line(leg, tmp_path) -> None:
 
 
 def test_a_monitor_begins_with_the_parameters_of_its_file(leg, references, written) -> None:
-    config = MonitorConfig(diagnosis=TorqueDiagnosis(reference=str(written)))
-    parts = WearMonitor(leg, config)._parts
+    diagnosis = TorqueDiagnosis(reference=str(written))
+    parts = WearMonitor(leg, MonitorConfig(diagnosis=diagnosis, load=Load(model=GROUND)))._parts
     assert parts.torque.state.parameters == parts.twin.parameters == references[1].parameters
     given = [one.parameters == references[1].parameters for one in parts.torque._references._given]
     assert given == [False, True, False]  # both of the file, and the shipped one
+    # they are of a leg under a load
+    assert WearMonitor(leg, MonitorConfig(diagnosis=diagnosis))._parts.torque.state.parameters is None
 
 
 def test_references_are_the_same_each_time_and_those_of_a_leg_at_each_cadence(leg, monkeypatch) -> None:

@@ -1,12 +1,12 @@
 """Legs behind drives as they are sold: what the diagnosis says of healthy and of worn ones.
 
 The legs of `disturbed.py` in the air, in full coordinates, with masses 4 % off the file. Their torque passes
-a drive: friction that grows with the load, Coulomb and viscous friction, cogging, a low-pass, a lag, a torque
-constant and friction that change over twenty minutes, steps of the sensor, lost samples, a coupling between
-the measured angle and the crank. The first table is of healthy legs: gait cycles drawn in blocks of ten make
-up the given time. The second is of joints that open after 690 gait cycles, when a leg is identified and a
-drive that warms up is half warm; J on three walks. With `--as-of-file` no leg is identified, and names count
-as if the leg were that of its file.
+a drive: friction that grows with the load, Coulomb and viscous friction, cogging, a low-pass of first or
+second order, a mean over some time, a lag, a torque constant and friction that change over twenty minutes,
+steps of the sensor, lost samples, a coupling between the measured angle and the crank. The first table is of
+healthy legs: gait cycles drawn in blocks of ten make up the given time. The second is of joints that open
+after 690 gait cycles, when a leg is identified and a drive that warms up is half warm; J on three walks. With
+`--as-of-file` no leg is identified, and names count as if the leg were that of its file.
 `python benchmarks/drives.py --keep DIRECTORY [--hours 100]`.
 """
 
@@ -22,6 +22,7 @@ import numpy as np
 from compliant import behind
 from diagnosis import NEW, RATE, kept
 from disturbed import COMMISSIONED, HEALTHY, MASSES, WORN, drawn, signed, walked, watched
+from scipy import signal
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.estimate import identification
@@ -45,6 +46,8 @@ class Drive:
 
     lag_s: float = 0.0
     hz: float = 0.0
+    order: int = 1  # of the low-pass; those from 2 on are Butterworth's
+    mean_s: float = 0.0  # over which a drive averages before it reports
     load_friction: float = 0.0
     coulomb_nm: float = 0.0
     viscous_nms: float = 0.0
@@ -69,7 +72,11 @@ class Drive:
         torque += self.coulomb_nm + warm * self.coulomb_drift_nm + self.viscous_nms * TURN
         torque += self.cogging * size_nm * np.sqrt(2.0) * np.sin(self.waves * walk[:, 1])
         torque *= 1.0 + warm * self.scale_drift
-        if self.hz:
+        if self.mean_s:
+            torque = signal.lfilter(np.ones(round(self.mean_s / step)) * step / self.mean_s, [1.0], torque)
+        if self.hz and self.order > 1:
+            torque = signal.lfilter(*signal.butter(self.order, self.hz, fs=RATE), torque)
+        elif self.hz:
             part, value = 1.0 - np.exp(-TURN * self.hz * step), torque[0]
             for i, now in enumerate(torque):
                 value += part * (now - value)
@@ -99,6 +106,8 @@ DRIVES = {
     "cogging 3 %, 100.3 waves": Drive(cogging=0.03, waves=100.3),
     "steps of 0.1 N m": Drive(quantum_nm=0.1),
     "2 % lost": Drive(loss=0.02),
+    **{f"Butterworth {hz:g} Hz": Drive(hz=hz, order=2) for hz in (20.0, 35.0)},
+    **{f"mean over {ms} ms": Drive(mean_s=1e-3 * ms) for ms in (20, 40)},
     "friction 0.2, 35 Hz, 5 ms": Drive(load_friction=0.2, hz=35.0, lag_s=0.005),
     "friction 0.2, 29.6 Hz, 7 ms": Drive(load_friction=0.2, hz=29.6, lag_s=0.007),
     "all": ALL,

@@ -45,12 +45,11 @@ def test_a_body_that_becomes_heavier_is_named_with_its_mass(leg, channel):
         assert best.value == pytest.approx(0.3, abs=0.02)
 
 
-@pytest.mark.parametrize("rate_hz", [100.0, 200.0])
-def test_samples_that_come_at_other_angles_are_no_change(leg, rate_hz):
+def test_samples_that_come_at_other_angles_are_no_change(leg):
     """A drive that has the sensor's clock leaves samples where they are until one of both starts again."""
     reference = shipped_references(leg)[0]
     new_m, cycles = reference.clearance_m[0], len(reference.torque_nm[0])
-    sensor = TorqueSensor(1.0 / rate_hz, 1.0, torque_size(build_linkage(leg), TURN), noise_nm=0.5)
+    sensor = TorqueSensor(0.01, 1.0, torque_size(build_linkage(leg), TURN), noise_nm=0.5)
 
     def walked(late: float, draw: int, number: int = 0) -> np.ndarray:
         simulated = SimulatedSensor(reference, len(reference.torque_nm[number]), sensor, late=late)
@@ -66,5 +65,5 @@ def test_samples_that_come_at_other_angles_are_no_change(leg, rate_hz):
             state = detector.with_cycle(state, signature, i + 1)
             sums.append(state.sums.max())
     assert len(sums) == 4 * 3 * cycles
-    # without it: 29 behind 200 Hz and 56 behind 100 Hz
-    assert max(sums) < 0.7 * detector.threshold
+    # 2.4; without the places in the baseline's uncertainty, 159
+    assert max(sums) < 0.5 * detector.threshold

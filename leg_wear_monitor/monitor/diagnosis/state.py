@@ -21,7 +21,7 @@ from leg_wear_monitor.estimate.signature import (
     signatures,
 )
 from leg_wear_monitor.files import finite_or_none
-from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.shown import Shown
@@ -76,16 +76,15 @@ class CycleTorque(NamedTuple):
     """Drive torque over a gait cycle.
 
     ``angle`` (n,) crank angle [rad], ``torque`` (n,) [N m], ``step`` (n,) torque less that of the sample
-    before [N m], NaN where that was lost; ``profile`` how the crank turned; ``period_s`` of the sensor;
-    ``jitter`` median departure of the times between samples from that period, as a fraction of it;
-    ``temperature_c`` mean temperature of the drive, NaN where it is not measured.
+    before [N m], NaN where that was lost; ``profile`` how the crank turned; ``jitter`` median departure of
+    the times between samples from the sensor's period, as a fraction of it; ``temperature_c`` mean
+    temperature of the drive, NaN where it is not measured.
     """
 
     angle: Floats
     torque: Floats
     step: Floats
     profile: CrankProfile
-    period_s: float
     jitter: float
     temperature_c: float
 
@@ -99,7 +98,12 @@ def sensor_period_s(kept: TorqueSamples, begin_ns: int, end_ns: int) -> tuple[fl
     if len(between) < 2:
         return math.nan, math.nan
     period_ns = float(np.median(between))
-    return 1.0e-9 * period_ns, float(np.median(np.abs(between - period_ns))) / period_ns
+    return 1.0e-9 * period_ns, _jitter(between, period_ns)
+
+
+def _jitter(between_ns: Ints, period_ns: float) -> float:
+    """Median departure of times between samples (n,) from a period, as a fraction of it."""
+    return float(np.median(np.abs(between_ns - period_ns))) / period_ns
 
 
 def mean_of(values: Floats) -> float:
@@ -133,10 +137,8 @@ def cycle_torque(kept: TorqueSamples, begin_ns: int, end_ns: int, sensor: Torque
         angle = angle[: len(torque)]
     step = np.diff(torque, prepend=np.nan)
     step[gap] = np.nan
-    period_ns = 1.0e9 * sensor.period_s
-    jitter = float(np.median(np.abs(np.diff(torque_ns) - period_ns))) / period_ns
-    temperature_c = mean_of(torques["temperature_c"])
-    return CycleTorque(angle, torque, step, profile, sensor.period_s, jitter, temperature_c)
+    jitter = _jitter(np.diff(torque_ns), 1.0e9 * sensor.period_s)
+    return CycleTorque(angle, torque, step, profile, jitter, mean_of(torques["temperature_c"]))
 
 
 # What the measured drive torque shows of the clearances, compared with those that the monitor counts.

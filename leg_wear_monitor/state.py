@@ -218,7 +218,7 @@ class Drive:
     load_friction : Estimate or None
         Friction over the size of the torque that the drive transmits.
     bandwidth_hz : Estimate or None
-        Of the first-order low-pass between the leg and the torque; None if none is seen.
+        Corner frequency of the low-pass between the leg and the torque; None if none is seen.
     temperature_c : Estimate or None
         Temperature of the drive [°C]; None where it is not measured.
     """

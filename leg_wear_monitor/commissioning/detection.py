@@ -317,7 +317,7 @@ def _better(sensor: TorqueSensor) -> Iterator[tuple[str, TorqueSensor]]:
     yield noise, quieter
     direct = attrs.evolve(sensor.channel, time_constant_s=0.0)
     if sensor.channel.time_constant_s:
-        hz = 1.0 / (TURN * sensor.channel.time_constant_s)
+        hz = sensor.channel.bandwidth_hz
         yield f"a low-pass of {hz:.0f} Hz hides it", attrs.evolve(sensor, channel=direct)
     yield (
         f"rate ({rate:.0f} Hz), noise ({sensor.noise_nm:.2g} N m) and low-pass together hide it",

@@ -1,9 +1,10 @@
 """The channel of a drive and its sensor, from the mean signature of a commissioned leg.
 
-The measured torque is often motor current, which is delayed by a control loop, passes a low-pass, and
-contains the friction of a gear that grows with the load. At one cadence, an offset of the crank looks like a
-delay. All of these move or change the phases in which the torque is rough, and these phases tell the joints
-apart. So a simulated torque has to pass the same channel before it is compared with the samples.
+The measured torque is often motor current, which is delayed by a control loop, passes a low-pass of first or
+second order (a mean over some time is much like one), and contains the friction of a gear that grows with the
+load. At one cadence, an offset of the crank looks like a delay. All of these move or change the phases in
+which the torque is rough, and these phases tell the joints apart. So a simulated torque has to pass the same
+channel before it is compared with the samples.
 """
 
 import functools
@@ -43,7 +44,7 @@ class DriveFigures:
     lag_s : float
         Time by which the measured torque is late.
     bandwidth_hz : float
-        Corner frequency of the first-order low-pass between the torque on the crank and the measured one.
+        Corner frequency of a first-order low-pass between the torque on the crank and the measured one.
     load_friction : float
         Fraction eta of the friction eta |torque| sign(speed).
     coulomb_nm : float
@@ -81,12 +82,19 @@ UNDECLARED = DriveFigures()
 _DELAYS_S = 0.005 * np.arange(-4, 9)
 _TIME_CONSTANTS_S = (0.0, *(1.0 / (TURN * hz) for hz in (100.0, 70.0, 50.0, 35.0, 25.0, 20.0, 14.0, 10.0)))
 _STEP_S = 0.0025  # to both sides of the best of these delays
-# from the best of them on: differences for derivatives, longest steps, and those after which it is enough
-_DIFFERENCE_S, _LONGEST_S, _DONE_S = 0.0005, 0.0025, 0.0001
+# from the best of them on, for delay, time constant and second order: bounds, differences for derivatives,
+# longest steps, and those after which it is enough
+_LOW, _HIGH = np.array([_DELAYS_S[0], 0.0005, 0.0]), np.array([_DELAYS_S[-1], 0.025, 0.5])
+_DIFFERENCES, _LONGEST = np.array([0.0005, 0.0005, 0.05]), np.array([0.0025, 0.0025, 0.2])
+_DONE = np.array([0.0001, 0.0001, 0.01])
 _CYCLES = 20  # simulated gait cycles; enough for a mean signature
 # A channel has to lower the mean square of the residual by this much, compared with none: unknown masses and
 # lengths change it by about 0.2 (docs/explanation/diagnosis.md).
 _CHANNEL_IMPROVEMENT = 0.3
+# A second order begins at that of a mean over some time, and has to lower the mean square by this much: with
+# masses 4 % off and a worn joint by 0.17 to 1.8 behind Butterworth's and means over 20 to 40 ms (24 of 25,
+# one 0.05), by at most 0.04 behind low-passes of first order and lags (n = 20)
+_SECOND_ORDER, _SECOND_ORDER_IMPROVEMENT = 0.3, 0.1
 
 # Load friction, as a fraction of the transmitted torque: 0.04 in harmonic drives to 0.31 in planetary servos.
 _FRICTION_SIGMA, _MOST_FRICTION = 0.2, 0.45  # prior standard deviation about 0; largest one
@@ -196,12 +204,12 @@ def channel_of(
         return np.asarray(measured - simulated_signatures(reference, 0, behind, cycles=_CYCLES).mean(axis=0))
 
     @functools.cache
-    def filtered(time_constant_s: float) -> Floats:  # clearance columns without a delay
-        channel = Channel(time_constant_s=time_constant_s)
-        return _clearance_columns(reference, attrs.evolve(sensor, channel=channel))
+    def filtered(low_pass: Channel) -> Floats:  # clearance columns without a delay
+        return _clearance_columns(reference, attrs.evolve(sensor, channel=low_pass))
 
     def clearances(channel: Channel) -> Floats:
-        return _delayed(filtered(channel.time_constant_s), float(phases_per_s * channel.delay_s))
+        low_pass = attrs.evolve(channel, delay_s=0.0)
+        return _delayed(filtered(low_pass), float(phases_per_s * channel.delay_s))
 
     fits = [_best_channel(residual, clearances, each, time_constants_s) for each in (in_air, on_ground)]
     return min(fits, key=lambda fit: fit.misfit)
@@ -288,8 +296,8 @@ def _best_channel(
         Of the low-passes to try; without 0, a low-pass is declared.
     """
 
-    def fit_of(delay_s: float, time_constant_s: float) -> ChannelFit:
-        channel = Channel(delay_s=delay_s, time_constant_s=time_constant_s)
+    def fit_of(delay_s: float, time_constant_s: float, second_order: float = 0.0) -> ChannelFit:
+        channel = Channel(delay_s=delay_s, time_constant_s=time_constant_s, second_order=second_order)
         rubbing = attrs.evolve(channel, load_friction=_FRICTION_STEP)
         friction_change = (residual(channel) - residual(rubbing)) / _FRICTION_STEP
         return hypothesis.fit(channel, residual(channel), friction_change, clearances(channel))
@@ -310,27 +318,35 @@ def _best_channel(
         near_s = best.channel.delay_s
         others += [best, *(fit_of(near_s + step_s, time_constant_s) for step_s in (-_STEP_S, _STEP_S))]
     is_declared = 0.0 not in time_constants_s
-    other = _refined(fit_of, least(others).channel, is_declared)
+    near = least(others).channel
+    free = 1 if is_declared or near.time_constant_s == 0.0 else 2
+    other = _refined(fit_of, near, free)
+    if free == 2:  # of second order if that is clearly better
+        second = _refined(fit_of, attrs.evolve(other.channel, second_order=_SECOND_ORDER), 3)
+        if other.square - second.square > _SECOND_ORDER_IMPROVEMENT:
+            other = second
     return other if is_declared or other.square < direct.square - _CHANNEL_IMPROVEMENT else direct
 
 
-def _refined(fit_of: Callable[[float, float], ChannelFit], near: Channel, is_declared: bool) -> ChannelFit:
-    """The best channel near one of the grid; a low-pass that is declared, and none, stay as they are."""
-    free = 1 if is_declared or near.time_constant_s == 0.0 else 2
-    start = np.array([near.delay_s, near.time_constant_s])[:free]
+def _refined(fit_of: Callable[..., ChannelFit], near: Channel, free: int) -> ChannelFit:
+    """The best channel near another one, by the first ``free`` of delay, time constant and second order."""
+    start = np.array([near.delay_s, near.time_constant_s, near.second_order])
 
     def fit_at(x: Floats) -> ChannelFit:
-        return fit_of(float(x[0]), float(x[1]) if free == 2 else near.time_constant_s)
+        return fit_of(*x.tolist(), *start[free:].tolist())
 
     def at(x: Floats) -> _Tried:
-        fit, moved = fit_at(x), x + _DIFFERENCE_S * np.eye(free)
-        return _Tried(
-            fit.rest, lambda: np.array([fit_at(one).rest - fit.rest for one in moved]).T / _DIFFERENCE_S, fit
-        )
+        fit, moved = fit_at(x), x + np.diag(_DIFFERENCES[:free])
 
-    low = np.array([_DELAYS_S[0], _DIFFERENCE_S])[:free]
-    high = np.array([_DELAYS_S[-1], _TIME_CONSTANTS_S[-1]])[:free]
-    return gauss_newton(at, start, low=low, high=high, longest=_LONGEST_S, done=_DONE_S).point.fit
+        def slopes() -> Floats:
+            changes = np.array([fit_at(one).rest - fit.rest for one in moved])
+            return np.asarray(changes.T / _DIFFERENCES[:free])
+
+        return _Tried(fit.rest, slopes, fit)
+
+    return gauss_newton(
+        at, start[:free], low=_LOW[:free], high=_HIGH[:free], longest=_LONGEST[:free], done=_DONE[:free]
+    ).point.fit
 
 
 def _clearance_columns(reference: TorqueReference, sensor: TorqueSensor) -> Floats:

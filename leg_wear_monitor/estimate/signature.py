@@ -32,19 +32,31 @@ class Channel:
         Time by which samples are late for their crank angle: a lag, less an offset of the crank over its
         speed.
     time_constant_s : float
-        Of the first-order low-pass; 0 without one.
+        T of the low-pass 1 / (1 + T s + c T² s²): the time by which it delays slow changes; 0 without one.
     load_friction : float
         Friction of the drive over the size of the torque that it transmits.
+    second_order : float
+        c: 0 for a low-pass of first order, 1/4 for two equal ones in a row, 1/2 for Butterworth's.
     """
 
     delay_s: float = 0.0
     time_constant_s: float = 0.0
     load_friction: float = 0.0
+    second_order: float = 0.0
 
     @property
     def lateness_s(self) -> float:
         """Time by which slow changes of the torque are late: by the delay and by the low-pass."""
         return self.delay_s + self.time_constant_s
+
+    @property
+    def bandwidth_hz(self) -> float:
+        """Frequency at which the low-pass passes half of the power; infinite without one."""
+        if self.time_constant_s == 0.0:
+            return math.inf
+        c = self.second_order  # |response|⁻² = (1 - c x)² + x = 2, at x = (omega T)²
+        x = 2.0 / (1.0 - 2.0 * c + math.hypot(1.0 - 2.0 * c, 2.0 * c))
+        return math.sqrt(x) / (TURN * self.time_constant_s)
 
     def received(self, torque: Floats, step_s: float, direction: float) -> Floats:
         """Torques (..., n) in equal steps of time [s] behind the drive; taken as periodic.
@@ -67,7 +79,8 @@ class Channel:
 
     def response(self, omega: Floats) -> Complex:
         """Frequency response (n,) of delay and low-pass, at angular frequencies (n,) [rad/s]."""
-        return np.asarray(np.exp(-1j * omega * self.delay_s) / (1.0 + 1j * omega * self.time_constant_s))
+        s = 1j * omega * self.time_constant_s
+        return np.asarray(np.exp(-1j * omega * self.delay_s) / (1.0 + s + self.second_order * s**2))
 
 
 DIRECT = Channel()

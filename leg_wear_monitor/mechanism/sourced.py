@@ -229,7 +229,7 @@ class Drive(SourcedFile):
     gear_ratio: SourcedValue | None = sourced("number", "turns of the motor per turn of the output")
     lag: SourcedValue | None = sourced("time", "time by which the reported torque is late")
     bandwidth: SourcedValue | None = sourced(
-        "frequency", "corner frequency of the first-order low-pass between torque and reported torque"
+        "frequency", "corner frequency of a first-order low-pass between torque and reported torque"
     )
     load_friction: SourcedValue | None = sourced(
         "number", "friction by load, as a fraction of the torque's size"

@@ -298,13 +298,13 @@ def _drive(last: CycleReport | None, diagnosis: Diagnosis, explained: TorqueExpl
     """The drive by the last gait cycle, by what explains a torque mismatch, and by the diagnosis."""
     named = explained.named if explained else ()
     factor = next((one for one in named if one.cause in _FACTORS), None)
-    pole_s = diagnosis.channel.time_constant_s
+    bandwidth_hz = diagnosis.channel.bandwidth_hz
     return Drive(
         scale=_estimate(factor.value, factor.sigma) if factor else None,
         lag_s=_estimate(last.torque_lag_s, last.torque_lag_sigma_s) if last else None,
         coulomb_nm=_estimate(last.friction_nm, last.friction_sigma_nm) if last else None,
         load_friction=_estimate(last.load_friction, last.load_friction_sigma) if last else None,
-        bandwidth_hz=Estimate(value=1.0 / (_TURN * pole_s)) if pole_s > 0.0 else None,
+        bandwidth_hz=Estimate(value=bandwidth_hz) if math.isfinite(bandwidth_hz) else None,
         temperature_c=None if diagnosis.temperature_c is None else Estimate(value=diagnosis.temperature_c),
     )
 

@@ -5,6 +5,7 @@ import math
 import attrs
 import numpy as np
 import pytest
+from scipy import signal
 
 from leg_wear_monitor.estimate.channel import DriveFigures, channel_of
 from leg_wear_monitor.estimate.leg_model import nuisances
@@ -46,6 +47,53 @@ def test_a_low_pass_is_found_whatever_its_corner_frequency(known, hz, delay_s):
     found = channel_of(reference, sensor, behind(known, drive), columns).channel
     assert found.time_constant_s == pytest.approx(drive.time_constant_s, rel=0.05)
     assert found.lateness_s == pytest.approx(drive.lateness_s, abs=0.0003)
+
+
+@attrs.frozen(kw_only=True)
+class Averaging(Channel):
+    """A drive that reports means over some time."""
+
+    mean_s: float = 0.0
+
+    def response(self, omega):
+        half = 0.5 * omega * self.mean_s
+        return super().response(omega) * np.sinc(half / math.pi) * np.exp(-1j * half)
+
+
+@pytest.mark.parametrize("hz", [15.0, 20.0])
+def test_a_low_pass_of_second_order_is_found(known, hz):
+    """One of first order would be 1.9 to 2.9 ms later, and leave 12 to 22 times the mean square."""
+    reference, sensor, columns = known
+    drive = Channel(time_constant_s=math.sqrt(2.0) / (TURN * hz), second_order=0.5)
+    found = channel_of(reference, sensor, behind(known, drive), columns)
+    assert found.channel.bandwidth_hz == pytest.approx(hz, rel=0.05)
+    assert found.channel.lateness_s == pytest.approx(drive.lateness_s, abs=0.0005)
+    assert found.square < 0.1
+
+
+def test_a_mean_over_some_time_is_taken_for_a_low_pass_of_second_order(known):
+    """One of first order would be 0.9 ms later."""
+    reference, sensor, columns = known
+    drive = Averaging(delay_s=0.001, mean_s=0.02)
+    found = channel_of(reference, sensor, behind(known, drive), columns)
+    assert found.channel.lateness_s == pytest.approx(0.001 + 0.5 * drive.mean_s, abs=0.0005)
+    assert found.channel.second_order > 0.1
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize(("second_order", "order"), [(0.0, 1), (0.5, 2)])
+def test_low_passes_are_those_of_butterworth(second_order, order):
+    time_constant_s = math.sqrt(order) / (TURN * 20.0)
+    channel = Channel(time_constant_s=time_constant_s, second_order=second_order)
+    omega = TURN * np.array([1.0, 20.0, 100.0])
+    _, expected = signal.freqs(*signal.butter(order, TURN * 20.0, analog=True), omega)
+    np.testing.assert_allclose(channel.response(omega), expected)
+    assert channel.bandwidth_hz == pytest.approx(20.0)
+    two = Channel(time_constant_s=2.0 * time_constant_s, second_order=0.25)  # in a row
+    one = Channel(time_constant_s=time_constant_s)
+    np.testing.assert_allclose(two.response(omega), one.response(omega) ** 2)
+    assert abs(two.response(np.array([TURN * two.bandwidth_hz])))[0] == pytest.approx(math.sqrt(0.5))
+    assert math.isinf(DIRECT.bandwidth_hz)
 
 
 @pytest.mark.parametrize("channel", [pytest.param(DIRECT, marks=pytest.mark.slow), DRIVE])

@@ -107,7 +107,9 @@ DRIVES = {
     "steps of 0.1 N m": Drive(quantum_nm=0.1),
     "2 % lost": Drive(loss=0.02),
     **{f"Butterworth {hz:g} Hz": Drive(hz=hz, order=2) for hz in (20.0, 35.0)},
+    "Butterworth 20 Hz of third order": Drive(hz=20.0, order=3),
     **{f"mean over {ms} ms": Drive(mean_s=1e-3 * ms) for ms in (20, 40)},
+    "mean over 20 ms, 20 Hz": Drive(mean_s=0.02, hz=20.0),
     "friction 0.2, 35 Hz, 5 ms": Drive(load_friction=0.2, hz=35.0, lag_s=0.005),
     "friction 0.2, 29.6 Hz, 7 ms": Drive(load_friction=0.2, hz=29.6, lag_s=0.007),
     "all": ALL,
@@ -171,7 +173,7 @@ def main() -> None:
 
     names = options.drive or list(DRIVES)
     if not options.worn_only:
-        print("| drive | lag, time constant, load friction found | misfit | findings |\n|---|---|---|---|")
+        print("| drive | lag, low-pass, load friction found | misfit | findings |\n|---|---|---|---|")
         for name in names:
             cycles = cycles_of(walk(DRIVES[name].stiffness_nm_per_rad), DRIVES[name], sensor, 5)
             order = drawn(np.arange(cycles.shape[1])[:, None], round(3600 * options.hours))
@@ -179,9 +181,7 @@ def main() -> None:
             one, found = watched(leg, size, rows)
             own, off = one.state.sensor, one.models.misfit(one.state)
             own = own.channel
-            channel = (
-                f"{1e3 * own.delay_s:.2f} ms, {1e3 * own.time_constant_s:.2f} ms, {own.load_friction:.3f}"
-            )
+            channel = f"{1e3 * own.delay_s:.2f} ms, {1e3 * own.low_pass_s:.2f} ms, {own.load_friction:.3f}"
             drive = one.state.reference.parameters
             channel += f", {1.0 / drive.compliance:.0f} N m/rad" if drive.compliance else ""
             print(f"| {name} | {channel} | {off:.2f} | {summary(found) or 'none'} |", flush=True)

@@ -315,8 +315,8 @@ def _better(sensor: TorqueSensor) -> Iterator[tuple[str, TorqueSensor]]:
     quieter = attrs.evolve(sensor, noise_nm=_QUIETER * sensor.noise_nm)
     noise = f"a noise of {sensor.noise_nm:.2g} N m is too strong, {quieter.noise_nm:.2g} N m would do"
     yield noise, quieter
-    direct = attrs.evolve(sensor.channel, time_constant_s=0.0)
-    if sensor.channel.time_constant_s:
+    direct = attrs.evolve(sensor.channel, time_constant_s=0.0, mean_s=0.0)
+    if sensor.channel.low_pass_s:
         hz = sensor.channel.bandwidth_hz
         yield f"a low-pass of {hz:.0f} Hz hides it", attrs.evolve(sensor, channel=direct)
     yield (

@@ -47,7 +47,7 @@ class LowPass:
     Attributes
     ----------
     time_constant_s : float
-        As of `Channel`; 0 where none shows, NaN where it cannot be told.
+        Time by which it delays slow changes; 0 where none shows, NaN where it cannot be told.
     bandwidth_hz : float
         Corner frequency; NaN where none shows.
     log_sigma : float
@@ -89,9 +89,9 @@ def low_pass_of(walk: Walk, reference: TorqueReference) -> LowPass | None:
     least_hz = min(_SHOWS_HZ, _OF_RATE / walk.sensor.period_s)
     shows = 0.99 * one.bandwidth_hz < least_hz
     # a direct channel is what is taken where no other one is surely better
-    is_told = found.square <= _POOR and bool(one.delay_s or one.time_constant_s)
+    is_told = found.square <= _POOR and bool(one.delay_s or one.low_pass_s)
     log_sigma = _SPREAD + _BY_SQUARE * found.square
-    time_constant_s = (one.time_constant_s if shows else 0.0) if is_told else math.nan
+    time_constant_s = (one.low_pass_s if shows else 0.0) if is_told else math.nan
     bandwidth_hz = one.bandwidth_hz if shows and is_told else math.nan
     return LowPass(time_constant_s, bandwidth_hz, log_sigma, found.square, least_hz)
 

@@ -82,19 +82,24 @@ UNDECLARED = DriveFigures()
 _DELAYS_S = 0.005 * np.arange(-4, 9)
 _TIME_CONSTANTS_S = (0.0, *(1.0 / (TURN * hz) for hz in (100.0, 70.0, 50.0, 35.0, 25.0, 20.0, 14.0, 10.0)))
 _STEP_S = 0.0025  # to both sides of the best of these delays
-# from the best of them on, for delay, time constant and second order: bounds, differences for derivatives,
-# longest steps, and those after which it is enough
-_LOW, _HIGH = np.array([_DELAYS_S[0], 0.0005, 0.0]), np.array([_DELAYS_S[-1], 0.025, 0.5])
-_DIFFERENCES, _LONGEST = np.array([0.0005, 0.0005, 0.05]), np.array([0.0025, 0.0025, 0.2])
-_DONE = np.array([0.0001, 0.0001, 0.01])
+# From the best of them on, by what is free: bounds, the difference for a derivative, the longest step, and
+# the one after which it is enough.
+_RANGES = {
+    "delay_s": (-0.02, 0.04, 0.0005, 0.0025, 0.0001),
+    "time_constant_s": (0.0005, 0.025, 0.0005, 0.0025, 0.0001),
+    "second_order": (0.0, 0.5, 0.05, 0.2, 0.01),
+    "mean_s": (0.002, 0.06, 0.001, 0.005, 0.0002),
+}
 _CYCLES = 20  # simulated gait cycles; enough for a mean signature
 # A channel has to lower the mean square of the residual by this much, compared with none: unknown masses and
 # lengths change it by about 0.2 (docs/explanation/diagnosis.md).
 _CHANNEL_IMPROVEMENT = 0.3
-# A second order begins at that of a mean over some time, and has to lower the mean square by this much: with
-# masses 4 % off and a worn joint by 0.17 to 1.8 behind Butterworth's and means over 20 to 40 ms (24 of 25,
-# one 0.05), by at most 0.04 behind low-passes of first order and lags (n = 20)
-_SECOND_ORDER, _SECOND_ORDER_IMPROVEMENT = 0.3, 0.1
+# Another low-pass than one of first order has to lower the mean square by this much. With masses 4 % off and
+# a worn joint, a second order does by 0.17 to 1.8 behind Butterworth's and means over 20 to 40 ms (24 of 25,
+# one 0.05), by at most 0.04 behind low-passes of first order and lags (n = 20).
+_IMPROVEMENT = 0.1
+_SECOND_ORDER = 0.3  # the first that is tried
+_MEANS_S = (0.01, 0.015, 0.02, 0.025, 0.03, 0.035, 0.04, 0.05)  # tried, as late as the best of first order
 
 # Load friction, as a fraction of the transmitted torque: 0.04 in harmonic drives to 0.31 in planetary servos.
 _FRICTION_SIGMA, _MOST_FRICTION = 0.2, 0.45  # prior standard deviation about 0; largest one
@@ -296,8 +301,7 @@ def _best_channel(
         Of the low-passes to try; without 0, a low-pass is declared.
     """
 
-    def fit_of(delay_s: float, time_constant_s: float, second_order: float = 0.0) -> ChannelFit:
-        channel = Channel(delay_s=delay_s, time_constant_s=time_constant_s, second_order=second_order)
+    def fit_of(channel: Channel) -> ChannelFit:
         rubbing = attrs.evolve(channel, load_friction=_FRICTION_STEP)
         friction_change = (residual(channel) - residual(rubbing)) / _FRICTION_STEP
         return hypothesis.fit(channel, residual(channel), friction_change, clearances(channel))
@@ -306,7 +310,7 @@ def _best_channel(
         return min(fits, key=lambda fit: fit.square)
 
     # without delay and low-pass: with load friction if it is clearly better
-    direct, none = fit_of(0.0, 0.0), np.zeros_like(residual(DIRECT))
+    direct, none = fit_of(DIRECT), np.zeros_like(residual(DIRECT))
     frictionless = hypothesis.fit(DIRECT, residual(DIRECT), none, clearances(DIRECT))
     if frictionless.square - direct.square < _FRICTION_IMPROVEMENT:
         sigma = direct.load_friction_sigma
@@ -314,39 +318,47 @@ def _best_channel(
     # with delay and low-pass: on a grid of both, then on from the best one
     others = []
     for time_constant_s in time_constants_s:
-        best = least(fit_of(delay_s, time_constant_s) for delay_s in _DELAYS_S.tolist())
+        low_pass = Channel(time_constant_s=time_constant_s)
+        best = least(fit_of(attrs.evolve(low_pass, delay_s=one)) for one in _DELAYS_S.tolist())
         near_s = best.channel.delay_s
-        others += [best, *(fit_of(near_s + step_s, time_constant_s) for step_s in (-_STEP_S, _STEP_S))]
-    is_declared = 0.0 not in time_constants_s
-    near = least(others).channel
-    free = 1 if is_declared or near.time_constant_s == 0.0 else 2
-    other = _refined(fit_of, near, free)
-    if free == 2:  # of second order if that is clearly better
-        second = _refined(fit_of, attrs.evolve(other.channel, second_order=_SECOND_ORDER), 3)
-        if other.square - second.square > _SECOND_ORDER_IMPROVEMENT:
-            other = second
+        nearer = [attrs.evolve(low_pass, delay_s=near_s + step_s) for step_s in (-_STEP_S, _STEP_S)]
+        others += [best, *map(fit_of, nearer)]
+    is_declared, near = 0.0 not in time_constants_s, least(others).channel
+    if is_declared or near.time_constant_s == 0.0:
+        other = _refined(fit_of, near, "delay_s")
+    else:
+        other = _refined(fit_of, near, "delay_s", "time_constant_s")
+        # of second order, or a mean, if that is clearly better
+        late_s = other.channel.lateness_s
+        second = attrs.evolve(other.channel, second_order=_SECOND_ORDER)
+        mean = least(fit_of(Channel(delay_s=late_s - 0.5 * one, mean_s=one)) for one in _MEANS_S).channel
+        better = least(
+            (
+                _refined(fit_of, second, "delay_s", "time_constant_s", "second_order"),
+                _refined(fit_of, mean, "delay_s", "mean_s"),
+            )
+        )
+        other = better if other.square - better.square > _IMPROVEMENT else other
     return other if is_declared or other.square < direct.square - _CHANNEL_IMPROVEMENT else direct
 
 
-def _refined(fit_of: Callable[..., ChannelFit], near: Channel, free: int) -> ChannelFit:
-    """The best channel near another one, by the first ``free`` of delay, time constant and second order."""
-    start = np.array([near.delay_s, near.time_constant_s, near.second_order])
+def _refined(fit_of: Callable[[Channel], ChannelFit], near: Channel, *free: str) -> ChannelFit:
+    """The best channel near another one, by those of its attributes that are free."""
+    low, high, difference, longest, done = np.array([_RANGES[name] for name in free]).T
 
     def fit_at(x: Floats) -> ChannelFit:
-        return fit_of(*x.tolist(), *start[free:].tolist())
+        return fit_of(attrs.evolve(near, **dict(zip(free, x.tolist(), strict=True))))
 
     def at(x: Floats) -> _Tried:
-        fit, moved = fit_at(x), x + np.diag(_DIFFERENCES[:free])
+        fit, moved = fit_at(x), x + np.diag(difference)
 
         def slopes() -> Floats:
-            changes = np.array([fit_at(one).rest - fit.rest for one in moved])
-            return np.asarray(changes.T / _DIFFERENCES[:free])
+            return np.asarray(np.array([fit_at(one).rest - fit.rest for one in moved]).T / difference)
 
         return _Tried(fit.rest, slopes, fit)
 
-    return gauss_newton(
-        at, start[:free], low=_LOW[:free], high=_HIGH[:free], longest=_LONGEST[:free], done=_DONE[:free]
-    ).point.fit
+    start = np.array([getattr(near, name) for name in free])
+    return gauss_newton(at, start, low=low, high=high, longest=longest, done=done).point.fit
 
 
 def _clearance_columns(reference: TorqueReference, sensor: TorqueSensor) -> Floats:

@@ -390,16 +390,16 @@ def read_commissioned_torques(db: sqlite3.Connection) -> list[CommissionedTorque
     found: list[CommissionedTorque] = []
     for row in db.execute(
         "SELECT stamp_ns, cycles, speed_radps, delay_s, time_constant_s, load_friction, second_order, "
-        "clearance_m, signatures, sigma_m, temperature_c, period_s, averaged, is_instant "
+        "mean_s, clearance_m, signatures, sigma_m, temperature_c, period_s, averaged, is_instant "
         "FROM torque_commissioning ORDER BY id DESC"
     ):
-        stamp_ns, cycles, speed, *drive = row[:7]
-        clearance_m, signatures, sigma_m = map(_floats, row[7:10])
-        names = "delay_s", "time_constant_s", "load_friction", "second_order"
+        stamp_ns, cycles, speed, *drive = row[:8]
+        clearance_m, signatures, sigma_m = map(_floats, row[8:11])
+        names = "delay_s", "time_constant_s", "load_friction", "second_order", "mean_s"
         channel = Channel(**dict(zip(names, drive, strict=True)))
         one = CommissionedTorque(
             stamp_ns, clearance_m, signatures.reshape(cycles, -1), sigma_m, channel, speed,
-            or_nan(row[10]), or_nan(row[11]), row[12], bool(row[13]),
+            or_nan(row[11]), or_nan(row[12]), row[13], bool(row[14]),
         )  # fmt: skip
         if not any(abs(one.speed - other.speed) <= UNLIKE * abs(other.speed) for other in found):
             found.append(one)

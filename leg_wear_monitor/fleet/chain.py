@@ -208,8 +208,13 @@ def entry_of(found: Found) -> dict[str, Any]:
 
 def _first_stamp_ns(path: Path, leg: FleetLeg) -> int:
     """First valid stamp; 0 if there is none."""
-    topics = {"joint_states": leg.joint_states, "drive_torque": leg.drive_torque}
-    with Recording([path], leg.config, **topics) as recording:  # type: ignore[arg-type]
+    with Recording(
+        [path],
+        leg.config,
+        memory_mb=leg.memory_mb,
+        joint_states=leg.joint_states,
+        drive_torque=leg.drive_torque,
+    ) as recording:
         for block in recording.blocks():
             stamps = block.samples["stamp_ns"][block.samples["fault"] == 0]
             if len(stamps):
@@ -349,6 +354,7 @@ def _replayed(leg: FleetLeg, directory: LegDirectory, found: Found, about: Line,
         node=leg.node,
         joint_states=leg.joint_states,
         drive_torque=leg.drive_torque,
+        memory_mb=leg.memory_mb,
         sample=leg.sample,
         finish=finish,
     )

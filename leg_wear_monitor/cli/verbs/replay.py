@@ -50,13 +50,7 @@ TIMES = ("header", "log", "publish")
     "Full name of the node to replace.  [default: leg_wear_monitor beside the crank's topic]",
 )
 @common.option("--crank-joint", "NAME", "The crank's name.  [default: crank_joint of the parameters]")
-@common.option(
-    "--memory-mb",
-    "MB",
-    "Memory limit of reading, temporary files included.",
-    type=click.FloatRange(min=16.0),
-    default=512.0,
-)
+@common.memory_option
 @common.sample_option
 @common.path_option(
     "--ledger",

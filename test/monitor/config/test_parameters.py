@@ -114,6 +114,16 @@ def test_sections_are_for_the_nodes_that_ros_means(pattern, node, taken):
     assert config.hardware_id == ("mine" if taken else "any")
 
 
+def test_sections_that_are_nested_are_read_as_ros_reads_them():
+    nested = "/left: {leg_wear_monitor: {ros__parameters: {hardware_id: mine}}}"
+    assert read(nested, None).hardware_id == "mine"  # the only node of the file
+    both = f"/**: {{ros__parameters: {{hardware_id: any}}}}\n{nested}"
+    assert read(both, "/left/leg_wear_monitor").hardware_id == "mine"
+    assert read(both, "/right/leg_wear_monitor").hardware_id == "any"
+    with pytest.raises(ConfigError, match=r"leg\.yaml: /left/other: 5 is not a mapping with the one key"):
+        read(f"{nested[:-1]}, other: 5}}", None)
+
+
 @pytest.mark.parametrize(
     ("text", "others"),
     [

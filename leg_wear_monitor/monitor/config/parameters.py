@@ -177,7 +177,7 @@ def _check_type(parameter: Parameter, value: Any, source: str) -> None:
             raise ConfigError(
                 source,
                 parameter.name,
-                f"{shown(value)} is a whole number to ROS, expected {float(entry)!r}{unit}",
+                f"{shown(value)} is a whole number to ROS, expected {shown(entry)}.0{unit}",
             )
 
 

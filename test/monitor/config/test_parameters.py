@@ -68,6 +68,10 @@ FILES = [
     ("/gait_publisher: {ros__parameters: {}}", ["nothing for the node /leg_wear_monitor", "/gait_publisher"]),
     ("/**: {ros__parameters: {limits: {9: 1}}}", ["limits", "the key 9", "not a text"]),
     (
+        f"/**: {{ros__parameters: {{limits.clearance_m: 1{400 * '0'}}}}}",
+        ["limits.clearance_m", "is a whole number to ROS, expected 1000", "000.0 [m]"],
+    ),
+    (
         "/**: {ros__parameters: {limits: {warn_fraction: 0.7}, limits.warn_fraction: 0.6}}",
         ["warn_fraction", "twice"],
     ),

@@ -77,6 +77,32 @@ class ConfigWarning(UserWarning):
     """Something that can be used but may not do what was meant; the command line prints it as one line."""
 
 
+# Optional modules.
+
+
+_EXTRAS = {"lz4": "bags", "mcap": "bags", "rosbags": "bags", "tornado": "dashboard", "zstandard": "bags"}
+"""Modules that are optional, and the extra that installs each."""
+
+
+@contextmanager
+def extras_named() -> Iterator[None]:
+    """Name the extra of an optional module that is not installed.
+
+    Raises
+    ------
+    LegWearError
+        In place of the ModuleNotFoundError; that of another module keeps its traceback.
+    """
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        module = (error.name or "").partition(".")[0]
+        if module not in _EXTRAS:
+            raise
+        extra = _EXTRAS[module]
+        raise LegWearError(f"{module} is not installed; pip install 'leg_wear_monitor[{extra}]'") from error
+
+
 # Suggestions for unknown names.
 
 

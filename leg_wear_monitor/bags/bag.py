@@ -505,13 +505,13 @@ def _open(bag_file: BagFile, config: MonitorConfig, budget: Budget, stack: ExitS
             return TableFile(bag_file.path, content, bag_file.storage, config, budget)
         if bag_file.storage == MCAP:
             return McapFile(bag_file.path, stack.enter_context(open_regular(path)), budget)
+        from leg_wear_monitor.bags.sqlite import SqliteFile
+
+        return SqliteFile(bag_file.path, path, budget, stack)
     except DamageError as error:
         raise RecordingError(str(bag_file.path), "", str(error)) from error
     except OSError as error:
         raise RecordingError(str(bag_file.path), "", f"cannot be read: {error.strerror}") from error
-    from leg_wear_monitor.bags.sqlite import SqliteFile
-
-    return SqliteFile(bag_file.path, path, budget, stack)
 
 
 def _expanded_file(bag_file: BagFile, budget: Budget, stack: ExitStack) -> Path:

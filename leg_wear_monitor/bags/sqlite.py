@@ -1,5 +1,6 @@
 """Recordings in SQLite (.db3): opening a database that is not trusted, and reading its messages."""
 
+import errno
 import shutil
 import sqlite3
 import tempfile
@@ -69,10 +70,13 @@ def open_database(
     Raises
     ------
     RecordingError
-        If the file cannot be read or is not a rosbag2 database.
+        If the file is not a rosbag2 database.
+    OSError
+        If the system cannot read it.
     """
     journals = _journals_of(file)
     try:
+        open_regular(file).close()  # SQLite does not say why it cannot open a file
         if journals:
             address = f"file:{quote(str(_private_copy(file, journals, budget, stack)))}?mode=rw"
         else:
@@ -91,7 +95,8 @@ def open_database(
         _limit_work(database, _LEAST_INSTRUCTIONS + _INSTRUCTIONS_PER_BYTE * size)
     except DamageError as error:
         raise RecordingError(str(path), "", str(error)) from error
-    except (*UNREADABLE, OSError) as error:
+    except UNREADABLE as error:
+        _raise_of_the_system(error)
         raise RecordingError(str(path), "", f"is not a readable .db3 file: {one_line(error)}") from error
     names = " and ".join(each.name for each in journals)
     return database, [f"was not closed: the content of {names} beside it is read as well"] if journals else []
@@ -107,6 +112,14 @@ def one_line(error: BaseException) -> str:
     if str(error) == "interrupted":  # by `_limit_work`
         return "reading it takes more work than its size explains"
     return " ".join(str(error).split()) or type(error).__name__
+
+
+def _raise_of_the_system(error: BaseException) -> None:
+    """Raise an OSError, as of other files, where the system could not read: that is no damage of the file."""
+    code = getattr(error, "sqlite_errorcode", 0)
+    is_cut_off = code == sqlite3.SQLITE_IOERR_SHORT_READ
+    if code & 0xFF == sqlite3.SQLITE_IOERR and not is_cut_off:
+        raise OSError(errno.EIO, str(error)) from error
 
 
 def _limit_work(database: sqlite3.Connection, most: int) -> None:
@@ -211,6 +224,8 @@ class SqliteFile:
     ------
     RecordingError
         If the file is not a rosbag2 database.
+    OSError
+        If the system cannot read it.
     """
 
     def __init__(self, path: Path, file: Path, budget: Budget, stack: ExitStack) -> None:
@@ -225,7 +240,8 @@ class SqliteFile:
             self._counts = _counts(self._database)
         except DamageError as error:
             raise RecordingError(str(path), "", str(error)) from error
-        except (*UNREADABLE, OSError) as error:
+        except UNREADABLE as error:
+            _raise_of_the_system(error)
             raise RecordingError(str(path), "", f"is not a readable .db3 file: {one_line(error)}") from error
         self._read = 0
         self._report_unlisted()
@@ -262,6 +278,7 @@ class SqliteFile:
             while rows := cursor.fetchmany(_ROWS_PER_PAGE):
                 yield deque(rows)
         except UNREADABLE as error:
+            _raise_of_the_system(error)
             self.findings.append(Finding(self.path, f"ends early: {one_line(error)}"))
 
     def _piece(self, rows: deque[_Row], types: dict[int, int], bytes_per_message: int) -> Piece:
@@ -295,7 +312,8 @@ class SqliteFile:
                 "SELECT data FROM messages WHERE id = ? AND length(data) <= ?",
                 (number, self.budget.part_limit // 8),
             ).fetchone()
-        except UNREADABLE:
+        except UNREADABLE as error:
+            _raise_of_the_system(error)
             return None  # `pieces` reports how many are missing
         return row[0] if row and isinstance(row[0], bytes) else None
 

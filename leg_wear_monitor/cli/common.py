@@ -156,6 +156,14 @@ sample_option: Option = option(
     type=click.FloatRange(0.0, 1.0, min_open=True),
 )
 
+memory_option: Option = option(
+    "--memory-mb",
+    "MB",
+    "Memory limit of reading, temporary files included.",
+    type=click.FloatRange(min=16.0),
+    default=512.0,
+)
+
 workers_option: Option = option(
     "--workers", "N", "Number of local processes.  [default: cores]", type=click.IntRange(min=1)
 )

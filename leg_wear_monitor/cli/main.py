@@ -10,7 +10,14 @@ from xml.etree import ElementTree
 
 import click
 
-from leg_wear_monitor.errors import INTERRUPTED, ConfigWarning, LegWearError, did_you_mean, printable
+from leg_wear_monitor.errors import (
+    INTERRUPTED,
+    ConfigWarning,
+    LegWearError,
+    did_you_mean,
+    extras_named,
+    printable,
+)
 from leg_wear_monitor.files import share_directory
 
 COULD_NOT = 2
@@ -23,9 +30,6 @@ _VERBS = {
     "report": "replay", "reset": "upkeep", "simulate": "study", "study": "study",
 }  # fmt: skip
 """Verbs, and the file in `verbs` of each."""
-
-_EXTRAS = {"lz4": "bags", "mcap": "bags", "rosbags": "bags", "tornado": "dashboard", "zstandard": "bags"}
-"""Modules that are optional, and the extra that installs each."""
 
 
 class Verbs(click.Group):
@@ -55,7 +59,7 @@ class Verbs(click.Group):
     def main(self, *args: Any, **extra: Any) -> Any:
         """Run and end the process; programming errors keep their traceback."""
         try:
-            with _warnings_as_lines():
+            with _warnings_as_lines(), extras_named():
                 code = super().main(*args, **{**extra, "standalone_mode": False})
         except click.UsageError as error:
             path = error.ctx.command_path if error.ctx else self.name
@@ -66,12 +70,6 @@ class Verbs(click.Group):
             code = COULD_NOT
         except LegWearError as error:
             _print_error(str(error))
-            code = COULD_NOT
-        except ModuleNotFoundError as error:
-            module = (error.name or "").partition(".")[0]
-            if module not in _EXTRAS:
-                raise
-            _print_error(f"{module} is not installed; pip install 'leg_wear_monitor[{_EXTRAS[module]}]'")
             code = COULD_NOT
         except click.Abort:
             if sys.stderr.isatty():

@@ -23,7 +23,13 @@ from leg_wear_monitor.monitor.alarm_specs import with_its_unit
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.measurement import last_measured
 from leg_wear_monitor.monitor.judgement import joint_clearance, leg_alarm, with_measured
-from leg_wear_monitor.monitor.ledger.entry import ClearancePoint, JointWear, binding_of, walked_words
+from leg_wear_monitor.monitor.ledger.entry import (
+    ClearancePoint,
+    JointWear,
+    binding_of,
+    clearance_limit_key,
+    walked_words,
+)
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import LedgerContent, read_ledger
 from leg_wear_monitor.monitor.verdict.situation import JointSituation
@@ -139,7 +145,8 @@ class LedgerLeg:
     def _clearance(
         self, found: LedgerContent, part: JointWear, counted_m: float, verdict: Verdict
     ) -> JointClearance:
-        joint, limit_m = part.name, self._setup.limits_m[part.name]
+        joint, totals = part.name, found.entry.totals if found.entry else {}
+        limit_m = totals.get(clearance_limit_key(joint), self._setup.limits_m[joint])
         last = last_measured(found.measurements, joint, part.replaced_ns)
         known = with_measured(JointSituation(joint=joint, counted_m=counted_m, limit_m=limit_m), last)
         alarms = found.entry.alarms if found.entry else ()

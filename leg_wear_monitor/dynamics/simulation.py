@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
@@ -330,6 +330,10 @@ def simulate(
         wear=wear,
         normal_law=normal_law,
     )
+    if not setup.clearance_joints:
+        of_joints = {"clearance-m": clearance_m, "wear": wear or None, "normal-law": normal_law}
+        is_ideal = isinstance(mechanism.drive, SpeedDrive)
+        _refuse(of_joints | ({"model": model, "intervals": intervals} if is_ideal else {}))
     model = model or default_model(mechanism)
     if not isinstance(model, str) or model not in MODELS:
         raise ConfigError("model", "", f"{shown(model)} is not one of {', '.join(MODELS)}")
@@ -345,6 +349,13 @@ def simulate(
     if fault := open_balance(result):
         warnings.warn(f"{mechanism.source}: {fault}", ConfigWarning, stacklevel=2)
     return result
+
+
+def _refuse(options: Mapping[str, object]) -> None:
+    """Refuse options that a leg without clearance joints would ignore."""
+    for name, value in options.items():
+        if value is not None:
+            raise ConfigError(name, "", "is for clearance joints, and no joint has clearance")
 
 
 def _check_intervals(intervals: int | None, model: str) -> None:

@@ -3,7 +3,6 @@
 import hashlib
 import math
 from collections.abc import Iterable, Mapping
-from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,14 @@ from leg_wear_monitor.configuration import part_document
 from leg_wear_monitor.errors import LegWearError, printable
 from leg_wear_monitor.files import write_whole
 from leg_wear_monitor.fleet.description import FleetLeg
-from leg_wear_monitor.fleet.directory import LegDirectory, Line, cycle_columns, locked, write_parquet
+from leg_wear_monitor.fleet.directory import (
+    LegDirectory,
+    Line,
+    Outcome,
+    cycle_columns,
+    locked,
+    write_parquet,
+)
 from leg_wear_monitor.playback.replay import replay
 from leg_wear_monitor.playback.summary import ReplayResult
 from leg_wear_monitor.workers import Job, package_digest
@@ -26,23 +32,6 @@ from leg_wear_monitor.workers import Job, package_digest
 
 _MOST_FINDINGS = 20
 _AGAIN = "tried again at the next update"
-
-
-class Outcome(Enum):
-    """What became of a recording."""
-
-    COUNTED = "counted"
-    ALREADY_COUNTED = "already_counted"
-    """All of its time was in the ledger, from other recordings."""
-    NO_GAIT = "no_gait"
-    """No gait cycle in it fits the leg; nothing is counted."""
-    UNREADABLE = "unreadable"
-    """Nothing in it can be read; nothing is counted."""
-
-    @property
-    def is_final(self) -> bool:
-        """Whether other settings of the leg would change nothing."""
-        return self in (Outcome.COUNTED, Outcome.ALREADY_COUNTED)
 
 
 _UNREAD: Line = {
@@ -219,8 +208,13 @@ def entry_of(found: Found) -> dict[str, Any]:
 
 def _first_stamp_ns(path: Path, leg: FleetLeg) -> int:
     """First valid stamp; 0 if there is none."""
-    topics = {"joint_states": leg.joint_states, "drive_torque": leg.drive_torque}
-    with Recording([path], leg.config, **topics) as recording:  # type: ignore[arg-type]
+    with Recording(
+        [path],
+        leg.config,
+        memory_mb=leg.memory_mb,
+        joint_states=leg.joint_states,
+        drive_torque=leg.drive_torque,
+    ) as recording:
         for block in recording.blocks():
             stamps = block.samples["stamp_ns"][block.samples["fault"] == 0]
             if len(stamps):
@@ -360,6 +354,7 @@ def _replayed(leg: FleetLeg, directory: LegDirectory, found: Found, about: Line,
         node=leg.node,
         joint_states=leg.joint_states,
         drive_torque=leg.drive_torque,
+        memory_mb=leg.memory_mb,
         sample=leg.sample,
         finish=finish,
     )

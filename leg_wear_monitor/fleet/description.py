@@ -16,6 +16,7 @@ from typing import Any
 
 import attrs
 
+from leg_wear_monitor.bags.budget import DEFAULT_MB
 from leg_wear_monitor.configuration import choice, described
 from leg_wear_monitor.configuration.strict import choose, structure
 from leg_wear_monitor.errors import ConfigError, ConfigWarning, printable
@@ -51,6 +52,8 @@ class FleetLeg:
         As in `leg_wear_monitor.replay`.
     learned_priors : str
         File with the priors of its wear coefficients that were learned from the fleet; empty if none.
+    memory_mb : float
+        Memory limit of reading, as in `leg_wear_monitor.replay` [10⁶ bytes].
     sample : float, optional
         Fraction of the gait cycles that are followed, as in `leg_wear_monitor.replay`.
     """
@@ -65,6 +68,7 @@ class FleetLeg:
     joint_states: str | None
     drive_torque: str | None
     learned_priors: str = ""
+    memory_mb: float = DEFAULT_MB
     sample: float | None = None
     config_file: Path | None = None
 
@@ -90,7 +94,8 @@ class FleetLeg:
     @property
     def settings(self) -> str:
         """Digest of all settings that decide whether a recording can be read and fits the leg."""
-        parts = (self.config, self.node, self.joint_states, self.drive_torque)
+        parts: tuple[object, ...] = (self.config, self.node, self.joint_states, self.drive_torque)
+        parts += () if self.memory_mb == DEFAULT_MB else (self.memory_mb,)
         return hashlib.sha256(repr(parts).encode()).hexdigest()[:20]
 
 

@@ -7,6 +7,7 @@ import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -86,6 +87,24 @@ def _whole_bytes(path: Path) -> int:
 
 
 Line = dict[str, Any]
+"""What is kept of one recording."""
+
+
+class Outcome(Enum):
+    """What became of a recording."""
+
+    COUNTED = "counted"
+    ALREADY_COUNTED = "already_counted"
+    """All of its time was in the ledger, from other recordings."""
+    NO_GAIT = "no_gait"
+    """No gait cycle in it fits the leg; nothing is counted."""
+    UNREADABLE = "unreadable"
+    """Nothing in it can be read; nothing is counted."""
+
+    @property
+    def is_final(self) -> bool:
+        """Whether other settings of the leg would change nothing."""
+        return self in (Outcome.COUNTED, Outcome.ALREADY_COUNTED)
 
 
 class LegDirectory:

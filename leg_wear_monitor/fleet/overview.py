@@ -14,9 +14,8 @@ from leg_wear_monitor.configuration import part_document
 from leg_wear_monitor.configuration.strict import structure
 from leg_wear_monitor.errors import ConfigError, printable
 from leg_wear_monitor.files import json_text, write_whole
-from leg_wear_monitor.fleet.chain import Outcome
 from leg_wear_monitor.fleet.description import FleetDescription, FleetLeg
-from leg_wear_monitor.fleet.directory import LegDirectory, Line, used_fraction
+from leg_wear_monitor.fleet.directory import LegDirectory, Line, Outcome, used_fraction
 from leg_wear_monitor.monitor.alarms import ADVICE
 from leg_wear_monitor.shown import Shown
 from leg_wear_monitor.state import JointClearance, LifeHours, State, Verdict

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 
 from leg_wear_monitor.bags.bag import METADATA, find_files
+from leg_wear_monitor.bags.budget import DEFAULT_MB
 from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.bags.mcap_layout import MAGIC
 from leg_wear_monitor.bags.table_file import PARQUET
@@ -94,6 +95,7 @@ def update_fleet(
     *,
     workers: int = 1,
     scheduler: str | None = None,
+    memory_mb: float = DEFAULT_MB,
     sample: float | None = None,
     begin: Callable[[Sequence[Chain]], None] | None = None,
     progress: Callable[[float], None] | None = None,
@@ -112,6 +114,8 @@ def update_fleet(
         Number of local processes; 1 uses this process only. Results do not depend on it.
     scheduler : str, optional
         Address of a Dask scheduler whose workers count instead; they need the same files at the same paths.
+    memory_mb : float
+        Memory limit of reading in each process, as in `leg_wear_monitor.replay` [10⁶ bytes].
     sample : float, optional
         Fraction of the gait cycles that are followed, as in `leg_wear_monitor.replay`; without it, all.
     begin : callable, optional
@@ -131,9 +135,8 @@ def update_fleet(
     arrow()  # fails early if pyarrow is not installed
     out = out.absolute()
     with locked(out):
-        work = _UpdateJobs(
-            [Chain(attrs.evolve(leg, sample=sample), out) for leg in fleet.legs], progress, report
-        )
+        legs = (attrs.evolve(leg, memory_mb=memory_mb, sample=sample) for leg in fleet.legs)
+        work = _UpdateJobs([Chain(leg, out) for leg in legs], progress, report)
         scans = work.scans()
         if begin and (scans or work.is_due):
             begin(work.chains)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
+from leg_wear_monitor.monitor.alarm_specs import CLEARANCE
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import LedgerFile
 from leg_wear_monitor.monitor.gait_evidence import FRICTION_KEY, SIGMA_KEY
@@ -21,6 +22,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
     ForecastPoint,
     JointWear,
     WalkedLoad,
+    clearance_limit_key,
     one_part,
     together,
 )
@@ -421,7 +423,7 @@ class Accounting:
         return kept
 
     def _entry(self, alarms: Iterable[Alarm]) -> Entry:
-        depth = self._twin.depth
+        depth, alarms = self._twin.depth, tuple(alarms)
         epoch = self.ledger.epoch if self.ledger else 0
         return Entry(
             stamp_ns=self._twin.intake.followed_stamp_ns or (self.ledger.kept_ns if self.ledger else 0),
@@ -429,7 +431,12 @@ class Accounting:
             totals=self.totals
             | self.state.commissioned
             | self._sampling_totals
-            | {_DUE_KEY: self.state.point_due_s},
+            | {_DUE_KEY: self.state.point_due_s}
+            | {
+                clearance_limit_key(alarm.subject): alarm.limit
+                for alarm in alarms
+                if alarm.kind == CLEARANCE.kind and not math.isnan(alarm.limit)
+            },
             alarms=tuple(alarm for alarm in alarms if alarm.level is not Level.OK),
             spans=(*self.state.past, *((*span, epoch) for span in self.state.spans)),
             loads=self.state.loads,

@@ -6,10 +6,11 @@ from itertools import takewhile
 
 import attrs
 
+from leg_wear_monitor.files import or_nan
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.ledger.entry import AlarmEvent
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
-from leg_wear_monitor.monitor.verdict.situation import MEASURED, SEEN
+from leg_wear_monitor.monitor.verdict.situation import ERROR_OF, MEASURED, SEEN
 from leg_wear_monitor.state import Level
 
 
@@ -69,5 +70,8 @@ def _as_it_was(ledger: Ledger, events: Sequence[AlarmEvent]) -> Alarm:
     for name, source in sources.items():
         value = evidence[name].value if name in evidence else None
         if value is not None and value == evidence[alarm.name].value:
-            return attrs.evolve(alarm, worst=value, cause=source)
+            error = evidence.get(f"{ERROR_OF}{name}")  # in ledgers of earlier versions, there is none
+            return attrs.evolve(
+                alarm, worst=value, cause=source, sigma=or_nan(error.value if error else None)
+            )
     return alarm

@@ -33,6 +33,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
     JointWear,
     Measurement,
     VerdictEvent,
+    clearance_limit_key,
     new_part,
     one_part,
 )
@@ -444,7 +445,12 @@ def clearance_limits(leg: Mechanism, config: MonitorConfig) -> dict[str, float]:
 
 
 def limit_in(ledger: Ledger, joint: str) -> float | None:
-    """Limit of a joint's clearance [m] when its alarm last changed; None if a ledger does not know it."""
+    """Limit of a joint's clearance [m] that a monitor last had; None if a ledger does not know it.
+
+    A ledger of an earlier version knows it from the changes of the alarm alone.
+    """
+    if ledger.entry and (limit_m := ledger.entry.totals.get(clearance_limit_key(joint))):
+        return limit_m
     name = alarm_specs.CLEARANCE.name(joint)
     changes = (event.alarm for event in reversed(ledger.alarm_history))
     alarms = (*(ledger.entry.alarms if ledger.entry else ()), *changes)

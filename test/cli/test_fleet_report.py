@@ -64,3 +64,12 @@ def test_how_old_a_recording_may_be(run, fleet):
     run(*COMMAND, "--fresh-days", "30")
     assert "last 30 days" in (fleet / "report.html").read_text()
     assert run(*COMMAND, "--fresh-days", "0").exit_code == 2
+
+
+def test_what_does_not_fit_into_the_memory_limit_is_tried_again_with_another_one(run, tmp_path):
+    zstandard = pytest.importorskip("zstandard")
+    (tmp_path / "large.mcap.zstd").write_bytes(zstandard.compress(bytes(20_000_000)))
+    (tmp_path / "fleet.yaml").write_text("legs: [{id: a, recordings: '*.zstd'}]\n")
+    update = ("fleet", "update", "fleet.yaml", "--workers", "1")
+    assert "temporary files than --memory-mb 16 allows" in run(*update, "--memory-mb", "16").stderr
+    assert "--memory-mb" not in run(*update).stderr

@@ -141,6 +141,9 @@ def test_a_stop_by_a_limit_of_the_leg_is_not_judged_by_another_one(run, refused,
     assert verdict(path)[0] == "stop"
     assert told in refused("measure", "--withdraw", "last", "--ledger", str(path))
     assert run("measure", "--withdraw", "last", "--ledger", str(path), "--config", "mine.yaml").exit_code == 0
+    for verb in (("acknowledge",), ("reset", "A"), ("reset", "A", "--undo")):
+        assert told in refused(*verb, "--ledger", str(path))
+    assert verdict(path)[0] == "stop"
 
 
 def test_an_alarm_by_a_measurement_that_was_wrong_clears_once_it_is_withdrawn_and_acknowledged(run, ledger):

@@ -113,6 +113,7 @@ def test_what_a_reset_has_cleared_is_raised_again_once_it_is_undone(run, ledger)
         assert not other.acknowledged
         for name in ("name", "level", "worst", "limit", "raised_ns", "cause"):
             assert getattr(one, name) == getattr(other, name)
+        assert str(one.sigma) == str(other.sigma)
     now = last_verdict(ledger)
     assert (now.state, now.fault_code, now.joints) == (stopped.state, stopped.fault_code, stopped.joints)
 

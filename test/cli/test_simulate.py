@@ -111,6 +111,22 @@ def test_a_file_is_replaced_whole_or_stays(run, complaints, tmp_path, monkeypatc
 
 
 @pytest.mark.plain
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [
+        ("--clearance-m", "0.0001"),
+        ("--wear", "on"),
+        ("--normal-law", "hunt-crossley"),
+        ("--model", "full"),
+        ("--intervals", "1024"),
+    ],
+)
+def test_the_ideal_leg_takes_no_option_of_clearance_joints(refused, option, value):
+    line = refused(*SHORT, "--clearances", "none", option, value)
+    assert line == f"error: {option}: is for clearance joints, and no joint has clearance"
+
+
+@pytest.mark.plain
 def test_a_bug_keeps_its_traceback(run, never):
     never(ZeroDivisionError("a bug"))
     with pytest.raises(ZeroDivisionError, match="a bug"):

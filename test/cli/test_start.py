@@ -106,7 +106,7 @@ def test_without_the_libraries_of_an_extra_it_is_named_in_a_line(tmp_path):
     """Only in ``replay`` and ``commission`` before; a live dashboard ended in a traceback, too."""
     (tmp_path / "leg.mcap").touch()
     (tmp_path / "fleet.yaml").write_text("legs: [{id: left, recordings: '*.mcap'}]\n")
-    lines = ["check fleet.yaml", "fleet report fleet.yaml", "fleet update fleet.yaml", "demo",
+    lines = ["check fleet.yaml", "fleet update fleet.yaml", "demo",
              "play leg.mcap --joint G", "replay leg.mcap", "commission leg.mcap"]  # fmt: skip
     code = (
         "import sys\n"
@@ -130,3 +130,28 @@ def test_without_the_libraries_of_an_extra_it_is_named_in_a_line(tmp_path):
         assert line.startswith("error: ") and line.endswith(
             "is not installed; pip install 'leg_wear_monitor[bags]'"
         )
+
+
+@pytest.mark.plain
+def test_without_an_extra_the_library_names_it_and_the_other_files_are_checked(tmp_path):
+    (tmp_path / "fleet.yaml").write_text("legs: [{id: left, recordings: '*.mcap'}]\n")
+    code = (
+        "import sys\n"
+        "sys.modules.update(dict.fromkeys(('mcap', 'rosbags', 'zstandard', 'lz4')))\n"
+        "import leg_wear_monitor as lw\n"
+        "for name in ('replay', 'Fleet', 'plot'):\n"
+        "    try:\n"
+        "        getattr(lw, name)\n"
+        "    except lw.LegWearError as error:\n"
+        "        print(name, error)\n"
+        "from leg_wear_monitor.cli.main import cli\n"
+        "cli(['check', 'fleet.yaml', 'bionic_leg'])\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, check=False
+    )
+    line = "mcap is not installed; pip install 'leg_wear_monitor[bags]'"
+    first, second, checked, *_ = done.stdout.splitlines()
+    assert (first, second) == (f"replay {line}", f"Fleet {line}")  # a picture of a simulation needs none
+    assert (done.returncode, done.stderr) == (2, f"error: {line}\n")
+    assert checked.startswith("bionic_leg    7 moving bodies")

@@ -49,6 +49,13 @@ def test_the_page_is_drawn_again_from_the_data_alone(run, done, tmp_path):
     assert page.read_bytes() == first
 
 
+def test_a_fault_of_the_page_is_not_blamed_on_the_data(run, done, monkeypatch):
+    """Checksums have told by then that nothing was altered."""
+    monkeypatch.setattr("leg_wear_monitor.report.study.page.study_page", lambda _results: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        run("report", "out")
+
+
 def test_another_leg_is_an_option(run, tmp_path, unpainted):
     (tmp_path / "tiny.yaml").write_text(TINY.replace("0.0001, ", ""))
     result = run("study", "size", "--config", "tiny.yaml", "--mechanism", "jansen_leg", "--out", "out")

@@ -1,11 +1,18 @@
 """A measured clearance beside the counted one: status, alarm and verdict, in a run and the next."""
 
+from contextlib import closing
+from pathlib import Path
+
+import attrs
 import pytest
 from told import status_of
 
 from leg_wear_monitor import open_ledger
+from leg_wear_monitor.dashboard.ledger_leg import LedgerLeg
+from leg_wear_monitor.monitor.config.settings import Limits
 from leg_wear_monitor.monitor.forecast.forecast import Answer
 from leg_wear_monitor.monitor.ledger.entry import Measurement
+from leg_wear_monitor.monitor.operators import limit_in
 from leg_wear_monitor.state import Figure, Level
 
 START_NS = 1_700_000_000_123_456_789
@@ -34,6 +41,18 @@ def test_a_measured_clearance_stands_beside_the_counted_one_and_raises_its_alarm
     evidence = {each.name: each.value for each in verdict.evidence}
     assert evidence["measured clearance G"] == 6.1e-4
     assert evidence["counted clearance G"] == pytest.approx(counted_m, rel=1e-3)
+
+
+def test_a_healthy_leg_s_own_limit_is_in_its_ledger(begin, gait) -> None:
+    """So that an operator's verb and a page without its parameters do not judge by the default one."""
+    monitor = begin(MEASURED | {"limits.joint_clearance_m": [6.0e-4, 4.5e-4]})
+    monitor.update(gait(2.5))
+    monitor.close()
+    with closing(open_ledger(monitor.mechanism, monitor.config)) as kept:
+        assert not kept.alarm_history
+        assert [limit_in(kept, joint) for joint in "AG"] == [6.0e-4, 4.5e-4]
+    leg = LedgerLeg(Path(kept.path), attrs.evolve(monitor.config, limits=Limits()), monitor.mechanism, float)
+    assert "limit 0.45 mm" in leg.content().regions["joints"]
 
 
 def test_what_contradicts_the_model_raises_the_alarm_too_and_a_new_part_ends_it(begin, gait) -> None:

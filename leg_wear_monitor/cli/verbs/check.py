@@ -16,7 +16,7 @@ import click
 from leg_wear_monitor.cli import common
 from leg_wear_monitor.cli.main import version
 from leg_wear_monitor.cli.verbs.study import DEFAULT_MODEL
-from leg_wear_monitor.errors import ConfigWarning, LegWearError
+from leg_wear_monitor.errors import ConfigWarning, LegWearError, extras_named
 from leg_wear_monitor.files import json_text, share_directory
 
 if TYPE_CHECKING:
@@ -80,7 +80,8 @@ def _all_well(parts: Mapping[str, Callable[[], str]]) -> bool:
     well = True
     for name, part in parts.items():
         try:
-            click.echo(f"{name:<13} {part()}")
+            with extras_named():
+                click.echo(f"{name:<13} {part()}")
         except LegWearError as error:
             click.echo(f"error: {error}", err=True)
             well = False

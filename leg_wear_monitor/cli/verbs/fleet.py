@@ -25,6 +25,7 @@ def fleet() -> None:
 @common.out_option("Directory of the fleet.  [default: out of the description, or fleet beside it]")
 @common.workers_option
 @common.scheduler_option("count")
+@common.memory_option
 @common.sample_option
 @click.option("--follow", is_flag=True, help="Go on with new recordings as they are completed, until ^C.")
 @common.option(
@@ -39,6 +40,7 @@ def update(
     out: Path | None,
     workers: int | None,
     scheduler: str | None,
+    memory_mb: float,
     sample: float | None,
     follow: bool,
     every_s: float,
@@ -57,7 +59,7 @@ def update(
     common.check_directory("--out", out)
 
     def count(now: "FleetDescription") -> "FleetUpdate":
-        return _update(now, out, workers, scheduler, sample)
+        return _update(now, out, workers, scheduler, memory_mb=memory_mb, sample=sample)
 
     if follow:
         return _follow(description, count, every_s)
@@ -83,7 +85,7 @@ def export(path: Path, out: Path | None) -> None:
 
 
 def _update(
-    legs: "FleetDescription", out: Path, workers: int | None, scheduler: str | None, sample: float | None
+    legs: "FleetDescription", out: Path, workers: int | None, scheduler: str | None, **reading: Any
 ) -> "FleetUpdate":
     from leg_wear_monitor.fleet.update import update_fleet
 
@@ -93,7 +95,7 @@ def _update(
             out,
             workers=workers or os.cpu_count() or 1,
             scheduler=scheduler,
-            sample=sample,
+            **reading,
             begin=None if scheduler else _compile,
             progress=progress,
         )

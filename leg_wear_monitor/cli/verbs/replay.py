@@ -50,13 +50,7 @@ TIMES = ("header", "log", "publish")
     "Full name of the node to replace.  [default: leg_wear_monitor beside the crank's topic]",
 )
 @common.option("--crank-joint", "NAME", "The crank's name.  [default: crank_joint of the parameters]")
-@common.option(
-    "--memory-mb",
-    "MB",
-    "Memory limit of reading, temporary files included.",
-    type=click.FloatRange(min=16.0),
-    default=512.0,
-)
+@common.memory_option
 @common.sample_option
 @common.path_option(
     "--ledger",
@@ -221,15 +215,14 @@ def report(directory: Path) -> int:
         raise ConfigError(str(directory), "", fault)
     from leg_wear_monitor.cli.verbs.study import write_study_page
 
-    with _as_one_line(directory / "study.json", "study"):
-        return write_study_page(directory)
+    return write_study_page(directory)  # checksums tell what was altered: the rest are programming errors
 
 
 def _replay(directory: Path) -> int:
     from leg_wear_monitor.playback.result import summary_of
 
     source = directory / common.SUMMARY
-    with _as_one_line(source, "replay"):
+    with _as_one_line(source):
         record = json.loads(source.read_text(encoding="utf-8"), parse_constant=_refuse)
         page = common.page_of(summary_of(record, str(source)))
     for path in common.write_directory(directory, {common.PAGE: page}):
@@ -242,12 +235,12 @@ def _refuse(name: str) -> None:
 
 
 @contextmanager
-def _as_one_line(source: Path, what: str) -> Iterator[None]:
+def _as_one_line(source: Path) -> Iterator[None]:
     """Data that a page cannot be made of is the file's fault: the run itself made one of what it wrote."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", RuntimeWarning)  # numpy would print it and go on
             yield
     except _MISMADE as error:
-        fault = f"is not what a {what} of this version writes ({type(error).__name__}: {error})"
+        fault = f"is not what a replay of this version writes ({type(error).__name__}: {error})"
         raise ConfigError(str(source), "", fault) from error

@@ -80,6 +80,12 @@ def check_limit(
     return limit_m
 
 
+def check_limits(kept: "Ledger", leg: "Mechanism", settings: "MonitorConfig", config: Path | None) -> None:
+    """Refuse to judge anew by other limits than the monitor's, which could end a stop."""
+    for joint in leg.clearance_joints:
+        check_limit(kept, leg, settings, joint, config)
+
+
 def list_measurements(joint: str | None, config: Path | None, ledger: Path | None) -> None:
     """Print the measurements of a ledger, or of a joint, a line each; the ledger is left as it is."""
     with opened(config, ledger, True, joint) as (kept, leg, _):
@@ -160,6 +166,7 @@ def acknowledge(
     from leg_wear_monitor.monitor.operators import acknowledge_in
 
     with opened(config, ledger, dry_run) as (kept, leg, settings):
+        check_limits(kept, leg, settings, config)
         click.echo(acknowledge_in(kept, leg, settings, time.time_ns()).words)
     if dry_run:
         click.echo("dry run: nothing was written")
@@ -208,6 +215,7 @@ def _reset_in(joint: str, config: Path | None, ledger: Path | None, undo: bool, 
 
     now_ns, who = time.time_ns(), getpass.getuser()
     with opened(config, ledger, dry_run, joint) as (kept, leg, settings):
+        check_limits(kept, leg, settings, config)
         joint = leg.clearance_joint(joint)
         if undo:
             words = wear_words(undo_in(kept, leg, settings, joint, now_ns, who))

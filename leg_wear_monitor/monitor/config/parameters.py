@@ -1,7 +1,7 @@
 """Parameters of a node as a flat list of dotted names: for ROS, for files, for documentation."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeVar
@@ -177,7 +177,7 @@ def _check_type(parameter: Parameter, value: Any, source: str) -> None:
             raise ConfigError(
                 source,
                 parameter.name,
-                f"{shown(value)} is a whole number to ROS, expected {float(entry)!r}{unit}",
+                f"{shown(value)} is a whole number to ROS, expected {shown(entry)}.0{unit}",
             )
 
 
@@ -239,9 +239,7 @@ def load_config(path: str | Path | None = None, node: str | None = None) -> Moni
 
 def is_parameter_file(document: Any) -> bool:
     """Whether the content of a YAML file is ROS parameters."""
-    return isinstance(document, dict) and any(
-        isinstance(entry, dict) and MARK in entry for entry in document.values()
-    )
+    return any(isinstance(entry, dict) and MARK in entry for _, entry in _sections(document))
 
 
 def parse_config(document: Any, source: str, node: str | None = None) -> MonitorConfig:
@@ -252,25 +250,23 @@ def parse_config(document: Any, source: str, node: str | None = None) -> Monitor
     if not is_parameter_file(document):
         raise ConfigError(source, "", f"is not a ROS parameter file, expected '/**: {{{MARK}: ...}}'")
     values: dict[str, Any] = {}
-    node, taken = node or _node_of(document), False
-    for pattern, entry in document.items():
-        parameters = _parameters(
-            entry, source, str(pattern) if str(pattern).isprintable() else shown(pattern)
-        )
-        if _is_for(str(pattern), node):
+    sections = list(_sections(document))
+    node, taken = node or _node_of([name for name, _ in sections]), False
+    for pattern, entry in sections:
+        parameters = _parameters(entry, source, pattern if pattern.isprintable() else shown(pattern))
+        if _is_for(pattern, node):
             taken = True
             values |= _flat(parameters, "", source)
     if not taken:
-        sections = ", ".join(map(str, document))
-        raise ConfigError(source, "", f"has nothing for the node {node}, its sections are for: {sections}")
+        found = ", ".join(name for name, _ in sections)
+        raise ConfigError(source, "", f"has nothing for the node {node}, its sections are for: {found}")
     return config_from({name: value for name, value in values.items() if not _OF_ROS.fullmatch(name)}, source)
 
 
-def _node_of(document: dict[Any, Any]) -> str:
+def _node_of(sections: Sequence[str]) -> str:
     """The node in the root namespace, or the only monitor node of a file such as a dump."""
-    only = str(next(iter(document)))
-    is_one = len(document) == 1 and "*" not in only and only.endswith(NODE)
-    return "/" + only.strip("/") if is_one else NODE
+    only, *others = sections
+    return only if not others and "*" not in only and only.endswith(NODE) else NODE
 
 
 def _parameters(entry: Any, source: str, pattern: str) -> dict[Any, Any]:
@@ -290,18 +286,18 @@ def sections_for_others(path: str | Path, node: str) -> tuple[str, ...]:
     ConfigError
         If the file cannot be read.
     """
-    found = tuple(_sections(read_yaml(Path(path), str(path))))
+    found = tuple(name for name, _ in _sections(read_yaml(Path(path), str(path))))
     return () if any(_is_for(each, node) for each in found) else found
 
 
-def _sections(document: Any, prefix: str = "") -> Iterator[str]:
-    """Full names of the sections; ROS takes names of namespaces and nodes that are nested, too."""
+def _sections(document: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Sections by full name; ROS takes names of namespaces and nodes that are nested, too."""
     for key, entry in document.items() if isinstance(document, dict) else ():
         name = f"{prefix}/{str(key).strip('/')}"
-        if isinstance(entry, dict) and MARK in entry:
-            yield name
-        else:
+        if isinstance(entry, dict) and entry and MARK not in entry:
             yield from _sections(entry, name)
+        else:
+            yield name, entry
 
 
 def _is_for(pattern: str, node: str) -> bool:

@@ -149,6 +149,7 @@ class MeasurementResult:
         if self.agrees and self.contradicts:  # the counting is wrong, not the measurement
             used = "uses" if now.counts else "does not use"
             lines.append(f"the joint has opened otherwise than counted; the forecast {used} the measurement")
+            lines += self.words[-1:] if now.counts else []
             return (*lines, validity([*earlier, now]).words)
         return (*lines, *self.words, validity([*earlier, now]).words)
 
@@ -275,7 +276,7 @@ def measure(
         counts=counts,
         wear_sigma_m=wear_sigma_m,
     )
-    words = _clock(stamp_ns, kept_ns)
+    words, per_pa = _clock(stamp_ns, kept_ns), max(clearance.wear_coefficient) if contradicts else 0.0
     if contradicts:
         words += _contradiction(accept, below, wear.name)
     return MeasurementResult(
@@ -284,7 +285,7 @@ def measure(
         after=after,
         contradicts=contradicts,
         counted_m=fresh_m + observation.wear_m,
-        words=(*words, _change(before, after)),
+        words=(*words, _change(before, after, per_pa)),
     )
 
 
@@ -312,13 +313,24 @@ def _contradiction(accept: bool, below: float, joint: str) -> list[str]:
     ]
 
 
-def _change(before: CoefficientEstimate, after: CoefficientEstimate) -> str:
+_MOST_PER_PA: float = attrs.fields_dict(Clearance)["wear_coefficient"].metadata["usual"][1]
+
+
+def _change(before: CoefficientEstimate, after: CoefficientEstimate, doubted_per_pa: float) -> str:
+    """What became of the coefficient; with its nominal value, whether that can be one of a joint."""
     if after.observations == before.observations:
         return "the estimate of the wear coefficient is unchanged"
     if after.sigma > _SAYS_SOMETHING * before.sigma:
         return "it adds little: the wear is still too small for its accuracy"
     low, middle, high = (float(x) for x in np.exp(after.log_factors((0.1, 0.5, 0.9))))
-    return (
+    line = (
         f"the wear coefficient is {middle:.3g} times the nominal one, {low:.3g} to {high:.3g} (p10 to p90); "
         f"its uncertainty is {before.sigma / after.sigma:.3g} times smaller than before"
+    )
+    if middle * doubted_per_pa <= _MOST_PER_PA:
+        return line
+    return (
+        f"{line}; that is {middle * doubted_per_pa:.2g} 1/Pa, usual are below {_MOST_PER_PA:g} 1/Pa: the "
+        "joint has not opened by wear alone, and the forecast is far too short; withdraw the measurement "
+        "and enter it without --accept"
     )

@@ -235,6 +235,11 @@ def one_part(before: JointWear, since: JointWear) -> JointWear:
     )
 
 
+def clearance_limit_key(joint: str) -> str:
+    """Name in the totals of the limit that the monitor has for a joint's clearance."""
+    return f"clearance_limit_{joint}_m"
+
+
 @attrs.frozen(eq=False)
 class Entry:
     """The state of the wear at one instant.
@@ -245,7 +250,7 @@ class Entry:
         Stamp up to which the wear is counted.
     joints : tuple of JointWear
     totals : dict of str to float
-        Counters over all runs; each name ends in the unit.
+        Counters over all runs, and values in force such as `clearance_limit_key`; each name ends in the unit.
     alarms : tuple of Alarm
         Those that are not OK.
     spans : tuple of (int, int, int)

@@ -44,7 +44,7 @@ CREATE TABLE joint (
 -- float64, little endian, (2, sectors) of bushing and journal [m]; the means in joint are the later ones
 CREATE TABLE surface (name TEXT PRIMARY KEY, depth BLOB NOT NULL) STRICT;
 
--- counters over all runs
+-- counters over all runs, and values in force, such as the limit of each clearance (clearance_limit_A_m)
 CREATE TABLE total (name TEXT PRIMARY KEY, value REAL NOT NULL) STRICT, WITHOUT ROWID;
 
 -- time whose wear is in the surfaces, by the clock of an epoch

@@ -18,7 +18,10 @@ from leg_wear_monitor.monitor.verdict.situation import (
 from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, NONE, Finding
 from leg_wear_monitor.state import Figure, Level, State
 
-_ACKNOWLEDGE = "then acknowledge the alarms: `leg-wear-monitor acknowledge --ledger FILE`, or `--node NAME`"
+_ACKNOWLEDGE = (
+    "then acknowledge the alarms: `leg-wear-monitor acknowledge --config FILE --ledger FILE`, or "
+    "`--node NAME`"
+)
 _COUNTED = "its faults are counted in the status `input` of /diagnostics, and in `lost` of `replay --json`"
 _MEASURE = "`leg-wear-monitor measure {joint} MM --sigma MM --config FILE --ledger FILE`, or `--node NAME`"
 _ROCK = (
@@ -26,8 +29,8 @@ _ROCK = (
     f"it: {_MEASURE}"
 )
 _ENTER_PART = (
-    "replace the parts of joint {joints}, and enter that: `leg-wear-monitor reset {joint} --ledger FILE`, or "
-    "`--node NAME` while a monitor runs"
+    "replace the parts of joint {joints}, and enter that: `leg-wear-monitor reset {joint} --config FILE "
+    "--ledger FILE`, or `--node NAME` while a monitor runs"
 )
 _REPLACE = (
     f"stop when it is safe, block the drive, and measure joint {{joints}}: {_MEASURE}; if the joint is at "

@@ -458,6 +458,16 @@ def of_foot_load(situation: Situation) -> Sequence[Hit]:
     ]
 
 
+ERROR_OF = "standard error of "
+"""Before the name of some evidence, the name of that of its standard error."""
+
+
+def known_evidence(name: str, known: KnownClearance, limit_m: float) -> tuple[Evidence, ...]:
+    """A clearance as evidence, with its standard error if that is known."""
+    error = Evidence(f"{ERROR_OF}{name}", known.sigma_m, None, "m")
+    return (Evidence(name, known.clearance_m, limit_m, "m"), *([] if math.isnan(known.sigma_m) else [error]))
+
+
 def hit_of(alarm: Alarm, situation: Situation, **words: str) -> Hit:
     """An alarm as a case of a rule: its last value if that is beyond the limit, else its worst one."""
     is_present = alarm.present is alarm.level  # a level that has fallen has a value within the limit
@@ -485,7 +495,7 @@ def hit_of(alarm: Alarm, situation: Situation, **words: str) -> Hit:
         told["known"] = "measured" if value <= each.measured.clearance_m else "estimated"
         told["past"] += f"; {each.measured.words} was measured, {amount(each.counted_m, 'm')} is counted"
         evidence = (
-            Evidence(f"measured clearance {each.joint}", each.measured.clearance_m, each.limit_m, "m"),
+            *known_evidence(f"measured clearance {each.joint}", each.measured, each.limit_m),
             Evidence(f"counted clearance {each.joint}", each.counted_m, each.limit_m, "m"),
         )
     return Hit(

@@ -17,6 +17,7 @@ from leg_wear_monitor.monitor.verdict.situation import (
     Situation,
     at_limit_by_estimate,
     hit_of,
+    known_evidence,
     raised,
 )
 from leg_wear_monitor.monitor.verdict.verdict import EVIDENCE, CauseWords, estimate
@@ -229,7 +230,7 @@ def _seen_hit(each: JointSituation, alarm: Alarm | None, seen: KnownClearance, s
         },
         joint=each.joint,
         since_ns=raised_ns,
-        evidence=(Evidence(f"clearance {each.joint} by {seen.by}", seen.clearance_m, each.limit_m, "m"),),
+        evidence=known_evidence(f"clearance {each.joint} by {seen.by}", seen, each.limit_m),
     )
 
 

@@ -3,6 +3,7 @@
 import shutil
 import sqlite3
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -205,3 +206,23 @@ def test_a_complaint_that_is_no_text_is_one(path, read):
     with pytest.raises(RecordingError, match=r"x\.db3: is not a readable \.db3 file: ") as caught:
         read(path)
     assert str(caught.value).isprintable()
+
+
+@pytest.mark.parametrize(
+    "query", ["SELECT name", "SELECT CASE", "SELECT id, timestamp", "SELECT data"], ids=lambda text: text[7:]
+)
+def test_what_the_system_cannot_read_is_no_damage(path, read, monkeypatch, query):
+    """As of other files: neither is the rest taken for the whole, nor is a fleet told that it is damaged."""
+
+    class OnBadDisk(sqlite3.Connection):
+        def execute(self, text, *values):
+            if text.startswith(query):
+                error = sqlite3.OperationalError("disk I/O error")
+                error.sqlite_errorcode = sqlite3.SQLITE_IOERR_READ
+                raise error
+            return super().execute(text, *values)
+
+    monkeypatch.setattr(sqlite3, "connect", partial(sqlite3.connect, factory=OnBadDisk))
+    with pytest.raises(RecordingError, match=r"x\.db3: cannot be read: disk I/O error$") as caught:
+        read(path)
+    assert caught.value.is_passing

@@ -68,6 +68,10 @@ FILES = [
     ("/gait_publisher: {ros__parameters: {}}", ["nothing for the node /leg_wear_monitor", "/gait_publisher"]),
     ("/**: {ros__parameters: {limits: {9: 1}}}", ["limits", "the key 9", "not a text"]),
     (
+        f"/**: {{ros__parameters: {{limits.clearance_m: 1{400 * '0'}}}}}",
+        ["limits.clearance_m", "is a whole number to ROS, expected 1000", "000.0 [m]"],
+    ),
+    (
         "/**: {ros__parameters: {limits: {warn_fraction: 0.7}, limits.warn_fraction: 0.6}}",
         ["warn_fraction", "twice"],
     ),
@@ -112,6 +116,16 @@ def test_sections_are_for_the_nodes_that_ros_means(pattern, node, taken):
     base = "/**: {ros__parameters: {hardware_id: any}}\n" if pattern != "/**" else ""
     config = read(f"{base}{pattern}: {{ros__parameters: {{hardware_id: mine}}}}", node)
     assert config.hardware_id == ("mine" if taken else "any")
+
+
+def test_sections_that_are_nested_are_read_as_ros_reads_them():
+    nested = "/left: {leg_wear_monitor: {ros__parameters: {hardware_id: mine}}}"
+    assert read(nested, None).hardware_id == "mine"  # the only node of the file
+    both = f"/**: {{ros__parameters: {{hardware_id: any}}}}\n{nested}"
+    assert read(both, "/left/leg_wear_monitor").hardware_id == "mine"
+    assert read(both, "/right/leg_wear_monitor").hardware_id == "any"
+    with pytest.raises(ConfigError, match=r"leg\.yaml: /left/other: 5 is not a mapping with the one key"):
+        read(f"{nested[:-1]}, other: 5}}", None)
 
 
 @pytest.mark.parametrize(

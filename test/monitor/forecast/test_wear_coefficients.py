@@ -147,6 +147,15 @@ def test_a_contradiction_is_said_and_kept_but_does_not_count():
     assert "--accept" in told.words[1] and "--accept" not in " ".join(asked_for.words)
 
 
+def test_an_accepted_measurement_that_no_wear_explains_is_doubted_in_words():
+    """Also where the drive torque shows it: it explains the clearance, not the coefficient."""
+    told = found(worn(5e-11), 0.63, accept=True)
+    assert "that is 6.5e-09 1/Pa, usual are below 1e-09 1/Pa" in told.words[-1]
+    shown = attrs.evolve(told, shown_m=0.6e-3, shown_sigma_m=0.05e-3, shown_by="the drive torque")
+    assert told.words[-1] in shown.told(1e-3, 0.8, [])
+    assert "usual" not in found(worn(1e-6), 0.33, accept=True).words[-1]
+
+
 def test_a_clearance_smaller_than_when_new_contradicts_too():
     told = found(worn(6e-5), 0.2)
     assert told.contradicts

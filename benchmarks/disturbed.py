@@ -211,6 +211,7 @@ def main() -> None:
     parser.add_argument("--cycles", type=int, default=7200)
     options = parser.parse_args()
     references.ROUNDS, identification.UNLIKE_FILE = 0, references.NAMED_TO
+    references.CORRECTED_TO = references.NAMED_TO
     leg = load_mechanism("bionic_leg")
     mass = np.array([MASSES.get(body, 1.0) for body in leg.bodies])
     real = LegParameters(mass, np.ones(len(mass))).applied(leg)

@@ -19,6 +19,7 @@ from leg_wear_monitor.monitor.diagnosis.references import (
     UNLIKE_CYCLES,
     LegModels,
     References,
+    is_narrow,
 )
 from leg_wear_monitor.monitor.diagnosis.state import (
     FIRST_CYCLES,
@@ -272,7 +273,7 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
         return _IRREGULAR
     if not state.is_compared:
         return f"changes at this cadence are not observed yet; at {_cadences(state.set_aside)} they are"
-    if models.is_of_file(state):
+    if models.is_sure(state):
         if state.fit is None or state.commissioned is None or state.fit.explains or state.changes:
             return ""
         return (
@@ -280,6 +281,9 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
             "estimated again when its noise, scale and lost samples are as they were. If the sensor was "
             "changed, reset a joint and undo it: the leg is commissioned again"
         )
+    if state.sensor and is_narrow(state):
+        hz = state.sensor.channel.bandwidth_hz
+        return f"the drive passes {hz:.0f} Hz of the torque: names of joints are not sure, none is corrected"
     known = "the model does not fit this leg, and the names of joints are not sure: "
     if not state.changes:
         known = "the model does not fit this leg, but nothing has changed since it was commissioned: "

@@ -256,7 +256,7 @@ class TorqueObserver(KeepsSamples):
             self._evidence.review(state, self.config)
         if not ended or not self.config.diagnosis.correct or self._references.is_to_identify(state):
             return None
-        return correction_of(state, self._joints) if self.models.is_of_file(state) else None
+        return correction_of(state, self._joints) if self.models.is_sure(state) else None
 
     def corrected(self, correction: Correction, counted_m: Floats) -> None:
         """Compare with the corrected clearances (k,) [m] from now on."""

@@ -56,6 +56,10 @@ _CHANNEL_MISFIT_FACTOR = 2.5
 # of the force leave 1.2 to 1.5. Before, twice the friction in the joints left 1.1, and G was taken for B
 _UNLIKE_ON_GROUND = 2.0
 
+# misfit up to which a clearance is corrected, and harmonics of the gait cycle that the drive has to pass for
+# it: I was taken for J, or J for I, at 0.68 and 0.78, and with 11 and 13 harmonics; with 17 and more none
+CORRECTED_TO, _LEAST_HARMONICS = 0.65, 15.0
+
 _MOST_KEPT = 6  # latest sets of models: of the last cadences, sensors and baselines
 
 
@@ -160,9 +164,12 @@ class LegModels:
 
     def is_of_file(self, state: TorqueState) -> bool:
         """Whether the commissioned leg is that of the mechanism file, or of the identified parameters."""
-        is_loaded = state.reference is not None and state.reference.parameters.load.size > 0
-        is_shape = is_loaded and state.rounds >= ROUNDS
-        return self.misfit(state) < (_UNLIKE_ON_GROUND if is_shape else identification.UNLIKE_FILE)
+        return self.misfit(state) < (_UNLIKE_ON_GROUND if _has_shape(state) else identification.UNLIKE_FILE)
+
+    def is_sure(self, state: TorqueState) -> bool:
+        """Whether a clearance may be corrected: the leg is known, and its drive passes enough."""
+        bound = _UNLIKE_ON_GROUND if _has_shape(state) else CORRECTED_TO
+        return self.misfit(state) < bound and not is_narrow(state)
 
     def _of(self, state: TorqueState) -> _ModelsOfState:
         """Models of a state: kept ones if its reference, sensor and baseline are the same, or new ones."""
@@ -519,3 +526,15 @@ def _abandon(state: TorqueState) -> None:
         state.has_failed = True
     else:
         state.is_identifying, state.parameters, state.rounds = False, state.reference.parameters, ROUNDS
+
+
+def _has_shape(state: TorqueState) -> bool:
+    """Whether what is left over may be the shape of a force under which the leg was identified."""
+    is_loaded = state.reference is not None and state.reference.parameters.load.size > 0
+    return is_loaded and state.rounds >= ROUNDS
+
+
+def is_narrow(state: TorqueState) -> bool:
+    """Whether the drive passes too little of the torque to tell the joints apart surely."""
+    one = state.sensor
+    return one is not None and one.channel.bandwidth_hz * one.cycle_s < _LEAST_HARMONICS

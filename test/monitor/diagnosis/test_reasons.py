@@ -11,7 +11,7 @@ import pytest
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
 from leg_wear_monitor.estimate.ground_load import GroundLoad
-from leg_wear_monitor.estimate.signature import CommissionedTorque, TorqueSensor
+from leg_wear_monitor.estimate.signature import DIRECT, Channel, CommissionedTorque, TorqueSensor
 from leg_wear_monitor.mechanism.person import PHASES
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.inputs import Cadence
@@ -108,7 +108,7 @@ def test_the_next_step_says_what_is_known_then_and_when(step: str) -> None:
 def test_what_is_known_of_a_cadence_without_a_baseline_of_its_own() -> None:
     other = AtCadence(of_reference(), SENSOR, known(), cycles(50))
     now = state(reference=of_reference(75.0), cycles=cycles(30, 75.0), set_aside=(other,))
-    models = SimpleNamespace(is_of_file=lambda _: True)
+    models = SimpleNamespace(is_sure=lambda _: True)
     assert doubt(now, IDLE, models) == "changes at this cadence are not observed yet; at 60 rpm they are"
     assert next_step(now, IDLE, CONFIG).endswith("is complete in 20 gait cycles (16 s)")
 
@@ -123,7 +123,7 @@ def test_what_is_missing_does_not_repeat_the_next_step() -> None:
 
 
 def test_a_ramp_is_recognised_and_a_start_raises_no_doubt() -> None:
-    models = SimpleNamespace(is_of_file=lambda _: True)
+    models = SimpleNamespace(is_sure=lambda _: True)
     ramp = state(reference=of_reference(), cycles=cycles(19), commissioned=known(), waiting=cycles(2, 67.0))
     ramp.unused = RAMP
     assert doubt(ramp, IDLE, models) == (
@@ -135,7 +135,7 @@ def test_a_ramp_is_recognised_and_a_start_raises_no_doubt() -> None:
 
 def test_a_torque_that_no_clearances_explain_is_told_with_what_to_do() -> None:
     """Twice the noise, half the scale or lost samples: nothing was observed, without a reason."""
-    models = SimpleNamespace(is_of_file=lambda _: True)
+    models = SimpleNamespace(is_sure=lambda _: True)
     fits = [ClearanceFit(NEW, np.eye(5), square, 0.0) for square in (1.0, 4.0)]
     known_leg = {"reference": of_reference(), "cycles": cycles(50), "commissioned": known()}
     explained, other = (state(**known_leg, fit=fit) for fit in fits)
@@ -165,7 +165,7 @@ def test_a_healthy_leg_is_told_how_well_it_is_known_and_what_comes_next() -> Non
 def test_a_force_on_the_foot_that_has_two_sizes_is_not_observable() -> None:
     load = GroundLoad(np.zeros((128, 2)), 40.0, 30.0, 0.1, 0.5, 0.0, 1.0, 9.0, other_n=95.0)
     on_ground = SimpleNamespace(**vars(IDLE), is_load_left_out=lambda _: False)
-    models = SimpleNamespace(is_of_file=lambda _: False)
+    models = SimpleNamespace(is_sure=lambda _: False)
     now = state(reference=of_reference(), cycles=cycles(50), commissioned=known(), load=load)
     told = doubt(now, on_ground, models)
     assert told.endswith("not observable: 40 N and 95 N explain its drive torque as well")
@@ -185,6 +185,24 @@ def test_a_leg_on_the_ground_is_identified_before_what_is_left_counts_as_the_sha
     assert not is_of_file(1.2, loaded=True, rounds=0) and not is_of_file(1.2, loaded=True, rounds=ROUNDS - 1)
     assert is_of_file(1.2, loaded=True, rounds=ROUNDS) and not is_of_file(1.2, loaded=False, rounds=ROUNDS)
     assert is_of_file(0.5, loaded=True, rounds=0) and not is_of_file(3.0, loaded=True, rounds=ROUNDS)
+
+
+def test_no_joint_is_corrected_where_the_drive_hides_it_or_the_leg_is_not_known_well() -> None:
+    """Behind a mean over 40 ms, I at 0.45 mm was corrected as J; a mean over 20 ms is 22 Hz."""
+    models = LegModels(load_mechanism("bionic_leg"))
+
+    def told(misfit: float, channel: Channel, cycle_s: float = 1.0) -> tuple[bool, str]:
+        sensor = attrs.evolve(SENSOR, channel=channel, cycle_s=cycle_s)
+        reference = SimpleNamespace(parameters=SimpleNamespace(load=np.zeros((0, 2))))
+        now = state(reference=reference, sensor=sensor, commissioned=known(), cycles=cycles(50))
+        with mock.patch.object(models, "misfit", lambda _: misfit):
+            return models.is_sure(now), doubt(now, IDLE, models)
+
+    hidden = "the drive passes 11 Hz of the torque: names of joints are not sure, none is corrected"
+    assert told(0.4, Channel(mean_s=0.04)) == (False, hidden)
+    assert told(0.4, Channel(mean_s=0.02)) == (True, "") == told(0.4, Channel(mean_s=0.04), cycle_s=2.0)
+    is_sure, reason = told(0.7, DIRECT)
+    assert not is_sure and reason.startswith("the model does not fit this leg")
 
 
 def test_a_leg_is_identified_until_scatter_is_left_and_one_of_an_earlier_run_where_it_is_unlike() -> None:

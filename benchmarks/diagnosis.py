@@ -39,12 +39,7 @@ from leg_wear_monitor.estimate.identification import (
     misfit,
 )
 from leg_wear_monitor.estimate.leg_model import explainer_of
-from leg_wear_monitor.estimate.signature import (
-    CommissionedTorque,
-    TorqueSensor,
-    signatures,
-    with_noise_of,
-)
+from leg_wear_monitor.estimate.signature import CommissionedTorque, TorqueSensor, signatures, with_noise_of
 from leg_wear_monitor.gait.config import PaceConfig
 from leg_wear_monitor.gait.leg import Pace
 from leg_wear_monitor.mechanism.position import TURN, build_linkage

@@ -9,7 +9,8 @@ from leg_wear_monitor.commissioning.detection import Walk
 from leg_wear_monitor.commissioning.result import CommissioningItem
 from leg_wear_monitor.errors import AssemblyError
 from leg_wear_monitor.estimate.body_torques import body_torques
-from leg_wear_monitor.estimate.channel import DriveFigures, channel_of
+from leg_wear_monitor.estimate.channel import channel_of
+from leg_wear_monitor.estimate.drive import DriveFigures
 from leg_wear_monitor.estimate.joint_motion import Pair, is_steady, slow_speed
 from leg_wear_monitor.estimate.least_squares import solved
 from leg_wear_monitor.estimate.leg_model import nuisances

@@ -18,7 +18,7 @@ from leg_wear_monitor.commissioning.evidence import (
 from leg_wear_monitor.commissioning.result import CommissioningItem as Item
 from leg_wear_monitor.commissioning.search import SAME_GEAR, Candidate, Choice, Rival
 from leg_wear_monitor.errors import LegWearError
-from leg_wear_monitor.estimate.channel import DriveFigures
+from leg_wear_monitor.estimate.drive import DriveFigures
 from leg_wear_monitor.estimate.joint_motion import JointMotion
 from leg_wear_monitor.estimate.torque_fit import Fit, Terms, fit, repeating
 from leg_wear_monitor.estimate.torque_model import TorqueModel

@@ -15,68 +15,14 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.estimate.cause import Cause
+from leg_wear_monitor.estimate.drive import DIRECT, UNDECLARED, Channel, DriveFigures
 from leg_wear_monitor.estimate.explanations import Nuisance
 from leg_wear_monitor.estimate.least_squares import Point, gauss_newton
-from leg_wear_monitor.estimate.signature import (
-    DIRECT,
-    Channel,
-    TorqueSensor,
-    simulated_signatures,
-    with_noise_of,
-)
+from leg_wear_monitor.estimate.signature import TorqueSensor, simulated_signatures, with_noise_of
 from leg_wear_monitor.estimate.torque_model import PHASE_ERROR_RAD
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.twin.torque_reference import TorqueReference
-
-# What is declared of a drive, before anything was measured: prior knowledge of an estimate.
-
-
-@attrs.frozen(kw_only=True)
-class DriveFigures:
-    """Declared figures of a drive, at the crank's shaft; NaN where nothing is declared.
-
-    A motor's or a gear's own figures are converted to the crank before: the torque by its turns per turn of
-    the crank, friction by speed and stiffness by their square.
-
-    Attributes
-    ----------
-    lag_s : float
-        Time by which the measured torque is late.
-    bandwidth_hz : float
-        Corner frequency of a first-order low-pass between the torque on the crank and the measured one.
-    load_friction : float
-        Fraction eta of the friction eta |torque| sign(speed).
-    coulomb_nm : float
-        Constant friction.
-    viscous_nms : float
-        Friction by speed [N m s/rad].
-    stiffness_nm_per_rad : float
-        Stiffness between the measured angle and the crank.
-    """
-
-    lag_s: float = math.nan
-    bandwidth_hz: float = math.nan
-    load_friction: float = math.nan
-    coulomb_nm: float = math.nan
-    viscous_nms: float = math.nan
-    stiffness_nm_per_rad: float = math.nan
-
-    @property
-    def declared(self) -> dict[str, float]:
-        """The figures that are declared, by name."""
-        return {name: value for name, value in attrs.asdict(self).items() if not math.isnan(value)}
-
-    @property
-    def lateness_s(self) -> float:
-        """Declared time by which slow changes of the torque are late: by the lag and by the low-pass."""
-        parts = (self.lag_s, 1.0 / (2.0 * math.pi * self.bandwidth_hz))
-        return sum(one for one in parts if not math.isnan(one))
-
-
-UNDECLARED = DriveFigures()
-"""Nothing is known."""
-
 
 # tried delays, from an offset of 0.13 rad at 60 rpm to a lag of 40 ms, and low-passes of 100 to 10 Hz
 _DELAYS_S = 0.005 * np.arange(-4, 9)
@@ -301,7 +247,8 @@ def _best_channel(
         Of the low-passes to try; without 0, a low-pass is declared.
     """
 
-    def fit_of(channel: Channel) -> ChannelFit:
+    def fit_of(near: Channel) -> ChannelFit:
+        channel = attrs.evolve(near, load_friction=0.0)  # which is fitted anew
         rubbing = attrs.evolve(channel, load_friction=_FRICTION_STEP)
         friction_change = (residual(channel) - residual(rubbing)) / _FRICTION_STEP
         return hypothesis.fit(channel, residual(channel), friction_change, clearances(channel))

@@ -20,7 +20,7 @@ import numpy as np
 
 from leg_wear_monitor.dynamics.clearance.tables import POINTS
 from leg_wear_monitor.estimate.cause import Cause
-from leg_wear_monitor.estimate.channel import UNDECLARED, DriveFigures
+from leg_wear_monitor.estimate.drive import UNDECLARED, DriveFigures
 from leg_wear_monitor.estimate.explanations import Nuisance
 from leg_wear_monitor.estimate.least_squares import Point, gauss_newton
 from leg_wear_monitor.estimate.signature import TorqueSensor, signature_of_torque

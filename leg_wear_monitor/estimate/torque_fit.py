@@ -7,9 +7,9 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from leg_wear_monitor.estimate.drive import Channel
 from leg_wear_monitor.estimate.joint_motion import Pair
 from leg_wear_monitor.estimate.least_squares import Point, gauss_newton, jackknife, solved
-from leg_wear_monitor.estimate.signature import Channel
 from leg_wear_monitor.estimate.torque_model import ModelError, TorqueModel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN

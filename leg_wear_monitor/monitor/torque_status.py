@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from leg_wear_monitor.estimate.cause import TorqueExplanation
-from leg_wear_monitor.estimate.signature import DIRECT
+from leg_wear_monitor.estimate.drive import DIRECT
 from leg_wear_monitor.files import or_nan
 from leg_wear_monitor.monitor import alarm_specs
 from leg_wear_monitor.monitor.alarms import CAUSES_OF_ALARMS, DIAGNOSIS, worst_code

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import Mechanism
+from leg_wear_monitor.estimate.drive import Channel
 from leg_wear_monitor.estimate.joint_motion import Pair
-from leg_wear_monitor.estimate.signature import Channel
 from leg_wear_monitor.estimate.torque_fit import Fit, Start, Terms, fit
 from leg_wear_monitor.estimate.torque_model import TorqueModel, with_clearances
 from leg_wear_monitor.mechanism.arrays import Floats

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from leg_wear_monitor.estimate.channel import DriveFigures, channel_of
+from leg_wear_monitor.estimate.channel import channel_of
+from leg_wear_monitor.estimate.drive import DIRECT, Channel, DriveFigures
 from leg_wear_monitor.estimate.leg_model import nuisances
-from leg_wear_monitor.estimate.signature import DIRECT, Channel, TorqueSensor, simulated_signatures
+from leg_wear_monitor.estimate.signature import TorqueSensor, simulated_signatures
 from leg_wear_monitor.mechanism.position import TURN, build_linkage
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.twin.load import torque_size

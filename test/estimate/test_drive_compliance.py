@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.estimate.coupling import compliance_of, leg_behind_coupling
-from leg_wear_monitor.estimate.signature import Channel, TorqueSensor, simulated_signatures
+from leg_wear_monitor.estimate.drive import Channel
+from leg_wear_monitor.estimate.signature import TorqueSensor, simulated_signatures
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.twin.reference import CrankProfile, LegParameters, LegSimulation

@@ -5,15 +5,10 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.estimate import ground_load as fits
+from leg_wear_monitor.estimate.drive import DIRECT, Channel
 from leg_wear_monitor.estimate.ground_load import ground_load
 from leg_wear_monitor.estimate.leg_model import nuisances
-from leg_wear_monitor.estimate.signature import (
-    DIRECT,
-    Channel,
-    TorqueSensor,
-    signature_model,
-    simulated_signatures,
-)
+from leg_wear_monitor.estimate.signature import TorqueSensor, signature_model, simulated_signatures
 from leg_wear_monitor.mechanism.person import PHASES, nominal_stance
 from leg_wear_monitor.mechanism.position import TURN, build_linkage
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references

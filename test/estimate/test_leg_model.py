@@ -7,10 +7,9 @@ import pytest
 from leg_wear_monitor.estimate.body_torques import body_torques
 from leg_wear_monitor.estimate.cause import Cause
 from leg_wear_monitor.estimate.change_detector import ChangeDetector
+from leg_wear_monitor.estimate.drive import DIRECT, Channel
 from leg_wear_monitor.estimate.leg_model import explainer_of
 from leg_wear_monitor.estimate.signature import (
-    DIRECT,
-    Channel,
     CommissionedTorque,
     SimulatedSensor,
     TorqueSensor,

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from leg_wear_monitor.estimate.drive import Channel
 from leg_wear_monitor.estimate.signature import (
-    Channel,
     PhaseMeans,
     SimulatedSensor,
     TorqueSensor,

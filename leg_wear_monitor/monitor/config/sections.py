@@ -4,7 +4,7 @@ import attrs
 
 from leg_wear_monitor.configuration import described, quantity
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.estimate.channel import DriveFigures
+from leg_wear_monitor.estimate.drive import DriveFigures
 from leg_wear_monitor.mechanism.sourced import LIBRARY, Drive, load_drive
 
 # What is declared of the drive: a file by name, and numbers that override it.

@@ -9,8 +9,9 @@ import numpy as np
 from leg_wear_monitor.estimate.cause import SURE_LOG_ODDS, SURE_SIGMAS, Cause, Change
 from leg_wear_monitor.estimate.change_detector import first_changed
 from leg_wear_monitor.estimate.clearance_fit import best_fit, start_of, starts_of, with_rivals
+from leg_wear_monitor.estimate.drive import DIRECT
 from leg_wear_monitor.estimate.explanations import Explanation, change_of
-from leg_wear_monitor.estimate.signature import DIRECT, CommissionedTorque, TorqueSensor, with_noise_of
+from leg_wear_monitor.estimate.signature import CommissionedTorque, TorqueSensor, with_noise_of
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -19,7 +20,6 @@ from leg_wear_monitor.monitor.diagnosis.references import (
     UNLIKE_CYCLES,
     LegModels,
     References,
-    is_narrow,
 )
 from leg_wear_monitor.monitor.diagnosis.state import (
     FIRST_CYCLES,
@@ -281,7 +281,7 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
             "estimated again when its noise, scale and lost samples are as they were. If the sensor was "
             "changed, reset a joint and undo it: the leg is commissioned again"
         )
-    if state.sensor and is_narrow(state):
+    if state.sensor and state.is_narrow:
         hz = state.sensor.channel.bandwidth_hz
         return f"the drive passes {hz:.0f} Hz of the torque: names of joints are not sure, none is corrected"
     known = "the model does not fit this leg, and the names of joints are not sure: "

@@ -14,8 +14,9 @@ import numpy as np
 from leg_wear_monitor.estimate.cause import Cause, Change
 from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
 from leg_wear_monitor.estimate.coupling import compliance_of
+from leg_wear_monitor.estimate.drive import DIRECT
 from leg_wear_monitor.estimate.ground_load import stance_phases
-from leg_wear_monitor.estimate.signature import DIRECT, CommissionedTorque
+from leg_wear_monitor.estimate.signature import CommissionedTorque
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.person import upwards
 from leg_wear_monitor.mechanism.spec import Mechanism

@@ -14,8 +14,9 @@ import numpy as np
 from leg_wear_monitor.estimate import identification, signature
 from leg_wear_monitor.estimate.body_torques import body_torques
 from leg_wear_monitor.estimate.change_detector import ChangeDetector
-from leg_wear_monitor.estimate.channel import UNDECLARED, DriveFigures, with_channel_of
+from leg_wear_monitor.estimate.channel import with_channel_of
 from leg_wear_monitor.estimate.coupling import leg_behind_coupling
+from leg_wear_monitor.estimate.drive import DIRECT, UNDECLARED, DriveFigures
 from leg_wear_monitor.estimate.explanations import Explainer
 from leg_wear_monitor.estimate.ground_load import GroundLoad, ground_load
 from leg_wear_monitor.estimate.identification import misfit
@@ -51,14 +52,12 @@ NAMED_TO = 5.0
 # N of load).
 _CHANNEL_MISFIT_FACTOR = 2.5
 
-
 # misfit up to which a leg on the ground counts as that of its reference once it was identified: other shapes
 # of the force leave 1.2 to 1.5. Before, twice the friction in the joints left 1.1, and G was taken for B
 _UNLIKE_ON_GROUND = 2.0
 
-# misfit up to which a clearance is corrected, and harmonics of the gait cycle that the drive has to pass for
-# it: I was taken for J, or J for I, at 0.68 and 0.78, and with 11 and 13 harmonics; with 17 and more none
-CORRECTED_TO, _LEAST_HARMONICS = 0.65, 15.0
+# misfit up to which a clearance is corrected: I was taken for J at 0.68, and J for I at 0.78
+CORRECTED_TO = 0.65
 
 _MOST_KEPT = 6  # latest sets of models: of the last cadences, sensors and baselines
 
@@ -137,9 +136,9 @@ class LegModels:
         Other lengths than expected move the impacts, as a delay does. A channel that explains the impacts of
         such a leg fits the mean torque much worse: it is refused, and the leg is to be identified.
         """
-        columns = nuisances(self._mechanism, reference, attrs.evolve(sensor, channel=signature.DIRECT))
+        columns = nuisances(self._mechanism, reference, attrs.evolve(sensor, channel=DIRECT))
         found = with_channel_of(reference, sensor, known.mean, columns, self._figures)
-        plain = signature.with_noise_of(reference, attrs.evolve(sensor, channel=signature.DIRECT), known.mean)
+        plain = signature.with_noise_of(reference, attrs.evolve(sensor, channel=DIRECT), known.mean)
         if found == plain:
             return plain
         leg, model = self._mechanism, signature.signature_model
@@ -168,8 +167,8 @@ class LegModels:
 
     def is_sure(self, state: TorqueState) -> bool:
         """Whether a clearance may be corrected: the leg is known, and its drive passes enough."""
-        bound = _UNLIKE_ON_GROUND if _has_shape(state) else CORRECTED_TO
-        return self.misfit(state) < bound and not is_narrow(state)
+        is_known = self.is_of_file(state) and (_has_shape(state) or self.misfit(state) < CORRECTED_TO)
+        return is_known and not state.is_narrow
 
     def _of(self, state: TorqueState) -> _ModelsOfState:
         """Models of a state: kept ones if its reference, sensor and baseline are the same, or new ones."""
@@ -532,9 +531,3 @@ def _has_shape(state: TorqueState) -> bool:
     """Whether what is left over may be the shape of a force under which the leg was identified."""
     is_loaded = state.reference is not None and state.reference.parameters.load.size > 0
     return is_loaded and state.rounds >= ROUNDS
-
-
-def is_narrow(state: TorqueState) -> bool:
-    """Whether the drive passes too little of the torque to tell the joints apart surely."""
-    one = state.sensor
-    return one is not None and one.channel.bandwidth_hz * one.cycle_s < _LEAST_HARMONICS

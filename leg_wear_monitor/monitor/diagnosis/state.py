@@ -11,15 +11,9 @@ import numpy as np
 from leg_wear_monitor.estimate.cause import Change
 from leg_wear_monitor.estimate.change_detector import DetectorState
 from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
+from leg_wear_monitor.estimate.drive import DIRECT, Channel
 from leg_wear_monitor.estimate.ground_load import GroundLoad
-from leg_wear_monitor.estimate.signature import (
-    DIRECT,
-    Channel,
-    CommissionedTorque,
-    TorqueSensor,
-    averaged,
-    signatures,
-)
+from leg_wear_monitor.estimate.signature import CommissionedTorque, TorqueSensor, averaged, signatures
 from leg_wear_monitor.files import finite_or_none
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.position import TURN
@@ -260,6 +254,9 @@ class Diagnosis(Shown):
 
 WINDOW_CYCLES = 60  # that are kept at a cadence, and that clearances are estimated from
 LAST_CYCLES = 10  # whose mean temperature is that of the drive now
+_LEAST_HARMONICS = (
+    15.0  # of a gait cycle: where a drive passed 11 and 13, I was taken for J; 17 and more: none
+)
 FIRST_CYCLES = 5  # gait cycles before the first reference is chosen
 UNUSABLE_CYCLES = 3  # in a row: a start has two that are unlike
 UNUSED_CYCLES = 20  # in a row, after which a result is not one of the leg as it walks now
@@ -418,6 +415,12 @@ class TorqueState:
     def temperature_c(self) -> float:
         """Mean temperature of the drive in the last gait cycles; NaN where it is not measured."""
         return temperature_of((self.cycles or self.waiting)[-LAST_CYCLES:])
+
+    @property
+    def is_narrow(self) -> bool:
+        """Whether the drive passes too little of the torque to tell the joints apart surely."""
+        one = self.sensor
+        return one is not None and one.channel.bandwidth_hz * one.cycle_s < _LEAST_HARMONICS
 
     @property
     def is_compared(self) -> bool:

@@ -8,7 +8,8 @@ from typing import Any, TypeVar
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate.signature import Channel, CommissionedTorque
+from leg_wear_monitor.estimate.drive import Channel
+from leg_wear_monitor.estimate.signature import CommissionedTorque
 from leg_wear_monitor.files import finite_or_none, or_nan
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.monitor.alarms import Alarm
@@ -395,8 +396,7 @@ def read_commissioned_torques(db: sqlite3.Connection) -> list[CommissionedTorque
     ):
         stamp_ns, cycles, speed, *drive = row[:8]
         clearance_m, signatures, sigma_m = map(_floats, row[8:11])
-        names = "delay_s", "time_constant_s", "load_friction", "second_order", "mean_s"
-        channel = Channel(**dict(zip(names, drive, strict=True)))
+        channel = Channel(**dict(zip(attrs.fields_dict(Channel), drive, strict=True)))
         one = CommissionedTorque(
             stamp_ns, clearance_m, signatures.reshape(cycles, -1), sigma_m, channel, speed,
             or_nan(row[11]), or_nan(row[12]), row[13], bool(row[14]),

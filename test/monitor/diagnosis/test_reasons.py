@@ -10,8 +10,9 @@ import pytest
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
+from leg_wear_monitor.estimate.drive import DIRECT, Channel
 from leg_wear_monitor.estimate.ground_load import GroundLoad
-from leg_wear_monitor.estimate.signature import DIRECT, Channel, CommissionedTorque, TorqueSensor
+from leg_wear_monitor.estimate.signature import CommissionedTorque, TorqueSensor
 from leg_wear_monitor.mechanism.person import PHASES
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.inputs import Cadence

@@ -1,0 +1,136 @@
+"""A drive and its sensor: what they make of the leg's torque, and what is declared of them."""
+
+import math
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.mechanism.arrays import Complex, Floats
+from leg_wear_monitor.mechanism.position import TURN
+
+_HALF_POWER = 0.442946  # x at which (sin(pi x) / (pi x))² is 1/2
+
+
+@attrs.frozen(kw_only=True)
+class Channel:
+    """What a drive makes of the leg's torque before it is sampled.
+
+    Attributes
+    ----------
+    delay_s : float
+        Time by which samples are late for their crank angle: a lag, less an offset of the crank over its
+        speed.
+    time_constant_s : float
+        T of the low-pass 1 / (1 + T s + c T² s²): the time by which it delays slow changes; 0 without one.
+    load_friction : float
+        Friction of the drive over the size of the torque that it transmits.
+    second_order : float
+        c: 0 for a low-pass of first order, 1/4 for two equal ones in a row, 1/2 for Butterworth's.
+    mean_s : float
+        Time over which a drive averages, in place of a low-pass; 0 if it does not.
+    """
+
+    delay_s: float = 0.0
+    time_constant_s: float = 0.0
+    load_friction: float = 0.0
+    second_order: float = 0.0
+    mean_s: float = 0.0
+
+    @property
+    def low_pass_s(self) -> float:
+        """Time by which slow changes of the torque are late by the low-pass, or by the averaging."""
+        return self.time_constant_s + 0.5 * self.mean_s
+
+    @property
+    def lateness_s(self) -> float:
+        """Time by which slow changes of the torque are late: by the delay and by the low-pass."""
+        return self.delay_s + self.low_pass_s
+
+    @property
+    def bandwidth_hz(self) -> float:
+        """Frequency at which half of the power passes; infinite without low-pass and averaging."""
+        if self.low_pass_s == 0.0:
+            return math.inf
+        if self.mean_s:
+            return _HALF_POWER / self.mean_s
+        c = self.second_order  # |response|⁻² = (1 - c x)² + x = 2, at x = (omega T)²
+        x = 2.0 / (1.0 - 2.0 * c + math.hypot(1.0 - 2.0 * c, 2.0 * c))
+        return math.sqrt(x) / (TURN * self.time_constant_s)
+
+    def received(self, torque: Floats, step_s: float, direction: float) -> Floats:
+        """Torques (..., n) in equal steps of time [s] behind the drive; taken as periodic.
+
+        Parameters
+        ----------
+        torque : (..., n) array
+            Of the leg [N m].
+        step_s : float
+        direction : float
+            Sign of the crank's speed: friction takes power in both directions of the power.
+        """
+        if self.load_friction:
+            torque = torque + direction * self.load_friction * np.abs(torque)
+        if self.delay_s == 0.0 and self.low_pass_s == 0.0:
+            return torque
+        points = torque.shape[-1]
+        response = self.response(np.asarray(TURN * np.fft.rfftfreq(points, step_s), np.float64))
+        return np.asarray(np.fft.irfft(np.fft.rfft(torque) * response, points))
+
+    def response(self, omega: Floats) -> Complex:
+        """Frequency response (n,) of delay, low-pass and averaging at angular frequencies (n,) [rad/s]."""
+        s, half = 1j * omega * self.time_constant_s, 0.5 * omega * self.mean_s
+        late = np.exp(-1j * (omega * self.delay_s + half)) * np.sinc(half / math.pi)
+        return np.asarray(late / (1.0 + s + self.second_order * s**2))
+
+
+DIRECT = Channel()
+"""A drive that adds nothing."""
+
+
+# What is declared of a drive, before anything was measured: prior knowledge of an estimate.
+
+
+@attrs.frozen(kw_only=True)
+class DriveFigures:
+    """Declared figures of a drive, at the crank's shaft; NaN where nothing is declared.
+
+    A motor's or a gear's own figures are converted to the crank before: the torque by its turns per turn of
+    the crank, friction by speed and stiffness by their square.
+
+    Attributes
+    ----------
+    lag_s : float
+        Time by which the measured torque is late.
+    bandwidth_hz : float
+        Corner frequency of a first-order low-pass between the torque on the crank and the measured one.
+    load_friction : float
+        Fraction eta of the friction eta |torque| sign(speed).
+    coulomb_nm : float
+        Constant friction.
+    viscous_nms : float
+        Friction by speed [N m s/rad].
+    stiffness_nm_per_rad : float
+        Stiffness between the measured angle and the crank.
+    """
+
+    lag_s: float = math.nan
+    bandwidth_hz: float = math.nan
+    load_friction: float = math.nan
+    coulomb_nm: float = math.nan
+    viscous_nms: float = math.nan
+    stiffness_nm_per_rad: float = math.nan
+
+    @property
+    def declared(self) -> dict[str, float]:
+        """The figures that are declared, by name."""
+        return {name: value for name, value in attrs.asdict(self).items() if not math.isnan(value)}
+
+    @property
+    def lateness_s(self) -> float:
+        """Declared time by which slow changes of the torque are late: by the lag and by the low-pass."""
+        parts = (self.lag_s, 1.0 / (2.0 * math.pi * self.bandwidth_hz))
+        return sum(one for one in parts if not math.isnan(one))
+
+
+UNDECLARED = DriveFigures()
+"""Nothing is known."""

@@ -220,6 +220,7 @@ def with_clearance_joints(leg: "Mechanism", names: str | None) -> "Mechanism":
 def need_rclpy() -> None:
     """Raise LegWearError where ROS is not installed, or not found."""
     try:
+        import_module("rclpy")
         import_module("rclpy.node")  # of an incomplete installation, `rclpy` alone can be imported
     except ImportError as error:
         raise LegWearError(

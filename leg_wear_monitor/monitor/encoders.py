@@ -323,6 +323,10 @@ class EncoderObserver(KeepsSamples):
         """Never wait for what is simulated."""
         self._reference.may_be_late = True
 
+    def leave(self) -> None:
+        """Leave what is simulated ahead: the process is about to end."""
+        self._reference.leave()
+
     def ended(self, statistics: CycleStatistics) -> None:
         """Queue an ended gait cycle for evaluation, if the leg walked steadily at the commanded cadence."""
         if statistics.is_steady and self.config.cadence.allows(statistics.cadence_rpm):

@@ -294,6 +294,12 @@ class Parts:
             if each and kept is not None:
                 each.restore(kept)
 
+    def leave(self) -> None:
+        """Leave what is simulated ahead: the process is about to end."""
+        for each in (self.encoders, self.torque):
+            if each:
+                each.leave()
+
     def keep(self, closed: bool = False) -> bool:
         """Write an entry into the ledger; return whether it is on the disk.
 

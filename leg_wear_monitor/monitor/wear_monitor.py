@@ -530,7 +530,7 @@ class WearMonitor:
             raise LegWearError(ledger.fault or "the ledger is written at the end of the recording")
 
     def close(self) -> None:
-        """Write the last entry and close the ledger.
+        """Write the last entry, close the ledger, and leave what is simulated ahead.
 
         Raises
         ------
@@ -538,6 +538,12 @@ class WearMonitor:
             If the last entry could not be written. Of a ledger that is written only at the end, nothing is
             stored then.
         """
+        try:
+            self._close_ledger()
+        finally:
+            self._parts.leave()
+
+    def _close_ledger(self) -> None:
         ledger = self._accounting.ledger
         if ledger is None:
             return

@@ -105,7 +105,7 @@ def until_down(context: Context) -> Iterator[None]:
             raise
 
 
-_MMAP_THRESHOLD, _LARGE_BYTES = -3, 2**20  # M_MMAP_THRESHOLD of glibc's malloc.h
+_MMAP_THRESHOLD, _LARGE_BYTES = -3, 2**18  # M_MMAP_THRESHOLD of glibc's malloc.h
 
 
 def release_large_arrays() -> None:

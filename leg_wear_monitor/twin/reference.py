@@ -3,7 +3,7 @@
 References are made of them: what the sensors of a leg with given clearances show.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import attrs
@@ -21,6 +21,7 @@ from leg_wear_monitor.dynamics.clearance.stepper import (
     put_force,
 )
 from leg_wear_monitor.dynamics.clearance.tables import POINTS as TABLE_POINTS
+from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables
 from leg_wear_monitor.dynamics.run import DONE, TORQUE, CrankMotion, Setup, new_run_statistics, quintic
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.arrays import Floats
@@ -335,6 +336,7 @@ class LegSimulation:
     def __init__(self, mechanism: Mechanism) -> None:
         self._mechanism = mechanism
         self._parameters: LegParameters | None = None
+        self._tables: ClearanceTables | None = None
         self._loaded: LoadedTables | None = None
 
     def simulate(
@@ -345,6 +347,7 @@ class LegSimulation:
         depth: Floats,
         settling: int,
         cycles: int,
+        wanted: Callable[[], bool] = lambda: True,
     ) -> SimulatedLeg | None:
         """Simulate a leg from the start.
 
@@ -359,11 +362,13 @@ class LegSimulation:
         settling : int
             Gait cycles before those that count.
         cycles : int
+        wanted : callable
+            Whether to go on, asked after each gait cycle; may be called in any thread.
 
         Returns
         -------
         SimulatedLeg or None
-            None if it cannot be simulated.
+            None if it cannot be simulated, or is not wanted any more.
 
         Raises
         ------
@@ -386,22 +391,22 @@ class LegSimulation:
         polynomial, torque = np.empty(7), np.empty((settling + cycles, POINTS))
         eccentricity = np.zeros((POINTS, len(stepper.state.e)))
         address = stepper.advance_address(polynomial, statistics)
-        for first, last in self._steps_alike(parameters.load, len(torque)):
+        for cycle in self._each_under_its_load(parameters.load, len(torque)):
             status = simulate_cycles(
                 address, stepper.model, self._setup.surfaces.feeds_back, stepper.state, pieces, period, turn,
-                first, settling, statistics, stepper.work, polynomial, torque[first:last], eccentricity,
+                cycle, settling, statistics, stepper.work, polynomial, torque[cycle, None], eccentricity,
             )  # fmt: skip
-            if status != DONE:
+            if status != DONE or not wanted():
                 return None
         return SimulatedLeg(torque[settling:], eccentricity.reshape(POINTS, -1, 2) / cycles)
 
-    def _steps_alike(self, load: Floats, cycles: int) -> Iterator[tuple[int, int]]:
-        """Gait cycles, from the first to before the last, under the same load, which acts on the leg.
+    def _each_under_its_load(self, load: Floats, cycles: int) -> Iterator[int]:
+        """Number of each gait cycle, whose load, if there is one, acts on the leg then.
 
         A force that were the same in each step would let impacts fall at the same phases.
         """
         if self._loaded is None:
-            yield 0, cycles
+            yield from range(cycles)
             return
         random, place = np.random.default_rng(_SEED), np.arange(len(load)) / len(load)
         phase = np.arange(TABLE_POINTS) / TABLE_POINTS
@@ -409,15 +414,15 @@ class LegSimulation:
             factor, late = 1.0 + _SIZE * random.standard_normal(), _TIMING * random.standard_normal()
             force = [factor * np.interp(phase - late, place, one, period=1.0) for one in load.T]
             put_force(self._loaded, np.stack(force, axis=1))
-            yield cycle, cycle + 1
+            yield cycle
 
     def _prepare(self, parameters: LegParameters) -> None:
         """Prepare the simulation of legs with given masses, lengths and friction."""
+        self._parameters = self._loaded = self._tables = None  # 18 MB, while what follows needs 50
         self._setup = prepare(parameters.in_air.applied(self._mechanism), wear=True)
         self._setup.contacts.wear_coefficient[:] = 0.0
         self._fresh = self._setup.contacts.clearance.copy()
         self._tables = ClearanceStepper(self._setup).model.tables
-        self._loaded = None
         if parameters.load.size:
             self._loaded = loaded_tables(self._setup.linkage, self._setup.contacts, self._tables)
         self._parameters = parameters

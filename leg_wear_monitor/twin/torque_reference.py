@@ -143,6 +143,7 @@ class ReferenceRun(Generic[FoundT]):
         self._urgent = ThreadPoolExecutor(self._threads, "reference-urgent")
         self._ahead: list[Future[NDArray[Any] | None]] = []
         self._hurried: list[Future[NDArray[Any] | None]] = []
+        self._wanted = object()  # another one as soon as nobody waits for what the threads simulate
         self._of_thread = threading.local()
 
     def _so_far(self) -> FoundT:
@@ -224,10 +225,18 @@ class ReferenceRun(Generic[FoundT]):
         self._begin(snapshot.legs, snapshot.depth, snapshot.profile)
         self._done, self._periods = snapshot.done, snapshot.periods
 
-    def _begin(self, legs: Sequence[Leg], depth: Floats, profile: CrankProfile) -> None:
+    def leave(self) -> None:
+        """Let the threads leave what they simulate ahead, for which a program's end would wait.
+
+        A call that follows has it simulated again.
+        """
         for one in self._ahead:
             one.cancel()
-        self._ahead, self._hurried, self._periods = [], [], 0
+        self._ahead, self._hurried, self._wanted = [], [], object()
+
+    def _begin(self, legs: Sequence[Leg], depth: Floats, profile: CrankProfile) -> None:
+        self.leave()
+        self._periods = 0
         self._legs, self._depth, self._done, self._profile = tuple(legs), depth.copy(), (), profile
 
     @property
@@ -257,8 +266,12 @@ class ReferenceRun(Generic[FoundT]):
             self._catch_up()
         first = len(self._done) + len(self._ahead)
         for leg in self._legs[first : min(self._due, simulated) + 2 * self._threads]:
-            arguments = self._profile, leg, self._depth, self._cycles_of(leg)
-            self._ahead.append(self._pool.submit(self._simulated, *arguments))
+            self._ahead.append(self._submitted(self._pool, leg))
+
+    def _submitted(self, pool: ThreadPoolExecutor, leg: Leg) -> "Future[NDArray[Any] | None]":
+        """A leg that a thread of a pool simulates."""
+        cycles = self._cycles_of(leg)
+        return pool.submit(self._simulated, self._wanted, self._profile, leg, self._depth, cycles)
 
     def _catch_up(self) -> None:
         """Let threads of the program's own priority simulate the next legs, where the others are behind.
@@ -269,25 +282,26 @@ class ReferenceRun(Generic[FoundT]):
         self._hurried = [one for one in self._hurried if not one.done()]
         late = [i for i, one in enumerate(self._ahead) if not (one.done() or one in self._hurried)]
         for i in late[: self._threads - len(self._hurried)]:
-            leg = self._legs[len(self._done) + i]
-            arguments = self._profile, leg, self._depth, self._cycles_of(leg)
             self._ahead[i].cancel()
-            self._ahead[i] = self._urgent.submit(self._simulated, *arguments)
+            self._ahead[i] = self._submitted(self._urgent, self._legs[len(self._done) + i])
             self._hurried.append(self._ahead[i])
 
     def _cost(self, legs: Sequence[Leg]) -> int:
         """Gait cycles that are simulated for some legs, with those in which they settle."""
         return sum(_SETTLING + self._cycles_of(leg) for leg in legs)
 
-    def _simulated(self, profile: CrankProfile, leg: Leg, depth: Floats, cycles: int) -> NDArray[Any] | None:
-        """What is kept of a leg; None if it cannot be simulated."""
+    def _simulated(
+        self, wanted: object, profile: CrankProfile, leg: Leg, depth: Floats, cycles: int
+    ) -> NDArray[Any] | None:
+        """What is kept of a leg; None if it cannot be simulated, or is not wanted any more."""
         own = self._of_thread
         if not hasattr(own, "simulation"):
             own.simulation = LegSimulation(self._mechanism)
         try:
             found = own.simulation.simulate(
-                profile, leg.parameters, leg.clearance_m, depth, _SETTLING, cycles
-            )
+                profile, leg.parameters, leg.clearance_m, depth, _SETTLING, cycles,
+                lambda: self._wanted is wanted,
+            )  # fmt: skip
         except AssemblyError:  # with such lengths it does not close
             return None
         return None if found is None else self._kept(found)

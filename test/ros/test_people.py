@@ -1,6 +1,8 @@
 """What people ask of a running monitor: alarms acknowledged, parts replaced."""
 
+import sys
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -11,6 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from made_node import made_node
 from std_srvs.srv import Trigger
 
+from leg_wear_monitor.cli import common
 from leg_wear_monitor.cli.main import cli
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.ros.monitor_node import CONFIRM_S, Confirmation
@@ -86,7 +89,25 @@ def test_a_reset_by_command_stops_at_its_success(shared_stage, monitor, monkeypa
     done = CliRunner().invoke(cli, ["reset", "B", "--node", ME])
     assert (done.exit_code, done.stderr) == (0, "")
     assert done.stdout.startswith("joint B: new surfaces")
+    assert CliRunner().invoke(cli, ["acknowledge", "--node", ME]).exit_code == 0
     assert "not reset yet" in trigger(shared_stage, "reset_wear/B").message
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("verb", [["acknowledge"], ["reset", "B"], ["reset", "B", "--undo"]])
+def test_what_a_node_did_not_store_is_a_finding(verb, monkeypatch) -> None:
+    reply = "cleared: none; still present: none; it is not stored: no ledger is kept; set ledger.path"
+    monkeypatch.setattr(common, "trigger", lambda *_: reply)
+    done = CliRunner().invoke(cli, [*verb, "--node", ME])
+    assert (done.exit_code, done.stdout) == (1, f"{reply}\n")
+
+
+@pytest.mark.plain
+def test_an_incomplete_rclpy_is_told_in_one_line(monkeypatch) -> None:
+    monkeypatch.delitem(sys.modules, "rclpy.node")
+    monkeypatch.setitem(sys.modules, "rclpy", ModuleType("rclpy"))
+    with pytest.raises(LegWearError, match=r"rclpy: No module named 'rclpy\.node'"):
+        common.need_rclpy()
 
 
 @pytest.mark.plain

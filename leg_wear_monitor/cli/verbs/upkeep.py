@@ -142,6 +142,15 @@ def _date(stamp_ns: int) -> str:
     return datetime.fromtimestamp(1.0e-9 * stamp_ns, UTC).strftime("%Y-%m-%d %H:%M")
 
 
+def _triggered(node: str, service: str, wait_s: float, times: int = 1) -> int:
+    """Have a running monitor do it, print its reply, and return the exit code."""
+    from leg_wear_monitor.monitor.forecast.measurement import NOT_STORED
+
+    told = common.trigger(node, service, wait_s, times)
+    click.echo(told)
+    return common.WITH_FINDINGS if NOT_STORED in told else 0
+
+
 # ``leg-wear-monitor acknowledge``: alarms that an operator has seen to.
 
 
@@ -161,8 +170,7 @@ def acknowledge(
     """
     if node is not None:
         common.check_alone(config=config, ledger=ledger, dry_run=dry_run)
-        click.echo(common.trigger(node, "acknowledge_alarms", wait_s))
-        return 0
+        return _triggered(node, "acknowledge_alarms", wait_s)
     from leg_wear_monitor.monitor.operators import acknowledge_in
 
     with opened(config, ledger, dry_run) as (kept, leg, settings):
@@ -201,8 +209,7 @@ def reset(
     if node is not None:
         common.check_alone(config=config, ledger=ledger, dry_run=dry_run)
         service = f"{'undo_reset' if undo else 'reset_wear'}/{joint}"
-        click.echo(common.trigger(node, service, wait_s, times=1 if undo else 2))  # a reset is confirmed
-        return 0
+        return _triggered(node, service, wait_s, times=1 if undo else 2)  # a reset is confirmed
     _reset_in(joint, config, ledger, undo, dry_run)
     if dry_run:
         click.echo("dry run: nothing was written")

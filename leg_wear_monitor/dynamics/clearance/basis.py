@@ -109,7 +109,9 @@ class Basis:
         self.c_e = 2.0 * np.einsum("nr,nri->ni", momentum, self.s_t)
         flat = (mass * self.s).transpose(0, 2, 1) @ curvature.reshape(len(q), -1, d * d)
         self.gamma = flat.reshape(-1, d, d, d)
-        swing = np.einsum("nr,nrij->nij", momentum, derivative(curvature))
+        swing = np.empty_like(self.b_e)
+        for j in range(d):  # of all at once, the series would take four times the memory of the curvature
+            swing[..., j] = np.einsum("nr,nri->ni", momentum, derivative(curvature[..., j]))
         self.c_ee = 2.0 * (project(self.s_t, mass * self.s_t) + swing)
 
     def _take_forces(self, linkage: Linkage, q: Floats) -> None:

@@ -238,14 +238,15 @@ def _first_order(basis: Basis, inverse_mass: Floats) -> dict[str, Singles]:
     }
     parts = {name: part[coarse] for name, part in parts.items()}
     parts["inverse_mass"] = -(change + change.transpose(0, 1, 3, 2))
-    by_e = np.concatenate([parts[name].reshape(m, d, -1) for name in changing_shapes(d // 2)], axis=2)
+    columns = [parts[name].reshape(m, d, -1) for name in changing_shapes(d // 2)]
+    by_e = np.concatenate(columns, axis=2, dtype=np.float32)
     return {
         "by_e": _in_blocks(by_e),
         "bend": _in_blocks(bend.reshape(m, d, d * d)),
     }
 
 
-def _in_blocks(table: Floats) -> Singles:
+def _in_blocks(table: Floats | Singles) -> Singles:
     """A table (M + 1, d, u) in the order in which vectors are taken from it, (M + 1, u / WIDTH, d, WIDTH)."""
     points, d, u = table.shape
     blocks = np.zeros((points, d, padded(u)), dtype=np.float32)

@@ -291,6 +291,10 @@ class TorqueObserver(KeepsSamples):
         """The legs of a reference, or of an identification, that are simulated so far; None without any."""
         return self._references.part
 
+    def leave(self) -> None:
+        """Leave what is simulated ahead: the process is about to end."""
+        self._references.leave()
+
     def begin_epoch(self) -> None:
         """Forget kept samples and gait cycles, because stamps start again."""
         self.state.samples, self.state.due = TorqueSamples(), ()

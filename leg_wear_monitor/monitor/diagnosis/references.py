@@ -286,6 +286,11 @@ class References:
         if snapshot is not None:
             self._running().restore(snapshot)
 
+    def leave(self) -> None:
+        """Leave what is simulated ahead, see `ReferenceRun.leave`."""
+        if self._run is not None:
+            self._run.leave()
+
     def advance(self, state: TorqueState, counted_m: Floats, depth: Floats) -> bool:
         """Choose a reference, continue its simulation, or begin a new one if required.
 

@@ -1,6 +1,7 @@
 """Runs of simulated legs: which legs, and that a restored run continues bit for bit."""
 
 import time
+from concurrent.futures import wait
 from threading import Event
 
 import attrs
@@ -203,6 +204,22 @@ def test_threads_that_are_behind_get_help(small, short, whole) -> None:
         stuck.set()
     assert found is not None
     assert_same(found, whole)
+
+
+def test_a_run_that_is_left_has_its_threads_end_and_can_go_on(small, short, whole) -> None:
+    run = TorqueReferenceRun(small, cycles=1000)  # minutes of a processor for each leg
+    run.begin(NEW, UNWORN, STEADY)
+    run.advance()
+    ahead = run._ahead
+    assert ahead
+    run.leave()
+    wait(ahead)
+    assert all(one.cancelled() or one.result() is None for one in ahead)
+    again = TorqueReferenceRun(small)
+    again.begin(NEW, UNWORN, STEADY)
+    again.advance()
+    again.leave()
+    assert_same(finished(again), whole)
 
 
 def test_a_live_run_never_waits(small, short, whole) -> None:

@@ -6,12 +6,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from typing import Any, TextIO
-from xml.etree import ElementTree
 
 import click
 
 from leg_wear_monitor.errors import INTERRUPTED, ConfigWarning, LegWearError, did_you_mean, printable
-from leg_wear_monitor.files import share_directory
+from leg_wear_monitor.files import package_version
 
 COULD_NOT = 2
 
@@ -54,25 +53,22 @@ class Verbs(click.Group):
 
     def main(self, *args: Any, **extra: Any) -> Any:
         """Run and end the process; programming errors keep their traceback."""
+        code: Any = COULD_NOT
         try:
             with _warnings_as_lines():
                 code = super().main(*args, **{**extra, "standalone_mode": False})
         except click.UsageError as error:
             path = error.ctx.command_path if error.ctx else self.name
             _print_error(f"{error.format_message()} (see {path} --help)")
-            code = COULD_NOT
         except click.ClickException as error:
             _print_error(error.format_message())
-            code = COULD_NOT
         except LegWearError as error:
             _print_error(str(error))
-            code = COULD_NOT
         except ModuleNotFoundError as error:
             module = (error.name or "").partition(".")[0]
             if module not in _EXTRAS:
                 raise
             _print_error(f"{module} is not installed; pip install 'leg_wear_monitor[{_EXTRAS[module]}]'")
-            code = COULD_NOT
         except click.Abort:
             if sys.stderr.isatty():
                 click.echo(err=True)  # below the terminal's own ^C
@@ -109,14 +105,9 @@ def _warnings_as_lines() -> Iterator[None]:
         yield
 
 
-def version() -> str:
-    """Version of this package, as package.xml has it."""
-    return ElementTree.parse(share_directory() / "package.xml").findtext("version") or "unknown"
-
-
 def _print_version(ctx: click.Context, _param: click.Parameter, wanted: bool) -> None:
     if wanted:
-        click.echo(f"leg-wear-monitor {version()}")
+        click.echo(f"leg-wear-monitor {package_version()}")
         ctx.exit()
 
 

@@ -37,7 +37,6 @@ from leg_wear_monitor.report.page import (
     Table,
     Text,
     render,
-    template_text,
     verdict_banner,
 )
 from leg_wear_monitor.report.replay.charts import health_chart, joint_trends
@@ -392,8 +391,8 @@ def leg_content(regions: Mapping[str, str], words: Words, freshness: Freshness, 
         title=words.heading,
         summary=words.summary,
         sections=(),
-        styles=[*map(template_text, _STYLES)],
-        libraries=[*map(template_text, _LIBRARIES)],
+        styles=_STYLES,
+        libraries=_LIBRARIES,
         has_dark=True,
     )
     # the same for pages with the same scripts and styles

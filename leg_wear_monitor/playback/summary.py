@@ -12,7 +12,7 @@ import numpy as np
 
 from leg_wear_monitor.bags.findings import Finding
 from leg_wear_monitor.errors import printable
-from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.position import carriers, is_on_ground, outline_of, rotated
 from leg_wear_monitor.mechanism.reach import Reach, reach_of
 from leg_wear_monitor.mechanism.spec import GROUND, Mechanism
@@ -329,12 +329,12 @@ def _history(history: History) -> ReplayHistory:
     return ReplayHistory(stamp_ns=history.stamp_ns[last], **columns)
 
 
-def _begins(last: np.ndarray[Any, np.dtype[np.int64]]) -> np.ndarray[Any, np.dtype[np.int64]]:
+def _begins(last: Ints) -> Ints:
     """First index of each group."""
     return np.concatenate([[0], last[:-1] + 1]) if len(last) else last
 
 
-def _thinned(name: str, column: Floats, last: np.ndarray[Any, np.dtype[np.int64]]) -> Floats:
+def _thinned(name: str, column: Floats, last: Ints) -> Floats:
     begins = _begins(last)
     if name == "peak_force_n" and len(last):
         return np.asarray(np.fmax.reduceat(column, begins))
@@ -343,7 +343,7 @@ def _thinned(name: str, column: Floats, last: np.ndarray[Any, np.dtype[np.int64]
     return np.asarray(column[last])
 
 
-def _ends(n: int) -> np.ndarray[Any, np.dtype[np.int64]]:
+def _ends(n: int) -> Ints:
     """Last index of each of at most `POINTS` groups of n cycles."""
     groups = min(n, POINTS)
     return np.asarray((np.arange(groups) + 1) * n // max(groups, 1) - 1, np.int64)

@@ -1,4 +1,4 @@
-"""The one root of everything this package raises on purpose, text that is fit to be shown, names."""
+"""The root of all errors of this package, printable text, suggestions for unknown names, and interrupts."""
 
 import os
 import signal
@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-# The one root of everything this package raises on purpose, and text that is fit to be shown.
+# Errors that this package raises on purpose, and text that a terminal can show.
 
 
-_MOST_SHOWN = 2000
+_MOST_SHOWN = 2000  # characters
 
 
 def printable(text: str, most: int = _MOST_SHOWN) -> str:
@@ -131,9 +131,11 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 INTERRUPTED = 130
 """Exit code."""
 
+# packages in whose frames an exception may be swallowed
 _LOSING = {"importlib", "_frozen_importlib", "_frozen_importlib_external", "llvmlite", "numba"}
 
 _open: list[Callable[[], None]] = []
+"""What closes the things that are open now, the newest last; see `closed_at_the_end`."""
 
 
 def would_be_lost(frame: FrameType | None) -> bool:
@@ -164,7 +166,7 @@ def closed_at_the_end(close: Callable[[], None]) -> Iterator[None]:
     try:
         yield
     finally:
-        if close in _open:  # it is not where it was called
+        if close in _open:  # not if `put_in_order` has called it
             _open.remove(close)
 
 
@@ -181,7 +183,7 @@ def leave(*_: object) -> None:
 
 
 def interrupt(_number: int, frame: FrameType | None) -> None:
-    """Raise where that is safe, and only once; where it is not, put in order what is open and leave."""
+    """Handler of the first Ctrl-C: KeyboardInterrupt where that is safe; else close all and leave."""
     if not would_be_lost(frame):
         signal.signal(signal.SIGINT, _insist)
         raise KeyboardInterrupt
@@ -193,5 +195,5 @@ def interrupt(_number: int, frame: FrameType | None) -> None:
 
 
 def _insist(_number: int, _frame: FrameType | None) -> None:
-    """The second time nobody wants to wait for what is being put in order."""
+    """Handler of the second Ctrl-C: the process ends at once, whatever is still being closed."""
     os._exit(INTERRUPTED)

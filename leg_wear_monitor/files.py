@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
+from xml.etree import ElementTree
 
 from leg_wear_monitor.errors import ConfigError, LegWearError
 
@@ -193,6 +194,11 @@ def share_directory() -> Path:
     raise ShareNotFoundError(
         f"{package}: no share/{package.name}/config in a directory above; install with pip or colcon"
     )
+
+
+def package_version() -> str:
+    """Version of this package, as package.xml has it."""
+    return ElementTree.parse(share_directory() / "package.xml").findtext("version") or "unknown"
 
 
 # Tables as pandas has them; pandas is wanted only by whoever asks for one.

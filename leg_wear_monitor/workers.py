@@ -78,6 +78,27 @@ def by_cost(jobs: Iterable[Job]) -> list[Job]:
     return sorted(jobs, key=lambda job: -job.cost)
 
 
+def run_jobs(jobs: Sequence[Job], done: Done, workers: int, scheduler: str | None = None) -> None:
+    """Run jobs, and those that follow from them: on a cluster, in local processes, or in this process.
+
+    Parameters
+    ----------
+    jobs : sequence of Job
+    done : callable
+        Called in this process with each job and its result, in order of completion.
+    workers : int
+        Number of local processes; 1 and less uses this process only.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers run the jobs instead.
+    """
+    if scheduler is not None:
+        run_on_cluster(jobs, scheduler, done)
+    elif workers > 1:
+        run_in_processes(jobs, workers, done)
+    else:
+        run_here(jobs, done)
+
+
 # Calls computed in local single-thread processes; if one dies, only jobs in progress are lost.
 
 

@@ -33,6 +33,11 @@ class Reader(HTMLParser):
         return [attributes for name, attributes in self.elements if name == tag]
 
 
+def words(markup):
+    """All texts, with single spaces between their words."""
+    return " ".join(" ".join(read(markup).texts).split())
+
+
 def read(html):
     reader = Reader()
     reader.feed(html)

@@ -1,7 +1,10 @@
 """A fleet that could be, of any size, without a recording: the same for the same seed."""
 
+from pathlib import Path
+
 import attrs
 import numpy as np
+from made_up_summary import made_up_summary
 
 from leg_wear_monitor.fleet.overview import (
     BadRecording,
@@ -112,3 +115,15 @@ def _with_history(draw, leg):
         return leg
     bad = BadRecording(file=f"{leg.id}/2026-11-20.mcap", outcome="unreadable", why="is not an MCAP file")
     return attrs.evolve(leg, recordings=attrs.evolve(leg.recordings, unreadable=1, bad=(bad,)))
+
+
+def written_fleet(home: Path, names: str, *legs: LegOverview, lot: str = "") -> Path:
+    """A description of legs with these names, and the fleet as an update left it; the leg a has a summary."""
+    entries = (f"- {{id: {name}, recordings: {name}.mcap, lot: '{lot}'}}\n" for name in names)
+    (home / "fleet.yaml").write_text(f"out: out\nlegs:\n{''.join(entries)}")
+    for name in names:
+        (home / f"{name}.mcap").touch()
+    (home / "out/legs/a").mkdir(parents=True)
+    (home / "out/legs/a/summary.json").write_text(made_up_summary().to_json())
+    (home / "out/fleet.json").write_text(made_up_fleet(legs).to_json())
+    return home

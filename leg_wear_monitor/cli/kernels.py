@@ -16,7 +16,7 @@ from leg_wear_monitor.messages.cdr import Decoder
 from leg_wear_monitor.messages.streams import STREAMS
 from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
 from leg_wear_monitor.twin.torque_reference import TorqueReferenceRun
-from leg_wear_monitor.workers import Job, run_here, run_in_processes
+from leg_wear_monitor.workers import Job, run_jobs
 
 SETS = ("clearance", "full", "gait", "monitor")
 """Sets of kernels that are then there, as commands name them."""
@@ -71,7 +71,4 @@ def compile_all(progress: AbstractContextManager[Callable[[float], None]]) -> No
             finished.append(job.key)
             show(len(finished) / len(_JOBS))
 
-        if find_spec("loky"):
-            run_in_processes(_JOBS, 2, done)
-        else:
-            run_here(_JOBS, done)
+        run_jobs(_JOBS, done, 2 if find_spec("loky") else 1)

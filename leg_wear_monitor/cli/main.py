@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from typing import Any, TextIO
-from xml.etree import ElementTree
 
 import click
 
@@ -18,7 +17,7 @@ from leg_wear_monitor.errors import (
     extras_named,
     printable,
 )
-from leg_wear_monitor.files import share_directory
+from leg_wear_monitor.files import package_version
 
 COULD_NOT = 2
 
@@ -58,19 +57,17 @@ class Verbs(click.Group):
 
     def main(self, *args: Any, **extra: Any) -> Any:
         """Run and end the process; programming errors keep their traceback."""
+        code: Any = COULD_NOT
         try:
             with _warnings_as_lines(), extras_named():
                 code = super().main(*args, **{**extra, "standalone_mode": False})
         except click.UsageError as error:
             path = error.ctx.command_path if error.ctx else self.name
             _print_error(f"{error.format_message()} (see {path} --help)")
-            code = COULD_NOT
         except click.ClickException as error:
             _print_error(error.format_message())
-            code = COULD_NOT
         except LegWearError as error:
             _print_error(str(error))
-            code = COULD_NOT
         except click.Abort:
             if sys.stderr.isatty():
                 click.echo(err=True)  # below the terminal's own ^C
@@ -107,14 +104,9 @@ def _warnings_as_lines() -> Iterator[None]:
         yield
 
 
-def version() -> str:
-    """Version of this package, as package.xml has it."""
-    return ElementTree.parse(share_directory() / "package.xml").findtext("version") or "unknown"
-
-
 def _print_version(ctx: click.Context, _param: click.Parameter, wanted: bool) -> None:
     if wanted:
-        click.echo(f"leg-wear-monitor {version()}")
+        click.echo(f"leg-wear-monitor {package_version()}")
         ctx.exit()
 
 

@@ -10,9 +10,9 @@ from rich.console import Console
 from rich.table import Table
 
 from leg_wear_monitor.cli.common import PAGE, SUMMARY, page_of, progress_bar, write_directory
-from leg_wear_monitor.cli.main import version
 from leg_wear_monitor.cli.tables import figure, plain_table
 from leg_wear_monitor.errors import ConfigError, printable
+from leg_wear_monitor.files import package_version
 from leg_wear_monitor.fleet.description import load_fleet
 from leg_wear_monitor.fleet.directory import json_object
 from leg_wear_monitor.fleet.overview import described, load_overview
@@ -20,7 +20,7 @@ from leg_wear_monitor.playback.result import summary_of
 from leg_wear_monitor.report.fleet_page import fleet_page
 from leg_wear_monitor.report.fleet_standing import Day
 from leg_wear_monitor.report.page import page_html
-from leg_wear_monitor.workers import Job, run_here, run_in_processes
+from leg_wear_monitor.workers import Job, run_jobs
 
 if TYPE_CHECKING:
     from leg_wear_monitor.commissioning.result import CommissioningItem, CommissioningResult
@@ -213,7 +213,7 @@ def write_pages(description: Path, out: Path, fresh_days: float, workers: int) -
     faults = _write_legs(due, workers)
     pages = {home.name for home in homes if (home / PAGE).is_file()}
     day = Day(now_ns=time.time_ns(), fresh_days=fresh_days)
-    page = fleet_page(overview, day, pages, {"leg_wear_monitor": version()})
+    page = fleet_page(overview, day, pages, {"leg_wear_monitor": package_version()})
     write_directory(out, {PAGE: page_html(page).encode()})
     return len(due) - len(faults), faults
 
@@ -234,10 +234,7 @@ def _write_legs(homes: Sequence[Path], workers: int) -> list[str]:
             progress(len(done) / len(homes))
 
         jobs = [Job(home.name, write_leg, (home,)) for home in homes]
-        if workers > 1 and len(jobs) >= _WORTH_WORKERS:
-            run_in_processes(jobs, workers, take)
-        else:
-            run_here(jobs, take)
+        run_jobs(jobs, take, workers if len(jobs) >= _WORTH_WORKERS else 1)
     return sorted(filter(None, done))
 
 

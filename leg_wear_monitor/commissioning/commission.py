@@ -84,25 +84,10 @@ def not_told(found: proposal.Found) -> tuple[str, ...]:
 
 def findings(found: proposal.Found, load: Load | None, mechanism: Mechanism) -> tuple[str, ...]:
     """What does not fit, or cannot be used as it is."""
-    return tuple(
-        text
-        for text in (
-            _load(load),
-            # of a leg that is not known, neither friction nor phases tell anything
-            *(
-                ()
-                if found.doubts
-                else (does_not_fit(found.fit, mechanism), _drives(found), _late(found), _anew(found))
-            ),
-            _position(found),
-        )
-        if text
-    )
-
-
-def notes(found: proposal.Found) -> tuple[str, ...]:
-    """What is worth knowing."""
-    return tuple(_notes(found))
+    told = [_load(load)]
+    if not found.doubts:  # of a leg that is not known, neither friction nor phases tell anything
+        told += [does_not_fit(found.fit, mechanism), _drives(found), _late(found), _anew(found)]
+    return tuple(filter(None, [*told, _position(found)]))
 
 
 def _lag(found: proposal.Found) -> Iterator[str]:
@@ -191,7 +176,8 @@ def _position(found: proposal.Found) -> str:
     return ""
 
 
-def _notes(found: proposal.Found) -> Iterator[str]:
+def notes(found: proposal.Found) -> Iterator[str]:
+    """What is worth knowing."""
     yield from found.choice.also
     yield from _otherwise(found)
     ratio = proposal.gear(found)[0]
@@ -383,7 +369,7 @@ def _result(facts: proposal.Found, load: Load | None, mechanism: Mechanism) -> C
         items=tuple(told),
         not_told=not_told(facts),
         findings=findings(facts, load, mechanism),
-        notes=notes(facts),
+        notes=tuple(notes(facts)),
         config=proposed,
         turns=facts.fit.turns,
     )

@@ -186,6 +186,7 @@ def offset_sigma_rad(found: Found) -> float:
 # How each quantity could be known better than a recording shows it.
 
 
+_FURTHER = "record cadences further apart"
 _TWO_CADENCES = "record two cadences in one recording, 40 rpm apart"
 
 
@@ -203,18 +204,14 @@ def _offset(found: Found) -> str:
     if by_lag <= found.fit.error.phase_rad:
         return "turn the crank to a known angle, such as a dead centre"
     if found.timing.is_lag_separated:
-        return f"{_further(found)}, or declare drive.lag_s"
+        return f"{_FURTHER}, or declare drive.lag_s"
     return f"{_TWO_CADENCES}, or declare drive.lag_s"
 
 
 def _lag(found: Found) -> str:
     if math.isfinite(found.declared.lag_s):
         return ""
-    return _further(found) if found.timing.is_lag_separated else _TWO_CADENCES
-
-
-def _further(_found: Found) -> str:
-    return "record cadences further apart"
+    return _FURTHER if found.timing.is_lag_separated else _TWO_CADENCES
 
 
 def _sampling(found: Found) -> str:

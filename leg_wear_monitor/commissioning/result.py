@@ -1,6 +1,5 @@
 """The result of commissioning: detectable clearances, the parameter file, and the result with all of it."""
 
-import math
 from collections.abc import Sequence
 from io import StringIO
 from typing import TYPE_CHECKING, Any
@@ -9,6 +8,7 @@ import attrs
 from ruamel.yaml import YAML
 
 from leg_wear_monitor.bags.findings import Finding
+from leg_wear_monitor.configuration import part_document
 from leg_wear_monitor.errors import LegWearError, printable
 from leg_wear_monitor.files import data_frame, json_text
 from leg_wear_monitor.monitor.config.parameters import MARK, PARAMETERS, values_of
@@ -208,11 +208,11 @@ class CommissioningResult:
             "schema_version": SCHEMA_VERSION,
             "turns": self.turns,
             "is_sure": self.is_sure,
-            "items": [_json_object(each) for each in self.items],
+            "items": part_document(self.items),
             "not_enough_to_tell": list(self.not_told),
             "findings": list(self.findings),
             "notes": list(self.notes),
-            "joints": [_json_object(each) for each in self.joints],
+            "joints": part_document(self.joints),
             "judgement": self.judgement,
             "reference_used": self.reference_used,
         }
@@ -247,15 +247,3 @@ class CommissioningResult:
         labels["torque"] = tuple(text for text in (self.judgement, self.reference_used) if text)
         remarks = [f"{label}: {text}" for label, texts in labels.items() for text in texts]
         return parameter_text(self.config, remarks)
-
-
-def _json_object(part: Any) -> dict[str, Any]:
-    """Plain object of an attrs class."""
-    return {key: _json_value(value) for key, value in attrs.asdict(part).items()}
-
-
-def _json_value(value: Any) -> Any:
-    """Plain value: lists for tuples, null for NaN and infinity."""
-    if isinstance(value, tuple):
-        return [_json_value(each) for each in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

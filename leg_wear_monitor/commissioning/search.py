@@ -1,7 +1,7 @@
 """The search over joints, torques, directions and signs: where to start, candidates, the choice."""
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
 import attrs
 import numpy as np
@@ -174,11 +174,6 @@ def on_one_shaft(one: Fit, other: Fit) -> bool:
     return len(apart) > 0 and float(apart.std()) < _ON_ONE_SHAFT_RAD
 
 
-def first(found: Iterable[Candidate], holds: Callable[[Candidate], bool]) -> Candidate | None:
-    """Best candidate of which something holds."""
-    return next((each for each in found if holds(each)), None)
-
-
 def same_gear(one: Fit, other: Fit) -> bool:
     """Whether two fits have about the same gear ratio."""
     return abs(one.gear_ratio / other.gear_ratio - 1.0) < SAME_GEAR
@@ -244,7 +239,7 @@ def choose(found: list[Candidate]) -> Choice:
     }
     rivals, also = {}, []
     for name, (among, differs) in respects.items():
-        rival = first(among, differs)
+        rival = next(filter(differs, among), None)  # the best one
         if rival is None:
             continue
         alike = too_alike(best.fit, rival.fit, other_signal=name in _SIGNALS)

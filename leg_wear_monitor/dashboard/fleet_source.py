@@ -23,7 +23,7 @@ from leg_wear_monitor.fleet.overview import FILE, FleetOverview, described, load
 from leg_wear_monitor.playback.result import summary_of
 from leg_wear_monitor.report.fleet_page import fleet_page
 from leg_wear_monitor.report.fleet_standing import Day
-from leg_wear_monitor.report.page import page_html, template_text
+from leg_wear_monitor.report.page import page_html
 from leg_wear_monitor.report.replay.page import replay_page
 
 FRESH_DAYS = 7.0
@@ -86,8 +86,8 @@ class FleetSource:
         page = fleet_page(self._overview, day, pages, self._versions)
         page = attrs.evolve(
             page,
-            libraries=[*page.libraries, template_text(SCRIPT)],
-            styles=[*page.styles, template_text("dashboard/dashboard.css")],
+            libraries=(*page.libraries, SCRIPT),
+            styles=(*page.styles, "dashboard/dashboard.css"),
         )
         state = page.banner.word.lower() if page.banner else ""
         words = Words(title=f"{state} – fleet", state=state, heading=page.title, summary=page.summary)

@@ -9,8 +9,8 @@ from leg_wear_monitor.dashboard.source import (
     NO_VERDICT,
     Content,
     Freshness,
-    LegPage,
     Stamps,
+    leg_content,
     leg_setup,
     stamps_of,
     unreadable,
@@ -34,6 +34,7 @@ from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import LedgerContent, read_ledger
 from leg_wear_monitor.monitor.verdict.situation import JointSituation
 from leg_wear_monitor.playback.result import ReplaySummary
+from leg_wear_monitor.report.replay.page import raised_alarms
 from leg_wear_monitor.state import Figure, JointClearance, LegAlarms, LegState, LifeHours, Verdict
 
 OLD_AFTER_S = 60.0  # a monitor of a walking leg writes more often
@@ -109,13 +110,13 @@ class LedgerLeg:
         regions = {
             region.VERDICT: region.verdict_region(view),
             region.JOINTS: region.joints_region(view),
-            region.ALARMS: region.alarms_region(view),
+            region.ALARMS: raised_alarms(view, otherwise="No alarm is raised."),
             region.TRENDS: region.trends_region(view, _heading(view)),
         }
         name = printable(self._setup.monitor.hardware_id)
         summary = f"{self._setup.monitor.mechanism}, from the ledger {printable(str(self._path))}"
         words = words_of(view, name, f"Joint wear of {name}", summary)
-        return LegPage(fresh="Written ").content(regions, words, self.freshness())
+        return leg_content(regions, words, self.freshness(), "Written ")
 
     def leg_page(self, name: str) -> None:
         """None: that is for a fleet, and this is one leg."""

@@ -16,9 +16,9 @@ from leg_wear_monitor.dashboard.source import (
     NOTHING_KNOWN,
     Content,
     Freshness,
-    LegPage,
     LegSetup,
     Words,
+    leg_content,
     unknown_leg,
     view_of,
     words_of,
@@ -28,6 +28,7 @@ from leg_wear_monitor.files import finite_or_none, or_nan, received_json
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, SEEN_COLUMNS, SUMMARY_COLUMNS
 from leg_wear_monitor.playback.result import ReplayHistory, ReplayStatus, ReplaySummary
+from leg_wear_monitor.report.replay.page import belief, raised_alarms
 from leg_wear_monitor.state import SCHEMA_VERSION, LegState, Level
 
 # Messages as other processes sent them; nothing in them is trusted.
@@ -294,12 +295,12 @@ class LiveLeg:
             region.VERDICT: region.verdict_region(view),
             region.JOINTS: region.joints_region(view, why_unknown),
             **({region.MOTION: self._moving} if self._moving else {}),
-            region.ALARMS: region.alarms_region(view),
-            region.BELIEF: region.belief_region(view),
+            region.ALARMS: raised_alarms(view, otherwise="No alarm is raised."),
+            region.BELIEF: belief(view),
             region.TRENDS: self._trends_region(view),
             region.STATUS: region.status_region(view),
         }
-        return LegPage(fresh="Live, data ").content(regions, self._words(view), self.freshness())
+        return leg_content(regions, self._words(view), self.freshness(), "Live, data ")
 
     def freshness(self) -> Freshness:
         """Since when nothing was heard of the monitor; or, if it speaks, since when it has no data."""

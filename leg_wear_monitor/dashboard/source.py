@@ -37,12 +37,10 @@ from leg_wear_monitor.report.page import (
     Table,
     Text,
     render,
-    template_text,
     verdict_banner,
 )
 from leg_wear_monitor.report.replay.charts import health_chart, joint_trends
 from leg_wear_monitor.report.replay.joints import joints_and_leg
-from leg_wear_monitor.report.replay.page import belief, raised_alarms
 from leg_wear_monitor.state import Evidence, LegState, State, Verdict
 
 # What is known of a leg at one instant, in the shape of a replay's summary: so the page has its words.
@@ -208,12 +206,7 @@ def verdict_region(view: ReplaySummary) -> str:
     banner = verdict_banner(
         view, f"/{guide_to(view.verdict)}", "/docs/explanation/validity.md#how-sure-a-verdict-is"
     )
-    return banner_markup(with_evidence(banner, view.verdict.evidence))
-
-
-def banner_markup(banner: Banner) -> str:
-    """A banner as it stands in the head of a page."""
-    return render("dashboard/banner.html", banner=banner)
+    return render("dashboard/banner.html", banner=with_evidence(banner, view.verdict.evidence))
 
 
 def with_evidence(banner: Banner, evidence: Sequence[Evidence]) -> Banner:
@@ -241,16 +234,6 @@ def joints_region(view: ReplaySummary, instead: str = "") -> str:
     if instead:
         return _parts([Text(instead, is_not_valid=True)])
     return joints_and_leg(view)
-
-
-def alarms_region(view: ReplaySummary) -> str:
-    """Every alarm that is raised."""
-    return raised_alarms(view, otherwise="No alarm is raised.")
-
-
-def belief_region(view: ReplaySummary) -> str:
-    """Whether input, torque, cadence and model can be believed."""
-    return belief(view)
 
 
 def status_region(view: ReplaySummary) -> str:
@@ -382,61 +365,46 @@ class Source(Protocol):
         """Frames of the moving leg; None where nothing moves."""
 
 
-@attrs.frozen(kw_only=True)
-class LegPage:
-    """The page of one leg, around its regions.
+_STYLES = (
+    "uplot/uPlot.min.css", "replay/replay.css", "dashboard/dashboard.css", "leg_slider.css",
+    "torque_phase.css",
+)  # fmt: skip
+_LIBRARIES = (
+    "uplot/uPlot.iife.min.js", "replay/charts.js", "leg_slider.js", "torque_phase.js", SCRIPT,
+    "dashboard/motion.js", "dashboard/trends.js",
+)  # fmt: skip
 
-    Attributes
+
+def leg_content(regions: Mapping[str, str], words: Words, freshness: Freshness, fresh: str) -> Content:
+    """The page of one leg with its regions.
+
+    Parameters
     ----------
+    regions : mapping of str to str
+        Markup by the name of its region.
+    words : Words
+    freshness : Freshness
     fresh : str
-        Begin of the line that says how old the data are, such as ``Data ``.
+        Begin of the line that says how old the data are, such as ``Written ``.
     """
-
-    fresh: str
-
-    def content(self, regions: Mapping[str, str], words: Words, freshness: Freshness) -> Content:
-        """The page with its regions."""
-        page, identity = self._page(words, freshness)
-        html = render("dashboard/page.html", page=page, regions=regions, titles=TITLES)
-        return Content(page=identity, html=html, regions=regions, words=words, policy=page.policy)
-
-    def _page(self, words: Words, freshness: Freshness) -> tuple[Page, str]:
-        """The page without its regions, and its identity."""
-        page = Page(
-            title=words.heading,
-            summary=words.summary,
-            sections=(),
-            styles=[
-                template_text("uplot/uPlot.min.css"),
-                template_text("replay/replay.css"),
-                template_text("dashboard/dashboard.css"),
-                template_text("leg_slider.css"),
-                template_text("torque_phase.css"),
-            ],
-            libraries=[
-                template_text("uplot/uPlot.iife.min.js"),
-                template_text("replay/charts.js"),
-                template_text("leg_slider.js"),
-                template_text("torque_phase.js"),
-                template_text(SCRIPT),
-                template_text("dashboard/motion.js"),
-                template_text("dashboard/trends.js"),
-            ],
-            has_dark=True,
-        )
-        identity = _identity(page)
-        live = live_settings(identity, words, freshness, self.fresh)
-        return attrs.evolve(page, live=live), identity
+    page = Page(
+        title=words.heading,
+        summary=words.summary,
+        sections=(),
+        styles=_STYLES,
+        libraries=_LIBRARIES,
+        has_dark=True,
+    )
+    # the same for pages with the same scripts and styles
+    identity = hashlib.sha256("\0".join((page.style, *page.scripts)).encode()).hexdigest()[:16]
+    page = attrs.evolve(page, live=live_settings(identity, words, freshness, fresh))
+    html = render("dashboard/page.html", page=page, regions=regions, titles=TITLES)
+    return Content(page=identity, html=html, regions=regions, words=words, policy=page.policy)
 
 
 def live_settings(page: str, words: Words, freshness: Freshness, fresh: str) -> str:
     """Settings of the page's script, as JSON."""
-    settings = {
-        "page": page,
-        "fresh": fresh,
-        **attrs.asdict(freshness),
-        "words": attrs.asdict(words),
-    }
+    settings = {"page": page, "fresh": fresh, **attrs.asdict(freshness), "words": attrs.asdict(words)}
     return json.dumps(settings, allow_nan=False)
 
 
@@ -447,9 +415,3 @@ def words_of(view: ReplaySummary, name: str, heading: str, summary: str) -> Word
     state = f"{verdict.state.words} joint {joints}" if joints else verdict.state.words
     title = f"{STATE_LOOKS[verdict.state][0]} {state} – {name}"
     return Words(title=title, state=f"{name}: {state}", heading=heading, summary=summary)
-
-
-def _identity(page: Page) -> str:
-    """The same for pages with the same scripts and styles."""
-    parts = (page.style, *page.scripts)
-    return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]

@@ -354,6 +354,17 @@ def used_fraction(clearance_m: _Values, new_m: float, limit_m: float) -> _Values
     return (clearance_m - new_m) / (limit_m - new_m)
 
 
+def used_of(joint: Line) -> float:
+    """That fraction of a `JointClearance` as a record has it, by the believed clearance.
+
+    Where nothing is valid, by what measurements of the gait show, or else by counting.
+    """
+    known = (joint.get("believed_m"), joint["seen_m"], joint["counted_m"])
+    clearance_m = next(each for each in known if each is not None)
+    used: float = used_fraction(clearance_m, joint["new_m"], joint["limit_m"])
+    return used
+
+
 # Table of the gait cycles of a recording: a row a minute, or a row a gait cycle.
 
 
@@ -459,23 +470,9 @@ LIVES = {
 }  # fmt: skip
 
 
-def recordings_table(legs: Legs) -> Any:
-    """Table with a row for each recording, in the order in which a leg counted them."""
-    return _table(RECORDINGS, legs, _recording)
-
-
-def verdicts_table(legs: Legs) -> Any:
-    """Table with a row for each counted recording: the verdict at its end."""
-    return _table(VERDICTS, legs, _verdict)
-
-
-def lives_table(legs: Legs) -> Any:
-    """Table with a row for each counted recording and joint, and for the whole ``leg``, at its end."""
-    return _table(LIVES, legs, _lives)
-
-
-def _table(columns: dict[str, str], legs: Legs, rows: Callable[[Line], Iterator[Line]]) -> Any:
-    pyarrow = arrow()
+def table_of(name: str, legs: Legs) -> Any:
+    """Table ``recordings``, ``verdicts`` or ``lives``; the recordings of a leg in the order of counting."""
+    (columns, rows), pyarrow = _TABLES[name], arrow()
     schema = pyarrow.schema([(name, getattr(pyarrow, kind)()) for name, kind in columns.items()])
     found = []
     for leg, lot, directory in legs:
@@ -486,6 +483,7 @@ def _table(columns: dict[str, str], legs: Legs, rows: Callable[[Line], Iterator[
 
 
 def _recording(line: Line) -> Iterator[Line]:
+    """The row of a recording."""
     lost = line["lost"] or {}
     given = {name: line[name] for name in RECORDINGS if name in line}
     counts = {name: lost.get(name) for name in ("unmonitored_s", "already_counted")}
@@ -493,6 +491,7 @@ def _recording(line: Line) -> Iterator[Line]:
 
 
 def _verdict(line: Line) -> Iterator[Line]:
+    """The row of the verdict at the end of a counted recording."""
     verdict = line["verdict"]
     if verdict:
         texts = {name: ",".join(verdict[name]) for name in ("joints", "not_valid")}
@@ -500,12 +499,18 @@ def _verdict(line: Line) -> Iterator[Line]:
 
 
 def _lives(line: Line) -> Iterator[Line]:
+    """At the end of a counted recording, a row for each joint, and for the whole ``leg``."""
     for joint in (*line["clearances"], "leg") if line["verdict"] else ():
         clearance = line["clearances"].get(joint) or {}
         row = {"stamp_ns": line["end_ns"], "joint": joint, **clearance, **(line["life"].get(joint) or {})}
         if clearance:
-            counted_m, seen_m = clearance["counted_m"], clearance["seen_m"]
-            best_m = clearance.get("believed_m") or (counted_m if seen_m is None else seen_m)
-            row["used_fraction"] = used_fraction(best_m, clearance["new_m"], clearance["limit_m"])
+            row["used_fraction"] = used_of(clearance)
             row["seen_by"] = ",".join(clearance["seen_by"])
         yield row
+
+
+_TABLES: dict[str, tuple[dict[str, str], Callable[[Line], Iterator[Line]]]] = {
+    "recordings": (RECORDINGS, _recording),
+    "verdicts": (VERDICTS, _verdict),
+    "lives": (LIVES, _lives),
+}

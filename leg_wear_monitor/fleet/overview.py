@@ -15,7 +15,7 @@ from leg_wear_monitor.configuration.strict import structure
 from leg_wear_monitor.errors import ConfigError, printable
 from leg_wear_monitor.files import json_text, write_whole
 from leg_wear_monitor.fleet.description import FleetDescription, FleetLeg
-from leg_wear_monitor.fleet.directory import LegDirectory, Line, Outcome, used_fraction
+from leg_wear_monitor.fleet.directory import LegDirectory, Line, Outcome, used_of
 from leg_wear_monitor.monitor.alarms import ADVICE
 from leg_wear_monitor.shown import Shown
 from leg_wear_monitor.state import JointClearance, LifeHours, State, Verdict
@@ -232,18 +232,10 @@ def leg_overview(
             now,
             verdict=structure(counted[-1]["verdict"], Verdict, source, "verdict"),
             clearances=joints,
-            used_fraction={name: _used(joint) for name, joint in joints.items()},
+            used_fraction={name: used_of(joint) for name, joint in counted[-1]["clearances"].items()},
             life=structure(counted[-1]["life"], dict[str, LifeHours | None], source, "life"),
         )
     return attrs.evolve(now, change=_change(now, before))
-
-
-def _used(joint: JointClearance) -> float:
-    """Fraction of the clearance that is used up, by the believed clearance."""
-    clearance_m = joint.believed_m
-    if clearance_m is None:  # nothing is valid, or it is a line of an older version
-        clearance_m = joint.counted_m if joint.seen_m is None else joint.seen_m
-    return used_fraction(clearance_m, joint.new_m, joint.limit_m)
 
 
 def _health(lines: list[Line], counted: list[Line], found: int) -> RecordingHealth:

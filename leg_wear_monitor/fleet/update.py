@@ -21,17 +21,15 @@ from leg_wear_monitor.fleet.description import FleetDescription, FleetLeg, fleet
 from leg_wear_monitor.fleet.directory import (
     LegDirectory,
     arrow,
-    lives_table,
     locked,
     make_directory,
     read_tables,
-    recordings_table,
-    verdicts_table,
+    table_of,
     write_table,
 )
 from leg_wear_monitor.fleet.overview import FleetOverview, load_overview, write_overview
 from leg_wear_monitor.fleet.renew import is_renewal_due, learn_fleet, learned_from, measured_in, renew
-from leg_wear_monitor.workers import Job, run_here, run_in_processes, run_on_cluster
+from leg_wear_monitor.workers import Job, run_jobs
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -142,23 +140,10 @@ def update_fleet(
             begin(work.chains)
         # further jobs follow from the results of the first ones, in `done`
         if jobs := scans or work.first_jobs():
-            _run_jobs(jobs, work.done, workers, scheduler)
-        write_overview(fleet, out, {chain.leg.id: _first_fault(chain) for chain in work.chains})
+            run_jobs(jobs, work.done, workers, scheduler)
+        faults = {one.leg.id: next(filter(None, [one.fault, *one.refused]), "") for one in work.chains}
+        write_overview(fleet, out, faults)
     return FleetUpdate(tuple(work.chains), work.learned)
-
-
-def _first_fault(chain: Chain) -> str:
-    """Fault of a leg for the overview; empty without any."""
-    return next(filter(None, [chain.fault, *chain.refused]), "")
-
-
-def _run_jobs(jobs: Sequence[Job], done: Any, workers: int, scheduler: str | None) -> None:
-    if scheduler is not None:
-        run_on_cluster(jobs, scheduler, done)
-    elif workers > 1:
-        run_in_processes(jobs, workers, done)
-    else:
-        run_here(jobs, done)
 
 
 class _UpdateJobs:
@@ -374,8 +359,7 @@ class Fleet:
         """
         if name == "cycles":
             return read_tables((leg, file) for leg, _, files in self._legs for file in files.tables())
-        makers = {"verdicts": verdicts_table, "recordings": recordings_table, "lives": lives_table}
-        return makers[name](self._legs)
+        return table_of(name, self._legs)
 
     def cycles(self) -> "pd.DataFrame":
         """Table with a row for each minute, or each gait cycle, of each leg, in the order of time.

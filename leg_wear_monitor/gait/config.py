@@ -7,6 +7,8 @@ import attrs
 from leg_wear_monitor.configuration import FieldError, choice, described, quantity
 from leg_wear_monitor.mechanism.person import FORE_AFT
 
+# Values of parameters: where a torque or a foot load is published, how a torque is sampled, and the shape of
+# the ground's force.
 MOST_ENCODERS = 4
 WRENCH, EFFORT, FLOAT64 = TORQUE_SOURCES = ("wrench", "effort", "float64")
 NO_LOAD, CONTACT = "none", "contact"
@@ -53,7 +55,7 @@ class PaceConfig:
             fault = f"has {len(self.speeds_rpm)} speeds for {len(self.times_s)} times, expected one each"
             raise FieldError("speeds_rpm", fault)
         if any(b - a < self.ramp_s for a, b in pairwise(self.times_s)):
-            raise FieldError("ramp_s", f"{self.ramp_s!r} is longer than the time between two speeds s")
+            raise FieldError("ramp_s", f"{self.ramp_s!r} s is longer than the time between two speeds")
 
 
 @attrs.frozen(kw_only=True)
@@ -146,7 +148,7 @@ class FootLoadSensorConfig:
 
 @attrs.frozen(kw_only=True)
 class TransportConfig:
-    """What happens to a reading on its way."""
+    """Faults of the messages between a sensor and the monitor."""
 
     jitter_s: float = quantity(
         "s", "jitter of the sampling time, standard deviation", at_least=0.0, default=1.0e-4
@@ -164,7 +166,7 @@ class TransportConfig:
 
 @attrs.frozen(kw_only=True)
 class LoadConfig:
-    """What the leg carries that a monitor cannot know of."""
+    """Loads and friction of which the monitor has no message: it has to find them from the torque."""
 
     toe_force_n: float = quantity(
         "N", "upward force of the ground on the toe while it moves backwards", at_least=0.0, default=0.0
@@ -240,7 +242,7 @@ class LoadConfig:
 
 @attrs.frozen(kw_only=True)
 class KnockConfig:
-    """A bushing that breaks out at once."""
+    """A bushing that breaks: the joint's clearance is another one from an instant on."""
 
     joint: str = described("the clearance joint, none if empty", default="")
     at_s: float = quantity("s", "when", at_least=0.0, default=5.0)

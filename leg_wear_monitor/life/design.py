@@ -20,7 +20,7 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.files import json_text
+from leg_wear_monitor.files import data_frame, finite_or_none, json_text
 from leg_wear_monitor.life.joint_loads import DutyPart, JointLoads, joint_loads
 from leg_wear_monitor.life.result import rating_hours
 from leg_wear_monitor.mechanism.materials import (
@@ -121,15 +121,12 @@ class Candidate:
     def row(self) -> dict[str, Any]:
         """Plain values of a table's row."""
         p10, p50, p90 = self.wear_h or (None, None, None)
+        sizes = ("joint", "material", "diameter_m", "width_m", "clearance_m")
         return {
-            "joint": self.joint,
-            "material": self.material,
-            "diameter_m": self.diameter_m,
-            "width_m": self.width_m,
-            "clearance_m": self.clearance_m,
-            "wear_p10_h": _finite(p10),
-            "wear_p50_h": _finite(p50),
-            "wear_p90_h": _finite(p90),
+            **{name: getattr(self, name) for name in sizes},
+            "wear_p10_h": finite_or_none(p10),
+            "wear_p50_h": finite_or_none(p50),
+            "wear_p90_h": finite_or_none(p90),
             "rating_h": self.rating_h,
             "limited_by": self.limited_by,
             "p99_pressure_pa": self.load.p99_pressure_pa,
@@ -142,10 +139,6 @@ class Candidate:
 def _hours(value: float) -> str:
     """Three digits, without a power of ten where people write none."""
     return f"{float(f'{value:.3g}'):.0f}" if 100.0 <= value < 1.0e7 else f"{value:.3g}"
-
-
-def _finite(value: float | None) -> float | None:
-    return value if value is not None and math.isfinite(value) else None
 
 
 def candidate(
@@ -334,10 +327,15 @@ class Design:
         return json_text(self.to_dict())
 
     def to_pandas(self) -> "pd.DataFrame":
-        """All candidates, a row each; needs pandas."""
-        import pandas as pd
+        """All candidates, a row each; requires pandas.
 
-        return pd.DataFrame([one.row() for one in self.candidates])
+        Raises
+        ------
+        LegWearError
+            If pandas is not installed.
+        """
+        rows = [one.row() for one in self.candidates]
+        return data_frame({name: [row[name] for row in rows] for name in rows[0]})
 
 
 @attrs.frozen(kw_only=True)

@@ -14,7 +14,7 @@ depends on coefficient times cycles only. See `monitor.forecast` for different c
 import math
 from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
-from typing import Any, NamedTuple
+from typing import Any
 
 import attrs
 import numpy as np
@@ -35,7 +35,6 @@ from leg_wear_monitor.dynamics.run import (
 from leg_wear_monitor.errors import ConfigError, SimulationError
 from leg_wear_monitor.life.jumps import (
     JumpControl,
-    WearRate,
     jump_error,
     longest_jump,
     mean_rate,
@@ -127,16 +126,6 @@ class LifeSettings:
     seed: int = quantity("", "of where legs start", at_least=0, default=0)
 
 
-class _Probe(NamedTuple):
-    """Mean of the cycles simulated at one state of wear and under all loads of the duty, for `LifePoint`."""
-
-    rate: WearRate
-    part_growth_m: Floats
-    archard_j: Floats
-    peak_force_n: Floats
-    toe_position_m: float
-
-
 class LifeRun:
     """A leg at some time of its life, advanced by cycle jumps.
 
@@ -216,7 +205,7 @@ class LifeRun:
         start = np.zeros_like(first.surfaces.depth) if depth is None else depth.copy()
         now = self._now = self._probe(start)
         self._wish = longest_jump(now.rate, self.settings.jump)
-        self.points = [self._point(0.0, start, np.zeros_like(now.archard_j), 0.0)]
+        self.points = [now]
 
     def jump(self, most_cycles: float = np.inf) -> LifePoint:
         """Advance by one jump of at most so many gait cycles.
@@ -235,11 +224,16 @@ class LifeRun:
             if error <= control.tolerance_m or trial == _TRIALS - 1:
                 break
             cycles = wish
-        depth = last.depth + 0.5 * cycles * (now.rate.depth + then.rate.depth)
-        worked = last.archard_j + 0.5 * cycles * (now.archard_j + then.archard_j)
+        point = attrs.evolve(
+            then,
+            cycles=last.cycles + cycles,
+            depth=last.depth + 0.5 * cycles * (now.rate.depth + then.rate.depth),
+            archard_j=last.archard_j + 0.5 * cycles * (now.rubbing_j_per_cycle + then.rubbing_j_per_cycle),
+            error_m=error,
+        )
         self._now, self._wish = then, wish
-        self.points.append(self._point(last.cycles + cycles, depth, worked, error))
-        return self.points[-1]
+        self.points.append(point)
+        return point
 
     def hold(self, k: int) -> None:
         """Stop the wear of joint k, as if its part were replaced before its clearance grows further."""
@@ -248,7 +242,7 @@ class LifeRun:
         part_growth_m = self._now.part_growth_m.copy()
         part_growth_m[:, k] = 0.0
         rate = attrs.evolve(self._now.rate, depth=depth)
-        self._now = self._now._replace(rate=rate, part_growth_m=part_growth_m)
+        self._now = attrs.evolve(self._now, rate=rate, part_growth_m=part_growth_m)
         for setup in self._setups:
             setup.contacts.wear_coefficient[k] = 0.0
 
@@ -258,23 +252,8 @@ class LifeRun:
         period_s = TURN / abs(self._setups[0].speed)
         return life_of(self.clearance_joints, self.fresh_m, self.points, period_s, self._duty)
 
-    def _point(self, cycles: float, depth: Floats, archard_j: Floats, error_m: float) -> LifePoint:
-        """The present state of wear, after a jump."""
-        now = self._now
-        return LifePoint(
-            cycles=cycles,
-            depth=depth,
-            rate=now.rate,
-            peak_force_n=now.peak_force_n,
-            toe_position_m=now.toe_position_m,
-            archard_j=archard_j,
-            error_m=error_m,
-            rubbing_j_per_cycle=now.archard_j,
-            part_growth_m=now.part_growth_m,
-        )
-
-    def _probe(self, depth: Floats) -> _Probe:
-        """Simulate a few cycles with surfaces (k, 2, N) [m]."""
+    def _probe(self, depth: Floats) -> LifePoint:
+        """Simulate a few cycles with surfaces (k, 2, N) [m]; their mean under all loads of the duty."""
         for setup in self._setups:
             setup.surfaces.depth[:] = depth
         self._advance(self.settings.settle_cycles)
@@ -289,12 +268,14 @@ class LifeRun:
             toe.append([statistics.response[0] for statistics in statistics_of_all])
         smooth_deg = self.settings.jump.smooth_deg
         rates = [wear_rate(one, smooth_deg) for one in self._by_part(worn)]
-        return _Probe(
-            mean_rate(rates, self._shares),
-            np.array([rate.clearance for rate in rates]),
-            weighted(self._by_part(archard).mean(axis=1), self._shares),
-            self._by_part(peak).mean(axis=1).max(axis=0),
-            float(self._by_part(toe).mean(axis=1).max()),
+        return LifePoint(
+            depth=depth,
+            rate=mean_rate(rates, self._shares),
+            peak_force_n=self._by_part(peak).mean(axis=1).max(axis=0),
+            toe_position_m=float(self._by_part(toe).mean(axis=1).max()),
+            rubbing_j_per_cycle=weighted(self._by_part(archard).mean(axis=1), self._shares),
+            part_growth_m=np.array([rate.clearance for rate in rates]),
+            archard_j=np.zeros(len(self.clearance_joints)),
         )
 
     def _by_part(self, values: list[list[Any]]) -> Floats:

@@ -9,7 +9,7 @@ import numpy as np
 
 from leg_wear_monitor.contact.conformity import contact_doubt, half_angle_of
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.files import data_frame, json_text
+from leg_wear_monitor.files import data_frame, finite_or_none, json_text
 from leg_wear_monitor.life.jumps import WearRate, opening
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials import (
@@ -122,7 +122,7 @@ SCHEMA_VERSION = 1
 _OF_JOINTS = ("clearance_m", "clearance_max_m", "worst_sector_deg", "peak_force_n", "growth_m_per_cycle")
 
 
-@attrs.frozen(eq=False)
+@attrs.frozen(kw_only=True, eq=False)
 class LifePoint:
     """A leg at one time of its life; k clearance joints.
 
@@ -138,25 +138,25 @@ class LifePoint:
         Largest contact force of a cycle, mean over the simulated cycles; of a duty the load where it is most.
     toe_position_m : float
         Largest distance of the toe from that of the ideal linkage in a cycle, likewise; 0 without a toe.
-    archard_j : (k,) array
-        Integral of ``F_N |v_t| dt`` since the life began.
-    error_m : float
-        Estimated error of the mean clearance in the jump to this point.
     rubbing_j_per_cycle : (k,) array
-        The same integral over a gait cycle, mean over the simulated cycles.
+        Integral of ``F_N |v_t| dt`` over a gait cycle, mean over the simulated cycles.
+    archard_j : (k,) array
+        The same integral since the life began.
     part_growth_m : (parts, k) array
         Growth of the mean clearances per cycle under each load of the duty; one part without a duty.
+    error_m : float
+        Estimated error of the mean clearance in the jump to this point.
     """
 
-    cycles: float
+    cycles: float = 0.0
     depth: Floats
     rate: WearRate
     peak_force_n: Floats
     toe_position_m: float
-    archard_j: Floats
-    error_m: float
     rubbing_j_per_cycle: Floats
+    archard_j: Floats
     part_growth_m: Floats
+    error_m: float = 0.0
 
     @property
     def opened_m(self) -> Floats:
@@ -240,15 +240,17 @@ class Life(Drawable):
 
     def _walking(self, cycles: float) -> dict[str, float | None]:
         hours = cycles * self.period_s / 3600.0
-        found = {"cycles": cycles, "hours": hours} | (
-            {"days": hours / self.duty.hours_per_day} if self.duty else {}
-        )
-        return {name: value if np.isfinite(value) else None for name, value in found.items()}
+        found = {"cycles": cycles, "hours": hours}
+        if self.duty:
+            found["days"] = hours / self.duty.hours_per_day
+        return {name: finite_or_none(value) for name, value in found.items()}
 
     def to_dict(self) -> dict[str, Any]:
         """Plain object for JSON, joints by name; null for an unknown sector."""
         joints = {
-            joint: {name: [_plain(v) for v in getattr(self, name)[:, k].tolist()] for name in _OF_JOINTS}
+            joint: {
+                name: [finite_or_none(v) for v in getattr(self, name)[:, k].tolist()] for name in _OF_JOINTS
+            }
             for k, joint in enumerate(self.clearance_joints)
         }
         for k, joint in enumerate(self.clearance_joints if self.duty else ()):
@@ -293,10 +295,6 @@ class Life(Drawable):
             If pandas is not installed.
         """
         return data_frame(self.columns(), index=["joint", "cycles"])
-
-
-def _plain(value: float) -> float | None:
-    return None if np.isnan(value) else value
 
 
 def life_of(

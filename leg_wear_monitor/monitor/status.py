@@ -69,7 +69,11 @@ def zero_status(crank_zero: CrankZero) -> Status:
     return Status("crank zero", Level.OK, f"crank angle at joint position 0: {found}", values)
 
 
+# All statuses, each from the part of the monitor that it is about.
+
+
 _INPUT = tuple(spec.name() for spec in alarm_specs.OF_INPUT)
+"""Names of the alarms of the input."""
 
 
 def statuses(parts: Parts, report: VerdictReport) -> tuple[Status, ...]:
@@ -128,15 +132,16 @@ def verdict_status(verdict: Verdict) -> Status:
 
 
 def _gait(parts: Parts) -> Status:
-    tracking, happened, last = parts.twin.tracking, parts.state.happened, parts.state.last
+    """Whether the crank is followed, the cadence, and the totals of all walking."""
+    tracking, event, last = parts.twin.tracking, parts.state.happened, parts.state.last
     cadence = parts.evaluation.board.alarms[alarm_specs.CADENCE.name()]
     message, level, code = tracking.name.lower().replace("_", " "), cadence.level, code_of(cadence)
     if parts.guard.cause:
         message, level, code = "not monitored: see input", Level.ERROR, NOT_FOLLOWED
     elif parts.without_zero:
         message, level, code = "not monitored: see crank zero", max(level, Level.WARN), CRANK_ZERO
-    elif happened and tracking in (Tracking.STARTING, Tracking.OUT_OF_STEP):
-        message += f", last {happened.what.value.replace('_', ' ')}"
+    elif event and tracking in (Tracking.STARTING, Tracking.OUT_OF_STEP):
+        message += f", last {event.what.value.replace('_', ' ')}"
     if parts.config.wear_acceleration != 1.0:
         message += "; wear is accelerated, this is a demonstration"
     values = {
@@ -150,6 +155,7 @@ def _gait(parts: Parts) -> Status:
 
 
 def _input(parts: Parts) -> Status:
+    """Samples that were received, used and refused, by reason; rates of the last evaluation period."""
     evaluation, guard = parts.evaluation, parts.guard
     counts = attrs.asdict(parts.twin.intake)
     faulty, used = counts.pop("faulty"), counts.pop("used")
@@ -157,6 +163,7 @@ def _input(parts: Parts) -> Status:
         counts.pop(stamp)
     values = _health_values(evaluation.state.health) if evaluation.state.health else {}
     values |= {"received": counts.pop("received")} | {f"{name}_used": count for name, count in used.items()}
+    # the other counters of the intake by their names, such as duplicates and gaps_lost
     values |= counts | {"already_counted": parts.accounting.state.skipped}
     values |= {"conflicting": guard.conflicting, "implausible": guard.implausible}
     values |= {f"faulty_{name}": count for name, count in faulty.items()}
@@ -175,12 +182,14 @@ def _code(evaluation: AlarmEvaluation, names: Iterable[str]) -> str:
 
 
 def _health_values(health: InputHealth) -> dict[str, float]:
+    """Rates, gaps and times of the input's evaluation period, a value each."""
     values = attrs.asdict(health)
     rates = {f"{name}_rate_hz": rate for name, rate in values.pop("rate_hz").items()}
     return {"duration_s": values.pop("duration_s"), **rates, **values}
 
 
 def _joint(parts: Parts, k: int, name: str) -> Status:
+    """Counted clearance, growth, forces and forecast of clearance joint k, with the level of its alarms."""
     twin, evaluation, last = parts.twin, parts.evaluation, parts.state.last
     names = [spec.name(name) for spec in alarm_specs.JOINT]
     level, code = evaluation.board.level(*names), _code(evaluation, names)
@@ -232,6 +241,7 @@ def _as_judged(joint: Status, known: JointClearance, findings: Sequence[Finding]
     joint = attrs.evolve(joint, values=values, message=message)
     if not findings:
         return joint
+    # a finding counts that is worse than the joint's own alarms; of equals, one that asks to inspect or stop
     worst = max(findings, key=lambda finding: finding.state.severity)
     level, is_grave = level_of(verdict_of([worst])), worst.state in (State.INSPECT, State.STOP)
     if level < joint.level or (level is joint.level and not is_grave):
@@ -257,7 +267,7 @@ def _encoders(encoders: EncoderObserver, parts: Parts) -> Status:
         kept = state.samples
         for what, count in (("samples", kept.samples), ("absent", kept.absent), ("no_angle", kept.no_angle)):
             values[f"{name}_{what}"] = float(count[i])
-        if state.errors.known[i]:
+        if state.errors.known[i]:  # mean: offset of the crank's encoder, then offsets, then scale errors
             values[f"{name}_offset_rad"] = float(state.errors.centre_rad[i] + state.errors.mean[1 + i])
             values[f"{name}_scale_error"] = float(state.errors.mean[1 + len(settings.names) + i])
     for joint in last.joints if last else ():
@@ -268,7 +278,7 @@ def _encoders(encoders: EncoderObserver, parts: Parts) -> Status:
     wrong = faults(settings.names, state)
     if encoders.has_failed:
         wrong.append("no reference: the leg could not be simulated with its clearances")
-    messages = [*wrong, *_shown(last)]
+    messages = [*wrong, *_by_encoders(last)]
     if wrong and level is Level.OK:
         level, code = Level.WARN, ENCODERS
     return Status("encoders", level, "; ".join(messages), values, code)
@@ -288,7 +298,7 @@ def _foot_load(check: FootLoadCheck, evaluation: AlarmEvaluation) -> Status:
     return Status(KINDS[LOAD].name, level, "; ".join(messages), values, worst_code(raised))
 
 
-def _shown(last: CycleReport | None) -> list[str]:
+def _by_encoders(last: CycleReport | None) -> list[str]:
     """Result of the encoders in words: joints that differ from the counted ones, or why there is none."""
     seen = [(joint.joint, joint.seen) for joint in last.joints if joint.seen] if last else []
     if not seen:
@@ -324,6 +334,7 @@ def alarms_status(alarms: Iterable[Alarm]) -> Status:
 
 
 def _ledger(accounting: Accounting) -> Status:
+    """Whether the wear is kept on the disk; ``not_kept_s``: walking that is not yet."""
     ledger = accounting.ledger
     if ledger is None:
         return Status("ledger", Level.OK, "no ledger: wear is lost at the end", {})

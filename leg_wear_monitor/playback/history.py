@@ -5,13 +5,12 @@ from collections import deque
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Any
 
 import numpy as np
 
 from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.files import or_nan
-from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.messages.encode import LegDrawing
 from leg_wear_monitor.messages.leg_markers import LegMarkers
 from leg_wear_monitor.messages.leg_motion import CycleMotion, whole_cycles
@@ -124,7 +123,7 @@ class History:
         return tuple({each.stamp_ns: each for each in begin[1:2] + end[-1:]}.values())
 
     @property
-    def stamp_ns(self) -> np.ndarray[Any, np.dtype[np.int64]]:
+    def stamp_ns(self) -> Ints:
         """End times of the gait cycles [ns], shape (cycles,)."""
         return np.array(self._stamps, np.int64)
 

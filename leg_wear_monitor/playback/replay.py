@@ -140,7 +140,9 @@ def replay(
                 ready(monitor)
             _run(result, recording, sink, progress)
         if out is not None and part:
-            _put_in_place(part, Path(out) / REPORTS_FILE, result)
+            place = Path(out) / REPORTS_FILE
+            if not (monitor.is_all_counted and place.exists()):  # empty ones not over those of before
+                part.replace(place)
         result.findings = recording.findings + _about_the_ledger(result)
         result.is_partial = recording.is_partial
         if finish:
@@ -238,12 +240,6 @@ def _part(directory: Path, files: list[Path]) -> Iterator[Path]:
         except OSError as error:
             raise RecordingError(str(path), "", f"cannot be written: {error.strerror}") from error
         yield part
-
-
-def _put_in_place(part: Path, path: Path, result: ReplayResult) -> None:
-    """Put finished reports in their place, but empty ones not over those of an earlier replay."""
-    if not (result.monitor.is_all_counted and path.exists()):
-        part.replace(path)
 
 
 def _evaluation_periods(block: Block, config: MonitorConfig) -> Iterator[Samples]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from leg_wear_monitor.bags.findings import Finding
 from leg_wear_monitor.errors import printable
-from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.position import carriers, is_on_ground, outline_of, rotated
 from leg_wear_monitor.mechanism.reach import Reach, reach_of
 from leg_wear_monitor.mechanism.spec import GROUND, Mechanism
@@ -147,8 +147,43 @@ class ReplayResult(Drawable):
     def summary(
         self, wall_s: float | None = None, made_with: Mapping[str, str] | None = None
     ) -> ReplaySummary:
-        """Results as classes, which give JSON and tables; see `playback.summary`."""
-        return summary(self, wall_s, made_with)
+        """What was found, as classes, which give JSON and tables.
+
+        Parameters
+        ----------
+        wall_s : float, optional
+            Wall-clock duration of the replay [s].
+        made_with : mapping of str to str, optional
+            Names and versions of what made it.
+        """
+        last, monitor = self.history.last, self.monitor
+        state = monitor.state
+        is_known = self.is_believable and last is not None
+        verdict, known = state.verdict, attrs.asdict(state, recurse=False)
+        known["alarms"] = attrs.evolve(state.alarms, changes=_changes(self))
+        told = leg_forecast(last.forecast, verdict) if is_known and last else None
+        return ReplaySummary(
+            **(known if is_known else known | {"clearances": {}, "life": {}}),
+            recording=_recording(self),
+            monitor=settings_of(monitor.config, monitor.mechanism),
+            leg=leg_shape(monitor.mechanism),
+            wall_s=wall_s,
+            real_time_factor=self.duration_s / wall_s if wall_s else None,
+            cycles=len(self.history),
+            gait=_gait(self),
+            joints=_joints(self, verdict) if is_known else {},
+            forecast=told,
+            measurements=tuple(monitor.measurements),
+            walked=monitor.walked,
+            status=tuple(_view(ReplayStatus, status) for status in monitor.status()),
+            lost=monitor.lost,
+            sampling=_view(ReplaySampling, monitor.sampling) if monitor.sampling else None,
+            history=_history(self.history),
+            wear_depth_m=_wear(self),
+            motion=self.history.motion if is_known else (),
+            advice=ADVICE,
+            made_with=dict(made_with or {}),
+        )
 
     def count(self, samples: Samples) -> None:
         """Count samples that are passed to the monitor."""
@@ -159,49 +194,6 @@ class ReplayResult(Drawable):
         if len(stamps):
             self.begin_ns = self.begin_ns or int(stamps[0])
             self.end_ns = int(stamps[-1])
-
-
-def summary(
-    result: ReplayResult, wall_s: float | None = None, made_with: Mapping[str, str] | None = None
-) -> ReplaySummary:
-    """What a replay found.
-
-    Parameters
-    ----------
-    result : ReplayResult
-    wall_s : float, optional
-        Wall-clock duration of the replay [s].
-    made_with : mapping of str to str, optional
-        Names and versions of what made it.
-    """
-    last, monitor = result.history.last, result.monitor
-    state = monitor.state
-    is_known = result.is_believable and last is not None
-    verdict, known = state.verdict, attrs.asdict(state, recurse=False)
-    known["alarms"] = attrs.evolve(state.alarms, changes=_changes(result))
-    told = leg_forecast(last.forecast, verdict) if is_known and last else None
-    return ReplaySummary(
-        **(known if is_known else known | {"clearances": {}, "life": {}}),
-        recording=_recording(result),
-        monitor=settings_of(monitor.config, monitor.mechanism),
-        leg=leg_shape(monitor.mechanism),
-        wall_s=wall_s,
-        real_time_factor=result.duration_s / wall_s if wall_s else None,
-        cycles=len(result.history),
-        gait=_gait(result),
-        joints=_joints(result, verdict) if is_known else {},
-        forecast=told,
-        measurements=tuple(monitor.measurements),
-        walked=monitor.walked,
-        status=tuple(_view(ReplayStatus, status) for status in monitor.status()),
-        lost=monitor.lost,
-        sampling=_view(ReplaySampling, monitor.sampling) if monitor.sampling else None,
-        history=_history(result.history),
-        wear_depth_m=_wear(result),
-        motion=result.history.motion if is_known else (),
-        advice=ADVICE,
-        made_with=dict(made_with or {}),
-    )
 
 
 def _view(kind: type[_Record], of: object) -> _Record:
@@ -337,12 +329,12 @@ def _history(history: History) -> ReplayHistory:
     return ReplayHistory(stamp_ns=history.stamp_ns[last], **columns)
 
 
-def _begins(last: np.ndarray[Any, np.dtype[np.int64]]) -> np.ndarray[Any, np.dtype[np.int64]]:
+def _begins(last: Ints) -> Ints:
     """First index of each group."""
     return np.concatenate([[0], last[:-1] + 1]) if len(last) else last
 
 
-def _thinned(name: str, column: Floats, last: np.ndarray[Any, np.dtype[np.int64]]) -> Floats:
+def _thinned(name: str, column: Floats, last: Ints) -> Floats:
     begins = _begins(last)
     if name == "peak_force_n" and len(last):
         return np.asarray(np.fmax.reduceat(column, begins))
@@ -351,7 +343,7 @@ def _thinned(name: str, column: Floats, last: np.ndarray[Any, np.dtype[np.int64]
     return np.asarray(column[last])
 
 
-def _ends(n: int) -> np.ndarray[Any, np.dtype[np.int64]]:
+def _ends(n: int) -> Ints:
     """Last index of each of at most `POINTS` groups of n cycles."""
     groups = min(n, POINTS)
     return np.asarray((np.arange(groups) + 1) * n // max(groups, 1) - 1, np.int64)

@@ -293,8 +293,8 @@ def fleet_page(
         sections=sections,
         versions=versions or {},
         banner=_banner(overview, day),
-        styles=[template_text("replay/replay.css"), template_text("fleet/fleet.css")],
-        libraries=[template_text("fleet/map.js")],
+        styles=("replay/replay.css", "fleet/fleet.css"),
+        libraries=("fleet/map.js",),
         has_dark=True,
     )
 

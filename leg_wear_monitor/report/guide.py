@@ -11,7 +11,7 @@ from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
 from leg_wear_monitor.files import share_directory
-from leg_wear_monitor.report.page import Page, render, template_text
+from leg_wear_monitor.report.page import Page, render
 
 FOLDER = "docs"
 """Below the share directory; nothing outside of it is shown."""
@@ -40,7 +40,7 @@ def document_page(path: Path) -> tuple[str, str]:
         title=_title(tokens),
         summary="",
         sections=(),
-        styles=[template_text("replay/replay.css"), template_text("guide.css")],
+        styles=("replay/replay.css", "guide.css"),
         has_dark=True,
     )
     markup = _markup(_with_links(tokens, partial(_leads_on, path)))

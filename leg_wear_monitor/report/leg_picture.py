@@ -71,14 +71,14 @@ def draw_support(axes: Axes, place: Floats, away: Floats) -> None:
     axes.plot(*place, marker=triangle, markersize=32.0, color=lighter(INK, 0.6), zorder=1.0, linewidth=0.0)
 
 
-def draw_spring(axes: Axes, ends: tuple[Floats, Floats], layer: float) -> None:
+def draw_spring(axes: Axes, ends: tuple[Floats, Floats]) -> None:
     """Draw a spring as a zigzag between two points (2,) [m]."""
     start, end = ends
     fraction = np.array([0.0, 0.15, *np.linspace(0.2, 0.8, 11), 0.85, 1.0])
     side = np.array([0.0, 0.0, *(1.0 if i % 2 else -1.0 for i in range(11)), 0.0, 0.0])
     across = 0.04 * np.array([start[1] - end[1], end[0] - start[0]])
     line = start + fraction[:, None] * (end - start) + side[:, None] * across
-    axes.plot(*line.T, color=INK, linewidth=1.0, zorder=layer)
+    axes.plot(*line.T, color=INK, linewidth=1.0, zorder=15.0)  # above the bodies, below the joints
 
 
 def draw_joint(axes: Axes, place: Floats, names: Mapping[str, bool], away: Floats) -> None:
@@ -253,7 +253,7 @@ def _draw_position(
         draw_joint(axes, place, {name: name in clearance_joints for name in names}, away)
     for spring in mechanism.springs.values():
         a, b = (here[body][point] for body, point in zip(spring.bodies, spring.points, strict=True))
-        draw_spring(axes, (a, b), 15.0)
+        draw_spring(axes, (a, b))
     if mechanism.toe is not None:
         body, point = mechanism.toe
         place = here[body][point]

@@ -313,7 +313,8 @@ class Page:
         Versions of the software, seeds and the origin of the data, by name.
     banner : Banner or None
     styles, libraries : sequence of str
-        Further style sheets, and scripts that come before those of the interactive parts.
+        Further style sheets, and scripts that come before those of the interactive parts; by their names in
+        ``report/templates``.
     has_dark : bool
         Whether it follows a reader who prefers dark colours; its pictures must follow as well.
     live : str
@@ -339,12 +340,12 @@ class Page:
         """The scripts, each once: the libraries, then those of the interactive parts."""
         parts = (part for section in self.sections for part in section.parts)
         scripts = (part.script for part in parts if isinstance(part, Fragment) and part.script)
-        return tuple(dict.fromkeys((*self.libraries, *scripts)))
+        return tuple(dict.fromkeys((*map(template_text, self.libraries), *scripts)))
 
     @property
     def style(self) -> str:
         """Its style sheets as one."""
-        return "\n".join([template_text("page.css"), *self.styles])
+        return "\n".join(map(template_text, ("page.css", *self.styles)))
 
     @property
     def policy(self) -> str:

@@ -11,20 +11,19 @@ from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import attrs
 import numpy as np
 
 from leg_wear_monitor.configuration.strict import structure
 from leg_wear_monitor.errors import ConfigError, ConfigWarning
-from leg_wear_monitor.files import json_text, share_directory, write_whole
+from leg_wear_monitor.files import json_text, package_version, share_directory, write_whole
 from leg_wear_monitor.mechanism.loader import is_file_name, load_mechanism, read_yaml, shipped_mechanisms
 from leg_wear_monitor.studies.kinds import STUDIES
 from leg_wear_monitor.studies.leg_tasks import TASKS, compute
 from leg_wear_monitor.studies.life_tasks import check_points
 from leg_wear_monitor.studies.plan import Arrays, Point, Study, code_digest
-from leg_wear_monitor.workers import Job, run_here, run_in_processes, run_on_cluster
+from leg_wear_monitor.workers import Job, run_jobs
 
 # Settings of studies from YAML files.
 
@@ -358,12 +357,7 @@ def run_study(
         report(spent / total)
 
     report(spent / total)
-    if scheduler is not None:
-        run_on_cluster(missing, scheduler, done)
-    elif workers > 1 and len(missing) > 1:
-        run_in_processes(missing, min(workers, len(missing)), done)
-    else:
-        run_here(missing, done)
+    run_jobs(missing, done, min(workers, len(missing)), scheduler)
     return len(missing)
 
 
@@ -381,9 +375,8 @@ def _is_kept(directory: StudyDirectory, key: str, point: Point) -> bool:
 
 def versions() -> dict[str, str]:
     """Versions that results depend on: this package, its code digest, and the numerical libraries."""
-    package = ElementTree.parse(share_directory() / "package.xml").findtext("version") or "unknown"
     libraries = {library: metadata.version(library) for library in _LIBRARIES}
-    return {"leg_wear_monitor": package, "code": code_digest(), **libraries}
+    return {"leg_wear_monitor": package_version(), "code": code_digest(), **libraries}
 
 
 def _manifest(

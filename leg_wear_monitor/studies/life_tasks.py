@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 import attrs
 import numpy as np
@@ -20,7 +20,7 @@ from leg_wear_monitor.mechanism.arrays import Flags, Floats
 from leg_wear_monitor.mechanism.person import on_the_ground
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Film, Mechanism
-from leg_wear_monitor.studies.plan import Arrays
+from leg_wear_monitor.studies.plan import Arrays, Estimate
 
 # Sampling grid of the studies.
 
@@ -279,13 +279,6 @@ def between(cycles: Floats, values: Floats, at: Floats) -> Floats:
 
 Motion = Callable[[Floats], Floats]
 Comparable = Callable[[Floats, Floats], bool]
-
-
-class Estimate(NamedTuple):
-    """A mean and its standard error."""
-
-    value: float
-    error: float
 
 
 def stretches(

@@ -11,35 +11,13 @@ import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.studies.kinds import ALL, FOOT, HIP, KNEE, PLACES, RIGID_KNEE, SETS
-from leg_wear_monitor.studies.plan import DEPTH, ERRORS, Arrays, Names
+from leg_wear_monitor.studies.plan import DEPTH, ERRORS, TITLES, Arrays, Estimate, Names
 
-# Effects: how far a claim is from its limit in one leg, with the standard error of that.
+# The measure of a claim in one leg, above 0 where the claim holds: the logarithm of a ratio, or a difference
+# of fractions.
 
 
 _TINY = 1.0e-300  # in place of a mean of 0, such as of impacts that do not occur
-
-
-@attrs.frozen
-class Effect:
-    """The measure of a claim, above 0 where the claim holds.
-
-    Attributes
-    ----------
-    value : float
-        Logarithm of a ratio, or a difference of fractions.
-    error : float
-        Its standard error, from the scatter over runs.
-    """
-
-    value: float
-    error: float
-
-    @property
-    def score(self) -> float:
-        """The value in standard errors."""
-        if self.error > 0.0:
-            return self.value / self.error
-        return float(np.copysign(np.inf, self.value)) if self.value else 0.0
 
 
 _OF_WEAR = (DEPTH, "zone_deg", "zone_centre_deg")
@@ -57,20 +35,20 @@ def of_runs(leg: Arrays, name: str, where: Names, joint: str = "") -> Floats:
     return found
 
 
-def log_ratio(x: Floats, y: Floats, paired: bool) -> Effect:
+def log_ratio(x: Floats, y: Floats, paired: bool) -> Estimate:
     """Logarithm of mean x over mean y, (r,) each; ``paired`` if they are of the same runs."""
     mean_x, mean_y = np.maximum(x.mean(), _TINY), np.maximum(y.mean(), _TINY)
-    return _effect(float(np.log(mean_x / mean_y)), _error(x / mean_x, y / mean_y, paired))
+    return _measured(float(np.log(mean_x / mean_y)), _error(x / mean_x, y / mean_y, paired))
 
 
-def difference(x: Floats, y: Floats, paired: bool) -> Effect:
+def difference(x: Floats, y: Floats, paired: bool) -> Estimate:
     """Mean x minus mean y."""
-    return _effect(float(x.mean() - y.mean()), _error(x, y, paired))
+    return _measured(float(x.mean() - y.mean()), _error(x, y, paired))
 
 
-def _effect(value: float, error: float) -> Effect:
-    """An effect; 0, which decides nothing, where the value is not known."""
-    return Effect(value, error) if np.isfinite(value) else Effect(0.0, 0.0)
+def _measured(value: float, error: float) -> Estimate:
+    """A measure; 0, which decides nothing, where the value is not known."""
+    return Estimate(value, error) if np.isfinite(value) else Estimate(0.0, 0.0)
 
 
 def _error(x: Floats, y: Floats, paired: bool) -> float:
@@ -79,22 +57,21 @@ def _error(x: Floats, y: Floats, paired: bool) -> float:
     return float(np.sqrt(variance / len(x)))
 
 
-def least(effects: list[Effect]) -> Effect:
-    """The effect of a claim with several conditions: that of the condition that holds by least."""
+def least(effects: list[Estimate]) -> Estimate:
+    """The measure of a claim with several conditions: that of the condition that holds by least."""
     return min(effects, key=lambda effect: effect.value)
 
 
-def greatest(effects: list[Effect]) -> Effect:
-    """The effect of a claim with alternatives: that of the one that holds by most."""
+def greatest(effects: list[Estimate]) -> Estimate:
+    """The measure of a claim with alternatives: that of the one that holds by most."""
     return max(effects, key=lambda effect: effect.value)
 
 
-Measure = Callable[[Arrays], Effect]
+Measure = Callable[[Arrays], Estimate]
 
 _SUM_WITHIN = 0.1  # deviation up to which the effect of all at once counts as the sum, as on a study's page
 _REGULAR = 0.5  # fraction of a force's variance from which on it counts as regular: most of it repeats
-_NAMES = ("toe displacement", "toe velocity", "toe acceleration", "drive torque")
-_TITLES = dict(zip(ERRORS, _NAMES, strict=True))
+_TITLES = dict(zip(ERRORS, TITLES, strict=True))
 
 
 @attrs.frozen
@@ -109,7 +86,7 @@ class Claim:
         Where the clearances are.
     text : str
     measure : callable
-        Its `Effect` in a leg.
+        Its measure in a leg.
     """
 
     key: str
@@ -124,7 +101,7 @@ _Pair = tuple[Names, str, Names, str]  # clearance joints and joint that are abo
 def _above(name: str, *pairs: _Pair) -> Measure:
     """A statistic is greater in the first place than in the second one, in each pair."""
 
-    def measure(leg: Arrays) -> Effect:
+    def measure(leg: Arrays) -> Estimate:
         effects = []
         for over, above, under, below in pairs:
             values = of_runs(leg, name, over, above), of_runs(leg, name, under, below)
@@ -144,12 +121,12 @@ def _repeats(where: Names, more: str, less: str) -> Measure:
     return lambda leg: difference(mean(leg, more), mean(leg, less), True)
 
 
-def _regular(leg: Arrays) -> Effect:
+def _regular(leg: Arrays) -> Estimate:
     repeats = of_runs(leg, "repeats_contact_force", KNEE, "G")
     return difference(repeats, np.full_like(repeats, _REGULAR), True)
 
 
-def _by_derivative(leg: Arrays) -> Effect:
+def _by_derivative(leg: Arrays) -> Estimate:
     """Errors as fractions of the ideal curve's range: displacement < velocity < acceleration, in all sets."""
 
     def fraction(where: Names, name: str) -> Floats:
@@ -160,13 +137,13 @@ def _by_derivative(leg: Arrays) -> Effect:
     return least([log_ratio(fraction(s, after), fraction(s, before), True) for s, (before, after) in pairs])
 
 
-def _apart_from_sum(leg: Arrays) -> Effect:
+def _apart_from_sum(leg: Arrays) -> Estimate:
     """How far errors of all at once are from the sum of the places, in the quantity where it is farthest."""
     effects = []
     for name in ERRORS:
         total = np.sum([of_runs(leg, f"error_{name}", place) for place in PLACES], axis=0)
         ratio = log_ratio(of_runs(leg, f"error_{name}", ALL), total, False)
-        effects.append(Effect(abs(ratio.value) - np.log1p(_SUM_WITHIN), ratio.error))
+        effects.append(Estimate(abs(ratio.value) - np.log1p(_SUM_WITHIN), ratio.error))
     return greatest(effects)
 
 
@@ -178,13 +155,13 @@ def _zones(leg: Arrays, one: tuple[Names, str], other: tuple[Names, str]) -> tup
     return between / 360.0, reach / 360.0
 
 
-def _stays(leg: Arrays) -> Effect:
+def _stays(leg: Arrays) -> Estimate:
     """B's zones, alone and with all five, lie over each other: their middles are nearer than half widths."""
     between, reach = _zones(leg, (HIP, "B"), (ALL, "B"))
     return difference(reach, between, True)
 
 
-def _differ(leg: Arrays) -> Effect:
+def _differ(leg: Arrays) -> Estimate:
     """The zones of I and J, both in the frame of the foot, have nothing in common."""
     between, reach = _zones(leg, (FOOT, "I"), (FOOT, "J"))
     return difference(between, reach, True)

@@ -318,8 +318,32 @@ class OnePlace(OneClearance):
 
 ERRORS = ("toe_position_m", "toe_velocity_mps", "toe_acceleration_mps2", "drive_torque_nm")
 """What is compared with the ideal leg: ``error_<name>``, ``ideal_<name>`` and so on."""
+TITLES = ("toe displacement", "toe velocity", "toe acceleration", "drive torque")
+"""What readers call them."""
 DEPTH, VOLUME = "wear_depth_m_per_cycle", "archard_integral_j_per_cycle"
 _OF_ALL_JOINTS = ("peak_force_n", "mean_force_n", "rms_force_n", "p99_force_n")
+
+
+@attrs.frozen
+class Estimate:
+    """A value and its standard error, such as a mean over runs, or the measure of a claim.
+
+    Attributes
+    ----------
+    value : float
+    error : float
+        Its standard error, from the scatter over runs.
+    """
+
+    value: float
+    error: float
+
+    @property
+    def score(self) -> float:
+        """The value in standard errors."""
+        if self.error > 0.0:
+            return self.value / self.error
+        return float(np.copysign(np.inf, self.value)) if self.value else 0.0
 
 
 class Spread(NamedTuple):

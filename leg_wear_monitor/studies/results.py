@@ -20,7 +20,7 @@ from leg_wear_monitor.studies.execution import (
     parse_settings,
     read_manifest,
 )
-from leg_wear_monitor.studies.paper import CLAIMS, Claim, Effect
+from leg_wear_monitor.studies.paper import CLAIMS, Claim
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -51,11 +51,11 @@ class ClaimResult:
     Attributes
     ----------
     claim : Claim
-    effects : tuple of Effect
+    effects : tuple of plan.Estimate
         Of every drawn leg, in the order of `LegClaims.factors`.
     states : tuple of str
         `HOLDS`, `FAILS` or `UNDECIDED`, of every drawn leg.
-    file_leg : Effect or None
+    file_leg : plan.Estimate or None
         Of the leg of the file.
     file_state : str
         Its state; empty without that leg.
@@ -66,9 +66,9 @@ class ClaimResult:
     """
 
     claim: Claim
-    effects: tuple[Effect, ...]
+    effects: tuple[plan.Estimate, ...]
     states: tuple[str, ...]
-    file_leg: Effect | None
+    file_leg: plan.Estimate | None
     file_state: str
     interval: tuple[float, float]
     influences: tuple[Influence, ...]
@@ -152,7 +152,7 @@ def evaluate(found: Sequence[tuple[plan.Point, plan.Arrays]]) -> LegClaims:
     return LegClaims(rejected=dict(sorted(rejected.items())), factors=factors, claims=tuple(results))
 
 
-def decide(effect: Effect, runs: int) -> str:
+def decide(effect: plan.Estimate, runs: int) -> str:
     """Whether a claim holds, or fails, or is within the scatter of its runs (Student's t, both sides)."""
     from scipy.stats import t
 
@@ -184,7 +184,7 @@ def _factors(drawn: Sequence[plan.Arrays]) -> dict[str, Floats]:
 
 
 def _influences(
-    factors: dict[str, Floats], effects: Sequence[tuple[Effect, ...]]
+    factors: dict[str, Floats], effects: Sequence[tuple[plan.Estimate, ...]]
 ) -> list[tuple[Influence, ...]]:
     """For every claim the factors whose rank correlation with its effect is significant among all of them."""
     pairs = [[_rank(factor, _values(each)) for factor in factors.values()] for each in effects]
@@ -217,7 +217,7 @@ def holm(p: Floats) -> Floats:
     return adjusted.reshape(p.shape)
 
 
-def _values(effects: Sequence[Effect]) -> Floats:
+def _values(effects: Sequence[plan.Estimate]) -> Floats:
     return np.array([effect.value for effect in effects])
 
 

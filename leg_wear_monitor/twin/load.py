@@ -32,6 +32,10 @@ from leg_wear_monitor.twin.steps import AHEAD_NS
 
 # A measured force on the toe, at each point of the leg's tables.
 #
+# The kernels take ``load``, the `LoadRows`; ``push``, the state of the force's filter, a record of
+# `follower_state.LOAD_FILTER`; and ``step``, a record of `steps.STEP` whose code is PUSH. A row is the number
+# of a point of the tables, POINTS in a turn of the crank; between two points it has a fraction.
+#
 # The tables are linear in the force at each point. A sample writes the rows that the crank passes until the
 # next sample; a row that no sample reaches keeps the force of the cycle before. White noise of a sensor would
 # wear an unloaded joint: noise of 5 % of the peak nearly four times as fast as the load itself (joint J under
@@ -193,6 +197,7 @@ def _write(load, push, row, rate, until, stamp):
         stands = (
             min(max((up / push.peak_n - _NONE) / (_SURE - _NONE), 0.0), 1.0) if push.peak_n > 0.0 else 1.0
         )
+        # smooth from 0 to 1, the fraction of the force that acts
         stands = stands * stands * (3.0 - 2.0 * stands) if up > 0.0 else 0.0
         load.force[i, 0] *= stands
         load.force[i, 1] *= stands
@@ -201,7 +206,7 @@ def _write(load, push, row, rate, until, stamp):
 
 @kernel
 def put_row(load, row):
-    """Set the tables at a row to its force; the first row is also the last one."""
+    """Set the tables at a row to its force; the tables repeat the first row behind the last point."""
     fx, fy = load.force[row, 0], load.force[row, 1]
     for i in range(2 if row == 0 else 1):
         at = row + i * load.force.shape[0]
@@ -214,6 +219,7 @@ def put_row(load, row):
 
 @kernel
 def _put(table, row, fx, fy):
+    """A row of one table: its part without a force, and its parts per newton along x and y."""
     for j in range(table.columns.shape[0]):
         part = table.parts[0, row, j] + fx * table.parts[1, row, j] + fy * table.parts[2, row, j]
         table.rows[row, table.columns[j]] = part
@@ -248,7 +254,7 @@ class FootLoad:
     linkage : Linkage
     contacts : ContactArrays
     shape : str
-        Shape of the load over the gait cycle, one of `settings.LOAD_SHAPES`; a known load (`rebuild`) has
+        Shape of the load over the gait cycle, one of `sample.LOAD_SHAPES`; a known load (`rebuild`) has
         priority.
     is_measured, is_of_foot : bool
         Whether a measured force acts, and whether its axes are those of the foot.
@@ -279,7 +285,7 @@ class FootLoad:
         self._contacts, self.shape, self._load = contacts, shape, 0.0
         self._known = np.zeros((0, 2))
         self._measured = is_measured, is_of_foot
-        self._learn(linkage, basis)
+        self._set_up(linkage, basis)
 
     def rebuild(self, linkage: Linkage, known: Floats) -> None:
         """Set the tables, in place, to those of a leg with other masses or lengths, under the same load.
@@ -299,11 +305,11 @@ class FootLoad:
         pairs: Iterable[tuple[NDArray[Any], NDArray[Any]]] = zip(self.tables, new, strict=True)
         for own, table in pairs:
             own[...] = table
-        self._learn(linkage, basis)
+        self._set_up(linkage, basis)
         self.set(load)
         set_force(self.rows, measured)
 
-    def _learn(self, linkage: Linkage, basis: Basis) -> None:
+    def _set_up(self, linkage: Linkage, basis: Basis) -> None:
         """Compute the effect of a load on the tables, which must be those without a load."""
         self._linkage = linkage
         self._shaped: dict[str, tuple[Floats, Floats]] = {}

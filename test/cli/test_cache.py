@@ -64,7 +64,7 @@ def test_nothing_is_removed_where_no_place_is_safe(run, monkeypatch):
 
 def test_what_was_filled_is_not_compiled_again(run, place, monkeypatch):
     monkeypatch.setattr(kernels, "_JOBS", tuple(kernels.Job(name, nothing, ()) for name in "ab"))
-    monkeypatch.setattr(kernels, "run_in_processes", lambda jobs, _, done: run_here(jobs, done))
+    monkeypatch.setattr(kernels, "run_jobs", lambda jobs, done, _: run_here(jobs, done))
     result = run("cache", "--fill")
     assert result.exit_code == 0
     assert result.stdout.startswith(f"place: {place}\ntotal: ")

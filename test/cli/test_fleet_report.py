@@ -3,24 +3,13 @@
 import time
 
 import pytest
-from made_up_fleet import made_up_fleet, made_up_leg
-from made_up_summary import made_up_summary
+from made_up_fleet import made_up_leg, written_fleet
 
 
 @pytest.fixture
 def fleet(tmp_path):
     """Two updated legs, one with its summary; the description has one more."""
-    (tmp_path / "fleet.yaml").write_text(
-        "legs:\n" + "".join(f"- {{id: {name}, recordings: {name}.mcap, lot: L}}\n" for name in "abc")
-    )
-    for name in "abc":
-        (tmp_path / f"{name}.mcap").touch()
-    home = tmp_path / "out" / "legs" / "a"
-    home.mkdir(parents=True)
-    (home / "summary.json").write_text(made_up_summary().to_json())
-    overview = made_up_fleet([made_up_leg("a"), made_up_leg("b")])
-    (tmp_path / "out" / "fleet.json").write_text(overview.to_json())
-    return tmp_path / "out"
+    return written_fleet(tmp_path, "abc", made_up_leg("a"), made_up_leg("b"), lot="L") / "out"
 
 
 COMMAND = ("fleet", "report", "fleet.yaml", "--out", "out")

@@ -2,7 +2,6 @@
 
 import html
 import json
-import math
 import random
 import re
 from pathlib import Path
@@ -10,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from spoilt_json import spoilt
 
 from leg_wear_monitor.cli.verbs import replay as verb
 from leg_wear_monitor.state import Level, State
@@ -100,24 +100,6 @@ def test_the_same_recording_again_keeps_the_report_and_exits_with_findings(
     assert "written: out" not in again.stdout
     assert {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()} == before
     assert json.loads((tmp_path / "again.json").read_text())["verdict"]["fault_code"] == "ALREADY_COUNTED"
-
-
-def spoilt(document, draw):
-    """A copy with one part removed, or of another type or value, at any depth."""
-    document = json.loads(json.dumps(document))
-    places = [(document, key) for key in document]
-    for parent, key in places:
-        below = parent[key]
-        if isinstance(below, dict | list):
-            inner = list(below) if isinstance(below, dict) else range(len(below))[:2]
-            places += [(below, each) for each in inner]
-    parent, key = draw.choice(places)
-    if draw.random() < 0.3:
-        del parent[key]
-    else:
-        deep = json.loads("[" * 60 + "]" * 60)
-        parent[key] = draw.choice([None, [], {}, "", "x", -1, 1e308, 2**70, True, math.nan, deep])
-    return document
 
 
 @pytest.mark.no_cover

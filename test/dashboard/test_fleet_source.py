@@ -1,7 +1,7 @@
 """A fleet is shown as it was updated last; its legs' pages by their exact names, and no other file."""
 
 import pytest
-from made_up_fleet import made_up_fleet, made_up_leg
+from made_up_fleet import made_up_fleet, made_up_leg, written_fleet
 from made_up_summary import made_up_summary
 
 from leg_wear_monitor.dashboard.fleet_source import FleetSource
@@ -15,16 +15,8 @@ NAMES = ["b", "c", "", ".", "..", "../..", "a/../..", "a\0", "/etc", "a.", "A", 
 @pytest.fixture
 def fleet(tmp_path):
     """Two updated legs, one with its summary; something beside them that is nobody's business."""
-    (tmp_path / "fleet.yaml").write_text(
-        "out: out\nlegs:\n" + "".join(f"- {{id: {name}, recordings: {name}.mcap}}\n" for name in "ab")
-    )
-    for name in "ab":
-        (tmp_path / f"{name}.mcap").touch()
-    home = tmp_path / "out" / "legs" / "a"
-    home.mkdir(parents=True)
-    (home / "summary.json").write_text(made_up_summary().to_json())
+    written_fleet(tmp_path, "ab", made_up_leg("a"), made_up_leg("b"))
     (tmp_path / "out" / "summary.json").write_text(made_up_summary().to_json())
-    write(tmp_path, made_up_leg("a"), made_up_leg("b"))
     return tmp_path
 
 

@@ -3,7 +3,7 @@
 import attrs
 import numpy as np
 import pytest
-from html_reader import read
+from html_reader import read, words
 
 from leg_wear_monitor.dashboard import ledger_leg
 from leg_wear_monitor.dashboard.ledger_leg import LedgerLeg
@@ -74,10 +74,6 @@ def ledger(tmp_path):
 
 def leg_of(ledger, now_s=1e10):
     return LedgerLeg(ledger.path, CONFIG, LEG, lambda: now_s)
-
-
-def words(markup):
-    return " ".join(" ".join(read(markup).texts).split())
 
 
 def test_the_page_is_the_verdict_of_the_ledger(ledger):

@@ -5,7 +5,7 @@ from html.parser import HTMLParser
 import attrs
 import pytest
 from heard_leg import NODE, raised, state_of, status, walk
-from html_reader import read
+from html_reader import read, words
 from hypothesis import example, given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
@@ -14,10 +14,6 @@ from leg_wear_monitor.dashboard.live_leg import MOST_ROWS, OLD_AFTER_S, LiveLeg,
 from leg_wear_monitor.state import Evidence, State
 
 pytestmark = pytest.mark.plain
-
-
-def words(markup):
-    return " ".join(" ".join(read(markup).texts).split())
 
 
 def test_the_page_says_verdict_joints_and_lives(leg):

@@ -1,13 +1,14 @@
 """Bushings by design: laws of the screening, and its lives beside whole lives."""
 
 import math
+import sys
 
 import attrs
 import numpy as np
 import pytest
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.life.design import BushingChoices, candidate
+from leg_wear_monitor.life.design import BushingChoices, Design, candidate
 from leg_wear_monitor.life.joint_loads import JointLoads, joint_loads, read_duty
 from leg_wear_monitor.mechanism.materials import load_material
 from leg_wear_monitor.mechanism.spec import Film
@@ -206,3 +207,14 @@ def test_a_limit_beyond_the_smallest_bushing_is_refused():
         lw.ConfigError, match=r"limit-m: 0\.005 m is not below the smallest radius of a bushing, 0\.004 m"
     ):
         lw.design(LEG, read_duty("0:8"), thin, limit_m=5e-3)
+
+
+@pytest.mark.plain
+def test_without_pandas_its_table_is_refused_in_one_line(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    made = Design(
+        mechanism="leg", duty=(), hours=1.0, limit_m=6e-4, loads=STEADY, own=(), pairs=(), candidates=(of(),),
+        sensitivities=(),
+    )  # fmt: skip
+    with pytest.raises(lw.LegWearError, match="tables need pandas"):
+        made.to_pandas()

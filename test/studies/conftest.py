@@ -19,3 +19,9 @@ def tiny() -> Callable[..., Study]:
         return parse_settings(study, {"ensemble": ENSEMBLE, **keys}, f"{study}.yaml")
 
     return make
+
+
+@pytest.fixture(scope="session")
+def sweep(tiny: Callable[..., Study]) -> Study:
+    """Three points that take a moment."""
+    return tiny("size", joints=["G"], clearances_m=[1.0e-4, 2.0e-4, 3.0e-4])

@@ -1,12 +1,12 @@
 """What lies in a study's directory is what was computed, or it is named: each part is bound by a checksum."""
 
 import json
-import math
 import random
 import shutil
 
 import numpy as np
 import pytest
+from spoilt_json import spoilt
 
 from leg_wear_monitor.errors import ConfigError, ConfigWarning, LegWearError
 from leg_wear_monitor.studies import execution
@@ -22,11 +22,6 @@ def result(_task, _mechanism, settings, _code):
         "clearance_m": np.array([settings["clearance_m"]]),
         "clearance_joints": np.array(settings["clearance_joints"]),
     }
-
-
-@pytest.fixture(scope="module")
-def sweep(tiny):
-    return tiny("size", joints=["G"], clearances_m=[1.0e-4, 2.0e-4, 3.0e-4])
 
 
 @pytest.fixture(scope="module")
@@ -126,31 +121,12 @@ def test_another_leg_beside_the_results_is_found(study):
         load_results(study)
 
 
-def changed_somewhere(document, draw):
-    """A copy with one part removed, or of another type or value, at any depth."""
-    document = json.loads(json.dumps(document))
-    places = [(document, key) for key in document]
-    for parent, key in places:
-        below = parent[key]
-        places += [(below, inner) for inner in (below if isinstance(below, dict) else range(len(below)))] if (
-            isinstance(below, dict | list)
-        ) else []  # fmt: skip
-    parent, key = draw.choice(places)
-    if draw.random() < 0.3:
-        del parent[key]
-    else:
-        deep = json.loads("[" * 60 + "]" * 60)
-        others = [None, [], {}, "", "x", -1, 1e308, 2**70, True, math.nan, deep, "../etc"]
-        parent[key] = draw.choice(others)
-    return document
-
-
 def test_a_study_changed_anywhere_is_one_line_or_what_it_was(study):
     """Also where its checksum was made to fit: then it may be refused or taken, but nothing else."""
     draw, whole, refused = random.Random(11), manifest(study), 0
     text = (study / "mechanism.yaml").read_text()
     for i in range(80):
-        changed = changed_somewhere(whole, draw)
+        changed = spoilt(whole, draw)
         if i % 2:
             changed.pop("checksum", None)
             try:

@@ -24,8 +24,8 @@ from leg_wear_monitor.studies.leg_tasks import (
     rejection,
     run_ensemble,
 )
-from leg_wear_monitor.studies.paper import CLAIMS, Effect, difference, greatest, least, log_ratio
-from leg_wear_monitor.studies.plan import DEPTH, ERRORS, Point, largest_error, of_joint
+from leg_wear_monitor.studies.paper import CLAIMS, difference, greatest, least, log_ratio
+from leg_wear_monitor.studies.plan import DEPTH, ERRORS, Estimate, Point, largest_error, of_joint
 from leg_wear_monitor.studies.results import FAILS, HOLDS, UNDECIDED, decide, evaluate, holm, load_results
 
 
@@ -128,8 +128,8 @@ def test_an_effect_has_sign_size_and_error_of_its_samples():
     assert np.sqrt((errors**2).mean()) == pytest.approx(values.std(), rel=0.05)
     same = difference(x[0] + 1.0, x[0], True)
     assert (same.value, same.error) == (pytest.approx(1.0), pytest.approx(0.0, abs=1e-12))
-    assert least([Effect(1.0, 0.1), Effect(0.5, 0.01)]) == Effect(0.5, 0.01)
-    assert greatest([Effect(1.0, 0.1), Effect(0.5, 0.01)]) == Effect(1.0, 0.1)
+    assert least([Estimate(1.0, 0.1), Estimate(0.5, 0.01)]) == Estimate(0.5, 0.01)
+    assert greatest([Estimate(1.0, 0.1), Estimate(0.5, 0.01)]) == Estimate(1.0, 0.1)
 
 
 @pytest.mark.plain
@@ -138,9 +138,9 @@ def test_a_claim_without_effect_is_undecided_and_rarely_decided():
     same = [log_ratio(*chance.lognormal(0.0, 0.1, (2, 6)), paired=True) for _ in range(4000)]
     states = [decide(each, runs=6) for each in same]
     assert states.count(UNDECIDED) / len(states) == pytest.approx(0.95, abs=0.015)
-    assert decide(Effect(0.5, 0.1), 6) == HOLDS
-    assert decide(Effect(-0.5, 0.1), 6) == FAILS
-    assert decide(Effect(0.0, 0.0), 6) == UNDECIDED
+    assert decide(Estimate(0.5, 0.1), 6) == HOLDS
+    assert decide(Estimate(-0.5, 0.1), 6) == FAILS
+    assert decide(Estimate(0.0, 0.0), 6) == UNDECIDED
 
 
 @pytest.mark.plain

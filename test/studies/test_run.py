@@ -27,12 +27,6 @@ def files(directory):
 
 
 @pytest.fixture(scope="module")
-def sweep(tiny):
-    """Three points that take a moment."""
-    return tiny("size", joints=["G"], clearances_m=[1.0e-4, 2.0e-4, 3.0e-4])
-
-
-@pytest.fixture(scope="module")
 def uninterrupted(sweep, tmp_path_factory):
     out = tmp_path_factory.mktemp("uninterrupted")
     assert run_study("size", sweep, out) == 3

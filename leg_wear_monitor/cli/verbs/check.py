@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING, TypeVar
 import click
 
 from leg_wear_monitor.cli import common
-from leg_wear_monitor.cli.main import version
 from leg_wear_monitor.cli.verbs.study import DEFAULT_MODEL
 from leg_wear_monitor.errors import ConfigWarning, LegWearError, extras_named
-from leg_wear_monitor.files import json_text, share_directory
+from leg_wear_monitor.files import json_text, package_version, share_directory
 
 if TYPE_CHECKING:
     from leg_wear_monitor.mechanism.materials import Material
@@ -62,7 +61,7 @@ def check(configs: tuple[str, ...]) -> int:
 
 
 def _installation() -> bool:
-    click.echo(f"{'version':<13} {version()}")
+    click.echo(f"{'version':<13} {package_version()}")
     libraries = {name: _library(name) for name in _LIBRARIES}
     if not _all_well({"python": platform.python_version, **libraries}):
         return False  # the rest needs them

@@ -53,13 +53,24 @@ def update(
     a leg could not be updated.
     """
     from leg_wear_monitor.fleet.description import load_fleet
+    from leg_wear_monitor.fleet.update import update_fleet
 
     legs = load_fleet(description)
     out = out or legs.out
     common.check_directory("--out", out)
 
     def count(now: "FleetDescription") -> "FleetUpdate":
-        return _update(now, out, workers, scheduler, memory_mb=memory_mb, sample=sample)
+        with common.progress_bar("updating the fleet") as progress:
+            return update_fleet(
+                now,
+                out,
+                workers=workers or os.cpu_count() or 1,
+                scheduler=scheduler,
+                memory_mb=memory_mb,
+                sample=sample,
+                begin=None if scheduler else _compile,
+                progress=progress,
+            )
 
     if follow:
         return _follow(description, count, every_s)
@@ -82,23 +93,6 @@ def export(path: Path, out: Path | None) -> None:
     common.check_directory("--out", out)
     for file in found.export(out):
         click.echo(f"written: {file}")
-
-
-def _update(
-    legs: "FleetDescription", out: Path, workers: int | None, scheduler: str | None, **reading: Any
-) -> "FleetUpdate":
-    from leg_wear_monitor.fleet.update import update_fleet
-
-    with common.progress_bar("updating the fleet") as progress:
-        return update_fleet(
-            legs,
-            out,
-            workers=workers or os.cpu_count() or 1,
-            scheduler=scheduler,
-            **reading,
-            begin=None if scheduler else _compile,
-            progress=progress,
-        )
 
 
 def _follow(description: Path, count: "Callable[[FleetDescription], FleetUpdate]", every_s: float) -> int:

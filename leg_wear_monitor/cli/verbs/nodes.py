@@ -18,7 +18,7 @@ import click
 from leg_wear_monitor.cli import common
 from leg_wear_monitor.cli.start import main as program
 from leg_wear_monitor.errors import LegWearError, closed_at_the_end
-from leg_wear_monitor.files import share_directory
+from leg_wear_monitor.files import package_version, share_directory
 
 if TYPE_CHECKING:
     from leg_wear_monitor.dashboard.server import Place
@@ -297,10 +297,9 @@ def _source(
         settings, leg = leg_of(config, ledger)
         yield LedgerLeg(ledger, settings, leg, time.time)
     elif fleet:
-        from leg_wear_monitor.cli.main import version
         from leg_wear_monitor.dashboard.fleet_source import FleetSource
 
-        yield FleetSource(fleet, time.time, {"leg_wear_monitor": version()})
+        yield FleetSource(fleet, time.time, {"leg_wear_monitor": package_version()})
     else:
         with _live(node or _NODE, config) as source:
             yield source

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from leg_wear_monitor.cli import common
-from leg_wear_monitor.cli.main import version
 from leg_wear_monitor.errors import ConfigError, closed_at_the_end
+from leg_wear_monitor.files import package_version
 from leg_wear_monitor.monitor.alarm_specs import INPUT_KINDS, KINDS
 
 if TYPE_CHECKING:
@@ -186,7 +186,7 @@ def _write(result: "ReplayResult", wall_s: float, out: Path | None, json_file: P
         return []
     from leg_wear_monitor.playback.replay import REPORTS_FILE
 
-    summary = result.summary(wall_s, made_with={"leg_wear_monitor": version()})
+    summary = result.summary(wall_s, made_with={"leg_wear_monitor": package_version()})
     text = summary.to_json()
     written: list[Path] = []
     if out is not None and not (result.monitor.is_all_counted and (out / common.SUMMARY).exists()):

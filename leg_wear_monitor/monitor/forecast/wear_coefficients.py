@@ -198,7 +198,8 @@ class ClearanceAtWear:
     wear_m : float
         Wear in the twin at that time.
     from_m : float
-        Wear in the twin from which on it is counted; below, from the one before.
+        Measurements belong to this clearance if the wear at them is this much or more, and less than that of
+        the next one; else to the clearance before.
     """
 
     clearance_m: float
@@ -254,7 +255,7 @@ class CoefficientEstimate:
     log_factor, weight : (g,) arrays
         Weights sum to 1.
     excess_m : (g,) array
-        Mean of d given the factor.
+        Mean of d, by which the clearance is wider than `known`, given the factor.
     excess_sigma_m : float
         Its standard deviation.
     observations : int
@@ -407,6 +408,7 @@ def _centred_grid(sigma: float, mean: float, precision: float) -> tuple[Floats, 
     low, high = -_WIDTH * sigma, _WIDTH * sigma
     if precision > 0.0:
         own = precision**-0.5
+        # of a mean below 0, positive factors have the tail only, which falls by e over own² / |mean|
         least = min(own, own**2 / abs(mean)) if mean < 0.0 else own
         low += min(0.0, math.log(least) - _WIDTH)
         high = max(high, math.log(max(mean, 0.0) + _WIDTH * own))

@@ -271,7 +271,7 @@ RULES = (
     Rule(
         code="CLEARANCE_NEAR",
         state=State.WATCH,
-        hits=subject_rules.near_limit,
+        hits=raised("clearance", most=Level.WARN),
         why="the {known} clearance of joint {joint} is {value}, near its limit of {limit}{past}",
         do="order the journal and the bushing of joint {joints}; at the next stop, rock the joint, measure "
         f"its radial clearance and enter it: {_MEASURE}",

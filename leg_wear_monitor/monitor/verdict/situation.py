@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import attrs
 
 from leg_wear_monitor.estimate.cause import SURE_SIGMAS, NamedCause, TorqueExplanation
+from leg_wear_monitor.files import or_nan
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials import BushingLoad
 from leg_wear_monitor.monitor.alarms import Alarm, amount, joint_of, time_words
@@ -196,10 +197,8 @@ def believed_words(one: JointClearance) -> str:
     """The believed clearance, such as ``1.66 mm ± 0.4 mm according to the drive torque``; empty if none."""
     if one.believed_m is None or one.believed_by is None:
         return ""
-    value = amount(one.believed_m, "m")
-    if one.believed_sigma_m is not None:
-        value = estimate(one.believed_m, one.believed_sigma_m, "m")
-    return f"{value} according to {SOURCES[one.believed_by]}"
+    known = KnownClearance(one.believed_by, one.believed_m, or_nan(one.believed_sigma_m))
+    return f"{known.words} according to {SOURCES[known.by]}"
 
 
 def judged(joint: JointSituation) -> KnownClearance:
@@ -423,14 +422,14 @@ class Rule:
 Condition = Callable[[Situation], Sequence[Hit]]
 
 
-def raised(*kinds: str, least: Level = Level.WARN) -> Condition:
-    """Alarms of some kinds (all if none is given) at a level or above it."""
+def raised(*kinds: str, least: Level = Level.WARN, most: Level = Level.ERROR) -> Condition:
+    """Alarms of some kinds (all if none is given) from a level up to another one."""
 
     def hits(situation: Situation) -> Sequence[Hit]:
         return [
             hit_of(alarm, situation)
             for alarm in situation.alarms
-            if alarm.level >= least and (not kinds or alarm.kind in kinds)
+            if least <= alarm.level <= most and (not kinds or alarm.kind in kinds)
         ]
 
     return hits

@@ -193,15 +193,6 @@ def _forecast_m(each: JointSituation) -> float:
     return each.believed_m if each.is_used or each.is_measurement_used else each.counted_m
 
 
-def near_limit(situation: Situation) -> Sequence[Hit]:
-    """The warning that comes before a joint is at its limit."""
-    return [
-        hit_of(alarm, situation)
-        for alarm in situation.alarms
-        if alarm.kind == "clearance" and alarm.level is Level.WARN
-    ]
-
-
 def seen_at_limit(situation: Situation) -> Sequence[Hit]:
     """Joints whose clearance is surely at its limit by what encoders or the drive torque show, or showed.
 

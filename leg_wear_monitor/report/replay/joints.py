@@ -335,7 +335,7 @@ def leg_drawing(summary: ReplaySummary, views: Sequence[JointView]) -> str:
         "ideal": [at(joint.place_m) for name, joint in leg.joints.items() if name not in shown],
         "marks": marks,
         "title": f"The leg {summary.monitor.mechanism}: "
-        + "; ".join(f"joint {_labelled(mark['view'])} {mark['words']}" for mark in marks),
+        + "; ".join(f"joint {leg.joint_words(mark['view'].joint)} {mark['words']}" for mark in marks),
     }
     return render("replay/leg.html", drawing=drawing)
 
@@ -381,7 +381,3 @@ def _words(view: JointView) -> str:
     if view.look == "over":  # the verdict says so, and is newer than the joint's last report
         return "at its limit, see the verdict"
     return f"{100.0 * view.used:.0f} % used"
-
-
-def _labelled(view: JointView) -> str:
-    return f"{view.joint} ({view.label})" if view.label else view.joint

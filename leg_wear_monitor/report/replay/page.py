@@ -32,7 +32,6 @@ from leg_wear_monitor.report.page import (
     reason,
     render,
     since_words,
-    template_text,
     value,
     verdict_banner,
 )
@@ -357,13 +356,8 @@ def replay_page(summary: ReplaySummary) -> Page:
         sections=[*sections[:shown], *guides, sure, *sections[shown:]],
         versions=summary.made_with,
         banner=verdict_banner(summary, f"#{guides[0].anchor}", f"#{sure.anchor}"),
-        styles=[
-            template_text("uplot/uPlot.min.css"),
-            template_text("replay/replay.css"),
-            template_text("guide.css"),
-            template_text("torque_phase.css"),
-        ],
-        libraries=[template_text("uplot/uPlot.iife.min.js"), template_text("replay/charts.js")],
+        styles=("uplot/uPlot.min.css", "replay/replay.css", "guide.css", "torque_phase.css"),
+        libraries=("uplot/uPlot.iife.min.js", "replay/charts.js"),
         has_dark=True,
     )
 

@@ -12,8 +12,8 @@ from leg_wear_monitor.report.page import Gallery, Picture, Section
 from leg_wear_monitor.report.study.figures import MARKS, compare_gallery, exponent_panel
 from leg_wear_monitor.report.study.text import FORGET, joined, number
 from leg_wear_monitor.studies.kinds import PORTRAIT_CYCLES, Chaos
-from leg_wear_monitor.studies.life_tasks import Estimate, exponent, period_of
-from leg_wear_monitor.studies.plan import Arrays, Found, Point, clearance_joints_of
+from leg_wear_monitor.studies.life_tasks import exponent, period_of
+from leg_wear_monitor.studies.plan import Arrays, Estimate, Found, Point, clearance_joints_of
 from leg_wear_monitor.studies.results import StudyResults
 
 _DENSE = 110.0  # resolution of figures with many points [dots per inch]
@@ -32,12 +32,12 @@ def foretold(exponents: Found) -> list[str]:
     for (point, _), one in zip(exponents, estimates_of(exponents), strict=True):
         value = f"{one.value:.2f} ± {one.error:.2f} a cycle (mean and standard error)"
         evaluated = "not distinct from 0."
-        if one.value > _SURE * one.error:
+        if one.score > _SURE:
             cycles = number(math.log(1000.0) / one.value)
             evaluated = (
                 f"above 0 beyond doubt: chaotic. A small error grows a thousandfold in {cycles} cycles."
             )
-        elif one.value < -_SURE * one.error:
+        elif one.score < -_SURE:
             evaluated = "below 0: small errors die out."
         sentences.append(f"{point.label}: the largest Lyapunov exponent is {value}, {evaluated}")
     return sentences

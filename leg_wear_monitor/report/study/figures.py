@@ -36,10 +36,10 @@ from leg_wear_monitor.report.study.text import (
     quantities,
     zone_text,
 )
-from leg_wear_monitor.studies.life_tasks import Estimate
 from leg_wear_monitor.studies.plan import (
     DEPTH,
     Arrays,
+    Estimate,
     Found,
     Spread,
     clearance_joints_of,
@@ -184,7 +184,9 @@ def panel_of_joints(found: Found, name: str, title: str, factor: float = 1.0) ->
 def exponent_panel(estimates: Sequence[Estimate | None]) -> Spreads:
     """Bars of two standard errors."""
     line = [
-        one and Spread(one.value, one.error, one.value - 2.0 * one.error, one.value + 2.0 * one.error)
+        None
+        if one is None
+        else Spread(one.value, one.error, one.value - 2.0 * one.error, one.value + 2.0 * one.error)
         for one in estimates
     ]
     return Spreads("largest Lyapunov exponent [1/cycle]", {"": line})

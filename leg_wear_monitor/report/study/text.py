@@ -7,12 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from leg_wear_monitor.report.page import Table
-from leg_wear_monitor.studies.life_tasks import Estimate
 from leg_wear_monitor.studies.plan import (
     DEPTH,
     ERRORS,
+    TITLES,
     VOLUME,
     Arrays,
+    Estimate,
     Found,
     Spread,
     clearance_joints_of,
@@ -41,10 +42,10 @@ class Quantity(NamedTuple):
 
 
 QUANTITIES = (
-    Quantity(ERRORS[0], "toe displacement", "mm", 1.0e3),
-    Quantity(ERRORS[1], "toe velocity", "m/s", 1.0),
-    Quantity(ERRORS[2], "toe acceleration", "m/s²", 1.0),
-    Quantity(ERRORS[3], "drive torque", "N m", 1.0),
+    Quantity(ERRORS[0], TITLES[0], "mm", 1.0e3),
+    Quantity(ERRORS[1], TITLES[1], "m/s", 1.0),
+    Quantity(ERRORS[2], TITLES[2], "m/s²", 1.0),
+    Quantity(ERRORS[3], TITLES[3], "N m", 1.0),
 )
 
 

@@ -163,12 +163,13 @@ class LegModels:
 
     def is_of_file(self, state: TorqueState) -> bool:
         """Whether the commissioned leg is that of the mechanism file, or of the identified parameters."""
-        return self.misfit(state) < (_UNLIKE_ON_GROUND if _has_shape(state) else identification.UNLIKE_FILE)
+        is_shape = state.is_loaded and state.rounds >= ROUNDS
+        return self.misfit(state) < (_UNLIKE_ON_GROUND if is_shape else identification.UNLIKE_FILE)
 
     def is_sure(self, state: TorqueState) -> bool:
         """Whether a clearance may be corrected: the leg is known, and its drive passes enough."""
-        is_known = self.is_of_file(state) and (_has_shape(state) or self.misfit(state) < CORRECTED_TO)
-        return is_known and not state.is_narrow
+        is_near = self.misfit(state) < CORRECTED_TO or (state.is_loaded and state.rounds >= ROUNDS)
+        return self.is_of_file(state) and is_near and not state.is_narrow
 
     def _of(self, state: TorqueState) -> _ModelsOfState:
         """Models of a state: kept ones if its reference, sensor and baseline are the same, or new ones."""
@@ -452,7 +453,7 @@ class References:
         A single leg among `legs` is one under a load: then the force is found again, or is final.
         """
         state.is_identifying = False
-        _turn_to(state, legs.profile)
+        state.turn_towards(legs.profile)
         if state.commissioned is not None and len(legs.torque_nm) == 1:
             if state.load_rounds < LOAD_ROUNDS:
                 self._begin_under_load(state, legs, depth)
@@ -472,7 +473,7 @@ class References:
         A reference with identified parameters must explain the leg at least as well as the former one;
         otherwise the former one stays, and the identification ends.
         """
-        _turn_to(state, reference.profile)
+        state.turn_towards(reference.profile)
         before, misfit_before = state.reference, self._models.misfit(state)
         if before is None or not before.profile.is_like(reference.profile):
             _start_at_cadence(state, reference)
@@ -495,13 +496,6 @@ class References:
         # other cadences may use the identified parameters; if none does, they are withdrawn
         if all(one.reference.parameters != state.parameters for one in state.set_aside):
             state.parameters = before.parameters
-
-
-def _turn_to(state: TorqueState, profile: CrankProfile) -> None:
-    """Make the cadence that was simulated the present one: the leg may walk at another one by now."""
-    other = state.at(profile)
-    if other is not None and not (state.reference and state.reference.profile.is_like(profile)):
-        state.turn_to(other)
 
 
 def _start_at_cadence(state: TorqueState, reference: TorqueReference) -> None:
@@ -530,9 +524,3 @@ def _abandon(state: TorqueState) -> None:
         state.has_failed = True
     else:
         state.is_identifying, state.parameters, state.rounds = False, state.reference.parameters, ROUNDS
-
-
-def _has_shape(state: TorqueState) -> bool:
-    """Whether what is left over may be the shape of a force under which the leg was identified."""
-    is_loaded = state.reference is not None and state.reference.parameters.load.size > 0
-    return is_loaded and state.rounds >= ROUNDS

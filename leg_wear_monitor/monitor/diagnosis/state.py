@@ -417,6 +417,11 @@ class TorqueState:
         return temperature_of((self.cycles or self.waiting)[-LAST_CYCLES:])
 
     @property
+    def is_loaded(self) -> bool:
+        """Whether the reference walks on the ground."""
+        return self.reference is not None and self.reference.parameters.load.size > 0
+
+    @property
     def is_narrow(self) -> bool:
         """Whether the drive passes too little of the torque to tell the joints apart surely."""
         one = self.sensor
@@ -449,6 +454,12 @@ class TorqueState:
         self.set_aside = tuple(each for each in self.known if each is not one)[: CADENCES - 1]
         self.reference, self.sensor, self.commissioned = one.reference, one.sensor, one.commissioned
         self.cycles, self.is_final, self.fit_due = one.cycles, one.is_final, 0
+
+    def turn_towards(self, profile: CrankProfile) -> None:
+        """Make the cadence that was simulated the present one: the leg may walk at another one by now."""
+        other = self.at(profile)
+        if other is not None and not (self.reference and self.reference.profile.is_like(profile)):
+            self.turn_to(other)
 
     def take_baseline(self, speed: float) -> CommissionedTorque | None:
         """The baseline of the sensor at a speed of the crank, which is not among the others any more.

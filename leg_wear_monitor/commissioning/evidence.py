@@ -43,14 +43,12 @@ _SHOWS_HZ, _OF_RATE = 70.0, 0.4
 
 @attrs.frozen
 class LowPass:
-    """A low-pass between a leg's torque and its samples.
+    """A first-order low-pass between a leg's torque and its samples.
 
     Attributes
     ----------
     time_constant_s : float
-        Time by which it delays slow changes; 0 where none shows, NaN where it cannot be told.
-    bandwidth_hz : float
-        Corner frequency; NaN where none shows.
+        0 where none shows; NaN where it cannot be told.
     log_sigma : float
         Standard deviation of its logarithm.
     square : float
@@ -60,7 +58,6 @@ class LowPass:
     """
 
     time_constant_s: float
-    bandwidth_hz: float
     log_sigma: float
     square: float
     least_hz: float
@@ -69,6 +66,11 @@ class LowPass:
     def is_told(self) -> bool:
         """Whether the recording tells if there is one."""
         return math.isfinite(self.time_constant_s)
+
+    @property
+    def bandwidth_hz(self) -> float:
+        """Corner frequency [Hz]; NaN where none shows."""
+        return 1.0 / (TURN * self.time_constant_s) if self.time_constant_s else math.nan
 
 
 def low_pass_of(walk: Walk, reference: TorqueReference) -> LowPass | None:
@@ -88,13 +90,12 @@ def low_pass_of(walk: Walk, reference: TorqueReference) -> LowPass | None:
     found = channel_of(reference, with_noise_of(reference, walk.sensor, mean), mean, columns)
     one = found.channel
     least_hz = min(_SHOWS_HZ, _OF_RATE / walk.sensor.period_s)
-    shows = 0.99 * one.bandwidth_hz < least_hz
+    shows = TURN * one.time_constant_s * least_hz > 0.99
     # a direct channel is what is taken where no other one is surely better
-    is_told = found.square <= _POOR and bool(one.delay_s or one.low_pass_s)
+    is_told = found.square <= _POOR and bool(one.delay_s or one.time_constant_s)
     log_sigma = _SPREAD + _BY_SQUARE * found.square
-    time_constant_s = (one.low_pass_s if shows else 0.0) if is_told else math.nan
-    bandwidth_hz = one.bandwidth_hz if shows and is_told else math.nan
-    return LowPass(time_constant_s, bandwidth_hz, log_sigma, found.square, least_hz)
+    time_constant_s = one.time_constant_s if shows else 0.0
+    return LowPass(time_constant_s if is_told else math.nan, log_sigma, found.square, least_hz)
 
 
 def low_pass_time(found: LowPass | None, declared: DriveFigures) -> tuple[float, float]:

@@ -43,7 +43,7 @@ _CHANNEL_IMPROVEMENT = 0.3
 # Another low-pass than one of first order has to lower the mean square by this much. With masses 4 % off and
 # a worn joint, a second order does by 0.17 to 1.8 behind Butterworth's and means over 20 to 40 ms (24 of 25,
 # one 0.05), by at most 0.04 behind low-passes of first order and lags (n = 20).
-_IMPROVEMENT = 0.1
+_IMPROVEMENT = 0.05
 _SECOND_ORDER = 0.3  # the first that is tried
 _MEANS_S = (0.01, 0.015, 0.02, 0.025, 0.03, 0.035, 0.04, 0.05)  # tried, as late as the best of first order
 
@@ -131,7 +131,8 @@ def channel_of(
     known within tolerances, and a leg on the ground under an unknown load, whose first harmonics say nothing.
     """
     variance = np.repeat([_MEAN_SIGMA * sensor.size_nm, _ROUGHNESS_SIGMA], sensor.phases) ** 2
-    if len(reference.torque_nm) == 1:  # what clearances change is not simulated: mostly, they shift phases
+    is_alone = len(reference.torque_nm) == 1
+    if is_alone:  # what clearances change is not simulated: mostly, they shift phases
         variance += np.square(PHASE_ERROR_RAD * _slopes(measured, sensor))
     tolerances = [
         max(_SPREADS[one.cause], _SPREAD_FACTOR * one.spread) * one.column
@@ -162,7 +163,10 @@ def channel_of(
         low_pass = attrs.evolve(channel, delay_s=0.0)
         return _delayed(filtered(low_pass), float(phases_per_s * channel.delay_s))
 
-    fits = [_best_channel(residual, clearances, each, time_constants_s) for each in (in_air, on_ground)]
+    fits = [
+        _best_channel(residual, clearances, each, time_constants_s, first_order=is_alone)
+        for each in (in_air, on_ground)
+    ]
     return min(fits, key=lambda fit: fit.misfit)
 
 
@@ -234,6 +238,8 @@ def _best_channel(
     clearances: Callable[[Channel], Floats],
     hypothesis: _Hypothesis,
     time_constants_s: Sequence[float],
+    *,
+    first_order: bool,
 ) -> ChannelFit:
     """The channel with the least residual; none unless one is clearly better.
 
@@ -245,6 +251,8 @@ def _best_channel(
     hypothesis : _Hypothesis
     time_constants_s : sequence of float
         Of the low-passes to try; without 0, a low-pass is declared.
+    first_order : bool
+        Whether no others are tried: impacts tell them apart, of clearances as they are.
     """
 
     def fit_of(near: Channel) -> ChannelFit:
@@ -271,21 +279,19 @@ def _best_channel(
         nearer = [attrs.evolve(low_pass, delay_s=near_s + step_s) for step_s in (-_STEP_S, _STEP_S)]
         others += [best, *map(fit_of, nearer)]
     is_declared, near = 0.0 not in time_constants_s, least(others).channel
-    if is_declared or near.time_constant_s == 0.0:
-        other = _refined(fit_of, near, "delay_s")
-    else:
-        other = _refined(fit_of, near, "delay_s", "time_constant_s")
-        # of second order, or a mean, if that is clearly better
+    free = ("delay_s",) if is_declared or not near.time_constant_s else ("delay_s", "time_constant_s")
+    other = _refined(fit_of, near, *free)
+    if len(free) == 2 and not first_order:  # of second order, or a mean, if that is clearly better
         late_s = other.channel.lateness_s
         second = attrs.evolve(other.channel, second_order=_SECOND_ORDER)
-        mean = least(fit_of(Channel(delay_s=late_s - 0.5 * one, mean_s=one)) for one in _MEANS_S).channel
-        better = least(
-            (
-                _refined(fit_of, second, "delay_s", "time_constant_s", "second_order"),
-                _refined(fit_of, mean, "delay_s", "mean_s"),
-            )
-        )
-        other = better if other.square - better.square > _IMPROVEMENT else other
+        means = [Channel(delay_s=late_s - 0.5 * one, mean_s=one) for one in _MEANS_S]
+        mean = least(map(fit_of, means)).channel
+        better = [
+            _refined(fit_of, second, *free, "second_order"),
+            _refined(fit_of, mean, "delay_s", "mean_s"),
+        ]
+        if other.square - least(better).square > _IMPROVEMENT:
+            other = least(better)
     return other if is_declared or other.square < direct.square - _CHANNEL_IMPROVEMENT else direct
 
 

@@ -1,8 +1,10 @@
 """Sections of the parameters: drive, forecast."""
 
+from typing import Any
+
 import attrs
 
-from leg_wear_monitor.configuration import described, quantity
+from leg_wear_monitor.configuration import FieldError, described, quantity
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.estimate.drive import DriveFigures
 from leg_wear_monitor.mechanism.sourced import LIBRARY, Drive, load_drive
@@ -74,7 +76,8 @@ def drive_figures(parameters: DriveParameters, source: str = "parameters") -> Dr
     Raises
     ------
     ConfigError
-        If there is no drive of this name, with the nearest name, or if its file has a fault.
+        If there is no drive of this name, with the nearest name, if its file has a fault, or if a figure of
+        it is at the crank beyond the bounds of the parameter that overrides it.
     """
     figures = DriveFigures()
     if parameters.type:
@@ -83,7 +86,13 @@ def drive_figures(parameters: DriveParameters, source: str = "parameters") -> Dr
             raise ConfigError(source, "drive.type", f"{parameters.type!r}: {fault}")
         figures = _of_file(load_drive(parameters.type), parameters.gear_ratio)
     given = {name: getattr(parameters, name) for name in attrs.asdict(figures)}
-    return attrs.evolve(figures, **{name: value for name, value in given.items() if value != NOT_DECLARED})
+    figures = attrs.evolve(figures, **{name: value for name, value in given.items() if value != NOT_DECLARED})
+    at_crank: dict[str, Any] = dict(figures.declared)
+    try:
+        attrs.evolve(parameters, **at_crank)
+    except FieldError as error:
+        raise ConfigError(source, "drive.type", f"{parameters.type!r} gives at the crank {error}") from None
+    return figures
 
 
 def _of_file(drive: Drive, output_turns: float) -> DriveFigures:

@@ -102,6 +102,32 @@ def test_a_fault_of_a_file_names_its_key(tmp_path: Path, wrong: str, said: str) 
     assert str(caught.value).startswith(f"{file}: {said}")
 
 
+@pytest.mark.parametrize(
+    ("figure", "said"),
+    [
+        (
+            "lag: {value: 4, unit: s, source: a, conditions: b}",
+            "lag_s: 4.0 is not at most 1 s",
+        ),
+        ("coulomb: {value: 2, unit: N m, source: a, conditions: b}", "coulomb_nm: 2000000.0 is not"),
+        ('load_friction: {value: 0.95, unit: "1", source: a, conditions: b}', "load_friction: 0.95 is not"),
+    ],
+)
+def test_a_figure_of_a_file_has_the_bounds_of_the_number_that_overrides_it(
+    tmp_path: Path, figure: str, said: str
+) -> None:
+    """It was taken as it is: a lag of 4 s, which was meant in ms."""
+    file = tmp_path / "own.yaml"
+    gear = 'gear_ratio: {value: 1000, unit: "1", source: a, conditions: b}'
+    file.write_text(f"name: own\ntitle: a\nshaft: motor\n{gear}\n{figure}\n", encoding="utf-8")
+    with pytest.raises(ConfigError) as caught:
+        declared(type=str(file), gear_ratio=1000.0)
+    assert str(caught.value).startswith(f"leg.yaml: drive.type: '{file}' gives at the crank {said}")
+    own = {"lag_s": 0.004, "coulomb_nm": 2.0, "load_friction": 0.1}
+    name = next(name for name in own if said.startswith(name))
+    assert declared(type=str(file), gear_ratio=1000.0, **{name: own[name]}) == {name: own[name]}
+
+
 def test_a_fault_ends_the_start_of_whatever_reads_the_parameters() -> None:
     config = config_from({"drive.type": "ak80"}, "leg.yaml")
     with pytest.raises(ConfigError, match=r"drive.type: 'ak80': no drive .* did you mean ak80-9\?"):

@@ -160,7 +160,7 @@ def wrenches(
 
 
 def dynamic_joint_states(
-    stamp_ns: ArrayLike, interfaces: Mapping[str, Mapping[str, ArrayLike]]
+    stamp_ns: ArrayLike, interfaces: Mapping[str, Mapping[str, ArrayLike]], *, frame_id: str = ""
 ) -> NDArray[np.uint8]:
     """Messages of control_msgs/DynamicJointState.
 
@@ -170,6 +170,7 @@ def dynamic_joint_states(
         Stamps of the headers [ns].
     interfaces : dict
         Values (n,) by the names of joints and their interfaces.
+    frame_id : str
 
     Returns
     -------
@@ -178,7 +179,7 @@ def dynamic_joint_states(
     """
     stamps = np.atleast_1d(np.asarray(stamp_ns, np.int64))
     layout = Layout()
-    layout.header(stamps, "")
+    layout.header(stamps, frame_id)
     layout.count(len(interfaces))
     for joint in interfaces:
         layout.text(joint)

@@ -229,7 +229,6 @@ def need_rclpy() -> None:
     """Raise LegWearError where ROS is not installed, or not found."""
     try:
         import_module("rclpy")
-        import_module("rclpy.node")  # of an incomplete installation, `rclpy` alone can be imported
     except ImportError as error:
         raise LegWearError(
             f"rclpy: {error}; source a ROS 2 installation, or pip install 'leg_wear_monitor[ros]'"

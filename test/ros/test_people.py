@@ -1,8 +1,6 @@
 """What people ask of a running monitor: alarms acknowledged, parts replaced."""
 
-import sys
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
@@ -100,14 +98,6 @@ def test_what_a_node_did_not_store_is_a_finding(verb, monkeypatch) -> None:
     monkeypatch.setattr(common, "trigger", lambda *_: reply)
     done = CliRunner().invoke(cli, [*verb, "--node", ME])
     assert (done.exit_code, done.stdout) == (1, f"{reply}\n")
-
-
-@pytest.mark.plain
-def test_an_incomplete_rclpy_is_told_in_one_line(monkeypatch) -> None:
-    monkeypatch.delitem(sys.modules, "rclpy.node")
-    monkeypatch.setitem(sys.modules, "rclpy", ModuleType("rclpy"))
-    with pytest.raises(LegWearError, match=r"rclpy: No module named 'rclpy\.node'"):
-        common.need_rclpy()
 
 
 @pytest.mark.plain

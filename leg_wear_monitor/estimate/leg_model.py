@@ -5,7 +5,14 @@ import numpy as np
 
 from leg_wear_monitor.estimate.body_torques import body_torques
 from leg_wear_monitor.estimate.cause import Cause
-from leg_wear_monitor.estimate.explanations import Baseline, Explainer, LeftOut, Nuisance, OtherChannel
+from leg_wear_monitor.estimate.explanations import (
+    MODEL_ERROR,
+    Baseline,
+    Explainer,
+    LeftOut,
+    Nuisance,
+    OtherChannel,
+)
 from leg_wear_monitor.estimate.signature import (
     CommissionedTorque,
     SimulatedSensor,
@@ -208,8 +215,13 @@ def explainer_of(
     reference: TorqueReference,
     sensor: TorqueSensor,
     commissioned: CommissionedTorque | None,
+    corrected_m: Floats | None = None,
 ) -> Explainer:
-    """What explains changes of a leg, measured by a sensor whose noise is known."""
+    """What explains changes of a leg, measured by a sensor whose noise is known.
+
+    With clearances (k,) [m] that were corrected since the baseline, that is what its signatures had in
+    addition to those of the model, and a fifth of what was corrected is uncertain.
+    """
     model = signature_model(reference, sensor)
     found, joints = nuisances(mechanism, reference, sensor), mechanism.clearance_joints
     if commissioned is None:
@@ -220,5 +232,9 @@ def explainer_of(
         covariance = with_scatter_of(model.covariance, commissioned.signatures)
         model = attrs.evolve(model, covariance=covariance)
         baseline = commissioned_baseline(commissioned, expected, covariance, left_out, model.places)
+        if corrected_m is not None:
+            error = MODEL_ERROR * (model.at(corrected_m)[0] - expected)
+            covariance = baseline.covariance + np.diag(np.square(error))
+            baseline = attrs.evolve(baseline, offset=commissioned.mean, covariance=covariance)
     fresh_m = np.array([mechanism.clearances[joint].radial_clearance for joint in joints])
     return Explainer(model, joints, baseline, found, other_channels(reference, sensor), fresh_m)

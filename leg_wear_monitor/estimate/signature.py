@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.estimate.drive import DIRECT, Channel
-from leg_wear_monitor.mechanism.arrays import Floats, Ints
+from leg_wear_monitor.mechanism.arrays import Flags, Floats, Ints
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.reference import POINTS
@@ -580,6 +580,9 @@ class CommissionedTorque:
         Number of its samples that were averaged into one.
     is_instant : bool
         As of `TorqueSensor`.
+    before : CommissionedTorque or None
+        Before a correction: what signatures had in addition to those of the model. The other joints are still
+        to be compared with it.
     """
 
     stamp_ns: int
@@ -592,6 +595,7 @@ class CommissionedTorque:
     period_s: float = math.nan
     together: int = 1
     is_instant: bool = False
+    before: "CommissionedTorque | None" = None
 
     @sigma_m.default
     def _as_counted(self) -> Floats:
@@ -601,6 +605,11 @@ class CommissionedTorque:
     def is_as_counted(self) -> bool:
         """Whether the clearances were the counted ones, not corrected."""
         return not self.sigma_m.any()
+
+    @property
+    def is_unknown(self) -> Flags:
+        """Whether each clearance (k,) is unknown: another was corrected, and it may have opened, too."""
+        return np.asarray(self.sigma_m >= self.clearance_m)
 
     @property
     def cycles(self) -> int:

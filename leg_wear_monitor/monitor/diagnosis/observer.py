@@ -23,6 +23,7 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.sections import drive_figures
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.evidence import (
+    CORRECTED_FROM,
     SETTLING_CYCLES,
     Evidence,
     doubt,
@@ -59,10 +60,6 @@ from leg_wear_monitor.twin.torque_reference import ReferenceSnapshot, TorqueRefe
 # Counted clearances that are surely wrong, and what becomes of the evidence when they are corrected.
 
 
-# of the counted clearance: smaller openings are named wrongly where masses are 5 % off (diagnosis.md)
-CORRECTED_FROM = 1.3
-
-
 class Correction(NamedTuple):
     """A counted clearance that is surely wrong: joint index, its clearance [m], and the change behind it."""
 
@@ -84,18 +81,21 @@ def correction_of(state: TorqueState, joints: Sequence[str]) -> Correction | Non
     return Correction(joints.index(change.subject), change.value, change)
 
 
-def settle(state: TorqueState, correction: Correction, counted_m: Floats) -> None:
+def settle(state: TorqueState, correction: Correction, counted_m: Floats, offset: Floats) -> None:
     """Make the gait cycles since a change those of the commissioned leg, with clearances (k,) [m].
 
     What the correction is off does then not look like a further change; it stays in the standard deviation.
-    Where other joints may have changed with it, theirs are not known any more.
+    Nor does what other joints changed at the same time: theirs are not known until they are compared with the
+    baseline before, which had an offset (F,) from its model (`Evidence.compare_with_before`).
     """
     joint, _, change = correction
     state.cycles = tuple(cycle for cycle in state.cycles if cycle.begin_ns >= change.since_ns)
     signatures, before = state.signatures, state.commissioned
-    sigma_m = before.sigma_m if before else np.zeros(len(counted_m))
-    sigma_m = np.maximum(sigma_m, 0.0 if state.fit is None or state.fit.explains else counted_m)
+    sigma_m = counted_m.copy()
     sigma_m[joint] = change.sigma
+    if before is not None:
+        signatures_before = before.signatures - before.mean + offset
+        before = before.before or attrs.evolve(before, signatures=signatures_before)
     state.forget_baselines()
     state.commissioned = CommissionedTorque(
         state.cycles[-1].end_ns,
@@ -105,6 +105,7 @@ def settle(state: TorqueState, correction: Correction, counted_m: Floats) -> Non
         before.channel if before else DIRECT,
         state.profile.speed,
         temperature_of(state.cycles),
+        before=before,
     )
     if state.sensor is not None:
         state.commissioned = state.commissioned.measured_by(state.sensor)
@@ -257,12 +258,20 @@ class TorqueObserver(KeepsSamples):
             self._evidence.review(state, self.config)
         if not ended or not self.config.diagnosis.correct or self._references.is_to_identify(state):
             return None
-        return correction_of(state, self._joints) if self.models.is_sure(state) else None
+        if not self.models.is_sure(state):
+            return None
+        return correction_of(state, self._joints) or self._opened_with_it()
+
+    def _opened_with_it(self) -> Correction | None:
+        """Another joint that opened with the one that was corrected."""
+        change = self._evidence.compare_with_before(self.state)
+        return Correction(self._joints.index(change.subject), change.value, change) if change else None
 
     def corrected(self, correction: Correction, counted_m: Floats) -> None:
         """Compare with the corrected clearances (k,) [m] from now on."""
         counted_m = np.asarray(counted_m, float).copy()
-        settle(self.state, correction, counted_m)
+        state = self.state
+        settle(state, correction, counted_m, self.models.explainer(state).baseline.offset)
         self._restart(counted_m)
 
     def replaced(self, counted_m: Floats) -> None:

@@ -97,6 +97,18 @@ class LegModels:
         """Possible explanations of the measured torque: other clearances and other causes."""
         return self._of(state).explainer
 
+    def explainer_before(self, state: TorqueState) -> Explainer | None:
+        """Possible explanations of what a corrected leg shows beside the baseline before the correction.
+
+        None without that baseline, or before there is a reference about the corrected clearances.
+        """
+        known, reference, sensor = state.commissioned, state.reference, state.sensor
+        if known is None or known.before is None or reference is None or sensor is None:
+            return None
+        if _is_far(reference, state.counted_m) or not known.before.is_of(sensor):
+            return None
+        return explainer_of(self._mechanism, reference, sensor, known.before, state.counted_m)
+
     def explained(self, state: TorqueState) -> ExplainedTorque | None:
         """What the estimate rests on; None without one."""
         if state.fit is None or not state.cycles:

@@ -354,7 +354,8 @@ def _vertex(x: Floats, y: Floats, best: int) -> tuple[float, float]:
 def change_of(explanations: Sequence[Explanation], since_ns: int) -> Change | None:
     """The change that explanations, the best first, amount to; None where the leg may be as counted.
 
-    Of many causes one always explains a bit more than none.
+    Of many causes one always explains a bit more than none. Where even the best one explains badly, as for
+    two joints that opened at once, it has to be as much better than the next: by the square of Birge's ratio.
     """
     best = explanations[0]
     nothing = next(one for one in explanations if one.cause is Cause.UNKNOWN)
@@ -377,5 +378,5 @@ def change_of(explanations: Sequence[Explanation], since_ns: int) -> Change | No
         counted=best.counted,
         log_odds=log_odds,
         runner_up="as counted" if second is nothing else runner_up,
-        runner_up_log_odds=0.5 * (second.misfit - best.misfit),
+        runner_up_log_odds=0.5 * (second.misfit - best.misfit) / max(1.0, best.square),
     )

@@ -9,6 +9,7 @@ from leg_wear_monitor.estimate.clearance_fit import best_fit, fit_clearances, st
 from leg_wear_monitor.estimate.explanations import (
     Baseline,
     Explainer,
+    Explanation,
     Misfits,
     Nuisance,
     OtherChannel,
@@ -154,6 +155,24 @@ def test_a_name_is_sure_only_where_no_other_joint_explains_nearly_as_much() -> N
     for odds, is_sure in ((7.0, False), (14.8, True)):  # G open behind twice the friction; B open there
         other = attrs.evolve(one, runner_up="clearance G", runner_up_log_odds=odds)
         assert other.is_sure is is_sure
+
+
+@pytest.mark.parametrize(("square", "is_sure"), [(1.5, True), (5.9, False)])
+def test_a_name_is_less_sure_where_even_the_best_cause_explains_badly(square: float, is_sure: bool) -> None:
+    """G and I at 0.60 mm behind a low-pass: I, *stop* at 1.48 mm, 38.8 before G, with a mean square of 5.9."""
+
+    def of(cause: Cause, subject: str, misfit: float, square: float) -> Explanation:
+        return Explanation(
+            cause=cause, subject=subject, value=1e-3, sigma=1e-4, counted=3e-4, misfit=misfit, square=square
+        )
+
+    found = [
+        of(Cause.CLEARANCE, "I", 0.0, square),
+        of(Cause.CLEARANCE, "G", 2.0 * 38.8, square + 0.6),
+        of(Cause.UNKNOWN, "", 4000.0, 60.0),
+    ]
+    change = change_of(found, 5)
+    assert (change.subject, change.is_sure) == ("I", is_sure)
 
 
 def test_a_leg_as_counted_has_no_change(explainer) -> None:

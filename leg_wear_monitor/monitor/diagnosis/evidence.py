@@ -252,7 +252,7 @@ class Evidence:
         number = config.alarms.on_delay_cycles
         least_m = state.fit.clearance_m - SURE_SIGMAS * state.fit.sigma_m
         is_enough = state.fit_cycles >= SETTLING_CYCLES
-        if change is not None and change.cause is Cause.CLEARANCE:
+        if change is not None and change.is_sure:
             k = self._models.explainer(state).joints.index(change.subject)
             least_m[k] = max(least_m[k], change.value - SURE_SIGMAS * change.sigma)
             is_enough |= change.log_odds >= _FAR_BEYOND * self._models.detector(state, config).threshold

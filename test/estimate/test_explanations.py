@@ -159,7 +159,7 @@ def test_a_name_is_sure_only_where_no_other_joint_explains_nearly_as_much() -> N
 
 @pytest.mark.parametrize(("square", "is_sure"), [(1.5, True), (5.9, False)])
 def test_a_name_is_less_sure_where_even_the_best_cause_explains_badly(square: float, is_sure: bool) -> None:
-    """G and I at 0.60 mm behind a low-pass: I, *stop* at 1.48 mm, 38.8 before G, with a mean square of 5.9."""
+    """G and I at 0.60 mm behind a low-pass: I, *stop* at 1.48 mm, 38.8 before G, mean square 5.9."""
 
     def of(cause: Cause, subject: str, misfit: float, square: float) -> Explanation:
         return Explanation(

@@ -259,9 +259,16 @@ class Parts:
 
     @property
     def unmeasured(self) -> frozenset[str]:
-        """Alarms of the drive torque, if none came in the last gait cycle."""
+        """Alarms of the drive torque, if none came in the last gait cycle, or of what nothing shows now."""
         last = self.state.last
-        return alarm_specs.OF_TORQUE if last and not last.torque_samples else frozenset()
+        is_gone = last is not None and not last.torque_samples
+        silent = {
+            "torque": is_gone or self.torque is None or self.is_torque_wrong,
+            "encoders": self.encoders is None,
+        }
+        alarms = self.evaluation.board.alarms.values()
+        shown = frozenset(alarm.name for alarm in alarms if silent.get(alarm.cause))
+        return alarm_specs.OF_TORQUE | shown if is_gone else shown
 
     @property
     def observers(self) -> tuple[Any, ...]:

@@ -284,11 +284,12 @@ def alarm_value(joint: JointSituation, alarm: Alarm) -> KnownClearance | None:
 
     A counted clearance is evaluated once a gait cycle instead, unless the alarm is held by another source.
     """
-    known, sure = judged(joint), surely_at(joint.limit_m, joint.seen)
+    known, sure, shown = judged(joint), surely_at(joint.limit_m, joint.seen), surest(joint.seen)
     if sure is not None and sure.clearance_m > known.clearance_m:
         return sure
-    # what the torque said, only the torque takes back: a new run shows nothing for a while
-    if is_held(alarm, SEEN) and is_overruled(joint, alarm) and not joint.seen:
+    # what the torque surely showed, it surely takes back: a new run shows nothing for a while
+    is_back = shown is not None and is_surely_below(joint.limit_m, shown.clearance_m, shown.sigma_m)
+    if is_held(alarm, SEEN) and known.clearance_m < joint.limit_m and not is_back:
         return None
     return None if known.by == COUNTED and not is_held(alarm) else known
 

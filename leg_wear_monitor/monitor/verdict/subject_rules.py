@@ -207,7 +207,8 @@ def _seen_hit(each: JointSituation, alarm: Alarm | None, seen: KnownClearance, s
     """A joint at its limit by an estimate: by the present one, or by the one that the alarm keeps."""
     raised_ns = alarm.raised_ns if alarm is not None and alarm.level is Level.ERROR else 0
     is_present = seen in each.seen
-    past = "" if is_present else f" (since {time_words(raised_ns)}; not shown now)"
+    seen_to = ", acknowledged" if alarm is not None and alarm.acknowledged else ""
+    past = "" if is_present else f" (since {time_words(raised_ns)}{seen_to}; not shown now)"
     if each.measured is not None:
         past += f"; {each.measured.words} was measured"
     return Hit(

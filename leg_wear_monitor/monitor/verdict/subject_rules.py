@@ -274,7 +274,7 @@ def _clearance_hit(change: Change, situation: Situation, addition: str = "") -> 
     """A changed clearance in words, with an addition and with what somebody measured at that joint."""
     own = (each.measured for each in situation.joints if each.joint == change.subject)
     measured = next(own, None)
-    if measured is not None:
+    if measured is not None and measured.words not in addition:
         addition += f"; {measured.words} was measured"
     return Hit(
         words={"change": f"{words_of(change, situation)}{addition}"},

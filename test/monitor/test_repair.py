@@ -99,7 +99,7 @@ def test_after_a_restart_a_stop_that_is_acknowledged_stays_until_the_torque_show
     walker.walks(WAITING)
     cleared, kept = walker.monitor.acknowledge(START_NS)
     assert (cleared, [one.name for one in kept if one.kind == "clearance"]) == ((), ["clearance G"])
-    assert walker.walks(WAITING) + walker.walks(shown(5.5e-4, 1e-4)) == []
+    assert walker.walks(WAITING) + walker.walks(shown(6.5e-4, 1e-4)) == []
     assert walker.verdict.fault_code == "CLEARANCE_SEEN_G"
     walker.walks(shown(3.1e-4, 2e-5))
     assert (walker.alarms, walker.verdict.state is State.STOP) == ([], False)

@@ -334,9 +334,16 @@ def _fault_of_torque(situation: Situation) -> str:
 
 
 def not_compared(situation: Situation) -> Sequence[Hit]:
-    """There is a drive torque, but not yet enough of it to be compared."""
-    is_known = not situation.has_torque or not math.isnan(situation.mismatch)
-    return [] if is_known or not situation.has_cycle or not situation.unobserved else [Hit()]
+    """There is a drive torque, but not yet enough of it to be compared, or to raise the mismatch."""
+    if not situation.has_torque or not situation.has_cycle:
+        return []
+    for alarm in situation.alarms:
+        if alarm.kind == "torque_mismatch" and alarm.level is Level.OK and alarm.beyond[1]:
+            hit = hit_of(alarm, situation)
+            told = ": {value} of the predicted RMS is not explained (limit {limit})".format(**hit.words)
+            return [attrs.evolve(hit, words={"causes": told})]
+    is_known = not math.isnan(situation.mismatch) or not situation.unobserved
+    return [] if is_known else [Hit(words={"causes": ""})]
 
 
 def not_observed(situation: Situation) -> Sequence[Hit]:

@@ -160,7 +160,7 @@ class Accounting:
         self._before = entry.totals if entry else {}
         self._kept_s = self._before.get("moving_s", 0.0)
         self.state = AccountingState(
-            int(self._before.get("cycles", 0)),
+            self.cycles_before,
             (PartLife(),) * len(twin.clearance_joints),
             point_due_s=self._before.get(_DUE_KEY, 0.0),
         )
@@ -184,6 +184,11 @@ class Accounting:
             wear.replaced_ns,
             wear.sampling_m2 - float(self._run_sampling_m2[k]),
         )
+
+    @property
+    def cycles_before(self) -> int:
+        """Gait cycles of the leg before this run."""
+        return int(self._before.get("cycles", 0))
 
     @property
     def unmonitored_s(self) -> float:

@@ -36,6 +36,8 @@ class Limit:
         Whether the limits are lower bounds: values below them are faults.
     is_latched : bool
         Whether a level that was shown stays until it is acknowledged.
+    far : float
+        A value beyond so many times a limit raises the level at once.
     """
 
     warn: float
@@ -44,6 +46,7 @@ class Limit:
     on_delay: int = 1
     is_least: bool = False
     is_latched: bool = True
+    far: float = math.inf
 
     def times(self, factor: float) -> "Limit":
         """The limits, multiplied."""
@@ -53,6 +56,11 @@ class Limit:
         """Whether a value is at the limit of WARN or ERROR, or beyond it."""
         limit = self.error if level is Level.ERROR else self.warn
         return value <= limit if self.is_least else value >= limit
+
+    def is_far(self, value: float, level: Level) -> bool:
+        """Whether a value is so far beyond the limit of WARN or ERROR that it raises the level at once."""
+        limit = self.error if level is Level.ERROR else self.warn
+        return not self.is_least and value > self.far * limit
 
     def leaves(self, value: float, level: Level) -> bool:
         """Whether a value is back from the limit of WARN or ERROR by more than the deadband."""
@@ -135,7 +143,7 @@ def next_level(
         Gait cycles the value stands for.
     """
     beyond_warn, beyond_error = (
-        before + cycles if limit.reaches(value, at) else 0
+        before + (limit.on_delay if limit.is_far(value, at) else cycles) if limit.reaches(value, at) else 0
         for before, at in zip(beyond, (Level.WARN, Level.ERROR), strict=True)
     )
     beyond = (beyond_warn, beyond_error)

@@ -156,6 +156,8 @@ def observe_torque(parts: Parts) -> None:
         return
     before = attrs.evolve(torque.state)
     correction = torque.end_period(twin.clearance_mean_m, twin.depth)
+    if correction is not None and parts.contradiction(correction.change):
+        correction = None
     is_wrong = parts.is_torque_wrong
     if not is_wrong:
         _take_parameters(parts, torque.parameters)

@@ -136,7 +136,7 @@ class Acknowledged:
 def acknowledge(parts: Parts, stamp_ns: int) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
     """See `WearMonitor.acknowledge`."""
     cleared, kept = parts.evaluation.board.acknowledge(parts.unmeasured)
-    if parts.unmeasured:
+    if alarm_specs.MISMATCH.name() in parts.unmeasured:
         parts.state.mismatch = NO_MISMATCH
     ledger = parts.accounting.ledger
     has_lost = ledger is not None and ledger.acknowledge_loss()

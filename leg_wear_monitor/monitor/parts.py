@@ -1,5 +1,6 @@
 """The parts of a monitor: their construction, the state that is common to them, and its snapshots."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -8,6 +9,7 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.compiled.kernel import Records
+from leg_wear_monitor.estimate.cause import Cause, Change
 from leg_wear_monitor.estimate.torque_model import torque_model
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials import bushing_of
@@ -39,7 +41,7 @@ from leg_wear_monitor.monitor.inputs import InputGuard
 from leg_wear_monitor.monitor.ledger.entry import Measurement, SimulatedReference
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport
-from leg_wear_monitor.monitor.verdict.verdict import Finding
+from leg_wear_monitor.monitor.verdict.verdict import Finding, estimate
 from leg_wear_monitor.twin.digital_twin import DigitalTwin, TwinSnapshot
 from leg_wear_monitor.twin.reference import LegParameters
 from leg_wear_monitor.twin.sample import GROUND, NO_LOAD, SamplingSettings
@@ -48,6 +50,7 @@ from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 WRONG_TORQUE = "the received drive torque is wrong; see the status `torque`"
 ACCELERATED = "wear is accelerated: clearances grow within the gait cycles that are compared"
+_CONTRADICTS = 3.0  # standard deviations between what the torque shows and what a person measured
 
 
 # The changing state of a monitor, without its ledger.
@@ -230,7 +233,11 @@ class Parts:
             if not self.is_torque_wrong:
                 own = self.twin.parameters
                 return attrs.evolve(
-                    found, bodies=self._counted_bodies(), friction=own.friction, compliance=own.compliance
+                    found,
+                    reason="; ".join(filter(None, (found.reason, *map(self.contradiction, found.changes)))),
+                    bodies=self._counted_bodies(),
+                    friction=own.friction,
+                    compliance=own.compliance,
                 )
             settled = tuple(change for change in found.changes if change.is_corrected)
             return Diagnosis(
@@ -241,6 +248,34 @@ class Parts:
             )
         return Diagnosis(
             reason=ACCELERATED if self.config.diagnosis.enabled else "diagnosis.enabled is false"
+        )
+
+    def contradiction(self, change: Change) -> str:
+        """A measurement of the changed leg that contradicts the change of a clearance; empty without one.
+
+        One from before the change says nothing of it. Before this run, another clock may have stamped it: it
+        is of the changed leg if this run began with that wear, and shows the change since its first gait
+        cycles.
+        """
+        if change.is_corrected or change.cause is not Cause.CLEARANCE:
+            return ""
+        k = self.clearance_joints.index(change.subject)
+        measured, own = self.measured[k], self.accounting
+        if measured is None:
+            return ""
+        begun = own.cycles_before - own.state.parts[k].cycles
+        if measured.cycles > begun:
+            is_since = measured.stamp_ns >= change.since_ns
+        else:
+            kept = self.torque.state.cycles if self.torque else ()
+            is_since = measured.cycles == begun and all(one.begin_ns >= change.since_ns for one in kept)
+        apart_m = abs(measured.clearance_m - change.value)
+        if not is_since or apart_m <= _CONTRADICTS * math.hypot(measured.sigma_m, change.sigma):
+            return ""
+        return (
+            f"the drive torque ({estimate(change.value, change.sigma, 'm')}) and a measurement "
+            f"({estimate(measured.clearance_m, measured.sigma_m, 'm')}) of joint {change.subject} disagree, "
+            "so its counted clearance is not corrected: measure it again"
         )
 
     def _counted_bodies(self) -> tuple[Body, ...]:
@@ -259,9 +294,16 @@ class Parts:
 
     @property
     def unmeasured(self) -> frozenset[str]:
-        """Alarms of the drive torque, if none came in the last gait cycle."""
+        """Alarms of the drive torque, if none came in the last gait cycle, or of what nothing shows now."""
         last = self.state.last
-        return alarm_specs.OF_TORQUE if last and not last.torque_samples else frozenset()
+        is_gone = last is not None and not last.torque_samples
+        silent = {
+            "torque": is_gone or self.torque is None or self.is_torque_wrong,
+            "encoders": self.encoders is None,
+        }
+        alarms = self.evaluation.board.alarms.values()
+        shown = frozenset(alarm.name for alarm in alarms if silent.get(alarm.cause))
+        return alarm_specs.OF_TORQUE | shown if is_gone else shown
 
     @property
     def observers(self) -> tuple[Any, ...]:

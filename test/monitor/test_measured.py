@@ -4,12 +4,16 @@ from contextlib import closing
 from pathlib import Path
 
 import attrs
+import numpy as np
 import pytest
 from told import status_of
 
 from leg_wear_monitor import open_ledger
 from leg_wear_monitor.dashboard.ledger_leg import LedgerLeg
+from leg_wear_monitor.estimate.cause import Cause, Change
 from leg_wear_monitor.monitor.config.settings import Limits
+from leg_wear_monitor.monitor.diagnosis.observer import Correction, TorqueObserver
+from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState, SignedCycle
 from leg_wear_monitor.monitor.forecast.forecast import Answer
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.operators import limit_in
@@ -100,3 +104,54 @@ def test_what_was_measured_between_two_runs_is_judged_with_the_first_samples(beg
     third.update(gait(3.0, begin_s=3.5))
     third.acknowledge(START_NS)
     assert status_of(third, "joint G").level is Level.OK
+
+
+def opened(since_s: float) -> Change:
+    """What the drive torque shows of joint G since some time."""
+    since_ns = START_NS + round(1e9 * since_s)
+    known = {"value": 4.8e-4, "sigma": 3.8e-5, "counted": 3.0e-4, "log_odds": 50.0}
+    return Change(cause=Cause.CLEARANCE, subject="G", since_ns=since_ns, **known)
+
+
+@pytest.mark.parametrize(
+    ("measured_m", "measured_s", "since_s", "first_s", "is_corrected"),
+    [
+        (3.1e-4, 3.0, 2.0, 1.0, False),  # 0.17 mm apart, three standard deviations are 0.13 mm
+        (4.4e-4, 3.0, 2.0, 1.0, True),
+        (3.1e-4, 3.0, 3.5, 1.0, True),  # the joint opened after it was measured
+        (3.1e-4, 0.0, 1.0, 1.0, False),  # measured between two runs, of the leg as it walks in this one
+        (3.1e-4, 0.0, 2.0, 1.0, True),  # as measured in the first gait cycle of this run
+    ],
+)
+def test_what_contradicts_a_measurement_of_the_changed_leg_is_not_corrected(
+    monitor, gait, monkeypatch, measured_m, measured_s, since_s, first_s, is_corrected
+) -> None:
+    torque, change = monitor._parts.torque, opened(since_s)
+    if measured_s:
+        monitor.update(gait(measured_s))
+    monitor.measure("G", measured_m, 2.0e-5, START_NS + round(1e9 * measured_s), "ann")
+    first_ns = START_NS + round(1e9 * first_s)
+    torque.state.cycles = (SignedCycle(first_ns, first_ns + 10**9, np.zeros(1), None),)
+    monkeypatch.setattr(torque, "end_period", lambda *_: Correction(2, change.value, change))
+    monkeypatch.setattr(torque, "corrected", lambda *_: None)
+    monitor.update(gait(1.5, begin_s=measured_s))
+    assert monitor.state.clearances["G"].counted_m == pytest.approx(
+        change.value if is_corrected else 3.0e-4, rel=1e-3
+    )
+
+
+def test_a_measurement_and_a_torque_that_disagree_are_told_with_what_to_do(
+    monitor, gait, monkeypatch
+) -> None:
+    shown = Diagnosis(state=DiagnosisState.CHANGED, changes=(opened(2.0),))
+    monkeypatch.setattr(TorqueObserver, "diagnosis", shown)
+    monitor.update(gait(3.0))
+    words = "joint G disagree, so its counted clearance is not corrected: measure it again"
+    for clearance_m, is_told in ((3.1e-4, True), (4.7e-4, False)):
+        monitor.measure("G", clearance_m, 2.0e-5, START_NS + 3 * 10**9, "ann")
+        for text in (status_of(monitor, "diagnosis").message, monitor.verdict.verdict.why):
+            assert (words in text) == is_told
+    monitor.measure("G", 3.1e-4, 2.0e-5, START_NS + 3 * 10**9, "ann")
+    both = "the drive torque (0.48 mm ± 0.038 mm) and a measurement (0.31 mm ± 0.02 mm) of joint G disagree"
+    assert both in monitor.verdict.verdict.why
+    assert monitor.verdict.verdict.why.count("0.31 mm") == 1

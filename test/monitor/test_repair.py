@@ -90,6 +90,21 @@ def test_a_stop_stays_over_unsure_estimates_and_a_restart_until_it_is_acknowledg
     assert walker.verdict.state.value != "stop"
 
 
+def test_after_a_restart_a_stop_that_is_acknowledged_stays_until_the_torque_shows_the_joint(
+    walker, monkeypatch
+):
+    monkeypatch.setattr(Parts, "unmeasured", frozenset())  # as while the torque is read
+    walker.walks(shown(2.05e-3, 3e-4))
+    walker.restart()
+    walker.walks(WAITING)
+    cleared, kept = walker.monitor.acknowledge(START_NS)
+    assert (cleared, [one.name for one in kept if one.kind == "clearance"]) == ((), ["clearance G"])
+    assert walker.walks(WAITING) + walker.walks(shown(6.5e-4, 1e-4)) == []
+    assert walker.verdict.fault_code == "CLEARANCE_SEEN_G"
+    walker.walks(shown(3.1e-4, 2e-5))
+    assert (walker.alarms, walker.verdict.state is State.STOP) == ([], False)
+
+
 def test_each_gait_cycle_and_each_verdict_has_a_state_of_the_leg_that_says_the_same(walker):
     walker.torque = shown(2.05e-3, 3e-4)
     reports = walker.monitor.update(walker._gait(2.5, begin_s=walker._now_s))

@@ -158,7 +158,7 @@ class Alarms:
     )
     knock_on_delay_cycles: int = quantity(
         "",
-        "on-delay of the alarms that a knock raises: impact forces and torque mismatch",
+        "on-delay of the alarms of impact forces",
         at_least=1,
         at_most=1000,
         default=1,

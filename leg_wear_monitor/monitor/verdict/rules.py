@@ -243,7 +243,7 @@ RULES = (
         code="TORQUE_NOT_COMPARED",
         state=State.WATCH,
         hits=subject_rules.not_compared,
-        why="the comparison of the drive torque needs more gait cycles",
+        why="the comparison of the drive torque needs more gait cycles{causes}",
         do="let the leg walk on",
     ),
     Rule(

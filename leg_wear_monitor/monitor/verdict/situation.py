@@ -284,13 +284,20 @@ def alarm_value(joint: JointSituation, alarm: Alarm) -> KnownClearance | None:
 
     A counted clearance is evaluated once a gait cycle instead, unless the alarm is held by another source.
     """
-    known, sure = judged(joint), surely_at(joint.limit_m, joint.seen)
+    known, sure, shown = judged(joint), surely_at(joint.limit_m, joint.seen), surest(joint.seen)
     if sure is not None and sure.clearance_m > known.clearance_m:
         return sure
     # what the torque said, only the torque takes back: a new run shows nothing for a while
-    if is_held(alarm, SEEN) and is_overruled(joint, alarm) and not joint.seen:
+    is_back = shown is not None and _takes_back(shown, joint.limit_m)
+    if is_held(alarm, SEEN) and known.clearance_m < joint.limit_m and not is_back:
         return None
     return None if known.by == COUNTED and not is_held(alarm) else known
+
+
+def _takes_back(shown: KnownClearance, limit_m: float) -> bool:
+    """Whether an estimate below a limit is sure, or has held as long as one beyond it has to."""
+    is_below = shown.clearance_m < limit_m and math.isfinite(shown.least_m)
+    return is_below or is_surely_below(limit_m, shown.clearance_m, shown.sigma_m)
 
 
 def is_held(alarm: Alarm, by: Sequence[str] = (MEASURED, BOTH, *SEEN)) -> bool:

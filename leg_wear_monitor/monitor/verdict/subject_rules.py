@@ -207,7 +207,8 @@ def _seen_hit(each: JointSituation, alarm: Alarm | None, seen: KnownClearance, s
     """A joint at its limit by an estimate: by the present one, or by the one that the alarm keeps."""
     raised_ns = alarm.raised_ns if alarm is not None and alarm.level is Level.ERROR else 0
     is_present = seen in each.seen
-    past = "" if is_present else f" (since {time_words(raised_ns)}; not shown now)"
+    seen_to = ", acknowledged" if alarm is not None and alarm.acknowledged else ""
+    past = "" if is_present else f" (since {time_words(raised_ns)}{seen_to}; not shown now)"
     if each.measured is not None:
         past += f"; {each.measured.words} was measured"
     return Hit(
@@ -273,7 +274,7 @@ def _clearance_hit(change: Change, situation: Situation, addition: str = "") -> 
     """A changed clearance in words, with an addition and with what somebody measured at that joint."""
     own = (each.measured for each in situation.joints if each.joint == change.subject)
     measured = next(own, None)
-    if measured is not None:
+    if measured is not None and measured.words not in addition:
         addition += f"; {measured.words} was measured"
     return Hit(
         words={"change": f"{words_of(change, situation)}{addition}"},
@@ -333,9 +334,16 @@ def _fault_of_torque(situation: Situation) -> str:
 
 
 def not_compared(situation: Situation) -> Sequence[Hit]:
-    """There is a drive torque, but not yet enough of it to be compared."""
-    is_known = not situation.has_torque or not math.isnan(situation.mismatch)
-    return [] if is_known or not situation.has_cycle or not situation.unobserved else [Hit()]
+    """There is a drive torque, but not yet enough of it to be compared, or to raise the mismatch."""
+    if not situation.has_torque or not situation.has_cycle:
+        return []
+    for alarm in situation.alarms:
+        if alarm.kind == "torque_mismatch" and alarm.level is Level.OK and alarm.beyond[1]:
+            hit = hit_of(alarm, situation)
+            told = ": {value} of the predicted RMS is not explained (limit {limit})".format(**hit.words)
+            return [attrs.evolve(hit, words={"causes": told})]
+    is_known = not math.isnan(situation.mismatch) or not situation.unobserved
+    return [] if is_known else [Hit(words={"causes": ""})]
 
 
 def not_observed(situation: Situation) -> Sequence[Hit]:

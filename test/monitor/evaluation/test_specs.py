@@ -51,6 +51,22 @@ def test_limits_follow_from_the_parameters():
     assert (sources.warn, sources.error, sources.deadband, sources.on_delay) == (2.0, 2.0, 0.0, 1)
 
 
+@pytest.mark.parametrize(
+    ("values", "level"),
+    [
+        ((0.061, 0.087, 0.103, 0.045), Level.OK),  # a healthy leg at 45 rpm, once in 2500 gait cycles
+        ((0.11, 0.12, 0.13), Level.ERROR),
+        ((0.14,), Level.WARN),  # 1.75 times the limit of WARN
+        ((0.16,), Level.ERROR),
+    ],
+)
+def test_a_mismatch_lasts_or_is_far_beyond_its_limit(values, level) -> None:
+    board = AlarmBoard(MonitorConfig(), ("A",))
+    for stamp_ns, value in enumerate(values):
+        board.evaluate({"torque_mismatch": value}, stamp_ns)
+    assert board.alarms["torque_mismatch"].level is level
+
+
 def test_the_limits_of_impact_forces_are_those_of_the_cadence() -> None:
     board = AlarmBoard(
         config_from({"limits.impact_force_n": 1000.0, "alarms.knock_on_delay_cycles": 1}), ("A",)

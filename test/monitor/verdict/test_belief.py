@@ -27,6 +27,7 @@ LIMIT = Limit(0.8 * LIMIT_M, LIMIT_M, 0.05, 3)
 COUNTED = JointSituation(joint="G", counted_m=3.0e-4, limit_m=LIMIT_M, label="knee")
 NEW = Alarm(kind="clearance", subject="G", unit="m")
 BROKEN = KnownClearance("torque", 2.05e-3, 0.65e-3)
+RETURNED = KnownClearance("torque", 3.2e-4, 2.0e-5)
 
 
 def after(alarm: Alarm, *seen: KnownClearance, joint: JointSituation = COUNTED) -> Alarm:
@@ -56,12 +57,25 @@ def test_a_stop_stays_while_the_estimate_comes_and_goes() -> None:
 
 
 def test_what_the_alarm_keeps_is_what_was_known_when_the_estimate_was_last_sure() -> None:
-    alarm = after(after(NEW, BROKEN))
+    alarm = after(after(NEW, BROKEN), RETURNED)
     assert (alarm.level, alarm.present) == (Level.ERROR, Level.OK)
     assert (alarm.worst, alarm.sigma, alarm.cause) == (2.05e-3, 0.65e-3, "torque")
     now = acknowledged(alarm)
     assert (now.level, now.cause, math.isnan(now.worst), math.isnan(now.sigma)) == (Level.OK, "", True, True)
     assert verdict(now).state is State.HEALTHY
+
+
+def test_only_what_shows_the_joint_below_its_limit_ends_what_is_acknowledged() -> None:
+    """After a restart, the torque showed nothing yet: the leg was healthy for a second, and then to stop."""
+    first, held = KnownClearance("torque", 5.5e-4, 5e-5, -math.inf), KnownClearance("torque", 5.5e-4, 5e-5)
+    for shown in ((), (first,), (KnownClearance("encoders", 6.5e-4, 1.0e-4),)):
+        alarm = after(acknowledged(after(NEW, BROKEN)), *shown)
+        assert (alarm.level, alarm.acknowledged) == (Level.ERROR, True)
+        found = verdict(alarm, *shown)
+        assert found.state is State.STOP
+        assert "acknowledged; not shown now" in found.why
+        for back in (held, attrs.evolve(RETURNED, least_m=-math.inf)):
+            assert verdict(after(alarm, back), back).state is State.HEALTHY
 
 
 @pytest.mark.parametrize("by", ["torque", "encoders"])
@@ -87,7 +101,7 @@ def test_a_measurement_that_contradicts_ends_the_stop_until_the_estimate_rises_a
     again = after(overruled, BROKEN, joint=measured)
     assert again.acknowledged  # the same estimate, and a start of the monitor without any, change nothing
     assert after(again, joint=measured) is again
-    returned = after(again, KnownClearance("torque", 3.2e-4, 2.0e-5), joint=measured)
+    returned = after(again, RETURNED, joint=measured)
     assert returned.level is Level.OK
     assert verdict(after(returned, BROKEN, joint=measured), BROKEN, joint=measured).state is State.STOP
 

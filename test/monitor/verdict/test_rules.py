@@ -199,6 +199,14 @@ CASES = [
     ({"has_torque": False}, State.WATCH, "NO_DRIVE_TORQUE", ()),
     (raised("input_torque"), State.WATCH, "NO_DRIVE_TORQUE", ()),
     ({"mismatch": math.nan}, State.WATCH, "TORQUE_NOT_COMPARED", ()),
+    # beyond its limit, and not yet for long enough
+    (
+        {"alarms": (alarm("torque_mismatch", Level.OK, beyond=(2, 1)),)},
+        State.WATCH,
+        "TORQUE_NOT_COMPARED",
+        (),
+    ),
+    ({"alarms": (alarm("torque_mismatch", Level.OK, beyond=(2, 0)),)}, State.HEALTHY, "NONE", ()),
     (
         {"diagnosis": Diagnosis(state=DiagnosisState.WAITING, reason="gait cycles: 2 of 5")},
         State.WATCH,

@@ -240,3 +240,21 @@ def test_a_leg_that_carries_a_person_is_the_one_of_its_ledger(run, worn_ledger, 
     result = run("measure", "A", "0.42", "--sigma", "0.005", "--ledger", str(ledger), "--config", str(config))
     assert (result.exit_code, result.stderr) == (0, "")
     assert rows(ledger)[0][0] == "A"
+
+
+def test_what_does_not_count_does_not_end_a_stop_by_a_measurement_that_counts(run, ledger):
+    kept = ("--sigma", "0.006", "--ledger", str(ledger))
+    run("measure", "A", "0.63", *kept, "--accept")
+    second = run("measure", "A", "0.31", *kept)
+    assert "does not count" in second.stdout and "raised" not in second.stdout
+    ((joint, level, is_acknowledged, *_),) = alarms(ledger)[0]
+    assert (joint, level, is_acknowledged) == ("A", 2, 0)
+    assert verdict(ledger)[:2] == ("stop", "CLEARANCE_A")
+
+
+def test_a_measurement_that_ends_the_stop_of_an_earlier_one_says_so(run, ledger):
+    kept = ("--sigma", "0.006", "--ledger", str(ledger))
+    run("measure", "A", "3.0", *kept)
+    second = run("measure", "A", "0.36", *kept)
+    assert "the alarm clearance A that an earlier measurement raised ends" in second.stdout
+    assert alarms(ledger)[0] == []

@@ -56,7 +56,9 @@ def test_a_contradiction_ends_with_findings_and_leaves_wear_as_it_is(run, ledger
         (("A", "420", "--sigma", "0.005"), "and 10 mm, the radius of its bushing; did you mean 0.42 mm?"),
         (("A", "0.0025", "--sigma", "0.005"), "did you mean 2.5 mm?"),
         (("A", "10.1", "--sigma", "0.01"), "10.1 mm is not between"),
-        (("A", "0.42", "--sigma", "5e-6"), "5e-06 mm is not a standard deviation from 1e-05 mm to 10 mm"),
+        (("A", "0.42", "--sigma", "5e-6"), "5e-06 mm is not a standard deviation from 0.0001 mm to 0.42 mm"),
+        (("A", "0.42", "--sigma", "10"), "the measured clearance; did you mean 0.01 mm?"),
+        (("A", "0.42", "--sigma", "1e-5"), "the measured clearance; did you mean 0.01 mm?"),
         (("A", "0.42", "--sigma", "50"), "50 mm is not a standard deviation"),
     ],
 )

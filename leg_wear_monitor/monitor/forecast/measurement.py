@@ -273,7 +273,7 @@ def measure(
     fresh_m, radius_m = clearance.radial_clearance, clearance.bushing_radius
     for name, fault in (
         ("clearance", measured_fault(wear.name, fresh_m, radius_m, clearance_m)),
-        ("sigma", sigma_fault(radius_m, sigma_m)),
+        ("sigma", sigma_fault(clearance_m, sigma_m)),
     ):
         if fault:
             raise ConfigError(name, "", fault)

@@ -164,7 +164,7 @@ def _loads(mechanism: spec.Mechanism) -> Iterator[Doubt]:
 
 
 LEAST_FRACTION = 0.01  # least measured clearance over the new one: wear widens it, so less is a typing error
-LEAST_SIGMA_M = 1.0e-8  # least standard deviation: no clearance gauge resolves 10 nm
+LEAST_SIGMA_M = 1.0e-7  # least standard deviation: no clearance gauge resolves 0.1 um
 
 _SLIPS = (1.0e-3, 1.0e3, 1.0e-6, 1.0e6)  # factors of wrong units: mm for m, m for mm, um for m, m for um
 
@@ -207,12 +207,14 @@ def measured_fault(joint: str, fresh_m: float, radius_m: float, measured_m: floa
     )
 
 
-def sigma_fault(radius_m: float, sigma_m: float) -> str | None:
+def sigma_fault(measured_m: float, sigma_m: float) -> str | None:
     """Error message for an invalid standard deviation [m] of a measured clearance; None if it is valid."""
-    if LEAST_SIGMA_M <= sigma_m <= radius_m:
+    if LEAST_SIGMA_M <= sigma_m <= measured_m:
         return None
-    bounds = f"from {1.0e3 * LEAST_SIGMA_M:g} mm to {1.0e3 * radius_m:g} mm, the bushing's radius"
-    return f"{1.0e3 * sigma_m:g} mm is not a standard deviation {bounds}"
+    meant = _meant(sigma_m, LEAST_SIGMA_M, measured_m)
+    hint = "" if meant is None else f"; did you mean {1.0e3 * meant:g} mm?"
+    bounds = f"from {1.0e3 * LEAST_SIGMA_M:g} mm to {1.0e3 * measured_m:g} mm, the measured clearance"
+    return f"{1.0e3 * sigma_m:g} mm is not a standard deviation {bounds}{hint}"
 
 
 def _meant(value_m: float, above_m: float, below_m: float) -> float | None:

@@ -4,18 +4,22 @@ First in a monitor, then in a ledger that no monitor uses, whose entry is change
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import attrs
 
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor import alarm_specs
-from leg_wear_monitor.monitor.alarms import Alarm, acknowledged, cleared, joint_of
-from leg_wear_monitor.monitor.cleared_alarms import cleared_at
+from leg_wear_monitor.monitor.alarms import Alarm, acknowledged, cleared
+from leg_wear_monitor.monitor.cleared_alarms import cleared_at, eased, named_for_clearance, rested_on
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
-from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult, last_measured
+from leg_wear_monitor.monitor.forecast.measurement import (
+    MeasurementResult,
+    believed_clearance_m,
+    last_measured,
+)
 from leg_wear_monitor.monitor.gait_evidence import NO_MISMATCH
 from leg_wear_monitor.monitor.judgement import (
     evaluate_clearances,
@@ -42,7 +46,9 @@ from leg_wear_monitor.monitor.parts import Parts
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, with_forecast
 from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.situation import (
+    BOTH,
     COUNTED,
+    MEASURED,
     SEEN,
     SOURCES,
     JointSituation,
@@ -52,7 +58,7 @@ from leg_wear_monitor.monitor.verdict.situation import (
     is_held,
     is_surely_below,
 )
-from leg_wear_monitor.monitor.verdict.verdict import Finding, dated, verdict_of
+from leg_wear_monitor.monitor.verdict.verdict import dated, verdict_of
 from leg_wear_monitor.state import Level, Verdict
 
 
@@ -81,32 +87,6 @@ def last_reset(ledger: Ledger | None, joint: str, now: JointWear) -> tuple[Ledge
     if found.joint.depth.shape != now.depth.shape:
         raise LegWearError(f"joint {joint}: had {found.joint.depth.shape[1]} sectors when it was reset")
     return ledger, found, found.joint
-
-
-def rested_on(alarms: Iterable[Alarm], joint: str, named: Iterable[str] = ()) -> tuple[str, ...]:
-    """Names of the raised alarms that rested on the part of a joint that was replaced.
-
-    The joint's own ones; and the torque mismatch if this joint explains it: if its clearance was at a limit,
-    or the verdict named it for its clearance.
-
-    Parameters
-    ----------
-    alarms : iterable of Alarm
-    joint : str
-    named : iterable of str
-        Joints that the verdict named for their clearance.
-    """
-    raised = [alarm for alarm in alarms if alarm.level is not Level.OK]
-    own = [alarm for alarm in raised if joint_of(alarm.name) == joint]
-    explains = joint in named or any(alarm.kind == alarm_specs.CLEARANCE.kind for alarm in own)
-    mismatch = [alarm for alarm in raised if explains and alarm.kind == alarm_specs.MISMATCH.kind]
-    return tuple(alarm.name for alarm in (*own, *mismatch))
-
-
-def named_for_clearance(findings: Iterable[Finding]) -> frozenset[str]:
-    """Joints that findings name for their clearance."""
-    of_clearance = (each for each in findings if each.code.startswith("CLEARANCE"))
-    return frozenset(joint for each in of_clearance for joint in each.joints)
 
 
 @attrs.frozen(eq=False)
@@ -173,6 +153,9 @@ def undo_reset(parts: Parts, joint: str, stamp_ns: int, who: str) -> JointWear:
     known = {name: alarm_specs.with_its_unit(raised[name]) for name in raised if name in board.alarms}
     board.alarms = board.alarms | known
     _part_changed(parts, joint, before.replaced_ns)
+    name = alarm_specs.CLEARANCE.name(joint)
+    if name in known and _ends(_situation(parts, joint), known[name]):
+        board.acknowledge_one(name)  # as it was before the reset
     accounting.note(Audit(stamp_ns, who, "undo_reset", since, undoes=reset.id))
     _note_alarms(parts, stamp_ns)
     update_verdict(parts)
@@ -203,7 +186,9 @@ def measure(
     if parts.encoders:
         parts.encoders.state.updated_ns = 0  # the next estimate updates the forecast again
     renew_forecast(parts)
+    before, board = parts.evaluation.board.alarms, parts.evaluation.board
     _compare(parts, joint, stamp_ns)
+    found = attrs.evolve(found, eased=eased(before.values(), board.alarms.values(), joint))
     update_verdict(parts)
     renew_forecast(parts)  # without a remaining life, if the verdict rests on what it does not use
     parts.keep()
@@ -249,6 +234,8 @@ def _ends(joint: JointSituation, alarm: Alarm) -> bool:
     """Whether the last measurement of a joint contradicts what the alarm of its clearance rests on."""
     if joint.measured is None or alarm.cause in ("", COUNTED) or alarm.level is Level.OK:
         return False
+    if alarm.cause in (MEASURED, BOTH) and not joint.is_measurement_used:
+        return False  # what does not count does not end what another measurement has raised
     return is_surely_below(joint.limit_m, joint.measured.clearance_m, joint.measured.sigma_m)
 
 
@@ -334,7 +321,9 @@ def shown_in(ledger: Ledger, joint: str) -> KnownClearance | None:
     return KnownClearance(own.cause, own.worst, own.sigma) if own else None
 
 
-def measured_in(ledger: Ledger, leg: Mechanism, config: MonitorConfig, found: Measurement) -> Entry | None:
+def measured_in(
+    ledger: Ledger, leg: Mechanism, config: MonitorConfig, found: Measurement
+) -> tuple[Entry | None, str]:
     """Compare a measurement with the limit of the clearance, as a monitor does; verdict and history follow.
 
     It raises the alarm of the clearance at once, and ends one that it contradicts.
@@ -352,12 +341,15 @@ def measured_in(ledger: Ledger, leg: Mechanism, config: MonitorConfig, found: Me
     -------
     Entry or None
         To be recorded; None if no alarm of the clearance is raised.
+    str
+        What became of an alarm that an earlier measurement had raised, see `MeasurementResult.eased`.
     """
     entry, known = ledger.entry, (*ledger.measurements, found)
     if entry is None:
-        return None
-    one = _joint_in(_part_in(entry, found.joint), leg, config, known)
-    return _judged(ledger, entry, leg, config, one, known, found.stamp_ns)
+        return None, ""
+    one = _joint_in(ledger, _part_in(entry, found.joint), leg, config, known)
+    now = _judged(ledger, entry, leg, config, one, known, found.stamp_ns)
+    return now, eased(entry.alarms, now.alarms, found.joint) if now else ""
 
 
 def withdraw_in(
@@ -388,7 +380,7 @@ def withdraw_in(
     """
     found, entry = ledger.withdraw(number, stamp_ns, who), ledger.entry
     if entry is not None and found.replaced_ns == _part_in(entry, found.joint).replaced_ns:
-        one = _joint_in(_part_in(entry, found.joint), leg, config, ledger.measurements)
+        one = _joint_in(ledger, _part_in(entry, found.joint), leg, config, ledger.measurements)
         name = alarm_specs.CLEARANCE.name(found.joint)
         now = {alarm.name: alarm for alarm in entry.alarms}
         stamps = [
@@ -432,7 +424,7 @@ def _judged(
     if Level.OK is before.level is now.level:
         return None
     entry = _with_alarm(ledger, entry, now, stamp_ns)
-    last, verdict = ledger.last_verdict, verdict_in(entry, leg, config, stamp_ns, known)
+    last, verdict = ledger.last_verdict, verdict_in(ledger, entry, leg, config, stamp_ns, known)
     if is_ended or last is None or verdict.state.severity >= last.state.severity:
         ledger.note(VerdictEvent(stamp_ns, verdict))
     return entry
@@ -462,19 +454,24 @@ def note_verdict_of(
     ledger: Ledger, entry: Entry, leg: Mechanism, config: MonitorConfig, stamp_ns: int
 ) -> None:
     """Note the verdict of an entry that an operator changed, see `verdict_in`."""
-    verdict = verdict_in(entry, leg, config, stamp_ns, ledger.measurements)
+    verdict = verdict_in(ledger, entry, leg, config, stamp_ns, ledger.measurements)
     ledger.note(VerdictEvent(stamp_ns, verdict))
 
 
 def verdict_in(
-    entry: Entry, leg: Mechanism, config: MonitorConfig, stamp_ns: int, measurements: Sequence[Measurement]
+    ledger: Ledger,
+    entry: Entry,
+    leg: Mechanism,
+    config: MonitorConfig,
+    stamp_ns: int,
+    measurements: Sequence[Measurement],
 ) -> Verdict:
     """The verdict of an entry, by the rules of the monitor.
 
     Nothing is known of the drive torque until the leg walks again.
     """
     situation = Situation(
-        joints=tuple(_joint_in(part, leg, config, measurements) for part in entry.joints),
+        joints=tuple(_joint_in(ledger, part, leg, config, measurements) for part in entry.joints),
         alarms=tuple(map(alarm_specs.with_its_unit, entry.alarms)),
         quantities=alarm_specs.QUANTITIES,
         mismatch=math.nan,
@@ -483,18 +480,19 @@ def verdict_in(
 
 
 def _joint_in(
-    part: JointWear, leg: Mechanism, config: MonitorConfig, measurements: Sequence[Measurement]
+    ledger: Ledger, part: JointWear, leg: Mechanism, config: MonitorConfig, known: Sequence[Measurement]
 ) -> JointSituation:
-    """What a ledger says of the clearance of a part."""
+    """What a ledger says of the clearance of a part; with its measurements, what the forecast believes."""
     one = JointSituation(
         joint=part.name,
         counted_m=leg.clearances[part.name].radial_clearance + part.mean_m,
+        believed_m=believed_clearance_m(leg, config.forecast, part, known, ledger.corrections),
         limit_m=clearance_limits(leg, config)[part.name],
         label=leg.joints[part.name].label,
         replaced_ns=part.replaced_ns,
         part_cycles=part.cycles,
     )
-    return with_measured(one, last_measured(measurements, part.name, part.replaced_ns))
+    return with_measured(one, last_measured(known, part.name, part.replaced_ns))
 
 
 def undo_in(
@@ -518,8 +516,10 @@ def undo_in(
     _, reset, before = last_reset(ledger, joint, since)
     part = one_part(before, since)
     entry = _with_part(entry, part)
+    one = _joint_in(ledger, part, leg, config, ledger.measurements)
     for alarm in cleared_at(ledger, [reset.stamp_ns], {alarm.name: alarm for alarm in entry.alarms}):
-        entry = _with_alarm(ledger, entry, alarm, stamp_ns)
+        is_ended = alarm.name == alarm_specs.CLEARANCE.name(joint) and _ends(one, alarm)
+        entry = _with_alarm(ledger, entry, acknowledged(alarm) if is_ended else alarm, stamp_ns)
     ledger.note(Audit(stamp_ns, who, "undo_reset", since, undoes=reset.id))
     note_verdict_of(ledger, entry, leg, config, stamp_ns)
     ledger.record(entry)

@@ -56,7 +56,9 @@ def test_a_contradiction_ends_with_findings_and_leaves_wear_as_it_is(run, ledger
         (("A", "420", "--sigma", "0.005"), "and 10 mm, the radius of its bushing; did you mean 0.42 mm?"),
         (("A", "0.0025", "--sigma", "0.005"), "did you mean 2.5 mm?"),
         (("A", "10.1", "--sigma", "0.01"), "10.1 mm is not between"),
-        (("A", "0.42", "--sigma", "5e-6"), "5e-06 mm is not a standard deviation from 1e-05 mm to 10 mm"),
+        (("A", "0.42", "--sigma", "5e-6"), "5e-06 mm is not a standard deviation from 0.0001 mm to 0.42 mm"),
+        (("A", "0.42", "--sigma", "10"), "the measured clearance; did you mean 0.01 mm?"),
+        (("A", "0.42", "--sigma", "1e-5"), "the measured clearance; did you mean 0.01 mm?"),
         (("A", "0.42", "--sigma", "50"), "50 mm is not a standard deviation"),
     ],
 )
@@ -240,3 +242,21 @@ def test_a_leg_that_carries_a_person_is_the_one_of_its_ledger(run, worn_ledger, 
     result = run("measure", "A", "0.42", "--sigma", "0.005", "--ledger", str(ledger), "--config", str(config))
     assert (result.exit_code, result.stderr) == (0, "")
     assert rows(ledger)[0][0] == "A"
+
+
+def test_what_does_not_count_does_not_end_a_stop_by_a_measurement_that_counts(run, ledger):
+    kept = ("--sigma", "0.006", "--ledger", str(ledger))
+    run("measure", "A", "0.63", *kept, "--accept")
+    second = run("measure", "A", "0.31", *kept)
+    assert "does not count" in second.stdout and "raised" not in second.stdout
+    ((joint, level, is_acknowledged, *_),) = alarms(ledger)[0]
+    assert (joint, level, is_acknowledged) == ("A", 2, 0)
+    assert verdict(ledger)[:2] == ("stop", "CLEARANCE_A")
+
+
+def test_a_measurement_that_ends_the_stop_of_an_earlier_one_says_so(run, ledger):
+    kept = ("--sigma", "0.006", "--ledger", str(ledger))
+    run("measure", "A", "3.0", *kept)
+    second = run("measure", "A", "0.36", *kept)
+    assert "the alarm clearance A that an earlier measurement raised ends" in second.stdout
+    assert alarms(ledger)[0] == []

@@ -175,3 +175,18 @@ def test_a_monitor_resets_to_the_same(run, ledger, tmp_path):
         assert one.moving_s == pytest.approx(same.moving_s, abs=1e-9)
     assert content(ledger)[1] == content(other)[1]
     assert audits(ledger) == audits(other)
+
+
+@pytest.mark.plain
+def test_a_stop_that_a_measurement_has_ended_stays_ended_once_a_reset_is_undone(run, worn_ledger):
+    stop = {"level": Level.ERROR, "worst": 1.7e-3, "limit": 6e-4, "raised_ns": 5, "cause": "torque"}
+    raised = Alarm(kind="clearance", subject="G", present=Level.ERROR, sigma=4e-4, **stop)
+    path = worn_ledger(alarms=(raised,))
+    run("measure", "G", "0.37", "--sigma", "0.01", "--ledger", str(path))
+    (before,) = content(path)[0].alarms
+    run("reset", "G", "--ledger", str(path))
+    run("reset", "G", "--undo", "--ledger", str(path))
+    (after,) = content(path)[0].alarms
+    assert before.acknowledged and after.acknowledged
+    assert (after.worst, after.sigma, after.cause) == (1.7e-3, 4e-4, "torque")
+    assert last_verdict(path).state.value != "stop"

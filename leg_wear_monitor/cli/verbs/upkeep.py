@@ -355,6 +355,8 @@ def _measured(
             by = SOURCES[shown.by]
             found = attrs.evolve(found, shown_m=shown.clearance_m, shown_sigma_m=shown.sigma_m, shown_by=by)
         kept.note(found.measurement)
-        kept.record(measured_in(kept, leg, settings, found.measurement))
+        entry, eased = measured_in(kept, leg, settings, found.measurement)
+        kept.record(entry)
+        found = attrs.evolve(found, eased=eased)
     told = found.told(limit_m, settings.limits.warn_fraction, kept.measurements)
     return told, found.has_findings(limit_m)

@@ -9,7 +9,7 @@ import numpy as np
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.estimate.cause import SURE_SIGMAS
 from leg_wear_monitor.mechanism.plausible import measured_fault, sigma_fault
-from leg_wear_monitor.mechanism.spec import Clearance
+from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
 from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     ClearanceAtWear,
@@ -17,6 +17,7 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     CoefficientPrior,
     corrections_of,
     estimate_coefficient,
+    prior_source,
 )
 from leg_wear_monitor.monitor.ledger.entry import CorrectedClearance, JointWear, Measurement
 
@@ -92,6 +93,9 @@ class MeasurementResult:
     shown_m, shown_sigma_m, shown_by : float, float, str
         What encoders or the drive torque showed of the joint before, with its source in words; NaN and empty
         if they showed nothing.
+    eased : str
+        What became of an alarm of the clearance that an earlier measurement had raised, such as ``ends``;
+        empty if it stays.
     """
 
     measurement: Measurement
@@ -103,6 +107,7 @@ class MeasurementResult:
     shown_m: float = math.nan
     shown_sigma_m: float = math.nan
     shown_by: str = ""
+    eased: str = ""
 
     @property
     def agrees(self) -> bool:
@@ -145,6 +150,8 @@ class MeasurementResult:
         elif now.clearance_m >= warn_fraction * limit_m:
             part = f"{100.0 * warn_fraction:g} % of its limit"
             lines.append(f"the measured clearance is above {part}: the alarm clearance {now.joint} is raised")
+        if self.eased:
+            lines.append(f"the alarm clearance {now.joint} that an earlier measurement raised {self.eased}")
         lines += self._compared(limit_m)
         if self.agrees and self.contradicts:  # the counting is wrong, not the measurement
             used = "uses" if now.counts else "does not use"
@@ -201,6 +208,23 @@ def observations_of(
     ]
 
 
+def believed_clearance_m(
+    leg: Mechanism,
+    settings: Forecasting,
+    part: JointWear,
+    measurements: Sequence[Measurement],
+    corrections: Sequence[CorrectedClearance],
+) -> float:
+    """Median of what counting and the measurements of a part give together; NaN without measurements."""
+    key = (part.name, part.replaced_ns)
+    used = observations_of(measurements, *key)
+    if not used:
+        return math.nan
+    fresh_m, prior = leg.clearances[part.name].radial_clearance, prior_source(leg, settings).prior(*key)
+    corrected = corrections_of(corrections, *key)
+    return estimate_coefficient(settings, fresh_m, used, prior, corrected).clearance_m(part.mean_m)
+
+
 def measure(
     settings: Forecasting,
     clearance: Clearance,
@@ -249,7 +273,7 @@ def measure(
     fresh_m, radius_m = clearance.radial_clearance, clearance.bushing_radius
     for name, fault in (
         ("clearance", measured_fault(wear.name, fresh_m, radius_m, clearance_m)),
-        ("sigma", sigma_fault(radius_m, sigma_m)),
+        ("sigma", sigma_fault(clearance_m, sigma_m)),
     ):
         if fault:
             raise ConfigError(name, "", fault)

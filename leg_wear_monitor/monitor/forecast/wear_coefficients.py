@@ -289,6 +289,14 @@ class CoefficientEstimate:
         reached = np.cumsum(self.weight) - 0.5 * self.weight
         return np.asarray(np.interp(np.asarray(fractions), reached, self.log_factor))
 
+    def clearance_m(self, wear_m: float) -> float:
+        """Median of the clearance at some wear in the twin."""
+        worn = wear_m - self.known.wear_m
+        expected = self.known.clearance_m + self.excess_m + np.exp(self.log_factor) * worn
+        order = np.argsort(expected)
+        reached = np.cumsum(self.weight[order]) - 0.5 * self.weight[order]
+        return float(np.interp(0.5, reached, expected[order]))
+
     def probability_below(self, observation: ClearanceAtWear) -> float:
         """Predicted probability that a measurement of this accuracy, now, is smaller than this one."""
         worn = observation.wear_m - self.known.wear_m

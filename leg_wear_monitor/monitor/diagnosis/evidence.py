@@ -91,10 +91,12 @@ class Evidence:
         they explain the leg.
         """
         known, is_fitted = state.commissioned, state.fit_due == _FIT_EVERY - 1
-        if known is None or state.changes or not is_fitted or len(state.cycles) < SETTLING_CYCLES:
+        if known is None or known.before is None or state.reference is None:
             return None
-        explainer = self._models.explainer_before(state)
-        if explainer is None or known.before is None:
+        if state.changes or not is_fitted or len(state.cycles) < SETTLING_CYCLES:
+            return None
+        explainer = self._models.explainer_since(known.before, state.reference, state)
+        if explainer is None:
             return None
         counted_m, mean, cycles = state.counted_m, state.signatures.mean(axis=0), len(state.cycles)
         explanations = explainer.explanations(mean, cycles, counted_m)

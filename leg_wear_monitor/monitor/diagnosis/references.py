@@ -26,7 +26,7 @@ from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
-from leg_wear_monitor.monitor.diagnosis.state import FIRST_CYCLES, AtCadence, ExplainedTorque, TorqueState
+from leg_wear_monitor.monitor.diagnosis.state import FIRST_CYCLES, ExplainedTorque, TorqueState
 from leg_wear_monitor.twin.reference import CrankProfile, LegParameters, mean_profile
 from leg_wear_monitor.twin.torque_reference import (
     LEAST_CLEARANCE_M,
@@ -97,17 +97,16 @@ class LegModels:
         """Possible explanations of the measured torque: other clearances and other causes."""
         return self._of(state).explainer
 
-    def explainer_before(self, state: TorqueState) -> Explainer | None:
+    def explainer_since(
+        self, before: signature.CommissionedTorque, reference: TorqueReference, state: TorqueState
+    ) -> Explainer | None:
         """Possible explanations of what a corrected leg shows beside the baseline before the correction.
 
-        None without that baseline, or before there is a reference about the corrected clearances.
+        None before there is a reference about the corrected clearances.
         """
-        known, reference, sensor = state.commissioned, state.reference, state.sensor
-        if known is None or known.before is None or reference is None or sensor is None:
+        if state.sensor is None or _is_far(reference, state.counted_m) or not before.is_of(state.sensor):
             return None
-        if _is_far(reference, state.counted_m) or not known.before.is_of(sensor):
-            return None
-        return explainer_of(self._mechanism, reference, sensor, known.before, state.counted_m)
+        return explainer_of(self._mechanism, reference, state.sensor, before, state.counted_m)
 
     def explained(self, state: TorqueState) -> ExplainedTorque | None:
         """What the estimate rests on; None without one."""
@@ -488,7 +487,7 @@ class References:
         state.turn_towards(reference.profile)
         before, misfit_before = state.reference, self._models.misfit(state)
         if before is None or not before.profile.is_like(reference.profile):
-            _start_at_cadence(state, reference)
+            state.begin_cadence(reference)
             return
         state.reference = reference
         own, former, sensor = reference.parameters, before.parameters, state.sensor
@@ -508,19 +507,6 @@ class References:
         # other cadences may use the identified parameters; if none does, they are withdrawn
         if all(one.reference.parameters != state.parameters for one in state.set_aside):
             state.parameters = before.parameters
-
-
-def _start_at_cadence(state: TorqueState, reference: TorqueReference) -> None:
-    """Begin a new cadence with the gait cycles that waited for its reference.
-
-    It has a baseline of its own, from the ledger if there is one.
-    """
-    if state.sensor is None:
-        raise RuntimeError("there are no samples yet")
-    own = state.take_baseline(reference.profile.speed)
-    cycles = [one for one in state.waiting if one.profile.is_like(reference.profile)]
-    state.turn_to(AtCadence(reference, state.sensor, own, tuple(cycles)))
-    state.waiting = ()
 
 
 def _is_far(reference: TorqueReference, counted_m: Floats) -> bool:

@@ -455,6 +455,18 @@ class TorqueState:
         self.reference, self.sensor, self.commissioned = one.reference, one.sensor, one.commissioned
         self.cycles, self.is_final, self.fit_due = one.cycles, one.is_final, 0
 
+    def begin_cadence(self, reference: TorqueReference) -> None:
+        """Begin a new cadence with the gait cycles that waited for its reference.
+
+        It has a baseline of its own, from the ledger if there is one.
+        """
+        if self.sensor is None:
+            raise RuntimeError("there are no samples yet")
+        own = self.take_baseline(reference.profile.speed)
+        cycles = [one for one in self.waiting if one.profile.is_like(reference.profile)]
+        self.turn_to(AtCadence(reference, self.sensor, own, tuple(cycles)))
+        self.waiting = ()
+
     def turn_towards(self, profile: CrankProfile) -> None:
         """Make the cadence that was simulated the present one: the leg may walk at another one by now."""
         other = self.at(profile)

@@ -512,7 +512,7 @@ class LearnedPart:
         doubt = "it counts, too few others are measured" if self.counts else "others do not learn from it"
         than = "faster" if self.residual > 0.0 else "slower"
         return (
-            f"{self.part.leg}: joint {self.part.joint} wears {than} than {self.prior.basis} predict, by "
+            f"joint {self.part.joint} wears {than} than {self.prior.basis} predict, by "
             f"{abs(self.residual):.1f} standard deviations; {doubt}; measure it again, and check its lot"
         )
 

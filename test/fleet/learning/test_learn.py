@@ -111,7 +111,7 @@ def test_an_outlier_is_named_and_the_others_are_forecast_as_without_it(factor):
     assert abs(bad.residual) > 4.0
     assert bad.prior.basis == "20 parts of lot 2026-03"
     direction = "faster" if factor > 0.0 else "slower"
-    assert bad.finding.startswith(f"bad: joint A wears {direction} than 20 parts of lot 2026-03 predict")
+    assert bad.finding.startswith(f"joint A wears {direction} than 20 parts of lot 2026-03 predict")
     assert not any(each.finding for each in found.measured if each.counts)
 
 

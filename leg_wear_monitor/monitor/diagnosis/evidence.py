@@ -1,5 +1,6 @@
 """The evidence of gait cycles: tests for a change, what explains it, and the clearances."""
 
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -105,13 +106,13 @@ class Evidence:
         if change and change.is_sure and is_wide and explanations[0].square <= _WHOLLY:
             return change
         found = best_fit(explainer, mean, cycles, counted_m, starts_of(explainer, None, counted_m))
-        sigma_m = known.sigma_m
+        state.commissioned = attrs.evolve(known, before=None)
         if found.square <= _WHOLLY:
             corrected_m = np.abs(counted_m - known.before.clearance_m).max()
             apart_m = np.abs(found.clearance_m - counted_m)
             own_m = np.sqrt(found.sigma_m**2 + apart_m**2 + (MODEL_ERROR * corrected_m) ** 2)
-            sigma_m = np.where(known.is_unknown, np.hypot(own_m, known.before.sigma_m), sigma_m)
-        state.commissioned = attrs.evolve(known, before=None, sigma_m=sigma_m)
+            own_m = np.hypot(own_m, known.before.sigma_m)
+            state.know_corrected(np.where(known.is_unknown, own_m, known.sigma_m))
         state.fit_due = 0
         return None
 
@@ -320,7 +321,7 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
         if state.fit is None or state.commissioned is None or state.changes:
             return ""
         if state.commissioned.is_unknown.any():
-            return _hidden(state.commissioned, models.explainer(state).joints)
+            return _hidden(state, state.commissioned, models.explainer(state).joints)
         if state.fit.explains:
             return ""
         return (
@@ -349,12 +350,16 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
     return f"{known}masses, lengths and friction near those of the file do not explain its drive torque"
 
 
-def _hidden(known: CommissionedTorque, joints: Sequence[str]) -> str:
+def _hidden(state: TorqueState, known: CommissionedTorque, joints: Sequence[str]) -> str:
     """That joints may have opened with one that was corrected."""
-    names = ", ".join(joint for joint, is_unknown in zip(joints, known.is_unknown, strict=True) if is_unknown)
-    then = (
-        "the torque cannot tell, measure them" if known.before is None else "a reference about it will show"
-    )
+    names = ", ".join(itertools.compress(joints, known.is_unknown))
+    compared = next((one for one in state.all_commissioned if one.before is not None), None)
+    if compared is None:
+        then = "the torque cannot tell, measure them"
+    elif compared is known:
+        then = "a reference about it will show"
+    else:
+        then = f"a reference about it will show at {60.0 * abs(compared.speed) / TURN:.3g} rpm"
     return f"{names} may have opened with the joint that was corrected: {then}"
 
 

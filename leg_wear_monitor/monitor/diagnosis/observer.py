@@ -445,6 +445,11 @@ class TorqueObserver(KeepsSamples):
             speed=state.profile.speed,
             temperature_c=temperature_of(state.cycles),
         )
+        # what a correction left unknown is not known better at another cadence
+        corrected = state.corrected
+        if corrected is not None:
+            sigma_m = np.where(corrected.is_unknown, state.counted_m, corrected.sigma_m)
+            known = attrs.evolve(known, sigma_m=sigma_m, channel=corrected.channel)
         state.commissioned = known.measured_by(state.sensor)
         self._evidence.review(state, self.config)
 

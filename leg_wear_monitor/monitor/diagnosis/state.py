@@ -445,6 +445,24 @@ class TorqueState:
         """Baselines of all cadences."""
         return (*(one.commissioned for one in self.known if one.commissioned), *self.baselines)
 
+    @property
+    def corrected(self) -> CommissionedTorque | None:
+        """A baseline after a correction, of any cadence; None without one."""
+        return next((one for one in self.all_commissioned if not one.is_as_counted), None)
+
+    def know_corrected(self, sigma_m: Floats) -> None:
+        """Give the baselines after a correction, of all cadences, other standard deviations (k,) [m]."""
+
+        def known(one: CommissionedTorque) -> CommissionedTorque:
+            return one if one.is_as_counted else attrs.evolve(one, sigma_m=sigma_m)
+
+        self.commissioned = self.commissioned and known(self.commissioned)
+        self.set_aside = tuple(
+            attrs.evolve(one, commissioned=one.commissioned and known(one.commissioned))
+            for one in self.set_aside
+        )
+        self.baselines = tuple(map(known, self.baselines))
+
     def at(self, profile: CrankProfile) -> AtCadence | None:
         """Another cadence than the present one whose crank turns as in a profile."""
         return next((one for one in self.set_aside if profile.is_like(one.reference.profile)), None)

@@ -386,7 +386,7 @@ def read_commissioned(db: sqlite3.Connection) -> Commissioned | None:
 def read_commissioned_torques(db: sqlite3.Connection) -> list[CommissionedTorque]:
     """Stored signatures of the drive torque of the present parts: the last ones of each cadence.
 
-    Those before a correction were of other clearances.
+    Those before a correction, or before it was known better, have other standard deviations.
     """
     found: list[CommissionedTorque] = []
     for row in db.execute(
@@ -401,11 +401,12 @@ def read_commissioned_torques(db: sqlite3.Connection) -> list[CommissionedTorque
             stamp_ns, clearance_m, signatures.reshape(cycles, -1), sigma_m, channel, speed,
             or_nan(row[11]), or_nan(row[12]), row[13], bool(row[14]),
         )  # fmt: skip
+        # those of unknown clearances grow with them; another correction has others
+        if found and not np.allclose(one.sigma_m, found[0].sigma_m, rtol=0.1, atol=0.0):
+            break
         if not any(abs(one.speed - other.speed) <= UNLIKE * abs(other.speed) for other in found):
             found.append(one)
-        if not one.is_as_counted or not one.speed or len(found) == CADENCES:
-            break
-    return found
+    return found[:CADENCES]
 
 
 _LEG = "stamp_ns, bodies, mass, length, friction, compliance_rad_per_nm, damping_ratio, load_n, load_sigma"

@@ -8,7 +8,7 @@ import pytest
 
 from leg_wear_monitor.estimate import identification
 from leg_wear_monitor.estimate.body_torques import body_torques
-from leg_wear_monitor.estimate.cause import Cause
+from leg_wear_monitor.estimate.cause import Cause, Change
 from leg_wear_monitor.estimate.signature import CommissionedTorque, TorqueSensor
 from leg_wear_monitor.mechanism.person import nominal_stance
 from leg_wear_monitor.mechanism.position import TURN, build_linkage
@@ -17,7 +17,7 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis import evidence, references
 from leg_wear_monitor.monitor.diagnosis import observer as observer_module
 from leg_wear_monitor.monitor.diagnosis import state as state_module
-from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
+from leg_wear_monitor.monitor.diagnosis.observer import Correction, TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.monitor.diagnosis.state import UNUSED_CYCLES, DiagnosisState, SignedCycle, TorqueState
 from leg_wear_monitor.twin import CRANK, TORQUE, torque_reference
@@ -580,23 +580,38 @@ def test_a_leg_that_was_never_healthy_is_not_commissioned(new, reference) -> Non
     assert observer.diagnosis.clearance_m[2] == pytest.approx(9.0e-4, rel=0.2)
 
 
-def test_each_cadence_has_its_own_baseline_and_reference(leg, reference, monkeypatch) -> None:
-    """Compared with the baseline of 60 rpm, a healthy leg at 57 rpm had a wide joint A."""
+def walk_at(observer, block, period_ns: int, at: int, cycles: int = 19) -> int:
+    """Feed gait cycles of a period, from a stamp on; the stamp after them."""
+    part = block.copy()
+    part["stamp_ns"] = at + np.round((block["stamp_ns"] - START_NS) * (1e-9 * period_ns))
+    for _ in range(cycles):
+        inside = (part["stamp_ns"] >= at) & (part["stamp_ns"] < at + period_ns)
+        observer.add_samples(part[inside])
+        begin_ns, at = at, at + period_ns
+        rpm = 6e10 / period_ns
+        observer.ended(SimpleNamespace(is_steady=True, cadence_rpm=rpm, begin_ns=begin_ns, stamp_ns=at))
+        observer.end_period(observer.state.counted_m, DEPTH)
+    return at
+
+
+SLOWER_NS = round(10**9 / 0.95)
+
+
+@pytest.fixture
+def two_cadences(leg, reference, monkeypatch) -> TorqueObserver:
+    """An observer with references at 60 and 57 rpm that soon has a baseline at each."""
     monkeypatch.setattr(observer_module, "COMMISSIONING_CYCLES", 10)
     monkeypatch.setattr(references, "UNLIKE_CYCLES", 3)
     slower = attrs.evolve(reference, profile=CrankProfile.steady(0.95 * TURN))
-    observer, known = observer_of(leg, references=[slower]), []
+    return observer_of(leg, references=[slower])
+
+
+def test_each_cadence_has_its_own_baseline_and_reference(two_cadences, reference) -> None:
+    """Compared with the baseline of 60 rpm, a healthy leg at 57 rpm had a wide joint A."""
+    observer, known = two_cadences, []
     block, at = samples(reference, [0] * 20), START_NS
-    for period_ns in (10**9, round(10**9 / 0.95), 10**9):
-        part = block.copy()
-        part["stamp_ns"] = at + np.round((block["stamp_ns"] - START_NS) * (1e-9 * period_ns))
-        for _ in range(19):
-            inside = (part["stamp_ns"] >= at) & (part["stamp_ns"] < at + period_ns)
-            observer.add_samples(part[inside])
-            begin_ns, at = at, at + period_ns
-            rpm = 6e10 / period_ns
-            observer.ended(SimpleNamespace(is_steady=True, cadence_rpm=rpm, begin_ns=begin_ns, stamp_ns=at))
-            observer.end_period(NEW, DEPTH)
+    for period_ns in (10**9, SLOWER_NS, 10**9):
+        at = walk_at(observer, block, period_ns, at)
         known.append(observer.state.commissioned)
     fast, slow, again = known
     assert fast is again
@@ -607,6 +622,34 @@ def test_each_cadence_has_its_own_baseline_and_reference(leg, reference, monkeyp
     assert observer.diagnosis.cycles_not_used == {"unlike": 3}
     assert observer.state.reference.profile.speed == TURN
     assert not observer.state.changes
+
+
+def test_what_a_correction_left_unknown_is_not_known_at_another_cadence(two_cadences, reference) -> None:
+    """Seen before: a joint that had opened with the corrected one was 0.30 ± 0.01 mm there."""
+    observer, block = two_cadences, samples(reference, [0] * 20)
+    at = walk_at(observer, block, 10**9, START_NS)
+    change = Change(
+        cause=Cause.CLEARANCE,
+        subject="A",
+        value=4.5e-4,
+        sigma=1e-5,
+        since_ns=at - 5 * 10**9,
+        counted=3e-4,
+        log_odds=50.0,
+    )
+    correct(observer, Correction(0, change.value, change))
+    walk_at(observer, block, SLOWER_NS, at)
+    fast, slow = observer.state.set_aside[0].commissioned, observer.state.commissioned
+    for one in (fast, slow):
+        assert one.is_unknown.tolist() == [False, True, True, True, True]
+        assert one.sigma_m[0] == change.sigma
+    assert slow.channel == fast.channel
+    shown = observer.diagnosis
+    assert np.isnan(shown.clearance_m[1:]).all()
+    assert shown.reason.endswith("a reference about it will show at 60 rpm")
+    # known better by the comparison with the baseline before: at all cadences
+    observer.state.know_corrected(np.full(5, 2e-5))
+    assert not any(one.is_unknown.any() for one in observer.state.all_commissioned)
 
 
 def test_one_strange_cycle_raises_nothing(commissioned, reference) -> None:

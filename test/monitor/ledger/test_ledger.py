@@ -348,8 +348,14 @@ def test_references_and_baselines_are_kept_for_each_cadence(reopened) -> None:
     np.testing.assert_equal(sensors, [(np.nan, 1, False), (0.001, 5, True), (np.nan, 1, False)])
     sigma_m = np.array([0.0, 0.0, 1e-5, 0.0, 0.0])
     found.close()
-    corrected = CommissionedTorque(20, np.full(5, 3e-4), np.ones((4, 6)), sigma_m, speed=6.0)
-    assert [one.stamp_ns for one in reopened(corrected).commissioned_torques] == [20]
+    corrected, also = (
+        CommissionedTorque(ns, np.full(5, 3e-4), np.ones((4, 6)), sigma_m, speed=speed)
+        for ns, speed in ((20, 6.0), (21, 4.5))
+    )
+    found = reopened(corrected)
+    assert [one.stamp_ns for one in found.commissioned_torques] == [20]
+    found.close()
+    assert [one.stamp_ns for one in reopened(also).commissioned_torques] == [21, 20]
 
 
 @pytest.mark.parametrize("what", ["reset_wear", "undo_reset"])

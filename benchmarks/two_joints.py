@@ -2,6 +2,7 @@
 
 Legs in full coordinates in the air, with masses 4 % off the file, behind a drive of `drives.py`; the joints
 open after 690 gait cycles, and the leg walks on for 90. Each correction is counted, as the monitor does it.
+With `--ground-n`, they walk on the ground as in `ground.py`, and nobody measures its force.
 `python benchmarks/two_joints.py --keep DIRECTORY [--drive none]` takes a quarter of an hour.
 """
 
@@ -15,13 +16,17 @@ import numpy as np
 from diagnosis import NEW, kept
 from disturbed import COMMISSIONED, HEALTHY, MASSES, walked, watched
 from drives import DRIVES, WARM, cycles_of, warming
+from ground import walked as walked_on_ground
 
-from leg_wear_monitor import load_mechanism
+from leg_wear_monitor import MonitorConfig, load_mechanism
 from leg_wear_monitor.estimate.signature import TorqueSensor
+from leg_wear_monitor.gait.config import LoadConfig
 from leg_wear_monitor.mechanism.position import TURN, build_linkage
+from leg_wear_monitor.monitor.config.inputs import Load
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.twin.load import torque_size
 from leg_wear_monitor.twin.reference import LegParameters
+from leg_wear_monitor.twin.sample import GROUND
 
 CASES = (
     {"A": 0.45}, {"B": 0.45}, {"G": 0.6}, {"I": 0.45}, {"J": 0.45}, {"J": 1.0},
@@ -37,23 +42,34 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--keep", type=Path)
     parser.add_argument("--drive", choices=sorted(DRIVES), default="none")
+    parser.add_argument("--ground-n", type=float, default=0.0)
     options = parser.parse_args()
     leg = load_mechanism("bionic_leg")
     mass, joints = np.array([MASSES.get(body, 1.0) for body in leg.bodies]), leg.clearance_joints
     real, size = LegParameters(mass, np.ones(len(mass))).applied(leg), torque_size(build_linkage(leg), TURN)
     sensor, drive = TorqueSensor(0.005, 1.0, size), DRIVES[options.drive]
+    peak_n = options.ground_n
+    config = MonitorConfig(load=Load(model=GROUND)) if peak_n else MonitorConfig()
+    load, suffix = LoadConfig(ground_n=peak_n, shape="treadmill"), f" {peak_n:g} N" if peak_n else ""
 
     def walk(sizes_mm: dict[str, float], cycles: int) -> np.ndarray:
         clearance = np.array([1e-3 * sizes_mm[joint] if joint in sizes_mm else NEW[0] for joint in joints])
         name = " ".join(f"{joint}{mm:g}" for joint, mm in sizes_mm.items()) or "new"
-        file = options.keep / f"two {name}.pkl" if options.keep else None
-        return kept(file, lambda: walked(real, clearance, cycles + 3, 0.0, 7))
+        file = options.keep / f"two {name}{suffix}.pkl" if options.keep else None
+
+        def rows() -> np.ndarray:
+            if peak_n:
+                return walked_on_ground(real, clearance, cycles + 3, load, 7).rows
+            return walked(real, clearance, cycles + 3, 0.0, 7)
+
+        return kept(file, rows)
 
     healthy = cycles_of(walk({}, HEALTHY), drive, sensor, 5)
     before = COMMISSIONED + WARM // 2
-    one, _ = watched(leg, size, warming(healthy, [i % healthy.shape[1] for i in range(before)]))
+    rows = warming(healthy, [i % healthy.shape[1] for i in range(before)])
+    one, _ = watched(leg, size, rows, config=config, periods=4 if peak_n else 1)
     commissioned = one.snapshot()
-    print(f"{options.drive}: misfit {one.models.misfit(one.state):.2f}\n")
+    print(f"{options.drive}{suffix}: misfit {one.models.misfit(one.state):.2f}\n")
     print(f"| opened | corrected (gait cycle) | {' | '.join(joints)} | reason |")
     print(f"|---|---{'|---' * len(joints)}|---|")
     for case in CASES:

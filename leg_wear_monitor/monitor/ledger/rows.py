@@ -212,8 +212,10 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
             errors = np.concatenate([centre_rad, mean, covariance.ravel()])
             values = {"stamp_ns": stamp_ns, "encoders": "\n".join(encoders), "errors": _blob(errors)}
             add(db, "commissioning", values)
-        case CommissionedTorque():
-            add(db, "torque_commissioning", _baseline_values(event))
+        case CommissionedTorque(before=before):
+            if before is not None:
+                add(db, "torque_commissioning", _baseline_values(before) | {"is_before": 1})
+            add(db, "torque_commissioning", _baseline_values(event) | {"is_before": 0})
         case IdentifiedLeg(stamp_ns, bodies, parameters):
             add(db, "identified_leg", {"stamp_ns": stamp_ns, **_leg_values(bodies, parameters)})
         case SimulatedReference():
@@ -389,9 +391,10 @@ def read_commissioned_torques(db: sqlite3.Connection) -> list[CommissionedTorque
     Those before a correction, or before it was known better, have other standard deviations.
     """
     found: list[CommissionedTorque] = []
+    last = None
     for row in db.execute(
         "SELECT stamp_ns, cycles, speed_radps, delay_s, time_constant_s, load_friction, second_order, "
-        "mean_s, clearance_m, signatures, sigma_m, temperature_c, period_s, averaged, is_instant "
+        "mean_s, clearance_m, signatures, sigma_m, temperature_c, period_s, averaged, is_instant, is_before "
         "FROM torque_commissioning ORDER BY id DESC"
     ):
         stamp_ns, cycles, speed, *drive = row[:8]
@@ -401,6 +404,10 @@ def read_commissioned_torques(db: sqlite3.Connection) -> list[CommissionedTorque
             stamp_ns, clearance_m, signatures.reshape(cycles, -1), sigma_m, channel, speed,
             or_nan(row[11]), or_nan(row[12]), row[13], bool(row[14]),
         )  # fmt: skip
+        if row[15]:
+            found = [attrs.evolve(each, before=one) if each is last else each for each in found]
+            continue
+        last = one
         # those of unknown clearances grow with them; another correction has others
         if found and not np.allclose(one.sigma_m, found[0].sigma_m, rtol=0.1, atol=0.0):
             break
@@ -445,17 +452,9 @@ def _reference_of(
     return names, attrs.evolve(reference, torque_nm=(expected, *wider.reshape(shape)))
 
 
-def _leg_of(
-    bodies: str,
-    mass: bytes,
-    length: bytes,
-    friction: float,
-    compliance: float,
-    damping: float,
-    load: bytes,
-    load_sigma: float,
-) -> tuple[tuple[str, ...], LegParameters]:
+def _leg_of(*row: Any) -> tuple[tuple[str, ...], LegParameters]:
     """Names of the bodies and parameters of the leg, of the values of `_leg_values`."""
+    bodies, mass, length, friction, compliance, damping, load, load_sigma = row
     force = _floats(load).reshape(-1, 2)
     leg = LegParameters(_floats(mass), _floats(length), friction, compliance, damping, force, load_sigma)
     return tuple(bodies.split("\n")), leg

@@ -130,13 +130,14 @@ CREATE TABLE commissioning (
 -- above 0 where a correction made them; then the drive by them (delay, time constant, load friction, second
 -- order of the low-pass, averaging), the mean speed of the crank, 0 where not known, the temperature of the
 -- drive as far as it was measured, and the sensor: its period, how many of its samples were averaged into
--- one, and whether these are instants
+-- one, and whether these are instants. A row with is_before 1 is before the correction of the next row, with
+-- what its signatures had in addition to those of the model
 CREATE TABLE torque_commissioning (
     id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, cycles INTEGER NOT NULL, clearance_m BLOB NOT NULL,
     signatures BLOB NOT NULL, sigma_m BLOB NOT NULL, delay_s REAL NOT NULL, time_constant_s REAL NOT NULL,
     load_friction REAL NOT NULL, second_order REAL NOT NULL, mean_s REAL NOT NULL,
     speed_radps REAL NOT NULL, temperature_c REAL, period_s REAL, averaged INTEGER NOT NULL,
-    is_instant INTEGER NOT NULL
+    is_instant INTEGER NOT NULL, is_before INTEGER NOT NULL
 ) STRICT;
 
 -- the leg that the drive torque shows; the last row is in force. bodies: a line each, with factors on masses

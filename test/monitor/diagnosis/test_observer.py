@@ -498,6 +498,25 @@ def test_whether_another_joint_opened_with_the_corrected_one_is_seen_by_a_refere
         assert shown.reason.endswith("measure them")
 
 
+def test_a_joint_that_opened_with_the_corrected_one_is_found_after_a_restart(
+    leg, commissioned, reference, monkeypatch
+) -> None:
+    """Seen before: the baseline before the correction was lost, and nothing could tell any more."""
+    monkeypatch.setattr(evidence, "_WHOLLY", 3.0)
+    observer, wider = commissioned(), about(reference, 0, 1.5)
+    walked = attrs.evolve(reference, torque_nm=(*reference.torque_nm, wider.torque_nm[leg_number(2, 1.5)]))
+    block = samples(walked, [0] * COMMISSIONING_CYCLES + [len(reference.torque_nm)] * 40)
+    ((cycle, correction),) = walk(observer, block, begin=COMMISSIONING_CYCLES, end=COMMISSIONING_CYCLES + 20)[
+        :1
+    ]
+    counted = correct(observer, correction)
+    known = observer.state.all_commissioned
+    again = TorqueObserver(leg, MonitorConfig(), SIZE_NM, counted, commissioned=known, references=[wider])
+    (_, second), *_ = walk(again, block, counted, cycle + 1, cycle + 20)
+    assert second.joint == 2
+    assert abs(second.clearance_m - 4.5e-4) < 2.0 * second.change.sigma
+
+
 def test_another_leg_is_reported_within_twenty_cycles(leg, commissioned, reference) -> None:
     observer = commissioned()
     mass, length = body_torques(leg).at(TURN)

@@ -352,10 +352,21 @@ def test_references_and_baselines_are_kept_for_each_cadence(reopened) -> None:
         CommissionedTorque(ns, np.full(5, 3e-4), np.ones((4, 6)), sigma_m, speed=speed)
         for ns, speed in ((20, 6.0), (21, 4.5))
     )
-    found = reopened(corrected)
-    assert [one.stamp_ns for one in found.commissioned_torques] == [20]
+    before = attrs.evolve(made[-1], signatures=np.full((4, 6), 0.5))
+    found = reopened(attrs.evolve(corrected, before=before))
+    (one,) = found.commissioned_torques
+    assert one.stamp_ns == 20
+    np.testing.assert_equal(attrs.asdict(one.before), attrs.asdict(before))
     found.close()
-    assert [one.stamp_ns for one in reopened(also).commissioned_torques] == [21, 20]
+    found = reopened(also)
+    assert [(one.stamp_ns, one.before is None) for one in found.commissioned_torques] == [
+        (21, True),
+        (20, False),
+    ]
+    found.close()
+    # what was compared with the baseline before is not compared again
+    found = reopened(corrected)
+    assert [(one.stamp_ns, one.before) for one in found.commissioned_torques] == [(20, None), (21, None)]
 
 
 @pytest.mark.parametrize("what", ["reset_wear", "undo_reset"])

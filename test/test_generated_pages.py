@@ -206,7 +206,7 @@ def of_drives(name: str) -> str:
 def ledger_tables(_name: str) -> str:
     comments = re.findall(r"((?:^-- .*\n)+)CREATE TABLE (\w+)", TABLES, re.MULTILINE)
     told = {name: " ".join(line[3:] for line in text.splitlines()) for text, name in comments}
-    units = {"ns": "ns", "s": "s", "m": "m", "cycles": "gait cycles"}
+    units = {"ns": "ns", "s": "s", "m": "m", "pa": "1/Pa", "cycles": "gait cycles"}
     lines = [f"The format is {FORMAT} (`PRAGMA user_version`)."]
     with closing(sqlite3.connect(":memory:", isolation_level=None)) as db:
         create_tables(db)

@@ -26,7 +26,7 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     posterior_grid,
     usual_prior,
 )
-from leg_wear_monitor.monitor.ledger.entry import CorrectedClearance, Measurement
+from leg_wear_monitor.monitor.ledger.entry import Measurement, Recount
 
 # The model with normal likelihoods: ln x = pair + lot + part, each of them normal.
 #
@@ -270,7 +270,7 @@ def parts_of(
     replaced_ns: Mapping[str, int],
     *,
     lot: str = "",
-    corrections: Sequence[CorrectedClearance] = (),
+    corrections: Sequence[Recount] = (),
 ) -> list[Part]:
     """All present parts of a leg, and its former parts that were measured.
 
@@ -287,7 +287,7 @@ def parts_of(
         When the present part of each joint was mounted; 0 for the first part, and for an absent joint.
     lot : str, optional
         Lot of the parts that the leg was built with; a replaced part has no known lot.
-    corrections : sequence of CorrectedClearance
+    corrections : sequence of CorrectedClearance and CoefficientSpan
         Of its ledger.
     """
     parts = []

@@ -18,13 +18,13 @@ from leg_wear_monitor.fleet.description import FleetLeg
 from leg_wear_monitor.fleet.directory import LegDirectory, json_object
 from leg_wear_monitor.fleet.learning import LearnedPair, LearnedPart, Part, learn, parts_of
 from leg_wear_monitor.mechanism.loader import load_mechanism
-from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
 from leg_wear_monitor.monitor.alarm_specs import CLEARANCE, with_its_unit
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.state import DiagnosisState
-from leg_wear_monitor.monitor.forecast.forecast import ForecastBasis, JointForecast
+from leg_wear_monitor.monitor.forecast.forecast import ForecastBasis, JointCondition, JointForecast
 from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     SCHEMA_VERSION,
@@ -32,9 +32,10 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     LearnedCoefficient,
     LearnedJoint,
     LearnedPriors,
+    nominal_per_pa,
 )
 from leg_wear_monitor.monitor.judgement import answers, joint_clearance, leg_alarm, life_of, with_measured
-from leg_wear_monitor.monitor.ledger.entry import Entry, Measurement
+from leg_wear_monitor.monitor.ledger.entry import Entry, JointWear, Measurement
 from leg_wear_monitor.monitor.ledger.file import copy_of, measurements_of
 from leg_wear_monitor.monitor.ledger.ledger import Ledger, open_ledger
 from leg_wear_monitor.monitor.status import verdict_status
@@ -342,8 +343,11 @@ def _with_parts(
     conditions, observed, clearances = list(basis.conditions), list(basis.observed), dict(before)
     for k, condition in enumerate(basis.conditions):
         joint = condition.joint
-        if joint not in parts or parts[joint].mean_m > condition.wear_m - _SAME_M:
-            continue  # wear never shrinks: it is the same part
+        if joint not in parts:
+            continue
+        if parts[joint].mean_m > condition.wear_m - _SAME_M:  # wear never shrinks: it is the same part
+            conditions[k] = _regrown(condition, parts[joint], mechanism.clearances[joint])
+            continue
         wear = parts[joint]
         observed[k] = None
         worn = {"wear_m": wear.mean_m, "wear_sigma_m": wear.sampling_m2**0.5}
@@ -355,6 +359,15 @@ def _with_parts(
                 limit_m=before[joint].limit_m,
             )
     return attrs.evolve(basis, conditions=tuple(conditions), observed=tuple(observed)), clearances
+
+
+def _regrown(condition: JointCondition, part: JointWear, clearance: Clearance) -> JointCondition:
+    """A joint's condition, its growth as with the wear coefficient of now."""
+    was, now = part.wear_coefficient_per_pa, nominal_per_pa(clearance)
+    if condition.growth_m is None or was in (0.0, now):
+        return condition
+    growth_m, error_m = (now / was * each for each in (condition.growth_m, condition.growth_error_m))
+    return attrs.evolve(condition, growth_m=growth_m, growth_error_m=error_m)
 
 
 # what is not known yet of a part that was replaced since the recording

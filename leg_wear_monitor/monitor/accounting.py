@@ -16,6 +16,7 @@ from leg_wear_monitor.monitor.gait_evidence import FRICTION_KEY, SIGMA_KEY
 from leg_wear_monitor.monitor.inputs import InputGuard, Pauses
 from leg_wear_monitor.monitor.ledger.entry import (
     AlarmEvent,
+    Audit,
     ClearancePoint,
     Entry,
     Event,
@@ -170,11 +171,19 @@ class Accounting:
             }
             self.state.shown = {a.name: (a.level, a.acknowledged) for a in entry.alarms}
             self._take_over({joint.name: joint for joint in entry.joints})
+            self._note_coefficients(entry)
 
     def _take_over(self, joints: dict[str, JointWear]) -> None:
         own = [joints[name] for name in self._twin.clearance_joints]
         self._twin.set_depth(np.stack([joint.depth for joint in own]))
         self.state.parts = tuple(self._part(k, joint) for k, joint in enumerate(own))
+
+    def _note_coefficients(self, entry: Entry) -> None:
+        """Take down how far the parts were worn with another wear coefficient."""
+        now = dict(zip(self._twin.clearance_joints, self._twin.wear_coefficient_per_pa, strict=True))
+        for joint in entry.joints:
+            if joint.wear_coefficient_per_pa not in (0.0, now[joint.name]):
+                self.note(Audit(entry.stamp_ns, "parameters", "change_coefficient", joint))
 
     def _part(self, k: int, wear: JointWear) -> PartLife:
         """A part of joint k that has walked so much until now."""
@@ -284,6 +293,7 @@ class Accounting:
             totals["moving_s"] - part.moving_s,
             part.replaced_ns,
             float(self._sampling_m2[k]),
+            float(self._twin.wear_coefficient_per_pa[k]),
         )
 
     @property

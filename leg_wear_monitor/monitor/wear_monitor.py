@@ -6,6 +6,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from leg_wear_monitor.configuration import Doubt
 from leg_wear_monitor.errors import LegWearError, closed_at_the_end
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
@@ -23,6 +24,7 @@ from leg_wear_monitor.monitor.evaluation import EvaluationPeriods
 from leg_wear_monitor.monitor.forecast.forecast import ForecastBasis
 from leg_wear_monitor.monitor.forecast.growth import all_extended
 from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult
+from leg_wear_monitor.monitor.forecast.wear_coefficients import coefficient_doubts
 from leg_wear_monitor.monitor.judgement import (
     evaluate_clearances,
     is_forecast_valid,
@@ -568,6 +570,12 @@ class WearMonitor:
     def ledger_loss(self) -> str:
         """What the ledger had lost when it was opened; empty if nothing was lost."""
         return self._accounting.ledger.loss if self._accounting.ledger else ""
+
+    @property
+    def coefficient_doubts(self) -> tuple[Doubt, ...]:
+        """Joints whose wear the ledger has counted with another wear coefficient, when it was opened."""
+        ledger = self._accounting.ledger
+        return coefficient_doubts(ledger.entry.joints, self.mechanism) if ledger and ledger.entry else ()
 
     @property
     def is_all_counted(self) -> bool:

@@ -262,7 +262,8 @@ class MonitorNode(ClosingNode):
         joints, leg = ", ".join(self._monitor.clearance_joints), self._monitor.mechanism.name
         rpm = f"{config.cadence.commanded_rpm:g} rpm"
         self.get_logger().info(f"monitoring joints {joints} of {leg} at {rpm}, hardware {config.hardware}")
-        for doubt in (*acceleration_doubts(config), *life_doubts(config, mechanism)):
+        doubts = *acceleration_doubts(config), *life_doubts(config, mechanism)
+        for doubt in (*doubts, *self._monitor.coefficient_doubts):
             self.get_logger().warning(str(doubt))
 
     @property

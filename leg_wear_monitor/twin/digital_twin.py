@@ -314,6 +314,11 @@ class DigitalTwin:
         self._setup.contacts.wear_coefficient[:] = factor * self._nominal
 
     @property
+    def wear_coefficient_per_pa(self) -> Floats:
+        """Nominal wear coefficient (k,) of bushing and journal together [1/Pa]."""
+        return np.asarray(self._nominal.sum(axis=1))
+
+    @property
     def depth(self) -> Floats:
         """Wear depth (k, 2, N) [m] of bushing and journal; a copy."""
         return self._setup.surfaces.depth.copy()

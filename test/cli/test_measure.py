@@ -34,6 +34,18 @@ def test_a_measurement_is_kept_and_explained(run, ledger):
     assert rows(ledger) == [("A", pytest.approx(4.2e-4), pytest.approx(6e-5), 4000, 1)]
 
 
+def test_another_wear_coefficient_than_that_of_the_counted_wear_is_told(run, ledger, tmp_path):
+    config = tmp_path / "monitor.yaml"
+    config.write_text("/**:\n  ros__parameters:\n    wear_coefficients_per_pa: [2.0e-15]\n")
+    given = ("measure", "A", "0.42", "--sigma", "0.005", "--ledger", str(ledger))
+    assert run(*given).stderr == ""
+    (line,) = run(*given, "--config", str(config)).stderr.splitlines()
+    assert line.startswith(
+        f"warning: {config}: wear coefficient of joint A: 4e-15 1/Pa (bushing and journal together), and the "
+        "wear in the ledger was counted with 2e-15 1/Pa; that wear stays as counted"
+    )
+
+
 def test_a_contradiction_ends_with_findings_and_leaves_wear_as_it_is(run, ledger):
     result = run("measure", "G", "3.0", "--sigma", "0.005", "--ledger", str(ledger))
     assert result.exit_code == 1

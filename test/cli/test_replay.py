@@ -102,6 +102,17 @@ def test_the_same_recording_again_keeps_the_report_and_exits_with_findings(
     assert json.loads((tmp_path / "again.json").read_text())["verdict"]["fault_code"] == "ALREADY_COUNTED"
 
 
+def test_another_wear_coefficient_than_that_of_the_ledger_is_told(run, bag, complaints, tmp_path, unpainted):
+    config = tmp_path / "monitor.yaml"
+    config.write_text("/**:\n  ros__parameters:\n    wear_coefficients_per_pa: [2.0e-15]\n")
+    first, again = (
+        run("replay", str(bag), "--ledger", "own.db", *more) for more in ((), ("--config", config))
+    )
+    line = f"warning: {config}: wear coefficient of joints A, B, G, I, J: 4e-15 1/Pa (bushing and journal "
+    assert not any("coefficient" in each for each in complaints(first))
+    assert any(each.startswith(line) for each in complaints(again))
+
+
 @pytest.mark.no_cover
 def test_a_summary_changed_anywhere_gives_a_page_or_one_line(run, bag, tmp_path, unpainted):
     run("replay", str(bag), "--out", "out")

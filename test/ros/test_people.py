@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 pytest.importorskip("rclpy")
@@ -133,6 +134,16 @@ def test_what_is_not_stored_is_said_and_cannot_be_undone(has_ledger: bool, tmp_p
             away.rename(ledger)
             assert "not stored" not in node._acknowledge()  # the next entry has what was done meanwhile
             assert "not stored" not in node._undo_reset("G")
+
+
+def test_another_wear_coefficient_than_that_of_the_ledger_is_logged(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    given = {"clearance_joints": ["G"], "ledger__path": str(tmp_path / "wear.db")}
+    with made_node(wear_coefficients_per_pa=[1.0e-15], **given) as node:
+        node.monitor._twin.set_depth(np.full((1, 2, 720), 3.0e-5))
+    with made_node("--log-level", "warn", wear_coefficients_per_pa=[2.0e-15], **given):
+        assert "wear coefficient of joint G: 4e-15 1/Pa (bushing and" in capfd.readouterr().err
 
 
 def test_without_a_clock_nothing_is_reset() -> None:

@@ -124,6 +124,7 @@ def _run(
     began, took = [0.0], [0.0]
 
     def ready(monitor: Any) -> None:
+        common.warn_of(str(config or "parameters"), monitor.coefficient_doubts)
         with common.compilation("monitor", how_long="about a minute"), closed_at_the_end(monitor.abandon):
             monitor.warm_up()
         began[0] = time.perf_counter()

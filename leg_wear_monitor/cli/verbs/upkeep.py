@@ -326,7 +326,7 @@ def _measured(
 ) -> tuple[tuple[str, ...], bool]:
     """What came of a measurement, a line each, and whether the caller has to act."""
     from leg_wear_monitor.monitor.forecast.measurement import measure as evaluate
-    from leg_wear_monitor.monitor.forecast.wear_coefficients import prior_source
+    from leg_wear_monitor.monitor.forecast.wear_coefficients import coefficient_doubts, prior_source
     from leg_wear_monitor.monitor.ledger.entry import new_part
     from leg_wear_monitor.monitor.operators import measured_in, shown_in
     from leg_wear_monitor.monitor.verdict.situation import SOURCES
@@ -336,6 +336,7 @@ def _measured(
         limit_m = check_limit(kept, leg, settings, joint, config)
         parts = {wear.name: wear for wear in kept.entry.joints} if kept.entry else {}
         part = parts.get(joint) or new_part(joint)
+        common.warn_of(str(config or "parameters"), coefficient_doubts([part], leg))
         found = evaluate(
             settings.forecast,
             leg.clearances[joint],

@@ -35,7 +35,13 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     estimate_coefficient,
     prior_source,
 )
-from leg_wear_monitor.monitor.ledger.entry import CorrectedClearance, JointWear, Measurement, fingerprint
+from leg_wear_monitor.monitor.ledger.entry import (
+    CorrectedClearance,
+    JointWear,
+    Measurement,
+    Recount,
+    fingerprint,
+)
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
 _T = TypeVar("_T")
@@ -201,7 +207,7 @@ class ForecastState:
         What encoders show of each joint, where the estimate uses it.
     basis : ForecastBasis or None
         Of the last forecast that was made.
-    measurements, corrections : tuples of Measurement, CorrectedClearance
+    measurements, corrections : tuples of Measurement, of CorrectedClearance and CoefficientSpan
         Of the ledger, and since.
     """
 
@@ -213,7 +219,7 @@ class ForecastState:
     observed: tuple[ClearanceAtWear | None, ...] = ()
     basis: ForecastBasis | None = None
     measurements: tuple[Measurement, ...] = ()
-    corrections: tuple[CorrectedClearance, ...] = ()
+    corrections: tuple[Recount, ...] = ()
 
 
 class Forecaster:
@@ -228,7 +234,7 @@ class Forecaster:
         Of the ledger.
     replaced_ns : sequence of int
         When each joint's part was replaced, 0 if it never was.
-    corrections : sequence of CorrectedClearance
+    corrections : sequence of CorrectedClearance and CoefficientSpan
         Of the ledger.
 
     Raises
@@ -243,7 +249,7 @@ class Forecaster:
         settings: Forecasting,
         measurements: Sequence[Measurement],
         replaced_ns: Sequence[int],
-        corrections: Sequence[CorrectedClearance] = (),
+        corrections: Sequence[Recount] = (),
     ) -> None:
         self._settings, self._clearance_joints = settings, mechanism.clearance_joints
         self._clearances = [mechanism.clearances[joint] for joint in mechanism.clearance_joints]

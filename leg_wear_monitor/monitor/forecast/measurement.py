@@ -19,7 +19,7 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     estimate_coefficient,
     prior_source,
 )
-from leg_wear_monitor.monitor.ledger.entry import CorrectedClearance, JointWear, Measurement
+from leg_wear_monitor.monitor.ledger.entry import JointWear, Measurement, Recount
 
 # How past forecasts did: a measured clearance is later reality, and the ledger says what was expected.
 
@@ -213,7 +213,7 @@ def believed_clearance_m(
     settings: Forecasting,
     part: JointWear,
     measurements: Sequence[Measurement],
-    corrections: Sequence[CorrectedClearance],
+    corrections: Sequence[Recount],
 ) -> float:
     """Median of what counting and the measurements of a part give together; NaN without measurements."""
     key = (part.name, part.replaced_ns)
@@ -238,7 +238,7 @@ def measure(
     kept_ns: int = 0,
     accept: bool = False,
     prior: CoefficientPrior | None = None,
-    corrections: Sequence[CorrectedClearance] = (),
+    corrections: Sequence[Recount] = (),
 ) -> MeasurementResult:
     """Evaluate a measured clearance.
 
@@ -262,7 +262,7 @@ def measure(
         Whether it counts even if it contradicts the model.
     prior : CoefficientPrior, optional
         Without it, the configured spread about the nominal coefficient.
-    corrections : sequence of CorrectedClearance
+    corrections : sequence of CorrectedClearance and CoefficientSpan
         All of the ledger.
 
     Raises

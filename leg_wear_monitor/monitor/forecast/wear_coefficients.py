@@ -7,17 +7,21 @@ around the estimate: an accepted measurement moves it as far as the data require
 
 Where the counted clearance was corrected by what the drive torque shows, c_0, d and w begin anew with that
 clearance, its error and the wear since; x remains.
+
+Where the nominal coefficient was another one, w is what would have been counted with the present one, so what
+was learned of x times the coefficient stays, whatever is configured. That holds as soon as something was
+learned; until then wear is taken as it was counted.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from statistics import NormalDist
 
 import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from leg_wear_monitor.configuration import described, quantity
+from leg_wear_monitor.configuration import Doubt, described, quantity
 from leg_wear_monitor.configuration.strict import structure
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.files import read_json
@@ -25,7 +29,12 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials import USUAL_SPREAD, regime_of, spread_of
 from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
 from leg_wear_monitor.monitor.config.sections import Forecasting
-from leg_wear_monitor.monitor.ledger.entry import CorrectedClearance
+from leg_wear_monitor.monitor.ledger.entry import (
+    CoefficientSpan,
+    CorrectedClearance,
+    JointWear,
+    Recount,
+)
 
 # Prior of each joint's wear coefficient: the spread of its material pair, or what a fleet has learned.
 #
@@ -125,6 +134,33 @@ def nominal_per_pa(clearance: Clearance) -> float:
     return sum(clearance.wear_coefficient)
 
 
+def coefficient_doubts(counted: Iterable[JointWear], leg: Mechanism) -> tuple[Doubt, ...]:
+    """Joints whose wear was counted with another wear coefficient than that of the leg."""
+    found: dict[tuple[float, float], list[str]] = {}
+    for part in counted:
+        was, now = part.wear_coefficient_per_pa, nominal_per_pa(leg.clearances[part.name])
+        if was > 0.0 and was != now and part.mean_m > 0.0:
+            found.setdefault((was, now), []).append(part.name)
+    return tuple(
+        Doubt(
+            f"wear coefficient of {'joint' if len(joints) == 1 else 'joints'} {', '.join(joints)}",
+            f"{now:.4g} 1/Pa (bushing and journal together), and the wear in the ledger was counted with "
+            f"{was:.4g} 1/Pa; that wear stays as counted, {_further(was, now)}",
+        )
+        for (was, now), joints in found.items()
+    )
+
+
+def _further(was_per_pa: float, now_per_pa: float) -> str:
+    """What becomes of the wear to come where the coefficient is another one."""
+    if not now_per_pa > 0.0:
+        return "and no more is counted"
+    return (
+        "wear from now on is counted with the new one, and the forecast keeps a measured coefficient "
+        f"(its factor is {was_per_pa / now_per_pa:.3g} times as large)"
+    )
+
+
 def prior_source(mechanism: Mechanism, settings: Forecasting) -> PriorSource:
     """Priors of a leg, from the file that ``forecast.priors`` names if it names one.
 
@@ -209,7 +245,7 @@ class ClearanceAtWear:
 
 
 def known_clearances(
-    settings: Forecasting, fresh_m: float, corrections: Sequence[CorrectedClearance] = ()
+    settings: Forecasting, fresh_m: float, corrections: Sequence[Recount] = ()
 ) -> list[ClearanceAtWear]:
     """Known clearances of a part, the oldest first.
 
@@ -218,7 +254,7 @@ def known_clearances(
     settings : Forecasting
     fresh_m : float
         Nominal clearance when new.
-    corrections : sequence of CorrectedClearance
+    corrections : sequence of CorrectedClearance and CoefficientSpan
         Of this part, in the order of time.
     """
     return [
@@ -227,13 +263,12 @@ def known_clearances(
         *(
             ClearanceAtWear(c.clearance_m, c.sigma_m, c.wear_m, 0.5 * (c.before_m + c.wear_m))
             for c in corrections
+            if isinstance(c, CorrectedClearance)
         ),
     ]
 
 
-def corrections_of(
-    corrections: Sequence[CorrectedClearance], joint: str, replaced_ns: int
-) -> list[CorrectedClearance]:
+def corrections_of(corrections: Sequence[Recount], joint: str, replaced_ns: int) -> list[Recount]:
     """Corrections of one part of a joint."""
     return [c for c in corrections if c.joint == joint and c.replaced_ns == replaced_ns]
 
@@ -311,7 +346,7 @@ def estimate_coefficient(
     fresh_m: float,
     observations: Sequence[ClearanceAtWear] = (),
     prior: CoefficientPrior | None = None,
-    corrections: Sequence[CorrectedClearance] = (),
+    corrections: Sequence[Recount] = (),
 ) -> CoefficientEstimate:
     """Coefficient estimate after measurements of the same part, in any order.
 
@@ -323,12 +358,16 @@ def estimate_coefficient(
     observations : sequence of ClearanceAtWear
     prior : CoefficientPrior, optional
         Without it, the configured or usual spread about the nominal coefficient.
-    corrections : sequence of CorrectedClearance
+    corrections : sequence of CorrectedClearance and CoefficientSpan
         Of its counted clearance, in the order of time.
     """
     prior = prior or usual_prior(settings)
-    factor = measured_factor(settings, fresh_m, observations, corrections)
-    log_factor, log_weight = posterior_grid(prior, *factor)
+    mean, precision = measured_factor(settings, fresh_m, observations, corrections)
+    if prior.mean == 0.0 and math.sqrt(precision) * mean * prior.sigma < 1.0:
+        # nothing is known better than the nominal coefficient: another one says nothing of the wear before it
+        corrections = [one for one in corrections if not isinstance(one, CoefficientSpan)]
+        mean, precision = measured_factor(settings, fresh_m, observations, corrections)
+    log_factor, log_weight = posterior_grid(prior, mean, precision)
     weight = np.exp(log_weight - log_weight.max())
     known, own = _spans(settings, fresh_m, observations, corrections)[-1]
     precision = 1.0 / known.sigma_m**2 + sum(observation.sigma_m**-2 for observation in own)
@@ -351,7 +390,7 @@ def measured_factor(
     settings: Forecasting,
     fresh_m: float,
     observations: Sequence[ClearanceAtWear],
-    corrections: Sequence[CorrectedClearance] = (),
+    corrections: Sequence[Recount] = (),
 ) -> tuple[float, float]:
     """Mean and precision of the factor from the measurements alone; 0 if they have no information.
 
@@ -367,15 +406,30 @@ def _spans(
     settings: Forecasting,
     fresh_m: float,
     observations: Sequence[ClearanceAtWear],
-    corrections: Sequence[CorrectedClearance],
+    corrections: Sequence[Recount],
 ) -> list[tuple[ClearanceAtWear, list[ClearanceAtWear]]]:
-    """Known clearances, each with the measurements between it and the next one."""
-    known = known_clearances(settings, fresh_m, corrections)
+    """Known clearances, each with the measurements between it and the next one.
+
+    Their wear is that of the present coefficient.
+    """
+    counted = [one for one in corrections if isinstance(one, CoefficientSpan)]
+    known = [_recounted(each, counted) for each in known_clearances(settings, fresh_m, corrections)]
+    observations = [_recounted(each, counted) for each in observations]
     ends = [*(each.from_m for each in known[1:]), math.inf]
     return [
         (each, [one for one in observations if each.from_m <= one.wear_m < end])
         for each, end in zip(known, ends, strict=True)
     ]
+
+
+def _recounted(one: ClearanceAtWear, counted: Sequence[CoefficientSpan]) -> ClearanceAtWear:
+    """A clearance at the wear that ends with the present one, had all been counted with its coefficient."""
+
+    def moved(wear_m: float) -> float:
+        steps = ((1.0 - each.factor) * max(0.0, each.to_m - max(wear_m, each.from_m)) for each in counted)
+        return wear_m + sum(steps)
+
+    return attrs.evolve(one, wear_m=moved(one.wear_m), from_m=moved(one.from_m))
 
 
 def _factor_since(known: ClearanceAtWear, observations: Sequence[ClearanceAtWear]) -> tuple[float, float]:

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import attrs
@@ -197,6 +197,8 @@ class JointWear:
         When the part was replaced, 0 if it never was.
     sampling_m2 : float
         Variance of the mean depth because sampled replays did not follow all gait cycles.
+    wear_coefficient_per_pa : float
+        Of bushing and journal together, with which the last of it was counted; 0 if it is not known.
     """
 
     name: str
@@ -205,6 +207,7 @@ class JointWear:
     moving_s: float = 0.0
     replaced_ns: int = 0
     sampling_m2: float = 0.0
+    wear_coefficient_per_pa: float = 0.0
 
     @property
     def mean_m(self) -> float:
@@ -232,6 +235,7 @@ def one_part(before: JointWear, since: JointWear) -> JointWear:
         before.moving_s + since.moving_s,
         before.replaced_ns,
         before.sampling_m2 + since.sampling_m2,
+        since.wear_coefficient_per_pa or before.wear_coefficient_per_pa,
     )
 
 
@@ -407,6 +411,57 @@ class CorrectedClearance:
     before_m: float
     wear_m: float
     replaced_ns: int
+
+
+@attrs.frozen
+class CoefficientSpan:
+    """Wear of a part that was counted with another wear coefficient than the present one.
+
+    Attributes
+    ----------
+    joint : str
+    replaced_ns : int
+        When the part was replaced, 0 if it never was.
+    from_m, to_m : float
+        Wear that the twin had counted for this part at begin and end.
+    factor : float
+        Present coefficient over that one.
+    """
+
+    joint: str
+    replaced_ns: int
+    from_m: float
+    to_m: float
+    factor: float
+
+
+Recount = CorrectedClearance | CoefficientSpan
+"""Counted wear of a part that a forecast takes otherwise than as worn with the present coefficient."""
+
+
+def coefficient_spans(
+    states: Iterable[JointWear], now_per_pa: Mapping[str, float]
+) -> tuple[CoefficientSpan, ...]:
+    """Wear that was counted with other coefficients than the present ones; none where one is not known.
+
+    Parameters
+    ----------
+    states : iterable of JointWear
+        Of all parts in the order of time, where their coefficient changed at the least, and the present ones.
+    now_per_pa : mapping of str to float
+        Present coefficients of bushing and journal together, by joint.
+    """
+    ends: dict[tuple[str, int], float] = {}
+    spans = []
+    for state in states:
+        part, was, now = (
+            (state.name, state.replaced_ns), state.wear_coefficient_per_pa, now_per_pa.get(state.name, 0.0)
+        )  # fmt: skip
+        begin_m, end_m = ends.get(part, 0.0), state.mean_m
+        ends[part] = max(begin_m, end_m)
+        if was > 0.0 and now > 0.0 and was != now and end_m > begin_m:
+            spans.append(CoefficientSpan(*part, begin_m, end_m, now / was))
+    return tuple(spans)
 
 
 @attrs.frozen

@@ -28,9 +28,11 @@ from leg_wear_monitor.monitor.ledger.entry import (
     Event,
     ForecastPoint,
     Measurement,
+    Recount,
     Run,
     WalkedLoad,
     binding_of,
+    coefficient_spans,
 )
 from leg_wear_monitor.monitor.ledger.file import MOVE, LedgerError, connect, copy_of, create, transaction
 from leg_wear_monitor.state import Evidence, Verdict
@@ -63,8 +65,11 @@ class Ledger:
         Last entry of earlier runs; None in a new ledger.
     measurements : tuple of Measurement
         Manually measured clearances of earlier runs, including withdrawn ones.
-    corrections : tuple of CorrectedClearance
-        Counted clearances that were corrected by the drive torque in earlier runs.
+    corrections : tuple of CorrectedClearance and CoefficientSpan
+        Counted clearances that were corrected by the drive torque in earlier runs; with `open_ledger`, also
+        wear that was counted with other wear coefficients than those of the leg now.
+    states : tuple of JointWear
+        Parts as they were before each change of their wear in earlier runs, then as in `entry`.
     commissioned : Commissioned or None
         Errors of further encoders from earlier runs.
     commissioned_torques : list of CommissionedTorque
@@ -128,7 +133,8 @@ class Ledger:
         self._kept_moving_s = self.entry.moving_s if self.entry else 0.0
         self.counted_ns = rows.read_spans(db)
         self.measurements = rows.read_measurements(db)
-        self.corrections = rows.read_rows(db, CorrectedClearance)
+        self.corrections: tuple[Recount, ...] = rows.read_rows(db, CorrectedClearance)
+        self.states = (*rows.read_former_states(db), *(self.entry.joints if self.entry else ()))
         self.commissioned = rows.read_commissioned(db)
         self.commissioned_torques = rows.read_commissioned_torques(db)
         self.parameters = rows.read_identified_leg(db)
@@ -357,8 +363,11 @@ def open_ledger(mechanism: Mechanism, config: MonitorConfig, at_end: bool = Fals
     """
     if not config.ledger.path:
         return None
-    binding = binding_of(fitted(mechanism, config), config)
-    return Ledger(config.ledger.path, binding, config.ledger.checkpoint_s, at_end)
+    leg = fitted(mechanism, config)
+    ledger = Ledger(config.ledger.path, binding_of(leg, config), config.ledger.checkpoint_s, at_end)
+    now_per_pa = {joint: sum(leg.clearances[joint].wear_coefficient) for joint in leg.clearance_joints}
+    ledger.corrections += coefficient_spans(ledger.states, now_per_pa)
+    return ledger
 
 
 @attrs.frozen(kw_only=True, eq=False)

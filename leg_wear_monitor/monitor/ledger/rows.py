@@ -80,14 +80,7 @@ def write_entry(db: sqlite3.Connection, run: int, entry: Entry, whole: bool) -> 
         Whether the surfaces are written, too, not only their means.
     """
     replace(db, "entry", [(1, run, entry.stamp_ns)])
-    replace(
-        db,
-        "joint",
-        [
-            (j.name, *j.surface_means_m, j.cycles, j.moving_s, j.replaced_ns, j.sampling_m2)
-            for j in entry.joints
-        ],
-    )
+    replace(db, "joint", [(j.name, *j.surface_means_m, *attrs.astuple(j)[2:]) for j in entry.joints])
     if whole:
         replace(db, "surface", [(joint.name, _blob(joint.depth)) for joint in entry.joints])
     replace(db, "total", (_totals(db) | entry.totals).items())
@@ -110,12 +103,11 @@ def read_entry(db: sqlite3.Connection) -> Entry | None:
         "SELECT begin_ns, end_ns, epoch FROM span WHERE run = ? ORDER BY part", (run,)
     ).fetchall()
     joints = db.execute(
-        "SELECT name, depth, cycles, moving_s, replaced_ns, sampling_m2, bushing_m, journal_m "
-        "FROM joint JOIN surface USING (name) ORDER BY name"
+        f"SELECT name, {_PART}, bushing_m, journal_m FROM joint JOIN surface USING (name) ORDER BY name"
     )
     return Entry(
         stamp_ns=stamp_ns,
-        joints=tuple(_risen(_joint(*row[:6]), row[6:]) for row in joints),
+        joints=tuple(_risen(_joint(*row[:7]), row[7:]) for row in joints),
         totals=_totals(db),
         alarms=tuple(_alarm_of(*row) for row in db.execute("SELECT * FROM alarm ORDER BY kind, subject")),
         spans=tuple(spans),
@@ -127,10 +119,12 @@ def _totals(db: sqlite3.Connection) -> dict[str, float]:
     return dict(db.execute("SELECT name, value FROM total"))
 
 
-def _joint(
-    name: str, depth: bytes, cycles: int, moving_s: float, replaced_ns: int, sampling_m2: float
-) -> JointWear:
-    return JointWear(name, _floats(depth).reshape(2, -1), cycles, moving_s, replaced_ns, sampling_m2)
+_PART = "depth, cycles, moving_s, replaced_ns, sampling_m2, wear_coefficient_per_pa"
+
+
+def _joint(name: str, depth: bytes, *rest: Any) -> JointWear:
+    """A part of its name and the columns `_PART`."""
+    return JointWear(name, _floats(depth).reshape(2, -1), *rest)
 
 
 def _risen(joint: JointWear, means_m: tuple[float, float]) -> JointWear:
@@ -362,8 +356,8 @@ def _verdict_of(state: str, why: str, since_ns: int, to_do: str, fault_code: str
 def read_last_reset(db: sqlite3.Connection, joint: str) -> Audit | None:
     """The last `reset_wear` of a joint that was not undone, None if there is none."""
     row = db.execute(
-        "SELECT id, stamp_ns, who, what, joint, depth, cycles, moving_s, replaced_ns, sampling_m2 "
-        "FROM audit AS a WHERE joint = ? AND what = 'reset_wear' "
+        f"SELECT id, stamp_ns, who, what, joint, {_PART} FROM audit AS a "
+        "WHERE joint = ? AND what = 'reset_wear' "
         "AND NOT EXISTS (SELECT 1 FROM audit WHERE undoes = a.id) ORDER BY id DESC LIMIT 1",
         (joint,),
     ).fetchone()
@@ -371,6 +365,12 @@ def read_last_reset(db: sqlite3.Connection, joint: str) -> Audit | None:
         return None
     number, stamp_ns, who, what = row[:4]
     return Audit(stamp_ns, who, what, _joint(*row[4:]), id=number)
+
+
+def read_former_states(db: sqlite3.Connection) -> tuple[JointWear, ...]:
+    """Parts as they were before each change of their wear, in the order of time."""
+    found = db.execute(f"SELECT joint, {_PART} FROM audit WHERE joint IS NOT NULL ORDER BY id")
+    return tuple(_joint(*row) for row in found)
 
 
 def read_commissioned(db: sqlite3.Connection) -> Commissioned | None:

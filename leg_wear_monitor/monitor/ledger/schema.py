@@ -34,10 +34,12 @@ CREATE TABLE entry (
 ) STRICT;
 
 -- mean wear depths of the surfaces; the rest since the part was new; sampling_m2 is the variance of the mean
--- depth because sampled replays did not follow all gait cycles
+-- depth because sampled replays did not follow all gait cycles; wear_coefficient_per_pa, of bushing and
+-- journal together, is that with which the last of it was counted, 0 if it is not known
 CREATE TABLE joint (
     name TEXT PRIMARY KEY, bushing_m REAL NOT NULL, journal_m REAL NOT NULL, cycles INTEGER NOT NULL,
-    moving_s REAL NOT NULL, replaced_ns INTEGER NOT NULL, sampling_m2 REAL NOT NULL
+    moving_s REAL NOT NULL, replaced_ns INTEGER NOT NULL, sampling_m2 REAL NOT NULL,
+    wear_coefficient_per_pa REAL NOT NULL
 ) STRICT, WITHOUT ROWID;
 
 -- wear depths around the surfaces as they were last written, at most a minute of motion before the entry:
@@ -78,7 +80,8 @@ CREATE TABLE alarm_history (
 -- who did what to the wear; the joint is as it was before, undoes is the row that was undone
 CREATE TABLE audit (
     id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, who TEXT NOT NULL, what TEXT NOT NULL, joint TEXT,
-    depth BLOB, cycles INTEGER, moving_s REAL, replaced_ns INTEGER, sampling_m2 REAL, undoes INTEGER
+    depth BLOB, cycles INTEGER, moving_s REAL, replaced_ns INTEGER, sampling_m2 REAL,
+    wear_coefficient_per_pa REAL, undoes INTEGER
 ) STRICT;
 
 -- clearances now and then

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate.cause import SURE_LOG_ODDS, Cause, Change
+from leg_wear_monitor.estimate.cause import SURE_LOG_ODDS, SURE_SIGMAS, Cause, Change
 from leg_wear_monitor.estimate.explanations import MODEL_ERROR, Explainer, Explanation, opened
 from leg_wear_monitor.estimate.least_squares import Point, gauss_newton
 from leg_wear_monitor.mechanism.arrays import Floats
@@ -43,6 +43,10 @@ class ClearanceFit:
     def explains(self) -> bool:
         """Whether the clearances explain what was measured."""
         return self.square <= _EXPLAINED
+
+    def agrees(self, k: int, change: Change) -> bool:
+        """Whether joint k has the size by all clearances at once that it has alone, by a change of it."""
+        return bool(abs(self.clearance_m[k] - change.value) <= SURE_SIGMAS * change.sigma)
 
 
 def fit_clearances(

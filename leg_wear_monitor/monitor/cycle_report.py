@@ -8,7 +8,8 @@ import attrs
 from leg_wear_monitor.estimate.mismatch import explanation
 from leg_wear_monitor.monitor.alarm_specs import MISMATCH
 from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate, ClearanceObservation
-from leg_wear_monitor.monitor.diagnosis.observer import Correction, TorqueObserver
+from leg_wear_monitor.monitor.diagnosis.evidence import Correction
+from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, TorqueState
 from leg_wear_monitor.monitor.forecast.forecast import Forecast
 from leg_wear_monitor.monitor.forecast.forecaster import RENEWED_NS

@@ -398,6 +398,8 @@ class LegSimulation:
             )  # fmt: skip
             if status != DONE or not wanted():
                 return None
+        if not np.abs(torque).max() < np.finfo(np.float16).max:  # as it is kept; also where it is no number
+            return None
         return SimulatedLeg(torque[settling:], eccentricity.reshape(POINTS, -1, 2) / cycles)
 
     def _each_under_its_load(self, load: Floats, cycles: int) -> Iterator[int]:
@@ -449,8 +451,9 @@ _LEAST_WEAR_M = 5.0e-6  # least mean wear whose profile is scaled; with less, a 
 def worn_to(fresh: Floats, depth: Floats, target: Floats) -> tuple[Floats, Floats]:
     """Clearances when new (k,) and wear depths (k, 2, N) that give the target (k,) mean clearances [m].
 
-    The wear profile of a worn joint is scaled; a joint without a profile is widened evenly.
+    The wear profile of a worn joint is scaled, to none where it is to be new; a joint without a profile is
+    widened evenly.
     """
-    worn, wanted = depth.sum(axis=1).mean(axis=1), target - fresh
-    scale = np.where((worn > _LEAST_WEAR_M) & (wanted > 0.0), wanted / np.maximum(worn, _LEAST_WEAR_M), 1.0)
+    worn, wanted = depth.sum(axis=1).mean(axis=1), np.maximum(target - fresh, 0.0)
+    scale = np.where(worn > _LEAST_WEAR_M, wanted / np.maximum(worn, _LEAST_WEAR_M), 1.0)
     return target - scale * worn, scale[:, None, None] * depth

@@ -12,7 +12,8 @@ from leg_wear_monitor import open_ledger
 from leg_wear_monitor.dashboard.ledger_leg import LedgerLeg
 from leg_wear_monitor.estimate.cause import Cause, Change
 from leg_wear_monitor.monitor.config.settings import Limits
-from leg_wear_monitor.monitor.diagnosis.observer import Correction, TorqueObserver
+from leg_wear_monitor.monitor.diagnosis.evidence import Correction
+from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState, SignedCycle
 from leg_wear_monitor.monitor.forecast.forecast import Answer
 from leg_wear_monitor.monitor.ledger.entry import Measurement

@@ -6,12 +6,11 @@ period evaluates the gait cycles that ended, and goes on with the simulation of 
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate.cause import Cause, Change
+from leg_wear_monitor.estimate.cause import Cause
 from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
 from leg_wear_monitor.estimate.coupling import compliance_of
 from leg_wear_monitor.estimate.drive import DIRECT
@@ -22,15 +21,8 @@ from leg_wear_monitor.mechanism.person import upwards
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.sections import drive_figures
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.diagnosis.evidence import (
-    CORRECTED_FROM,
-    SETTLING_CYCLES,
-    Evidence,
-    doubt,
-    missing,
-    next_step,
-    other_sensor,
-)
+from leg_wear_monitor.monitor.diagnosis.evidence import CORRECTED_FROM, Correction, Evidence, correction_of
+from leg_wear_monitor.monitor.diagnosis.reasons import doubt, missing, next_step, other_sensor
 from leg_wear_monitor.monitor.diagnosis.references import (
     COMMISSIONING_CYCLES,
     LOAD_ROUNDS,
@@ -57,29 +49,6 @@ from leg_wear_monitor.twin.sample import GROUND, MEASURED, KeepsSamples
 from leg_wear_monitor.twin.statistics import CycleStatistics
 from leg_wear_monitor.twin.torque_reference import ReferenceSnapshot, TorqueReference
 
-# Counted clearances that are surely wrong, and what becomes of the evidence when they are corrected.
-
-
-class Correction(NamedTuple):
-    """A counted clearance that is surely wrong: joint index, its clearance [m], and the change behind it."""
-
-    joint: int
-    clearance_m: float
-    change: Change
-
-
-def correction_of(state: TorqueState, joints: Sequence[str]) -> Correction | None:
-    """A settled change of one clearance, seen at the present cadence."""
-    if not state.changes or state.fit_cycles < SETTLING_CYCLES or not state.is_compared:
-        return None
-    change = state.changes[-1]
-    if sum(cycle.begin_ns >= change.since_ns for cycle in state.cycles) < SETTLING_CYCLES:
-        return None
-    is_wide = change.value >= CORRECTED_FROM * change.counted
-    if change.subject not in joints or not change.is_sure or not is_wide:
-        return None
-    return Correction(joints.index(change.subject), change.value, change)
-
 
 def settle(state: TorqueState, correction: Correction, counted_m: Floats, offset: Floats) -> None:
     """Make the gait cycles since a change those of the commissioned leg, with clearances (k,) [m].
@@ -92,6 +61,8 @@ def settle(state: TorqueState, correction: Correction, counted_m: Floats, offset
     state.cycles = tuple(cycle for cycle in state.cycles if cycle.begin_ns >= change.since_ns)
     signatures, before = state.signatures, state.commissioned
     sigma_m = counted_m.copy()
+    if before is not None and before.before is not None:  # joints that were corrected since stay known
+        sigma_m = np.where(before.is_unknown, counted_m, before.sigma_m)
     sigma_m[joint] = change.sigma
     if before is not None:
         signatures_before = before.signatures - before.mean + offset
@@ -277,6 +248,7 @@ class TorqueObserver(KeepsSamples):
     def replaced(self, counted_m: Floats) -> None:
         """Start again after the replacement of a part: the leg has to be commissioned again."""
         self.state.settled = ()
+        self.state.fit, self.state.fit_cycles, self.state.fit_due = None, 0, 0  # it is of the former part
         self.state.forget_baselines()
         self._restart(counted_m)
 

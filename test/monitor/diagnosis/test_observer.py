@@ -9,15 +9,17 @@ import pytest
 from leg_wear_monitor.estimate import identification
 from leg_wear_monitor.estimate.body_torques import body_torques
 from leg_wear_monitor.estimate.cause import Cause, Change
+from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
 from leg_wear_monitor.estimate.signature import CommissionedTorque, TorqueSensor
 from leg_wear_monitor.mechanism.person import nominal_stance
 from leg_wear_monitor.mechanism.position import TURN, build_linkage
 from leg_wear_monitor.monitor.config.inputs import Load
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.diagnosis import evidence, references
+from leg_wear_monitor.monitor.diagnosis import evidence, reasons, references
 from leg_wear_monitor.monitor.diagnosis import observer as observer_module
 from leg_wear_monitor.monitor.diagnosis import state as state_module
-from leg_wear_monitor.monitor.diagnosis.observer import Correction, TorqueObserver
+from leg_wear_monitor.monitor.diagnosis.evidence import SETTLING_CYCLES, Correction, correction_of
+from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.monitor.diagnosis.state import UNUSED_CYCLES, DiagnosisState, SignedCycle, TorqueState
 from leg_wear_monitor.twin import CRANK, TORQUE, torque_reference
@@ -46,7 +48,7 @@ def short():
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(torque_reference, "CYCLES", 1)
         patched.setattr(torque_reference, "PACE", 1)
-        for where in (observer_module, evidence):
+        for where in (observer_module, reasons):
             patched.setattr(where, "COMMISSIONING_CYCLES", COMMISSIONING_CYCLES)
         yield
 
@@ -144,6 +146,12 @@ def commissioned(new, reference):
         return observer
 
     return again
+
+
+def opening(joint: str, size_m: float, sigma_m: float, since_ns: int, **more) -> Change:
+    """A sure change of a clearance that was 0.30 mm."""
+    own = {"counted": 3e-4, "log_odds": 50.0} | more
+    return Change(cause=Cause.CLEARANCE, subject=joint, value=size_m, sigma=sigma_m, since_ns=since_ns, **own)
 
 
 def walk_on(observer, reference, numbers, counted=NEW, **more):
@@ -267,6 +275,40 @@ def test_a_joint_is_surely_at_its_limit_after_three_estimates_or_beyond_doubt(
         (sure if now.least_m[2] >= limit_m else []).append(cycle)
     assert shown[:3] == [shown[0], shown[0] + 1, shown[0] + 2]
     assert sure[0] == shown[0] + later
+
+
+@pytest.mark.parametrize(("all_at_once_m", "is_corrected"), [(8.1e-4, True), (4.7e-4, False)])
+def test_two_joints_that_look_like_a_wider_one_are_not_corrected(
+    leg, all_at_once_m: float, is_corrected: bool
+) -> None:
+    """B and G at 0.50 mm were G at 0.83 ± 0.11 mm and *stop*; all clearances at once had G at 0.47 mm."""
+    cycles = tuple(
+        SignedCycle(i, i + 1, np.zeros(4), CrankProfile.steady(TURN)) for i in range(SETTLING_CYCLES)
+    )
+    clearance_m = np.array([3e-4, 3e-4, all_at_once_m, 3e-4, 3e-4])
+    state = TorqueState(
+        NEW,
+        cycles=cycles,
+        changes=(opening("G", 8.3e-4, 1.1e-4, 0),),
+        fit=ClearanceFit(clearance_m, 1e-10 * np.eye(5), 1.0, 0.0),
+        fit_cycles=SETTLING_CYCLES,
+    )
+    assert (correction_of(state, leg.clearance_joints) is not None) is is_corrected
+
+
+@pytest.mark.parametrize(("odds", "size_m"), [(19.0, 7e-4), (26.0, 3.7e-4), (26.0, 4.5e-4)])
+def test_before_a_baseline_a_change_is_one_that_will_be_corrected(
+    new, reference, monkeypatch, odds: float, size_m: float
+) -> None:
+    """Seen before: I and J at 0.50 mm were *stop*, J 1.19 mm; G at 0.37 mm let no leg be commissioned."""
+    found = opening("G", size_m, 2e-5, START_NS, runner_up_log_odds=odds)
+    monkeypatch.setattr(evidence, "change_of", lambda *_: found)
+    is_told = odds > 20.0 and size_m > 4e-4
+    observer = new()
+    walk(observer, samples(reference, [0] * COMMISSIONING_CYCLES + [leg_number(2, 1.5)] * 2), end=9)
+    state = observer.state
+    told = observer._evidence._change(state, (), START_NS + 5 * 10**9)
+    assert (told is not None) is is_told
 
 
 CHANNELS = [
@@ -647,15 +689,7 @@ def test_what_a_correction_left_unknown_is_not_known_at_another_cadence(two_cade
     """Seen before: a joint that had opened with the corrected one was 0.30 ± 0.01 mm there."""
     observer, block = two_cadences, samples(reference, [0] * 20)
     at = walk_at(observer, block, 10**9, START_NS)
-    change = Change(
-        cause=Cause.CLEARANCE,
-        subject="A",
-        value=4.5e-4,
-        sigma=1e-5,
-        since_ns=at - 5 * 10**9,
-        counted=3e-4,
-        log_odds=50.0,
-    )
+    change = opening("A", 4.5e-4, 1e-5, at - 5 * 10**9)
     correct(observer, Correction(0, change.value, change))
     walk_at(observer, block, SLOWER_NS, at)
     fast, slow = observer.state.set_aside[0].commissioned, observer.state.commissioned

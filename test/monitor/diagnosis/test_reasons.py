@@ -17,7 +17,7 @@ from leg_wear_monitor.mechanism.person import PHASES
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.inputs import Cadence
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.diagnosis.evidence import doubt, missing, next_step
+from leg_wear_monitor.monitor.diagnosis.reasons import doubt, missing, next_step
 from leg_wear_monitor.monitor.diagnosis.references import ROUNDS, LegModels, References
 from leg_wear_monitor.monitor.diagnosis.state import (
     AtCadence,

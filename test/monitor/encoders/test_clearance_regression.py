@@ -231,6 +231,15 @@ def test_a_worn_joint_is_worn_more_where_it_is_worn():
 
 
 @pytest.mark.plain
+@pytest.mark.parametrize("target", [3e-4, 2.9e-4])
+def test_a_joint_that_is_to_be_new_has_no_wear(target: float):
+    """Worn by more than its clearance when new, it had a negative one, and a torque of 1e143 N m."""
+    clearance, profile = worn_to(np.array([3e-4]), np.full((1, 2, 720), 3e-4), np.array([target]))
+    assert clearance == [target]
+    assert not profile.any()
+
+
+@pytest.mark.plain
 def test_a_sensor_has_to_sit_on_a_revolute_joint(leg):
     with pytest.raises(ConfigError, match="'Z' is not a revolute joint"):
         angle_model(leg, ("Z",))

@@ -12,7 +12,7 @@ from leg_wear_monitor.estimate.cause import Cause, Change
 from leg_wear_monitor.fleet.learning import parts_of
 from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.cycle_report import correct
-from leg_wear_monitor.monitor.diagnosis.observer import Correction
+from leg_wear_monitor.monitor.diagnosis.evidence import Correction
 from leg_wear_monitor.monitor.forecast.forecast import JointCondition, forecast, no_law
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     ClearanceAtWear,

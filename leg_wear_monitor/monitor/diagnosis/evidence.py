@@ -1,5 +1,6 @@
 """The evidence of gait cycles: tests for a change, what explains it, and the clearances."""
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -69,9 +70,17 @@ def correction_of(state: TorqueState, joints: Sequence[str]) -> Correction | Non
     if change.subject not in joints or not change.is_sure or not is_wide:
         return None
     k = joints.index(change.subject)
-    if state.fit is None or not state.fit.agrees(k, change):
-        return None
-    return Correction(k, change.value, change)
+    return Correction(k, change.value, change) if _is_alone(state, change, k) else None
+
+
+def _is_alone(state: TorqueState, change: Change, joint: int) -> bool:
+    """Whether the change of a joint is of this one alone, and not of two that look like a wider one.
+
+    B and G at 0.50 mm looked like G at 0.83 ± 0.11 mm, G and I like G at 0.84 ± 0.11, where all clearances at
+    once had G at 0.47 and 0.54 mm (2026-11-27).
+    """
+    is_enough = state.commissioned is not None or change.runner_up_log_odds >= _SURE_BEFORE
+    return is_enough and state.fit is not None and state.fit.agrees(joint, change)
 
 
 class Evidence:
@@ -227,12 +236,13 @@ class Evidence:
     ) -> Change | None:
         """What has changed since a gait cycle, by the explanations of those from then on, the best first.
 
-        Before a leg is commissioned, only a clearance that will be corrected counts: all else is constant,
-        and becomes part of the baseline. A change of a clearance gets its most probable begin; another one
-        keeps that of its detection.
+        Before a leg is commissioned, only a clearance that is sure, and as wide as is corrected, counts: all
+        else is constant, and becomes part of the baseline. A change of a clearance gets its most probable
+        begin; another one keeps that of its detection.
         """
         change = change_of(explanations, since_ns)
-        if state.commissioned is None and not (change and _is_sure_before(change)):
+        is_wide = change is not None and change.value >= CORRECTED_FROM * change.counted
+        if state.commissioned is None and not (change and change.is_sure and is_wide):
             return None
         if change is None or change.cause is not Cause.CLEARANCE:
             return change
@@ -273,19 +283,14 @@ class Evidence:
         number = config.alarms.on_delay_cycles
         least_m = state.fit.clearance_m - SURE_SIGMAS * state.fit.sigma_m
         is_enough = state.fit_cycles >= SETTLING_CYCLES
-        k = self._models.explainer(state).joints.index(change.subject) if change and change.is_sure else -1
-        # two joints at once may look like a wider one: B and G at 0.50 mm like G at 0.83 ± 0.11, G and I like
-        # G at 0.84 ± 0.11, where all clearances at once had G at 0.47 and 0.54 mm (2026-11-27)
-        if change is not None and k >= 0 and state.fit.agrees(k, change):
-            least_m[k] = max(least_m[k], change.value - SURE_SIGMAS * change.sigma)
-            is_enough |= change.log_odds >= _FAR_BEYOND * self._models.detector(state, config).threshold
+        if change is not None and change.is_sure:
+            k = self._models.explainer(state).joints.index(change.subject)
+            if _is_alone(state, change, k):
+                least_m[k] = max(least_m[k], change.value - SURE_SIGMAS * change.sigma)
+                is_enough |= change.log_odds >= _FAR_BEYOND * self._models.detector(state, config).threshold
+            elif state.commissioned is None:  # nor do all at once show whose it is
+                least_m[k] = -math.inf
         state.least_m = (least_m,) * number if is_enough else (*state.least_m, least_m)[-number:]
-
-
-def _is_sure_before(change: Change) -> bool:
-    """Whether a leg that was never commissioned surely has another clearance, as wide as is corrected."""
-    is_alone = change.runner_up_log_odds >= _SURE_BEFORE
-    return change.is_sure and is_alone and change.value >= CORRECTED_FROM * change.counted
 
 
 def _is_of_reference(explanations: Sequence[Explanation]) -> bool:

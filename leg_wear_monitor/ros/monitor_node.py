@@ -184,7 +184,7 @@ _TAKE_S = 0.05
 # period at which a thread takes messages, too: a reference keeps the node busy for up to ten seconds where
 # the machine is, and the middleware holds five seconds at 1 kHz
 _RECEIVE_S = 1.0
-_RELEASE_S = 60.0  # period at which free memory is given back
+_RELEASE_S = 10.0  # period at which free memory is given back, in 0.2 ms
 _AT_ONCE = 500  # messages at once, so that services and parameters are also served
 _HELD = 20_000  # capacity in messages: ten seconds at 1 kHz on both topics
 _A_SAMPLE = (outputs.TORQUE, outputs.MEASURED_TORQUE, outputs.IMPACTS)

@@ -14,15 +14,14 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.compiled.kernel import kernel
 from leg_wear_monitor.contact.arrays import ContactArrays
-from leg_wear_monitor.dynamics.clearance.basis import Basis
-from leg_wear_monitor.dynamics.clearance.stepper import LoadedTables, loaded_tables, put_force
-from leg_wear_monitor.dynamics.clearance.tables import (
-    COARSER,
-    POINTS,
-    ClearanceTables,
-    build_basis,
-    build_tables,
+from leg_wear_monitor.dynamics.clearance.basis import COARSER, Basis
+from leg_wear_monitor.dynamics.clearance.stepper import (
+    LoadedTables,
+    loaded_tables,
+    put_force,
+    under_trial_force,
 )
+from leg_wear_monitor.dynamics.clearance.tables import POINTS, build_basis, build_tables
 from leg_wear_monitor.mechanism.arrays import Floats, body_names
 from leg_wear_monitor.mechanism.person import PHASES, nominal_stance, upwards
 from leg_wear_monitor.mechanism.position import Linkage, one_cycle, point_motion
@@ -279,7 +278,7 @@ class FootLoad:
         is_measured: bool = False,
         is_of_foot: bool = False,
     ) -> None:
-        basis = build_basis(linkage, contacts)
+        basis = build_basis(linkage, contacts, loaded=under_trial_force(linkage))
         self.tables = build_tables(linkage, contacts, basis=basis)
         self.signature = np.zeros(POINTS + 1)
         self._contacts, self.shape, self._load = contacts, shape, 0.0
@@ -300,9 +299,10 @@ class FootLoad:
         """
         self._known = known
         load, self._load, measured = self._load, 0.0, force_of(self.rows)
-        basis = build_basis(linkage, self._contacts)
-        new: ClearanceTables = build_tables(linkage, self._contacts, basis=basis)
-        pairs: Iterable[tuple[NDArray[Any], NDArray[Any]]] = zip(self.tables, new, strict=True)
+        basis = build_basis(linkage, self._contacts, loaded=under_trial_force(linkage))
+        pairs: Iterable[tuple[NDArray[Any], NDArray[Any]]] = zip(
+            self.tables, build_tables(linkage, self._contacts, basis=basis), strict=True
+        )
         for own, table in pairs:
             own[...] = table
         self._set_up(linkage, basis)

@@ -19,9 +19,10 @@ from leg_wear_monitor.dynamics.clearance.stepper import (
     LoadedTables,
     loaded_tables,
     put_force,
+    under_trial_force,
 )
 from leg_wear_monitor.dynamics.clearance.tables import POINTS as TABLE_POINTS
-from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables
+from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, build_basis, build_tables
 from leg_wear_monitor.dynamics.run import DONE, TORQUE, CrankMotion, Setup, new_run_statistics, quintic
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.arrays import Floats
@@ -422,11 +423,14 @@ class LegSimulation:
         """Prepare the simulation of legs with given masses, lengths and friction."""
         self._parameters = self._loaded = self._tables = None  # 18 MB, while what follows needs 50
         self._setup = prepare(parameters.in_air.applied(self._mechanism), wear=True)
-        self._setup.contacts.wear_coefficient[:] = 0.0
-        self._fresh = self._setup.contacts.clearance.copy()
-        self._tables = ClearanceStepper(self._setup).model.tables
+        linkage, contacts = self._setup.linkage, self._setup.contacts
+        contacts.wear_coefficient[:] = 0.0
+        self._fresh = contacts.clearance.copy()
+        loaded = under_trial_force(linkage) if parameters.load.size else ()
+        basis = build_basis(linkage, contacts, loaded=loaded)
+        self._tables = build_tables(linkage, contacts, basis=basis)
         if parameters.load.size:
-            self._loaded = loaded_tables(self._setup.linkage, self._setup.contacts, self._tables)
+            self._loaded = loaded_tables(linkage, contacts, self._tables, basis)
         self._parameters = parameters
 
 

@@ -2,6 +2,7 @@
 
 import copy
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -16,11 +17,21 @@ from leg_wear_monitor.mechanism.position import (
     jacobians,
 )
 
+COARSER = 2  # ratio of the step of the tables of first order in e to that of the others
+
 _NUDGE = 1.0e-5  # m or rad: step of central differences of smooth functions of the coordinates
 
 
 class Basis:
     """Quantities at N crank angles of the ideal motion; b moving bodies, d = 2 k eccentricities.
+
+    Parameters
+    ----------
+    linkage : Linkage
+    contacts : ContactArrays
+    motion : IdealMotion
+    loaded : sequence of Linkage
+        The same linkage under other loads.
 
     Attributes
     ----------
@@ -36,12 +47,11 @@ class Basis:
         s and its derivative.
     all : (N, 3 b, d + 1) array
         S and s side by side.
-    curvature : (N, 3 b, d, d) array
-        q_ee.
     b_e, c_ee : (N, d, d) arrays
         B_e and c_ee of the Lagrangian.
-    gamma : (N, d, d, d) array
-        Gamma = S^T M q_ee: force on e (i) that is bilinear in e' (j, k); A changes by Gamma e plus transpose.
+    gamma : (N / COARSER, d, d, d) array
+        Gamma = S^T M q_ee, at every `COARSER`-th angle: force on e (i) that is bilinear in e' (j, k); A
+        changes by Gamma e plus transpose.
     c_e : (N, d) array
     force, load : (N, 3 b) arrays
         Applied forces at rest, and the part of the loads in them.
@@ -54,9 +64,19 @@ class Basis:
         Generalised force of a unit friction force in each joint, beyond its force on e.
     drag : (N, 3 b, d + 1) array
         Force of dampers against each column of ``all``.
+    loaded : tuple of Basis
+        Those under the other loads: only the applied forces differ.
     """
 
-    def __init__(self, linkage: Linkage, contacts: ContactArrays, motion: IdealMotion) -> None:
+    loaded: "tuple[Basis, ...]" = ()
+
+    def __init__(
+        self,
+        linkage: Linkage,
+        contacts: ContactArrays,
+        motion: IdealMotion,
+        loaded: Sequence[Linkage] = (),
+    ) -> None:
         self.motion, n = motion, len(motion.q)
         self.x: Floats = np.asarray(np.linalg.inv(jacobians(linkage, motion.q)), dtype=np.float64)
         self.mass = linkage.arrays.mass[1:].ravel()
@@ -68,8 +88,9 @@ class Basis:
         self.all = np.concatenate([self.s, self.drive[:, :, None]], axis=2)
         self._take_levers(linkage, contacts)
         self.drag = _drag(linkage.arrays, motion.q, self.all)
-        self._curve(linkage, motion.q)
-        self._take_forces(linkage, motion.q)
+        curvature = self._curve(linkage, motion.q)  # larger than all else, and not kept
+        self._take_forces(linkage, curvature)
+        self.loaded = tuple(self._under_load(one, curvature) for one in loaded)
 
     def with_contacts(self, linkage: Linkage, contacts: ContactArrays) -> "Basis":
         """That of the same linkage and joints with other radii: only the levers of friction differ."""
@@ -77,10 +98,9 @@ class Basis:
         other._take_levers(linkage, contacts)
         return other
 
-    def with_loads(self, linkage: Linkage) -> "Basis":
-        """That of the same linkage and joints under other loads: only the applied forces differ."""
+    def _under_load(self, linkage: Linkage, curvature: Floats) -> "Basis":
         other = copy.copy(self)
-        other._take_forces(linkage, self.motion.q)
+        other._take_forces(linkage, curvature)
         return other
 
     def _take_levers(self, linkage: Linkage, contacts: ContactArrays) -> None:
@@ -95,11 +115,11 @@ class Basis:
         behind[:, 1:] -= step
         return ahead, behind
 
-    def _curve(self, linkage: Linkage, q: Floats) -> None:
-        """Set the quantities of first order in e that depend on the masses alone."""
+    def _curve(self, linkage: Linkage, q: Floats) -> Floats:
+        """Set the quantities of first order in e that depend on the masses alone; q_ee (N, 3 b, d, d)."""
         d = len(self.rows)
         mass, minus_x = self.mass[:, None], -self.x
-        self.curvature = curvature = np.empty((*self.s.shape, d))
+        curvature = np.empty((*self.s.shape, d))
         for j in range(d):
             ahead, behind = (jacobian_blocks(linkage, near) for near in self._nudged(q, j))
             slope = dense_jacobian(linkage.rows, (ahead - behind) / (2.0 * _NUDGE), q.shape[1])
@@ -107,15 +127,18 @@ class Basis:
         momentum = self.mass * self.drive
         self.b_e = np.einsum("nr,nrij->nij", momentum, curvature) + project(self.s, mass * self.s_t)
         self.c_e = 2.0 * np.einsum("nr,nri->ni", momentum, self.s_t)
-        flat = (mass * self.s).transpose(0, 2, 1) @ curvature.reshape(len(q), -1, d * d)
+        momenta = (mass * self.s).transpose(0, 2, 1)[::COARSER]
+        flat = momenta @ curvature.reshape(len(q), -1, d * d)[::COARSER]
         self.gamma = flat.reshape(-1, d, d, d)
         swing = np.empty_like(self.b_e)
         for j in range(d):  # of all at once, the series would take four times the memory of the curvature
             swing[..., j] = np.einsum("nr,nri->ni", momentum, derivative(curvature[..., j]))
         self.c_ee = 2.0 * (project(self.s_t, mass * self.s_t) + swing)
+        return curvature
 
-    def _take_forces(self, linkage: Linkage, q: Floats) -> None:
+    def _take_forces(self, linkage: Linkage, curvature: Floats) -> None:
         """Set the applied forces, and their derivatives by e."""
+        q = self.motion.q
         self.force, self.load, self.potential = _forces(linkage, q)
         force_s, load_s = np.zeros((2, *self.s.shape))
         if len(linkage.arrays.load_body) or len(linkage.arrays.spring_body):
@@ -123,8 +146,8 @@ class Basis:
                 after, before = (_forces(linkage, near) for near in self._nudged(q, j))
                 force_s[:, :, j] = (after[0] - before[0]) / (2.0 * _NUDGE)
                 load_s[:, :, j] = (after[1] - before[1]) / (2.0 * _NUDGE)
-        self.force_e = np.einsum("nr,nrij->nij", self.force, self.curvature) + project(self.s, force_s)
-        self.load_e = np.einsum("nr,nrij->nij", self.load, self.curvature) + project(self.s, load_s)
+        self.force_e = np.einsum("nr,nrij->nij", self.force, curvature) + project(self.s, force_s)
+        self.load_e = np.einsum("nr,nrij->nij", self.load, curvature) + project(self.s, load_s)
         self.drive_force_e = self._on_crank(self.force, force_s)
         self.drive_load_e = self._on_crank(self.load, load_s)
 

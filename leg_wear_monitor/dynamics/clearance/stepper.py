@@ -1,7 +1,7 @@
 """Stepper of the leg in clearance coordinates: advance, observe, snapshot (physics.md section 7)."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from copy import copy
 from typing import Any, NamedTuple
@@ -14,6 +14,7 @@ from leg_wear_monitor.compiled.vectors import padded
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.dynamics.clearance.advance import ADVANCE, advance_clearances, observe
 from leg_wear_monitor.dynamics.clearance.basis import (
+    COARSER,
     Basis,
     is_damped,
     motion_shapes,
@@ -44,7 +45,12 @@ from leg_wear_monitor.dynamics.clearance.model import (
     rigid_coupling,
     state_shapes,
 )
-from leg_wear_monitor.dynamics.clearance.tables import COARSER, ClearanceTables, build_basis, build_tables
+from leg_wear_monitor.dynamics.clearance.tables import (
+    UNDER_LOAD,
+    ClearanceTables,
+    build_basis,
+    build_tables,
+)
 from leg_wear_monitor.dynamics.joint import F_N
 from leg_wear_monitor.dynamics.run import (
     DONE,
@@ -496,12 +502,25 @@ class LoadedTable(NamedTuple):
 
 
 class LoadedTables(NamedTuple):
-    """Those of `ClearanceTables`."""
+    """Those of `ClearanceTables` in `UNDER_LOAD`."""
 
     motion: LoadedTable
     reaction: LoadedTable
     stored: LoadedTable
     by_e: LoadedTable
+
+
+def under_trial_force(linkage: Linkage) -> list[Linkage]:
+    """A linkage under a force on its toe along each axis, for `build_basis`; none for one without a toe."""
+    mechanism = linkage.mechanism
+    if mechanism.toe is None:
+        return []
+    body, point = mechanism.toe
+    loads = [ConstantLoad(body=body, point=point, force=push) for push in ((_TRIAL_N, 0.0), (0.0, _TRIAL_N))]
+    return [
+        build_linkage(attrs.evolve(mechanism, loads={**mechanism.loads, "trial of a toe force": load}))
+        for load in loads
+    ]
 
 
 def loaded_tables(
@@ -517,18 +536,16 @@ def loaded_tables(
     tables : ClearanceTables
         Of this linkage; `put_force` changes them.
     basis : Basis, optional
-        Of these tables.
+        Of these tables, loaded as `under_trial_force`.
     """
-    mechanism = linkage.mechanism
-    basis, others = basis or build_basis(linkage, contacts), []
-    for push in ((_TRIAL_N, 0.0), (0.0, _TRIAL_N)):
-        if mechanism.toe is None:
-            break
-        trial = ConstantLoad(body=mechanism.toe[0], point=mechanism.toe[1], force=push)
-        pushed = attrs.evolve(mechanism, loads={**mechanism.loads, "trial of a toe force": trial})
-        loaded = build_linkage(pushed)
-        others.append(build_tables(loaded, contacts, basis=basis.with_loads(loaded)))
-    return LoadedTables(*(_loaded(name, tables, others) for name in LoadedTables._fields))
+    basis = basis or build_basis(linkage, contacts, loaded=under_trial_force(linkage))
+    found = []
+    for name in LoadedTables._fields:
+        table, make = getattr(tables, name), UNDER_LOAD[name]
+        rows = table.reshape(len(table), -1)  # a view
+        slopes = [_slope(make(linkage, contacts, each), rows) for each in basis.loaded]
+        found.append(_loaded(rows, slopes))
+    return LoadedTables(*found)
 
 
 def put_force(loaded: LoadedTables, force: Floats) -> None:
@@ -539,12 +556,19 @@ def put_force(loaded: LoadedTables, force: Floats) -> None:
         table.rows[:, table.columns] = table.parts[0] + fx * table.parts[1] + fy * table.parts[2]
 
 
-def _loaded(name: str, tables: ClearanceTables, others: list[ClearanceTables]) -> LoadedTable:
-    table = getattr(tables, name)
-    rows = table.reshape(len(table), -1)  # a view
-    if not others:
-        return LoadedTable(rows, np.zeros(0, np.int64), np.zeros((3, len(rows), 0)))
-    slopes = [(getattr(other, name).reshape(rows.shape).astype(float) - rows) / _TRIAL_N for other in others]
-    columns = np.flatnonzero(np.any(slopes, axis=(0, 1)))
-    parts = np.stack([rows.astype(float), *slopes])[:, :, columns]
-    return LoadedTable(rows, columns.astype(np.int64), np.ascontiguousarray(parts))
+def _slope(table: Floats | Singles, rows: Floats | Singles) -> tuple[Flags, Floats]:
+    """Columns in which a table under a trial force is not that without it, and what they change by per N."""
+    slope: Floats = np.subtract(table.reshape(rows.shape), rows, dtype=float)
+    slope /= _TRIAL_N
+    changed = np.asarray(slope.any(axis=0))
+    return changed, slope[:, changed]
+
+
+def _loaded(rows: Floats | Singles, slopes: Sequence[tuple[Flags, Floats]]) -> LoadedTable:
+    none = np.zeros(rows.shape[1], dtype=bool)
+    columns = np.flatnonzero(np.any([none, *(changed for changed, _ in slopes)], axis=0))
+    parts = np.zeros((3, len(rows), len(columns)))
+    parts[0] = rows[:, columns]
+    for part, (changed, slope) in zip(parts[1:], slopes, strict=False):  # without a toe there is no column
+        part[:, changed[columns]] = slope
+    return LoadedTable(rows, columns.astype(np.int64), parts)

@@ -16,6 +16,7 @@ M q_ee, and the term Gamma e' e' is added to A e''; the drive torque and the sto
 """
 
 import math
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ import numpy as np
 from leg_wear_monitor.compiled.vectors import WIDTH, padded
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.dynamics.clearance.basis import (
+    COARSER,
     Basis,
     changing_shapes,
     derivative,
@@ -36,7 +38,6 @@ from leg_wear_monitor.mechanism.constraints import DRIVE
 from leg_wear_monitor.mechanism.position import TURN, IdealMotion, Linkage, one_cycle, rotated
 
 POINTS = 1024  # table points per turn, with linear interpolation
-COARSER = 2  # ratio of the step of the tables of first order in e to that of the others
 
 # 1/rad^2: largest second derivative of the Coriolis terms over their RMS for an undivided interval
 _BENT = 10.0
@@ -70,15 +71,26 @@ class ClearanceTables(NamedTuple):
     spin_reaction: Singles
 
 
-def build_basis(linkage: Linkage, contacts: ContactArrays, points: int = POINTS) -> Basis:
+def build_basis(
+    linkage: Linkage, contacts: ContactArrays, points: int = POINTS, loaded: Sequence[Linkage] = ()
+) -> Basis:
     """What the tables of a linkage are made of, but for the radii of its clearance joints: most of the time.
+
+    Parameters
+    ----------
+    linkage : Linkage
+    contacts : ContactArrays
+    points : int
+        Crank steps per turn.
+    loaded : sequence of Linkage
+        The same linkage under other loads, whose bases are to be made as well.
 
     Raises
     ------
     AssemblyError
         If the linkage does not close or has a dead point.
     """
-    return Basis(linkage, contacts, one_cycle(linkage, points, 1.0))
+    return Basis(linkage, contacts, one_cycle(linkage, points, 1.0), loaded)
 
 
 def build_tables(
@@ -113,15 +125,30 @@ def build_tables(
     basis = basis.with_contacts(linkage, contacts) if basis else build_basis(linkage, contacts, points)
     if like is not None:
         return _with_levers(like, linkage, basis)
-    motion, points = basis.motion, len(basis.motion.q)
     held, joints = _held_rows(linkage, basis)
-    reaction = _reactions(basis, held)
+    bodies = linkage.arrays.joint_body[contacts.joint]
+    return ClearanceTables(
+        motion=_motion(linkage, contacts, basis),
+        reaction=_reaction(linkage, contacts, basis),
+        reaction_joint=joints,
+        stored=_stored(linkage, contacts, basis),
+        by_e=_by_e(linkage, contacts, basis),
+        parts=_parts(_accelerations(basis)["coriolis"]),
+        bend=_in_blocks(_bend(basis).reshape(len(basis.gamma) + 1, 2 * len(contacts.joint), -1)),
+        **_spins(bodies, basis, held),
+    )
+
+
+def _motion(linkage: Linkage, contacts: ContactArrays, basis: Basis) -> Floats:
+    """Table ``motion``."""
+    motion, points = basis.motion, len(basis.motion.q)
+    bodies = linkage.arrays.joint_body[contacts.joint]
     parts = {
         **_accelerations(basis),
         **_torque(basis),
         **_levers(basis),
-        "angle": motion.q[:, linkage.arrays.joint_body[contacts.joint], 2],
-        "turn": motion.v[:, linkage.arrays.joint_body[contacts.joint], 2],
+        "angle": motion.q[:, bodies, 2],
+        "turn": motion.v[:, bodies, 2],
         "toe": _toe(linkage, motion, basis),
         "load_power": project(basis.all, basis.load[:, :, None]),
         "damper": project(basis.all, basis.drag),
@@ -133,17 +160,9 @@ def build_tables(
     rows = np.zeros((points + 1, padded(width)))
     np.concatenate([parts[name].reshape(points, -1) for name in shapes], axis=1, out=rows[:-1, :width])
     rows[-1] = rows[0]
-    turns = np.round(motion.v[:, linkage.arrays.joint_body[contacts.joint], 2].mean(axis=0))
+    turns = np.round(motion.v[:, bodies, 2].mean(axis=0))
     views(rows[-1], shapes)["angle"][:] += TURN * turns
-    return ClearanceTables(
-        motion=rows,
-        reaction=np.concatenate([reaction, reaction[:1]]),
-        reaction_joint=joints,
-        stored=_stored(basis),
-        parts=_parts(parts["coriolis"]),
-        **_spins(linkage.arrays.joint_body[contacts.joint], basis, held),
-        **_first_order(basis, parts["inverse_mass"]),
-    )
+    return rows
 
 
 def _with_levers(tables: ClearanceTables, linkage: Linkage, basis: Basis) -> ClearanceTables:
@@ -200,8 +219,7 @@ def _parts(table: Floats) -> Floats:
 
 def _accelerations(basis: Basis) -> dict[str, Floats]:
     """Parts of `motion_shapes` for the accelerations of the eccentricities."""
-    mass = basis.mass[:, None]
-    inverse_mass: Floats = np.asarray(np.linalg.inv(project(basis.s, mass * basis.s)), dtype=np.float64)
+    mass, inverse_mass = basis.mass[:, None], _inverse_mass(basis)
 
     def respond(generalised: Floats) -> Floats:
         """Accelerations (N, d, m) of the eccentricities by generalised forces (N, 3 b, m) on the bodies."""
@@ -216,16 +234,31 @@ def _accelerations(basis: Basis) -> dict[str, Floats]:
     }
 
 
-def _first_order(basis: Basis, inverse_mass: Floats) -> dict[str, Singles]:
-    """Tables ``by_e`` and ``bend``, from the inverse mass (N, d, d) at e = 0.
+def _inverse_mass(basis: Basis) -> Floats:
+    """Inverse (N, d, d) of A at e = 0."""
+    return np.asarray(np.linalg.inv(project(basis.s, basis.mass[:, None] * basis.s)), dtype=np.float64)
+
+
+def _bend(basis: Basis) -> Floats:
+    """Accelerations A^-1 Gamma (M + 1, d, d, d), bilinear in e'."""
+    n, d = basis.gamma.shape[:2]
+    turn = [*range(n), 0]
+    bend = _inverse_mass(basis)[::COARSER][turn] @ basis.gamma[turn].reshape(n + 1, d, d * d)
+    return np.asarray(bend.reshape(n + 1, d, d, d).transpose(0, 3, 2, 1))
+
+
+def _inverse_mass_slopes(basis: Basis) -> Floats:
+    """Derivatives (M + 1, d, d, d) of the inverse mass by e.
 
     The inverse of A + Gamma e + (Gamma e)^T is A^-1 - Q e - (Q e)^T with Q = A^-1 Gamma A^-1.
     """
-    n, d = inverse_mass.shape[:2]
-    coarse = _coarse(n)
-    inverse_mass, m = inverse_mass[coarse], len(coarse)
-    bend = (inverse_mass @ basis.gamma[coarse].reshape(m, d, d * d)).reshape(m, d, d, d).transpose(0, 3, 2, 1)
-    change = inverse_mass[:, None] @ bend
+    change = _inverse_mass(basis)[_coarse(len(basis.s))][:, None] @ _bend(basis)
+    return np.asarray(-(change + change.transpose(0, 1, 3, 2)))
+
+
+def _by_e(_linkage: Linkage, _contacts: ContactArrays, basis: Basis) -> Singles:
+    """Table ``by_e``."""
+    d, coarse = len(basis.rows), _coarse(len(basis.s))
     free = np.stack([basis.force_e, -basis.b_e, 0.5 * basis.c_ee - derivative(basis.b_e)], axis=1)
     parts = {
         "free": free.transpose(0, 3, 1, 2),
@@ -237,21 +270,19 @@ def _first_order(basis: Basis, inverse_mass: Floats) -> dict[str, Singles]:
         "torque_v": basis.c_ee.transpose(0, 2, 1),
     }
     parts = {name: part[coarse] for name, part in parts.items()}
-    parts["inverse_mass"] = -(change + change.transpose(0, 1, 3, 2))
-    columns = [parts[name].reshape(m, d, -1) for name in changing_shapes(d // 2)]
-    by_e = np.concatenate(columns, axis=2, dtype=np.float32)
-    return {
-        "by_e": _in_blocks(by_e),
-        "bend": _in_blocks(bend.reshape(m, d, d * d)),
-    }
+    parts["inverse_mass"] = _inverse_mass_slopes(basis)
+    columns = [parts[name].reshape(len(coarse), d, -1) for name in changing_shapes(d // 2)]
+    return _in_blocks(np.concatenate(columns, axis=2, dtype=np.float32))
 
 
 def _in_blocks(table: Floats | Singles) -> Singles:
     """A table (M + 1, d, u) in the order in which vectors are taken from it, (M + 1, u / WIDTH, d, WIDTH)."""
     points, d, u = table.shape
-    blocks = np.zeros((points, d, padded(u)), dtype=np.float32)
-    blocks[:, :, :u] = table
-    return np.ascontiguousarray(blocks.reshape(points, d, -1, WIDTH).transpose(0, 2, 1, 3))
+    blocks = np.zeros((points, padded(u) // WIDTH, d, WIDTH), dtype=np.float32)
+    for i, first in enumerate(range(0, u, WIDTH)):
+        part = table[:, :, first : first + WIDTH]
+        blocks[:, i, :, : part.shape[2]] = part
+    return blocks
 
 
 def _torque(basis: Basis) -> dict[str, Floats]:
@@ -270,7 +301,7 @@ def _torque(basis: Basis) -> dict[str, Floats]:
     }
 
 
-def _stored(basis: Basis) -> Floats:
+def _stored(_linkage: Linkage, _contacts: ContactArrays, basis: Basis) -> Floats:
     """Table ``stored``."""
     parts = {
         "a": project(basis.s, basis.mass[:, None] * basis.s),
@@ -297,14 +328,15 @@ def _held_rows(linkage: Linkage, basis: Basis) -> tuple[list[int], Ints]:
     return rows, np.array(joints, dtype=np.int64)
 
 
-def _reactions(basis: Basis, rows: list[int]) -> Floats:
-    """Table ``reaction`` (N, 4 + 3 d + k, r) without its closing row."""
-    mass = basis.mass[:, None]
+def _reaction(linkage: Linkage, _contacts: ContactArrays, basis: Basis) -> Floats:
+    """Table ``reaction``."""
+    mass, (rows, _) = basis.mass[:, None], _held_rows(linkage, basis)
     by = [-basis.force[:, :, None], mass * basis.drive[:, :, None], mass * basis.drive_t[:, :, None]]
     by += [basis.drag[:, :, -1:], mass * basis.s, 2.0 * mass * basis.s_t]
     by.append(basis.drag[:, :, :-1])
     others = project(np.concatenate(by, axis=2), basis.x[:, :, rows])
-    return np.concatenate([others, _friction_reactions(basis, rows)], axis=1)
+    reaction = np.concatenate([others, _friction_reactions(basis, rows)], axis=1)
+    return np.concatenate([reaction, reaction[:1]])
 
 
 def _spins(bodies: Ints, basis: Basis, rows: list[int]) -> dict[str, Singles]:
@@ -338,3 +370,9 @@ def _toe(linkage: Linkage, motion: IdealMotion, basis: Basis) -> Floats:
     swing = motion.v[:, i, 2, None, None] * lever[:, :, None]
     toe[:, :, 1 + d :] = basis.s_t[:, here] + across * basis.s_t[:, 3 * i - 1, None] - swing * turn
     return toe
+
+
+_Table = Callable[[Linkage, ContactArrays, Basis], Floats | Singles]
+
+# tables that a load changes
+UNDER_LOAD: dict[str, _Table] = {"motion": _motion, "reaction": _reaction, "stored": _stored, "by_e": _by_e}

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from leg_wear_monitor import Mechanism
 from leg_wear_monitor.compiled.vectors import padded
+from leg_wear_monitor.dynamics.clearance.basis import COARSER
 from leg_wear_monitor.dynamics.clearance.contact import (
     CAM,
     DAMPING,
@@ -31,7 +32,7 @@ from leg_wear_monitor.dynamics.clearance.film_system import (
     solve_films,
 )
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceRun, ClearanceStepper
-from leg_wear_monitor.dynamics.clearance.tables import COARSER, build_tables
+from leg_wear_monitor.dynamics.clearance.tables import build_tables
 from leg_wear_monitor.dynamics.full_run import FullRun
 from leg_wear_monitor.dynamics.joint import DELTA, EX, EY, F_N
 from leg_wear_monitor.dynamics.run import (

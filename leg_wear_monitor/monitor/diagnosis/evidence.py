@@ -79,10 +79,13 @@ class Evidence:
         self._know_sensor(state)
         if not state.is_compared:  # what was found at another cadence stays
             return
-        state.detector, state.changes, state.fit_due = None, (), 0
+        told = state.changes
+        state.detector, state.changes, state.fit_due = None, told[:0], 0
         for cycle in state.cycles:
             self._test(state, cycle, config)
         self._explain(state, config)
+        if told and state.changes and state.changes[-1].subject == told[-1].subject:
+            state.changes = (_since(state.changes[-1], told[-1].since_ns, state),)
 
     def compare_with_before(self, state: TorqueState) -> Change | None:
         """Compare a corrected leg with the baseline before, once there is a reference about it.
@@ -221,7 +224,7 @@ class Evidence:
         explainer = self._models.explainer(state)
         changed_m = start_of(change, explainer.joints, state.counted_m)
         first = first_changed(explainer, state.signatures, state.counted_m, changed_m)
-        return attrs.evolve(change, since_ns=state.cycles[first].begin_ns)
+        return _since(attrs.evolve(change, since_ns=state.cycles[first].begin_ns), since_ns, state)
 
     def _fit(
         self,
@@ -260,6 +263,12 @@ class Evidence:
             least_m[k] = max(least_m[k], change.value - SURE_SIGMAS * change.sigma)
             is_enough |= change.log_odds >= _FAR_BEYOND * self._models.detector(state, config).threshold
         state.least_m = (least_m,) * number if is_enough else (*state.least_m, least_m)[-number:]
+
+
+def _since(change: Change, told_ns: int, state: TorqueState) -> Change:
+    """A change since an earlier stamp, if all kept gait cycles belong to it: older ones are forgotten."""
+    is_whole = change.since_ns <= state.cycles[0].begin_ns
+    return attrs.evolve(change, since_ns=min(change.since_ns, told_ns)) if is_whole else change
 
 
 def _is_of_reference(explanations: Sequence[Explanation]) -> bool:

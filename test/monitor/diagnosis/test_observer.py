@@ -249,6 +249,20 @@ def test_a_joint_that_opens_is_named_and_corrected(commissioned, reference, join
     assert observer.diagnosis.state is not DiagnosisState.CHANGED
 
 
+def test_a_change_that_is_not_corrected_keeps_its_begin(commissioned, reference, monkeypatch) -> None:
+    """Else it began after a measurement that contradicts it, once its first gait cycles are forgotten."""
+    monkeypatch.setattr(observer_module, "WINDOW_CYCLES", 15)
+    observer, first = commissioned(), COMMISSIONING_CYCLES
+    block = samples(reference, [0] * (first + 3) + [leg_number(3, 1.5)] * 37)
+    walk(observer, block, begin=first, end=first + 14)
+    (change,) = observer.diagnosis.changes
+    walk(observer, block, begin=first + 14, end=first + 30)
+    assert observer.state.cycles[0].begin_ns > change.since_ns
+    observer._evidence.review(observer.state, observer.config)
+    walk(observer, block, begin=first + 30)
+    assert [one.since_ns for one in observer.diagnosis.changes] == [change.since_ns]
+
+
 @pytest.mark.parametrize(("far_beyond", "later"), [(np.inf, 2), (4.0, 0)])
 def test_a_joint_is_surely_at_its_limit_after_three_estimates_or_beyond_doubt(
     commissioned, reference, monkeypatch, far_beyond: float, later: int

@@ -130,8 +130,11 @@ def test_what_contradicts_a_measurement_of_the_changed_leg_is_not_corrected(
     if measured_s:
         monitor.update(gait(measured_s))
     shows(monitor, monkeypatch, since_s)
+    told = set()
+    monkeypatch.setattr(TorqueObserver, "contradicted", lambda _, *of: told.add(of[1:]))
     monitor.measure("G", measured_m, 2.0e-5, START_NS + round(1e9 * measured_s), "ann")
     monitor.update(gait(1.5, begin_s=measured_s))
+    assert told == (set() if is_corrected else {(measured_m, 2.0e-5)})
     assert monitor.state.clearances["G"].counted_m == pytest.approx(
         4.8e-4 if is_corrected else 3.0e-4, rel=1e-3
     )

@@ -87,12 +87,12 @@ class Evidence:
         if told and state.changes and state.changes[-1].subject == told[-1].subject:
             state.changes = (_since(state.changes[-1], told[-1].since_ns, state),)
 
-    def compare_with_before(self, state: TorqueState) -> Change | None:
+    def compare_with_before(self, state: TorqueState, is_last: bool = False) -> Change | None:
         """Compare a corrected leg with the baseline before, once there is a reference about it.
 
         What another joint changed at the same time is in the baseline after the correction, and would never
-        be seen. Returns a clearance that surely opened, too; without one, the others are known as well as
-        they explain the leg.
+        be seen. Returns a clearance that surely opened, too; without one, or the last time, the others are
+        known as well as they explain the leg.
         """
         known, is_fitted = state.commissioned, state.fit_due == _FIT_EVERY - 1
         if known is None or known.before is None or state.reference is None:
@@ -106,7 +106,7 @@ class Evidence:
         explanations = explainer.explanations(mean, cycles, counted_m)
         change = change_of(explanations, state.settled[-1].since_ns if state.settled else known.stamp_ns)
         is_wide = change is not None and change.value >= CORRECTED_FROM * change.counted
-        if change and change.is_sure and is_wide and explanations[0].square <= _WHOLLY:
+        if change and change.is_sure and is_wide and explanations[0].square <= _WHOLLY and not is_last:
             return change
         found = best_fit(explainer, mean, cycles, counted_m, starts_of(explainer, None, counted_m))
         state.commissioned = attrs.evolve(known, before=None)

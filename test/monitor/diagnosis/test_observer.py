@@ -512,6 +512,41 @@ def test_whether_another_joint_opened_with_the_corrected_one_is_seen_by_a_refere
         assert shown.reason.endswith("measure them")
 
 
+def test_an_opening_beside_a_correction_that_a_measurement_contradicts_is_told_until_both_agree(
+    commissioned, reference, monkeypatch
+) -> None:
+    """Seen before: nobody told it, and all others stayed unknown for good."""
+    monkeypatch.setattr(evidence, "_WHOLLY", 3.0)
+    observer, wider = commissioned(), about(reference, 0, 1.5)
+    walked = attrs.evolve(reference, torque_nm=(*reference.torque_nm, wider.torque_nm[leg_number(2, 1.5)]))
+    block = samples(walked, [0] * COMMISSIONING_CYCLES + [len(reference.torque_nm)] * 55)
+    ((at, correction),) = walk(observer, block, begin=COMMISSIONING_CYCLES, end=COMMISSIONING_CYCLES + 20)[:1]
+    counted = correct(observer, correction)
+    observer.state.reference = wider
+
+    def next_one(begin: int) -> tuple[int, Correction]:
+        cycles = range(begin, begin + 13)
+        return next(one for at in cycles for one in walk(observer, block, counted, at, at + 1))
+
+    at, second = next_one(at + 1)
+    observer.contradicted(second, 3.1e-4, 2.0e-5)
+    known = observer.state.commissioned
+    assert not known.is_unknown.any() and known.before is not None
+    assert known.sigma_m[2] == pytest.approx(np.hypot(1.0e-5, 2.0e-5))
+    walk(observer, block, counted, at + 1, at + 3)
+    shown = observer.diagnosis
+    assert shown.state is DiagnosisState.CHANGED and not shown.reason
+    assert [(one.subject, one.is_corrected) for one in shown.changes] == [("A", True), ("G", False)]
+    assert shown.clearance_m[2] == second.clearance_m
+    assert np.isfinite(shown.clearance_m).all()
+    at, second = next_one(at + 3)
+    observer.contradicted(second, 3.1e-4, 2.0e-5)
+    assert observer.state.commissioned is known  # not another row in the ledger each time
+    _, second = next_one(at + 1)  # measured again: both agree
+    correct(observer, second)
+    assert [(one.subject, one.is_corrected) for one in observer.state.settled] == [("A", True), ("G", True)]
+
+
 def test_a_joint_that_opened_with_the_corrected_one_is_found_after_a_restart(
     leg, commissioned, reference, monkeypatch
 ) -> None:

@@ -157,7 +157,9 @@ def observe_torque(parts: Parts) -> None:
         return
     before = attrs.evolve(torque.state)
     correction = torque.end_period(twin.clearance_mean_m, twin.depth)
-    if correction is not None and parts.contradiction(correction.change):
+    measured = parts.measured[correction.joint] if correction else None
+    if correction is not None and measured is not None and parts.contradiction(correction.change):
+        torque.contradicted(correction, measured.clearance_m, measured.sigma_m)
         correction = None
     is_wrong = parts.is_torque_wrong
     if not is_wrong:

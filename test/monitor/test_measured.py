@@ -115,29 +115,58 @@ def opened(since_s: float) -> Change:
 
 
 @pytest.mark.parametrize(
-    ("measured_m", "measured_s", "since_s", "first_s", "is_corrected"),
+    ("measured_m", "measured_s", "since_s", "is_corrected"),
     [
-        (3.1e-4, 3.0, 2.0, 1.0, False),  # 0.17 mm apart, three standard deviations are 0.13 mm
-        (4.4e-4, 3.0, 2.0, 1.0, True),
-        (3.1e-4, 3.0, 3.5, 1.0, True),  # the joint opened after it was measured
-        (3.1e-4, 0.0, 1.0, 1.0, False),  # measured between two runs, of the leg as it walks in this one
-        (3.1e-4, 0.0, 2.0, 1.0, True),  # as measured in the first gait cycle of this run
+        (3.1e-4, 3.0, 2.0, False),  # 0.17 mm apart, three standard deviations are 0.13 mm
+        (4.4e-4, 3.0, 2.0, True),
+        (3.1e-4, 3.0, 3.5, True),  # the joint opened after it was measured
+        (3.1e-4, 0.0, 1.0, False),  # measured between two runs, of the leg as it walks in this one
+        (3.1e-4, 0.0, 2.0, False),  # one gait cycle does not show the leg before the change
+        (3.1e-4, 0.0, 4.0, True),  # as measured in the first gait cycles of this run
     ],
 )
 def test_what_contradicts_a_measurement_of_the_changed_leg_is_not_corrected(
-    monitor, gait, monkeypatch, measured_m, measured_s, since_s, first_s, is_corrected
+    monitor, gait, monkeypatch, measured_m, measured_s, since_s, is_corrected
 ) -> None:
-    torque, change = monitor._parts.torque, opened(since_s)
     if measured_s:
         monitor.update(gait(measured_s))
+    shows(monitor, monkeypatch, since_s)
+    told = set()
+    monkeypatch.setattr(TorqueObserver, "contradicted", lambda _, *of: told.add(of[1:]))
     monitor.measure("G", measured_m, 2.0e-5, START_NS + round(1e9 * measured_s), "ann")
-    first_ns = START_NS + round(1e9 * first_s)
-    torque.state.cycles = (SignedCycle(first_ns, first_ns + 10**9, np.zeros(1), None),)
-    monkeypatch.setattr(torque, "end_period", lambda *_: Correction(2, change.value, change))
-    monkeypatch.setattr(torque, "corrected", lambda *_: None)
     monitor.update(gait(1.5, begin_s=measured_s))
+    assert told == (set() if is_corrected else {(measured_m, 2.0e-5)})
     assert monitor.state.clearances["G"].counted_m == pytest.approx(
-        change.value if is_corrected else 3.0e-4, rel=1e-3
+        4.8e-4 if is_corrected else 3.0e-4, rel=1e-3
+    )
+
+
+def shows(monitor, monkeypatch, since_s: float) -> None:
+    """The drive torque shows joint G open since some time, in gait cycles from 1, 2, 3 s on."""
+    torque, change = monitor._parts.torque, opened(since_s)
+    begins_ns = [START_NS + second * 10**9 for second in (1, 2, 3)]
+    torque.state.cycles = tuple(SignedCycle(at, at + 10**9, np.zeros(1), None) for at in begins_ns)
+    k = monitor._parts.clearance_joints.index("G")
+    monkeypatch.setattr(torque, "end_period", lambda *_: Correction(k, change.value, change))
+    monkeypatch.setattr(torque, "corrected", lambda *_: None)
+
+
+@pytest.mark.parametrize(("walked", "is_corrected"), [(1, False), (100_000, False), (100_001, True)])
+def test_a_restart_does_not_forget_a_contradiction_but_honest_wear_since_is_corrected(
+    begin, gait, monkeypatch, walked, is_corrected
+) -> None:
+    """Measured some gait cycles of the part before this run began."""
+    first = begin({})
+    first.update(gait(2.5))
+    first.measure("G", 3.1e-4, 2.0e-5, START_NS + 2 * 10**9, "ann")
+    first.close()
+    again = begin({})
+    again._parts.accounting._before["cycles"] += walked
+    again._parts.accounting.state.cycles += walked
+    shows(again, monkeypatch, 1.0)
+    again.update(gait(1.5, begin_s=2.5))
+    assert again.state.clearances["G"].counted_m == pytest.approx(
+        4.8e-4 if is_corrected else 3.0e-4, rel=1e-3
     )
 
 

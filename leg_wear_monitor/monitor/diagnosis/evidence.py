@@ -106,17 +106,20 @@ class Evidence:
         self._know_sensor(state)
         if not state.is_compared:  # what was found at another cadence stays
             return
-        state.detector, state.changes, state.fit_due = None, (), 0
+        told = state.changes
+        state.detector, state.changes, state.fit_due = None, told[:0], 0
         for cycle in state.cycles:
             self._test(state, cycle, config)
         self._explain(state, config)
+        if told and state.changes and state.changes[-1].subject == told[-1].subject:
+            state.changes = (_since(state.changes[-1], told[-1].since_ns, state),)
 
-    def compare_with_before(self, state: TorqueState) -> Change | None:
+    def compare_with_before(self, state: TorqueState, is_last: bool = False) -> Change | None:
         """Compare a corrected leg with the baseline before, once there is a reference about it.
 
         What another joint changed at the same time is in the baseline after the correction, and would never
-        be seen. Returns a clearance that surely opened, too; without one, the others are known as well as
-        they explain the leg.
+        be seen. Returns a clearance that surely opened, too; without one, or the last time, the others are
+        known as well as they explain the leg.
         """
         known, is_fitted = state.commissioned, state.fit_due == _FIT_EVERY - 1
         if known is None or known.before is None or state.reference is None:
@@ -130,7 +133,7 @@ class Evidence:
         explanations = explainer.explanations(mean, cycles, counted_m)
         change = change_of(explanations, state.settled[-1].since_ns if state.settled else known.stamp_ns)
         is_wide = change is not None and change.value >= CORRECTED_FROM * change.counted
-        if change and change.is_sure and is_wide and explanations[0].square <= _WHOLLY:
+        if change and change.is_sure and is_wide and explanations[0].square <= _WHOLLY and not is_last:
             return change
         found = best_fit(explainer, mean, cycles, counted_m, starts_of(explainer, None, counted_m))
         state.commissioned = attrs.evolve(known, before=None)
@@ -249,7 +252,7 @@ class Evidence:
         explainer = self._models.explainer(state)
         changed_m = start_of(change, explainer.joints, state.counted_m)
         first = first_changed(explainer, state.signatures, state.counted_m, changed_m)
-        return attrs.evolve(change, since_ns=state.cycles[first].begin_ns)
+        return _since(attrs.evolve(change, since_ns=state.cycles[first].begin_ns), since_ns, state)
 
     def _fit(
         self,
@@ -291,6 +294,12 @@ class Evidence:
             elif state.commissioned is None:  # nor do all at once show whose it is
                 least_m[k] = -math.inf
         state.least_m = (least_m,) * number if is_enough else (*state.least_m, least_m)[-number:]
+
+
+def _since(change: Change, told_ns: int, state: TorqueState) -> Change:
+    """A change since an earlier stamp, if all kept gait cycles belong to it: older ones are forgotten."""
+    is_whole = change.since_ns <= state.cycles[0].begin_ns
+    return attrs.evolve(change, since_ns=min(change.since_ns, told_ns)) if is_whole else change
 
 
 def _is_of_reference(explanations: Sequence[Explanation]) -> bool:

@@ -236,12 +236,34 @@ class TorqueObserver(KeepsSamples):
     def _opened_with_it(self) -> Correction | None:
         """Another joint that opened with the one that was corrected."""
         change = self._evidence.compare_with_before(self.state)
+        if not any(one.before for one in self.state.all_commissioned):
+            self.state.settled = self.state.corrections
         return Correction(self._joints.index(change.subject), change.value, change) if change else None
+
+    def contradicted(self, correction: Correction, clearance_m: float, sigma_m: float) -> None:
+        """Tell a correction that a measured clearance [m] contradicts, and is not made.
+
+        Where the joint opened with one that was corrected, it is known from the measurement meanwhile, and
+        the others as well as they explain the leg. The comparison goes on, until both agree.
+        """
+        state, k = self.state, correction.joint
+        known = state.commissioned
+        if correction.change in state.changes or known is None or known.before is None:
+            return
+        state.settled = (*state.corrections, correction.change)
+        known_sigma_m = math.hypot(sigma_m, clearance_m - float(known.clearance_m[k]))
+        if known.sigma_m[k] == known_sigma_m:
+            return
+        self._evidence.compare_with_before(state, is_last=True)
+        state.commissioned = attrs.evolve(state.commissioned or known, before=known.before)
+        others_m = state.commissioned.sigma_m
+        state.know_corrected(np.where(np.arange(len(others_m)) == k, known_sigma_m, others_m))
 
     def corrected(self, correction: Correction, counted_m: Floats) -> None:
         """Compare with the corrected clearances (k,) [m] from now on."""
         counted_m = np.asarray(counted_m, float).copy()
         state = self.state
+        state.settled = state.corrections
         settle(state, correction, counted_m, self.models.explainer(state).baseline.offset)
         self._restart(counted_m)
 
@@ -325,7 +347,7 @@ class TorqueObserver(KeepsSamples):
         clearance_m, sigma_m = self._observed(state.fit)
         return attrs.evolve(
             found,
-            state=DiagnosisState.CHANGED if state.changes else DiagnosisState.AS_COUNTED,
+            state=DiagnosisState.CHANGED if state.not_corrected else DiagnosisState.AS_COUNTED,
             reason=_joined(doubt(state, self._references, self.models), other_sensor(state)),
             cycles=state.fit_cycles,
             clearance_m=tuple(clearance_m.tolist()),
@@ -337,9 +359,10 @@ class TorqueObserver(KeepsSamples):
     def _observed(self, fit: ClearanceFit) -> tuple[Floats, Floats]:
         """Observable clearances and their standard deviations, NaN for the others.
 
-        Nor is a joint observable that no test would find as wide as is corrected. A joint that the
-        fit of all joints does not show is known from its own change. Where the reference is not that of the
-        leg, a change can have the name of another joint, and no clearance is known.
+        Nor is a joint observable that no test would find as wide as is corrected. A joint that the fit of all
+        joints does not show, or only as somebody measured it, is known from its own change. Where the
+        reference is not that of the leg, a change can have the name of another joint, and no clearance is
+        known.
         """
         if not self.models.fits(self.state):
             nothing = np.full(len(fit.clearance_m), math.nan)
@@ -352,10 +375,10 @@ class TorqueObserver(KeepsSamples):
         clearance_m, sigma_m = (
             np.where(observable, each, math.nan) for each in (fit.clearance_m, fit.sigma_m)
         )
-        for change in self.state.changes:
+        for change in self.state.not_corrected:
             if change.cause is Cause.CLEARANCE:
                 k = self._joints.index(change.subject)
-                if not observable[k]:
+                if not observable[k] or change in self.state.settled:
                     clearance_m[k], sigma_m[k] = change.value, change.sigma
         return clearance_m, sigma_m
 

@@ -342,7 +342,8 @@ class TorqueState:
     changes : tuple of Change
         Unsettled changes; the last one is being observed.
     settled : tuple of Change
-        Changes by which the counted clearances were corrected.
+        Changes by which the counted clearances were corrected, and one beside them that a measurement
+        contradicts.
     not_used : dict of str to int
         Gait cycles that were not used, by the values of `NotUsed`; replaced, never changed.
     unused : tuple of NotUsed
@@ -444,6 +445,16 @@ class TorqueState:
     def all_commissioned(self) -> tuple[CommissionedTorque, ...]:
         """Baselines of all cadences."""
         return (*(one.commissioned for one in self.known if one.commissioned), *self.baselines)
+
+    @property
+    def corrections(self) -> tuple[Change, ...]:
+        """Changes by which the counted clearances were corrected."""
+        return tuple(change for change in self.settled if change.is_corrected)
+
+    @property
+    def not_corrected(self) -> tuple[Change, ...]:
+        """Changes by which they were not."""
+        return tuple(change for change in self.settled + self.changes if not change.is_corrected)
 
     @property
     def corrected(self) -> CommissionedTorque | None:

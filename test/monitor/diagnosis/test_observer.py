@@ -257,6 +257,20 @@ def test_a_joint_that_opens_is_named_and_corrected(commissioned, reference, join
     assert observer.diagnosis.state is not DiagnosisState.CHANGED
 
 
+def test_a_change_that_is_not_corrected_keeps_its_begin(commissioned, reference, monkeypatch) -> None:
+    """Else it began after a measurement that contradicts it, once its first gait cycles are forgotten."""
+    monkeypatch.setattr(observer_module, "WINDOW_CYCLES", 15)
+    observer, first = commissioned(), COMMISSIONING_CYCLES
+    block = samples(reference, [0] * (first + 3) + [leg_number(3, 1.5)] * 37)
+    walk(observer, block, begin=first, end=first + 14)
+    (change,) = observer.diagnosis.changes
+    walk(observer, block, begin=first + 14, end=first + 30)
+    assert observer.state.cycles[0].begin_ns > change.since_ns
+    observer._evidence.review(observer.state, observer.config)
+    walk(observer, block, begin=first + 30)
+    assert [one.since_ns for one in observer.diagnosis.changes] == [change.since_ns]
+
+
 @pytest.mark.parametrize(("far_beyond", "later"), [(np.inf, 2), (4.0, 0)])
 def test_a_joint_is_surely_at_its_limit_after_three_estimates_or_beyond_doubt(
     commissioned, reference, monkeypatch, far_beyond: float, later: int
@@ -541,6 +555,41 @@ def test_whether_another_joint_opened_with_the_corrected_one_is_seen_by_a_refere
         assert np.isnan(shown.clearance_m[2])
         assert shown.reason.startswith("B, G, I, J may have opened")
         assert shown.reason.endswith("measure them")
+
+
+def test_an_opening_beside_a_correction_that_a_measurement_contradicts_is_told_until_both_agree(
+    commissioned, reference, monkeypatch
+) -> None:
+    """Seen before: nobody told it, and all others stayed unknown for good."""
+    monkeypatch.setattr(evidence, "_WHOLLY", 3.0)
+    observer, wider = commissioned(), about(reference, 0, 1.5)
+    walked = attrs.evolve(reference, torque_nm=(*reference.torque_nm, wider.torque_nm[leg_number(2, 1.5)]))
+    block = samples(walked, [0] * COMMISSIONING_CYCLES + [len(reference.torque_nm)] * 55)
+    ((at, correction),) = walk(observer, block, begin=COMMISSIONING_CYCLES, end=COMMISSIONING_CYCLES + 20)[:1]
+    counted = correct(observer, correction)
+    observer.state.reference = wider
+
+    def next_one(begin: int) -> tuple[int, Correction]:
+        cycles = range(begin, begin + 13)
+        return next(one for at in cycles for one in walk(observer, block, counted, at, at + 1))
+
+    at, second = next_one(at + 1)
+    observer.contradicted(second, 3.1e-4, 2.0e-5)
+    known = observer.state.commissioned
+    assert not known.is_unknown.any() and known.before is not None
+    assert known.sigma_m[2] == pytest.approx(np.hypot(1.0e-5, 2.0e-5))
+    walk(observer, block, counted, at + 1, at + 3)
+    shown = observer.diagnosis
+    assert shown.state is DiagnosisState.CHANGED and not shown.reason
+    assert [(one.subject, one.is_corrected) for one in shown.changes] == [("A", True), ("G", False)]
+    assert shown.clearance_m[2] == second.clearance_m
+    assert np.isfinite(shown.clearance_m).all()
+    at, second = next_one(at + 3)
+    observer.contradicted(second, 3.1e-4, 2.0e-5)
+    assert observer.state.commissioned is known  # not another row in the ledger each time
+    _, second = next_one(at + 1)  # measured again: both agree
+    correct(observer, second)
+    assert [(one.subject, one.is_corrected) for one in observer.state.settled] == [("A", True), ("G", True)]
 
 
 def test_a_joint_that_opened_with_the_corrected_one_is_found_after_a_restart(

@@ -12,7 +12,7 @@ from leg_wear_monitor.estimate.change_detector import first_changed
 from leg_wear_monitor.estimate.clearance_fit import best_fit, start_of, starts_of, with_rivals
 from leg_wear_monitor.estimate.drive import DIRECT
 from leg_wear_monitor.estimate.explanations import MODEL_ERROR, Explanation, change_of
-from leg_wear_monitor.estimate.signature import with_noise_of
+from leg_wear_monitor.estimate.signature import CommissionedTorque, with_noise_of
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.references import (
@@ -21,6 +21,7 @@ from leg_wear_monitor.monitor.diagnosis.references import (
 from leg_wear_monitor.monitor.diagnosis.state import (
     SignedCycle,
     TorqueState,
+    temperature_of,
 )
 
 SETTLING_CYCLES = 10  # since a change, before the counted clearances are corrected by it
@@ -83,6 +84,39 @@ def _is_alone(state: TorqueState, change: Change, joint: int) -> bool:
     return is_enough and state.fit is not None and state.fit.agrees(joint, change)
 
 
+def settle(state: TorqueState, correction: Correction, counted_m: Floats, offset: Floats) -> None:
+    """Make the gait cycles since a change those of the commissioned leg, with clearances (k,) [m].
+
+    What the correction is off does then not look like a further change; it stays in the standard deviation.
+    Nor does what other joints changed at the same time: theirs are not known until they are compared with the
+    baseline before, which had an offset (F,) from its model (`Evidence.compare_with_before`).
+    """
+    joint, _, change = correction
+    state.cycles = tuple(cycle for cycle in state.cycles if cycle.begin_ns >= change.since_ns)
+    signatures, before = state.signatures, state.commissioned
+    sigma_m = counted_m.copy()
+    if before is not None and before.before is not None:  # joints that were corrected since stay known
+        sigma_m = np.where(before.is_unknown, counted_m, before.sigma_m)
+    sigma_m[joint] = change.sigma
+    if before is not None:
+        signatures_before = before.signatures - before.mean + offset
+        before = before.before or attrs.evolve(before, signatures=signatures_before)
+    state.forget_baselines()
+    state.commissioned = CommissionedTorque(
+        state.cycles[-1].end_ns,
+        counted_m,
+        signatures,
+        sigma_m,
+        before.channel if before else DIRECT,
+        state.profile.speed,
+        temperature_of(state.cycles),
+        before=before,
+    )
+    if state.sensor is not None:
+        state.commissioned = state.commissioned.measured_by(state.sensor)
+    state.settled = (*state.settled, attrs.evolve(change, is_corrected=True))
+
+
 class Evidence:
     """Evaluates the gait cycles that an observer keeps.
 
@@ -107,7 +141,7 @@ class Evidence:
         if not state.is_compared:  # what was found at another cadence stays
             return
         told = state.changes
-        state.detector, state.changes, state.fit_due = None, told[:0], 0
+        state.detector, state.changes, state.fit_due = None, (), 0
         for cycle in state.cycles:
             self._test(state, cycle, config)
         self._explain(state, config)

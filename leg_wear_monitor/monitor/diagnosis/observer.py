@@ -21,7 +21,13 @@ from leg_wear_monitor.mechanism.person import upwards
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.sections import drive_figures
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.diagnosis.evidence import CORRECTED_FROM, Correction, Evidence, correction_of
+from leg_wear_monitor.monitor.diagnosis.evidence import (
+    CORRECTED_FROM,
+    Correction,
+    Evidence,
+    correction_of,
+    settle,
+)
 from leg_wear_monitor.monitor.diagnosis.reasons import doubt, missing, next_step, other_sensor
 from leg_wear_monitor.monitor.diagnosis.references import (
     COMMISSIONING_CYCLES,
@@ -48,40 +54,6 @@ from leg_wear_monitor.twin.reference import LegParameters
 from leg_wear_monitor.twin.sample import GROUND, MEASURED, KeepsSamples
 from leg_wear_monitor.twin.statistics import CycleStatistics
 from leg_wear_monitor.twin.torque_reference import ReferenceSnapshot, TorqueReference
-
-
-def settle(state: TorqueState, correction: Correction, counted_m: Floats, offset: Floats) -> None:
-    """Make the gait cycles since a change those of the commissioned leg, with clearances (k,) [m].
-
-    What the correction is off does then not look like a further change; it stays in the standard deviation.
-    Nor does what other joints changed at the same time: theirs are not known until they are compared with the
-    baseline before, which had an offset (F,) from its model (`Evidence.compare_with_before`).
-    """
-    joint, _, change = correction
-    state.cycles = tuple(cycle for cycle in state.cycles if cycle.begin_ns >= change.since_ns)
-    signatures, before = state.signatures, state.commissioned
-    sigma_m = counted_m.copy()
-    if before is not None and before.before is not None:  # joints that were corrected since stay known
-        sigma_m = np.where(before.is_unknown, counted_m, before.sigma_m)
-    sigma_m[joint] = change.sigma
-    if before is not None:
-        signatures_before = before.signatures - before.mean + offset
-        before = before.before or attrs.evolve(before, signatures=signatures_before)
-    state.forget_baselines()
-    state.commissioned = CommissionedTorque(
-        state.cycles[-1].end_ns,
-        counted_m,
-        signatures,
-        sigma_m,
-        before.channel if before else DIRECT,
-        state.profile.speed,
-        temperature_of(state.cycles),
-        before=before,
-    )
-    if state.sensor is not None:
-        state.commissioned = state.commissioned.measured_by(state.sensor)
-    state.settled = (*state.settled, attrs.evolve(change, is_corrected=True))
-
 
 # by which a load has moved, of its size: the twin's mean over twenty gait cycles is within 1 % of what the
 # foot carries, and where its shape was found under 100 N up to 23 % above it (2026-11-25)

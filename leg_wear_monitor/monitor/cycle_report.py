@@ -156,6 +156,10 @@ def observe_torque(parts: Parts) -> None:
     if torque is None:
         return
     before = attrs.evolve(torque.state)
+    hidden = before.corrected
+    for k, one in enumerate(parts.measured if hidden is not None and hidden.is_unknown.any() else ()):
+        if one is not None:
+            torque.measured(k, one.stamp_ns, one.clearance_m, one.sigma_m)
     correction = torque.end_period(twin.clearance_mean_m, twin.depth)
     measured = parts.measured[correction.joint] if correction else None
     if correction is not None and measured is not None and parts.contradiction(correction.change):

@@ -157,9 +157,9 @@ def observe_torque(parts: Parts) -> None:
         return
     before = attrs.evolve(torque.state)
     hidden = before.corrected
-    for k, one in enumerate(parts.measured if hidden is not None and hidden.is_unknown.any() else ()):
-        if one is not None:
-            torque.measured(k, one.stamp_ns, one.clearance_m, one.sigma_m)
+    if hidden is not None and hidden.is_unknown.any():  # a measurement since then need not be asked for
+        stamps_ns = [one.stamp_ns if one is not None else 0 for one in parts.measured]
+        torque.state.measured = tuple(stamp_ns >= hidden.stamp_ns for stamp_ns in stamps_ns)
     correction = torque.end_period(twin.clearance_mean_m, twin.depth)
     measured = parts.measured[correction.joint] if correction else None
     if correction is not None and measured is not None and parts.contradiction(correction.change):

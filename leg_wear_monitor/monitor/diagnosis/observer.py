@@ -231,16 +231,6 @@ class TorqueObserver(KeepsSamples):
         others_m = state.commissioned.sigma_m
         state.know_corrected(np.where(np.arange(len(others_m)) == k, known_sigma_m, others_m))
 
-    def measured(self, joint: int, stamp_ns: int, clearance_m: float, sigma_m: float) -> None:
-        """Know a joint that may have opened with a corrected one by its clearance [m], measured since."""
-        known = self.state.corrected
-        if known is None or not known.is_unknown[joint] or stamp_ns < known.stamp_ns:
-            return
-        own_m = known.sigma_m.copy()
-        own_m[joint] = math.hypot(sigma_m, clearance_m - float(known.clearance_m[joint]))
-        if own_m[joint] < known.clearance_m[joint]:
-            self.state.know_corrected(own_m)
-
     def corrected(self, correction: Correction, counted_m: Floats) -> None:
         """Compare with the corrected clearances (k,) [m] from now on."""
         counted_m = np.asarray(counted_m, float).copy()

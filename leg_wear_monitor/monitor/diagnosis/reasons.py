@@ -4,6 +4,8 @@ import itertools
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from leg_wear_monitor.estimate.signature import CommissionedTorque, TorqueSensor
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -66,8 +68,10 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
     if models.is_sure(state):
         if state.fit is None or state.commissioned is None or state.changes:
             return ""
-        if state.commissioned.is_unknown.any():
-            return _hidden(state, state.commissioned, models.explainer(state).joints)
+        is_unknown = state.commissioned.is_unknown.any()
+        hidden = _hidden(state, state.commissioned, models.explainer(state).joints) if is_unknown else ""
+        if hidden:
+            return hidden
         if state.fit.explains:
             return ""
         return (
@@ -97,8 +101,11 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
 
 
 def _hidden(state: TorqueState, known: CommissionedTorque, joints: Sequence[str]) -> str:
-    """That joints may have opened with one that was corrected."""
-    names = ", ".join(itertools.compress(joints, known.is_unknown))
+    """That joints may have opened with one that was corrected, and nobody has measured them since."""
+    measured = state.measured or (False,) * len(joints)
+    names = ", ".join(itertools.compress(joints, known.is_unknown & ~np.array(measured)))
+    if not names:
+        return ""
     compared = next((one for one in state.all_commissioned if one.before is not None), None)
     if compared is None:
         then = "the torque cannot tell, measure them"

@@ -344,6 +344,8 @@ class TorqueState:
     settled : tuple of Change
         Changes by which the counted clearances were corrected, and one beside them that a measurement
         contradicts.
+    measured : tuple of bool
+        Whether each joint was measured since a correction; empty without one.
     not_used : dict of str to int
         Gait cycles that were not used, by the values of `NotUsed`; replaced, never changed.
     unused : tuple of NotUsed
@@ -385,6 +387,7 @@ class TorqueState:
     least_m: tuple[Floats, ...] = ()
     changes: tuple[Change, ...] = ()
     settled: tuple[Change, ...] = ()
+    measured: tuple[bool, ...] = ()
     not_used: dict[str, int] = attrs.field(factory=dict)
     unused: tuple[NotUsed, ...] = ()
     off_cadence_rpm: float = math.nan

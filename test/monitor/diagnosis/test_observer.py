@@ -592,6 +592,28 @@ def test_an_opening_beside_a_correction_that_a_measurement_contradicts_is_told_u
     assert [(one.subject, one.is_corrected) for one in observer.state.settled] == [("A", True), ("G", True)]
 
 
+def test_a_joint_that_may_be_as_wide_as_is_corrected_stays_unknown_and_is_asked_for(
+    commissioned, reference, monkeypatch
+) -> None:
+    """Seen before: J at 0.60 mm beside B, or I: not surely, and the status said nothing."""
+    monkeypatch.setattr(evidence, "_WHOLLY", 3.0)
+    observer, wider = commissioned(), about(reference, 0, 1.5)
+    walked = attrs.evolve(reference, torque_nm=(*reference.torque_nm, wider.torque_nm[leg_number(2, 1.5)]))
+    block = samples(walked, [0] * COMMISSIONING_CYCLES + [len(reference.torque_nm)] * 40)
+    ((cycle, correction),) = walk(observer, block, begin=COMMISSIONING_CYCLES, end=COMMISSIONING_CYCLES + 20)[
+        :1
+    ]
+    counted = correct(observer, correction)
+    observer.state.reference = wider
+    monkeypatch.setattr(evidence, "change_of", lambda *_: None)
+    assert walk(observer, block, counted, cycle + 1, cycle + 12) == []
+    known = observer.state.commissioned
+    assert known.before is None
+    assert known.is_unknown.tolist() == [False, False, True, False, False]
+    assert observer.diagnosis.reason.startswith("G may have opened")
+    assert observer.diagnosis.reason.endswith("measure them")
+
+
 def test_a_joint_that_opened_with_the_corrected_one_is_found_after_a_restart(
     leg, commissioned, reference, monkeypatch
 ) -> None:

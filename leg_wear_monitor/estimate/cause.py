@@ -10,6 +10,8 @@ SURE_LOG_ODDS = 5.0  # 150 to 1
 # another. Under 300 N of load and twice the friction, B had 7 where G was open; right names had 15 and more
 # there, 85 and more in the air (2026-11-25)
 SURE_OF_NAME = 10.0
+# of the counted clearance: smaller openings are named wrongly where masses are 5 % off (diagnosis.md)
+CORRECTED_FROM = 1.3
 SURE_SIGMAS = 2.0  # by which a clearance must be beyond its limit, or below it
 
 
@@ -104,6 +106,11 @@ class Change(NamedCause):
         """Whether a clearance has changed, much more probably than anything else."""
         is_alone = self.runner_up_log_odds >= SURE_OF_NAME
         return self.cause is Cause.CLEARANCE and self.log_odds >= SURE_LOG_ODDS and is_alone
+
+    @property
+    def is_wide(self) -> bool:
+        """Whether a clearance is so much wider than counted that it is corrected."""
+        return self.cause is Cause.CLEARANCE and self.value >= CORRECTED_FROM * self.counted
 
 
 @attrs.frozen(kw_only=True)

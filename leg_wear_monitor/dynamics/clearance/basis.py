@@ -43,6 +43,8 @@ class Basis:
     mass : (3 b,) array
     s, s_t : (N, 3 b, d) arrays
         S and its derivative by the crank angle.
+    inverse_mass : (N, d, d) array
+        Inverse of the Lagrangian's A.
     drive, drive_t : (N, 3 b) arrays
         s and its derivative.
     all : (N, 3 b, d + 1) array
@@ -83,6 +85,8 @@ class Basis:
         self.rows = _rows(linkage, contacts.joint)
         self.s = self.x[:, :, self.rows]
         self.s_t = derivative(self.s)
+        inertia = project(self.s, self.mass[:, None] * self.s)
+        self.inverse_mass: Floats = np.asarray(np.linalg.inv(inertia), dtype=np.float64)
         self.drive = self.x[:, :, linkage.rows.drive_row]
         self.drive_t = motion.a[:, 1:].reshape(n, -1)
         self.all = np.concatenate([self.s, self.drive[:, :, None]], axis=2)

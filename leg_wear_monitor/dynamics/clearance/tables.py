@@ -219,31 +219,26 @@ def _parts(table: Floats) -> Floats:
 
 def _accelerations(basis: Basis) -> dict[str, Floats]:
     """Parts of `motion_shapes` for the accelerations of the eccentricities."""
-    mass, inverse_mass = basis.mass[:, None], _inverse_mass(basis)
+    mass = basis.mass[:, None]
 
     def respond(generalised: Floats) -> Floats:
         """Accelerations (N, d, m) of the eccentricities by generalised forces (N, 3 b, m) on the bodies."""
-        return np.asarray(inverse_mass @ project(basis.s, generalised))
+        return np.asarray(basis.inverse_mass @ project(basis.s, generalised))
 
     free = np.stack([basis.force, -basis.mass * basis.drive, -basis.mass * basis.drive_t], axis=2)
     return {
-        "inverse_mass": inverse_mass,
+        "inverse_mass": basis.inverse_mass,
         "coriolis": -2.0 * respond(mass * basis.s_t).transpose(0, 2, 1),
         "free": project(basis.s, free).transpose(0, 2, 1),
         "viscous": -respond(basis.drag),
     }
 
 
-def _inverse_mass(basis: Basis) -> Floats:
-    """Inverse (N, d, d) of A at e = 0."""
-    return np.asarray(np.linalg.inv(project(basis.s, basis.mass[:, None] * basis.s)), dtype=np.float64)
-
-
 def _bend(basis: Basis) -> Floats:
     """Accelerations A^-1 Gamma (M + 1, d, d, d), bilinear in e'."""
     n, d = basis.gamma.shape[:2]
     turn = [*range(n), 0]
-    bend = _inverse_mass(basis)[::COARSER][turn] @ basis.gamma[turn].reshape(n + 1, d, d * d)
+    bend = basis.inverse_mass[::COARSER][turn] @ basis.gamma[turn].reshape(n + 1, d, d * d)
     return np.asarray(bend.reshape(n + 1, d, d, d).transpose(0, 3, 2, 1))
 
 
@@ -252,7 +247,7 @@ def _inverse_mass_slopes(basis: Basis) -> Floats:
 
     The inverse of A + Gamma e + (Gamma e)^T is A^-1 - Q e - (Q e)^T with Q = A^-1 Gamma A^-1.
     """
-    change = _inverse_mass(basis)[_coarse(len(basis.s))][:, None] @ _bend(basis)
+    change = basis.inverse_mass[_coarse(len(basis.s))][:, None] @ _bend(basis)
     return np.asarray(-(change + change.transpose(0, 1, 3, 2)))
 
 

@@ -7,7 +7,13 @@ from typing import NamedTuple
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate.cause import SURE_LOG_ODDS, SURE_SIGMAS, Cause, Change
+from leg_wear_monitor.estimate.cause import (
+    CORRECTED_FROM,
+    SURE_LOG_ODDS,
+    SURE_SIGMAS,
+    Cause,
+    Change,
+)
 from leg_wear_monitor.estimate.change_detector import first_changed
 from leg_wear_monitor.estimate.clearance_fit import best_fit, start_of, starts_of, with_rivals
 from leg_wear_monitor.estimate.drive import DIRECT
@@ -15,9 +21,7 @@ from leg_wear_monitor.estimate.explanations import MODEL_ERROR, Explanation, cha
 from leg_wear_monitor.estimate.signature import CommissionedTorque, with_noise_of
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.diagnosis.references import (
-    LegModels,
-)
+from leg_wear_monitor.monitor.diagnosis.references import LegModels
 from leg_wear_monitor.monitor.diagnosis.state import (
     SignedCycle,
     TorqueState,
@@ -25,9 +29,6 @@ from leg_wear_monitor.monitor.diagnosis.state import (
 )
 
 SETTLING_CYCLES = 10  # since a change, before the counted clearances are corrected by it
-
-# of the counted clearance: smaller openings are named wrongly where masses are 5 % off (diagnosis.md)
-CORRECTED_FROM = 1.3
 
 # mean square up to which another joint explains what a corrected leg shows beside the baseline before: G, I
 # and B left 0.9 to 1.1 where they had opened with A and G, and J 1.9, at 1.7 mm for 0.6 (2026-11-27)
@@ -67,8 +68,7 @@ def correction_of(state: TorqueState, joints: Sequence[str]) -> Correction | Non
     change = state.changes[-1]
     if sum(cycle.begin_ns >= change.since_ns for cycle in state.cycles) < SETTLING_CYCLES:
         return None
-    is_wide = change.value >= CORRECTED_FROM * change.counted
-    if change.subject not in joints or not change.is_sure or not is_wide:
+    if change.subject not in joints or not (change.is_sure and change.is_wide):
         return None
     k = joints.index(change.subject)
     return Correction(k, change.value, change) if _is_alone(state, change, k) else None
@@ -82,39 +82,6 @@ def _is_alone(state: TorqueState, change: Change, joint: int) -> bool:
     """
     is_enough = state.commissioned is not None or change.runner_up_log_odds >= _SURE_BEFORE
     return is_enough and state.fit is not None and state.fit.agrees(joint, change)
-
-
-def settle(state: TorqueState, correction: Correction, counted_m: Floats, offset: Floats) -> None:
-    """Make the gait cycles since a change those of the commissioned leg, with clearances (k,) [m].
-
-    What the correction is off does then not look like a further change; it stays in the standard deviation.
-    Nor does what other joints changed at the same time: theirs are not known until they are compared with the
-    baseline before, which had an offset (F,) from its model (`Evidence.compare_with_before`).
-    """
-    joint, _, change = correction
-    state.cycles = tuple(cycle for cycle in state.cycles if cycle.begin_ns >= change.since_ns)
-    signatures, before = state.signatures, state.commissioned
-    sigma_m = counted_m.copy()
-    if before is not None and before.before is not None:  # joints that were corrected since stay known
-        sigma_m = np.where(before.is_unknown, counted_m, before.sigma_m)
-    sigma_m[joint] = change.sigma
-    if before is not None:
-        signatures_before = before.signatures - before.mean + offset
-        before = before.before or attrs.evolve(before, signatures=signatures_before)
-    state.forget_baselines()
-    state.commissioned = CommissionedTorque(
-        state.cycles[-1].end_ns,
-        counted_m,
-        signatures,
-        sigma_m,
-        before.channel if before else DIRECT,
-        state.profile.speed,
-        temperature_of(state.cycles),
-        before=before,
-    )
-    if state.sensor is not None:
-        state.commissioned = state.commissioned.measured_by(state.sensor)
-    state.settled = (*state.settled, attrs.evolve(change, is_corrected=True))
 
 
 class Evidence:
@@ -148,6 +115,39 @@ class Evidence:
         if told and state.changes and state.changes[-1].subject == told[-1].subject:
             state.changes = (_since(state.changes[-1], told[-1].since_ns, state),)
 
+    def settle(self, state: TorqueState, correction: Correction, counted_m: Floats) -> None:
+        """Make the gait cycles since a change those of the commissioned leg, with clearances (k,) [m].
+
+        What the correction is off does then not look like a further change; it stays in the standard
+        deviation. Nor does what other joints changed at the same time: theirs are not known until they are
+        compared with the baseline before (`compare_with_before`).
+        """
+        joint, _, change = correction
+        offset = self._models.explainer(state).baseline.offset  # of the baseline before, from its model
+        state.cycles = tuple(cycle for cycle in state.cycles if cycle.begin_ns >= change.since_ns)
+        signatures, before = state.signatures, state.commissioned
+        sigma_m = counted_m.copy()
+        if before is not None and before.before is not None:  # joints that were corrected since stay known
+            sigma_m = np.where(before.is_unknown, counted_m, before.sigma_m)
+        sigma_m[joint] = change.sigma
+        if before is not None:
+            signatures_before = before.signatures - before.mean + offset
+            before = before.before or attrs.evolve(before, signatures=signatures_before)
+        state.forget_baselines()
+        state.commissioned = CommissionedTorque(
+            state.cycles[-1].end_ns,
+            counted_m,
+            signatures,
+            sigma_m,
+            before.channel if before else DIRECT,
+            state.profile.speed,
+            temperature_of(state.cycles),
+            before=before,
+        )
+        if state.sensor is not None:
+            state.commissioned = state.commissioned.measured_by(state.sensor)
+        state.settled = (*state.settled, attrs.evolve(change, is_corrected=True))
+
     def compare_with_before(self, state: TorqueState, is_last: bool = False) -> Change | None:
         """Compare a corrected leg with the baseline before, once there is a reference about it.
 
@@ -166,8 +166,8 @@ class Evidence:
         counted_m, mean, cycles = state.counted_m, state.signatures.mean(axis=0), len(state.cycles)
         explanations = explainer.explanations(mean, cycles, counted_m)
         change = change_of(explanations, state.settled[-1].since_ns if state.settled else known.stamp_ns)
-        is_wide = change is not None and change.value >= CORRECTED_FROM * change.counted
-        if change and change.is_sure and is_wide and explanations[0].square <= _WHOLLY and not is_last:
+        is_found = change is not None and change.is_sure and change.is_wide
+        if is_found and explanations[0].square <= _WHOLLY and not is_last:
             return change
         found = best_fit(explainer, mean, cycles, counted_m, starts_of(explainer, None, counted_m))
         state.commissioned = attrs.evolve(known, before=None)
@@ -280,8 +280,7 @@ class Evidence:
         begin; another one keeps that of its detection.
         """
         change = change_of(explanations, since_ns)
-        is_wide = change is not None and change.value >= CORRECTED_FROM * change.counted
-        if state.commissioned is None and not (change and change.is_sure and is_wide):
+        if state.commissioned is None and not (change and change.is_sure and change.is_wide):
             return None
         if change is None or change.cause is not Cause.CLEARANCE:
             return change

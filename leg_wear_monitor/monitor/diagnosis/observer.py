@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate.cause import Cause
+from leg_wear_monitor.estimate.cause import CORRECTED_FROM, Cause
 from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
 from leg_wear_monitor.estimate.coupling import compliance_of
 from leg_wear_monitor.estimate.drive import DIRECT
@@ -22,11 +22,9 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.sections import drive_figures
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.evidence import (
-    CORRECTED_FROM,
     Correction,
     Evidence,
     correction_of,
-    settle,
 )
 from leg_wear_monitor.monitor.diagnosis.reasons import doubt, missing, next_step, other_sensor
 from leg_wear_monitor.monitor.diagnosis.references import (
@@ -236,7 +234,7 @@ class TorqueObserver(KeepsSamples):
         counted_m = np.asarray(counted_m, float).copy()
         state = self.state
         state.settled = state.corrections
-        settle(state, correction, counted_m, self.models.explainer(state).baseline.offset)
+        self._evidence.settle(state, correction, counted_m)
         self._restart(counted_m)
 
     def replaced(self, counted_m: Floats) -> None:

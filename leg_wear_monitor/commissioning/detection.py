@@ -221,7 +221,7 @@ def _commissioned(
     one = explainer_of(walk.mechanism, reference, sensor, known)
     part = min(1.0, known.cycles / COMMISSIONING_CYCLES)
     baseline = attrs.evolve(one.baseline, covariance=part * one.baseline.covariance)
-    return Explainer(one.model, one.joints, baseline, one.nuisances, one.channels, one.fresh_m)
+    return Explainer(one.model, one.joints, baseline, one.nuisances, one.channels, one.noises, one.fresh_m)
 
 
 def _found(walk: Walk, explainer: Explainer) -> list[JointDetection]:

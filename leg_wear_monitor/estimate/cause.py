@@ -38,6 +38,7 @@ class Cause(Enum):
     TIMING = "crank offset or lag of the torque", "TORQUE_TIMING"  # at one speed the two look alike
     CRANK_OFFSET = "offset of the crank encoder", "TORQUE_TIMING"
     LAG = "lag of the torque sensor", "TORQUE_TIMING"
+    NOISE = "noise of the torque sensor", "TORQUE_NOISE"
     BIAS = "zero of the torque sensor", "TORQUE_BIAS"
     LOAD = "load at the foot", "TORQUE_LOAD"
     FRICTION = "friction of the drive", "FRICTION_CHANGED"
@@ -47,7 +48,7 @@ class Cause(Enum):
     UNKNOWN = "unknown", "MECHANISM_CHANGED"
 
 
-INPUTS = (Cause.SIGN, Cause.SCALE, Cause.TIMING, Cause.CRANK_OFFSET, Cause.LAG)
+INPUTS = (Cause.SIGN, Cause.SCALE, Cause.TIMING, Cause.CRANK_OFFSET, Cause.LAG, Cause.NOISE)
 """Causes in what is received, not in the leg."""
 
 
@@ -60,7 +61,8 @@ class NamedCause:
     cause : Cause
     value, sigma : float
         Clearance [m]; measured over predicted torque (SIGN, SCALE); angle by which the crank is ahead of its
-        measured angle (TIMING, CRANK_OFFSET) [rad]; lag [s]; constant torque beyond the bounds of friction,
+        measured angle (TIMING, CRANK_OFFSET) [rad]; lag [s]; standard deviation of a sample (NOISE) [N m];
+        constant torque beyond the bounds of friction,
         negative where it drives (BIAS) [N m]; change of the friction [N m], or of the fraction of the
         torque that it is (LOAD_FRICTION); load at the foot [N]; fraction by which a mass or a length is
         larger.

@@ -2,11 +2,12 @@
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate.cause import SURE_LOG_ODDS, Cause, Change, NamedCause
+from leg_wear_monitor.estimate.cause import SURE_LOG_ODDS, SURE_OF_NAME, Cause, Change, NamedCause
 from leg_wear_monitor.estimate.signature import SignatureModel
 from leg_wear_monitor.mechanism.arrays import Floats
 
@@ -21,10 +22,15 @@ _APART = 2.0  # standard deviations by which likely sizes may scatter about the 
 _SIZES = 24  # clearances of a joint that are tried; between them a parabola finds the best
 _LEAST_FACTOR = 0.7  # of the counted clearance
 _CORNER = 1.0e200
+# of the mean square: less than a channel's delay, 2.5 ms from the next that is tried, leaves over
+_LEFT = 0.5
 _LATE_SIGMA_S = 0.0015  # about the step between the channels that are tried
-_LEFT = (
-    0.5  # of the mean square: less than a channel's delay, 2.5 ms from the next that is tried, leaves over
-)
+_NOISE_SIGMA = 0.08  # of the noise: half of the step between those that are tried
+_QUIETEST = 0.01  # of the square of the roughness
+_ROUNDS = 2  # of the search for a clearance and a noise
+# mean square up to which it is noise alone: up to 1.4 of a healthy leg, a real motor's stick-slip too; where
+# two joints opened as well, which no single one explains, it would explain most of it (2026-11-27)
+_NOISE_ALONE = 2.0
 
 # mean square above which an explanation does not explain (docs/explanation/diagnosis.md), and values that
 # linear columns can show and a leg can have
@@ -74,6 +80,36 @@ class OtherChannel:
 
     later_s: float
     column: Floats
+
+
+@attrs.frozen(eq=False)
+class OtherNoise:
+    """More or less noise of the torque sensor.
+
+    Attributes
+    ----------
+    noise_nm : float
+        Standard deviation of a sample.
+    power : (F,) array
+        What it adds to the square of the roughness [(N m)^2]; 0 for the mean torque.
+    scatter : (F,) array
+        Variance of a gait cycle's signature in addition.
+    """
+
+    noise_nm: float
+    power: Floats
+    scatter: Floats
+
+    def shown(self, signature: Floats) -> Floats:
+        """Signatures (..., F) with this noise instead of the sensor's."""
+        # of less noise than there is, no more can be left out
+        more = np.maximum(self.power * np.exp(-2.0 * signature), _QUIETEST - 1.0)
+        return np.asarray(signature + 0.5 * np.log1p(np.where(self.power == 0.0, 0.0, more)))
+
+    def variance(self, signature: Floats, cycles: int) -> Floats:
+        """What is uncertain of the mean of some cycles' signatures (F,) with it, beside what there is."""
+        share = 1.0 - np.exp(2.0 * (signature - self.shown(signature)))
+        return np.asarray(self.scatter / cycles + (_NOISE_SIGMA * share) ** 2)
 
 
 @attrs.frozen(eq=False)
@@ -141,7 +177,8 @@ class Explanation(NamedCause):
             `square` without any cause.
         """
         low, high = _POSSIBLE.get(self.cause, (-math.inf, math.inf))
-        return self.square <= max(POOREST, _PART * without) and low <= self.value <= high
+        poorest = _NOISE_ALONE if self.cause is Cause.NOISE else max(POOREST, _PART * without)
+        return self.square <= poorest and low <= self.value <= high
 
 
 class Explainer:
@@ -154,6 +191,7 @@ class Explainer:
     baseline : Baseline
     nuisances : sequence of Nuisance
     channels : sequence of OtherChannel, optional
+    noises : sequence of OtherNoise, optional
     fresh_m : (k,) array, optional
         Clearances of new parts, the least that a joint can have; those of the expected leg by default.
     """
@@ -165,10 +203,12 @@ class Explainer:
         baseline: Baseline,
         nuisances: Sequence[Nuisance],
         channels: Sequence[OtherChannel] = (),
+        noises: Sequence[OtherNoise] = (),
         fresh_m: Floats | None = None,
     ) -> None:
         self.model, self.joints, self.baseline = model, tuple(joints), baseline
-        self.nuisances, self.channels = tuple(nuisances), tuple(channels)
+        self.nuisances = tuple(nuisances)
+        self.channels, self.noises = tuple(channels), tuple(noises)
         self.fresh_m = model.grid_m[:, 0] if fresh_m is None else fresh_m
         self._root = np.linalg.cholesky(model.covariance)
         self._constant = baseline.covariance.copy()  # what does not become less over several cycles
@@ -197,10 +237,15 @@ class Explainer:
             Counted clearances.
         """
         covariance, there = self.covariance(cycles), self.model.at(counted_m)[0]
-        rest = mean - self.baseline.offset - there
+        expected = self.baseline.offset + there
+        rest = mean - expected
         found = [self._as_counted(rest, covariance), *self._others(rest, covariance)]
         found += self._late(rest, covariance)
-        found += [self._clearance(k, rest, there, covariance, counted_m) for k in range(len(counted_m))]
+        more, noises = self._noise(rest, expected, covariance, cycles)
+        found += more
+        for k in range(len(counted_m)):
+            tried = _Opened(self.model, k, counted_m, expected, mean, covariance, cycles)
+            found.append(self._clearance(tried, noises))
         return sorted(found, key=lambda one: one.misfit)
 
     def _as_counted(self, rest: Floats, covariance: Floats) -> Explanation:
@@ -223,26 +268,43 @@ class Explainer:
         best = int(np.where(possible, misfits.value, np.inf).argmin())
         return [misfits.explanation(best, NamedCause(Cause.LAG, self.channels[best].later_s, _LATE_SIGMA_S))]
 
-    def _clearance(
-        self, k: int, rest: Floats, there: Floats, covariance: Floats, counted_m: Floats
-    ) -> Explanation:
-        """Best clearance of one joint, the others as counted."""
+    def _noise(
+        self, rest: Floats, expected: Floats, covariance: Floats, cycles: int
+    ) -> tuple[list[Explanation], Sequence[OtherNoise]]:
+        """Other noise as the cause, and what noise there may be beside an opening.
 
-        def tried(sizes: Floats) -> Misfits:
-            each = [opened(counted_m, k, size) for size in sizes]
-            change = np.array([self.model.at(one)[0] for one in each]) - there
-            scatter = np.array([self.model.scatter_at(one) for one in each])
-            own = scatter[:, None, None] * self.model.covariance + _diagonal(MODEL_ERROR * change)
-            return Misfits(rest - change, covariance + own)
+        An opened joint makes the torque rougher, too, so that there is at most as much as without one.
+        """
+        if not self.noises:
+            return [], ()
+        change = np.array([one.shown(expected) for one in self.noises]) - expected
+        own = covariance + _diagonal(np.sqrt([one.variance(expected, cycles) for one in self.noises]))
+        misfits = Misfits(rest - change, own)
+        possible = misfits.square < _LEFT * Misfits(rest[None], covariance).square
+        if not possible.any():
+            return [], ()
+        best = int(np.where(possible, misfits.value, np.inf).argmin())
+        found, known_nm = self.noises[best], self.model.sensor.noise_nm
+        beside = [one for one in self.noises if known_nm < one.noise_nm <= found.noise_nm]
+        cause = NamedCause(Cause.NOISE, found.noise_nm, _NOISE_SIGMA * found.noise_nm)
+        return [misfits.explanation(best, cause, known_nm)], beside
 
-        widest = self.model.grid_m[k, -1]
-        least = _LEAST_FACTOR * min(counted_m[k], self.fresh_m[k])
-        sizes = np.geomspace(least, max(widest, counted_m[k]), _SIZES)
-        misfits = tried(sizes).value
+    def _clearance(self, joint: "_Opened", noises: Sequence[OtherNoise]) -> Explanation:
+        """Best clearance of one joint, the others as counted, beside other noise if there is some."""
+        k, counted = joint.k, float(joint.counted_m[joint.k])
+        widest = max(self.model.grid_m[k, -1], counted)
+        sizes = np.geomspace(_LEAST_FACTOR * min(counted, self.fresh_m[k]), widest, _SIZES)
+        noise, unlikely = None, 0.0
+        for _ in range(_ROUNDS if noises else 0):  # from the most noise on
+            size = sizes[joint.misfits(sizes, noise or noises[-1]).value.argmin()]
+            values = [joint.misfits(np.array([size]), one).value[0] for one in (None, *noises)]
+            noise = (None, *noises)[int(np.argmin(values))]
+            unlikely = 2.0 * SURE_OF_NAME if noise else 0.0
+        misfits = joint.misfits(sizes, noise).value
         best = int(misfits.argmin())
         value, sigma = _vertex(np.log(sizes), misfits, best)
         size = float(np.exp(value))
-        square = float(tried(np.array([size])).square[0]) / len(rest)
+        square = float(joint.misfits(np.array([size]), noise).square[0]) / len(joint.mean)
         poor = max(1.0, square)  # the square of Birge's ratio
         # sizes far from the best one may fit almost as well: then the mean of all. Where none fits, the model
         # is off by as much in neighbouring phases, which then are few independent numbers
@@ -255,9 +317,9 @@ class Explainer:
             cause=Cause.CLEARANCE,
             subject=self.joints[k],
             value=size,
-            sigma=float(np.hypot(own, MODEL_ERROR * (size - counted_m[k]))),
-            counted=float(counted_m[k]),
-            misfit=float(misfits[best]),
+            sigma=float(np.hypot(own, MODEL_ERROR * (size - counted))),
+            counted=counted,
+            misfit=float(misfits[best]) + unlikely,
             square=square,
         )
 
@@ -326,6 +388,34 @@ class Misfits:
             misfit=float(self.value[i]),
             square=float(self.square[i]) / self._size,
         )
+
+
+class _Opened(NamedTuple):
+    """A joint that may have another clearance: the mean signature of some gait cycles, and what is expected.
+
+    Signatures are (F,) arrays, the covariance of their mean is (F, F).
+    """
+
+    model: SignatureModel
+    k: int
+    counted_m: Floats
+    expected: Floats
+    mean: Floats
+    covariance: Floats
+    cycles: int
+
+    def misfits(self, sizes: Floats, noise: OtherNoise | None) -> Misfits:
+        """How well some clearances (n,) [m] explain, with other noise than the sensor's or with its own."""
+        each = [opened(self.counted_m, self.k, size) for size in sizes]
+        there = self.model.at(self.counted_m)[0]
+        shown = self.expected + np.array([self.model.at(one)[0] for one in each]) - there
+        scatter = np.array([self.model.scatter_at(one) for one in each])
+        before, covariance = self.expected, self.covariance
+        if noise is not None:
+            covariance = covariance + np.diag(noise.variance(before, self.cycles))
+            shown, before = noise.shown(shown), noise.shown(before)
+        own = scatter[:, None, None] * self.model.covariance + _diagonal(MODEL_ERROR * (shown - before))
+        return Misfits(self.mean - shown, covariance + own)
 
 
 def _diagonal(sigma: Floats) -> Floats:

@@ -12,6 +12,7 @@ from leg_wear_monitor.estimate.explanations import (
     LeftOut,
     Nuisance,
     OtherChannel,
+    OtherNoise,
 )
 from leg_wear_monitor.estimate.signature import (
     CommissionedTorque,
@@ -48,7 +49,9 @@ _MASS_STEP, _LENGTH_STEP = 0.05, 0.005
 
 _LATER_S = 0.0025 * np.array([*range(-8, 0), *range(1, 13)])
 _SLOWER_S = tuple(1.0 / (TURN * hz) for hz in (70.0, 35.0, 20.0, 10.0))
-_CHANNEL_CYCLES = 20
+_NOISE_STEP = 0.16  # of its logarithm
+_NOISE = 0.001 * np.exp(_NOISE_STEP * np.arange(40))  # of the torque's size
+_SENSOR_CYCLES = 20
 
 # gait cycles that the expected covariance counts as: a tenth to 0.45 of the weight is that of 50 measured
 # cycles where the others are most probable by it, in the air and on the ground (2026-11-25)
@@ -102,7 +105,7 @@ def _loads(linkage: Linkage, known: Floats, simulated: SimulatedSensor) -> list[
 
 def other_channels(reference: TorqueReference, sensor: TorqueSensor) -> list[OtherChannel]:
     """Channels that a torque sensor may have instead of its own: earlier, later, filtered."""
-    own = simulated_signatures(reference, 0, sensor, cycles=_CHANNEL_CYCLES).mean(axis=0)
+    own = simulated_signatures(reference, 0, sensor, cycles=_SENSOR_CYCLES).mean(axis=0)
     present = sensor.channel
     slower = [one for one in _SLOWER_S if one > present.time_constant_s]
     tried = [(late, present.time_constant_s) for late in _LATER_S] + [
@@ -114,8 +117,26 @@ def other_channels(reference: TorqueReference, sensor: TorqueSensor) -> list[Oth
     for later_s, time_constant_s in tried:
         other = attrs.evolve(present, delay_s=present.delay_s + later_s, time_constant_s=time_constant_s)
         behind = attrs.evolve(sensor, channel=other)
-        column = simulated_signatures(reference, 0, behind, cycles=_CHANNEL_CYCLES).mean(axis=0) - own
+        column = simulated_signatures(reference, 0, behind, cycles=_SENSOR_CYCLES).mean(axis=0) - own
         found.append(OtherChannel(float(other.lateness_s - present.lateness_s), column))
+    return found
+
+
+def other_noises(reference: TorqueReference, sensor: TorqueSensor) -> list[OtherNoise]:
+    """More or less noise than a torque sensor has, in increasing order."""
+    simulated, phases = SimulatedSensor(reference, _SENSOR_CYCLES, sensor), sensor.phases
+    torque, noise = simulated.torque(0), simulated.noise(0)
+    own = simulated.signatures_of(torque + sensor.noise_nm * noise)
+    found = []
+    for noise_nm in _NOISE * sensor.size_nm:
+        if abs(np.log(noise_nm / max(sensor.noise_nm, _NOISE[0] * sensor.size_nm))) < _NOISE_STEP:
+            continue
+        each = simulated.signatures_of(torque + noise_nm * noise)
+        power = np.exp(2.0 * each.mean(axis=0)) - np.exp(2.0 * own.mean(axis=0))
+        power[:phases] = 0.0
+        # of 20 gait cycles a phase has hardly a variance; all of them have one
+        more = (each.var(axis=0, ddof=1) - own.var(axis=0, ddof=1)).reshape(2, phases).mean(axis=1)
+        found.append(OtherNoise(float(noise_nm), power, np.repeat(np.maximum(more, 0.0), phases)))
     return found
 
 
@@ -237,4 +258,5 @@ def explainer_of(
             covariance = baseline.covariance + np.diag(np.square(error))
             baseline = attrs.evolve(baseline, offset=commissioned.mean, covariance=covariance)
     fresh_m = np.array([mechanism.clearances[joint].radial_clearance for joint in joints])
-    return Explainer(model, joints, baseline, found, other_channels(reference, sensor), fresh_m)
+    channels, noises = other_channels(reference, sensor), other_noises(reference, sensor)
+    return Explainer(model, joints, baseline, found, channels, noises, fresh_m)

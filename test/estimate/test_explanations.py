@@ -13,6 +13,7 @@ from leg_wear_monitor.estimate.explanations import (
     Misfits,
     Nuisance,
     OtherChannel,
+    OtherNoise,
     change_of,
 )
 from leg_wear_monitor.estimate.leg_model import with_scatter_of
@@ -232,6 +233,47 @@ def test_a_channel_that_leaves_as_much_as_it_explains_is_no_lag(explainer) -> No
     causes = [one.cause for one in legs.explanations(measured(legs, open_wide, 5, 1, off), 5, NEW)]
     assert Cause.LAG not in causes
     assert causes[0] is Cause.CLEARANCE
+
+
+@pytest.fixture(scope="module")
+def noisy(explainer) -> Explainer:
+    """The same with noise as a cause, of which a sample has none so far."""
+    power = np.r_[np.zeros(F // 2), np.ones(F // 2)]
+    sizes = 2.0 ** np.arange(5)
+    noises = [OtherNoise(float(n), n**2 * power, 0.1 * (n**2 * (1.0 - power) + power)) for n in sizes]
+    return Explainer(explainer.model, JOINTS, explainer.baseline, explainer.nuisances, (), noises)
+
+
+@pytest.mark.parametrize("size_m", [3.0e-4, 4.5e-4])
+def test_noise_is_a_cause_and_a_clearance_is_found_beside_it(noisy, size_m: float) -> None:
+    opened = np.array([3.0e-4, size_m, 3.0e-4])
+    more = noisy.noises[2]
+    mean = more.shown(measured(noisy, opened, 10, 3))
+    change = change_of(noisy.explanations(mean, 10, NEW), 5)
+    assert change is not None
+    if size_m == NEW[0]:
+        assert (change.cause, change.value, change.counted) == (Cause.NOISE, more.noise_nm, 0.0)
+    else:
+        assert change.is_sure
+        assert change.subject == "B"
+        assert abs(change.value - size_m) < 2.0 * change.sigma
+
+
+def test_noise_that_is_not_alone_explains_nothing(noisy) -> None:
+    """Two joints that opened while the torque became noisy are not noise alone."""
+    off = 1.6 * np.random.default_rng(7).standard_normal(F)
+    change = change_of(
+        noisy.explanations(noisy.noises[2].shown(measured(noisy, NEW, 10, 3)) + off, 10, NEW), 5
+    )
+    assert change is not None
+    assert change.cause is Cause.UNKNOWN
+
+
+def test_less_noise_leaves_at_least_the_roughness_of_the_leg() -> None:
+    less = OtherNoise(0.1, np.r_[0.0, -4.0], np.zeros(2))
+    shown = less.shown(np.zeros(2))
+    assert shown[0] == 0.0
+    assert np.isfinite(shown[1]) and shown[1] < 0.0
 
 
 def test_where_no_size_fits_those_that_fit_as_badly_are_in_the_standard_deviation(explainer) -> None:

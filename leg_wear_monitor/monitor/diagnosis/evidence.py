@@ -220,6 +220,8 @@ class Evidence:
             state.fit_due -= 1
             return
         state.fit_due = _FIT_EVERY - 1
+        if state.changes and state.changes[-1].cause is Cause.NOISE:  # it may come and go
+            cycles = cycles[-SETTLING_CYCLES:]
         # single causes: of a change, and of a leg that was never commissioned
         mean = np.mean([cycle.signature for cycle in cycles], axis=0)
         explanations: Sequence[Explanation] = ()

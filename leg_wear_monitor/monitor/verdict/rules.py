@@ -135,6 +135,7 @@ RULES = (
         f"if none has play, check the load at the foot and the torque sensor; {_ACKNOWLEDGE}",
         not_valid=EVERYTHING,
     ),
+    _cause("TORQUE_NOISE", "it has more or less noise than before", State.WATCH),
     _cause("TORQUE_BIAS", "it has a constant part that friction cannot be"),
     _cause("FRICTION_CHANGED", "the friction of the drive has changed", State.WATCH),
     Rule(

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 
 import attrs
 
-from leg_wear_monitor.estimate.cause import Cause, NamedCause, TorqueExplanation
+from leg_wear_monitor.estimate.cause import Cause, Change, NamedCause, TorqueExplanation
 from leg_wear_monitor.monitor.alarms import amount, guide_of
 from leg_wear_monitor.monitor.config.inputs import AT_START, Crank, DriveTorque
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
@@ -144,6 +144,7 @@ EVIDENCE = {
     Cause.TIMING: ("crank_angle_ahead", "rad"),
     Cause.CRANK_OFFSET: ("crank_angle_ahead", "rad"),
     Cause.LAG: ("torque_late", "s"),
+    Cause.NOISE: ("torque_noise", "N m"),
     Cause.BIAS: ("impossible_friction", "N m"),
     Cause.FRICTION: ("friction", "N m"),
     Cause.LOAD_FRICTION: ("load_friction", ""),
@@ -213,6 +214,9 @@ class CauseWords:
                 return f"the crank is {size} {'ahead of' if one.value > 0.0 else 'behind'} its measured angle"
             case Cause.LAG:
                 return f"the torque is {size} {'late' if one.value > 0.0 else 'early'}"
+            case Cause.NOISE:
+                then = f" instead of {amount(one.counted, 'N m')}" if isinstance(one, Change) else ""
+                return f"its samples scatter by {size}{then}"
             case Cause.BIAS if one.value < 0.0:
                 return f"a constant torque of {size} drives the crank; friction cannot drive"
             case Cause.BIAS:
@@ -242,6 +246,10 @@ class CauseWords:
                 return self._shift(one.value)
             case Cause.LAG:
                 return _DELAY
+            case Cause.NOISE:
+                return (
+                    "check the cable, the shield and the filter of the torque sensor, and the drive's control"
+                )
             case Cause.BIAS:
                 more = ", and the friction of the drive" if one.value > 0.0 else ""
                 return f"{_ZERO}, drive_torque.sign, scale and gear_ratio{more}"

@@ -521,6 +521,20 @@ def about(reference, joint: int, factor: float):
     return attrs.evolve(reference, clearance_m=clearance_m, torque_nm=torque_nm)
 
 
+def corrected_beside(observer, reference, wider, opened: int, cycles=40):
+    """Joint A opens, and another one as in a leg of a reference about it; up to the correction of A.
+
+    The block of samples, the gait cycle of the correction, and the counted clearances since then.
+    """
+    walked = attrs.evolve(reference, torque_nm=(*reference.torque_nm, wider.torque_nm[opened]))
+    block = samples(walked, [0] * COMMISSIONING_CYCLES + [len(reference.torque_nm)] * cycles)
+    end = COMMISSIONING_CYCLES + 20
+    at, correction = walk(observer, block, begin=COMMISSIONING_CYCLES, end=end)[0]
+    assert correction.joint == 0
+    assert np.isnan(np.array(observer.diagnosis.clearance_m)[1:]).all()  # a change hides others
+    return block, at, correct(observer, correction)
+
+
 @pytest.mark.parametrize(
     ("opened", "wholly"), [(leg_number(2, 1.5), 3.0), (0, 3.0), (0, 0.0)], ids=["both", "one", "unlike"]
 )
@@ -530,14 +544,7 @@ def test_whether_another_joint_opened_with_the_corrected_one_is_seen_by_a_refere
     """Seen before: it was in the baseline after the correction, 0.30 ± 0.01 mm for good."""
     monkeypatch.setattr(evidence, "_WHOLLY", wholly)
     observer, wider = commissioned(), about(reference, 0, 1.5)
-    walked = attrs.evolve(reference, torque_nm=(*reference.torque_nm, wider.torque_nm[opened]))
-    block = samples(walked, [0] * COMMISSIONING_CYCLES + [len(reference.torque_nm)] * 40)
-    ((cycle, correction),) = walk(observer, block, begin=COMMISSIONING_CYCLES, end=COMMISSIONING_CYCLES + 20)[
-        :1
-    ]
-    assert correction.joint == 0
-    assert np.isnan(np.array(observer.diagnosis.clearance_m)[1:]).all()  # a change hides others
-    counted = correct(observer, correction)
+    block, cycle, counted = corrected_beside(observer, reference, wider, opened)
     observer.state.reference = wider
     found = walk(observer, block, counted, cycle + 1, cycle + 12)
     shown, known = observer.diagnosis, observer.state.commissioned
@@ -563,10 +570,7 @@ def test_an_opening_beside_a_correction_that_a_measurement_contradicts_is_told_u
     """Seen before: nobody told it, and all others stayed unknown for good."""
     monkeypatch.setattr(evidence, "_WHOLLY", 3.0)
     observer, wider = commissioned(), about(reference, 0, 1.5)
-    walked = attrs.evolve(reference, torque_nm=(*reference.torque_nm, wider.torque_nm[leg_number(2, 1.5)]))
-    block = samples(walked, [0] * COMMISSIONING_CYCLES + [len(reference.torque_nm)] * 55)
-    ((at, correction),) = walk(observer, block, begin=COMMISSIONING_CYCLES, end=COMMISSIONING_CYCLES + 20)[:1]
-    counted = correct(observer, correction)
+    block, at, counted = corrected_beside(observer, reference, wider, leg_number(2, 1.5), 55)
     observer.state.reference = wider
 
     def next_one(begin: int) -> tuple[int, Correction]:
@@ -598,12 +602,7 @@ def test_a_joint_that_may_be_as_wide_as_is_corrected_stays_unknown_and_is_asked_
     """Seen before: J at 0.60 mm beside B, or I: not surely, and the status said nothing."""
     monkeypatch.setattr(evidence, "_WHOLLY", 3.0)
     observer, wider = commissioned(), about(reference, 0, 1.5)
-    walked = attrs.evolve(reference, torque_nm=(*reference.torque_nm, wider.torque_nm[leg_number(2, 1.5)]))
-    block = samples(walked, [0] * COMMISSIONING_CYCLES + [len(reference.torque_nm)] * 40)
-    ((cycle, correction),) = walk(observer, block, begin=COMMISSIONING_CYCLES, end=COMMISSIONING_CYCLES + 20)[
-        :1
-    ]
-    counted = correct(observer, correction)
+    block, cycle, counted = corrected_beside(observer, reference, wider, leg_number(2, 1.5))
     observer.state.reference = wider
     monkeypatch.setattr(evidence, "change_of", lambda *_: None)
     assert walk(observer, block, counted, cycle + 1, cycle + 12) == []
@@ -620,12 +619,7 @@ def test_a_joint_that_opened_with_the_corrected_one_is_found_after_a_restart(
     """Seen before: the baseline before the correction was lost, and nothing could tell any more."""
     monkeypatch.setattr(evidence, "_WHOLLY", 3.0)
     observer, wider = commissioned(), about(reference, 0, 1.5)
-    walked = attrs.evolve(reference, torque_nm=(*reference.torque_nm, wider.torque_nm[leg_number(2, 1.5)]))
-    block = samples(walked, [0] * COMMISSIONING_CYCLES + [len(reference.torque_nm)] * 40)
-    ((cycle, correction),) = walk(observer, block, begin=COMMISSIONING_CYCLES, end=COMMISSIONING_CYCLES + 20)[
-        :1
-    ]
-    counted = correct(observer, correction)
+    block, cycle, counted = corrected_beside(observer, reference, wider, leg_number(2, 1.5))
     known = observer.state.all_commissioned
     again = TorqueObserver(leg, MonitorConfig(), SIZE_NM, counted, commissioned=known, references=[wider])
     (_, second), *_ = walk(again, block, counted, cycle + 1, cycle + 20)
@@ -652,6 +646,28 @@ def test_a_lag_that_begins_after_commissioning_is_no_clearance(commissioned, ref
     assert change.cause in (Cause.LAG, Cause.TIMING)
     if change.cause is Cause.LAG:
         assert change.value == pytest.approx(0.01, abs=0.0026)
+
+
+@pytest.mark.parametrize("joint", [None, 0, 2])
+def test_noise_that_begins_after_commissioning_is_no_clearance_and_hides_none(
+    commissioned, reference, joint: int | None
+) -> None:
+    """Seen before: ten times the noise was *A, 1.04 mm*, and with a fourth of that A at 0.45 was 0.66 mm."""
+    observer, cycles = commissioned(), COMMISSIONING_CYCLES + 20
+    noise = 2.0 * np.sqrt(POINTS / RATE) * np.random.default_rng(5).standard_normal((cycles, POINTS))
+    noise[:COMMISSIONING_CYCLES] = 0.0
+    number = 0 if joint is None else leg_number(joint, 1.5)
+    corrections = walk_on(observer, reference, [number] * 20, added=noise)
+    if joint is None:
+        assert corrections == []
+        (change,) = observer.diagnosis.changes
+        assert change.cause is Cause.NOISE
+        assert change.value == pytest.approx(2.0, abs=3.0 * change.sigma)
+        assert change.counted == pytest.approx(0.3, rel=0.2)
+    else:
+        _, correction = corrections[0]
+        assert correction.joint == joint
+        assert abs(correction.clearance_m - 4.5e-4) < 2.0 * correction.change.sigma
 
 
 STEPS_NOT_USED = (

@@ -138,6 +138,7 @@ CASES = [
     (shown(Cause.SCALE), State.INSPECT, "TORQUE_SCALE", ()),
     (shown(Cause.LAG), State.INSPECT, "TORQUE_TIMING", ()),
     (shown(Cause.TIMING), State.INSPECT, "TORQUE_TIMING", ()),
+    (shown(Cause.NOISE), State.WATCH, "TORQUE_NOISE", ()),
     (shown(Cause.LOAD), State.WATCH, "TORQUE_LOAD", (Figure.GROWTH, Figure.IMPACT_FORCES, Figure.FORECAST)),
     (shown(Cause.FRICTION), State.WATCH, "FRICTION_CHANGED", ()),
     ({"diagnosis": Diagnosis(state=DiagnosisState.AS_COUNTED)}, State.WATCH, "NOT_OBSERVED", ()),

@@ -318,7 +318,8 @@ class Evidence:
         the change is far above the threshold, or as many cycles have passed as settle it, one fit is enough:
         its bound counts as all of them.
         """
-        if state.fit is None:
+        if state.fit is None or not self._models.fits(state):  # the change may be of another joint
+            state.least_m = ()
             return
         number = config.alarms.on_delay_cycles
         least_m = state.fit.clearance_m - SURE_SIGMAS * state.fit.sigma_m

@@ -291,6 +291,18 @@ def test_a_joint_is_surely_at_its_limit_after_three_estimates_or_beyond_doubt(
     assert sure[0] == shown[0] + later
 
 
+def test_where_names_are_not_sure_nothing_is_surely_at_its_limit(
+    commissioned, reference, monkeypatch
+) -> None:
+    """Behind a belt of 200 N m/rad (misfit 13) the leg was to be stopped for B where G had opened."""
+    observer = commissioned()
+    monkeypatch.setattr(references, "NAMED_TO", 0.0)
+    assert walk_on(observer, reference, [leg_number(2, 5.0)] * 9) == []
+    found = observer.diagnosis
+    assert [one.subject for one in found.changes] == ["G"]
+    assert max(found.least_m) == -np.inf
+
+
 @pytest.mark.parametrize(
     ("all_at_once_m", "odds", "has_baseline", "is_corrected"),
     [(8.1e-4, 11.0, True, True), (4.7e-4, 99.0, True, False), (8.1e-4, 19.0, False, False),

@@ -31,7 +31,13 @@ from leg_wear_monitor.commissioning.result import CommissioningResult
 from leg_wear_monitor.commissioning.search import Choice, candidates, choose
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.estimate.cause import Cause, NamedCause
-from leg_wear_monitor.estimate.joint_motion import JointMotion, Series, motion_of, why_not_a_crank
+from leg_wear_monitor.estimate.joint_motion import (
+    JointMotion,
+    Series,
+    motion_of,
+    why_not_a_crank,
+    with_repeating_acceleration,
+)
 from leg_wear_monitor.estimate.torque_fit import Terms, fit, repeating
 from leg_wear_monitor.estimate.torque_model import TorqueModel, torque_model, with_clearances
 from leg_wear_monitor.mechanism.loader import load_mechanism
@@ -55,6 +61,7 @@ _ROUGH_SCALE = 0.05
 _ROUGH_REST = 0.15  # a repeating rest that may shift the scale by more than twice what clearances do
 _DECLARED_ERROR = 0.3  # by which a drive differs from another one of its kind, and when it is warm
 _AT_ZERO_RAD = 0.02
+_AS_WELL = 1.02  # of the mismatch of another fit
 
 
 def not_told(found: proposal.Found) -> tuple[str, ...]:
@@ -387,7 +394,10 @@ def _final(
     low_pass_s, low_pass_sigma_s = low_pass_time(low_pass, declared)
     terms = Terms(bias=one.pair.walks_both_ways, load_friction=True, lag=separates_lag(one.pair))
     start = attrs.evolve(one.refined, lag_s=low_pass_s, low_pass_s=low_pass_s)
-    again = fit(one.pair, model, start, terms, with_errors=True)
+    # an acceleration that repeats has less noise, but lacks that of a ramp
+    pairs = one.pair, with_repeating_acceleration(one.pair, one.ratio)
+    own, repeating = (fit(pair, model, start, terms, with_errors=True) for pair in pairs)
+    again = repeating if repeating.mismatch <= _AS_WELL * own.mismatch else own
     again, load = with_load(again, model, terms)
     sampling = sampling_of(again, model)
     used = sampling.value or base.drive_torque.sampling

@@ -176,6 +176,7 @@ def _smoothed(
 
 
 _MOVING = 0.2  # of the usual speed, below which the leg stands or starts
+_WAVES = 8  # a turn, of the ripple that repeats
 _SLOW_S = 1.0  # averaging time for a speed without its ripple
 _STEADY = 0.08  # relative width of a speed that counts as one
 
@@ -247,9 +248,29 @@ def paired(motion: JointMotion, torque: Series) -> Pair:
     return pair.part(speed > _MOVING * np.median(speed)) if len(speed) else pair
 
 
-def slow_speed(pair: Pair) -> Floats:
-    """Speed of the joint without the ripple of a turn (n,) [rad/s]."""
-    number = max(1, min(len(pair.time_s) // 4, round(_SLOW_S / max(pair.interval_s, 1.0e-6))))
+def with_repeating_acceleration(pair: Pair, ratio: float) -> Pair:
+    """The pair with the acceleration that repeats in each turn of the crank, by its speed.
+
+    Over many turns an encoder's noise averages out; that of a single one may be as large as the acceleration.
+
+    Parameters
+    ----------
+    pair : Pair
+    ratio : float
+        Turns of the crank per turn of the joint.
+    """
+    speed = slow_speed(pair, TURN / abs(ratio * float(np.median(pair.speed_radps))))
+    order = np.arange(1, _WAVES + 1)
+    angle = np.outer(ratio * pair.position_rad, order)
+    waves = np.concatenate([np.cos(angle), np.sin(angle)], axis=1)
+    size = np.linalg.lstsq(waves, pair.speed_radps / speed - 1.0, rcond=None)[0]
+    slopes = np.concatenate([-order * np.sin(angle), order * np.cos(angle)], axis=1) @ size
+    return attrs.evolve(pair, acceleration_radps2=ratio * speed**2 * slopes)
+
+
+def slow_speed(pair: Pair, span_s: float = _SLOW_S) -> Floats:
+    """Speed of the joint without the ripple of a turn (n,) [rad/s]: its mean over some time."""
+    number = max(1, min(len(pair.time_s) // 4, round(span_s / max(pair.interval_s, 1.0e-6))))
     total = np.concatenate([[0.0], np.cumsum(pair.speed_radps)])
     after = np.minimum(np.arange(len(pair.time_s)) + number // 2 + 1, len(pair.time_s))
     before = np.maximum(np.arange(len(pair.time_s)) - number // 2, 0)

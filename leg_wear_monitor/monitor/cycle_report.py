@@ -218,7 +218,8 @@ def _note_torque(parts: Parts, torque: TorqueObserver, before: TorqueState) -> N
     To simulate a reference again takes a minute of walking.
     """
     known, stamp_ns = before.all_commissioned, parts.twin.intake.followed_stamp_ns
-    for one in torque.state.all_commissioned:
+    found = torque.state.all_commissioned if not torque.state.is_load_new else ()
+    for one in found:
         if all(one is not other for other in known):
             parts.accounting.note(one)
     names, made = tuple(parts.mechanism.bodies), [one.reference for one in before.known]

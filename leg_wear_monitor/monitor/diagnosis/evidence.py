@@ -212,6 +212,8 @@ class Evidence:
 
     def _explain(self, state: TorqueState, config: MonitorConfig) -> None:
         """Renew the clearances, and the change if there is one."""
+        if state.is_load_other and state.not_by_load:
+            return  # stays as told
         # the gait cycles since the change, if there is one: often at first, then now and then
         since_ns = self._since_ns(state, config)
         cycles = [cycle for cycle in state.cycles if cycle.begin_ns >= since_ns]
@@ -228,7 +230,8 @@ class Evidence:
         if since_ns or state.commissioned is None:
             explanations = self._models.explainer(state).explanations(mean, len(cycles), state.counted_m)
         # a leg that is not that of the reference has no names and no clearances
-        if not (state.commissioned or state.changes or self._fits(state, explanations, since_ns)):
+        is_known = state.commissioned or state.changes or state.is_load_other
+        if not (is_known or self._fits(state, explanations, since_ns)):
             self._tell(state, None, since_ns, len(cycles), config)
             state.fit, state.least_m = None, ()
             return
@@ -237,6 +240,8 @@ class Evidence:
         # all clearances at once
         self._fit(state, mean, len(cycles), change, explanations if since_ns else ())
         self._keep_least(state, change, config)
+        if change is None and state.is_load_new and not (state.is_load_other or state.commissioned):
+            _tell_wide(state, self._models.explainer(state).joints, since_ns or cycles[0].begin_ns)
 
     def _since_ns(self, state: TorqueState, config: MonitorConfig) -> int:
         """Stamp since when the leg has changed, as told before or as detected now; 0 where it has not."""
@@ -279,9 +284,14 @@ class Evidence:
 
         Before a leg is commissioned, only a clearance that is sure, and as wide as is corrected, counts: all
         else is constant, and becomes part of the baseline. A change of a clearance gets its most probable
-        begin; another one keeps that of its detection.
+        begin; another one keeps that of its detection. Under another load than in the reference, nothing is
+        sure: an unknown change is that of the load, and so is any before a baseline.
         """
         change = change_of(explanations, since_ns)
+        if change and state.is_load_other:
+            if change.cause is Cause.UNKNOWN:
+                return None
+            change = attrs.evolve(change, runner_up=Cause.LOAD.value, runner_up_log_odds=0.0)
         if state.commissioned is None and not (change and change.is_sure and change.is_wide):
             return None
         if change is None or change.cause is not Cause.CLEARANCE:
@@ -332,6 +342,30 @@ class Evidence:
             elif state.commissioned is None:  # nor do all at once show whose it is
                 least_m[k] = -math.inf
         state.least_m = (least_m,) * number if is_enough else (*state.least_m, least_m)[-number:]
+
+
+def _tell_wide(state: TorqueState, joints: Sequence[str], since_ns: int) -> None:
+    """Tell a joint that is wider by all clearances at once, before the baseline under a new load hides it.
+
+    With doubt, as the load was found with what the joint changes of the torque.
+    """
+    if state.fit is None:
+        return
+    beyond = (state.fit.clearance_m - state.counted_m) / state.fit.sigma_m
+    k = int(np.argmax(beyond))
+    change = Change(
+        cause=Cause.CLEARANCE,
+        subject=joints[k],
+        since_ns=since_ns,
+        value=float(state.fit.clearance_m[k]),
+        sigma=float(state.fit.sigma_m[k]),
+        counted=float(state.counted_m[k]),
+        log_odds=0.5 * float(beyond[k]) ** 2,
+        runner_up=Cause.LOAD.value,
+        runner_up_log_odds=0.0,
+    )
+    if beyond[k] >= SURE_SIGMAS and change.is_wide:
+        state.changes = (change,)
 
 
 def _since(change: Change, told_ns: int, state: TorqueState) -> Change:

@@ -195,7 +195,8 @@ class TorqueObserver(KeepsSamples):
         self._follow_counted(counted_m)
         self._follow_load()
         ended = self.evaluate_due(self._evaluate)
-        if self._references.advance(state, counted_m, depth):
+        is_renewed = self._references.advance(state, counted_m, depth)
+        if self._found_load() or is_renewed:
             self._evidence.review(state, self.config)
         if not ended or not self.config.diagnosis.correct or self._references.is_to_identify(state):
             return None
@@ -248,7 +249,7 @@ class TorqueObserver(KeepsSamples):
     def parameters(self) -> LegParameters | None:
         """Identified masses, lengths and friction that explain the drive torque; None without any."""
         own, reference = self.state.parameters, self.state.reference
-        if own is None or reference is None or reference.parameters != own:
+        if own is None or reference is None or reference.parameters != own or self.state.is_load_new:
             return None
         is_near = self.models.fits if own.load.size else self.models.is_of_file
         return own if is_near(self.state) else None
@@ -302,6 +303,7 @@ class TorqueObserver(KeepsSamples):
         """What the drive torque shows now."""
         state, known = self.state, self.state.commissioned
         is_old = not state.cycles or (len(state.unused) == UNUSED_CYCLES and not state.changes)
+        is_old = (is_old or state.detector is None) and not (state.is_load_new and state.not_corrected)
         found = Diagnosis(
             next_step=next_step(state, self._references, self.config),
             changes=state.settled,
@@ -311,7 +313,7 @@ class TorqueObserver(KeepsSamples):
             temperature_c=state.temperature_c,
             commissioned_c=known.temperature_c if known else None,
         )
-        if state.fit is None or state.detector is None or is_old:
+        if state.fit is None or is_old:
             reason = _joined(missing(state, self._references, self.config), other_sensor(state))
             return attrs.evolve(found, state=DiagnosisState.WAITING, reason=reason)
         clearance_m, sigma_m = self._observed(state.fit)
@@ -416,6 +418,10 @@ class TorqueObserver(KeepsSamples):
             sigma_m = np.where(corrected.is_unknown, state.counted_m, corrected.sigma_m)
             known = attrs.evolve(known, sigma_m=sigma_m, channel=corrected.channel)
         state.commissioned = known.measured_by(state.sensor)
+        if state.is_load_new and state.load_rounds >= LOAD_ROUNDS:  # the new load explains what was told
+            state.is_load_new, state.settled = False, state.corrections
+        elif state.is_load_new:
+            state.load_rounds, state.renewed_n = 0, float(np.mean(state.carried_n))
         self._evidence.review(state, self.config)
 
     def _restart(self, counted_m: Floats) -> None:
@@ -429,21 +435,43 @@ class TorqueObserver(KeepsSamples):
     def _follow_load(self) -> None:
         """Commission the leg anew where it carries another load than that of its reference.
 
-        Once for each load: what the twin finds, or a sensor, may differ from the force of the reference.
+        Once for each load: what the twin finds, or a sensor, may differ from the force of the reference. A
+        joint that was named before stays told until the leg is compared with a reference of the new load.
         """
         state = self.state
-        known = (
-            state.reference.parameters.load if state.reference and self._is_on_ground else np.zeros((0, 2))
-        )
-        if not known.size or state.load_rounds < LOAD_ROUNDS or len(state.carried_n) < UNLIKE_CYCLES:
+        is_found = state.commissioned is None and state.load_rounds >= LOAD_ROUNDS
+        state.is_load_other = state.is_load_new and not is_found
+        is_due = self._is_on_ground and len(state.carried_n) >= FIRST_CYCLES and not state.is_load_other
+        if state.reference is None or not (is_due and state.is_loaded):
             return
-        peak_n, now_n = float((known @ self._up).max()), float(np.mean(state.carried_n))
-        has_moved = abs(now_n - peak_n) > _MOVED * max(peak_n, _LEAST_LOAD_N)
-        if not has_moved or abs(now_n - state.renewed_n) <= _MOVED * max(now_n, _LEAST_LOAD_N):
+        peak_n = float((state.reference.parameters.load @ self._up).max())
+        state.is_load_other = self._has_moved(peak_n, FIRST_CYCLES)
+        is_long = len(state.carried_n) == UNLIKE_CYCLES and state.load_rounds >= LOAD_ROUNDS
+        if not (is_long and self._has_moved(peak_n, UNLIKE_CYCLES)):
             return
-        state.renewed_n, state.load, state.load_rounds = now_n, None, 0
+        state.settled += state.not_by_load
+        state.is_load_new, state.is_load_other, state.load, state.load_rounds = True, True, None, 0
         state.forget_baselines()
         self._restart(state.counted_m)
+
+    def _has_moved(self, peak_n: float, cycles: int) -> bool:
+        """Whether the foot carried another load in the last gait cycles than in the reference."""
+        now_n = float(np.mean(self.state.carried_n[-cycles:]))
+        is_renewed = abs(now_n - self.state.renewed_n) <= _MOVED * max(now_n, _LEAST_LOAD_N)
+        return abs(now_n - peak_n) > _MOVED * max(peak_n, _LEAST_LOAD_N) and not is_renewed
+
+    def _found_load(self) -> bool:
+        """Forget the baseline by which a new load was found, once the reference under it is in force.
+
+        What opened meanwhile is in it: the leg is compared with the reference alone before another one.
+        """
+        state = self.state
+        is_done = state.load_rounds > 0 and not self._references.is_busy
+        if not (state.is_load_new and is_done and state.commissioned):
+            return False
+        state.load_rounds, state.is_load_other, state.settled = LOAD_ROUNDS, False, state.corrections
+        state.forget_baselines()
+        return True
 
     def _follow_counted(self, counted_m: Floats) -> None:
         """Compare with the counted clearances as they grow."""

@@ -65,6 +65,14 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
         return _IRREGULAR
     if not state.is_compared:
         return f"changes at this cadence are not observed yet; at {_cadences(state.set_aside)} they are"
+    if state.is_load_other:
+        return (
+            "the foot carries another load than in the reference: no clearance is observable, and names of "
+            "joints are not sure, until there is a reference under this load"
+        )
+    if state.is_load_new and state.changes:
+        names = ", ".join(one.subject for one in state.changes)
+        return f"the load at the foot has changed, and {names} may have opened meanwhile: measure it"
     if models.is_sure(state):
         if state.fit is None or state.commissioned is None or state.changes:
             return ""

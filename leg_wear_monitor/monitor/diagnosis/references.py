@@ -170,7 +170,7 @@ class LegModels:
 
     def fits(self, state: TorqueState) -> bool:
         """Whether the reference explains the commissioned leg well enough to name a joint."""
-        return self.misfit(state) < NAMED_TO
+        return not state.is_load_other and self.misfit(state) < NAMED_TO
 
     def is_of_file(self, state: TorqueState) -> bool:
         """Whether the commissioned leg is that of the mechanism file, or of the identified parameters."""
@@ -180,7 +180,8 @@ class LegModels:
     def is_sure(self, state: TorqueState) -> bool:
         """Whether a clearance may be corrected: the leg is known, and its drive passes enough."""
         is_near = self.misfit(state) < CORRECTED_TO or (state.is_loaded and state.rounds >= ROUNDS)
-        return self.is_of_file(state) and is_near and not state.is_narrow
+        is_of_load = not (state.is_load_new or state.is_load_other)
+        return is_of_load and self.is_of_file(state) and is_near and not state.is_narrow
 
     def _of(self, state: TorqueState) -> _ModelsOfState:
         """Models of a state: kept ones if its reference, sensor and baseline are the same, or new ones."""

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate.cause import Change
+from leg_wear_monitor.estimate.cause import Cause, Change
 from leg_wear_monitor.estimate.change_detector import DetectorState
 from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
 from leg_wear_monitor.estimate.drive import DIRECT, Channel
@@ -362,6 +362,11 @@ class TorqueState:
         Size of the load in the last gait cycles, by the twin.
     renewed_n : float
         That under which the leg was commissioned anew; NaN before.
+    is_load_new : bool
+        Whether the load has changed, and the leg is to be commissioned under a reference of the new one; a
+        baseline before that only serves to find the load, and may contain joints that opened meanwhile.
+    is_load_other : bool
+        Whether the foot carries another load than in the reference: no clearance is known, and no name sure.
     is_identifying : bool
         Whether the run simulates legs with other parameters.
     has_failed : bool
@@ -397,6 +402,8 @@ class TorqueState:
     load: GroundLoad | None = None
     carried_n: tuple[float, ...] = ()
     renewed_n: float = math.nan
+    is_load_new: bool = False
+    is_load_other: bool = False
     is_identifying: bool = False
     has_failed: bool = False
 
@@ -458,6 +465,12 @@ class TorqueState:
     def not_corrected(self) -> tuple[Change, ...]:
         """Changes by which they were not."""
         return tuple(change for change in self.settled + self.changes if not change.is_corrected)
+
+    @property
+    def not_by_load(self) -> tuple[Change, ...]:
+        """Unsettled changes of clearances that a load at the foot explains less well: none ends with it."""
+        found = (change for change in self.changes if change.cause is Cause.CLEARANCE)
+        return tuple(change for change in found if change.is_sure or change.runner_up != Cause.LOAD.value)
 
     @property
     def corrected(self) -> CommissionedTorque | None:
@@ -539,7 +552,7 @@ class TorqueState:
     def surely_m(self, number: int) -> tuple[float, ...]:
         """Clearances that joints surely have by so many last fits; minus infinity where there are fewer."""
         least_m = self.least_m[-number:]
-        if len(least_m) < number:
+        if len(least_m) < number or self.is_load_other:
             return (-math.inf,) * len(self.counted_m)
         return tuple(np.min(least_m, axis=0).tolist())
 

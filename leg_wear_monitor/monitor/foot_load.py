@@ -56,6 +56,7 @@ class FootLoadState:
     cycles: tuple[_Cycle, ...] = ()
     acts: float = 0.0  # `_Cycle.acted` of the present gait cycle
     largest_n: float = 0.0  # largest force received since the last gait cycle, unusable values included
+    is_missing: bool = False  # whether the last gait cycle had no sample
 
 
 class FootLoadCheck:
@@ -109,7 +110,7 @@ class FootLoadCheck:
         state, load = self.state, statistics.load
         # scaled so that a force at the end of its valid range has the limit of the alarm
         beyond = FOOT_LOAD_LIMITS[SCALE] * state.largest_n / KINDS[LOAD].largest
-        state.largest_n = 0.0
+        state.largest_n, state.is_missing = 0.0, load is None
         if load is None:
             return {SCALE: beyond} if beyond > FOOT_LOAD_LIMITS[SCALE] else {}
         force = _means_by_phase(load.number, load.force_n)
@@ -122,13 +123,13 @@ class FootLoadCheck:
         return values | ({SCALE: beyond} if beyond > FOOT_LOAD_LIMITS[SCALE] else {})
 
     def freezes(self, values: Mapping[str, float]) -> tuple[bool, bool]:
-        """Whether values of a gait cycle show a wrong load, and whether it has always been wrong.
+        """Whether the last gait cycle shows a wrong load or none, and whether it has always been wrong.
 
-        A sensor that got stuck or lost its zero was right before; any other fault holds for earlier cycles,
-        too.
+        A sensor that got stuck, lost its zero or went silent was right before; any other fault holds for
+        earlier cycles, too.
         """
         wrong = {kind for kind, limit in FOOT_LOAD_LIMITS.items() if values.get(kind, 0.0) >= limit}
-        is_frozen, clears = bool(wrong - {GAPS}), bool(wrong - {GAPS, STUCK, ZERO})
+        is_frozen, clears = self.state.is_missing or bool(wrong - {GAPS}), bool(wrong - {GAPS, STUCK, ZERO})
         self.state.acts = 0.0 if clears else self._load_acts
         return is_frozen, clears
 

@@ -156,6 +156,20 @@ def test_missing_samples_are_named_and_the_crank_is_monitored(walk, begin_s, end
     assert monitor.lost.unmonitored_s < 1.0
 
 
+def test_a_silent_sensor_leaves_the_mean_of_the_steps_before_and_not_the_last_one(walk):
+    """Each step has another size; the last one before the silence acted in all gait cycles after it."""
+    monitor, new = as_new("measured", "wrench")
+    last_n = []
+    for size in (1.0, 2.0):  # of the last step
+        monitor.restore(new)
+        larger = changed(lambda t, force, size=size: np.where((t > 7.0)[:, None], size, 1.0) * force, walk)
+        is_sent = (larger["kind"] != LOAD) | (larger["stamp_ns"] < START + 8 * S)
+        cycles = monitor.update(larger[is_sent]).cycles
+        last_n.append(cycles[-1].joints[2].mean_force_n)
+    # a seventh of the mean is that of the last step
+    assert last_n[1] == pytest.approx(last_n[0], rel=0.3)
+
+
 def test_a_contact_switch_gives_heel_strike_and_toe_off(walk):
     monitor = monitored(
         changed(lambda t, force: np.stack([0.0 * t, force[:, 1] > 60.0], axis=1), walk),

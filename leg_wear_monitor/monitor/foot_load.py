@@ -25,6 +25,7 @@ from leg_wear_monitor.twin.statistics import CycleStatistics, LoadProfile, Torqu
 _CYCLES = 10  # gait cycles over which the load is averaged
 _LEAST_CYCLES = 3  # gait cycles from which on the sensor is checked
 _NOISE_SIGMAS = 3.0  # a force that changes by less within a gait cycle, in units of its noise, is none
+_OF_MEDIAN = 1.48  # standard deviation over the median deviation, of normal noise
 # Fraction of the peak above which the foot stands. The template has the same fraction some time after heel
 # strike and before toe-off; the difference is known, and subtracted (`_phase_bias`).
 _STANCE_FRACTION = 0.25
@@ -56,6 +57,8 @@ class FootLoadState:
     cycles: tuple[_Cycle, ...] = ()
     acts: float = 0.0  # `_Cycle.acted` of the present gait cycle
     largest_n: float = 0.0  # largest force received since the last gait cycle, unusable values included
+    is_missing: bool = False  # whether the last gait cycle had no sample
+    is_noise: bool = False  # whether the load of the last gait cycles is not above the sensor's noise
 
 
 class FootLoadCheck:
@@ -109,26 +112,29 @@ class FootLoadCheck:
         state, load = self.state, statistics.load
         # scaled so that a force at the end of its valid range has the limit of the alarm
         beyond = FOOT_LOAD_LIMITS[SCALE] * state.largest_n / KINDS[LOAD].largest
-        state.largest_n = 0.0
+        state.largest_n, state.is_missing = 0.0, load is None
         if load is None:
             return {SCALE: beyond} if beyond > FOOT_LOAD_LIMITS[SCALE] else {}
         force = _means_by_phase(load.number, load.force_n)
         cycle = _Cycle(load, force, _unexplained(statistics.torque_profile), state.acts)
         state.cycles = (*state.cycles, cycle)[-_CYCLES:]
         stuck = _stuck_fraction(load)
+        state.is_noise = stuck < FOOT_LOAD_LIMITS[STUCK] and self._is_noise()
+        stuck = 1.0 if state.is_noise else stuck
         values = {GAPS: load.gap_s / statistics.duration_s, STUCK: stuck}
         if stuck < FOOT_LOAD_LIMITS[STUCK]:
             values |= self._comparisons()
         return values | ({SCALE: beyond} if beyond > FOOT_LOAD_LIMITS[SCALE] else {})
 
     def freezes(self, values: Mapping[str, float]) -> tuple[bool, bool]:
-        """Whether values of a gait cycle show a wrong load, and whether it has always been wrong.
+        """Whether the last gait cycle shows a wrong load or none, and whether it has always been wrong.
 
-        A sensor that got stuck or lost its zero was right before; any other fault holds for earlier cycles,
-        too.
+        A sensor that got stuck, lost its zero or went silent was right before; any other fault, and noise
+        without a load, holds for earlier cycles, too.
         """
         wrong = {kind for kind, limit in FOOT_LOAD_LIMITS.items() if values.get(kind, 0.0) >= limit}
-        is_frozen, clears = bool(wrong - {GAPS}), bool(wrong - {GAPS, STUCK, ZERO})
+        is_frozen = self.state.is_missing or bool(wrong - {GAPS})
+        clears = self.state.is_noise or bool(wrong - {GAPS, STUCK, ZERO})
         self.state.acts = 0.0 if clears else self._load_acts
         return is_frozen, clears
 
@@ -203,6 +209,18 @@ class FootLoadCheck:
         cycles = np.array([self._stance.up @ each.force_n for each in self.state.cycles])
         noise = float(cycles.std(axis=0, ddof=1).mean()) / math.sqrt(len(cycles))
         return float(up.std()) > _NOISE_SIGMAS * noise
+
+    def _is_noise(self) -> bool:
+        """Whether the mean vertical force changes within a gait cycle by less than by the noise in swing.
+
+        Unlike in `_is_above_noise`, steps that differ or are missed are a load, and one cycle in which the
+        sensor failed does not count: most phases are in swing, and most cycles are sound.
+        """
+        cycles = np.array([self._stance.up @ each.force_n for each in self.state.cycles])
+        if len(cycles) < _LEAST_CYCLES:
+            return False
+        noise = _OF_MEDIAN * float(np.median(np.abs(cycles - np.median(cycles, axis=0))))
+        return float(cycles.mean(axis=0).std()) < _NOISE_SIGMAS * noise / math.sqrt(len(cycles))
 
     def _scale_factor(self, force: Floats) -> float:
         """Factor between the load and what the drive torque shows of it, at least 1; NaN if not shown."""

@@ -156,6 +156,37 @@ def test_missing_samples_are_named_and_the_crank_is_monitored(walk, begin_s, end
     assert monitor.lost.unmonitored_s < 1.0
 
 
+def test_noise_without_a_load_does_not_wear_and_is_told(walk):
+    """The knee bears 73 N in the air; under this noise alone it was pressed as by a load."""
+    monitor, new = as_new("measured", "wrench")
+    monitor.restore(new)
+    noise = np.random.default_rng(1)
+    cycles = monitor.update(changed(lambda t, force: 60.0 * noise.standard_normal(force.shape), walk)).cycles
+    assert of_foot_load(monitor) == {"foot_load_stuck"}
+    assert np.mean([one.joints[2].mean_force_n for one in cycles[-3:]]) == pytest.approx(73.0, rel=0.1)
+    # a load that begins on the ground is one from the fourth step on
+    monitor.restore(new)
+    later = changed(
+        lambda t, force: np.where((t > 5.0)[:, None], force, 15.0 * noise.standard_normal(force.shape)), walk
+    )
+    cycles = monitor.update(later).cycles
+    assert np.mean([one.joints[2].mean_force_n for one in cycles[-2:]]) == pytest.approx(229.0, rel=0.2)
+
+
+def test_a_silent_sensor_leaves_the_mean_of_the_steps_before_and_not_the_last_one(walk):
+    """Each step has another size; the last one before the silence acted in all gait cycles after it."""
+    monitor, new = as_new("measured", "wrench")
+    last_n = []
+    for size in (1.0, 2.0):  # of the last step
+        monitor.restore(new)
+        larger = changed(lambda t, force, size=size: np.where((t > 7.0)[:, None], size, 1.0) * force, walk)
+        is_sent = (larger["kind"] != LOAD) | (larger["stamp_ns"] < START + 8 * S)
+        cycles = monitor.update(larger[is_sent]).cycles
+        last_n.append(cycles[-1].joints[2].mean_force_n)
+    # a seventh of the mean is that of the last step
+    assert last_n[1] == pytest.approx(last_n[0], rel=0.3)
+
+
 def test_a_contact_switch_gives_heel_strike_and_toe_off(walk):
     monitor = monitored(
         changed(lambda t, force: np.stack([0.0 * t, force[:, 1] > 60.0], axis=1), walk),

@@ -526,7 +526,7 @@ def test_a_joint_that_was_named_stays_told_while_the_load_at_the_foot_has_change
     assert told.subject == "G"
     unsure = attrs.evolve(told, runner_up="clearance B", runner_up_log_odds=5.0)
     observer.state.changes = (told if is_sure else unsure,)
-    for cycle in range(first + 6, first + 36):
+    for cycle in range(first + 6, first + 30):
         assert walk(observer, block, begin=cycle, end=cycle + 1, load_n=600.0) == []
         now = observer.diagnosis
         assert now.state is DiagnosisState.CHANGED

@@ -58,6 +58,8 @@ class FootLoadState:
     acts: float = 0.0  # `_Cycle.acted` of the present gait cycle
     largest_n: float = 0.0  # largest force received since the last gait cycle, unusable values included
     is_missing: bool = False  # whether the last gait cycle had no sample
+    is_frozen: bool = False  # whether the samples do not act
+    has_mean: bool = False  # whether the twin knows a mean load of gait cycles
     is_noise: bool = False  # whether the load of the last gait cycles is not above the sensor's noise
 
 
@@ -136,7 +138,19 @@ class FootLoadCheck:
         is_frozen = self.state.is_missing or bool(wrong - {GAPS})
         clears = self.state.is_noise or bool(wrong - {GAPS, STUCK, ZERO})
         self.state.acts = 0.0 if clears else self._load_acts
+        self.state.is_frozen = is_frozen
         return is_frozen, clears
+
+    @property
+    def acts(self) -> str:
+        """What acts on the leg as a foot load, in words."""
+        if not self._load_acts:
+            return "the load by the drive torque acts, if there is one"
+        if not self.state.has_mean:
+            return "no load acts: wear on the ground is counted too small"
+        if self.state.is_frozen:
+            return "the mean load of earlier gait cycles acts"
+        return "the samples themselves act"
 
     @property
     def load(self) -> FootLoad:

@@ -110,6 +110,7 @@ def situation_of(parts: Parts) -> Situation:
         has_torque=last is not None and last.torque_samples > 0,
         mismatch=last.torque_mismatch if last else math.nan,
         mismatch_limit=config.limits.torque_mismatch,
+        acts=parts.foot_load.acts if parts.foot_load else "",
         torque_causes=evaluation.present_causes(last, parts.state.torque) if last else {},
         without_zero="" if parts.guard.cause else parts.without_zero,
         unfollowed=_unfollowed(parts),

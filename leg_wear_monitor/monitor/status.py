@@ -293,7 +293,9 @@ def _foot_load(check: FootLoadCheck, evaluation: AlarmEvaluation) -> Status:
     level = max((alarm.level for alarm in raised), default=Level.OK)
     values = {name: or_nan(value) for name, value in attrs.asdict(load).items() if not isinstance(value, str)}
     messages = [FOOT_LOAD_WORDS.get(alarm.kind, f"see: {alarm.name}") for alarm in raised]
-    if not messages:
+    if messages:
+        messages.append(check.acts)
+    else:
         messages = ["measured" if load.cycles else "no whole gait cycle with samples yet"]
     return Status(KINDS[LOAD].name, level, "; ".join(messages), values, worst_code(raised))
 

@@ -221,7 +221,8 @@ class WearMonitor:
         parts.state.has_ended = True
         sensor = parts.foot_load.ended(statistics) if parts.foot_load else None
         if parts.foot_load and sensor is not None:
-            self._twin.freeze_load(*parts.foot_load.freezes(sensor))
+            known = self._twin.freeze_load(*parts.foot_load.freezes(sensor))
+            parts.foot_load.state.has_mean = known
         self._take_changes(parts.evaluation.end_cycle(report, parts.state.torque, sensor), changes)
         if statistics.is_followed:
             explain_mismatch(parts, statistics)

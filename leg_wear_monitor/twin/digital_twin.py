@@ -405,7 +405,7 @@ class DigitalTwin:
             self._follower.take_parameters(linkage, friction, parameters)
             self._parameters = parameters
 
-    def freeze_load(self, is_frozen: bool, clears: bool = False) -> None:
+    def freeze_load(self, is_frozen: bool, clears: bool = False) -> bool:
         """Go on with the measured load of the gait cycles before, because its samples are wrong.
 
         Parameters
@@ -414,8 +414,13 @@ class DigitalTwin:
             False to take samples again.
         clears : bool, optional
             Whether the load of the gait cycles before was wrong, too: then none acts.
+
+        Returns
+        -------
+        bool
+            Whether a mean load of gait cycles is known.
         """
-        self._follower.freeze_load(is_frozen, clears)
+        return self._follower.freeze_load(is_frozen, clears)
 
     def set_depth(self, depth: Floats) -> None:
         """Set wear depths (k, 2, N) [m], for instance from a ledger.

@@ -168,14 +168,18 @@ class LegFollower:
         self._stepper.model.law[:] = contact_laws(contacts)
         self._repeating.cycles = ()
 
-    def freeze_load(self, is_frozen: bool, clears: bool) -> None:
-        """Let the mean of the measured force act, and no sample change it; none if it ``clears``."""
+    def freeze_load(self, is_frozen: bool, clears: bool) -> bool:
+        """Let the mean of the measured force act, and no sample change it; returns whether there is one.
+
+        There is none if it ``clears``.
+        """
         _, mean, learned = force_of(self._load.rows)
         if clears:
             mean[:], learned[:] = 0.0, 0.0
         if is_frozen and (clears or not self.state.push.is_frozen):
             set_force(self._load.rows, (mean, mean, learned))
         self.state.push.is_frozen = is_frozen
+        return bool(learned.any())
 
     def follow(
         self, steps: Steps, n: int, cycles: list[CycleStatistics], events: list[Event]

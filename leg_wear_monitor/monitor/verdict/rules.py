@@ -65,7 +65,8 @@ def _foot_load(kind: str) -> Rule:
         code=kind.upper(),
         state=State.INSPECT,
         hits=raised(kind, least=Level.ERROR),
-        why=f"{alarms.FOOT_LOAD_WORDS[kind]} (the {{quantity}} is {{value}}, limit {{limit}}){{past}}",
+        why=f"{alarms.FOOT_LOAD_WORDS[kind]} (the {{quantity}} is {{value}}, limit {{limit}})"
+        "{past}{acts}",
         do=f"{_FOOT_LOAD[kind]}; {_ACKNOWLEDGE}",
         not_valid=OF_THE_MODEL,
     )
@@ -213,7 +214,7 @@ RULES = (
         code="FOOT_LOAD_MISSING",
         state=State.WATCH,
         hits=of_foot_load,
-        why="the {quantity} is {value} (limit {limit}); meanwhile the load of earlier gait cycles acts",
+        why="the {quantity} is {value} (limit {limit}){acts}",
         do="repair the sensor of the foot load or its publisher, or set foot_load.source to none",
         not_valid=OF_THE_GAIT,
     ),

@@ -111,6 +111,8 @@ class Situation:
     mismatch, mismatch_limit : float
         Part of the drive torque that is not explained, as a fraction of the predicted RMS; NaN if it is not
         known.
+    acts : str
+        What acts as a foot load; empty without its sensor, and for a ledger.
     torque_causes : mapping of str to NamedCause
         Causes of an impossible bias, drift or lag of the torque, by the alarm.
     without_zero : str
@@ -141,6 +143,7 @@ class Situation:
     has_torque: bool = True
     mismatch: float = 0.0
     mismatch_limit: float = math.nan
+    acts: str = ""
     torque_causes: Mapping[str, NamedCause] = attrs.field(factory=dict)
     without_zero: str = ""
     unfollowed: str = ""
@@ -493,6 +496,7 @@ def hit_of(alarm: Alarm, situation: Situation, **words: str) -> Hit:
         "value": amount(value, alarm.unit),
         "limit": amount(alarm.limit, alarm.unit),
         "past": past,
+        "acts": f"; {situation.acts}" if situation.acts else "",
         "known": "counted",
     }
     evidence: tuple[Evidence, ...] = ()

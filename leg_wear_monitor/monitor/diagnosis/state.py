@@ -8,7 +8,7 @@ from typing import NamedTuple
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate.cause import Cause, Change
+from leg_wear_monitor.estimate.cause import Change
 from leg_wear_monitor.estimate.change_detector import DetectorState
 from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
 from leg_wear_monitor.estimate.drive import DIRECT, Channel
@@ -468,9 +468,8 @@ class TorqueState:
 
     @property
     def not_by_load(self) -> tuple[Change, ...]:
-        """Unsettled changes of clearances that a load at the foot explains less well: none ends with it."""
-        found = (change for change in self.changes if change.cause is Cause.CLEARANCE)
-        return tuple(change for change in found if change.is_sure or change.runner_up != Cause.LOAD.value)
+        """Surely changed clearances: another load at the foot does not end them."""
+        return tuple(change for change in self.changes if change.is_sure)
 
     @property
     def corrected(self) -> CommissionedTorque | None:

@@ -1,16 +1,18 @@
-"""Healthy and worn legs on the ground, whose force nobody measures: names, sizes, the load, and the wear.
+"""Healthy and worn legs on the ground: names, sizes, the load, and the wear.
 
 A leg in full coordinates, with masses 4 % off, walks under a force of another shape than the template's (a
 treadmill's), whose size and time differ from step to step by 10 % and by 2 % of the cycle, behind drives that
 people have. `load.model` is ground: the force is found, and the references are simulated under it. Healthy
 cycles, drawn in blocks of ten, make up some hours; joints open after 600 cycles, when the leg is identified.
 The wear is that of the twin under the force that was found, over what the leg has, by the Archard integral of
-60 gait cycles.
-`python benchmarks/ground.py --keep DIRECTORY` takes half an hour of two cores.
+60 gait cycles; the last rows have it under a measured force, at 200 Hz with noise of 5 % of its value or of
+its peak.
+`python benchmarks/ground.py --keep DIRECTORY` takes half an hour of two cores, a minute with `--wear-only`.
 """
 
 import argparse
 import functools
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -31,19 +33,20 @@ from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.estimate.signature import TorqueSensor
 from leg_wear_monitor.gait.config import GaitConfig, LoadConfig
 from leg_wear_monitor.gait.leg import POINTS, Ground
-from leg_wear_monitor.mechanism.person import with_toe_force
+from leg_wear_monitor.mechanism.person import upwards, with_toe_force
 from leg_wear_monitor.mechanism.position import TURN, build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.inputs import Load
-from leg_wear_monitor.twin import CRANK
+from leg_wear_monitor.twin import CRANK, LOAD
 from leg_wear_monitor.twin import TORQUE as TORQUE_KIND
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.load import torque_size
 from leg_wear_monitor.twin.reference import LegParameters
-from leg_wear_monitor.twin.sample import GROUND, STANCE, TwinSettings, gait_samples
+from leg_wear_monitor.twin.sample import GROUND, MEASURED, STANCE, WRENCH, TwinSettings, gait_samples
 
 PEAKS_N = (100.0, 300.0, 600.0)
-BEFORE, HEALTHY, WORN, COUNTED = 600, 260, 40, 60
+BEFORE, HEALTHY, WORN, COUNTED, FORCE_HZ = 600, 260, 40, 60, 200
+MEASURED_LOAD = TwinSettings(load_model=MEASURED, load_source=WRENCH)
 OPENINGS = (("G", 0.6), ("I", 0.6), ("J", 0.6), ("A", 0.45), ("B", 0.45))
 DRIVES = {
     "none": Drive(),
@@ -60,17 +63,43 @@ class Walk:
     archard_j: np.ndarray
 
 
+def walked_steps(
+    leg: Mechanism, cycles: int, load: LoadConfig, seed: int
+) -> Iterator[tuple[int, np.ndarray]]:
+    """First row of each step of a walk, and its force (POINTS, 2) [N]."""
+    ground = Ground(leg, GaitConfig(load=load, seed=seed))
+    for i in sorted({0, *range(round(ground.swing * RATE) % RATE, cycles * RATE, RATE)}):
+        yield i, ground.step(TURN)
+
+
+def sensed(leg: Mechanism, cycles: int, load: LoadConfig, seed: int, of_value: float, of_peak: float):
+    """Samples of a foot load sensor on a walk, whose noise is a part of the value and one of the peak."""
+    up, random, place = upwards(leg), np.random.default_rng(seed), np.arange(POINTS) / POINTS
+    steps = list(walked_steps(leg, cycles, load, seed))
+    row = np.arange(0, cycles * RATE, RATE // FORCE_HZ)
+    which = np.searchsorted([first for first, _ in steps], row, side="right") - 1
+    force = np.array(
+        [
+            [np.interp(i / RATE, place, one, period=1.0) for one in steps[at][1].T]
+            for i, at in zip(row, which, strict=True)
+        ]
+    )
+    noise = random.standard_normal(force.shape)
+    force += (of_value * np.abs(force) + of_peak * load.ground_n) * noise
+    along = np.stack([force @ [up[1], -up[0]], force @ up], axis=1)
+    return gait_samples(10**9 + np.round(1e9 * row / RATE).astype(np.int64), LOAD, foot_force_n=along)
+
+
 def walked(leg: Mechanism, clearance: np.ndarray, cycles: int, load: LoadConfig, seed: int) -> Walk:
     """A leg that walks on the ground."""
-    ground = Ground(leg, GaitConfig(load=load, seed=seed))
+    steps = dict(walked_steps(leg, cycles, load, seed))
     setup = prepare(with_toe_force(leg, np.zeros((POINTS, 2))))
     setup.contacts.clearance[:] = clearance
     run = FullRun(attrs.evolve(setup, speed=TURN), tolerance_m=1e-9)
     statistics, rows, archard = new_run_statistics(len(leg.joints)), np.empty((cycles * RATE, 4)), []
-    swing = round(ground.swing * RATE) % RATE
     for i in range(len(rows)):
-        if i % RATE == swing or i == 0:
-            run.model.arrays.load_force[-1] = np.pad(ground.step(TURN), ((1, 1), (0, 0)), mode="wrap")
+        if i in steps:
+            run.model.arrays.load_force[-1] = np.pad(steps[i], ((1, 1), (0, 0)), mode="wrap")
         before, t = i / RATE, (i + 1) / RATE
         begin, end = (SimpleNamespace(angle=TURN * at, speed=TURN, acceleration=0.0) for at in (before, t))
         run.polynomial[:] = quintic(before, begin, t - before, end)
@@ -81,9 +110,11 @@ def walked(leg: Mechanism, clearance: np.ndarray, cycles: int, load: LoadConfig,
     return Walk(rows, np.diff(np.array(archard), axis=0, prepend=0.0))
 
 
-def worn(leg: Mechanism, walk: Walk, parameters: LegParameters | None, shape: str) -> np.ndarray:
-    """Archard integral (k,) of the twin of a walk, over that of the leg."""
-    twin = DigitalTwin(leg, TwinSettings(load_shape=shape))
+def worn(
+    leg: Mechanism, walk: Walk, parameters: LegParameters | None, settings: TwinSettings, *more: np.ndarray
+) -> np.ndarray:
+    """Archard integral (k,) of the twin of a walk, over that of the leg; with samples of further sensors."""
+    twin = DigitalTwin(leg, settings)
     if parameters is not None:
         twin.set_parameters(parameters)
     time, torque = walk.rows[:, 0], np.diff(walk.rows[:, 2], prepend=0.0) * RATE
@@ -92,6 +123,7 @@ def worn(leg: Mechanism, walk: Walk, parameters: LegParameters | None, shape: st
         [
             gait_samples(stamps, CRANK, crank_angle_rad=walk.rows[:, 1]),
             gait_samples(stamps, TORQUE_KIND, torque_nm=torque),
+            *more,
         ]
     )
     samples = samples[np.argsort(samples["stamp_ns"], kind="stable")]
@@ -128,6 +160,7 @@ def main() -> None:
     parser.add_argument("--peak", type=float, action="append")
     parser.add_argument("--shape", default="treadmill")
     parser.add_argument("--drive", action="append", choices=sorted(DRIVES))
+    parser.add_argument("--wear-only", action="store_true", help="under a measured force, and no more")
     parser.add_argument("--leg", default="masses", choices=sorted(LEGS))
     options = parser.parse_args()
     leg = load_mechanism("bionic_leg")
@@ -147,8 +180,12 @@ def main() -> None:
         cycles = WORN if joint else HEALTHY
         return kept(file, lambda: walked(real, clearance, cycles + 3, load, round(1000 * size_mm)))
 
+    def wear(peak_n: float, known: LegParameters | None, settings: TwinSettings, *more: np.ndarray) -> str:
+        ratio = worn(leg, walk(peak_n), known, settings, *more)
+        return ", ".join(f"{j} {r:.2f}" for j, r in zip(leg.clearance_joints, ratio, strict=True))
+
     for peak_n in options.peak or PEAKS_N:
-        for name in options.drive or DRIVES:
+        for name in () if options.wear_only else options.drive or DRIVES:
             drive = DRIVES[name]
             cycles = cycles_of(walk(peak_n).rows, drive, sensor, 5)[0]
             before = [cycles[i % len(cycles)] for i in range(BEFORE)]
@@ -184,9 +221,13 @@ def main() -> None:
                     ("ground, before the fit", None, GROUND),
                     ("ground", parameters, GROUND),
                 ):
-                    ratio = worn(leg, walk(peak_n), known, shape)
-                    told = ", ".join(f"{j} {r:.2f}" for j, r in zip(leg.clearance_joints, ratio, strict=True))
+                    told = wear(peak_n, known, TwinSettings(load_shape=shape))
                     print(f"  wear, load.model {what}: {told}", flush=True)
+        load = LoadConfig(ground_n=peak_n, shape=options.shape)
+        for of_value, of_peak in ((0.0, 0.0), (0.05, 0.0), (0.0, 0.05)):
+            force = sensed(real, HEALTHY + 3, load, 300, of_value, of_peak)
+            told = wear(peak_n, None, MEASURED_LOAD, force)
+            print(f"{peak_n:.0f} N measured, noise {of_value:g}, {of_peak:g}: wear {told}", flush=True)
 
 
 if __name__ == "__main__":

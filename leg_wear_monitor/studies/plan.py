@@ -346,7 +346,7 @@ class Estimate:
 
     @property
     def score(self) -> float:
-        """The value as a multiple of its standard error, with its sign; infinite where only the error is 0."""
+        """The value as a multiple of its standard error, with its sign; infinite if only the error is 0."""
         if self.error > 0.0:
             return self.value / self.error
         return float(np.copysign(np.inf, self.value)) if self.value else 0.0

@@ -77,7 +77,7 @@ def create(path: Path, binding: Binding) -> None:
 
 
 def connect(path: Path, binding: Binding) -> sqlite3.Connection:
-    """Open a ledger, check all of it, and lock it for others until the connection is closed.
+    """Open a ledger, check all of it, and lock others out until the connection is closed.
 
     On a read-only disk the ledger can be read, and every write fails.
 
@@ -96,7 +96,7 @@ def connect(path: Path, binding: Binding) -> sqlite3.Connection:
         _check_header(path)
         writable = _is_opened_to_write(path)
         # SQLite undoes an interrupted transaction as soon as it reads the file
-        if writable and _is_hot(beside(path, "-journal")):
+        if _is_hot(beside(path, "-journal")):
             _recover_a_copy(path, binding)
         # immutable: nobody writes, so SQLite takes no lock
         db = _connect(path, "rw" if writable else "ro&immutable=1")
@@ -244,6 +244,7 @@ def _check_header(path: Path) -> None:
     wal = beside(path, "-wal")
     if _has_content(wal):  # a ledger has no write-ahead log of its own
         raise LedgerError(f"{path}: {wal.name} beside it belongs to another ledger; move it away")
+    # no format is below the first one
     if found != schema.FORMAT or header[18:20] != _ROLLBACK:
         raise LedgerError(f"{path}: is damaged: its header is not what was written; {REMEDY}")
 
@@ -273,7 +274,7 @@ def _recover_a_copy(path: Path, binding: Binding) -> None:
 
 @contextmanager
 def _locked(path: Path) -> Iterator[None]:
-    """Lock the file for others as SQLite does, while SQLite does not have it open."""
+    """Lock others out as SQLite does, while SQLite itself does not have the file open."""
     with path.open("r+b") as file:
         try:
             fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB, _LOCK_SIZE, _LOCK_FIRST)
@@ -330,6 +331,7 @@ def _refusal(path: Path, error: Exception) -> LedgerError:
 
 
 def _has_content(path: Path) -> bool:
+    """Whether there is a file with at least one byte."""
     return path.exists() and path.stat().st_size > 0
 
 
@@ -342,9 +344,9 @@ def _is_hot(journal: Path) -> bool:
 
 
 def _is_opened_to_write(path: Path) -> bool:
-    """Whether a ledger is opened for writing: if it can be written, or if a transaction has to be undone.
+    """Whether a ledger is opened for writing: if it can be written, or has a journal that is not empty.
 
-    In the second case, a read-only disk is an error: the file alone is not what was written last.
+    In the second case a read-only disk is an error, because a transaction may have to be undone.
     """
     is_interrupted = _has_content(beside(path, "-journal"))
     return is_interrupted or all(os.access(place, os.W_OK) for place in (path, path.parent))

@@ -5,7 +5,7 @@ Names are imported when they are first used, so that the command line can answer
 
 from importlib import import_module
 
-from leg_wear_monitor.errors import AssemblyError, ConfigError, LegWearError, SimulationError, extras_named
+from leg_wear_monitor.errors import AssemblyError, ConfigError, LegWearError, SimulationError, extras_hinted
 from leg_wear_monitor.shown import VIEWS
 
 TYPE_CHECKING = False  # as typing has it, without the time to import that
@@ -157,7 +157,7 @@ def __getattr__(name: str) -> "Any":
         return import_module("importlib.metadata").version(__name__)
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    with extras_named():
+    with extras_hinted():
         return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
 
 

@@ -1,4 +1,7 @@
-"""The root of all errors of this package, printable text, suggestions for unknown names, and interrupts."""
+"""Errors of this package, printable text, suggestions for unknown names, and what an interrupt does.
+
+`cli.start` imports this module before all others, so that Ctrl-C is answered at once: it imports little.
+"""
 
 import os
 import signal
@@ -9,20 +12,20 @@ from types import FrameType
 # Errors that this package raises on purpose, and text that a terminal can show.
 
 
-_MOST_SHOWN = 2000  # characters
+_MOST_SHOWN = 2000  # characters, as many as a terminal of 25 lines of 80
 
 
 def printable(text: str, most: int = _MOST_SHOWN) -> str:
-    r"""Text from a file as it may be shown: on one line, nothing in it that a terminal obeys, not too long.
+    r"""Text from a file on one line, without control sequences for the terminal, and not too long.
 
-    What cannot be printed stands as its escape (``\x1b``); so do line breaks, marks that turn the direction
-    of writing, and bytes of a file name that are no UTF-8.
+    Characters that cannot be printed are replaced by their escapes (``\x1b``): control characters, line
+    breaks, marks that reverse the direction of writing, and bytes of a file name that are no UTF-8.
 
     Parameters
     ----------
     text : str
     most : int
-        Characters that are kept.
+        Number of its characters that are shown; the result says how many more there are.
     """
     shown = "".join(
         each if each.isprintable() else each.encode("unicode_escape").decode("ascii") for each in text[:most]
@@ -61,37 +64,37 @@ class ConfigError(LegWearError):
         super().__init__(": ".join(part for part in (source, key, fault) if part))
 
     def __reduce__(self) -> tuple[type["ConfigError"], tuple[str, str, str]]:
-        """By its parts, so that it survives the way from a worker process; the message alone does not."""
+        """Pickle the three parts: with the message alone, it could not come back from a worker process."""
         return type(self), (self.source, self.key, self.fault)
 
 
 class AssemblyError(LegWearError):
-    """The linkage cannot be put together, or its crank cannot pass a dead point."""
+    """The linkage cannot be assembled, or has a dead point, beyond which its crank cannot turn."""
 
 
 class SimulationError(LegWearError):
-    """A run that stopped; the message gives the place, the time and the remedy."""
+    """A simulation that stopped; the message gives mechanism, joint, time and remedy as far as known."""
 
 
 class ConfigWarning(UserWarning):
-    """Something that can be used but may not do what was meant; the command line prints it as one line."""
+    """A usable setting that is probably a mistake; the command line prints it as one line."""
 
 
 # Optional modules.
 
 
 _EXTRAS = {"lz4": "bags", "mcap": "bags", "rosbags": "bags", "tornado": "dashboard", "zstandard": "bags"}
-"""Modules that are optional, and the extra that installs each."""
+"""Optional modules, and the extra of this package that installs each."""
 
 
 @contextmanager
-def extras_named() -> Iterator[None]:
-    """Name the extra of an optional module that is not installed.
+def extras_hinted() -> Iterator[None]:
+    """Within this context, the error for an optional module that is not installed says how to install it.
 
     Raises
     ------
     LegWearError
-        In place of the ModuleNotFoundError; that of another module keeps its traceback.
+        Instead of the ModuleNotFoundError of an optional module. That of another module passes unchanged.
     """
     try:
         yield
@@ -108,7 +111,7 @@ def extras_named() -> Iterator[None]:
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
     """The known name most similar to a given one, ignoring case; None if none is similar."""
-    import difflib  # not at start: ^C is answered only after this file is read
+    import difflib  # not at the top, where it would delay the first moment at which Ctrl-C is answered
 
     by_lower = {entry.lower(): entry for entry in known}
     near = difflib.get_close_matches(name.lower(), by_lower, n=1)
@@ -123,77 +126,81 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 # What an interrupt does, also where an exception would be lost: in imports and in the compiler.
 #
-# numba compiles in callbacks and finalisers, which print an exception or swallow it, and an import cut short
-# ends in a traceback or in half a module. There a signal handler must not raise: it puts in order what is
-# open and ends the process.
+# A signal handler usually raises KeyboardInterrupt. But numba compiles in callbacks and finalisers, which
+# print an exception or swallow it, and an import that is cut short ends in a traceback or leaves half a
+# module. There the handler must not raise: it closes what is open (ledger, child processes, progress bar)
+# and ends the process.
 
 
 INTERRUPTED = 130
-"""Exit code."""
+"""Exit code after Ctrl-C: 128 and the number of SIGINT, as shells have it."""
 
-# packages in whose frames an exception may be swallowed
-_LOSING = {"importlib", "_frozen_importlib", "_frozen_importlib_external", "llvmlite", "numba"}
+# packages whose functions may swallow an exception
+_SWALLOWING = {"importlib", "_frozen_importlib", "_frozen_importlib_external", "llvmlite", "numba"}
 
-_open: list[Callable[[], None]] = []
-"""What closes the things that are open now, the newest last; see `closed_at_the_end`."""
+_closers: list[Callable[[], None]] = []
+"""Functions that close what is open now, the newest last; see `closed_on_interrupt`."""
 
 
 def would_be_lost(frame: FrameType | None) -> bool:
-    """Whether an exception raised in a frame might not reach who called.
+    """Whether an exception that is raised in a frame may be swallowed by one of its callers.
 
     Parameters
     ----------
     frame : frame, optional
-        The one that a signal handler is given.
+        The interrupted frame, as a signal handler is given it.
     """
     while frame is not None:
-        if str(frame.f_globals.get("__name__")).split(".")[0] in _LOSING or frame.f_code.co_name == "__del__":
+        package = str(frame.f_globals.get("__name__")).split(".")[0]
+        if package in _SWALLOWING or frame.f_code.co_name == "__del__":
             return True
         frame = frame.f_back
     return False
 
 
 @contextmanager
-def closed_at_the_end(close: Callable[[], None]) -> Iterator[None]:
-    """Have something put in order if the process must end inside, without an exception.
+def closed_on_interrupt(close: Callable[[], None]) -> Iterator[None]:
+    """Have something closed if an interrupt ends the process within this context.
+
+    Whoever leaves the context in the usual way, or by an exception, closes it himself.
 
     Parameters
     ----------
     close : callable
-        Not called otherwise.
+        Called by `close_open`, and by nothing else here.
     """
-    _open.append(close)
+    _closers.append(close)
     try:
         yield
     finally:
-        if close in _open:  # not if `put_in_order` has called it
-            _open.remove(close)
+        if close in _closers:  # unless `close_open` has called it
+            _closers.remove(close)
 
 
-def put_in_order() -> None:
-    """Close what is open, the newest first; each once."""
-    while _open:
-        _open.pop()()
+def close_open() -> None:
+    """Close all that was given to `closed_on_interrupt`, the newest first, each once."""
+    while _closers:
+        _closers.pop()()
 
 
 def leave(*_: object) -> None:
-    """Say in one line that this was interrupted, and end the process; can be a signal's handler."""
+    """Print one line, and end the process without its clean-up; usable as a signal handler."""
     os.write(2, b"error: interrupted\n")
     os._exit(INTERRUPTED)
 
 
 def interrupt(_number: int, frame: FrameType | None) -> None:
-    """Handler of the first Ctrl-C: KeyboardInterrupt where that is safe; else close all and leave."""
+    """Handler of the first Ctrl-C: KeyboardInterrupt where it is not lost; else close all and leave."""
     if not would_be_lost(frame):
-        signal.signal(signal.SIGINT, _insist)
+        signal.signal(signal.SIGINT, _end_at_once)
         raise KeyboardInterrupt
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        put_in_order()
+        close_open()
     finally:
         leave()
 
 
-def _insist(_number: int, _frame: FrameType | None) -> None:
-    """Handler of the second Ctrl-C: the process ends at once, whatever is still being closed."""
+def _end_at_once(_number: int, _frame: FrameType | None) -> None:
+    """Handler of the second Ctrl-C: end the process, even if something is still being closed."""
     os._exit(INTERRUPTED)

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, NamedTuple
 
 from leg_wear_monitor.compiled.kernel import cache_directory, is_stored
-from leg_wear_monitor.errors import ConfigError, ConfigWarning, LegWearError, closed_at_the_end
+from leg_wear_monitor.errors import ConfigError, ConfigWarning, LegWearError, closed_on_interrupt
 
 if TYPE_CHECKING:
     from loky import ProcessPoolExecutor
@@ -303,7 +303,7 @@ def compiled_beside(compile_it: Callable[[], None], entry: Callable[..., object]
     with (
         tempfile.TemporaryFile() as log,
         _started(compile_it, log) as process,
-        closed_at_the_end(process.kill),
+        closed_on_interrupt(process.kill),
     ):
         try:
             yield

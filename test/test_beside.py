@@ -15,7 +15,7 @@ import pytest
 from leg_wear_monitor import workers
 from leg_wear_monitor.cli.start import main
 from leg_wear_monitor.compiled.cache import one_process_at_a_time
-from leg_wear_monitor.errors import ConfigWarning, put_in_order
+from leg_wear_monitor.errors import ConfigWarning, close_open
 from leg_wear_monitor.workers import Job, compiled_beside, python_command, run_in_processes
 
 MODULE = """
@@ -125,7 +125,7 @@ def test_it_ends_with_what_is_inside(started):
 @pytest.mark.plain
 def test_it_ends_where_an_exception_would_be_lost(started):
     with pytest.warns(ConfigWarning, match="ended with -9"), compiled_beside(signal.pause, entry):
-        put_in_order()
+        close_open()
         started[0].wait()
 
 

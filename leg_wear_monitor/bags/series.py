@@ -1,4 +1,7 @@
-"""All joints and torques of recordings as time series, for finding the crank and its torque."""
+"""All joints and torques of recordings as time series.
+
+Which of the joints is the crank, and which torque drives it, `commissioning` and `play` then find out.
+"""
 
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack
@@ -21,11 +24,7 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, ZERO_STAMP, Samples
 
-# The series: each joint is a candidate for the crank, each torque one for the drive torque.
-
-
-# of a joint's interfaces those that are no torque, and the one that joint_states has, too
-_NO_TORQUE = ("position", "velocity", "acceleration", "effort")
+# What identifies a series: each joint is a candidate for the crank, each torque one for the drive torque.
 
 
 @attrs.frozen
@@ -43,12 +42,12 @@ class TorqueSource:
     Attributes
     ----------
     source : str
-        Value of `drive_torque.source`.
+        `WRENCH`, `EFFORT`, `INTERFACE` or `FLOAT64`, as the parameter `drive_torque.source`.
     topic : str
     component : str
-        Axis of a wrench (x, y, z), joint of an effort or of an interface; empty for a Float64.
+        Axis of a wrench (x, y or z); joint of an effort or of an interface; empty for a Float64.
     interface : str
-        Name of an interface; empty for others.
+        Name of the joint's interface, such as ``motor_current``; empty for the other sources.
     """
 
     source: str
@@ -58,7 +57,7 @@ class TorqueSource:
 
     @property
     def label(self) -> str:
-        """The torque in words."""
+        """Source, component and topic, as messages print them."""
         if self.source == WRENCH:
             return f"wrench, axis {self.component}, of {self.topic}"
         if self.source == EFFORT:
@@ -78,25 +77,27 @@ class Signals:
 
 # Reading: each channel is decoded by the monitor's own decoder, once for each joint or axis.
 #
-# A decoder yields a crank angle and a torque, of one joint or axis that its configuration names. So it is
-# configured with each joint in turn as if that were the crank, and with each axis as if that were the
-# torque's.
+# The monitor's configuration names one crank joint and one axis, and its decoder yields the angle and the
+# torque of these only. So one decoder is made for each joint, as if that were the crank, and one for each
+# axis. A recording is read in pieces, because it may be larger than the memory.
 
 
-# Ends of topics that the monitor itself publishes: its predicted torque would fit better than any measured
-# one.
+# Ends of the topics that the monitor publishes as joint states or wrenches. They are no sensors, and its
+# predicted torque would fit better than any measured one.
 _PUBLISHED = tuple(each.name.lstrip("~") for each in (outputs.CLEARANCES, outputs.IMPACTS, outputs.TORQUE))
-_MOST_CHANNELS = 250  # the field `type` of a message, which contains a channel's number here, has eight bits
+# Interfaces of a joint that are no candidates: three are no torques, and joint_states has the effort, too.
+_NO_CANDIDATES = ("position", "velocity", "acceleration", "effort")
+_MOST_CHANNELS = 250  # numbers of channels have eight bits in `bags.mcap_file`, which itself uses 0 and 255
 _MOST_JOINTS = 200  # of a channel, to bound the work: each joint is decoded by itself
 _NAMING_MESSAGES = 20  # first messages of a piece, whose joint names are read
 _NO_JOINT = "(no joint)"  # name of a crank joint that no message has
 
 
-_Channel = tuple[str, Stream]
-"""Topic and stream of a channel that is read."""
+_Selected = list[tuple[str, Stream]]
+"""Topics that are read, and their streams; files of one recording may share an entry."""
 
 _Parts = list[tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]]
-"""Parts of one series, from successive pieces: stamps [ns], values, indices of the recording."""
+"""Parts of one series, a piece each: stamps [ns], values, indices of the recording, (n,) each."""
 
 
 def read_signals(
@@ -116,18 +117,24 @@ def read_signals(
     config : MonitorConfig
         Columns and units of tables.
     joint_states, drive_torque : str, optional
-        Topics to read, and no others of their kind; default: all.
+        The only topic to read for joints, or for torques; default: all topics.
     progress : callable
-        Takes the fraction read.
+        Called after each piece with the fraction that is read, up to 1.
+
+    Returns
+    -------
+    signals : Signals
+    findings : list of Finding
+        Files and channels that were not read, and damage in those that were.
 
     Raises
     ------
     RecordingError
-        If nothing can be read, or there is no joint.
+        If nothing can be read, or there is no topic of joints.
     """
     bag_files, findings = find_files(paths)
     with ExitStack() as stack:
-        sources, lost = open_sources(bag_files, config, Budget(), stack)
+        sources, unreadable = open_sources(bag_files, config, Budget(), stack)
         selected, skipped = _select(sources, joint_states, drive_torque)
         if not any(stream.kind == CRANK for _, stream in selected):
             raise RecordingError(
@@ -140,70 +147,85 @@ def read_signals(
         for source in sources:
             for due in source.pieces():
                 piece = due.load()
-                if piece is not None:
+                if piece is not None:  # a damaged piece is a finding of its file
                     recording = source.bag_file.recording
                     _add_piece(collected, selected, piece.data, piece.messages, recording)
                     read += piece.stored
                     progress(min(1.0, read / total))
-        findings += lost + skipped + [each for source in sources for each in source.file.findings]
+        findings += unreadable + skipped + [each for source in sources for each in source.file.findings]
     return _signals(collected), findings
 
 
 def _select(
     sources: list[Source], joint_states: str | None, drive_torque: str | None
-) -> tuple[list[_Channel], list[Finding]]:
-    """Channels to be read.
+) -> tuple[_Selected, list[Finding]]:
+    """Choose the topics to be read, and enter their channels in `Source.types`.
 
-    The messages of a source get the number of their channel here, from 1, as their `type`; a reader of one
-    channel for each stream has the stream's code there. Channels of the same topic and stream share a number.
+    A source writes the number that `Source.types` has for a channel into the field `type` of its messages.
+    Elsewhere that is the code of the stream. Here several topics may have the same stream, so it is the place
+    of topic and stream in the returned list, counted from 1.
     """
-    selected: list[_Channel] = []
+    selected: _Selected = []
     findings: list[Finding] = []
     for source in sources:
         for number, channel in sorted(source.file.channels.items()):
-            path, known = source.bag_file.path, source.bag_file.types.get(channel.topic, "")
-            stream = _stream(channel, known, {CRANK: joint_states}, drive_torque)
+            # the type by the metadata of the recording, for a file that does not give it
+            path, listed_type = source.bag_file.path, source.bag_file.types.get(channel.topic, "")
+            stream = _stream(channel, listed_type, joint_states, drive_torque)
             if stream is None:
                 continue
             try:
-                check_channel(stream, channel, known, str(path))
+                check_channel(stream, channel, listed_type, str(path))
             except RecordingError as error:
                 findings.append(Finding(path, f"{error.key} {error.fault}: it is not read", Severity.NOTE))
                 continue
-            selected_channel = channel.topic, stream
-            if selected_channel not in selected:
-                selected.append(selected_channel)
-            if (index := selected.index(selected_channel)) < _MOST_CHANNELS:
+            if (channel.topic, stream) not in selected:
+                selected.append((channel.topic, stream))
+            if (index := selected.index((channel.topic, stream))) < _MOST_CHANNELS:
                 source.types[number] = 1 + index
     return selected, findings
 
 
 def _stream(
-    channel: Channel, known: str, chosen: dict[int, str | None], drive_torque: str | None
+    channel: Channel, listed_type: str, joint_states: str | None, drive_torque: str | None
 ) -> Stream | None:
     """Stream of a channel by its message type; None for a channel that is not read."""
     if channel.topic.endswith(_PUBLISHED):
         return None
     for stream in STREAMS:
-        topic = chosen.get(stream.kind, drive_torque)
-        if stream.type == (channel.type or known) and not stream.load_source:
-            return stream if topic in (None, channel.topic, channel.topic.lstrip("/")) else None
+        # the streams of a foot load have the types of torques, too, and no torque is read as one
+        if stream.type == (channel.type or listed_type) and not stream.load_source:
+            wanted = joint_states if stream.kind == CRANK else drive_torque
+            return stream if wanted in (None, channel.topic, channel.topic.lstrip("/")) else None
     return None
 
 
 def _add_piece(
     collected: dict[JointName | TorqueSource, _Parts],
-    selected: list[_Channel],
+    selected: _Selected,
     data: NDArray[np.uint8],
     messages: NDArray[np.void],
     recording: int,
 ) -> None:
-    """Decode a piece, and add its values to the series of each joint and torque."""
+    """Decode a piece, and add its values to the series of each joint and torque.
+
+    Parameters
+    ----------
+    collected : dict
+        Parts of the series so far, added to.
+    selected : list of (str, Stream)
+        As `_select` returns it.
+    data : (bytes,) array of uint8
+    messages : (n,) array of `cdr.MESSAGE`
+        Where each message is in the data; `type` is the place in ``selected``, from 1.
+    recording : int
+        Index of the recording.
+    """
     for number in np.unique(messages["type"]).tolist():
-        channel = selected[number - 1]
-        chosen = messages[messages["type"] == number]
-        chosen["type"] = channel[1].code
-        for name, samples, field in _decoded_series(channel, data, chosen):
+        topic, stream = selected[number - 1]
+        chosen = messages[messages["type"] == number]  # a copy, with the code that the decoder expects
+        chosen["type"] = stream.code
+        for name, samples, field in _decoded_series(topic, stream.code, data, chosen):
             # a message without a stamp is usable at its log time
             is_unstamped = samples["fault"] == ZERO_STAMP
             is_usable = is_unstamped | (samples["fault"] == NO_FAULT)
@@ -213,10 +235,12 @@ def _add_piece(
 
 
 def _decoded_series(
-    channel: _Channel, data: NDArray[np.uint8], messages: NDArray[np.void]
+    topic: str, code: int, data: NDArray[np.uint8], messages: NDArray[np.void]
 ) -> list[tuple[JointName | TorqueSource, Samples, str]]:
-    """Samples of each series in a channel's messages, and the field of its values."""
-    topic, code = channel[0], channel[1].code
+    """Each series in the messages of a topic: its name, its samples, and the field of these with its values.
+
+    Samples are one for each message. Those of a joint state have both the angle and the effort of the joint.
+    """
     found: list[tuple[JointName | TorqueSource, Samples, str]] = []
     if code == JOINT_STATE:
         for joint in _joint_names(data, messages):
@@ -239,40 +263,41 @@ def _decoded_series(
 
 
 def _decoder(source: str, axis: str = "z", joint: str = _NO_JOINT, interface: str = "effort") -> Decoder:
-    """Decoder of one torque source and of one joint as the crank."""
+    """Decoder of one torque source and of one joint as the crank; a source ignores what it does not have."""
     torque = DriveTorque(source=source, axis=axis, interface=interface)
     return Decoder(MonitorConfig(crank_joint=joint, drive_torque=torque))
 
 
 def _joint_names(data: NDArray[np.uint8], messages: NDArray[np.void]) -> list[str]:
-    """Names of the joints in the first sound messages."""
-    names: dict[str, None] = {}
-    for raw in _first_sound(EFFORT, data, messages):
+    """Names of the joints in the first messages, at most `_MOST_JOINTS`."""
+    names: dict[str, None] = {}  # a set that keeps the order
+    for raw in _first_decodable(EFFORT, data, messages):
         names |= dict.fromkeys(names_in(raw)[:_MOST_JOINTS])
     return [name for name in names if name][:_MOST_JOINTS]
 
 
 def _interfaces(data: NDArray[np.uint8], messages: NDArray[np.void]) -> list[tuple[str, str]]:
-    """Joints and interfaces in the first sound messages that may be a torque."""
+    """Joints with those of their interfaces that may be a torque, in the first messages."""
     pairs: dict[tuple[str, str], None] = {}
-    for raw in _first_sound(INTERFACE, data, messages):
+    for raw in _first_decodable(INTERFACE, data, messages):
         for joint, names in list(interfaces_in(raw).items())[:_MOST_JOINTS]:
-            pairs |= dict.fromkeys((joint, name) for name in names if name and name not in _NO_TORQUE)
+            pairs |= dict.fromkeys((joint, name) for name in names if name and name not in _NO_CANDIDATES)
     return list(pairs)[:_MOST_JOINTS]
 
 
-def _first_sound(source: str, data: NDArray[np.uint8], messages: NDArray[np.void]) -> list[bytes]:
-    """The first messages without a fault.
+def _first_decodable(source: str, data: NDArray[np.uint8], messages: NDArray[np.void]) -> list[bytes]:
+    """The first messages that are not damaged.
 
-    A decoder for a joint that no message has reports only sound messages as MISSING_JOINT.
+    The decoder is made for a joint that no message has: it reports an undamaged message as MISSING_JOINT, and
+    a damaged one with another fault.
     """
     faults = _decoder(source).many(data, messages)["fault"]
-    sound = np.flatnonzero(faults == MISSING_JOINT)[:_NAMING_MESSAGES]
-    return [data[one["begin"] : one["end"]].tobytes() for one in messages[sound]]
+    decodable = np.flatnonzero(faults == MISSING_JOINT)[:_NAMING_MESSAGES]
+    return [data[one["begin"] : one["end"]].tobytes() for one in messages[decodable]]
 
 
 def _signals(collected: dict[JointName | TorqueSource, _Parts]) -> Signals:
-    """Series that are not empty, with times since the first stamp of all."""
+    """Join the parts of each series that is not empty; time 0 is the first stamp of all series."""
     full = {name: parts for name, parts in collected.items() if any(len(part[0]) for part in parts)}
     first_ns = min(
         (int(part[0].min()) for parts in full.values() for part in parts if len(part[0])), default=0
@@ -284,5 +309,6 @@ def _signals(collected: dict[JointName | TorqueSource, _Parts]) -> Signals:
 
 
 def _joined(parts: _Parts, first_ns: int) -> Series:
+    """One series from its parts."""
     stamps, values, recording = (np.concatenate(column) for column in zip(*parts, strict=True))
     return series(stamps, values, recording, first_ns)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from leg_wear_monitor.errors import ConfigError, ConfigWarning, LegWearError, closed_at_the_end
+from leg_wear_monitor.errors import ConfigError, ConfigWarning, LegWearError, closed_on_interrupt
 from leg_wear_monitor.files import write_whole
 
 if TYPE_CHECKING:
@@ -535,7 +535,7 @@ def _progress() -> Iterator["Progress"]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         _display.append(bar)
         try:
-            with closed_at_the_end(bar.stop):  # it hides the cursor
+            with closed_on_interrupt(bar.stop):  # it hides the cursor
                 yield bar
         finally:
             _display.clear()

@@ -14,7 +14,7 @@ from leg_wear_monitor.errors import (
     ConfigWarning,
     LegWearError,
     did_you_mean,
-    extras_named,
+    extras_hinted,
     printable,
 )
 from leg_wear_monitor.files import package_version
@@ -59,7 +59,7 @@ class Verbs(click.Group):
         """Run and end the process; programming errors keep their traceback."""
         code: Any = COULD_NOT
         try:
-            with _warnings_as_lines(), extras_named():
+            with _warnings_as_lines(), extras_hinted():
                 code = super().main(*args, **{**extra, "standalone_mode": False})
         except click.UsageError as error:
             path = error.ctx.command_path if error.ctx else self.name

@@ -1,4 +1,7 @@
-"""The motion of a joint, and a drive torque with the joint's motion at its samples."""
+"""The smoothed motion of a joint, and a drive torque with that motion at the times of its samples.
+
+A joint is a candidate for the crank: an encoder that a gear may separate from it.
+"""
 
 import math
 
@@ -21,8 +24,9 @@ class Series:
     time_s : (n,) array
         Since the first stamp of all recordings [s].
     value : (n,) array
+        Positions [rad], or torques in the unit of their sensor.
     recording : (n,) array of int
-        Index of the recording; an encoder may start anew in each.
+        Index of the recording; the readings of an encoder may begin anew in each.
     """
 
     time_s: Floats
@@ -31,14 +35,15 @@ class Series:
 
 
 def series(stamp_ns: NDArray[np.int64], value: Floats, recording: NDArray[np.int64], first_ns: int) -> Series:
-    """Series of the finite values, in order of their stamps, each stamp once.
+    """Series of the finite values, in order of their stamps; of values with equal stamps, the first one.
 
     Parameters
     ----------
     stamp_ns : (n,) array of int
-        Stamps [ns].
+        Stamps [ns], in any order.
     value : (n,) array
     recording : (n,) array of int
+        As in `Series`.
     first_ns : int
         Stamp of time 0 [ns].
     """
@@ -51,13 +56,14 @@ def series(stamp_ns: NDArray[np.int64], value: Floats, recording: NDArray[np.int
 # Motion of a joint that turns on and on: position, speed and acceleration, and noise of its encoder.
 
 
-_WINDOW_S = 0.12  # of the local fit: a twelfth of a turn at 40 rpm, so a ripple of two a turn stays
-_LEAST_WINDOW = 7  # samples, enough for a cubic with three to spare
-_GAP_SAMPLES = 4.0  # sampling intervals without a sample that are not bridged
-_LEAST_TRAVEL_RAD = 1.0
-# A crank that walks forwards and back as far travels twice its range; a joint that swings, once a cycle
+_WINDOW_S = 0.12  # of a local fit: a twelfth of a turn at 40 rpm, which keeps a ripple of two periods a turn
+_LEAST_WINDOW = 7  # samples: three more than a cubic has coefficients
+_GAP_SAMPLES = 4.0  # a longer gap between samples, in sampling intervals, is not bridged
+_LEAST_TRAVEL_RAD = 1.0  # a joint that moves by less in all does not turn
+# Least range of the positions as a fraction of the path: 1 for a crank that turns one way, 1/2 for one that
+# walks forwards and then as far back, 1/(2 n) for a joint that swings to and fro in each of n gait cycles.
 _ROCKING = 0.2
-_NO_VARIANCE = 1.0e-12
+_NO_VARIANCE = 1.0e-12  # (rad/s^2)^2, so that nothing is divided by 0 if there is no acceleration
 
 
 @attrs.frozen(eq=False)
@@ -70,14 +76,15 @@ class JointMotion:
         Smoothed; the position counts on over turns.
     recording : (n,) array of int
     near : (n,) array of bool
-        Whether samples lie around this time.
+        Whether the time is not in a gap between samples.
     is_wrapped : bool
         Whether the encoder's readings are wrapped to a turn.
     noise_rad : float
         Standard deviation of the readings about the smoothed position [rad].
     first_rad : (recordings,) array
-        First reading of each recording [rad].
+        First reading of each recording that has enough samples to be smoothed [rad].
     rate_hz : float
+        Usual sampling rate of the encoder.
     """
 
     time_s: Floats
@@ -100,14 +107,17 @@ def why_not_a_crank(joint: Series) -> str:
     reach = float(np.ptp(position))
     if reach < _LEAST_TRAVEL_RAD:
         return f"moves by {reach:.2g} rad in all"
-    turning_points = position[:: max(1, len(position) // 2000)]  # coarse, so that noise adds no path
-    path = float(np.abs(np.diff(turning_points)).sum())
+    coarse = position[:: max(1, len(position) // 2000)]  # so that noise adds no path
+    path = float(np.abs(np.diff(coarse)).sum())
     return f"swings to and fro within {reach:.2g} rad" if reach < _ROCKING * path else ""
 
 
 def motion_of(joint: Series) -> JointMotion:
-    """Smoothed motion of a joint for which `why_not_a_crank` is empty."""
-    parts = []
+    """Smoothed motion of a joint for which `why_not_a_crank` is empty.
+
+    Each recording is smoothed by itself; one with less than 2 `_LEAST_WINDOW` samples is left out.
+    """
+    parts = []  # of each recording: its index, its first reading, and the six results of `_smoothed`
     for number in np.unique(joint.recording):
         chosen = joint.recording == number
         time_s, value = joint.time_s[chosen], _unwrapped_values(joint.value[chosen])
@@ -130,17 +140,18 @@ def motion_of(joint: Series) -> JointMotion:
 
 
 def is_wrapped(value: Floats) -> bool:
-    """Whether readings jump by about a turn and stay within one."""
+    """Whether readings (n,) [rad] jump by about a turn and stay within one, but for noise."""
     jumps = np.abs(np.diff(value)) > math.pi
     return bool(jumps.any() and np.ptp(value) <= 1.05 * TURN)
 
 
 def _unwrapped_values(value: Floats) -> Floats:
+    """Readings (n,) [rad] of one recording that count on over turns."""
     return np.asarray(np.unwrap(value)) if is_wrapped(value) else value
 
 
 def _unwrapped(joint: Series) -> Floats:
-    """Positions without jumps, not even from one recording to the next."""
+    """Positions (n,) [rad] that count on over turns, and over recordings without a jump."""
     value = joint.value.astype(float)
     if is_wrapped(value):
         return np.asarray(np.unwrap(value))
@@ -152,21 +163,42 @@ def _unwrapped(joint: Series) -> Floats:
 def _smoothed(
     time_s: Floats, value: Floats
 ) -> tuple[Floats, Floats, Floats, Floats, NDArray[np.bool_], float]:
-    """Time, position, speed, acceleration on an even grid; where samples are near; noise."""
+    """Smooth the positions of one recording by a cubic that is fitted around each time.
+
+    Parameters
+    ----------
+    time_s, value : (n,) arrays
+        Times [s] and positions [rad] that count on over turns.
+
+    Returns
+    -------
+    time_s, position, speed, acceleration : (m,) arrays
+        At even steps, half a window inside the first and the last sample [s, rad, rad/s, rad/s^2].
+    near : (m,) array of bool
+        Whether the time is not in a gap between samples.
+    noise : float
+        Standard deviation of the samples about the smoothed position [rad].
+    """
+    # positions at even steps of time
     step = float(np.median(np.diff(time_s)))
     grid = np.arange(time_s[0], time_s[-1], step)
     even = np.interp(grid, time_s, value)
+    # a cubic by least squares over each window, whose coefficients are sums of the positions with weights
     half = max(_LEAST_WINDOW, round(_WINDOW_S / step)) // 2
     offsets = step * np.arange(-half, half + 1)
-    rows = np.linalg.pinv(np.vander(offsets, 4, increasing=True))  # a local cubic by least squares
-    position, speed, halved = (np.convolve(even, row[::-1], mode="valid") for row in rows[:3])
+    weights = np.linalg.pinv(np.vander(offsets, 4, increasing=True))
+    position, speed, half_acceleration = (np.convolve(even, row[::-1], mode="valid") for row in weights[:3])
+    acceleration = 2.0 * half_acceleration
     inner = slice(half, len(grid) - half)
-    left = value - np.interp(time_s, grid[inner], position, left=np.nan, right=np.nan)
-    noise = float(np.nanmedian(np.abs(left)) / 0.6745 / math.sqrt(1.0 - rows[0, half]))
-    acceleration = 2.0 * halved
-    error = 2.0 * noise * float(np.linalg.norm(rows[2]))
-    # an encoder's noise shall not stand in the torque as the leg's inertia
+    # noise by the median residual, which is 0.6745 standard deviations of a normal distribution; the fit
+    # follows the noise of its middle sample in part, so that residuals are smaller than the noise
+    residual = value - np.interp(time_s, grid[inner], position, left=np.nan, right=np.nan)
+    noise = float(np.nanmedian(np.abs(residual)) / 0.6745 / math.sqrt(1.0 - weights[0, half]))
+    # The acceleration is reduced to the fraction of its variance that is not noise of the encoder, because
+    # the fit of the torque would take that noise for the inertia of the leg.
+    error = 2.0 * noise * float(np.linalg.norm(weights[2]))
     acceleration *= max(0.0, 1.0 - error**2 / max(float(acceleration.var()), error**2, _NO_VARIANCE))
+    # gaps: the distance of the samples before and after each time
     after = np.searchsorted(time_s, grid[inner]).clip(1, len(time_s) - 1)
     near = time_s[after] - time_s[after - 1] <= _GAP_SAMPLES * step
     return grid[inner], position, speed, acceleration, near, noise
@@ -175,21 +207,22 @@ def _smoothed(
 # A torque and the motion of a joint at the torque's times, while the joint turns.
 
 
-_MOVING = 0.2  # of the usual speed, below which the leg stands or starts
-_WAVES = 8  # a turn, of the ripple that repeats
+_MOVING = 0.2  # of the median speed: below, the leg stands or starts
+_WAVES = 8  # harmonics of a turn of the crank, in the ripple of the speed that repeats
 _SLOW_S = 1.0  # averaging time for a speed without its ripple
-_STEADY = 0.08  # relative width of a speed that counts as one
+_STEADY = 0.08  # relative difference up to which two speeds count as the same
 
 
 @attrs.frozen(eq=False)
 class Pair:
-    """Torque samples with the joint's motion.
+    """Samples of a torque, paired with the motion of a joint at their times.
 
     Attributes
     ----------
     time_s, torque, position_rad, speed_radps, acceleration_radps2 : (n,) arrays
-        The torque in its own unit; the motion is the joint's, not the crank's.
+        The torque is in the unit of its sensor; the motion is the joint's, before any gear to the crank.
     recording : (n,) array of int
+        Index of the recording.
     interval_s : float
         Sampling interval of the torque [s].
     """
@@ -208,7 +241,7 @@ class Pair:
         return attrs.evolve(self, **columns)
 
     def earlier(self, by_s: float) -> tuple[Floats, Floats, Floats]:
-        """Position, speed and acceleration, each (n,), some time before each sample [s]."""
+        """Position, speed and acceleration, each (n,), by a time [s] before each sample."""
         motion = (self.position_rad, self.speed_radps, self.acceleration_radps2)
         if by_s == 0.0:
             return motion
@@ -235,6 +268,7 @@ def paired(motion: JointMotion, torque: Series) -> Pair:
     for number in np.unique(motion.recording):
         of_joint, of_torque = motion.recording == number, torque.recording == number
         time_s, times = motion.time_s[of_joint], torque.time_s[of_torque]
+        # torque samples within the motion, and of these the ones that are not in a gap of it
         inside = (times >= time_s[0]) & (times <= time_s[-1])
         inside[inside] = np.interp(times[inside], time_s, motion.near[of_joint].astype(float)) > 0.5
         at = times[inside]
@@ -249,9 +283,13 @@ def paired(motion: JointMotion, torque: Series) -> Pair:
 
 
 def with_repeating_acceleration(pair: Pair, ratio: float) -> Pair:
-    """The pair with the acceleration that repeats in each turn of the crank, by its speed.
+    """The pair with only that part of the acceleration that repeats in each turn of the crank.
 
-    Over many turns an encoder's noise averages out; that of a single one may be as large as the acceleration.
+    Noise of the encoder may be as large as the acceleration within one turn, but averages out over many.
+
+    The speed is modelled as u (1 + w(φ)): u is its mean over a turn of the crank, and w a Fourier series of
+    the crank angle φ = ratio · position, fitted by least squares. So the acceleration is u w'(φ) dφ/dt, with
+    dφ/dt = ratio · u.
 
     Parameters
     ----------
@@ -263,22 +301,25 @@ def with_repeating_acceleration(pair: Pair, ratio: float) -> Pair:
     order = np.arange(1, _WAVES + 1)
     angle = np.outer(ratio * pair.position_rad, order)
     waves = np.concatenate([np.cos(angle), np.sin(angle)], axis=1)
-    size = np.linalg.lstsq(waves, pair.speed_radps / speed - 1.0, rcond=None)[0]
-    slopes = np.concatenate([-order * np.sin(angle), order * np.cos(angle)], axis=1) @ size
-    return attrs.evolve(pair, acceleration_radps2=ratio * speed**2 * slopes)
+    amplitudes = np.linalg.lstsq(waves, pair.speed_radps / speed - 1.0, rcond=None)[0]
+    slope = np.concatenate([-order * np.sin(angle), order * np.cos(angle)], axis=1) @ amplitudes
+    return attrs.evolve(pair, acceleration_radps2=ratio * speed**2 * slope)
 
 
 def slow_speed(pair: Pair, span_s: float = _SLOW_S) -> Floats:
-    """Speed of the joint without the ripple of a turn (n,) [rad/s]: its mean over some time."""
-    number = max(1, min(len(pair.time_s) // 4, round(span_s / max(pair.interval_s, 1.0e-6))))
+    """Speed of the joint (n,) [rad/s] without its ripple: the mean over a time [s] around each sample.
+
+    That is over at most a quarter of all samples, and at both ends over those that there are.
+    """
+    samples = max(1, min(len(pair.time_s) // 4, round(span_s / max(pair.interval_s, 1.0e-6))))
     total = np.concatenate([[0.0], np.cumsum(pair.speed_radps)])
-    after = np.minimum(np.arange(len(pair.time_s)) + number // 2 + 1, len(pair.time_s))
-    before = np.maximum(np.arange(len(pair.time_s)) - number // 2, 0)
+    after = np.minimum(np.arange(len(pair.time_s)) + samples // 2 + 1, len(pair.time_s))
+    before = np.maximum(np.arange(len(pair.time_s)) - samples // 2, 0)
     return np.asarray((total[after] - total[before]) / (after - before))
 
 
 def is_steady(pair: Pair) -> NDArray[np.bool_]:
-    """Where the speed without its ripple is about the same half a second before and after (n,)."""
+    """Whether (n,) the speed without its ripple is about the same half a second before and after a sample."""
     speed, at = slow_speed(pair), np.arange(len(pair.time_s))
     half = round(0.5 * _SLOW_S / max(pair.interval_s, 1.0e-6))
     before, after = np.maximum(at - half, 0), np.minimum(at + half, len(at) - 1)
@@ -286,14 +327,16 @@ def is_steady(pair: Pair) -> NDArray[np.bool_]:
 
 
 def steady_stretch(pair: Pair) -> Pair:
-    """Longest stretch at one speed, in one direction, in one recording."""
+    """Longest stretch of samples at about one speed, in one direction, in one recording."""
     speed = slow_speed(pair)
+    # each speed that occurs is tried as the one
     centres = np.quantile(speed, np.linspace(0.05, 0.95, 19))
     best = slice(0, 0)
     for centre in centres:
         steady = np.abs(speed - centre) <= _STEADY * abs(centre)
-        whole = steady[1:] & steady[:-1] & (np.diff(pair.recording) == 0)
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], whole, [False]]).astype(int)))
+        # which samples belong together with the next one; a stretch is a run of these
+        linked = steady[1:] & steady[:-1] & (np.diff(pair.recording) == 0)
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], linked, [False]]).astype(int)))
         for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
             if last - first > best.stop - best.start:
                 best = slice(first, last + 1)

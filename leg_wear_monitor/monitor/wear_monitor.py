@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from leg_wear_monitor.configuration import Doubt
-from leg_wear_monitor.errors import LegWearError, closed_at_the_end
+from leg_wear_monitor.errors import LegWearError, closed_on_interrupt
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms import Alarm
@@ -620,7 +620,7 @@ def open_monitor(
     ledger = open_ledger(mechanism, config, at_end)
     if ledger is None:
         return WearMonitor(mechanism, config, sampling=sampling)
-    with closed_at_the_end(ledger.abandon):
+    with closed_on_interrupt(ledger.abandon):
         try:
             return WearMonitor(mechanism, config, ledger, sampling)
         except BaseException:

@@ -15,7 +15,7 @@ from rclpy.subscription import Subscription
 from std_srvs.srv import Trigger
 
 from leg_wear_monitor.dynamics.clearance.stepper import advance_beside
-from leg_wear_monitor.errors import LegWearError, closed_at_the_end
+from leg_wear_monitor.errors import LegWearError, closed_on_interrupt
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.messages import outputs
 from leg_wear_monitor.messages.cdr import Decoder
@@ -217,7 +217,7 @@ class MonitorNode(ClosingNode):
         self._monitor.go_live()
         # until `close`: a signal may arrive before the caller of the constructor holds this node
         self._in_order = ExitStack()
-        self._in_order.enter_context(closed_at_the_end(self._monitor.close))
+        self._in_order.enter_context(closed_on_interrupt(self._monitor.close))
         try:
             self._get_ready(parameters)
         except BaseException:  # signals included: the next start must not consider the ledger truncated

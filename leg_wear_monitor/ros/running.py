@@ -20,7 +20,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.utilities import remove_ros_args, try_shutdown
 
-from leg_wear_monitor.errors import ConfigError, LegWearError, printable, put_in_order, would_be_lost
+from leg_wear_monitor.errors import ConfigError, LegWearError, close_open, printable, would_be_lost
 from leg_wear_monitor.monitor.config.parameters import sections_for_others
 from leg_wear_monitor.ros.parameters import ParameterNode
 
@@ -186,7 +186,7 @@ def _stop_making(_number: int, frame: FrameType | None) -> None:
         raise KeyboardInterrupt
     code = COULD_NOT
     try:
-        put_in_order()
+        close_open()
         code = DONE
     except LegWearError as error:
         _print_error(error)
@@ -235,7 +235,7 @@ def run(
             for number in _SIGNALS:
                 signal.signal(number, lambda *_: asked.set())
         except KeyboardInterrupt:  # interrupted before the node started
-            put_in_order()  # the node may be complete but not yet assigned
+            close_open()  # the node may be complete but not yet assigned
             return DONE
         try:
             serve(node, lambda: not asked.is_set())

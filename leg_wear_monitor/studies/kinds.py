@@ -12,7 +12,7 @@ from leg_wear_monitor.studies.plan import (
     Ensemble,
     Names,
     OneClearance,
-    OnePlace,
+    OneSet,
     Point,
     Settings,
     Study,
@@ -25,8 +25,8 @@ from leg_wear_monitor.studies.plan import (
     count_field,
     cycle_cost,
     millimetres,
-    place,
     response,
+    run_settings,
     set_name,
     some_of,
     speed_field,
@@ -65,11 +65,11 @@ class Exponent:
     )
 
 
-def exponent_point(label: str, where: Settings, ensemble: Ensemble, exponent: Exponent) -> Point:
+def exponent_point(label: str, run: Settings, ensemble: Ensemble, exponent: Exponent) -> Point:
     """Point of a Lyapunov exponent for given run settings."""
-    settings = where | {"perturb_fraction": ensemble.perturb_fraction, "seed": ensemble.seed}
+    settings = run | {"perturb_fraction": ensemble.perturb_fraction, "seed": ensemble.seed}
     settings |= attrs.asdict(exponent) | {"skip_cycles": ensemble.skip_cycles}
-    cost = 6.0 * exponent.runs * exponent.cycles * cycle_cost(where)
+    cost = 6.0 * exponent.runs * exponent.cycles * cycle_cost(run)
     return Point(label=label, task="exponent", settings=settings, cost=cost)
 
 
@@ -84,7 +84,7 @@ class Bifurcation:
 
 
 @attrs.frozen(kw_only=True)
-class Chaos(OnePlace):
+class Chaos(OneSet):
     """Predictability of the motion."""
 
     title = "Predictability of the motion"
@@ -101,25 +101,25 @@ class Chaos(OnePlace):
     def points(self) -> list[Point]:
         """The response, its Poincaré section, exponents of all sets, sections over clearance and speed."""
         over = self.bifurcation
-        sections = [self._section("section", self.place(), self.section_cycles, PORTRAIT_CYCLES)]
+        sections = [self._section("section", self.run_of(self.joints), self.section_cycles, PORTRAIT_CYCLES)]
         for size in over.clearances_m:
-            where = place(self.joints, size, self.speed_rpm)
-            sections.append(self._section(millimetres(size), where, over.cycles))
+            run = run_settings(self.joints, size, self.speed_rpm)
+            sections.append(self._section(millimetres(size), run, over.cycles))
         for speed in over.speeds_rpm:
-            where = place(self.joints, self.clearance_m, speed)
-            sections.append(self._section(f"{speed:g} rpm", where, over.cycles))
+            run = run_settings(self.joints, self.clearance_m, speed)
+            sections.append(self._section(f"{speed:g} rpm", run, over.cycles))
         exponents = [
-            exponent_point(set_name(joints), self.at(joints), self.ensemble, self.exponent)
+            exponent_point(set_name(joints), self.run_of(joints), self.ensemble, self.exponent)
             for joints in (self.joints, *self.others)
         ]
         return [self.response(set_name(self.joints)), sections[0], *exponents, *sections[1:]]
 
-    def _section(self, label: str, where: Settings, cycles: int, portrait_cycles: int = 0) -> Point:
+    def _section(self, label: str, run: Settings, cycles: int, portrait_cycles: int = 0) -> Point:
         skipped = self.bifurcation.skip_cycles
-        settings = where | {"perturb_fraction": self.ensemble.perturb_fraction, "seed": self.ensemble.seed}
+        settings = run | {"perturb_fraction": self.ensemble.perturb_fraction, "seed": self.ensemble.seed}
         settings |= {"cycles": cycles, "portrait_cycles": portrait_cycles, "skip_cycles": skipped}
         settings |= {"crank_angle_deg": self.section_crank_angle_deg, "runs": 1}
-        cost = (cycles + skipped) * cycle_cost(where)
+        cost = (cycles + skipped) * cycle_cost(run)
         return Point(label=label, task="section", settings=settings, cost=cost)
 
 
@@ -132,7 +132,7 @@ _OF_HERTZ = tuple(law for law in NORMAL_LAWS if law != "winkler")
 
 
 @attrs.frozen(kw_only=True)
-class Laws(OnePlace):
+class Laws(OneSet):
     """The normal force and friction laws against each other."""
 
     title = "Contact and friction laws"
@@ -206,12 +206,12 @@ class Legs(OneClearance):
         return [self._leg(number) for number in range(self.legs + 1)]
 
     def _leg(self, number: int) -> Point:
-        where = self.at(
+        run = self.run_of(
             ALL, sets=[list(joints) for joints in SETS], leg=number, draw_seed=self.draw_seed,
             length_tolerance=self.length_tolerance, mass_tolerance=self.mass_tolerance,
         )  # fmt: skip
-        each = (response("", self.at(joints), self.ensemble) for joints in SETS)
-        settings = where | attrs.asdict(self.ensemble)
+        each = (response("", self.run_of(joints), self.ensemble) for joints in SETS)
+        settings = run | attrs.asdict(self.ensemble)
         label = f"leg {number}" if number else "leg of the file"
         return Point(label=label, task="leg", settings=settings, cost=sum(point.cost for point in each))
 
@@ -233,14 +233,14 @@ class Location(OneClearance):
         return [self._response(joints) for joints in self.sets]
 
     def _response(self, joints: Names) -> Point:
-        return response(set_name(joints), self.at(joints), self.ensemble)
+        return response(set_name(joints), self.run_of(joints), self.ensemble)
 
 
 # Study ``lubrication``: joints dry, and with oil or grease of several viscosities.
 
 
 @attrs.frozen(kw_only=True)
-class Lubrication(OnePlace):
+class Lubrication(OneSet):
     """The same joints dry and greased, with the same wear coefficient where surfaces touch."""
 
     title = "Oil and grease"
@@ -304,8 +304,8 @@ class Size(Study):
     def points(self) -> list[Point]:
         """Responses over the clearance."""
         return [
-            response(millimetres(clearance), place(self.joints, clearance, self.speed_rpm), self.ensemble)
-            for clearance in self.clearances_m
+            response(millimetres(size), run_settings(self.joints, size, self.speed_rpm), self.ensemble)
+            for size in self.clearances_m
         ]
 
 
@@ -327,7 +327,7 @@ class Speed(Study):
     def points(self) -> list[Point]:
         """Responses over the speed."""
         return [
-            response(f"{speed:g} rpm", place(self.joints, self.clearance_m, speed), self.ensemble)
+            response(f"{speed:g} rpm", run_settings(self.joints, self.clearance_m, speed), self.ensemble)
             for speed in self.speeds_rpm
         ]
 
@@ -360,12 +360,12 @@ class Life:
     runs: int = count_field("lives with different initial conditions", 2, 4)
 
 
-def life_point(label: str, where: Settings, ensemble: Ensemble, life: Life) -> Point:
+def life_point(label: str, run: Settings, ensemble: Ensemble, life: Life) -> Point:
     """Point of a life for given run settings."""
-    settings = where | attrs.asdict(life)
+    settings = run | attrs.asdict(life)
     settings |= {"perturb_fraction": ensemble.perturb_fraction, "seed": ensemble.seed}
     cycles = _LIKELY_JUMPS * life.opens_m / life.jump_m * (life.cycles + 1)
-    return Point(label=label, task="life", settings=settings, cost=life.runs * cycles * cycle_cost(where))
+    return Point(label=label, task="life", settings=settings, cost=life.runs * cycles * cycle_cost(run))
 
 
 @attrs.frozen(kw_only=True)
@@ -380,7 +380,7 @@ class Wear(Location):
     def points(self) -> list[Point]:
         """The response of every set, and its life."""
         return super().points() + [
-            life_point(set_name(joints), self.at(joints), self.ensemble, self.life) for joints in self.sets
+            life_point(set_name(names), self.run_of(names), self.ensemble, self.life) for names in self.sets
         ]
 
 
@@ -388,7 +388,7 @@ class Wear(Location):
 
 
 @attrs.frozen(kw_only=True)
-class Load(OnePlace):
+class Load(OneSet):
     """The same leg under forces of the ground of several sizes, in the stance of a person."""
 
     title = "Load of the ground"
@@ -411,12 +411,12 @@ class Load(OnePlace):
         """Response, life and Lyapunov exponent under each load."""
         points = []
         for load_n in self.loads_n:
-            where = self.place(ground_n=load_n)
+            run = self.run_of(self.joints, ground_n=load_n)
             label = f"{load_n:g} N"
             points += [
-                response(label, where, self.ensemble),
-                life_point(label, where, self.ensemble, self.life),
-                exponent_point(label, where, self.ensemble, self.exponent),
+                response(label, run, self.ensemble),
+                life_point(label, run, self.ensemble, self.life),
+                exponent_point(label, run, self.ensemble, self.exponent),
             ]
         return points
 

@@ -235,7 +235,7 @@ _OF_JOINTS = (
     "impact_speed_mps",
     "contact_fraction",
     "friction_work_j_per_cycle",
-    plan.VOLUME,
+    plan.ARCHARD,
     plan.DEPTH,
 )
 

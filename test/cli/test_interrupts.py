@@ -10,7 +10,7 @@ import sys
 
 import pytest
 
-from leg_wear_monitor.errors import closed_at_the_end, put_in_order, would_be_lost
+from leg_wear_monitor.errors import close_open, closed_on_interrupt, would_be_lost
 from leg_wear_monitor.files import share_directory
 
 RUN = """
@@ -76,13 +76,13 @@ def test_the_ledger_of_a_replay_that_is_still_compiling_is_left_in_order(tmp_pat
 @pytest.mark.plain
 def test_what_is_open_is_closed_once_the_newest_first():
     closed = []
-    with closed_at_the_end(lambda: closed.append("outer")):
-        with closed_at_the_end(lambda: closed.append("done")):
+    with closed_on_interrupt(lambda: closed.append("outer")):
+        with closed_on_interrupt(lambda: closed.append("done")):
             pass
-        with closed_at_the_end(lambda: closed.append("inner")):
-            put_in_order()
-            put_in_order()
-    put_in_order()
+        with closed_on_interrupt(lambda: closed.append("inner")):
+            close_open()
+            close_open()
+    close_open()
     assert closed == ["inner", "outer"]
 
 

@@ -284,7 +284,7 @@ def test_a_ledger_that_cannot_be_written_is_refused_before_the_work(
     path = tmp_path / "own.db"
     open_ledger(lw.load_mechanism("bionic_leg"), ledger_at(path)).abandon()
     before = path.read_bytes()
-    monkeypatch.setattr("leg_wear_monitor.monitor.ledger.file._is_writable", lambda _path: False)
+    monkeypatch.setattr("leg_wear_monitor.monitor.ledger.file._is_opened_to_write", lambda _path: False)
     with pytest.raises(lw.LegWearError, match=r"own.db: cannot be written: attempt to write a readonly"):
         lw.replay(bag, lw.MonitorConfig(), ledger=path)
     assert path.read_bytes() == before

@@ -15,7 +15,7 @@ import click
 
 from leg_wear_monitor.cli import common
 from leg_wear_monitor.cli.verbs.study import DEFAULT_MODEL
-from leg_wear_monitor.errors import ConfigWarning, LegWearError, extras_named
+from leg_wear_monitor.errors import ConfigWarning, LegWearError, extras_hinted
 from leg_wear_monitor.files import json_text, package_version, share_directory
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def _all_well(parts: Mapping[str, Callable[[], str]]) -> bool:
     well = True
     for name, part in parts.items():
         try:
-            with extras_named():
+            with extras_hinted():
                 click.echo(f"{name:<13} {part()}")
         except LegWearError as error:
             click.echo(f"error: {error}", err=True)

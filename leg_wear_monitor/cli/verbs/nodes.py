@@ -17,7 +17,7 @@ import click
 
 from leg_wear_monitor.cli import common
 from leg_wear_monitor.cli.start import main as program
-from leg_wear_monitor.errors import LegWearError, closed_at_the_end
+from leg_wear_monitor.errors import LegWearError, closed_on_interrupt
 from leg_wear_monitor.files import package_version, share_directory
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ def _compile(out: Path) -> None:
         log_path.open("wb") as log,
         # a group of its own: Ctrl-C reaches it by us, once
         subprocess.Popen(python_command(compile_leg), stdout=log, stderr=log, start_new_session=True) as leg,
-        closed_at_the_end(leg.kill),
+        closed_on_interrupt(leg.kill),
         advance_beside(),
     ):
         try:
@@ -174,7 +174,7 @@ def _process(verb: str, out: Path, domain: int, **paths: Path) -> "Iterator[subp
     with (out / f"{verb}.log").open("wb") as log:
         process = subprocess.Popen(command, env=environment, stdout=log, stderr=subprocess.STDOUT)
         try:
-            with closed_at_the_end(process.terminate):
+            with closed_on_interrupt(process.terminate):
                 yield process
         finally:
             if process.poll() is None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from leg_wear_monitor.cli import common
-from leg_wear_monitor.errors import ConfigError, closed_at_the_end
+from leg_wear_monitor.errors import ConfigError, closed_on_interrupt
 from leg_wear_monitor.files import package_version
 from leg_wear_monitor.monitor.alarm_specs import INPUT_KINDS, KINDS
 
@@ -125,7 +125,7 @@ def _run(
 
     def ready(monitor: Any) -> None:
         common.warn_of(str(config or "parameters"), monitor.coefficient_doubts)
-        with common.compilation("monitor", how_long="about a minute"), closed_at_the_end(monitor.abandon):
+        with common.compilation("monitor", how_long="about a minute"), closed_on_interrupt(monitor.abandon):
             monitor.warm_up()
         began[0] = time.perf_counter()
 

@@ -34,7 +34,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
     binding_of,
     coefficient_spans,
 )
-from leg_wear_monitor.monitor.ledger.file import MOVE, LedgerError, connect, copy_of, create, transaction
+from leg_wear_monitor.monitor.ledger.file import REMEDY, LedgerError, connect, copy_of, create, transaction
 from leg_wear_monitor.state import Evidence, Verdict
 
 WHOLE_S = 60.0
@@ -426,7 +426,7 @@ def _damage_told(path: Path) -> Iterator[None]:
     try:
         yield
     except (sqlite3.Error, ValueError, TypeError) as error:
-        raise LedgerError(f"{path}: is damaged: {error}; {MOVE}") from error
+        raise LedgerError(f"{path}: is damaged: {error}; {REMEDY}") from error
 
 
 def _place(path: Path) -> tuple[int, int] | None:

@@ -24,8 +24,8 @@ from leg_wear_monitor.report.study.text import (
 )
 from leg_wear_monitor.studies.leg_tasks import DEAD_POINT, OPEN, STEP, TRANSMISSION
 from leg_wear_monitor.studies.plan import (
+    ARCHARD,
     DEPTH,
-    VOLUME,
     Arrays,
     Found,
     Spread,
@@ -198,7 +198,7 @@ def zones(found: Found) -> list[str]:
 
 def several_at_once(alone: Found, whole: Arrays) -> list[str]:
     """The worst joint with all clearances at once, and these against the sum of the places alone."""
-    volume, depth = _order(whole, VOLUME), _order(whole, DEPTH)
+    volume, depth = _order(whole, ARCHARD), _order(whole, DEPTH)
     return [
         f"With clearance in all of them, worn volume falls in the order {' > '.join(volume)}, "
         f"greatest depth in the order {' > '.join(depth)}: {volume[0]} wears most, {volume[-1]} least.",
@@ -241,7 +241,7 @@ def _joint_times(before: Arrays, after: Arrays, name: str, joint: str) -> str:
 
 def _joint_against_alone(joint: str, alone: Arrays, whole: Arrays) -> str:
     force, volume, depth = (
-        _joint_times(alone, whole, name, joint) for name in ("peak_force_n", VOLUME, DEPTH)
+        _joint_times(alone, whole, name, joint) for name in ("peak_force_n", ARCHARD, DEPTH)
     )
     return (
         f"Joint {joint}, all at once against its place alone: largest contact force {force}, "
@@ -258,7 +258,7 @@ def laws(found: Found) -> list[str]:
     groups = (("The normal laws", normal), ("The dissipative ones", dissipative), ("Friction", friction))
     sentences = [_law_sentence(what, group) for what, group in groups if len(group) > 1]
     for joint in clearance_joints_of(found[0][1]):
-        volumes = [(of_joint(arrays, VOLUME, joint), point.label) for point, arrays in found]
+        volumes = [(of_joint(arrays, ARCHARD, joint), point.label) for point, arrays in found]
         low, high = min(volumes), max(volumes)
         sentences.append(
             f"Wear of {joint}, ∫ F |v| dt [J a cycle]: from {with_spread(low[0])} ({low[1]}) "
@@ -273,7 +273,7 @@ def _law_sentence(what: str, group: Found) -> str:
         each.title: [largest_error(arrays, each.name) for _, arrays in group] for each in quantities(group)
     }
     for joint in clearance_joints_of(group[0][1]):
-        values[f"wear of {joint}"] = [of_joint(arrays, VOLUME, joint) for _, arrays in group]
+        values[f"wear of {joint}"] = [of_joint(arrays, ARCHARD, joint) for _, arrays in group]
     texts = []
     for name, spreads in values.items():
         means = np.array([each.mean for each in spreads])
@@ -300,7 +300,7 @@ def _wear_and_life(arrays: Arrays) -> str:
     depths = {joint: of_joint(arrays, DEPTH, joint) for joint in _order(arrays, DEPTH)}
     worn = [joint for joint in depths if depths[joint].mean > 0.0]
     # surfaces that rub without wear have no coefficient; the others, a film carries
-    rubbing = [joint for joint in depths if joint not in worn and of_joint(arrays, VOLUME, joint).mean > 0.0]
+    rubbing = [joint for joint in depths if joint not in worn and of_joint(arrays, ARCHARD, joint).mean > 0.0]
     not_counted = f"wear of {joined(rubbing)} is not counted, without a wear coefficient" if rubbing else ""
     if not worn:
         return f"{not_counted}." if rubbing else "the films carry everything, and no joint wears."
@@ -322,7 +322,7 @@ def _against_dry(arrays: Arrays, dry: Arrays) -> str:
     """Wear relative to that of the dry joints, and the fraction of time in contact."""
     wear_texts, contact_texts = [], []
     for joint in clearance_joints_of(dry):
-        before, after = (of_joint(each, VOLUME, joint).mean for each in (dry, arrays))
+        before, after = (of_joint(each, ARCHARD, joint).mean for each in (dry, arrays))
         wear_texts.append(f"{joint} {percent(after / before) if before > 0.0 else '–'}")
         contact_texts.append(f"{joint} {percent(of_joint(arrays, 'contact_fraction', joint).mean)}")
     return (
@@ -344,7 +344,7 @@ def load(found: Found) -> list[str]:
         sentences.append(
             f"Joint {joint}, from {first.label} to {last.label}: mean force {' to '.join(force)} N "
             f"({_joint_times(before, after, 'mean_force_n', joint)}), worn volume "
-            f"{_joint_times(before, after, VOLUME, joint)}, greatest depth {' to '.join(depth)} pm a cycle "
+            f"{_joint_times(before, after, ARCHARD, joint)}, greatest depth {' to '.join(depth)} pm a cycle "
             f"({_joint_times(before, after, DEPTH, joint)})."
         )
     head = "zone that holds half of the bushing's wear"

@@ -65,7 +65,7 @@ from leg_wear_monitor.report.study.text import (
     wear_table,
 )
 from leg_wear_monitor.studies.kinds import STUDIES
-from leg_wear_monitor.studies.plan import DEPTH, VOLUME, Found, Sweep, clearance_joints_of, spread
+from leg_wear_monitor.studies.plan import ARCHARD, DEPTH, Found, Sweep, clearance_joints_of, spread
 from leg_wear_monitor.studies.results import FAILS, HOLDS, UNDECIDED, LegClaims, StudyResults
 
 CLEARANCE_FRACTION = 0.3  # drawn clearance, as a fraction of the bushing's radius
@@ -225,7 +225,7 @@ def _load(results: StudyResults, found: Found) -> _Own:
     panels = [
         *panels_of(found),
         panel_of_joints(found, "mean_force_n", "mean force [N]"),
-        panel_of_joints(found, VOLUME, "∫ F |v| dt [J a cycle]"),
+        panel_of_joints(found, ARCHARD, "∫ F |v| dt [J a cycle]"),
         Spreads("life of the joint that opens first [million cycles]", {"": life}, MILLIONTH),
         exponent_panel([by_label.get(point.label) for point, _ in found]),
     ]

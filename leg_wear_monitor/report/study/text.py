@@ -8,10 +8,10 @@ import numpy as np
 
 from leg_wear_monitor.report.page import Table
 from leg_wear_monitor.studies.plan import (
+    ARCHARD,
     DEPTH,
     ERRORS,
     TITLES,
-    VOLUME,
     Arrays,
     Estimate,
     Found,
@@ -172,7 +172,7 @@ def wear_table(found: Found, head: str) -> Table:
     """Table of wear."""
     columns = {
         "greatest depth [pm a cycle]": _mean(DEPTH, PICO),
-        "∫ F |v| dt [J a cycle]": _mean(VOLUME),
+        "∫ F |v| dt [J a cycle]": _mean(ARCHARD),
         "zone with half of the wear": _zone(0.5),
         "zone with 90 % of it": _zone(0.9),
     }

@@ -109,20 +109,21 @@ def why_not_a_crank(joint: Series) -> str:
         return f"moves by {reach:.2g} rad in all"
     coarse = position[:: max(1, len(position) // 2000)]  # so that noise adds no path
     path = float(np.abs(np.diff(coarse)).sum())
-    return f"swings to and fro within {reach:.2g} rad" if reach < _ROCKING * path else ""
+    if reach < _ROCKING * path:
+        return f"swings to and fro within {reach:.2g} rad"
+    return "" if len(_long_enough(joint)) else "has no recording that is long enough to be smoothed"
 
 
 def motion_of(joint: Series) -> JointMotion:
     """Smoothed motion of a joint for which `why_not_a_crank` is empty.
 
-    Each recording is smoothed by itself; one with less than 2 `_LEAST_WINDOW` samples is left out.
+    Each recording is smoothed by itself; one that is too short is left out.
     """
     parts = []  # of each recording: its index, its first reading, and the six results of `_smoothed`
-    for number in np.unique(joint.recording):
-        chosen = joint.recording == number
-        time_s, value = joint.time_s[chosen], _unwrapped_values(joint.value[chosen])
-        if len(time_s) >= 2 * _LEAST_WINDOW:
-            parts.append((number, value[0], *_smoothed(time_s, value)))
+    for index in _long_enough(joint):
+        chosen = joint.recording == index
+        value = _unwrapped_values(joint.value[chosen])
+        parts.append((index, value[0], *_smoothed(joint.time_s[chosen], value)))
     columns = [np.concatenate([part[i] for part in parts]) for i in range(2, 7)]
     number = np.concatenate([np.full(len(part[2]), part[0]) for part in parts])
     return JointMotion(
@@ -137,6 +138,24 @@ def motion_of(joint: Series) -> JointMotion:
         first_rad=np.array([part[1] for part in parts]),
         rate_hz=float(1.0 / np.median(np.diff(joint.time_s))),
     )
+
+
+def _long_enough(joint: Series) -> list[int]:
+    """Indices of the recordings that are longer than a window of the smoothing."""
+    found = []
+    for number in np.unique(joint.recording).tolist():
+        time_s = joint.time_s[joint.recording == number]
+        if len(time_s) >= 2 * _LEAST_WINDOW:
+            step, half = _window(time_s)
+            if time_s[-1] - time_s[0] > (2 * half + 1) * step:
+                found.append(number)
+    return found
+
+
+def _window(time_s: Floats) -> tuple[float, int]:
+    """Sampling interval of a recording [s], and the samples on either side of a time that smooth it."""
+    step = float(np.median(np.diff(time_s)))
+    return step, max(_LEAST_WINDOW, round(_WINDOW_S / step)) // 2
 
 
 def is_wrapped(value: Floats) -> bool:
@@ -180,11 +199,10 @@ def _smoothed(
         Standard deviation of the samples about the smoothed position [rad].
     """
     # positions at even steps of time
-    step = float(np.median(np.diff(time_s)))
+    step, half = _window(time_s)
     grid = np.arange(time_s[0], time_s[-1], step)
     even = np.interp(grid, time_s, value)
     # a cubic by least squares over each window, whose coefficients are sums of the positions with weights
-    half = max(_LEAST_WINDOW, round(_WINDOW_S / step)) // 2
     offsets = step * np.arange(-half, half + 1)
     weights = np.linalg.pinv(np.vander(offsets, 4, increasing=True))
     position, speed, half_acceleration = (np.convolve(even, row[::-1], mode="valid") for row in weights[:3])

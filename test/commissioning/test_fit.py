@@ -11,6 +11,7 @@ from leg_wear_monitor.estimate.joint_motion import (
     Series,
     motion_of,
     paired,
+    why_not_a_crank,
     with_repeating_acceleration,
 )
 from leg_wear_monitor.estimate.torque_fit import Fit, Start, Terms, fit
@@ -118,3 +119,21 @@ def test_an_acceleration_that_repeats_is_found_behind_the_noise_of_an_encoder(ge
     true = np.interp(pair.time_s, time_s, true)
     off, off_before = (one.acceleration_radps2 / gear - true for one in (found, pair))
     assert off.std() < 0.25 * true.std() < off_before.std()
+
+
+def recordings(lengths: list[int], rate_hz: float) -> Series:
+    """An even turn of a crank, in recordings of given numbers of samples."""
+    time_s = np.concatenate([10.0 * k + np.arange(n) / rate_hz for k, n in enumerate(lengths)])
+    return Series(time_s, TURN * time_s, np.repeat(np.arange(len(lengths)), lengths))
+
+
+@pytest.mark.parametrize("short", [14, 20, 24])
+def test_a_recording_that_is_too_short_to_be_smoothed_is_left_out(short: int) -> None:
+    """It ended in a traceback from fourteen samples on, which a window at 200 Hz is longer than."""
+    found = motion_of(recordings([1000, short], 200.0))
+    assert set(found.recording.tolist()) == {0}
+    assert found.acceleration_radps2 == pytest.approx(np.zeros(len(found.time_s)), abs=1.0e-6)
+
+
+def test_recordings_that_are_all_too_short_are_of_no_crank() -> None:
+    assert "no recording that is long enough" in why_not_a_crank(recordings([10] * 10, 2.0))

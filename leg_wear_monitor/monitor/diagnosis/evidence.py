@@ -248,8 +248,7 @@ class Evidence:
         if state.changes:
             return state.changes[-1].since_ns
         detector = self._models.detector(state, config)
-        found = detector.detection(state.detector) if state.detector else None
-        return found.since_ns if found else 0
+        return detector.detected_ns(state.detector) if state.detector else 0
 
     def _tell(
         self, state: TorqueState, change: Change | None, since_ns: int, cycles: int, config: MonitorConfig

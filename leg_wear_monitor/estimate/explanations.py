@@ -238,9 +238,11 @@ class Explainer:
         covariance, there = self.covariance(cycles), self.model.at(counted_m)[0]
         expected = self.baseline.offset + there
         rest = mean - expected
-        found = [self._as_counted(rest, covariance), *self._others(rest, covariance)]
-        found += self._late(rest, covariance)
-        more, noises = self._noise(rest, expected, covariance, cycles)
+        as_counted = Misfits(rest[None], covariance)
+        found = [as_counted.explanation(0, NamedCause(Cause.UNKNOWN, 0.0, 0.0))]
+        found += self._others(rest, covariance)
+        found += self._late(rest, covariance, as_counted)
+        more, noises = self._noise(rest, expected, covariance, cycles, as_counted)
         found += more
 
         def opened_to(k: int, sizes: Floats, noise: OtherNoise | None) -> Misfits:
@@ -259,11 +261,7 @@ class Explainer:
             found.append(self._clearance(k, counted, noises, opened_to))
         return sorted(found, key=lambda one: one.misfit)
 
-    def _as_counted(self, rest: Floats, covariance: Floats) -> Explanation:
-        misfits = Misfits(rest[None], covariance)
-        return misfits.explanation(0, NamedCause(Cause.UNKNOWN, 0.0, 0.0))
-
-    def _late(self, rest: Floats, covariance: Floats) -> list[Explanation]:
+    def _late(self, rest: Floats, covariance: Floats, as_counted: "Misfits") -> list[Explanation]:
         """The best of the other channels; none where none explains.
 
         A channel that changes much has a large error in each phase, and could seem to explain anything: it
@@ -272,7 +270,7 @@ class Explainer:
         if not self.channels:
             return []
         change = np.array([one.column for one in self.channels])
-        possible = Misfits(rest - change, covariance).square < _LEFT * Misfits(rest[None], covariance).square
+        possible = Misfits(rest - change, covariance).square < _LEFT * as_counted.square
         if not possible.any():
             return []
         misfits = Misfits(rest - change, covariance + _diagonal(MODEL_ERROR * change))
@@ -280,7 +278,7 @@ class Explainer:
         return [misfits.explanation(best, NamedCause(Cause.LAG, self.channels[best].later_s, _LATE_SIGMA_S))]
 
     def _noise(
-        self, rest: Floats, expected: Floats, covariance: Floats, cycles: int
+        self, rest: Floats, expected: Floats, covariance: Floats, cycles: int, as_counted: "Misfits"
     ) -> tuple[list[Explanation], Sequence[OtherNoise]]:
         """Other noise as the cause, and what noise there may be beside an opening.
 
@@ -291,7 +289,7 @@ class Explainer:
         change = np.array([one.shown(expected) for one in self.noises]) - expected
         own = covariance + _diagonal(np.sqrt([one.variance(expected, cycles) for one in self.noises]))
         misfits = Misfits(rest - change, own)
-        possible = misfits.square < _LEFT * Misfits(rest[None], covariance).square
+        possible = misfits.square < _LEFT * as_counted.square
         if not possible.any():
             return [], ()
         best = int(np.where(possible, misfits.value, np.inf).argmin())

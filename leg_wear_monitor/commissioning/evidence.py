@@ -123,9 +123,8 @@ def expected_leg(walk: Walk) -> TorqueReference | None:
 # Clearances of 0.3 mm in five joints of the default leg repeat with 0.03 to 0.17 of the torque, the most at
 # 30 rpm and of a sensor that samples instants, whose impacts do not average out
 _NOTABLE = 0.2
-_LEAST_LOAD = (
-    0.06  # repeating rest below which a load is not looked for: sensors that average have up to 0.05
-)
+# repeating rest below which a load is not looked for: sensors that average have up to 0.05
+_LEAST_LOAD = 0.06
 _EXPLAINS = 0.5  # of the energy of the repeating rest, from which on a cause is named
 _SURE_CAUSE = 5.0  # standard deviations
 

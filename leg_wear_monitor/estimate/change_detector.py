@@ -86,10 +86,9 @@ class ChangeDetector:
         # the baseline is off by the same in each cycle: that alone must not drive a test upwards
         drift = np.sqrt(((weighted @ explainer.baseline.covariance) * weighted).sum(axis=1))
         information = (weighted * change).sum(axis=1)
-        self._half = 0.5 * information + _SIGMAS * drift
         # a part that is new already cannot be renewed
         is_possible = information > _LEAST_INFORMATION
-        self._half = np.where(is_possible, self._half, np.inf)
+        self._half = np.where(is_possible, 0.5 * information + _SIGMAS * drift, np.inf)
         self._excess = excess(_scatter(explainer, change))
         self.threshold = threshold(false_alarm_cycles, len(change))
         self._step, self._counted_m = (information - self._half) / self._excess, counted_m

@@ -1,7 +1,7 @@
 """State of the torque observer; every value is immutable, so a shallow copy is a snapshot."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
 from typing import NamedTuple
 
@@ -465,16 +465,7 @@ class TorqueState:
 
     def know_corrected(self, sigma_m: Floats) -> None:
         """Give the baselines after a correction, of all cadences, other standard deviations (k,) [m]."""
-
-        def known(one: CommissionedTorque) -> CommissionedTorque:
-            return one if one.is_as_counted else attrs.evolve(one, sigma_m=sigma_m)
-
-        self.commissioned = self.commissioned and known(self.commissioned)
-        self.set_aside = tuple(
-            attrs.evolve(one, commissioned=one.commissioned and known(one.commissioned))
-            for one in self.set_aside
-        )
-        self.baselines = tuple(map(known, self.baselines))
+        self._baselines_as(lambda one: one if one.is_as_counted else attrs.evolve(one, sigma_m=sigma_m))
 
     def at(self, profile: CrankProfile) -> AtCadence | None:
         """Another cadence than the present one whose crank turns as in a profile."""
@@ -553,15 +544,16 @@ class TorqueState:
 
     def forget_baselines(self, since_ns: int = 0) -> None:
         """Forget the baselines with gait cycles after a stamp, at all cadences."""
+        self._baselines_as(lambda one: None if one.stamp_ns > since_ns else one)
 
-        def rest(one: CommissionedTorque | None) -> CommissionedTorque | None:
-            return None if one and one.stamp_ns > since_ns else one
-
-        self.commissioned = rest(self.commissioned)
+    def _baselines_as(self, of: Callable[[CommissionedTorque], CommissionedTorque | None]) -> None:
+        """Replace the baselines of all cadences; None forgets one."""
+        self.commissioned = self.commissioned and of(self.commissioned)
         self.set_aside = tuple(
-            attrs.evolve(one, commissioned=rest(one.commissioned)) for one in self.set_aside
+            attrs.evolve(one, commissioned=one.commissioned and of(one.commissioned))
+            for one in self.set_aside
         )
-        self.baselines = tuple(one for one in self.baselines if rest(one))
+        self.baselines = tuple(filter(None, map(of, self.baselines)))
 
 
 # Gait cycles with the signature of their torque, from the samples that an observer keeps.

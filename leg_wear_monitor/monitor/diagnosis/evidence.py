@@ -14,9 +14,9 @@ from leg_wear_monitor.estimate.cause import (
     Change,
 )
 from leg_wear_monitor.estimate.change_detector import first_changed
-from leg_wear_monitor.estimate.clearance_fit import best_fit, start_of, starts_of, with_rivals
+from leg_wear_monitor.estimate.clearance_fit import ClearanceFit, best_fit, start_of, starts_of, with_rivals
 from leg_wear_monitor.estimate.drive import DIRECT
-from leg_wear_monitor.estimate.explanations import MODEL_ERROR, Explanation, change_of
+from leg_wear_monitor.estimate.explanations import MODEL_ERROR, Explanation, change_of, with_doubt
 from leg_wear_monitor.estimate.signature import CommissionedTorque, with_noise_of
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -32,6 +32,10 @@ SETTLING_CYCLES = 10  # since a change, before the counted clearances are correc
 # mean square up to which another joint explains what a corrected leg shows beside the baseline before: G, I
 # and B left 0.9 to 1.1 where they had opened with A and G, and J 1.9, at 1.7 mm for 0.6 (2026-11-27)
 _WHOLLY = 1.5
+
+# mean square up to which all clearances at once explain a leg of which one or two opened: 0.9 to 1.4; five,
+# which they do not tell apart, leave 1.5 to 1.7, and a mass on the thigh 1.8 to 3.6 (2026-11-27)
+_WHOLE = 1.4
 
 _LEAST_CYCLES = 2  # since a change, before it is explained: the first contains the change itself
 _LEAST_CYCLES_UNLIKE = 6  # where the leg is not that of its reference: two strange steps are no change
@@ -225,9 +229,12 @@ class Evidence:
             state.fit, state.least_m = None, ()
             return
         change = self._change(state, explanations, since_ns) if since_ns else None
-        self._tell(state, change, since_ns, len(cycles), config)
         # all clearances at once
-        self._fit(state, mean, len(cycles), change, explanations if since_ns else ())
+        fit = self._fit(state, mean, len(cycles), change, explanations if since_ns else ())
+        if change is not None and fit.square > _WHOLE:
+            change = with_doubt(change, explanations)
+        state.fit, state.fit_cycles = fit, len(cycles)
+        self._tell(state, change, since_ns, len(cycles), config)
         self._keep_least(state, change, config)
         if change is None and state.is_load_new and not (state.is_load_other or state.commissioned):
             _tell_wide(state, self._models.explainer(state).joints, since_ns or cycles[0].begin_ns)
@@ -296,8 +303,8 @@ class Evidence:
         cycles: int,
         change: Change | None,
         explanations: Sequence[Explanation],
-    ) -> None:
-        """Estimate all clearances from the mean signature (F,) of some cycles."""
+    ) -> ClearanceFit:
+        """Estimate of all clearances from the mean signature (F,) of some cycles."""
         explainer, counted_m = self._models.explainer(state), state.counted_m
         starts = starts_of(explainer, change, counted_m)
         known_sigma_m = state.commissioned.sigma_m if state.commissioned else 0.0
@@ -307,7 +314,7 @@ class Evidence:
             others = np.array([joint != change.subject for joint in explainer.joints])
             hidden = np.diag(np.where(others, found.clearance_m, 0.0) ** 2)
             found = attrs.evolve(found, covariance=found.covariance + hidden)
-        state.fit, state.fit_cycles = found, cycles
+        return found
 
     def _keep_least(self, state: TorqueState, change: Change | None, config: MonitorConfig) -> None:
         """Keep the lower bounds of the clearances by the last fits, as many as an alarm waits for.

@@ -190,6 +190,27 @@ def test_noise_without_a_load_does_not_wear_and_is_told(walk):
     assert np.mean([one.joints[2].mean_force_n for one in cycles[-2:]]) == pytest.approx(229.0, rel=0.2)
 
 
+def test_single_spikes_do_not_wear_and_are_told(walk):
+    """One sample of 3 kN in every other swing was taken for a force: it doubled those of hip and knee."""
+    monitor, new = as_new("measured", "wrench")
+    forces_n = []
+    for size_n in (0.0, 3000.0):
+        monitor.restore(new)
+        spiked = changed(
+            lambda t, force, size_n=size_n: force + (np.abs(t % 2.0 - 0.8)[:, None] < 0.002) * [0.0, size_n],
+            walk,
+        )
+        reports = monitor.update(spiked)
+        forces_n.append([max(one.joints[k].p99_force_n for one in reports.cycles) for k in (1, 2)])
+    assert forces_n[1] == pytest.approx(forces_n[0], rel=0.2)
+    assert not of_foot_load(monitor) and not raised(monitor)
+    assert reports.lost.outliers == 6
+    status = status_of(monitor, "foot_load")
+    assert status.values["outliers"] == 6.0
+    assert "6 samples are outliers, far from the samples before and after, and not used" in status.message
+    assert status_of(monitor, "input").values["load_outliers"] == 6.0
+
+
 def test_a_silent_sensor_leaves_the_mean_of_the_steps_before_and_not_the_last_one(walk):
     """Each step has another size; the last one before the silence acted in all gait cycles after it."""
     monitor, new = as_new("measured", "wrench")

@@ -14,11 +14,11 @@ from leg_wear_monitor.gait.config import FootLoadSensorConfig, GaitConfig, LoadC
 from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.sensors import readings
 from leg_wear_monitor.mechanism.person import nominal_stance
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.position import TURN, build_linkage
 from leg_wear_monitor.monitor.alarms import FOOT_LOAD_WORDS
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.state import Level
-from leg_wear_monitor.twin import LOAD
+from leg_wear_monitor.twin import LOAD, TORQUE
 from leg_wear_monitor.twin.sample import Samples
 
 S, START = 1_000_000_000, 10**18
@@ -121,6 +121,25 @@ def test_each_fault_of_the_sensor_is_named(walk, change, alarm):
     assert FOOT_LOAD_WORDS[alarm] in found[alarm.upper()].why
     status = status_of(monitor, "foot_load")
     assert status.level is Level.ERROR and FOOT_LOAD_WORDS[alarm] in status.message
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.001, 1 / 785, 100.0])
+def test_without_a_torque_a_step_of_an_unusual_size_is_another_unit(walk, scale):
+    monitor = monitored(changed(lambda t, force: scale * force, walk[walk["kind"] != TORQUE]))
+    assert of_foot_load(monitor) == (set() if scale == 1.0 else {"foot_load_scale"})
+
+
+def test_without_a_torque_a_sensor_that_feels_the_foot_swing_is_of_no_other_unit(walk):
+    """In the air: some newtons of inertia at each phase, which are no step."""
+    noise = np.random.default_rng(1)
+    for lag in (0.0, 0.25, 0.5, 0.75):
+        swung = changed(
+            lambda t, force, lag=lag: (
+                np.cos(TURN * (t - lag))[:, None] * [0.5, 1.0] + 0.3 * noise.standard_normal(force.shape)
+            ),
+            walk[walk["kind"] != TORQUE],
+        )
+        assert "foot_load_scale" not in of_foot_load(monitored(swung))
 
 
 def test_a_fault_is_named_too_where_the_load_is_not_used(walk):

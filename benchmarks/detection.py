@@ -55,7 +55,7 @@ def detected(detector: ChangeDetector, rows: np.ndarray) -> float:
     state = detector.fresh()
     for i, row in enumerate(rows, 1):
         state = detector.with_cycle(state, row, i)
-        if detector.detection(state):
+        if detector.detected_ns(state):
             return i
     return math.inf
 

@@ -267,7 +267,7 @@ def detected(detector: ChangeDetector, cycles: np.ndarray) -> int | None:
     state = detector.fresh()
     for i, signature in enumerate(cycles):
         state = detector.with_cycle(state, signature, i + 1)
-        if detector.detection(state):
+        if detector.detected_ns(state):
             return i + 1
     return None
 

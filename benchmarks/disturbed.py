@@ -181,9 +181,9 @@ def watched(
             stops = zip(joints, seen.least_m, strict=False)
             told += [f"stop {joint}" for joint, least_m in stops if least_m >= limit_m]
             if correction is not None:
-                told.append(f"corrected {joints[correction.joint]} {1e3 * correction.clearance_m:.3f} mm")
+                told.append(f"corrected {correction.subject} {1e3 * correction.value:.3f} mm")
                 counted = counted.copy()
-                counted[correction.joint] = correction.clearance_m
+                counted[joints.index(correction.subject)] = correction.value
                 one.corrected(correction, counted)
             found += [f"{i}: {text}" for text in told]
     return one, found

@@ -128,9 +128,9 @@ class Monitored:
         for _ in range(PERIODS):
             correction = self.observer.end_period(self.counted, UNWORN)
             if correction is not None:
-                self._note(f"corrected {self.joints[correction.joint]} {1e3 * correction.clearance_m:.2f} mm")
+                self._note(f"corrected {correction.subject} {1e3 * correction.value:.2f} mm")
                 self.counted = self.counted.copy()
-                self.counted[correction.joint] = correction.clearance_m
+                self.counted[self.joints.index(correction.subject)] = correction.value
                 self.observer.corrected(correction, self.counted)
         seen, limit_m = self.observer.diagnosis, self.observer.config.limits.clearance_m
         for change in seen.changes:

@@ -51,15 +51,12 @@ class LowPass:
         0 where none shows; NaN where it cannot be told.
     log_sigma : float
         Standard deviation of its logarithm.
-    square : float
-        Mean square of what it leaves over.
     least_hz : float
         Corner frequency that a low-pass has at least where none shows.
     """
 
     time_constant_s: float
     log_sigma: float
-    square: float
     least_hz: float
 
     @property
@@ -95,7 +92,7 @@ def low_pass_of(walk: Walk, reference: TorqueReference) -> LowPass | None:
     is_told = found.square <= _POOR and bool(one.delay_s or one.time_constant_s)
     log_sigma = _SPREAD + _BY_SQUARE * found.square
     time_constant_s = one.time_constant_s if shows else 0.0
-    return LowPass(time_constant_s if is_told else math.nan, log_sigma, found.square, least_hz)
+    return LowPass(time_constant_s if is_told else math.nan, log_sigma, least_hz)
 
 
 def low_pass_time(found: LowPass | None, declared: DriveFigures) -> tuple[float, float]:
@@ -126,9 +123,8 @@ def expected_leg(walk: Walk) -> TorqueReference | None:
 # Clearances of 0.3 mm in five joints of the default leg repeat with 0.03 to 0.17 of the torque, the most at
 # 30 rpm and of a sensor that samples instants, whose impacts do not average out
 _NOTABLE = 0.2
-_LEAST_LOAD = (
-    0.06  # repeating rest below which a load is not looked for: sensors that average have up to 0.05
-)
+# repeating rest below which a load is not looked for: sensors that average have up to 0.05
+_LEAST_LOAD = 0.06
 _EXPLAINS = 0.5  # of the energy of the repeating rest, from which on a cause is named
 _SURE_CAUSE = 5.0  # standard deviations
 
@@ -270,7 +266,6 @@ def scatter(one: Fit) -> float:
 
 
 _SPEED_SPREAD = 0.15  # relative spread of the speed from which on a lag is separated from the offset
-_SURE_TIMING = 3.0  # standard deviations
 _FILTERED = 0.25  # of an interval: behind a low-pass, instants look like averages, and are not late by a half
 # a drive may have no lag to speak of, or any up to 30 ms: current loops, filters, buses; neither is likelier
 _MOST_S, _STEP_S = 0.030, 0.00025
@@ -317,11 +312,6 @@ class Timing:
     declared_s: float = math.nan
     low_pass_s: float = 0.0
     low_pass_sigma_s: float = 0.0
-
-    @property
-    def is_late(self) -> bool:
-        """Whether a lag shows for sure."""
-        return self.is_lag_separated and abs(self.late_s) > _SURE_TIMING * self.error_s
 
     @property
     def lag_s(self) -> float:

@@ -25,9 +25,8 @@ from leg_wear_monitor.monitor.config.inputs import EFFORT, INTERFACE
 
 LEAST_TURNS = 5.0
 _HARMONICS = 10
-_FINE = (
-    2 * _HARMONICS
-)  # steps of a ratio within a turn more or less: half a step of the highest harmonic's line
+# steps of a ratio within a turn more or less: half a step of the highest harmonic's line
+_FINE = 2 * _HARMONICS
 _OFFSETS = 64
 _LEAST_SAMPLES_PER_TURN = 2.5 * _HARMONICS
 _FASTEST_RADPS = 60.0  # 570 rpm

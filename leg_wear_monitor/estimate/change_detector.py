@@ -14,7 +14,7 @@ from leg_wear_monitor.estimate.explanations import MODEL_ERROR, Explainer, opene
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 
 # on the counted clearance of one joint; two further tests are for a new part in a worn joint
-FACTORS = (1.08, 1.2, 1.35, 1.5, 2.0, 2.5, 3.3, 5.0, 8.0)  # on the counted clearance of one joint
+FACTORS = (1.08, 1.2, 1.35, 1.5, 2.0, 2.5, 3.3, 5.0, 8.0)
 
 _LEAST_INFORMATION = 1.0e-6  # of one gait cycle, by which a test can tell anything
 _SIGMAS = 4.0  # by which the baseline may be off
@@ -24,20 +24,10 @@ _MOST = 0.4
 
 
 class DetectorState(NamedTuple):
-    """Sums (tests,), the stamp (tests,) [ns] and the number of cycles (tests,) since each was 0."""
+    """Sums (tests,), and the stamp (tests,) [ns] since each was 0; 0 where it is."""
 
     sums: Floats
     since_ns: Ints
-    cycles: Ints
-
-
-class Detection(NamedTuple):
-    """A change: the test that raised it, the stamp since when, the cycles since then, and its sum."""
-
-    test: int
-    since_ns: int
-    cycles: int
-    log_odds: float
 
 
 def threshold(false_alarm_cycles: float, tests: int) -> float:
@@ -96,10 +86,9 @@ class ChangeDetector:
         # the baseline is off by the same in each cycle: that alone must not drive a test upwards
         drift = np.sqrt(((weighted @ explainer.baseline.covariance) * weighted).sum(axis=1))
         information = (weighted * change).sum(axis=1)
-        self._half = 0.5 * information + _SIGMAS * drift
         # a part that is new already cannot be renewed
         is_possible = information > _LEAST_INFORMATION
-        self._half = np.where(is_possible, self._half, np.inf)
+        self._half = np.where(is_possible, 0.5 * information + _SIGMAS * drift, np.inf)
         self._excess = excess(_scatter(explainer, change))
         self.threshold = threshold(false_alarm_cycles, len(change))
         self._step, self._counted_m = (information - self._half) / self._excess, counted_m
@@ -113,25 +102,21 @@ class ChangeDetector:
     def fresh(self) -> DetectorState:
         """State before the first gait cycle."""
         tests = len(self._half)
-        return DetectorState(np.zeros(tests), np.zeros(tests, np.int64), np.zeros(tests, np.int64))
+        return DetectorState(np.zeros(tests), np.zeros(tests, np.int64))
 
     def with_cycle(self, state: DetectorState, signature: Floats, begin_ns: int) -> DetectorState:
         """State after one more gait cycle, with its signature (F,) and the stamp of its begin."""
         ratio = (self._weighted @ (signature - self._expected) - self._half) / self._excess
         ratio = np.minimum(ratio, _MOST * self.threshold)
-        since = np.where(state.cycles == 0, begin_ns, state.since_ns)
+        since = np.where(state.since_ns == 0, begin_ns, state.since_ns)
         sums = state.sums + ratio
         stays = sums > 0.0
-        return DetectorState(
-            np.where(stays, sums, 0.0), np.where(stays, since, 0), np.where(stays, state.cycles + 1, 0)
-        )
+        return DetectorState(np.where(stays, sums, 0.0), np.where(stays, since, 0))
 
-    def detection(self, state: DetectorState) -> Detection | None:
-        """The change that is detected; None where no test exceeds the threshold."""
+    def detected_ns(self, state: DetectorState) -> int:
+        """Stamp since when there is a change; 0 where no test exceeds the threshold."""
         best = int(state.sums.argmax())
-        if not state.sums[best] > self.threshold:
-            return None
-        return Detection(best, int(state.since_ns[best]), int(state.cycles[best]), float(state.sums[best]))
+        return int(state.since_ns[best]) if state.sums[best] > self.threshold else 0
 
 
 def first_changed(explainer: Explainer, signatures: Floats, counted_m: Floats, changed_m: Floats) -> int:

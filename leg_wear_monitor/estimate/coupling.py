@@ -14,6 +14,7 @@ import numpy as np
 
 from leg_wear_monitor.estimate.body_torques import body_torques
 from leg_wear_monitor.estimate.signature import TorqueSensor
+from leg_wear_monitor.estimate.torque_model import at_angles
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
@@ -208,13 +209,13 @@ class _CouplingFit:
         if not stiffness:
             powers = np.stack([np.ones(_POINTS), self._rate, self._rate**2, self._acceleration])
             rows = np.concatenate([tables[None], self._by_body])
-            return deviation, np.asarray((_at(rows, self._angle)[0] * powers).sum(axis=1))
+            return deviation, np.asarray((at_angles(rows, self._angle)[0] * powers).sum(axis=1))
         damping = 2.0 * damping_ratio * math.sqrt(stiffness * float(tables[3].mean()))
         second = self._slope @ self._slope  # second time derivative
         for _ in range(_NEWTON_STEPS):
             angle, rate = self._angle + deviation, self._rate + self._slope @ deviation
             powers = np.stack([np.ones(_POINTS), rate, rate**2, self._acceleration + second @ deviation])
-            values, slopes = _at(tables, angle)
+            values, slopes = at_angles(tables, angle)
             spring = stiffness * deviation + damping * (self._slope @ deviation)
             by_rate = (values[1] + 2.0 * rate * values[2] + damping)[:, None] * self._slope
             by_angle = np.diag((slopes * powers).sum(axis=0) + stiffness)
@@ -225,19 +226,9 @@ class _CouplingFit:
             if largest < _CONVERGED_RAD:
                 break
         # the measured torque is that of the spring; a change of a body changes it by the deviation
-        by_body = (_at(self._by_body, angle)[0] * powers).sum(axis=1)
+        by_body = (at_angles(self._by_body, angle)[0] * powers).sum(axis=1)
         deviations = np.vstack([deviation, np.linalg.solve(jacobian, -by_body.T).T])
         return deviation, np.asarray(-stiffness * deviations - damping * deviations @ self._slope.T)
-
-
-def _at(tables: Floats, angle: Floats) -> tuple[Floats, Floats]:
-    """Values (..., n) of periodic tables (..., P) at angles (n,), and their slopes by the angle."""
-    points = tables.shape[-1]
-    place = (angle / TURN) % 1.0 * points
-    left = np.minimum(place.astype(np.int64), points - 1)
-    values = tables[..., left]
-    step = tables[..., (left + 1) % points] - values
-    return values + (place - left) * step, step * (points / TURN)
 
 
 def _vertex(x: Floats, y: Floats) -> float:

@@ -1,8 +1,7 @@
 """What may explain a change of the torque's signature: a clearance, or something else."""
 
 import math
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
 
 import attrs
 import numpy as np
@@ -239,20 +238,30 @@ class Explainer:
         covariance, there = self.covariance(cycles), self.model.at(counted_m)[0]
         expected = self.baseline.offset + there
         rest = mean - expected
-        found = [self._as_counted(rest, covariance), *self._others(rest, covariance)]
-        found += self._late(rest, covariance)
-        more, noises = self._noise(rest, expected, covariance, cycles)
+        as_counted = Misfits(rest[None], covariance)
+        found = [as_counted.explanation(0, NamedCause(Cause.UNKNOWN, 0.0, 0.0))]
+        found += self._others(rest, covariance)
+        found += self._late(rest, covariance, as_counted)
+        more, noises = self._noise(rest, expected, covariance, cycles, as_counted)
         found += more
-        for k in range(len(counted_m)):
-            tried = _Opened(self.model, k, counted_m, expected, mean, covariance, cycles)
-            found.append(self._clearance(tried, noises))
+
+        def opened_to(k: int, sizes: Floats, noise: OtherNoise | None) -> Misfits:
+            """How well some clearances (n,) [m] of joint k explain, with other noise or the sensor's own."""
+            each = [opened(counted_m, k, size) for size in sizes]
+            shown = expected + np.array([self.model.at(one)[0] for one in each]) - there
+            scatter = np.array([self.model.scatter_at(one) for one in each])
+            before, own = expected, covariance
+            if noise is not None:
+                own = covariance + np.diag(noise.variance(expected, cycles))
+                shown, before = noise.shown(shown), noise.shown(expected)
+            model = scatter[:, None, None] * self.model.covariance + _diagonal(MODEL_ERROR * (shown - before))
+            return Misfits(mean - shown, own + model)
+
+        for k, counted in enumerate(counted_m.tolist()):
+            found.append(self._clearance(k, counted, noises, opened_to))
         return sorted(found, key=lambda one: one.misfit)
 
-    def _as_counted(self, rest: Floats, covariance: Floats) -> Explanation:
-        misfits = Misfits(rest[None], covariance)
-        return misfits.explanation(0, NamedCause(Cause.UNKNOWN, 0.0, 0.0))
-
-    def _late(self, rest: Floats, covariance: Floats) -> list[Explanation]:
+    def _late(self, rest: Floats, covariance: Floats, as_counted: "Misfits") -> list[Explanation]:
         """The best of the other channels; none where none explains.
 
         A channel that changes much has a large error in each phase, and could seem to explain anything: it
@@ -261,7 +270,7 @@ class Explainer:
         if not self.channels:
             return []
         change = np.array([one.column for one in self.channels])
-        possible = Misfits(rest - change, covariance).square < _LEFT * Misfits(rest[None], covariance).square
+        possible = Misfits(rest - change, covariance).square < _LEFT * as_counted.square
         if not possible.any():
             return []
         misfits = Misfits(rest - change, covariance + _diagonal(MODEL_ERROR * change))
@@ -269,7 +278,7 @@ class Explainer:
         return [misfits.explanation(best, NamedCause(Cause.LAG, self.channels[best].later_s, _LATE_SIGMA_S))]
 
     def _noise(
-        self, rest: Floats, expected: Floats, covariance: Floats, cycles: int
+        self, rest: Floats, expected: Floats, covariance: Floats, cycles: int, as_counted: "Misfits"
     ) -> tuple[list[Explanation], Sequence[OtherNoise]]:
         """Other noise as the cause, and what noise there may be beside an opening.
 
@@ -280,7 +289,7 @@ class Explainer:
         change = np.array([one.shown(expected) for one in self.noises]) - expected
         own = covariance + _diagonal(np.sqrt([one.variance(expected, cycles) for one in self.noises]))
         misfits = Misfits(rest - change, own)
-        possible = misfits.square < _LEFT * Misfits(rest[None], covariance).square
+        possible = misfits.square < _LEFT * as_counted.square
         if not possible.any():
             return [], ()
         best = int(np.where(possible, misfits.value, np.inf).argmin())
@@ -289,22 +298,26 @@ class Explainer:
         cause = NamedCause(Cause.NOISE, found.noise_nm, _NOISE_SIGMA * found.noise_nm)
         return [misfits.explanation(best, cause, known_nm)], beside
 
-    def _clearance(self, joint: "_Opened", noises: Sequence[OtherNoise]) -> Explanation:
+    def _clearance(
+        self,
+        k: int,
+        counted: float,
+        noises: Sequence[OtherNoise],
+        opened_to: Callable[[int, Floats, OtherNoise | None], "Misfits"],
+    ) -> Explanation:
         """Best clearance of one joint, the others as counted, beside other noise if there is some."""
-        k, counted = joint.k, float(joint.counted_m[joint.k])
         widest = max(self.model.grid_m[k, -1], counted)
         sizes = np.geomspace(_LEAST_FACTOR * min(counted, self.fresh_m[k]), widest, _SIZES)
-        noise, unlikely = None, 0.0
+        noise = None
         for _ in range(_ROUNDS if noises else 0):  # from the most noise on
-            size = sizes[joint.misfits(sizes, noise or noises[-1]).value.argmin()]
-            values = [joint.misfits(np.array([size]), one).value[0] for one in (None, *noises)]
+            size = sizes[opened_to(k, sizes, noise or noises[-1]).value.argmin()]
+            values = [opened_to(k, np.array([size]), one).value[0] for one in (None, *noises)]
             noise = (None, *noises)[int(np.argmin(values))]
-            unlikely = 2.0 * SURE_OF_NAME if noise else 0.0
-        misfits = joint.misfits(sizes, noise).value
+        misfits = opened_to(k, sizes, noise).value
         best = int(misfits.argmin())
         value, sigma = _vertex(np.log(sizes), misfits, best)
         size = float(np.exp(value))
-        square = float(joint.misfits(np.array([size]), noise).square[0]) / len(joint.mean)
+        square = float(opened_to(k, np.array([size]), noise).square[0]) / len(self.model.mean)
         poor = max(1.0, square)  # the square of Birge's ratio
         # sizes far from the best one may fit almost as well: then the mean of all. Where none fits, the model
         # is off by as much in neighbouring phases, which then are few independent numbers
@@ -319,7 +332,7 @@ class Explainer:
             value=size,
             sigma=float(np.hypot(own, MODEL_ERROR * (size - counted))),
             counted=counted,
-            misfit=float(misfits[best]) + unlikely,
+            misfit=float(misfits[best]) + (2.0 * SURE_OF_NAME if noise else 0.0),  # of a second cause
             square=square,
         )
 
@@ -388,34 +401,6 @@ class Misfits:
             misfit=float(self.value[i]),
             square=float(self.square[i]) / self._size,
         )
-
-
-class _Opened(NamedTuple):
-    """A joint that may have another clearance: the mean signature of some gait cycles, and what is expected.
-
-    Signatures are (F,) arrays, the covariance of their mean is (F, F).
-    """
-
-    model: SignatureModel
-    k: int
-    counted_m: Floats
-    expected: Floats
-    mean: Floats
-    covariance: Floats
-    cycles: int
-
-    def misfits(self, sizes: Floats, noise: OtherNoise | None) -> Misfits:
-        """How well some clearances (n,) [m] explain, with other noise than the sensor's or with its own."""
-        each = [opened(self.counted_m, self.k, size) for size in sizes]
-        there = self.model.at(self.counted_m)[0]
-        shown = self.expected + np.array([self.model.at(one)[0] for one in each]) - there
-        scatter = np.array([self.model.scatter_at(one) for one in each])
-        before, covariance = self.expected, self.covariance
-        if noise is not None:
-            covariance = covariance + np.diag(noise.variance(before, self.cycles))
-            shown, before = noise.shown(shown), noise.shown(before)
-        own = scatter[:, None, None] * self.model.covariance + _diagonal(MODEL_ERROR * (shown - before))
-        return Misfits(self.mean - shown, covariance + own)
 
 
 def _diagonal(sigma: Floats) -> Floats:

@@ -104,11 +104,8 @@ def identified_leg(
     sigma = np.append(np.repeat([_MASS, np.hypot(_LENGTH, far)], bodies), _LOG_FRICTION)
     levels = levels_of(near)[1:]
     if near.compliance and not is_drive_known:  # its deviation from the compliance of the simulated leg
-        before, steps, sigma = (
-            np.append(before, 0.0),
-            np.append(steps, -math.log(STIFFER)),
-            np.append(sigma, _LOG_COMPLIANCE),
-        )
+        before, steps = np.append(before, 0.0), np.append(steps, -math.log(STIFFER))
+        sigma = np.append(sigma, _LOG_COMPLIANCE)
     slopes = means[1:].T @ levels[:, : len(steps)] / (len(levels) * steps)
     weighted = np.linalg.solve(_covariance(model, nuisances, commissioned.cycles), slopes)
     information = slopes.T @ weighted + np.diag(sigma**-2.0)

@@ -178,12 +178,9 @@ def begin(pair: Pair, model: TorqueModel, start: Start) -> State:
     phase = start.ratio * middle + start.offset_rad
     for i, number in enumerate(numbers.tolist()):
         if number != start.recording:
-            phase[i] = _best_phase(pair.part(row == i), model, start, float(middle[i]))
+            explained = explained_by_phase(pair.part(row == i), model, start, float(middle[i]))
+            phase[i] = explained.argmax() * TURN / PHASES
     return State(start.ratio, phase, middle, row, start.lag_s, start.low_pass_s)
-
-
-def _best_phase(pair: Pair, model: TorqueModel, start: Start, middle: float) -> float:
-    return int(np.argmax(explained_by_phase(pair, model, start, middle))) * TURN / PHASES
 
 
 def explained_by_phase(pair: Pair, model: TorqueModel, start: Start, middle: float) -> Floats:

@@ -20,6 +20,16 @@ PHASE_ERROR_RAD = 0.02
 """Standard deviation by which clearances of 0.3 mm in five joints shift the torque's phase."""
 
 
+def at_angles(tables: Floats, angle: Floats) -> tuple[Floats, Floats]:
+    """Values (..., n) of periodic tables (..., points) at angles (n,), and their slopes by the angle."""
+    points = tables.shape[-1]
+    place = (angle / TURN) % 1.0 * points
+    left = np.minimum(place.astype(np.int64), points - 1)
+    values = tables[..., left]
+    step = tables[..., (left + 1) % points] - values
+    return values + (place - left) * step, step * (points / TURN)
+
+
 @attrs.frozen(kw_only=True)
 class ModelError:
     """Standard deviations of what clearances change that is not in a model.
@@ -69,18 +79,13 @@ class TorqueModel:
 
     def torque(self, angle: Floats, speed: Floats, acceleration: Floats) -> tuple[Floats, Floats]:
         """Torque [N m] and its derivative by the angle [N m/rad], each (n,)."""
-        values, slopes = _at(self.tables, angle)
+        values, slopes = at_angles(self.tables, angle)
         motion = np.stack([np.ones_like(speed), speed, speed * speed, acceleration])
         return np.asarray((values * motion).sum(axis=0)), np.asarray((slopes * motion).sum(axis=0))
 
     def load_torque(self, angle: Floats) -> Floats:
         """Torque by a foot load of one newton up (n,) [N m/N]."""
-        return np.asarray(_at(self.load[None], angle)[0][0])
-
-    def at_speed(self, speed: Floats) -> Floats:
-        """Torque over a turn (n, points) [N m] at constant speeds (n,) [rad/s]."""
-        motion = np.stack([np.ones_like(speed), speed, speed * speed], axis=1)
-        return np.asarray(motion @ self.tables[:3])
+        return np.asarray(at_angles(self.load, angle)[0])
 
 
 def torque_model(mechanism: Mechanism) -> TorqueModel:
@@ -127,13 +132,3 @@ def with_clearances(model: TorqueModel, legs: Sequence[TorqueReference]) -> Torq
     tables = model.tables.copy()
     tables[: by_speed.shape[1]] += np.linalg.lstsq(by_speed, np.array(changes), rcond=None)[0]
     return attrs.evolve(model, tables=tables, error=_WITH_CLEARANCES)
-
-
-def _at(tables: Floats, angle: Floats) -> tuple[Floats, Floats]:
-    """Values (m, n) of periodic tables (m, points) at angles (n,), and their slopes by the angle."""
-    points = tables.shape[1]
-    place = (angle / TURN) % 1.0 * points
-    left = np.minimum(place.astype(np.int64), points - 1)
-    values = tables[:, left]
-    step = tables[:, (left + 1) % points] - values
-    return values + (place - left) * step, step * (points / TURN)

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 
 import attrs
 
+from leg_wear_monitor.estimate.cause import Change
 from leg_wear_monitor.estimate.mismatch import explanation
 from leg_wear_monitor.monitor.alarm_specs import MISMATCH
 from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate, ClearanceObservation
-from leg_wear_monitor.monitor.diagnosis.evidence import Correction
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, TorqueState
 from leg_wear_monitor.monitor.forecast.forecast import Forecast
@@ -161,8 +161,8 @@ def observe_torque(parts: Parts) -> None:
         stamps_ns = [one.stamp_ns if one is not None else 0 for one in parts.measured]
         torque.state.measured = tuple(stamp_ns >= hidden.stamp_ns for stamp_ns in stamps_ns)
     correction = torque.end_period(twin.clearance_mean_m, twin.depth)
-    measured = parts.measured[correction.joint] if correction else None
-    if correction is not None and measured is not None and parts.contradiction(correction.change):
+    measured = parts.measured[parts.clearance_joints.index(correction.subject)] if correction else None
+    if correction is not None and measured is not None and parts.contradiction(correction):
         torque.contradicted(correction, measured.clearance_m, measured.sigma_m)
         correction = None
     is_wrong = parts.is_torque_wrong
@@ -177,17 +177,16 @@ def observe_torque(parts: Parts) -> None:
         parts.keep()
 
 
-def correct(parts: Parts, correction: Correction) -> None:
+def correct(parts: Parts, change: Change) -> None:
     """Open a joint to the clearance that the drive torque shows, and count its wear from there."""
-    stamp_ns, k = parts.twin.intake.followed_stamp_ns, correction.joint
-    joint = parts.clearance_joints[k]
-    was = parts.accounting.correct(joint, correction.clearance_m)
+    stamp_ns, joint = parts.twin.intake.followed_stamp_ns, change.subject
+    was = parts.accounting.correct(joint, change.value)
     now = parts.accounting.wear_of(joint)
     corrected = CorrectedClearance(
         stamp_ns=stamp_ns,
         joint=joint,
-        clearance_m=float(parts.twin.clearance_mean_m[k]),
-        sigma_m=correction.change.sigma,
+        clearance_m=float(parts.twin.clearance_mean_m[parts.clearance_joints.index(joint)]),
+        sigma_m=change.sigma,
         before_m=was.mean_m,
         wear_m=now.mean_m,
         replaced_ns=now.replaced_ns,

@@ -14,7 +14,6 @@ from leg_wear_monitor.estimate.cause import Cause, Change
 from leg_wear_monitor.estimate.signature import CommissionedTorque
 from leg_wear_monitor.monitor.config.settings import Limits
 from leg_wear_monitor.monitor.diagnosis import reasons
-from leg_wear_monitor.monitor.diagnosis.evidence import Correction
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState, SignedCycle
 from leg_wear_monitor.monitor.forecast.forecast import Answer
@@ -148,8 +147,7 @@ def shows(monitor, monkeypatch, since_s: float) -> None:
     torque, change = monitor._parts.torque, opened(since_s)
     begins_ns = [START_NS + second * 10**9 for second in (1, 2, 3)]
     torque.state.cycles = tuple(SignedCycle(at, at + 10**9, np.zeros(1), None) for at in begins_ns)
-    k = monitor._parts.clearance_joints.index("G")
-    monkeypatch.setattr(torque, "end_period", lambda *_: Correction(k, change.value, change))
+    monkeypatch.setattr(torque, "end_period", lambda *_: change)
     monkeypatch.setattr(torque, "corrected", lambda *_: None)
 
 

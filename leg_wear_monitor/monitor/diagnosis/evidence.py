@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import attrs
 import numpy as np
@@ -53,16 +52,8 @@ _SURE_BEFORE = 20.0
 _LEAST_BEFORE = 3  # gait cycles before a change that show the leg without it
 
 
-class Correction(NamedTuple):
-    """A counted clearance that is surely wrong: joint index, its clearance [m], and the change behind it."""
-
-    joint: int
-    clearance_m: float
-    change: Change
-
-
-def correction_of(state: TorqueState, joints: Sequence[str]) -> Correction | None:
-    """A settled change of one clearance, seen at the present cadence."""
+def correction_of(state: TorqueState, joints: Sequence[str]) -> Change | None:
+    """A settled change of one clearance, seen at the present cadence: it surely is counted wrong."""
     if not state.changes or state.fit_cycles < SETTLING_CYCLES or not state.is_compared:
         return None
     change = state.changes[-1]
@@ -70,8 +61,7 @@ def correction_of(state: TorqueState, joints: Sequence[str]) -> Correction | Non
         return None
     if change.subject not in joints or not (change.is_sure and change.is_wide):
         return None
-    k = joints.index(change.subject)
-    return Correction(k, change.value, change) if _is_alone(state, change, k) else None
+    return change if _is_alone(state, change, joints.index(change.subject)) else None
 
 
 def _is_alone(state: TorqueState, change: Change, joint: int) -> bool:
@@ -115,23 +105,22 @@ class Evidence:
         if told and state.changes and state.changes[-1].subject == told[-1].subject:
             state.changes = (_since(state.changes[-1], told[-1].since_ns, state),)
 
-    def settle(self, state: TorqueState, correction: Correction, counted_m: Floats) -> None:
+    def settle(self, state: TorqueState, change: Change, counted_m: Floats) -> None:
         """Make the gait cycles since a change those of the commissioned leg, with clearances (k,) [m].
 
         What the correction is off does then not look like a further change; it stays in the standard
         deviation. Nor does what other joints changed at the same time: theirs are not known until they are
         compared with the baseline before (`compare_with_before`).
         """
-        joint, _, change = correction
-        offset = self._models.explainer(state).baseline.offset  # of the baseline before, from its model
+        explainer = self._models.explainer(state)  # of the baseline before
         state.cycles = tuple(cycle for cycle in state.cycles if cycle.begin_ns >= change.since_ns)
         signatures, before = state.signatures, state.commissioned
         sigma_m = counted_m.copy()
         if before is not None and before.before is not None:  # joints that were corrected since stay known
             sigma_m = np.where(before.is_unknown, counted_m, before.sigma_m)
-        sigma_m[joint] = change.sigma
+        sigma_m[explainer.joints.index(change.subject)] = change.sigma
         if before is not None:
-            signatures_before = before.signatures - before.mean + offset
+            signatures_before = before.signatures - before.mean + explainer.baseline.offset
             before = before.before or attrs.evolve(before, signatures=signatures_before)
         state.forget_baselines()
         state.commissioned = CommissionedTorque(
@@ -248,8 +237,7 @@ class Evidence:
         if state.changes:
             return state.changes[-1].since_ns
         detector = self._models.detector(state, config)
-        found = detector.detection(state.detector) if state.detector else None
-        return found.since_ns if found else 0
+        return detector.detected_ns(state.detector) if state.detector else 0
 
     def _tell(
         self, state: TorqueState, change: Change | None, since_ns: int, cycles: int, config: MonitorConfig

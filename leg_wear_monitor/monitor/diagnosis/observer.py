@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate.cause import CORRECTED_FROM, Cause
+from leg_wear_monitor.estimate.cause import CORRECTED_FROM, Cause, Change
 from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
 from leg_wear_monitor.estimate.coupling import compliance_of
 from leg_wear_monitor.estimate.drive import DIRECT
@@ -21,11 +21,7 @@ from leg_wear_monitor.mechanism.person import upwards
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.sections import drive_figures
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.diagnosis.evidence import (
-    Correction,
-    Evidence,
-    correction_of,
-)
+from leg_wear_monitor.monitor.diagnosis.evidence import Evidence, correction_of
 from leg_wear_monitor.monitor.diagnosis.reasons import doubt, missing, next_step, other_sensor
 from leg_wear_monitor.monitor.diagnosis.references import (
     COMMISSIONING_CYCLES,
@@ -176,7 +172,7 @@ class TorqueObserver(KeepsSamples):
         if state.reference is not None:
             self._evidence.review(state, self.config)
 
-    def end_period(self, counted_m: Floats, depth: Floats) -> Correction | None:
+    def end_period(self, counted_m: Floats, depth: Floats) -> Change | None:
         """Evaluate the gait cycles that ended, and go on with what is simulated for the reference.
 
         Parameters
@@ -188,8 +184,8 @@ class TorqueObserver(KeepsSamples):
 
         Returns
         -------
-        Correction or None
-            A counted clearance that is surely wrong, and shall be corrected before the next period.
+        Change or None
+            Of a counted clearance that is surely wrong, and shall be corrected before the next period.
         """
         state = self.state
         self._follow_counted(counted_m)
@@ -204,24 +200,24 @@ class TorqueObserver(KeepsSamples):
             return None
         return correction_of(state, self._joints) or self._opened_with_it()
 
-    def _opened_with_it(self) -> Correction | None:
+    def _opened_with_it(self) -> Change | None:
         """Another joint that opened with the one that was corrected."""
         change = self._evidence.compare_with_before(self.state)
         if not any(one.before for one in self.state.all_commissioned):
             self.state.settled = self.state.corrections
-        return Correction(self._joints.index(change.subject), change.value, change) if change else None
+        return change
 
-    def contradicted(self, correction: Correction, clearance_m: float, sigma_m: float) -> None:
-        """Tell a correction that a measured clearance [m] contradicts, and is not made.
+    def contradicted(self, change: Change, clearance_m: float, sigma_m: float) -> None:
+        """Tell a change that a measured clearance [m] contradicts, and is not made.
 
         Where the joint opened with one that was corrected, it is known from the measurement meanwhile, and
         the others as well as they explain the leg. The comparison goes on, until both agree.
         """
-        state, k = self.state, correction.joint
+        state, k = self.state, self._joints.index(change.subject)
         known = state.commissioned
-        if correction.change in state.changes or known is None or known.before is None:
+        if change in state.changes or known is None or known.before is None:
             return
-        state.settled = (*state.corrections, correction.change)
+        state.settled = (*state.corrections, change)
         known_sigma_m = math.hypot(sigma_m, clearance_m - float(known.clearance_m[k]))
         if known.sigma_m[k] == known_sigma_m:
             return
@@ -230,12 +226,12 @@ class TorqueObserver(KeepsSamples):
         others_m = state.commissioned.sigma_m
         state.know_corrected(np.where(np.arange(len(others_m)) == k, known_sigma_m, others_m))
 
-    def corrected(self, correction: Correction, counted_m: Floats) -> None:
+    def corrected(self, change: Change, counted_m: Floats) -> None:
         """Compare with the corrected clearances (k,) [m] from now on."""
         counted_m = np.asarray(counted_m, float).copy()
         state = self.state
         state.settled = state.corrections
-        self._evidence.settle(state, correction, counted_m)
+        self._evidence.settle(state, change, counted_m)
         self._restart(counted_m)
 
     def replaced(self, counted_m: Floats) -> None:

@@ -195,11 +195,8 @@ def _reference(parts: Any, i: int, order: list[int], joints: int) -> TorqueRefer
             raise ValueError(f"a {name} is not above 0")
     if min(friction, compliance, damping, load_sigma) < 0.0 or speed == 0.0:
         raise ValueError("friction, compliance, damping or a sigma is below 0, or speed is 0")
-    profile, leg = (
-        CrankProfile(speed, cosine, sine),
-        LegParameters(mass, length, friction, compliance, damping, load, load_sigma),
-    )
-    return TorqueReference(profile, clearance_m, (expected, *torque), leg)
+    leg = LegParameters(mass, length, friction, compliance, damping, load, load_sigma)
+    return TorqueReference(CrankProfile(speed, cosine, sine), clearance_m, (expected, *torque), leg)
 
 
 def _checked(parts: Any, name: str, shape: tuple[int | None, ...]) -> Any:

@@ -1,7 +1,7 @@
 """State of the torque observer; every value is immutable, so a shallow copy is a snapshot."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
 from typing import NamedTuple
 
@@ -81,18 +81,6 @@ class CycleTorque(NamedTuple):
     profile: CrankProfile
     jitter: float
     temperature_c: float
-
-
-def sensor_period_s(kept: TorqueSamples, begin_ns: int, end_ns: int) -> tuple[float, float]:
-    """Median time between the torque samples of a gait cycle, and the median departure, as a fraction of it.
-
-    NaN where there are fewer than three.
-    """
-    between = np.diff(within(kept.torque, begin_ns, end_ns)["stamp_ns"])
-    if len(between) < 2:
-        return math.nan, math.nan
-    period_ns = float(np.median(between))
-    return 1.0e-9 * period_ns, _jitter(between, period_ns)
 
 
 def _jitter(between_ns: Ints, period_ns: float) -> float:
@@ -254,9 +242,8 @@ class Diagnosis(Shown):
 
 WINDOW_CYCLES = 60  # that are kept at a cadence, and that clearances are estimated from
 LAST_CYCLES = 10  # whose mean temperature is that of the drive now
-_LEAST_HARMONICS = (
-    15.0  # of a gait cycle: where a drive passed 11 and 13, I was taken for J; 17 and more: none
-)
+# of a gait cycle: where a drive passed 11 and 13, I was taken for J; 17 and more: none
+_LEAST_HARMONICS = 15.0
 FIRST_CYCLES = 5  # gait cycles before the first reference is chosen
 UNUSABLE_CYCLES = 3  # in a row: a start has two that are unlike
 UNUSED_CYCLES = 20  # in a row, after which a result is not one of the leg as it walks now
@@ -478,16 +465,7 @@ class TorqueState:
 
     def know_corrected(self, sigma_m: Floats) -> None:
         """Give the baselines after a correction, of all cadences, other standard deviations (k,) [m]."""
-
-        def known(one: CommissionedTorque) -> CommissionedTorque:
-            return one if one.is_as_counted else attrs.evolve(one, sigma_m=sigma_m)
-
-        self.commissioned = self.commissioned and known(self.commissioned)
-        self.set_aside = tuple(
-            attrs.evolve(one, commissioned=one.commissioned and known(one.commissioned))
-            for one in self.set_aside
-        )
-        self.baselines = tuple(map(known, self.baselines))
+        self._baselines_as(lambda one: one if one.is_as_counted else attrs.evolve(one, sigma_m=sigma_m))
 
     def at(self, profile: CrankProfile) -> AtCadence | None:
         """Another cadence than the present one whose crank turns as in a profile."""
@@ -566,15 +544,16 @@ class TorqueState:
 
     def forget_baselines(self, since_ns: int = 0) -> None:
         """Forget the baselines with gait cycles after a stamp, at all cadences."""
+        self._baselines_as(lambda one: None if one.stamp_ns > since_ns else one)
 
-        def rest(one: CommissionedTorque | None) -> CommissionedTorque | None:
-            return None if one and one.stamp_ns > since_ns else one
-
-        self.commissioned = rest(self.commissioned)
+    def _baselines_as(self, of: Callable[[CommissionedTorque], CommissionedTorque | None]) -> None:
+        """Replace the baselines of all cadences; None forgets one."""
+        self.commissioned = self.commissioned and of(self.commissioned)
         self.set_aside = tuple(
-            attrs.evolve(one, commissioned=rest(one.commissioned)) for one in self.set_aside
+            attrs.evolve(one, commissioned=one.commissioned and of(one.commissioned))
+            for one in self.set_aside
         )
-        self.baselines = tuple(one for one in self.baselines if rest(one))
+        self.baselines = tuple(filter(None, map(of, self.baselines)))
 
 
 # Gait cycles with the signature of their torque, from the samples that an observer keeps.
@@ -599,10 +578,11 @@ def find_sensor(
     last = (NotUsed.JITTER,) * (UNUSED_CYCLES if is_known else UNUSABLE_CYCLES)
     if own is not None and (state.changes or state.unused[-len(last) :] != last):
         return
-    period_s, jitter = sensor_period_s(state.samples, begin_ns, end_ns)
-    if math.isnan(period_s) or (own is not None and jitter > _JITTER):
+    between_ns = np.diff(within(state.samples.torque, begin_ns, end_ns)["stamp_ns"])
+    period_ns = float(np.median(between_ns)) if len(between_ns) > 1 else math.nan
+    if math.isnan(period_ns) or (own is not None and _jitter(between_ns, period_ns) > _JITTER):
         return
-    near = [float(f"{part * period_s:.2g}") for part in _ROUNDED]
+    near = [float(f"{part * (1.0e-9 * period_ns):.2g}") for part in _ROUNDED]
     known = {one.period_s for one in state.baselines}
     period_s = next((one for one in near if one in known), near[0])
     # as commanded: a reference, and all of its signatures, are for one cadence

@@ -19,7 +19,7 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis import evidence, reasons, references
 from leg_wear_monitor.monitor.diagnosis import observer as observer_module
 from leg_wear_monitor.monitor.diagnosis import state as state_module
-from leg_wear_monitor.monitor.diagnosis.evidence import SETTLING_CYCLES, Correction, correction_of
+from leg_wear_monitor.monitor.diagnosis.evidence import SETTLING_CYCLES, correction_of
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.monitor.diagnosis.state import UNUSED_CYCLES, DiagnosisState, SignedCycle, TorqueState
@@ -30,7 +30,7 @@ from leg_wear_monitor.twin.sample import GROUND, gait_samples
 from leg_wear_monitor.twin.torque_reference import LEAST_CLEARANCE_M, WIDER
 from leg_wear_monitor.wear import SECTORS
 
-NEW = np.full(5, 3.0e-4)
+NEW, JOINTS = np.full(5, 3.0e-4), "ABGIJ"
 SIZE_NM = 9.2
 COMMISSIONING_CYCLES = 25  # half as many as usual
 START_NS = 1_700_000_000_000_000_000
@@ -111,7 +111,7 @@ def walk(observer, block, counted=NEW, begin=0, end=None, load_n=math.nan):
 def correct(observer, correction):
     """Correct a new leg; its clearances as they are counted then."""
     counted = NEW.copy()
-    counted[correction.joint] = correction.clearance_m
+    counted[JOINTS.index(correction.subject)] = correction.value
     observer.corrected(correction, counted)
     return counted
 
@@ -248,13 +248,12 @@ def test_a_joint_that_opens_is_named_and_corrected(commissioned, reference, join
     block = samples(reference, [0] * (COMMISSIONING_CYCLES + 2) + [number] * 25)
     ((cycle, correction),) = walk(observer, block, begin=COMMISSIONING_CYCLES)[:1]
     assert COMMISSIONING_CYCLES + 10 <= cycle <= COMMISSIONING_CYCLES + 24
-    assert correction.joint == joint
-    assert correction.clearance_m == pytest.approx(4.5e-4, rel=0.06)
-    change = correction.change
-    assert change.cause is Cause.CLEARANCE
-    assert abs(change.since_ns - START_NS - (COMMISSIONING_CYCLES + 2) * 10**9) <= 3 * 10**9
+    assert correction.subject == JOINTS[joint]
+    assert correction.value == pytest.approx(4.5e-4, rel=0.06)
+    assert correction.cause is Cause.CLEARANCE
+    assert abs(correction.since_ns - START_NS - (COMMISSIONING_CYCLES + 2) * 10**9) <= 3 * 10**9
     counted = correct(observer, correction)
-    assert observer.diagnosis.changes == (attrs.evolve(change, is_corrected=True),)
+    assert observer.diagnosis.changes == (attrs.evolve(correction, is_corrected=True),)
     walk(observer, block, counted, cycle + 1)
     assert observer.diagnosis.state is not DiagnosisState.CHANGED
 
@@ -385,7 +384,7 @@ def test_a_late_filtered_or_rubbing_torque_names_nothing_before_commissioning_an
     assert known.channel.lateness_s == pytest.approx(lateness_s, abs=0.0025)
     assert known.channel.load_friction == pytest.approx(channel.get("load_friction", 0.0), abs=0.06)
     corrections = walk(observer, block, begin=COMMISSIONING_CYCLES + 4)
-    changes = observer.diagnosis.changes or (corrections[0][1].change,)
+    changes = observer.diagnosis.changes or (corrections[0][1],)
     assert {change.subject for change in changes} == {"G"}
     (first,) = changes[:1]
     assert abs(first.value - 4.5e-4) < 3.0 * first.sigma
@@ -609,8 +608,8 @@ def test_the_sigma_of_a_correction_stays_in_the_clearance(commissioned, referenc
     counted = correct(observer, correction)
     walk(observer, block, counted, cycle + 1)
     found = observer.diagnosis
-    assert found.sigma_m[2] >= correction.change.sigma or np.isnan(found.sigma_m[2])
-    assert abs(correction.clearance_m - 1.5e-3) < 3.0 * correction.change.sigma
+    assert found.sigma_m[2] >= correction.sigma or np.isnan(found.sigma_m[2])
+    assert abs(correction.value - 1.5e-3) < 3.0 * correction.sigma
 
 
 def about(reference, joint: int, factor: float):
@@ -636,7 +635,7 @@ def corrected_beside(observer, reference, wider, opened: int, cycles=40):
     block = samples(walked, [0] * COMMISSIONING_CYCLES + [len(reference.torque_nm)] * cycles)
     end = COMMISSIONING_CYCLES + 20
     at, correction = walk(observer, block, begin=COMMISSIONING_CYCLES, end=end)[0]
-    assert correction.joint == 0
+    assert correction.subject == "A"
     assert np.isnan(np.array(observer.diagnosis.clearance_m)[1:]).all()  # a change hides others
     return block, at, correct(observer, correction)
 
@@ -656,8 +655,8 @@ def test_whether_another_joint_opened_with_the_corrected_one_is_seen_by_a_refere
     shown, known = observer.diagnosis, observer.state.commissioned
     if opened:
         _, second = found[0]
-        assert second.joint == 2
-        assert abs(second.clearance_m - 4.5e-4) < 2.0 * second.change.sigma
+        assert second.subject == "G"
+        assert abs(second.value - 4.5e-4) < 2.0 * second.sigma
         assert known.before is not None
     elif wholly:
         assert found == []
@@ -679,7 +678,7 @@ def test_an_opening_beside_a_correction_that_a_measurement_contradicts_is_told_u
     block, at, counted = corrected_beside(observer, reference, wider, leg_number(2, 1.5), 55)
     observer.state.reference = wider
 
-    def next_one(begin: int) -> tuple[int, Correction]:
+    def next_one(begin: int) -> tuple[int, Change]:
         cycles = range(begin, begin + 13)
         return next(one for at in cycles for one in walk(observer, block, counted, at, at + 1))
 
@@ -692,7 +691,7 @@ def test_an_opening_beside_a_correction_that_a_measurement_contradicts_is_told_u
     shown = observer.diagnosis
     assert shown.state is DiagnosisState.CHANGED and not shown.reason
     assert [(one.subject, one.is_corrected) for one in shown.changes] == [("A", True), ("G", False)]
-    assert shown.clearance_m[2] == second.clearance_m
+    assert shown.clearance_m[2] == second.value
     assert np.isfinite(shown.clearance_m).all()
     at, second = next_one(at + 3)
     observer.contradicted(second, 3.1e-4, 2.0e-5)
@@ -729,8 +728,8 @@ def test_a_joint_that_opened_with_the_corrected_one_is_found_after_a_restart(
     known = observer.state.all_commissioned
     again = TorqueObserver(leg, MonitorConfig(), SIZE_NM, counted, commissioned=known, references=[wider])
     (_, second), *_ = walk(again, block, counted, cycle + 1, cycle + 20)
-    assert second.joint == 2
-    assert abs(second.clearance_m - 4.5e-4) < 2.0 * second.change.sigma
+    assert second.subject == "G"
+    assert abs(second.value - 4.5e-4) < 2.0 * second.sigma
 
 
 def test_another_leg_is_reported_within_twenty_cycles(leg, commissioned, reference) -> None:
@@ -772,8 +771,8 @@ def test_noise_that_begins_after_commissioning_is_no_clearance_and_hides_none(
         assert change.counted == pytest.approx(0.3, rel=0.2)
     else:
         _, correction = corrections[0]
-        assert correction.joint == joint
-        assert abs(correction.clearance_m - 4.5e-4) < 2.0 * correction.change.sigma
+        assert correction.subject == JOINTS[joint]
+        assert abs(correction.value - 4.5e-4) < 2.0 * correction.sigma
 
 
 STEPS_NOT_USED = (
@@ -886,7 +885,7 @@ def test_what_a_correction_left_unknown_is_not_known_at_another_cadence(two_cade
     observer, block = two_cadences, samples(reference, [0] * 20)
     at = walk_at(observer, block, 10**9, START_NS)
     change = opening("A", 4.5e-4, 1e-5, at - 5 * 10**9)
-    correct(observer, Correction(0, change.value, change))
+    correct(observer, change)
     walk_at(observer, block, SLOWER_NS, at)
     fast, slow = observer.state.set_aside[0].commissioned, observer.state.commissioned
     for one in (fast, slow):

@@ -12,7 +12,6 @@ from leg_wear_monitor.estimate.cause import Cause, Change
 from leg_wear_monitor.fleet.learning import parts_of
 from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.cycle_report import correct
-from leg_wear_monitor.monitor.diagnosis.evidence import Correction
 from leg_wear_monitor.monitor.forecast.forecast import JointCondition, forecast, no_law
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     ClearanceAtWear,
@@ -125,7 +124,7 @@ def test_a_monitor_believes_a_corrected_clearance_now_and_in_its_next_run(begin,
         counted=FRESH,
         log_odds=99.0,
     )
-    correct(monitor._parts, Correction(1, OPENED, change))
+    correct(monitor._parts, change)
     reports = monitor.update(gait(2.0, begin_s=2.5))
     first = reports.cycles[-1].joints[1]
     assert first.clearance_m == pytest.approx(OPENED, rel=1e-4)

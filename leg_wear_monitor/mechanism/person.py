@@ -125,7 +125,7 @@ GROUND_LOAD = "ground"  # name of the load in a mechanism
 
 _OF_FORCE = ("crank_angle", "foot_load", "foot_load_along")  # columns of a file with the force on the toe
 _LEAST_ROWS = 11  # after the first one
-_USUAL_PEAK_N = 10.0, 5000.0  # of the vertical force: a child's step, and a run of 150 kg
+USUAL_PEAK_N = 10.0, 5000.0  # of the vertical force: a child's step, and a run of 150 kg
 
 
 @attrs.frozen
@@ -235,7 +235,7 @@ def read_toe_force(path: Path) -> Floats:
     if widest > TURN / _LEAST_ROWS:
         fault = f"no rows over {widest:.3g} rad of the turn, expected at most {TURN / _LEAST_ROWS:.2g} rad"
         raise ConfigError(str(path), _OF_FORCE[0], fault)
-    peak_n, (least_n, most_n) = float(up.max()), _USUAL_PEAK_N
+    peak_n, (least_n, most_n) = float(up.max()), USUAL_PEAK_N
     if peak_n <= -float(up.min()):
         fault = f"{peak_n:.3g} N at most and {up.min():.3g} N at least, expected a ground that pushes up"
         raise ConfigError(str(path), _OF_FORCE[1], fault)

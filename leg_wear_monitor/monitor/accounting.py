@@ -221,7 +221,7 @@ class Accounting:
             duplicates=intake.duplicates,
             late=intake.late,
             stray_stamps=intake.stray_stamps,
-            outliers=intake.outliers,
+            outliers=intake.outliers + intake.load_outliers,
             gaps_bridged=intake.gaps_bridged,
             gaps_lost=max(0, intake.lost - pauses.number),
             backward_jumps=intake.backward_jumps,

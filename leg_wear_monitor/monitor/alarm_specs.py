@@ -307,9 +307,10 @@ FOOT_LOAD: "tuple[AlarmSpec[Mapping[str, float]], ...]" = (
     ),
     _foot_load(
         SCALE,
-        "factor between the foot load and what the drive torque shows of it",
-        "factor by which the foot load is larger or smaller than the drive torque shows; or three times the "
-        "largest force received over 50 kN, if that is more than 3",
+        "factor between the foot load and what the drive torque shows of it, or a usual step",
+        "factor by which the foot load is larger or smaller than the drive torque shows, or without a torque "
+        "than a step of 10 to 5000 N; or three times the largest force received over 50 kN, if that is more "
+        "than 3",
     ),
     _foot_load(
         EXCHANGED,

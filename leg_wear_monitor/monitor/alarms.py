@@ -271,7 +271,8 @@ FOOT_LOAD_WORDS = {
     STUCK: "the foot load does not change between stance and swing: its sensor is stuck, or the leg walks in "
     "the air",
     ZERO: "the foot load is not 0 in swing: the zero of its sensor has drifted",
-    SCALE: "the size of the foot load does not fit the drive torque: its unit or scale is wrong",
+    SCALE: "the foot load has another size than the drive torque shows, or a step has: its unit or scale is "
+    "wrong",
     EXCHANGED: "the foot load is there while this foot is in the air: it is that of the other leg",
     SIGN: "the foot load pulls: its sign is reversed",
 }

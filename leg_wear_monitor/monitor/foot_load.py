@@ -11,7 +11,7 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.person import nominal_stance
+from leg_wear_monitor.mechanism.person import USUAL_PEAK_N, nominal_stance
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle, point_motion
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms import EXCHANGED, FOOT_LOAD_LIMITS, GAPS, SCALE, SIGN, STUCK, ZERO
@@ -201,7 +201,7 @@ class FootLoadCheck:
         return np.array([middle - half, middle + half]) % 1.0
 
     def _comparisons(self) -> dict[str, float]:
-        """Values of the alarms that compare the load with stance and with the drive torque."""
+        """Values of the alarms that compare the load with stance and with the drive torque or usual steps."""
         cycles = self.state.cycles
         force = np.mean([each.force_n for each in cycles], axis=0)
         up = self._stance.up @ force
@@ -216,6 +216,10 @@ class FootLoadCheck:
             values[ZERO] = abs(float(np.median(up[self._swing]))) / largest
             if sign > 0.0:
                 values[SCALE] = self._scale_factor(force)
+                is_step = all(values[kind] < FOOT_LOAD_LIMITS[kind] for kind in (SIGN, ZERO))
+                if is_step and np.isnan([each.unexplained_nm for each in cycles]).all():
+                    # without a torque, its size as a step
+                    values[SCALE] = max(1.0, USUAL_PEAK_N[0] / largest, largest / USUAL_PEAK_N[1])
         return values
 
     def _is_above_noise(self, up: Floats) -> bool:

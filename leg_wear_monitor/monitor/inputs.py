@@ -418,7 +418,7 @@ def of_other_joints(before: Intake, after: Intake) -> int:
 def unused(counts: Intake) -> int:
     """Number of unused samples."""
     faulty = sum(counts.faulty.values())
-    return faulty + counts.duplicates + counts.late + counts.stray_stamps + counts.outliers
+    return faulty + sum(int(getattr(counts, name)) for name in _DROPPED)
 
 
 # Sentences on unused samples: how many of how many, the fault, and what to do.
@@ -426,7 +426,7 @@ def unused(counts: Intake) -> int:
 
 _WORTH_TELLING = 0.01  # fraction of the samples; smaller ones are visible in the counters only
 
-_DROPPED = ("duplicates", "late", "stray_stamps", "outliers")
+_DROPPED = ("duplicates", "late", "stray_stamps", "outliers", "load_outliers")
 
 _SENTENCES = {
     "zero_stamp": "have a zero stamp: set header.stamp",
@@ -441,6 +441,7 @@ _SENTENCES = {
     "late": "arrive more than tracker.reorder_window_s after newer ones",
     "stray_stamps": "have a stamp far from the others: see the clock of the sender",
     "outliers": "have an angle far from the motion of the others",
+    "load_outliers": "have a foot load far from the samples before and after: see the cable of the sensor",
 }
 
 

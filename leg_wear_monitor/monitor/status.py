@@ -96,7 +96,7 @@ def statuses(parts: Parts, report: VerdictReport) -> tuple[Status, ...]:
         *((zero_status(parts.crank_zero),) if parts.crank_zero else ()),
         _input(parts),
         torque_status(parts),
-        *((_foot_load(parts.foot_load, parts.evaluation),) if parts.foot_load else ()),
+        *((_foot_load(parts.foot_load, parts),) if parts.foot_load else ()),
         diagnosis_status(parts.clearance_joints, parts.diagnosis),
         *joints,
         *((_encoders(parts.encoders, parts),) if parts.encoders else ()),
@@ -284,19 +284,23 @@ def _encoders(encoders: EncoderObserver, parts: Parts) -> Status:
     return Status("encoders", level, "; ".join(messages), values, code)
 
 
-def _foot_load(check: FootLoadCheck, evaluation: AlarmEvaluation) -> Status:
-    """The measured foot load, and faults of its sensor."""
-    load, alarms = check.load, evaluation.board.alarms
+def _foot_load(check: FootLoadCheck, parts: Parts) -> Status:
+    """The measured foot load, faults of its sensor, and outliers among its samples."""
+    load, alarms, outliers = check.load, parts.evaluation.board.alarms, parts.twin.intake.load_outliers
     raised = [
         alarms[spec.name()] for spec in alarm_specs.OF_FOOT_LOAD if alarms[spec.name()].level is not Level.OK
     ]
     level = max((alarm.level for alarm in raised), default=Level.OK)
     values = {name: or_nan(value) for name, value in attrs.asdict(load).items() if not isinstance(value, str)}
+    values["outliers"] = float(outliers)
     messages = [FOOT_LOAD_WORDS.get(alarm.kind, f"see: {alarm.name}") for alarm in raised]
     if messages:
         messages.append(check.acts)
     else:
         messages = ["measured" if load.cycles else "no whole gait cycle with samples yet"]
+    if outliers:
+        noun = "sample is an outlier" if outliers == 1 else "samples are outliers"
+        messages.append(f"{outliers} {noun}, far from the samples before and after, and not used")
     return Status(KINDS[LOAD].name, level, "; ".join(messages), values, worst_code(raised))
 
 

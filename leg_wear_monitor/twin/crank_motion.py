@@ -167,16 +167,62 @@ _PATIENCE = 10  # largest duration of a start, in settling times
 IS_STOPPED, IS_STARTING, IS_IN_STEP, IS_OUT_OF_STEP = range(4)
 
 
+# A sample of the foot load is an outlier if it departs from both neighbours by more than _FAR times the
+# largest force of recent turns, and they from each other by less than _AGREED of that. A force is known once
+# two neighbours have it; it decays over _TURNS. In 10 000 steps of the synthetic leg at 40 to 1000 Hz, with
+# noise of 5 % of the peak, no heel strike was an outlier whose transient, a single sample at 100 Hz, is up to
+# 1.5 times the peak of stance. Noise in the air is none by the least known force, the start by the first.
+_FAR, _AGREED, _TURNS = 2.0, 0.1, 10.0
+_LEAST_LOAD_N, FIRST_LOAD_N = 100.0, 500.0
+
+
+@kernel
+def _apart(one, other):
+    """Size of the difference of two forces (2,)."""
+    return math.hypot(one[0] - other[0], one[1] - other[1])
+
+
+@kernel
+def judge_load(state, sample):
+    """Judge the last queued sample of the foot load by the one before it and by the next one.
+
+    An outlier is counted, and gets the force between the other two.
+    """
+    clock, queue, at, before = state.clock, state.queue, -1, -1
+    for j in range(clock.tail - 1, clock.head - 1, -1):
+        if queue[j].kind == LOAD:
+            if at >= 0:
+                before = j
+                break
+            at = j
+    if before < 0:
+        return
+    force, first, last = queue[at].foot_force, queue[before].foot_force, sample.foot_force_n
+    away, passed_ns = min(_apart(force, first), _apart(force, last)), sample.stamp_ns - queue[at].stamp_ns
+    turns = 1.0e-9 * passed_ns * abs(state.estimate.speed) / _TURN
+    known = max(clock.foot_force * math.exp(-turns / _TURNS), _LEAST_LOAD_N)
+    if away > _FAR * known and _apart(first, last) < _AGREED * away:
+        state.counts.load_outliers += 1
+        state.counts.used[LOAD] -= 1
+        w = passed_ns / (sample.stamp_ns - queue[before].stamp_ns)
+        for i in range(2):
+            force[i] = w * first[i] + (1.0 - w) * last[i]
+    else:
+        beside = max(math.hypot(first[0], first[1]), math.hypot(last[0], last[1]))
+        known = max(known, min(math.hypot(force[0], force[1]), beside))
+    clock.foot_force = known
+
+
 @kernel
 def _push(state, j, steps, n):
     """Add the step of a queued sample of the foot load, with the one that is a filter's delay ahead."""
-    row, after, ahead = state.queue[j], -1, j
+    row, after, ahead, newest = state.queue[j], -1, j, j
     for k in range(j + 1, state.clock.tail):
-        other = state.queue[k]
-        if other.kind == LOAD:
-            after, ahead = k if after < 0 else after, k
+        if state.queue[k].kind == LOAD:
+            # the newest sample may still be an outlier
+            after, ahead, newest = k if after < 0 else after, newest, k
             # the filtered force is then right until the next sample
-            if other.stamp_ns >= state.queue[after].stamp_ns + AHEAD_NS:
+            if state.queue[ahead].stamp_ns >= state.queue[after].stamp_ns + AHEAD_NS:
                 break
     n = add_step(steps, n, PUSH, row.stamp_ns, state.queue[ahead].stamp_ns, 0)
     push = steps[n - 1]

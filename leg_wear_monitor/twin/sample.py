@@ -384,6 +384,7 @@ def intake(tracker: Records, leg: Records, kinds: Iterable[int] = KINDS) -> Inta
         stray_stamps=count["stray_stamps"],
         outliers=count["outliers"],
         velocity_outliers=count["velocity_outliers"],
+        load_outliers=count["load_outliers"],
         gaps_bridged=count["gaps_bridged"],
         lost=count["lost"],
         backward_jumps=count["backward_jumps"],

@@ -310,8 +310,9 @@ class Intake:
     duplicates, late, stray_stamps : int
         Dropped samples: repeated; later than the window; with a stamp far from the others that no second
         sample confirmed.
-    outliers, velocity_outliers : int
-        Samples dropped by the angle's gate; velocities dropped by theirs.
+    outliers, velocity_outliers, load_outliers : int
+        Samples dropped by the angle's gate; velocities dropped by theirs; samples of the foot load that both
+        neighbours contradict.
     gaps_bridged, lost, backward_jumps, reversals, failures : int
         Numbers of events; ``failures`` of the leg's integration, see `TwinEventKind`.
     bridged_s, moving_s, standing_s : float
@@ -332,6 +333,7 @@ class Intake:
     stray_stamps: int
     outliers: int
     velocity_outliers: int
+    load_outliers: int
     gaps_bridged: int
     lost: int
     backward_jumps: int

@@ -6,8 +6,10 @@ from collections.abc import Iterator
 from leg_wear_monitor.compiled.kernel import Record, Records, entry, kernel, new_records, record_of
 from leg_wear_monitor.twin import CRANK, KINDS, LOAD, TORQUE
 from leg_wear_monitor.twin.crank_motion import (
+    FIRST_LOAD_N,
     IS_STARTING,
     begin_filter,
+    judge_load,
     lose,
     note_prediction,
     reach_spline_nodes,
@@ -262,6 +264,7 @@ def _follow(model, state, sample, steps, n):
         count.used[LOAD] += 1
         if clock.last_crank_ns == 0:
             return n
+        judge_load(state, sample)
         for i in range(2):
             row.foot_force[i] = sample.foot_force_n[i]
     elif kind == CRANK:
@@ -384,7 +387,7 @@ class CrankTracker:
         self.records, self._block = new_records(1, TRACKER_STATE), new_records(_CHUNK, GAIT_SAMPLE)
         self._arrivals, self._queue = new_records(ARRIVALS, GAIT_SAMPLE), new_records(QUEUE, QUEUED)
         self.state: Record = record_of(self.records)
-        self.state.clock.tracking = IS_STARTING
+        self.state.clock.tracking, self.state.clock.foot_force = IS_STARTING, FIRST_LOAD_N
         self.steps = room_for_steps(_STEPS_A_SAMPLE * (QUEUE + ARRIVALS + _CHUNK))
 
     def update(self, samples: Samples) -> Iterator[tuple[Steps, int]]:

@@ -53,6 +53,7 @@ TRACKER_COUNTS = np.dtype(
         ("stray_stamps", "i8"),  # with a stamp far from all others
         ("outliers", "i8"),  # with an angle beyond the gate
         ("velocity_outliers", "i8"),  # with a velocity beyond the gate
+        ("load_outliers", "i8"),  # with a foot load that both neighbours contradict
         # events
         ("gaps_bridged", "i8"),  # bridged gaps
         ("lost", "i8"),  # losses of tracking
@@ -92,6 +93,7 @@ TRACKER_CLOCK = np.dtype(
         ("turns", "i8"),  # whole crank turns, counted separately
         ("velocity_credit", "i8"),  # successive velocities that agreed with the angles
         ("period_ns", "i8"),  # shortest recent time between crank samples
+        ("foot_force", "f8"),  # largest one of the foot load that a neighbour has, too, in recent turns [N]
     ]
 )
 

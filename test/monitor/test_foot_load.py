@@ -14,11 +14,11 @@ from leg_wear_monitor.gait.config import FootLoadSensorConfig, GaitConfig, LoadC
 from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.sensors import readings
 from leg_wear_monitor.mechanism.person import nominal_stance
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.position import TURN, build_linkage
 from leg_wear_monitor.monitor.alarms import FOOT_LOAD_WORDS
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.state import Level
-from leg_wear_monitor.twin import LOAD
+from leg_wear_monitor.twin import LOAD, TORQUE
 from leg_wear_monitor.twin.sample import Samples
 
 S, START = 1_000_000_000, 10**18
@@ -123,6 +123,25 @@ def test_each_fault_of_the_sensor_is_named(walk, change, alarm):
     assert status.level is Level.ERROR and FOOT_LOAD_WORDS[alarm] in status.message
 
 
+@pytest.mark.parametrize("scale", [1.0, 0.001, 1 / 785, 100.0])
+def test_without_a_torque_a_step_of_an_unusual_size_is_another_unit(walk, scale):
+    monitor = monitored(changed(lambda t, force: scale * force, walk[walk["kind"] != TORQUE]))
+    assert of_foot_load(monitor) == (set() if scale == 1.0 else {"foot_load_scale"})
+
+
+def test_without_a_torque_a_sensor_that_feels_the_foot_swing_is_of_no_other_unit(walk):
+    """In the air: some newtons of inertia at each phase, which are no step."""
+    noise = np.random.default_rng(1)
+    for lag in (0.0, 0.25, 0.5, 0.75):
+        swung = changed(
+            lambda t, force, lag=lag: (
+                np.cos(TURN * (t - lag))[:, None] * [0.5, 1.0] + 0.3 * noise.standard_normal(force.shape)
+            ),
+            walk[walk["kind"] != TORQUE],
+        )
+        assert "foot_load_scale" not in of_foot_load(monitored(swung))
+
+
 def test_a_fault_is_named_too_where_the_load_is_not_used(walk):
     assert of_foot_load(monitored(changed(lambda t, force: 0.0 * force, walk), "none")) == {"foot_load_stuck"}
 
@@ -188,6 +207,27 @@ def test_noise_without_a_load_does_not_wear_and_is_told(walk):
     )
     cycles = monitor.update(later).cycles
     assert np.mean([one.joints[2].mean_force_n for one in cycles[-2:]]) == pytest.approx(229.0, rel=0.2)
+
+
+def test_single_spikes_do_not_wear_and_are_told(walk):
+    """One sample of 3 kN in every other swing was taken for a force: it doubled those of hip and knee."""
+    monitor, new = as_new("measured", "wrench")
+    forces_n = []
+    for size_n in (0.0, 3000.0):
+        monitor.restore(new)
+        spiked = changed(
+            lambda t, force, size_n=size_n: force + (np.abs(t % 2.0 - 0.8)[:, None] < 0.002) * [0.0, size_n],
+            walk,
+        )
+        reports = monitor.update(spiked)
+        forces_n.append([max(one.joints[k].p99_force_n for one in reports.cycles) for k in (1, 2)])
+    assert forces_n[1] == pytest.approx(forces_n[0], rel=0.2)
+    assert not of_foot_load(monitor) and not raised(monitor)
+    assert reports.lost.outliers == 6
+    status = status_of(monitor, "foot_load")
+    assert status.values["outliers"] == 6.0
+    assert "6 samples are outliers, far from the samples before and after, and not used" in status.message
+    assert status_of(monitor, "input").values["load_outliers"] == 6.0
 
 
 def test_a_silent_sensor_leaves_the_mean_of_the_steps_before_and_not_the_last_one(walk):

@@ -9,8 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 
+from leg_wear_monitor.gait.config import GaitConfig, LoadConfig
+from leg_wear_monitor.gait.leg import POINTS, Ground
+from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.twin import CRANK, TORQUE
+from leg_wear_monitor.twin import CRANK, LOAD, TORQUE
 from leg_wear_monitor.twin.sample import Samples, TrackerSettings, gait_samples
 from leg_wear_monitor.twin.steps import (
     EVALUATE,
@@ -20,6 +23,7 @@ from leg_wear_monitor.twin.steps import (
     LOST_IN_GAP,
     MOVE,
     MOVING,
+    PUSH,
     REPORT,
     REST,
     REVERSED,
@@ -354,6 +358,61 @@ def test_outliers_change_little_and_a_crank_that_is_elsewhere_is_found_again(gai
     steps = track([jumped])
     assert list(steps.of(LEAVE)["detail"]) == [LOST_BY_OUTLIERS]
     assert len(steps.of(START)) == 2
+
+
+def on_the_ground(crank: Samples, rate_hz: float, transient: float = 0.0, spikes: int = 0) -> Samples:
+    """The crank and a foot load: steps of 300 N that differ, 5 % of noise; every so many samples a spike."""
+    config = GaitConfig(load=LoadConfig(ground_n=300.0, heel_strike_transient=transient))
+    ground, random = Ground(load_mechanism("bionic_leg"), config), np.random.default_rng(1)
+    t = 1.0e-9 * (crank["stamp_ns"][-1] - START_NS) * np.arange(0.01, 0.99, 0.05 / rate_hz)
+    turned = t + 0.5 / TURN
+    which = np.floor(turned - ground.swing).astype(int) + 1
+    steps = np.array([ground.step(TURN) for _ in range(which.max() + 1)])
+    force = steps[which, (turned % 1.0 * POINTS).astype(int)] + 15.0 * random.standard_normal((len(t), 2))
+    if spikes:
+        angle = TURN * random.random(len(force[spikes::spikes]))
+        force[spikes::spikes] = 3000.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    load = gait_samples(START_NS + np.round(1.0e9 * t).astype(np.int64), LOAD, foot_force_n=force)
+    both = np.concatenate([crank, load])
+    return both[np.argsort(both["stamp_ns"], kind="stable")]
+
+
+@pytest.mark.parametrize("rate_hz", [50.0, 100.0, 200.0, 1000.0])
+@pytest.mark.parametrize("transient", [0.0, 0.5, 1.5])
+def test_no_heel_strike_is_an_outlier(gait, rate_hz, transient):
+    """At 100 Hz the transient of 20 ms may be one sample."""
+    tracker, samples = CrankTracker(TrackerSettings()), on_the_ground(gait(20.0), rate_hz, transient)
+    track([samples], tracker)
+    assert tracker.state.counts.load_outliers == 0
+    assert tracker.state.counts.used[LOAD] > 19.5 * rate_hz
+
+
+@pytest.mark.parametrize("rate_hz", [25.0, 100.0, 1000.0])
+def test_a_spike_of_the_foot_load_is_counted_and_does_not_push(gait, rate_hz):
+    """Also not by the filter, which takes the sample ahead; and blocks and snapshots change nothing."""
+    samples, spikes = on_the_ground(gait(20.0), rate_hz, spikes=37), 37
+    tracker, one = CrankTracker(TrackerSettings()), CrankTracker(TrackerSettings())
+    found, counts = track([samples], tracker), tracker.state.counts
+    number = np.count_nonzero(samples["stamp_ns"][samples["kind"] == LOAD] <= tracker.state.clock.released_ns)
+    assert counts.load_outliers == len(range(spikes, number, spikes))
+    assert counts.used[LOAD] == number - counts.load_outliers
+    assert np.abs(found.of(PUSH)["motion"]).max() < 600.0
+    parts = []
+    for block in cut(samples, range(0, len(samples), 501)):
+        snapshot = one.snapshot()
+        track([samples[:300]], one)
+        one.restore(snapshot)
+        parts.append(track([block], one).steps)
+    assert_same(Reported(np.concatenate(parts)), found)
+
+
+def test_a_force_of_two_samples_is_a_force(gait):
+    samples = on_the_ground(gait(5.0), 100.0)
+    struck = np.flatnonzero(samples["kind"] == LOAD)[200:202]
+    samples["foot_force_n"][struck] = 0.0, 3000.0
+    tracker = CrankTracker(TrackerSettings())
+    assert track([samples], tracker).of(PUSH)["motion"].max() == 3000.0
+    assert tracker.state.counts.load_outliers == 0
 
 
 def test_velocity_helps_where_it_is_right_and_is_dropped_where_it_is_not(gait):

@@ -612,6 +612,28 @@ def test_the_sigma_of_a_correction_stays_in_the_clearance(commissioned, referenc
     assert abs(correction.value - 1.5e-3) < 3.0 * correction.sigma
 
 
+@pytest.fixture(scope="module")
+def beside_a_mass(leg, reference):
+    """The reference with one more leg at its end: its thigh weighs 1.7 times as much, 2.45 kg more."""
+    mass = np.array([1.7 if body == "thigh" else 1.0 for body in leg.bodies])
+    own = LegParameters(mass, np.ones(len(mass)))
+    heavy = LegSimulation(leg).simulate(reference.profile, own, NEW, DEPTH, 3, 20).torque
+    return attrs.evolve(reference, torque_nm=(*reference.torque_nm, np.tile(heavy, (2, 1))))
+
+
+def test_a_mass_on_the_leg_is_no_joint(commissioned, beside_a_mass) -> None:
+    """Seen before: I was corrected to 0.96 ± 0.39 mm, and the leg was to be stopped."""
+    observer = commissioned()
+    numbers = [0] * COMMISSIONING_CYCLES + [len(beside_a_mass.torque_nm) - 1] * 40
+    block, limit_m = samples(beside_a_mass, numbers), MonitorConfig().limits.clearance_m
+    for cycle in range(COMMISSIONING_CYCLES, len(numbers)):
+        assert walk(observer, block, begin=cycle, end=cycle + 1) == []
+        found = observer.diagnosis
+        assert not any(change.is_sure for change in found.changes)
+        assert max(found.least_m, default=0.0) < limit_m
+    assert found.state is DiagnosisState.CHANGED
+
+
 def about(reference, joint: int, factor: float):
     """A reference about a leg with a joint wider by a factor, if what joints change adds up."""
     wider, clearance_m, own = leg_number(joint, factor), reference.clearance_m.copy(), {}

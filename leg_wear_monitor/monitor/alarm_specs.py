@@ -229,7 +229,7 @@ SOURCES: "AlarmSpec[InputGuard]" = AlarmSpec(
     is_count=True,
 )
 
-JOINT = (IMPACT, CLEARANCE, GROWTH, LIFE, MATERIAL)
+JOINT: "tuple[AlarmSpec[JointReport], ...]" = (IMPACT, CLEARANCE, GROWTH, LIFE, MATERIAL)
 ENCODERS = (DEPARTURE,)
 TORQUE: "tuple[AlarmSpec[CycleEvidence], ...]" = (
     MISMATCH,

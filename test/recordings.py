@@ -10,6 +10,7 @@ from leg_wear_monitor.messages import encode
 from leg_wear_monitor.messages.cdr import Decoder
 from leg_wear_monitor.messages.streams import JOINT_STATE, STREAMS, WRENCH_STAMPED, definition
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.twin import LOAD
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE
 
 
@@ -61,7 +62,7 @@ def foreign():
     return read
 
 
-CODES = {stream.type: stream.code for stream in STREAMS if not stream.load_source}
+CODES = {stream.type: stream.code for stream in STREAMS if stream.kind != LOAD}
 
 START_NS = 1_700_000_000 * 10**9
 

@@ -182,7 +182,7 @@ def example(name: str) -> Any:
 def test_the_page_lists_every_field_as_the_classes_declare_it() -> None:
     page = PAGE.read_text(encoding="utf-8")
     assert {found[1] for found in TABLE.findall(page)} == set(DOCUMENTS)
-    assert renewed(page) == page
+    assert renewed(page) == page, "make tables renews it"
 
 
 @pytest.mark.plain

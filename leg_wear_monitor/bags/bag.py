@@ -31,7 +31,7 @@ from leg_wear_monitor.bags.mcap_layout import ZSTD_MAGIC, Channel, expand_messag
 from leg_wear_monitor.bags.table_file import CSV, PARQUET, TableFile
 from leg_wear_monitor.configuration.strict import events_with_depth
 from leg_wear_monitor.errors import printable
-from leg_wear_monitor.messages.streams import Stream, streams_read
+from leg_wear_monitor.messages.streams import Stream, streams_of
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin import TORQUE
 
@@ -479,7 +479,7 @@ def assign(
     first = sources[0].bag_file.path
     topics: dict[str, str] = {}
     findings: list[Finding] = []
-    for stream in streams_read(config.drive_torque.source, config.foot_load.source):
+    for stream in streams_of(config):
         topic = find_topic(stream, given.get(stream.topic), recorded, str(first), topics.get("joint_states"))
         if topic is not None:
             topics[stream.topic] = topic

@@ -21,7 +21,7 @@ from leg_wear_monitor.messages.names import interfaces_in, names_in
 from leg_wear_monitor.messages.streams import INTERFACES, JOINT_STATE, STREAMS, WRENCH_STAMPED, Stream
 from leg_wear_monitor.monitor.config.inputs import EFFORT, FLOAT64, INTERFACE, WRENCH, DriveTorque
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.twin import CRANK
+from leg_wear_monitor.twin import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, ZERO_STAMP, Samples
 
 # What identifies a series: each joint is a candidate for the crank, each torque one for the drive torque.
@@ -194,7 +194,7 @@ def _stream(
         return None
     for stream in STREAMS:
         # the streams of a foot load have the types of torques, too, and no torque is read as one
-        if stream.type == (channel.type or listed_type) and not stream.load_source:
+        if stream.type == (channel.type or listed_type) and stream.kind in (CRANK, TORQUE):
             wanted = joint_states if stream.kind == CRANK else drive_torque
             return stream if wanted in (None, channel.topic, channel.topic.lstrip("/")) else None
     return None

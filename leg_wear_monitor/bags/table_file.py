@@ -25,8 +25,9 @@ from leg_wear_monitor.bags.table_rows import CsvFile
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.messages import encode
 from leg_wear_monitor.messages.cdr import MESSAGE
-from leg_wear_monitor.messages.streams import CONTACT, INTERFACES, LOAD_WRENCH, STREAMS, WRENCH_STAMPED
+from leg_wear_monitor.messages.streams import CONTACT, INTERFACES, LOAD_WRENCH, WRENCH_STAMPED, streams_of
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.twin import CRANK, LOAD, TORQUE
 
 # What is remarkable about the rows of a table: times that go back, gaps, empty cells.
 
@@ -164,9 +165,8 @@ class Encoder:
         self._crank, self._further = config.crank_joint, config.encoders.names
         self._torque = config.drive_torque
         self.has_torque = bool(config.input.columns.drive_torque)
-        self._streams = {stream.torque_source: stream for stream in STREAMS if not stream.load_source}
-        of_load = {stream.load_source: stream for stream in STREAMS}
-        self._load = of_load.get(config.foot_load.source if config.input.columns.foot_load else "none")
+        self._streams = {stream.kind: stream for stream in streams_of(config)}
+        self._load = self._streams.get(LOAD) if config.input.columns.foot_load else None
 
     @property
     def is_effort(self) -> bool:
@@ -176,9 +176,9 @@ class Encoder:
     @property
     def channels(self) -> dict[int, Channel]:
         """Channels of a table by channel number."""
-        streams = {CRANK_CHANNEL: self._streams[""]}
+        streams = {CRANK_CHANNEL: self._streams[CRANK]}
         if self.has_torque and not self.is_effort:
-            streams[TORQUE_CHANNEL] = self._streams[self._torque.source]
+            streams[TORQUE_CHANNEL] = self._streams[TORQUE]
         if self._load:
             streams[LOAD_CHANNEL] = self._load
         return {number: Channel(f"/{one.topic}", one.type, "cdr", "", "") for number, one in streams.items()}
@@ -235,11 +235,11 @@ class Encoder:
         return row, raw
 
     def _torques(self, stamp_ns: NDArray[np.int64], torque: Floats) -> NDArray[np.uint8]:
-        if self._streams[self._torque.source].code == WRENCH_STAMPED:
+        if self._streams[TORQUE].code == WRENCH_STAMPED:
             vector = np.zeros((len(torque), 3))
             vector[:, "xyz".index(self._torque.axis)] = torque
             return encode.wrenches(stamp_ns, torque=vector)
-        if self._streams[self._torque.source].code == INTERFACES:
+        if self._streams[TORQUE].code == INTERFACES:
             values = {self._crank: {self._torque.interface: torque}}
             return encode.dynamic_joint_states(stamp_ns, values)
         return encode.float64s(torque)

@@ -3,7 +3,7 @@
 `cdr` parses the messages of a stream; `twin` defines the use of its samples.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -18,6 +18,8 @@ from leg_wear_monitor.twin import CRANK, LOAD, TORQUE
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
+
+    from leg_wear_monitor.monitor.config.settings import MonitorConfig
 
 JOINT_STATE, WRENCH_STAMPED, FLOAT64, LOAD_WRENCH, LOAD_FLOAT64, CONTACT, INTERFACES = range(1, 8)
 
@@ -38,9 +40,9 @@ class Stream:
         Fields of the type's main definition; names of nested types without their package.
     kind : int
         Kind of its samples, a key of `twin.KINDS`.
-    torque_source, load_source : str
-        Value of `drive_torque.source`, or of `foot_load.source`, for which the stream is read; both are empty
-        if it is always read.
+    source : str
+        Value of the parameter of its kind, in `streams_of`, for which the stream is read; empty if it is
+        always read.
     has_stamp : bool
         Whether the type has a header; without one, the time of arrival stamps its samples.
     is_needed : bool
@@ -52,8 +54,7 @@ class Stream:
     type: str
     fields: tuple[str, ...]
     kind: int
-    torque_source: str = ""
-    load_source: str = ""
+    source: str = ""
     has_stamp: bool = True
     is_needed: bool = False
 
@@ -67,24 +68,28 @@ STREAMS = (
     Stream(code=JOINT_STATE, topic="joint_states", type="sensor_msgs/msg/JointState", fields=_JOINTS,
            kind=CRANK, is_needed=True),
     Stream(code=WRENCH_STAMPED, topic="drive_torque", type="geometry_msgs/msg/WrenchStamped", fields=_WRENCH,
-           kind=TORQUE, torque_source="wrench"),
+           kind=TORQUE, source="wrench"),
     Stream(code=FLOAT64, topic="drive_torque", type="std_msgs/msg/Float64", fields=("float64 data",),
-           kind=TORQUE, torque_source="float64", has_stamp=False),
+           kind=TORQUE, source="float64", has_stamp=False),
     Stream(code=INTERFACES, topic="dynamic_joint_states", type="control_msgs/msg/DynamicJointState",
-           fields=_INTERFACES, kind=TORQUE, torque_source="interface"),
+           fields=_INTERFACES, kind=TORQUE, source="interface"),
     Stream(code=LOAD_WRENCH, topic="foot_load", type="geometry_msgs/msg/WrenchStamped", fields=_WRENCH,
-           kind=LOAD, load_source="wrench"),
+           kind=LOAD, source="wrench"),
     Stream(code=LOAD_FLOAT64, topic="foot_load", type="std_msgs/msg/Float64", fields=("float64 data",),
-           kind=LOAD, load_source="float64", has_stamp=False),
+           kind=LOAD, source="float64", has_stamp=False),
     Stream(code=CONTACT, topic="foot_load", type="std_msgs/msg/Bool", fields=("bool data",),
-           kind=LOAD, load_source="contact", has_stamp=False),
+           kind=LOAD, source="contact", has_stamp=False),
 )  # fmt: skip
 
 
-def streams_read(torque_source: str, load_source: str = "none") -> tuple[Stream, ...]:
-    """Streams that are read with values of `drive_torque.source` and `foot_load.source`."""
-    sources = (("", ""), (torque_source, ""), ("", load_source))
-    return tuple(stream for stream in STREAMS if (stream.torque_source, stream.load_source) in sources)
+def streams_read(sources: Mapping[int, str]) -> tuple[Stream, ...]:
+    """Streams that are read with the source of each kind of samples."""
+    return tuple(stream for stream in STREAMS if stream.source in ("", sources.get(stream.kind)))
+
+
+def streams_of(config: "MonitorConfig") -> tuple[Stream, ...]:
+    """Streams that are read with the parameters of a monitor."""
+    return streams_read({TORQUE: config.drive_torque.source, LOAD: config.foot_load.source})
 
 
 # An output topic of the monitor, and messages for it.

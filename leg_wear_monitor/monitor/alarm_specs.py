@@ -21,6 +21,7 @@ from leg_wear_monitor.monitor.alarms import (
     Alarm,
     Limit,
 )
+from leg_wear_monitor.state import Figure
 from leg_wear_monitor.twin import KINDS as SAMPLE_KINDS
 from leg_wear_monitor.twin import LOAD
 
@@ -98,6 +99,8 @@ class AlarmSpec(Generic[_E]):
         Whether the alarm stays until it is acknowledged; that of missing data ends when they return.
     far : float
         A value beyond so many times a limit raises the level at once.
+    figure : Figure or None
+        Kind of values that it belongs to: its value is not shown while the verdict says these are not valid.
     """
 
     kind: str
@@ -113,6 +116,7 @@ class AlarmSpec(Generic[_E]):
     is_count: bool = False
     is_latched: bool = True
     far: float = math.inf
+    figure: Figure | None = None
 
     def new(self, joint: str = "") -> Alarm:
         """The alarm in its initial state."""
@@ -142,6 +146,7 @@ IMPACT: "AlarmSpec[JointReport]" = AlarmSpec(
     value=lambda joint: joint.peak_force_n,
     limit=lambda of: of.by_joint(of.config.limits.joint_impact_force_n, of.config.limits.impact_force_n),
     on_delay=_knock,
+    figure=Figure.IMPACT_FORCES,
 )
 CLEARANCE: "AlarmSpec[JointReport]" = AlarmSpec(
     kind="clearance",
@@ -151,6 +156,7 @@ CLEARANCE: "AlarmSpec[JointReport]" = AlarmSpec(
     limit_words="`limits.clearance_m`, `limits.joint_clearance_m`",
     value=lambda joint: joint.judged_clearance_m,
     limit=lambda of: of.by_joint(of.config.limits.joint_clearance_m, of.config.limits.clearance_m),
+    figure=Figure.CLEARANCES,
 )
 GROWTH: "AlarmSpec[JointReport]" = AlarmSpec(
     kind="growth",
@@ -160,6 +166,7 @@ GROWTH: "AlarmSpec[JointReport]" = AlarmSpec(
     limit_words="`limits.growth_m_per_hour`",
     value=lambda joint: math.nan if joint.growth_mps is None else 3600.0 * joint.growth_mps,
     limit=lambda of: of.config.limits.growth_m_per_hour,
+    figure=Figure.GROWTH,
 )
 LIFE: "AlarmSpec[JointReport]" = AlarmSpec(
     kind="remaining_life",
@@ -170,6 +177,7 @@ LIFE: "AlarmSpec[JointReport]" = AlarmSpec(
     value=lambda joint: joint.forecast.hours.p10 if joint.forecast and joint.forecast.hours else math.nan,
     limit=lambda of: of.config.limits.remaining_life_h,
     is_least=True,
+    figure=Figure.FORECAST,
 )
 MATERIAL: "AlarmSpec[JointReport]" = AlarmSpec(
     kind="material_limit",
@@ -221,7 +229,7 @@ SOURCES: "AlarmSpec[InputGuard]" = AlarmSpec(
     is_count=True,
 )
 
-JOINT = (IMPACT, CLEARANCE, GROWTH, LIFE, MATERIAL)
+JOINT: "tuple[AlarmSpec[JointReport], ...]" = (IMPACT, CLEARANCE, GROWTH, LIFE, MATERIAL)
 ENCODERS = (DEPARTURE,)
 TORQUE: "tuple[AlarmSpec[CycleEvidence], ...]" = (
     MISMATCH,
@@ -363,6 +371,7 @@ OF_TORQUE = frozenset((*(spec.name() for spec in TORQUE), "input_torque"))
 INPUT_KINDS = tuple(dict.fromkeys(spec.kind for spec in OF_INPUT))
 KINDS = tuple(dict.fromkeys(spec.kind for spec in ALL))
 UNITS = {spec.kind: spec.unit for spec in ALL}
+FIGURES = {spec.kind: spec.figure for spec in ALL}
 
 
 def with_its_unit(alarm: Alarm) -> Alarm:

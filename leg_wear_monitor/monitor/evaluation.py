@@ -198,10 +198,10 @@ class AlarmBoard:
         """Highest shown level of some alarms."""
         return max(self.alarms[name].level for name in names)
 
-    def _set(self, found: Iterable[Alarm], stamp_ns: int) -> tuple[AlarmList, ...]:
+    def _set(self, found: list[Alarm], stamp_ns: int) -> tuple[AlarmList, ...]:
         before = self.alarms
         self.alarms = before | {alarm.name: alarm for alarm in found}
-        if any(has_changed(before[name], alarm) for name, alarm in self.alarms.items()):
+        if any(has_changed(before[alarm.name], alarm) for alarm in found):
             return (AlarmList(stamp_ns, tuple(self.alarms.values())),)
         return ()
 

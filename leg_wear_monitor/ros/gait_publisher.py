@@ -29,7 +29,7 @@ from leg_wear_monitor.messages.streams import streams_read
 from leg_wear_monitor.ros.inputs import message_class
 from leg_wear_monitor.ros.parameters import Parameters
 from leg_wear_monitor.ros.running import WAKE_S, ClosingNode, repeated, run, spin, until_down
-from leg_wear_monitor.twin import CRANK, LOAD
+from leg_wear_monitor.twin import CRANK, LOAD, TORQUE
 from leg_wear_monitor.twin.sample import (
     EMPTY,
     MISSING_JOINT,
@@ -187,9 +187,10 @@ class GaitPublisher(ClosingNode):
             if self.config.precompute:
                 self._blocks = iter(list(self._blocks))
         qos = QoSProfile(depth=200, reliability=self._reliability())
+        sources = {TORQUE: self.config.torque_sensor.source, LOAD: self.config.foot_load_sensor.source}
         self._by_kind: dict[int, Publisher] = {
             stream.kind: self._publisher(message_class(stream.type), stream.topic, qos)
-            for stream in streams_read(self.config.torque_sensor.source, self.config.foot_load_sensor.source)
+            for stream in streams_read(sources)
         }
         self.published, self._start_ns = 0, 0
 

@@ -20,9 +20,10 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from leg_wear_monitor.errors import ConfigError, printable
 from leg_wear_monitor.messages.cdr import MESSAGE, Decoder
 from leg_wear_monitor.messages.names import is_without, names_in, without_interface
-from leg_wear_monitor.messages.streams import INTERFACES, JOINT_STATE, WRENCH_STAMPED, Stream, streams_read
+from leg_wear_monitor.messages.streams import INTERFACES, JOINT_STATE, WRENCH_STAMPED, Stream, streams_of
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.ros.generated_type import generated_class
+from leg_wear_monitor.twin import LOAD
 from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, Samples
 
 # Bounded queue of received messages that wait for the monitor; adding a message is cheap.
@@ -323,11 +324,12 @@ def check_stamps(config: MonitorConfig, source: str) -> None:
     ConfigError
         Naming the parameter, and sources that have stamps.
     """
-    for stream in streams_read(config.drive_torque.source, config.foot_load.source):
+    for stream in streams_of(config):
         if not stream.has_stamp:
-            key, stamped = ("foot_load", "wrench") if stream.load_source else ("drive_torque", _STAMPED)
-            value = stream.load_source or stream.torque_source
-            fault = f"the messages of {value} have no stamp, which use_sim_time needs, expected {stamped}"
+            key, stamped = ("foot_load", "wrench") if stream.kind == LOAD else ("drive_torque", _STAMPED)
+            fault = (
+                f"the messages of {stream.source} have no stamp, which use_sim_time needs, expected {stamped}"
+            )
             raise ConfigError(source, f"{key}.source", fault)
 
 
@@ -406,7 +408,7 @@ class Inputs:
     """
 
     def __init__(self, node: Node, config: MonitorConfig) -> None:
-        streams = streams_read(config.drive_torque.source, config.foot_load.source)
+        streams = streams_of(config)
         self.topics = tuple(InputTopic(node.resolve_topic_name(each.topic), each) for each in streams)
         self.subscriptions = tuple(_subscribe(node, topic) for topic in self.topics)
 

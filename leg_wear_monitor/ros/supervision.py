@@ -10,7 +10,7 @@ from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
 
 from leg_wear_monitor.messages.names import wanted_interfaces
-from leg_wear_monitor.messages.streams import INTERFACES, WRENCH_STAMPED, streams_read
+from leg_wear_monitor.messages.streams import INTERFACES, WRENCH_STAMPED, streams_of
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.judgement import leg_alarm
@@ -142,10 +142,7 @@ class Supervision:
     def __init__(self, node: Node, monitor: "WearMonitor", config: MonitorConfig) -> None:
         self._node, self._monitor = node, monitor
         self._started_ns = time.monotonic_ns()
-        kinds = tuple(
-            KINDS[stream.kind].name
-            for stream in streams_read(config.drive_torque.source, config.foot_load.source)
-        )
+        kinds = tuple(KINDS[stream.kind].name for stream in streams_of(config))
         self._silence = health.Silence(kinds, self._started_ns, time.time_ns())
         self._names = CrankNames(config.crank_joint)
         torque = config.drive_torque

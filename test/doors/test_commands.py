@@ -39,7 +39,8 @@ def commands(help_of: Callable[..., str], *verb: str) -> Iterator[str]:
 
 @pytest.mark.plain
 def test_commands_and_options_are_those_that_are_kept(run) -> None:
-    assert list(commands(lambda *verb: run(*verb, "--help").out)) == KEPT.read_text().splitlines()
+    found = list(commands(lambda *verb: run(*verb, "--help").out))
+    assert found == KEPT.read_text().splitlines(), "if it is meant: python test/doors/test_commands.py"
 
 
 def printed(*verb: str) -> str:

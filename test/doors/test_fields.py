@@ -26,7 +26,7 @@ def fields() -> Iterator[str]:
 
 @pytest.mark.plain
 def test_fields_their_types_and_units_are_those_that_are_kept() -> None:
-    assert list(fields()) == KEPT.read_text().splitlines()
+    assert list(fields()) == KEPT.read_text().splitlines(), "if it is meant: python test/doors/test_fields.py"
 
 
 @pytest.mark.parametrize("model", ["full", "clearance"])

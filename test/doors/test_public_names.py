@@ -52,7 +52,9 @@ def names() -> Iterator[str]:
 
 
 def test_names_and_how_they_are_called_are_those_that_are_kept():
-    assert list(names()) == KEPT.read_text().splitlines()
+    assert list(names()) == KEPT.read_text().splitlines(), (
+        "if it is meant: python test/doors/test_public_names.py"
+    )
 
 
 def test_dir_lists_every_public_name_before_it_is_used():

@@ -39,6 +39,7 @@ if find_spec("rclpy"):
     from leg_wear_monitor.ros.inputs import Arrival, Inputs, message_class
     from leg_wear_monitor.ros.monitor_node import MonitorNode
     from leg_wear_monitor.ros.running import spin
+    from leg_wear_monitor.twin import LOAD, TORQUE
 
 START_NS = 1_700_000_000_000_000_000
 PATIENCE_S = 300.0  # before a test that waits in vain is given up; compilation takes its time
@@ -75,7 +76,7 @@ class Legs:
         qos = QoSProfile(depth=200, reliability=reliability)
         self._publishers = {
             stream.kind: node.create_publisher(message_class(stream.type), f"{namespace}/{stream.topic}", qos)
-            for stream in streams_read(source, load)
+            for stream in streams_read({TORQUE: source, LOAD: load})
         }
 
     def listeners(self) -> int:

@@ -5,6 +5,7 @@ import math
 import attrs
 
 from leg_wear_monitor.files import or_nan, share_directory
+from leg_wear_monitor.monitor.alarm_specs import FIGURES
 from leg_wear_monitor.monitor.alarms import amount, joint_of, raised_words, time_words
 from leg_wear_monitor.monitor.verdict.decision import decision_of, figures_of
 from leg_wear_monitor.monitor.verdict.situation import COUNTED
@@ -52,12 +53,6 @@ from leg_wear_monitor.state import AlarmChange, Figure, JointClearance, LegAlarm
 
 
 MOST_ROWS = 50
-_FIGURES = {
-    "impact_force": Figure.IMPACT_FORCES,
-    "clearance": Figure.CLEARANCES,
-    "growth": Figure.GROWTH,
-    "remaining_life": Figure.FORECAST,
-}
 
 
 def raised_alarms(summary: ReplaySummary, otherwise: str) -> str:
@@ -97,7 +92,7 @@ def _alarm_doubt(summary: ReplaySummary, alarm: LegAlarm) -> str:
     if alarm.name in (each.name for each in summary.verdict.evidence[:1]):
         return ""
     kind, _, subject = alarm.name.partition(" ")
-    figure, clearance = _FIGURES.get(kind), summary.clearances.get(subject)
+    figure, clearance = FIGURES.get(kind), summary.clearances.get(subject)
     if figure is Figure.CLEARANCES and clearance and clearance.believed_by not in (None, COUNTED):
         return ""
     return not_valid(summary.verdict, figure) if figure else ""

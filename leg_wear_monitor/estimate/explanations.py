@@ -26,6 +26,7 @@ _LEFT = 0.5
 _LATE_SIGMA_S = 0.0015  # about the step between the channels that are tried
 _NOISE_SIGMA = 0.08  # of the noise: half of the step between those that are tried
 _QUIETEST = 0.01  # of the square of the roughness
+_QUIETER = 0.25  # of less noise than known: what an opening beside it may hide of its decrease
 _ROUNDS = 2  # of the search for a clearance and a noise
 # mean square up to which it is noise alone: up to 1.4 of a healthy leg, a real motor's stick-slip too; where
 # two joints opened as well, which no single one explains, it would explain most of it (2026-11-27)
@@ -298,12 +299,19 @@ class Explainer:
         change = np.array([one.shown(expected) for one in self.noises]) - expected
         own = covariance + _diagonal(np.sqrt([one.variance(expected, cycles) for one in self.noises]))
         misfits = Misfits(rest - change, own)
+        known_nm = self.model.sensor.noise_nm
+        is_less = np.array([one.noise_nm for one in self.noises]) < known_nm
         possible = misfits.square < _LEFT * as_counted.square
-        if not possible.any():
+        # less noise is clear even where an opening makes up for it
+        usable = possible | (is_less & (as_counted.value - misfits.value > 2.0 * SURE_OF_NAME))
+        if not usable.any():
             return [], ()
-        best = int(np.where(possible, misfits.value, np.inf).argmin())
-        found, known_nm = self.noises[best], self.model.sensor.noise_nm
-        beside = [one for one in self.noises if known_nm < one.noise_nm <= found.noise_nm]
+        best = int(np.where(usable, misfits.value, np.inf).argmin())
+        found = self.noises[best]
+        least_nm = _QUIETER * found.noise_nm if is_less[best] else known_nm
+        beside = [one for one in self.noises if least_nm < one.noise_nm <= found.noise_nm]
+        if not possible[best]:
+            return [], beside
         cause = NamedCause(Cause.NOISE, found.noise_nm, _NOISE_SIGMA * found.noise_nm)
         return [misfits.explanation(best, cause, known_nm)], beside
 

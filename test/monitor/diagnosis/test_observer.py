@@ -612,6 +612,16 @@ def test_the_sigma_of_a_correction_stays_in_the_clearance(commissioned, referenc
     assert abs(correction.value - 1.5e-3) < 3.0 * correction.sigma
 
 
+def test_an_opening_is_seen_by_a_sensor_that_became_quieter(commissioned, reference) -> None:
+    """Seen before: only more noise was tried beside it; I was named for a gait cycle, then the mechanism."""
+    observer = commissioned()
+    numbers = [0] * (COMMISSIONING_CYCLES + 8) + [leg_number(3, 1.5)] * 20
+    block = samples(reference, numbers, noise=0.05)
+    _, correction = walk(observer, block, begin=COMMISSIONING_CYCLES)[0]
+    assert correction.subject == "I"
+    assert abs(correction.value - 4.5e-4) < 2.0 * correction.sigma
+
+
 @pytest.fixture(scope="module")
 def beside_a_mass(leg, reference):
     """The reference with one more leg at its end: its thigh weighs 1.7 times as much, 2.45 kg more."""

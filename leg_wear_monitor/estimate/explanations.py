@@ -32,13 +32,14 @@ _ROUNDS = 2  # of the search for a clearance and a noise
 # two joints opened as well, which no single one explains, it would explain most of it (2026-11-27)
 _NOISE_ALONE = 2.0
 
-# mean square up to which a joint may be sure: right names have 0.6 to 1.9 up to 0.6 mm. Or, of a joint that
-# opens widely, the part of what is left over without it, by the square of how often it is as wide as counted,
-# if its standard deviation is no larger part of the opening: 0.05 and 0.21 for A at 1 mm, 0.08 to 0.16 and
-# 0.21 to 0.40 for G at 2 mm. A mass of 1 to 2.5 kg on a healthy leg was A at 0.34 mm with 3.6 (0.56) and I at
-# 0.9 mm with 6 to 13 (0.26 to 0.38), G at 0.45 beside one 0.79 mm (0.12); five joints up to 0.55 mm were A at
-# 0.62 mm for 0.50 with 6 (0.07) (2026-11-27)
-_SURE_SQUARE, _SURE_PART, _SURE_SIGMA = 2.0, 0.01, 0.45
+# mean square up to which a joint is sure by itself: right names have 0.6 to 1.9 up to 0.6 mm, A has 3 to 15 at
+# 0.7 and 0.8 mm. Else it has to be far better than the next cause: A has odds of e^134 and more there; a mass
+# of 1 to 2.5 kg on a healthy leg e^2 to e^13, as A at 0.34 or I at 0.9 mm; B and G at 0.50 mm e^3 to e^16, as
+# G at 0.79 mm; G at 0.45 mm beside 0.48 kg on the foot e^20 to e^42, as G at 0.79 mm. Or it is so wide that
+# its size is hardly known, and leaves such a part of what is left over without it: G at 2 mm, as 1.3 to
+# 2.1 mm, 0.08 to 0.17 (2026-11-27)
+_SURE_SQUARE, _SURE_BY = 2.0, 100.0
+_WIDE, _OF_WIDE = 4.0, 0.2
 _ANYTHING_ELSE = "something else"
 
 # mean square above which an explanation does not explain (docs/explanation/diagnosis.md), and values that
@@ -486,10 +487,8 @@ def with_doubt(change: Change, explanations: Sequence[Explanation]) -> Change:
     the impacts, too, or several joints at once.
     """
     best, nothing = explanations[0], as_counted(explanations)
-    if change.cause is not Cause.CLEARANCE or best.square <= _SURE_SQUARE:
-        return change
-    part = min(_SURE_PART * (change.value / change.counted) ** 2, _PART)
-    is_known = change.sigma <= _SURE_SIGMA * abs(change.value - change.counted)
-    if is_known and best.square <= part * nothing.square:
+    is_apart = best.square <= _SURE_SQUARE or change.runner_up_log_odds >= _SURE_BY
+    is_wide = change.value >= _WIDE * change.counted and best.square <= _OF_WIDE * nothing.square
+    if change.cause is not Cause.CLEARANCE or is_apart or is_wide:
         return change
     return attrs.evolve(change, runner_up=_ANYTHING_ELSE, runner_up_log_odds=0.0)

@@ -32,7 +32,7 @@ _ROUNDS = 2  # of the search for a clearance and a noise
 # two joints opened as well, which no single one explains, it would explain most of it (2026-11-27)
 _NOISE_ALONE = 2.0
 
-# mean square up to which a joint is sure by itself: right names have 0.6 to 1.9 up to 0.6 mm, A has 3 to 15 at
+# mean square up to which a joint is sure by itself: right names have 0.6 to 1.9 up to 0.6 mm, A 3 to 15 at
 # 0.7 and 0.8 mm. Else it has to be far better than the next cause: A has odds of e^134 and more there; a mass
 # of 1 to 2.5 kg on a healthy leg e^2 to e^13, as A at 0.34 or I at 0.9 mm; B and G at 0.50 mm e^3 to e^16, as
 # G at 0.79 mm; G at 0.45 mm beside 0.48 kg on the foot e^20 to e^42, as G at 0.79 mm. Or it is so wide that

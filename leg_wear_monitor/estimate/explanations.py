@@ -32,13 +32,14 @@ _ROUNDS = 2  # of the search for a clearance and a noise
 # two joints opened as well, which no single one explains, it would explain most of it (2026-11-27)
 _NOISE_ALONE = 2.0
 
-# mean square up to which a joint is sure by itself: right names have 0.6 to 1.9 up to 0.6 mm, A 3 to 15 at
-# 0.7 and 0.8 mm. Else it has to be far better than the next cause: A has odds of e^134 and more there; a mass
-# of 1 to 2.5 kg on a healthy leg e^2 to e^13, as A at 0.34 or I at 0.9 mm; B and G at 0.50 mm e^3 to e^16, as
-# G at 0.79 mm; G at 0.45 mm beside 0.48 kg on the foot e^20 to e^42, as G at 0.79 mm. Or it is so wide that
-# its size is hardly known, and leaves such a part of what is left over without it: G at 2 mm, as 1.3 to
-# 2.1 mm, 0.08 to 0.17 (2026-11-27)
-_SURE_SQUARE, _SURE_BY = 2.0, 100.0
+# mean square up to which a joint is sure by itself: right names have 0.6 to 1.9, but A 3 to 15 at 0.7 and
+# 0.8 mm, G 2 to 6 at 0.50 and 0.52. Else it has to be far better than the next cause, by such odds below
+# twice the counted clearance and above: G has e^57 to e^96 there, A e^134 and more; a mass of 1 to 2.5 kg on
+# a healthy leg e^2 to e^13, as A at 0.34 or I at 0.9 mm; B and G at 0.50 mm e^3 to e^63 in ten gait cycles,
+# as G at 0.79 to 0.86 mm; G at 0.45 and 0.50 mm beside 0.48 kg on the foot e^20 to e^91, as G at 0.79 to
+# 0.84 mm. Or it is so wide that its size is hardly known, and leaves such a part of what is left over
+# without it: G at 2 mm, as 1.3 to 2.1 mm, 0.08 to 0.17 (2026-11-27)
+_SURE_SQUARE, _SURE_BY = 2.0, (50.0, 100.0)
 _WIDE, _OF_WIDE = 4.0, 0.2
 _ANYTHING_ELSE = "something else"
 
@@ -487,7 +488,8 @@ def with_doubt(change: Change, explanations: Sequence[Explanation]) -> Change:
     the impacts, too, or several joints at once.
     """
     best, nothing = explanations[0], as_counted(explanations)
-    is_apart = best.square <= _SURE_SQUARE or change.runner_up_log_odds >= _SURE_BY
+    needed = _SURE_BY[change.value >= 2.0 * change.counted]
+    is_apart = best.square <= _SURE_SQUARE or change.runner_up_log_odds >= needed
     is_wide = change.value >= _WIDE * change.counted and best.square <= _OF_WIDE * nothing.square
     if change.cause is not Cause.CLEARANCE or is_apart or is_wide:
         return change

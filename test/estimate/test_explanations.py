@@ -181,12 +181,13 @@ def test_a_name_is_less_sure_where_even_the_best_cause_explains_badly(square: fl
     ("value", "square", "without", "odds", "is_sure"),
     [
         (0.45e-3, 1.8, 5.3, 14.8, True),
+        (0.486e-3, 3.8, 18.3, 57.0, True),  # G at 0.52 mm
         (0.83e-3, 12.1, 144.0, 134.0, True),  # A at 0.8 mm
         (1.52e-3, 11.7, 77.7, 11.9, True),  # G at 2 mm
         (0.344e-3, 3.6, 6.5, 11.0, False),  # 1 kg on the thigh
         (0.885e-3, 6.8, 23.6, 13.4, False),  # 1.75 kg
         (1.04e-3, 16.1, 84.4, 11.0, False),  # G at 0.45 mm beside 0.48 kg on the foot
-        (0.799e-3, 20.9, 277.0, 42.0, False),  # the same, later
+        (0.835e-3, 18.6, 255.0, 91.0, False),  # at 0.50 mm, and 60 gait cycles later
         (0.79e-3, 3.7, 65.6, 14.6, False),  # B and G at 0.50 mm
     ],
 )

@@ -33,14 +33,15 @@ _ROUNDS = 2  # of the search for a clearance and a noise
 _NOISE_ALONE = 2.0
 
 # mean square up to which a joint is sure by itself: right names have 0.6 to 1.9, but A 3 to 15 at 0.7 and
-# 0.8 mm, G 2 to 6 at 0.50 and 0.52. Else it has to be far better than the next cause, by such odds below
-# twice the counted clearance and above: G has e^57 to e^96 there, A e^134 and more; a mass of 1 to 2.5 kg on
-# a healthy leg e^2 to e^13, as A at 0.34 or I at 0.9 mm; B and G at 0.50 mm e^3 to e^63 in ten gait cycles,
-# as G at 0.79 to 0.86 mm; G at 0.45 and 0.50 mm beside 0.48 kg on the foot e^20 to e^91, as G at 0.79 to
-# 0.84 mm. Or it is so wide that its size is hardly known, and leaves such a part of what is left over
-# without it: G at 2 mm, as 1.3 to 2.1 mm, 0.08 to 0.17 (2026-11-27)
-_SURE_SQUARE, _SURE_BY = 2.0, (50.0, 100.0)
-_WIDE, _OF_WIDE = 4.0, 0.2
+# 0.8 mm, G 2 to 6 at 0.50 and 0.52. Else it has to be far better than the next cause. Where it is twice to
+# four times as wide as counted, others look like it, too: A has odds of e^134 and more there; a mass of 1 to
+# 2.5 kg on a healthy leg e^2 to e^13, as I at 0.9 mm; B and G at 0.50 mm e^3 to e^63 in ten gait cycles, as
+# G at 0.79 to 0.86 mm; G at 0.45 and 0.50 mm beside 0.48 kg on the foot e^20 to e^91, as G at 0.79 to 0.84
+# mm. Below and above, G has e^57 to e^96 at 0.5 mm, and e^71 and more at 2 mm in a leg without a baseline.
+# Or it is so wide that its size is hardly known, and leaves such a part of what is left over without it: G
+# at 2 mm, as 1.3 to 2.1 mm, 0.08 to 0.17 (2026-11-27)
+_SURE_SQUARE, _SURE_BY, _SURE_BY_AMONG_OTHERS = 2.0, 50.0, 100.0
+_WIDER, _WIDE, _OF_WIDE = 2.0, 4.0, 0.2
 _ANYTHING_ELSE = "something else"
 
 # mean square above which an explanation does not explain (docs/explanation/diagnosis.md), and values that
@@ -487,10 +488,11 @@ def with_doubt(change: Change, explanations: Sequence[Explanation]) -> Change:
     However much better it explains than others: the true cause may not be among them, as a mass that changes
     the impacts, too, or several joints at once.
     """
-    best, nothing = explanations[0], as_counted(explanations)
-    needed = _SURE_BY[change.value >= 2.0 * change.counted]
+    if change.cause is not Cause.CLEARANCE:
+        return change
+    best, nothing, times = explanations[0], as_counted(explanations), change.value / change.counted
+    needed = _SURE_BY_AMONG_OTHERS if _WIDER <= times < _WIDE else _SURE_BY
     is_apart = best.square <= _SURE_SQUARE or change.runner_up_log_odds >= needed
-    is_wide = change.value >= _WIDE * change.counted and best.square <= _OF_WIDE * nothing.square
-    if change.cause is not Cause.CLEARANCE or is_apart or is_wide:
+    if is_apart or (times >= _WIDE and best.square <= _OF_WIDE * nothing.square):
         return change
     return attrs.evolve(change, runner_up=_ANYTHING_ELSE, runner_up_log_odds=0.0)

@@ -184,6 +184,7 @@ def test_a_name_is_less_sure_where_even_the_best_cause_explains_badly(square: fl
         (0.486e-3, 3.8, 18.3, 57.0, True),  # G at 0.52 mm
         (0.83e-3, 12.1, 144.0, 134.0, True),  # A at 0.8 mm
         (1.52e-3, 11.7, 77.7, 11.9, True),  # G at 2 mm
+        (1.65e-3, 7.8, 27.3, 71.0, True),  # the same in a leg without a baseline
         (0.344e-3, 3.6, 6.5, 11.0, False),  # 1 kg on the thigh
         (0.885e-3, 6.8, 23.6, 13.4, False),  # 1.75 kg
         (1.04e-3, 16.1, 84.4, 11.0, False),  # G at 0.45 mm beside 0.48 kg on the foot

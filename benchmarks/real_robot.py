@@ -36,6 +36,7 @@ from leg_wear_monitor.estimate.change_detector import threshold
 from leg_wear_monitor.estimate.explanations import Explainer, Nuisance, change_of
 from leg_wear_monitor.estimate.leg_model import commissioned_baseline, with_scatter_of
 from leg_wear_monitor.estimate.signature import (
+    Changes,
     CommissionedTorque,
     PhaseMeans,
     SignatureModel,
@@ -163,7 +164,11 @@ def explainer(first: Period, cycles: np.ndarray, sensor: TorqueSensor, scatter: 
     covariance = with_scatter_of(scatter, cycles)
     known = CommissionedTorque(0, no_joint, cycles)
     model = SignatureModel(
-        sensor, np.zeros((0, 2)), nothing, np.zeros((0, 2, 2 * phases)), covariance, 1.0 / len(cycles)
+        sensor,
+        nothing,
+        Changes(np.zeros((0, 2)), np.zeros((0, 2, 2 * phases))),
+        covariance,
+        1.0 / len(cycles),
     )
     return Explainer(model, (), commissioned_baseline(known, nothing, covariance), nuisances)
 

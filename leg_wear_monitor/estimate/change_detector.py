@@ -1,4 +1,4 @@
-"""Detects when a leg departs from the one that is counted: one CUSUM test for each joint and size.
+"""Detects when a leg departs from the one that is counted: a CUSUM test for each size of a joint, or mass.
 
 A CUSUM adds up, gait cycle by gait cycle, by how much a changed leg explains the signature better, and
 starts again where it falls below zero. Where the likelihoods are what it supposes, the mean time between
@@ -59,7 +59,7 @@ def _scatter(explainer: Explainer, change: Floats) -> Floats:
 
 
 class ChangeDetector:
-    """CUSUM tests of a leg against one with a wider joint, and against one with a new part.
+    """CUSUM tests of a leg against one with a wider joint, with a new part, and with a body of another mass.
 
     Parameters
     ----------
@@ -73,11 +73,13 @@ class ChangeDetector:
     def __init__(self, explainer: Explainer, counted_m: Floats, false_alarm_cycles: float) -> None:
         model = explainer.model
         expected = model.at(counted_m)[0]
-        changes = []
+        changes: list[Floats] = []
         for k in range(len(counted_m)):
             fresh = min(explainer.fresh_m[k], counted_m[k])
             sizes = [factor * counted_m[k] for factor in FACTORS] + [fresh, math.sqrt(fresh * counted_m[k])]
             changes += [model.at(opened(counted_m, k, size))[0] - expected for size in sizes]
+        self._of_joints = len(changes)
+        changes += [model.bodies.change[i, place] for i, place in np.argwhere(model.bodies.grid != 1.0)]
         # for a leg that shows as much less of an opening as the model may be off
         change = (1.0 - MODEL_ERROR) * np.array(changes)
         weighted = np.linalg.solve(explainer.covariance(1), change.T).T
@@ -95,7 +97,7 @@ class ChangeDetector:
 
     def unseen_m(self, cycles: int) -> Floats:
         """Widest clearances (k,) [m] that are not expected to be detected within some gait cycles."""
-        steps = self._step.reshape(len(self._counted_m), -1)[:, : len(FACTORS)]
+        steps = self._step[: self._of_joints].reshape(len(self._counted_m), -1)[:, : len(FACTORS)]
         factors = np.where(cycles * steps < self.threshold, FACTORS, 1.0)
         return np.asarray(factors.max(axis=1) * self._counted_m)
 

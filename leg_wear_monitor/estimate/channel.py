@@ -317,13 +317,12 @@ def _refined(fit_of: Callable[[Channel], ChannelFit], near: Channel, *free: str)
 def _clearance_columns(reference: TorqueReference, sensor: TorqueSensor) -> Floats:
     """Columns (k, F): change of the signature by one standard deviation of each clearance.
 
-    A reference has the expected leg at index 0, and for each joint the same number of legs with that joint
-    of another size, of which the smallest wider one comes first.
+    Of the legs of each joint, the smallest wider one comes first.
     """
-    joints, wider = reference.clearance_m.shape[1], len(reference.torque_nm) - 1
+    firsts = reference.of_joints[:, :1].ravel().tolist()
     expected = simulated_signatures(reference, 0, sensor, cycles=_CYCLES).mean(axis=0)
-    columns = np.zeros((joints if wider else 0, len(expected)))
-    for column, leg in zip(columns, range(1, wider + 1, max(1, wider // joints)), strict=True):
+    columns = np.zeros((len(firsts), len(expected)))
+    for column, leg in zip(columns, firsts, strict=True):
         log_ratio = np.log(reference.clearance_m[leg] / reference.clearance_m[0]).sum()
         if log_ratio > 0.0:  # 0 for a joint that has its largest clearance already
             changed = simulated_signatures(reference, leg, sensor, cycles=_CYCLES).mean(axis=0)

@@ -72,7 +72,7 @@ def fit_clearances(
     """
     model = explainer.model
     measured, counted = mean - explainer.baseline.offset, np.log(counted_m)
-    low, high = np.log(_LEAST_FACTOR * model.grid_m[:, 0]), np.log(model.grid_m[:, -1])
+    low, high = np.log(_LEAST_FACTOR * model.joints.grid[:, 0]), np.log(model.joints.grid[:, -1])
     new, flat = np.log(np.minimum(counted_m, explainer.fresh_m)), np.eye(len(counted_m)) / _FLAT
     clearance: Floats = start_m
     for _ in range(_FIT_ROUNDS):  # what the model may be off depends on the clearances
@@ -116,7 +116,7 @@ def best_fit(
 
 def starts_of(explainer: Explainer, change: Change | None, counted_m: Floats) -> list[Floats]:
     """Clearances (k,) [m] where searches begin: after a change, and from there with each joint wider."""
-    widest, first = explainer.model.grid_m[:, -1], start_of(change, explainer.joints, counted_m)
+    widest, first = explainer.model.joints.grid[:, -1], start_of(change, explainer.joints, counted_m)
     wider = np.minimum(_ELSEWHERE * first, np.maximum(widest, first))
     return [first, *(opened(first, k, size) for k, size in enumerate(wider.tolist()))]
 

@@ -1,13 +1,21 @@
 """What may explain a change of the torque's signature: a clearance, or something else."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate.cause import SURE_LOG_ODDS, SURE_OF_NAME, Cause, Change, NamedCause
-from leg_wear_monitor.estimate.signature import SignatureModel
+from leg_wear_monitor.estimate.cause import (
+    SURE_LOG_ODDS,
+    SURE_OF_NAME,
+    SURE_SIGMAS,
+    Cause,
+    Change,
+    NamedCause,
+)
+from leg_wear_monitor.estimate.signature import Changes, SignatureModel
 from leg_wear_monitor.mechanism.arrays import Floats
 
 # of what a clearance changes, and of an opening: legs with masses 4 % off show 10 to 27 % less (2026-11-23)
@@ -20,6 +28,7 @@ MODEL_NOISE = 0.3
 _APART = 2.0  # standard deviations by which likely sizes may scatter about the best one
 _SIZES = 24  # clearances of a joint that are tried; between them a parabola finds the best
 _LEAST_FACTOR = 0.7  # of the counted clearance
+_MASSES = np.geomspace(0.4, 2.0, 16)  # factors on the mass of a body that are tried
 _CORNER = 1.0e200
 # of the mean square: less than a channel's delay, 2.5 ms from the next that is tried, leaves over
 _LEFT = 0.5
@@ -193,6 +202,42 @@ class Explanation(NamedCause):
         return self.square <= poorest and low <= self.value <= high
 
 
+class _Seen(NamedTuple):
+    """A mean signature (F,) of some cycles, and what is expected of it in a leg as counted.
+
+    Attributes
+    ----------
+    scatter : float
+        Variance of what is expected, as a part of that of a gait cycle; beside the covariance (F, F).
+    """
+
+    mean: Floats
+    cycles: int
+    expected: Floats
+    covariance: Floats
+    scatter: float
+
+    @property
+    def rest(self) -> Floats:
+        """What a leg as counted leaves over (F,)."""
+        return self.mean - self.expected
+
+    @property
+    def as_counted(self) -> "Misfits":
+        """How well a leg as counted explains it."""
+        return Misfits(self.rest[None], self.covariance)
+
+
+class _Quantity(NamedTuple):
+    """One of some quantities whose changes were simulated, with its counted value."""
+
+    cause: Cause
+    subject: str
+    changes: Changes
+    number: int
+    counted: float
+
+
 class Explainer:
     """Compares causes of a change.
 
@@ -220,8 +265,9 @@ class Explainer:
     ) -> None:
         self.model, self.joints, self.baseline = model, tuple(joints), baseline
         self.nuisances = tuple(nuisances)
+        self.bodies = tuple(one.subject for one in nuisances if one.cause is Cause.MASS)
         self.channels, self.noises = tuple(channels), tuple(noises)
-        self.fresh_m = model.grid_m[:, 0] if fresh_m is None else fresh_m
+        self.fresh_m = model.joints.grid[:, 0] if fresh_m is None else fresh_m
         self._root = np.linalg.cholesky(model.covariance)
         self._constant = baseline.covariance.copy()  # what does not become less over several cycles
         for one in nuisances:
@@ -248,33 +294,24 @@ class Explainer:
         counted_m : (k,) array
             Counted clearances.
         """
-        covariance, there = self.covariance(cycles), self.model.at(counted_m)[0]
-        expected = self.baseline.offset + there
-        rest = mean - expected
-        as_counted = Misfits(rest[None], covariance)
-        found = [as_counted.explanation(0, NamedCause(Cause.UNKNOWN, 0.0, 0.0))]
-        found += self._others(rest, covariance)
-        found += self._late(rest, covariance, as_counted)
-        more, noises = self._noise(rest, expected, covariance, cycles, as_counted)
+        model = self.model
+        expected, scatter = self.baseline.offset + model.at(counted_m)[0], model.scatter_at(counted_m)
+        seen = _Seen(mean, cycles, expected, self.covariance(cycles), scatter)
+        found = [seen.as_counted.explanation(0, NamedCause(Cause.UNKNOWN, 0.0, 0.0))]
+        found += self._others(seen)
+        found += self._late(seen)
+        more, noises = self._noise(seen)
         found += more
-
-        def opened_to(k: int, sizes: Floats, noise: OtherNoise | None) -> Misfits:
-            """How well some clearances (n,) [m] of joint k explain, with other noise or the sensor's own."""
-            each = [opened(counted_m, k, size) for size in sizes]
-            shown = expected + np.array([self.model.at(one)[0] for one in each]) - there
-            scatter = np.array([self.model.scatter_at(one) for one in each])
-            before, own = expected, covariance
-            if noise is not None:
-                own = covariance + np.diag(noise.variance(expected, cycles))
-                shown, before = noise.shown(shown), noise.shown(expected)
-            model = scatter[:, None, None] * self.model.covariance + _diagonal(MODEL_ERROR * (shown - before))
-            return Misfits(mean - shown, own + model)
-
         for k, counted in enumerate(counted_m.tolist()):
-            found.append(self._clearance(k, counted, noises, opened_to))
+            one = _Quantity(Cause.CLEARANCE, self.joints[k], model.joints, k, counted)
+            least, widest = min(counted, self.fresh_m[k]), max(model.joints.grid[k, -1], counted)
+            found.append(self._best(seen, one, np.geomspace(_LEAST_FACTOR * least, widest, _SIZES), noises))
+        for i in range(len(model.bodies.grid)):
+            one = _Quantity(Cause.MASS, self.bodies[i], model.bodies, i, 1.0)
+            found += self._heavier(self._best(seen, one, _MASSES))
         return sorted(found, key=lambda one: one.misfit)
 
-    def _late(self, rest: Floats, covariance: Floats, as_counted: "Misfits") -> list[Explanation]:
+    def _late(self, seen: _Seen) -> list[Explanation]:
         """The best of the other channels; none where none explains.
 
         A channel that changes much has a large error in each phase, and could seem to explain anything: it
@@ -283,25 +320,24 @@ class Explainer:
         if not self.channels:
             return []
         change = np.array([one.column for one in self.channels])
-        possible = Misfits(rest - change, covariance).square < _LEFT * as_counted.square
+        possible = Misfits(seen.rest - change, seen.covariance).square < _LEFT * seen.as_counted.square
         if not possible.any():
             return []
-        misfits = Misfits(rest - change, covariance + _diagonal(MODEL_ERROR * change))
+        misfits = Misfits(seen.rest - change, seen.covariance + _diagonal(MODEL_ERROR * change))
         best = int(np.where(possible, misfits.value, np.inf).argmin())
         return [misfits.explanation(best, NamedCause(Cause.LAG, self.channels[best].later_s, _LATE_SIGMA_S))]
 
-    def _noise(
-        self, rest: Floats, expected: Floats, covariance: Floats, cycles: int, as_counted: "Misfits"
-    ) -> tuple[list[Explanation], Sequence[OtherNoise]]:
+    def _noise(self, seen: _Seen) -> tuple[list[Explanation], Sequence[OtherNoise]]:
         """Other noise as the cause, and what noise there may be beside an opening.
 
         An opened joint makes the torque rougher, too, so that there is at most as much as without one.
         """
         if not self.noises:
             return [], ()
-        change = np.array([one.shown(expected) for one in self.noises]) - expected
-        own = covariance + _diagonal(np.sqrt([one.variance(expected, cycles) for one in self.noises]))
-        misfits = Misfits(rest - change, own)
+        shown = np.array([one.shown(seen.expected) for one in self.noises])
+        variance = np.array([one.variance(seen.expected, seen.cycles) for one in self.noises])
+        misfits = Misfits(seen.mean - shown, seen.covariance + _diagonal(np.sqrt(variance)))
+        as_counted = seen.as_counted
         known_nm = self.model.sensor.noise_nm
         is_less = np.array([one.noise_nm for one in self.noises]) < known_nm
         possible = misfits.square < _LEFT * as_counted.square
@@ -318,51 +354,65 @@ class Explainer:
         cause = NamedCause(Cause.NOISE, found.noise_nm, _NOISE_SIGMA * found.noise_nm)
         return [misfits.explanation(best, cause, known_nm)], beside
 
-    def _clearance(
-        self,
-        k: int,
-        counted: float,
-        noises: Sequence[OtherNoise],
-        opened_to: Callable[[int, Floats, OtherNoise | None], "Misfits"],
+    def _best(
+        self, seen: _Seen, one: _Quantity, values: Floats, noises: Sequence[OtherNoise] = ()
     ) -> Explanation:
-        """Best clearance of one joint, the others as counted, beside other noise if there is some."""
-        widest = max(self.model.grid_m[k, -1], counted)
-        sizes = np.geomspace(_LEAST_FACTOR * min(counted, self.fresh_m[k]), widest, _SIZES)
+        """Best of some values (n,) of a quantity, all else as counted, beside other noise if any."""
         noise = None
         for _ in range(_ROUNDS if noises else 0):  # from the most noise on
-            size = sizes[opened_to(k, sizes, noise or noises[-1]).value.argmin()]
-            values = [opened_to(k, np.array([size]), one).value[0] for one in (None, *noises)]
-            noise = (None, *noises)[int(np.argmin(values))]
-        misfits = opened_to(k, sizes, noise).value
+            value = values[self._misfits(seen, one, values, noise or noises[-1]).value.argmin()]
+            each = [self._misfits(seen, one, np.array([value]), other).value[0] for other in (None, *noises)]
+            noise = (None, *noises)[int(np.argmin(each))]
+        misfits = self._misfits(seen, one, values, noise).value
         best = int(misfits.argmin())
-        value, sigma = _vertex(np.log(sizes), misfits, best)
-        size = float(np.exp(value))
-        square = float(opened_to(k, np.array([size]), noise).square[0]) / len(self.model.mean)
+        log_value, sigma = _vertex(np.log(values), misfits, best)
+        value = float(np.exp(log_value))
+        square = float(self._misfits(seen, one, np.array([value]), noise).square[0]) / len(seen.mean)
         poor = max(1.0, square)  # the square of Birge's ratio
-        # sizes far from the best one may fit almost as well: then the mean of all. Where none fits, the model
-        # is off by as much in neighbouring phases, which then are few independent numbers
+        # values far from the best one may fit almost as well: then the mean of all. Where none fits, the
+        # model is off by as much in neighbouring phases, which then are few independent numbers
         likely = np.exp(-0.5 * (misfits - misfits[best]) / (poor * max(1.0, square / POOREST) ** 2))
-        mean, own = float((likely @ sizes) / likely.sum()), math.sqrt(poor) * size * sigma
-        apart = float(np.sqrt((likely @ np.square(sizes - mean)) / likely.sum()))
+        mean, own = float((likely @ values) / likely.sum()), math.sqrt(poor) * value * sigma
+        apart = float(np.sqrt((likely @ np.square(values - mean)) / likely.sum()))
         if apart > _APART * own:
-            size, own = mean, apart
+            value, own = mean, apart
         return Explanation(
-            cause=Cause.CLEARANCE,
-            subject=self.joints[k],
-            value=size,
-            sigma=float(np.hypot(own, MODEL_ERROR * (size - counted))),
-            counted=counted,
+            cause=one.cause,
+            subject=one.subject,
+            value=value,
+            sigma=float(np.hypot(own, MODEL_ERROR * (value - one.counted))),
+            counted=one.counted,
             misfit=float(misfits[best]) + (2.0 * SURE_OF_NAME if noise else 0.0),  # of a second cause
             square=square,
         )
 
-    def _others(self, rest: Floats, covariance: Floats) -> list[Explanation]:
+    def _heavier(self, factor: Explanation) -> list[Explanation]:
+        """An explanation by a factor on a mass as one by the mass; none where it may as well be 1."""
+        change = attrs.evolve(factor, value=factor.value - 1.0, counted=0.0)
+        return [change] if abs(change.value) > SURE_SIGMAS * change.sigma else []
+
+    def _misfits(self, seen: _Seen, one: _Quantity, values: Floats, noise: OtherNoise | None) -> "Misfits":
+        """How well some values (n,) of a quantity explain, with other noise or the sensor's own."""
+        tried, which = np.append(values, one.counted), np.full(len(values) + 1, one.number)
+        at, variance = one.changes.at(tried, which)[0], one.changes.scatter_at(tried, which)
+        shown, scatter = seen.expected + at[:-1] - at[-1], seen.scatter + variance[:-1] - variance[-1]
+        before, own = seen.expected, seen.covariance
+        if noise is not None:
+            own = own + np.diag(noise.variance(before, seen.cycles))
+            shown, before = noise.shown(shown), noise.shown(before)
+        model = scatter[:, None, None] * self.model.covariance + _diagonal(MODEL_ERROR * (shown - before))
+        return Misfits(seen.mean - shown, own + model)
+
+    def _others(self, seen: _Seen) -> list[Explanation]:
         """Best values of the nuisances, each with the spread by which it is most probable.
 
-        What is within the usual spread is no more probable than a leg as counted, which has that, too.
+        What is within the usual spread is no more probable than a leg as counted, which has that, too. Masses
+        whose changes were simulated are none of them: the ideal torque is but a part of what they change.
         """
-        columns = np.array([one.column for one in self.nuisances]).reshape(-1, len(rest))
-        spread = np.array([one.spread for one in self.nuisances])
+        rest, covariance, has_masses = seen.rest, seen.covariance, len(self.model.bodies.grid) > 0
+        nuisances = [one for one in self.nuisances if not (has_masses and one.cause is Cause.MASS)]
+        columns = np.array([one.column for one in nuisances]).reshape(-1, len(rest))
+        spread = np.array([one.spread for one in nuisances])
         weighted = np.linalg.solve(covariance, columns.T).T
         information = (weighted * columns).sum(axis=1)
         values = weighted @ rest / information
@@ -373,7 +423,7 @@ class Explainer:
         error = _diagonal(MODEL_ERROR * values[:, None] * columns)
         misfits = Misfits(rests, covariance + error, more)
         found = []
-        for i, one in enumerate(self.nuisances):
+        for i, one in enumerate(nuisances):
             counted = _COUNTED.get(one.cause, 0.0)
             cause = NamedCause(one.cause, counted + values[i].item(), sigmas[i].item(), one.subject)
             found.append(misfits.explanation(i, cause, counted))

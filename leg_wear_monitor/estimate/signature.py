@@ -13,7 +13,7 @@ from leg_wear_monitor.mechanism.arrays import Flags, Floats, Ints
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.reference import POINTS
-from leg_wear_monitor.twin.torque_reference import TorqueReference
+from leg_wear_monitor.twin.torque_reference import MASSES, TorqueReference
 
 SAMPLES = 200  # a gait cycle: what comes faster is averaged, since clearances show at these times already
 
@@ -319,74 +319,103 @@ _HALVINGS = 12  # of that range: the noise is found to 0.2 %
 
 
 @attrs.frozen(eq=False)
-class SignatureModel:
-    """Expected signatures (F,) of a leg, as a function of its k clearances.
+class Changes:
+    """What each of n quantities changes of a signature (F,), as far as it was simulated.
 
-    What several clearances change is the sum of what each of them changes alone.
+    Attributes
+    ----------
+    grid : (n, s) array
+        Increasing values of each quantity.
+    change : (n, s, F) array
+        What it changes there.
+    scatter : (n, s) array
+        Variance of each change, as a part of that of a gait cycle; 0 where they are exact.
+    """
+
+    grid: Floats
+    change: Floats
+    scatter: Floats = attrs.field()
+    _log_grid: Floats = attrs.field(init=False)
+    _slopes: Floats = attrs.field(init=False)
+
+    def at(self, value: Floats, which: Ints) -> tuple[Floats, Floats]:
+        """Changes (m, F) by quantities ``which`` (m,), and their slopes.
+
+        The slopes (m, F) are derivatives by the logarithms of the values (m,). The changes are linear in
+        these between points of the grid, and beyond its ends.
+        """
+        x = np.log(value)
+        i = (self._log_grid[which, 1:-1] < x[:, None]).sum(axis=1)
+        slopes, beyond = self._slopes[which, i], x - self._log_grid[which, i]
+        return self.change[which, i] + beyond[:, None] * slopes, slopes
+
+    def scatter_at(self, value: Floats, which: Ints) -> Floats:
+        """Variances (m,) of the changes, as of `at`, as a part of that of a gait cycle."""
+        pairs = zip(np.log(value), which, strict=True)
+        return np.array([np.interp(x, self._log_grid[i], self.scatter[i]) for x, i in pairs])
+
+    @scatter.default
+    def _exact(self) -> Floats:
+        return np.zeros(self.grid.shape)
+
+    @_log_grid.default
+    def _logarithms(self) -> Floats:
+        return np.asarray(np.log(self.grid))
+
+    @_slopes.default
+    def _derivatives(self) -> Floats:
+        """Derivatives (n, s - 1, F) by the logarithm of a value between points of the grid."""
+        with np.errstate(invalid="ignore", divide="ignore"):  # where a clearance can be no wider
+            return np.asarray(np.diff(self.change, axis=1) / np.diff(self._log_grid, axis=1)[:, :, None])
+
+
+@attrs.frozen(eq=False)
+class SignatureModel:
+    """Expected signatures (F,) of a leg, as a function of its k clearances and of the masses of its bodies.
+
+    What several of them change is the sum of what each of them changes alone.
 
     Attributes
     ----------
     sensor : TorqueSensor
-    grid_m : (k, s) array
-        Increasing clearances of each joint.
     mean : (F,) array
         Signature of the expected leg.
-    change : (k, s, F) array
-        What each joint changes, at each clearance of the grid.
+    joints : Changes
+        By the clearances [m].
     covariance : (F, F) array
         Of the signature of one gait cycle.
     own : float
         Variance of the mean signature of a simulated leg, as a part of that of a gait cycle.
-    scatter : (k, s) array
-        Variance of each change, as a part of that of a gait cycle; 0 where they are exact.
+    bodies : Changes
+        By factors on the masses of the bodies; of none where they were not simulated.
     places : (F, F) array
         Covariance of what changes where samples come at other angles of the crank; 0 where nothing does.
     """
 
     sensor: TorqueSensor
-    grid_m: Floats
     mean: Floats
-    change: Floats
+    joints: Changes
     covariance: Floats
     own: float
-    scatter: Floats = attrs.field()
+    bodies: Changes = attrs.field()
     places: Floats = attrs.field()
-    _log_grid: Floats = attrs.field(init=False)
-    _slopes: Floats = attrs.field(init=False)
 
     def at(self, clearance_m: Floats) -> tuple[Floats, Floats]:
-        """Signature (F,) at clearances (k,) [m], and its derivatives (F, k) by their logarithms.
-
-        Linear in the logarithms of the clearances between points of the grid, and beyond its ends.
-        """
-        x, joints = np.log(clearance_m), np.arange(len(self.grid_m))
-        grid = self._log_grid
-        i = (grid[:, 1:-1] < x[:, None]).sum(axis=1)
-        slopes, beyond = self._slopes[joints, i], x - grid[joints, i]
-        return self.mean + self.change[joints, i].sum(axis=0) + beyond @ slopes, slopes.T
+        """Signature (F,) at clearances (k,) [m], and its derivatives (F, k) by their logarithms."""
+        change, slopes = self.joints.at(clearance_m, np.arange(len(clearance_m)))
+        return self.mean + change.sum(axis=0), slopes.T
 
     def scatter_at(self, clearance_m: Floats) -> float:
         """Variance of the signature at clearances (k,) [m], as a part of that of a gait cycle."""
-        x, grid = np.log(clearance_m), self._log_grid
-        return float(sum(np.interp(x[k], grid[k], self.scatter[k]) for k in range(len(grid))))
+        return float(self.joints.scatter_at(clearance_m, np.arange(len(clearance_m))).sum())
 
-    @scatter.default
-    def _exact(self) -> Floats:
-        return np.zeros(self.grid_m.shape)
+    @bodies.default
+    def _none(self) -> Changes:
+        return Changes(np.ones((0, 2)), np.zeros((0, 2, len(self.mean))))
 
     @places.default
     def _anywhere(self) -> Floats:
         return np.zeros((len(self.mean), len(self.mean)))
-
-    @_log_grid.default
-    def _logarithms(self) -> Floats:
-        return np.asarray(np.log(self.grid_m))
-
-    @_slopes.default
-    def _derivatives(self) -> Floats:
-        """Derivatives (k, s - 1, F) by the logarithm of a clearance between points of the grid."""
-        with np.errstate(invalid="ignore", divide="ignore"):  # where a clearance can be no wider
-            return np.asarray(np.diff(self.change, axis=1) / np.diff(self._log_grid, axis=1)[:, :, None])
 
 
 def signature_model(reference: TorqueReference, sensor: TorqueSensor) -> SignatureModel:
@@ -397,23 +426,31 @@ def signature_model(reference: TorqueReference, sensor: TorqueSensor) -> Signatu
     scatter = np.concatenate([leg[0] - leg[0].mean(axis=0) for leg in drawn])
     covariance = scatter.T @ scatter / (len(scatter) - len(drawn))
     own = _part_of_cycle(drawn[0], covariance) / cycles
-    # after the expected leg, the legs of each joint follow one another; with the expected one in front, they
-    # are the joint's grid, in the order of their clearances
-    joints = reference.clearance_m.shape[1]
-    order = np.arange(1, len(drawn)).reshape(joints, -1)
-    grid = np.array([reference.clearance_m[[0, *order[k]], k] for k in range(joints)])
-    change = np.array([means[[0, *order[k]]] - means[0] for k in range(joints)])
-    variance = np.zeros(grid.shape)
-    for k in range(joints):
-        wider = np.log(grid[k, 1:] / grid[k, 0])
-        change[k, 1:], variance[k, 1:] = without_scatter(
-            wider, change[k, 1:], covariance, own[order[k]], own[0]
-        )
-    place = np.argsort(grid, axis=1, kind="stable")
-    grid, variance = (np.take_along_axis(one, place, 1) for one in (grid, variance))
-    change = np.take_along_axis(change, place[:, :, None], 1)
-    places = _of_places(reference, sensor)
-    return SignatureModel(sensor, grid, means[0], change, covariance, float(own[1]), variance, places)
+
+    def changes(legs: Ints, grid: Floats) -> Changes:
+        """What n quantities change, of which legs (n, s) have other values than the expected one."""
+        found, variance = np.zeros((*grid.shape, len(means[0]))), np.zeros(grid.shape)
+        for i, each in enumerate(legs):
+            ratio = np.log(grid[i, 1:] / grid[i, 0])
+            found[i, 1:], variance[i, 1:] = without_scatter(
+                ratio, means[each] - means[0], covariance, own[each], own[0]
+            )
+        place = np.argsort(grid, axis=1, kind="stable")
+        grid, variance = (np.take_along_axis(one, place, 1) for one in (grid, variance))
+        return Changes(grid, np.take_along_axis(found, place[:, :, None], 1), variance)
+
+    of_joints, of_bodies = reference.of_joints, reference.of_bodies
+    clearance_m = np.array([reference.clearance_m[[0, *legs], k] for k, legs in enumerate(of_joints)])
+    masses = np.tile([1.0, *MASSES], (len(of_bodies), 1))
+    return SignatureModel(
+        sensor,
+        means[0],
+        changes(of_joints, clearance_m),
+        covariance,
+        float(own[1]),
+        changes(of_bodies, masses),
+        _of_places(reference, sensor),
+    )
 
 
 def _of_places(reference: TorqueReference, sensor: TorqueSensor) -> Floats:

@@ -190,12 +190,9 @@ class Parts:
         return known.parameters.of_bodies(known.bodies, self.mechanism) if known else None
 
     def _known_references(self, ledger: Ledger | None) -> list[TorqueReference]:
-        """Torque references of the ledger, their parameters in the order of the mechanism."""
-        known = []
-        for kept in ledger.references if ledger else ():
-            parameters = kept.reference.parameters.of_bodies(kept.bodies, self.mechanism)
-            known.append(attrs.evolve(kept.reference, parameters=parameters))
-        return known
+        """Torque references of the ledger, with bodies in the order of the mechanism."""
+        references = ledger.references if ledger else ()
+        return [kept.reference.in_order_of(self.mechanism, kept.bodies) for kept in references]
 
     @property
     def model_error(self) -> ModelError:

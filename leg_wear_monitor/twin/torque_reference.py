@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from leg_wear_monitor.errors import AssemblyError
-from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.reference import (
     CrankProfile,
@@ -43,6 +43,10 @@ PACE = 6  # simulated gait cycles in an evaluation period, a quarter cycle; a co
 WIDER = (1.2, 1.35, 1.5, 2.0, 3.0, 5.0, 8.0)  # factors on the expected clearance, one joint at a time
 
 WORN, NARROWER = 1.2, 0.8  # a clearance over the new one, and a factor on the others beside it
+
+# factors on the mass of one body at a time: half a kilogram on a foot, two on a thigh. Files and ledgers know
+# such legs by their places alone, so that other factors need a place for them there
+MASSES = (0.75, 1.4)
 
 # of each body's mass and length, and factors on the friction in the joints and on the stiffness of a drive
 # that is not rigid (a quarter of its resonance's width): up and down, all of them at once
@@ -66,7 +70,8 @@ class TorqueReference:
     profile : CrankProfile
     clearance_m : (legs, k) array
         Mean radial clearances of each leg; the first leg is the expected one, then each joint is wider in
-        turn, all sizes of the first joint before those of the next.
+        turn, all sizes of the first joint before those of the next. The last legs, if their clearances are
+        the expected ones, have another mass of each body in turn, as of MASSES.
     torque_nm : tuple of (cycles, POINTS) arrays
         Mean drive torque between equal steps of time of a gait cycle, which begins at the profile's angle 0.
     parameters : LegParameters
@@ -87,6 +92,34 @@ class TorqueReference:
     def is_of_parameters(self) -> bool:
         """Whether its legs differ in masses, lengths and friction, from those of the first one."""
         return bool((self.clearance_m == self.clearance_m[0]).all())
+
+    @property
+    def of_bodies(self) -> Ints:
+        """Indices (bodies, masses) of legs with another mass of a body; (0, masses) where there are none."""
+        number, legs = len(MASSES) * len(self.parameters.mass), len(self.clearance_m)
+        there = number < legs and (self.clearance_m[-number:] == self.clearance_m[0]).all()
+        has_some = there and not self.is_of_parameters
+        return np.arange(legs - number if has_some else legs, legs).reshape(-1, len(MASSES))
+
+    @property
+    def of_joints(self) -> Ints:
+        """Indices (k, sizes) of legs with another clearance of a joint."""
+        others = len(self.clearance_m) - self.of_bodies.size
+        return np.arange(1, others).reshape(self.clearance_m.shape[1], -1)
+
+    def in_order_of(self, mechanism: Mechanism, names: Sequence[str]) -> "TorqueReference":
+        """The same with bodies in the order of a mechanism, instead of that of their names.
+
+        If the orders differ, one that is not whole keeps no leg with other bodies but the expected one.
+        """
+        parameters = self.parameters.of_bodies(names, mechanism)
+        order = [names.index(name) for name in mechanism.bodies]
+        if order == sorted(order):
+            return attrs.evolve(self, parameters=parameters)
+        others = 1 if self.is_of_parameters else 1 + self.of_joints.size
+        of_bodies = self.of_bodies[order].ravel().tolist() if self.is_whole and self.of_bodies.size else []
+        torque_nm = (*self.torque_nm[:others], *(self.torque_nm[leg] for leg in of_bodies))
+        return attrs.evolve(self, parameters=parameters, torque_nm=torque_nm)
 
     @property
     def angle(self) -> Floats:
@@ -331,7 +364,7 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
         profile: CrankProfile,
         parameters: LegParameters | None = None,
     ) -> None:
-        """Begin a reference: the expected leg, and each of its joints wider in turn.
+        """Begin a reference: the expected leg, then each joint wider, then each body of another mass.
 
         Parameters
         ----------
@@ -355,7 +388,7 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
                 other = centre.copy()
                 other[k] = size
                 legs.append(Leg(parameters, other))
-        self._begin(legs, depth, profile)
+        self._begin([*legs, *_of_masses(parameters, centre)], depth, profile)
 
     def begin_expected(
         self, clearance_m: Floats, depth: Floats, profile: CrankProfile, parameters: LegParameters
@@ -375,7 +408,10 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
         if part.is_of_parameters:
             legs = _changed(part.parameters, part.clearance_m[0])
         else:
-            legs = [Leg(part.parameters, clearance_m) for clearance_m in part.clearance_m]
+            of_bodies, expected_m = part.of_bodies.size, part.clearance_m[0]
+            others = part.clearance_m[: len(part.clearance_m) - of_bodies]
+            legs = [Leg(part.parameters, clearance_m) for clearance_m in others]
+            legs += _of_masses(part.parameters, expected_m) if of_bodies else []
         self._begin(legs, depth, part.profile)
         self._done = part.torque_nm
         self._periods = -(-self._cost(legs[: len(self._done)]) // PACE)
@@ -445,6 +481,13 @@ def _changed(near: LegParameters, clearance_m: Floats) -> list[Leg]:
         )
         legs.append(Leg(changed, clearance_m))
     return legs
+
+
+def _of_masses(near: LegParameters, clearance_m: Floats) -> list[Leg]:
+    """Legs with one body of another mass, all masses of the first body before those of the next."""
+    each = np.eye(len(near.mass))
+    masses = [near.mass * (1.0 + (factor - 1.0) * one) for one in each for factor in MASSES]
+    return [Leg(attrs.evolve(near, mass=mass), clearance_m) for mass in masses]
 
 
 def _lower_priority() -> None:

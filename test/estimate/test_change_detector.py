@@ -9,7 +9,7 @@ import pytest
 from leg_wear_monitor.estimate.change_detector import FACTORS, ChangeDetector, excess, threshold
 from leg_wear_monitor.estimate.explanations import Baseline, Explainer
 from leg_wear_monitor.estimate.leg_model import commissioned_baseline, parts_left_out, with_scatter_of
-from leg_wear_monitor.estimate.signature import CommissionedTorque, SignatureModel, TorqueSensor
+from leg_wear_monitor.estimate.signature import Changes, CommissionedTorque, SignatureModel, TorqueSensor
 
 NEW = np.array([3.0e-4, 3.0e-4])
 F = 12
@@ -22,7 +22,9 @@ def model(entries: int = F) -> SignatureModel:
     slopes = random.standard_normal((2, entries))
     change = np.log(grid / NEW[0])[:, :, None] * 4.0 * slopes[:, None, :]
     sensor = TorqueSensor(0.005, 1.0, 10.0)
-    return SignatureModel(sensor, grid, random.standard_normal(entries), change, np.eye(entries), 1.0e-9)
+    return SignatureModel(
+        sensor, random.standard_normal(entries), Changes(grid, change), np.eye(entries), 1.0e-9
+    )
 
 
 def detector(hours: float = 240.0) -> ChangeDetector:
@@ -67,7 +69,8 @@ def test_the_widest_joint_that_is_not_seen_is_the_last_that_is_not_found(k: int)
 
 def test_a_joint_that_the_torque_does_not_show_is_never_seen() -> None:
     own = model()
-    hidden = attrs.evolve(own, change=own.change * np.array([1.0, 0.0])[:, None, None])
+    change = own.joints.change * np.array([1.0, 0.0])[:, None, None]
+    hidden = attrs.evolve(own, joints=attrs.evolve(own.joints, change=change))
     none = Baseline(np.zeros(F), np.zeros((F, F)))
     tests = ChangeDetector(Explainer(hidden, ("A", "B"), none, ()), NEW, 1e6)
     unseen = tests.unseen_m(10**6)

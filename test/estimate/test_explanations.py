@@ -18,7 +18,7 @@ from leg_wear_monitor.estimate.explanations import (
     with_doubt,
 )
 from leg_wear_monitor.estimate.leg_model import with_scatter_of
-from leg_wear_monitor.estimate.signature import SignatureModel, TorqueSensor
+from leg_wear_monitor.estimate.signature import Changes, SignatureModel, TorqueSensor
 
 JOINTS = ("A", "B", "G")
 NEW = np.full(3, 3.0e-4)
@@ -33,12 +33,17 @@ def explainer() -> Explainer:
     slopes = 3.0 * random.standard_normal((3, F))
     change = np.log(GRID / NEW[0])[None, :, None] * slopes[:, None, :]
     model = SignatureModel(
-        TorqueSensor(0.005, 1.0, 10.0), np.tile(GRID, (3, 1)), np.zeros(F), change, np.eye(F), 1.0e-6
+        TorqueSensor(0.005, 1.0, 10.0), np.zeros(F), Changes(np.tile(GRID, (3, 1)), change), np.eye(F), 1.0e-6
     )
     baseline = Baseline(0.1 * random.standard_normal(F), 1.0e-4 * np.eye(F))
     friction = Nuisance(Cause.FRICTION, "", np.r_[np.ones(F // 2), np.zeros(F // 2)], 0.3)
     foot = Nuisance(Cause.MASS, "foot", 10.0 * random.standard_normal(F), 0.0)
     return Explainer(model, JOINTS, baseline, (friction, foot))
+
+
+def with_changes(model, change) -> SignatureModel:
+    """A model with other changes (k, s, F) by its joints."""
+    return attrs.evolve(model, joints=attrs.evolve(model.joints, change=change))
 
 
 def measured(explainer, clearance, cycles: int, seed: int, extra=0.0):
@@ -52,7 +57,7 @@ def test_the_model_passes_through_its_grid(explainer) -> None:
     model = explainer.model
     for i, clearance in enumerate(GRID):
         found = model.at(np.array([NEW[0], clearance, NEW[0]]))[0]
-        np.testing.assert_allclose(found, model.change[1, i], atol=1e-12)
+        np.testing.assert_allclose(found, model.joints.change[1, i], atol=1e-12)
 
 
 def test_slopes_are_derivatives_by_the_logarithm(explainer) -> None:
@@ -77,7 +82,7 @@ def test_all_clearances_are_found_within_their_standard_deviations(explainer) ->
 def test_a_joint_that_the_torque_does_not_show_is_not_known(explainer) -> None:
     """It keeps its prior, a factor of e, however many gait cycles there are."""
     model = explainer.model
-    hidden = attrs.evolve(model, change=model.change * np.array([1.0, 1.0, 0.0])[:, None, None])
+    hidden = with_changes(model, model.joints.change * np.array([1.0, 1.0, 0.0])[:, None, None])
     one = Explainer(hidden, JOINTS, explainer.baseline, explainer.nuisances)
     fit = fit_clearances(one, measured(one, NEW, 1000, 1), 1000, NEW, NEW)
     assert fit.sigma_m[2] == pytest.approx(NEW[2], rel=0.1)
@@ -87,7 +92,7 @@ def test_a_joint_that_the_torque_does_not_show_is_not_known(explainer) -> None:
 def test_joints_that_explain_a_change_as_well_widen_each_other(explainer) -> None:
     """I at 0.45 mm behind a belt looked like G at 0.33 mm, and was told as 0.31 ± 0.01 mm."""
     model = explainer.model
-    alike = attrs.evolve(model, change=model.change[[0, 1, 1]])
+    alike = with_changes(model, model.joints.change[[0, 1, 1]])
     one = Explainer(alike, JOINTS, explainer.baseline, explainer.nuisances)
     true = [3.0e-4, 3.0e-4, 4.2e-4]
     mean = measured(one, true, 10, 1)
@@ -101,7 +106,7 @@ def test_joints_that_explain_a_change_as_well_widen_each_other(explainer) -> Non
 
 def test_no_joint_gets_narrower_than_a_new_part_but_a_worn_one_may_have_got_one(explainer) -> None:
     """Wear only opens: with A and G opened at once, I was found at 0.21 ± 0.02 mm."""
-    less = -1.5 * explainer.model.change[0, 1]  # as if it were 0.76 times as wide
+    less = -1.5 * explainer.model.joints.change[0, 1]  # as if it were 0.76 times as wide
     new = fit_clearances(explainer, measured(explainer, NEW, 1, 1, less), 1, NEW, NEW)
     assert new.clearance_m[0] > 0.9 * NEW[0]
     worn = NEW * np.array([2.0, 1.0, 1.0])
@@ -315,9 +320,9 @@ def test_less_noise_leaves_at_least_the_roughness_of_the_leg() -> None:
 def test_where_no_size_fits_those_that_fit_as_badly_are_in_the_standard_deviation(explainer) -> None:
     """Seen before: G broken out to 2 mm was 0.84 mm with a tenth of it as its standard deviation."""
     random = np.random.default_rng(5)
-    change = explainer.model.change.copy()
+    change = explainer.model.joints.change.copy()
     change[2, 1:] = 3.0 * random.standard_normal((len(GRID) - 1, F))  # each size changes other phases
-    legs = attrs.evolve(explainer.model, change=change)
+    legs = with_changes(explainer.model, change)
     own = Explainer(legs, JOINTS, explainer.baseline, explainer.nuisances)
     for seed in range(20):
         off = 3.0 * np.random.default_rng(seed).standard_normal(F)
@@ -353,7 +358,7 @@ def test_misfits_are_those_of_normal_densities() -> None:
 
 def test_causes_do_not_depend_on_the_order_of_the_joints(explainer) -> None:
     model = explainer.model
-    turned = attrs.evolve(model, grid_m=model.grid_m[::-1], change=model.change[::-1])
+    turned = with_changes(model, model.joints.change[::-1])
     other = Explainer(turned, JOINTS[::-1], explainer.baseline, explainer.nuisances)
     mean = measured(explainer, [3.0e-4, 4.2e-4, 3.0e-4], 10, 4)
     one, two = (each.explanations(mean, 10, NEW)[0] for each in (explainer, other))

@@ -159,8 +159,9 @@ def _references(path: Path, mechanism: Mechanism) -> tuple[tuple[TorqueReference
             # clearances are in the order of the joints, which the fingerprint leaves open
             if str(parts["fingerprint"]) != fingerprint(mechanism) or joints != mechanism.clearance_joints:
                 return (), name
-            order = [parts["bodies"].tolist().index(body) for body in mechanism.bodies]
-            found = tuple(_reference(parts, i, order, len(joints)) for i in range(int(parts["references"])))
+            names, references = parts["bodies"].tolist(), range(int(parts["references"]))
+            read = (_reference(parts, i, len(names), len(joints)) for i in references)
+            found = tuple(one.in_order_of(mechanism, names) for one in read)
             if not found:
                 raise ValueError("there is none in it")
             return found, name
@@ -173,13 +174,13 @@ def _references(path: Path, mechanism: Mechanism) -> tuple[tuple[TorqueReference
         ) from error
 
 
-def _reference(parts: Any, i: int, order: list[int], joints: int) -> TorqueReference:
+def _reference(parts: Any, i: int, bodies: int, joints: int) -> TorqueReference:
     """Reference number i of an archive; raises ValueError where values cannot be those of one."""
     clearance_m = _checked(parts, f"clearance_m_{i}", (None, joints))
     torque = _checked(parts, f"torque_nm_{i}", (len(clearance_m) - 1, None, POINTS))
     expected = _checked(parts, f"expected_torque_nm_{i}", (None, POINTS))
     cosine, sine = _checked(parts, f"ripple_rad_{i}", (2, HARMONICS))
-    mass, length = (_checked(parts, f"{name}_{i}", (len(order),))[order] for name in ("mass", "length"))
+    mass, length = (_checked(parts, f"{name}_{i}", (bodies,)) for name in ("mass", "length"))
     friction, speed = (float(_checked(parts, f"{name}_{i}", ())) for name in ("friction", "speed_radps"))
     compliance, damping = 0.0, COUPLING_DAMPING  # files from before drives could be compliant are without
     if f"damping_ratio_{i}" in parts:

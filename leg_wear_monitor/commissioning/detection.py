@@ -57,7 +57,14 @@ from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.twin.load import torque_size
 from leg_wear_monitor.twin.reference import CrankProfile, mean_profile
 from leg_wear_monitor.twin.sample import NONE
-from leg_wear_monitor.twin.torque_reference import CYCLES, MASSES, PACE, WIDER, TorqueReference
+from leg_wear_monitor.twin.torque_reference import (
+    CYCLES,
+    FRICTIONS,
+    MASSES,
+    PACE,
+    WIDER,
+    TorqueReference,
+)
 
 # A recording as the monitor sees it with the proposed parameters: gait cycles with their torques.
 
@@ -389,7 +396,8 @@ def _known(walk: Walk) -> tuple[TorqueReference | None, str]:
 def _none(walk: Walk) -> str:
     """That there is no reference, and when there will be one."""
     leg = walk.mechanism
-    legs = 1 + len(leg.clearance_joints) * len(WIDER) + len(leg.bodies) * len(MASSES)
+    of_factors = len(leg.bodies) * len(MASSES) + len(FRICTIONS)
+    legs = 1 + len(leg.clearance_joints) * len(WIDER) + of_factors
     cycles = FIRST_CYCLES + math.ceil((CYCLES * (legs + 1) + _SIMULATED_SETTLING * legs) / PACE / _PERIODS)
     rpm = walk.profile.cadence_rpm
     return (

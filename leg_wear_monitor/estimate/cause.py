@@ -43,6 +43,7 @@ class Cause(Enum):
     LOAD = "load at the foot", "TORQUE_LOAD"
     FRICTION = "friction of the drive", "FRICTION_CHANGED"
     LOAD_FRICTION = "friction of the drive under load", "FRICTION_CHANGED"
+    JOINT_FRICTION = "friction in the joints", "FRICTION_CHANGED"
     MASS = "mass of a body", "TORQUE_MASS"
     LENGTH = "length of a body", "MECHANISM_CHANGED"
     UNKNOWN = "unknown", "MECHANISM_CHANGED"
@@ -64,8 +65,8 @@ class NamedCause:
         measured angle (TIMING, CRANK_OFFSET) [rad]; lag [s]; standard deviation of a sample (NOISE) [N m];
         constant torque beyond the bounds of friction,
         negative where it drives (BIAS) [N m]; change of the friction [N m], or of the fraction of the
-        torque that it is (LOAD_FRICTION); load at the foot [N]; fraction by which a mass or a length is
-        larger.
+        torque that it is (LOAD_FRICTION); load at the foot [N]; fraction by which a mass, a length or
+        the friction in all joints (JOINT_FRICTION) is larger.
     subject : str
         The joint, or the body, concerned; empty where there is none.
     """

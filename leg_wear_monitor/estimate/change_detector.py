@@ -1,4 +1,4 @@
-"""Detects when a leg departs from the one that is counted: a CUSUM test for each size of a joint, or mass.
+"""Detects when a leg departs from the one that is counted: one CUSUM test for each quantity and size.
 
 A CUSUM adds up, gait cycle by gait cycle, by how much a changed leg explains the signature better, and
 starts again where it falls below zero. Where the likelihoods are what it supposes, the mean time between
@@ -59,7 +59,7 @@ def _scatter(explainer: Explainer, change: Floats) -> Floats:
 
 
 class ChangeDetector:
-    """CUSUM tests of a leg against one with a wider joint, with a new part, and with a body of another mass.
+    """CUSUM tests of a leg against one with a wider joint, with a new part, of another mass or friction.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class ChangeDetector:
             sizes = [factor * counted_m[k] for factor in FACTORS] + [fresh, math.sqrt(fresh * counted_m[k])]
             changes += [model.at(opened(counted_m, k, size))[0] - expected for size in sizes]
         self._of_joints = len(changes)
-        changes += [model.bodies.change[i, place] for i, place in np.argwhere(model.bodies.grid != 1.0)]
+        changes += [each for one in (model.masses, model.friction) for each in one.change[one.grid != 1.0]]
         # for a leg that shows as much less of an opening as the model may be off
         change = (1.0 - MODEL_ERROR) * np.array(changes)
         weighted = np.linalg.solve(explainer.covariance(1), change.T).T

@@ -28,7 +28,8 @@ MODEL_NOISE = 0.3
 _APART = 2.0  # standard deviations by which likely sizes may scatter about the best one
 _SIZES = 24  # clearances of a joint that are tried; between them a parabola finds the best
 _LEAST_FACTOR = 0.7  # of the counted clearance
-_MASSES = np.geomspace(0.4, 2.0, 16)  # factors on the mass of a body that are tried
+# factors that are tried, on the mass of a body and on the friction in the joints
+_FACTORS = {Cause.MASS: np.geomspace(0.4, 2.0, 16), Cause.JOINT_FRICTION: np.geomspace(0.25, 4.0, 16)}
 _CORNER = 1.0e200
 # of the mean square: less than a channel's delay, 2.5 ms from the next that is tried, leaves over
 _LEFT = 0.5
@@ -306,9 +307,11 @@ class Explainer:
             one = _Quantity(Cause.CLEARANCE, self.joints[k], model.joints, k, counted)
             least, widest = min(counted, self.fresh_m[k]), max(model.joints.grid[k, -1], counted)
             found.append(self._best(seen, one, np.geomspace(_LEAST_FACTOR * least, widest, _SIZES), noises))
-        for i in range(len(model.bodies.grid)):
-            one = _Quantity(Cause.MASS, self.bodies[i], model.bodies, i, 1.0)
-            found += self._heavier(self._best(seen, one, _MASSES))
+        bodies, friction = range(len(model.masses.grid)), range(len(model.friction.grid))
+        factors = [_Quantity(Cause.MASS, self.bodies[i], model.masses, i, 1.0) for i in bodies]
+        factors += [_Quantity(Cause.JOINT_FRICTION, "", model.friction, i, 1.0) for i in friction]
+        for one in factors:
+            found += _changed_by(self._best(seen, one, _FACTORS[one.cause]))
         return sorted(found, key=lambda one: one.misfit)
 
     def _late(self, seen: _Seen) -> list[Explanation]:
@@ -386,11 +389,6 @@ class Explainer:
             square=square,
         )
 
-    def _heavier(self, factor: Explanation) -> list[Explanation]:
-        """An explanation by a factor on a mass as one by the mass; none where it may as well be 1."""
-        change = attrs.evolve(factor, value=factor.value - 1.0, counted=0.0)
-        return [change] if abs(change.value) > SURE_SIGMAS * change.sigma else []
-
     def _misfits(self, seen: _Seen, one: _Quantity, values: Floats, noise: OtherNoise | None) -> "Misfits":
         """How well some values (n,) of a quantity explain, with other noise or the sensor's own."""
         tried, which = np.append(values, one.counted), np.full(len(values) + 1, one.number)
@@ -409,7 +407,7 @@ class Explainer:
         What is within the usual spread is no more probable than a leg as counted, which has that, too. Masses
         whose changes were simulated are none of them: the ideal torque is but a part of what they change.
         """
-        rest, covariance, has_masses = seen.rest, seen.covariance, len(self.model.bodies.grid) > 0
+        rest, covariance, has_masses = seen.rest, seen.covariance, len(self.model.masses.grid) > 0
         nuisances = [one for one in self.nuisances if not (has_masses and one.cause is Cause.MASS)]
         columns = np.array([one.column for one in nuisances]).reshape(-1, len(rest))
         spread = np.array([one.spread for one in nuisances])
@@ -483,6 +481,12 @@ def opened(clearance_m: Floats, k: int, size: float) -> Floats:
     changed = clearance_m.copy()
     changed[k] = size
     return changed
+
+
+def _changed_by(factor: Explanation) -> list[Explanation]:
+    """An explanation by a factor as one by the fraction of a change; none where it may as well be 1."""
+    change = attrs.evolve(factor, value=factor.value - 1.0, counted=0.0)
+    return [change] if abs(change.value) > SURE_SIGMAS * change.sigma else []
 
 
 def _vertex(x: Floats, y: Floats, best: int) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from leg_wear_monitor.mechanism.arrays import Flags, Floats, Ints
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.reference import POINTS
-from leg_wear_monitor.twin.torque_reference import MASSES, TorqueReference
+from leg_wear_monitor.twin.torque_reference import FRICTIONS, MASSES, TorqueReference
 
 SAMPLES = 200  # a gait cycle: what comes faster is averaged, since clearances show at these times already
 
@@ -371,7 +371,7 @@ class Changes:
 
 @attrs.frozen(eq=False)
 class SignatureModel:
-    """Expected signatures (F,) of a leg, as a function of its k clearances and of the masses of its bodies.
+    """Expected signatures (F,) of a leg, as a function of its k clearances, masses, and friction.
 
     What several of them change is the sum of what each of them changes alone.
 
@@ -386,8 +386,9 @@ class SignatureModel:
         Of the signature of one gait cycle.
     own : float
         Variance of the mean signature of a simulated leg, as a part of that of a gait cycle.
-    bodies : Changes
-        By factors on the masses of the bodies; of none where they were not simulated.
+    masses, friction : Changes
+        By factors on the mass of each body, and on the friction in all joints; of none where such legs were
+        not simulated.
     places : (F, F) array
         Covariance of what changes where samples come at other angles of the crank; 0 where nothing does.
     """
@@ -397,7 +398,8 @@ class SignatureModel:
     joints: Changes
     covariance: Floats
     own: float
-    bodies: Changes = attrs.field()
+    masses: Changes = attrs.field()
+    friction: Changes = attrs.field()
     places: Floats = attrs.field()
 
     def at(self, clearance_m: Floats) -> tuple[Floats, Floats]:
@@ -409,7 +411,8 @@ class SignatureModel:
         """Variance of the signature at clearances (k,) [m], as a part of that of a gait cycle."""
         return float(self.joints.scatter_at(clearance_m, np.arange(len(clearance_m))).sum())
 
-    @bodies.default
+    @masses.default
+    @friction.default
     def _none(self) -> Changes:
         return Changes(np.ones((0, 2)), np.zeros((0, 2, len(self.mean))))
 
@@ -423,8 +426,9 @@ def signature_model(reference: TorqueReference, sensor: TorqueSensor) -> Signatu
     drawn = _drawn(reference, sensor)
     cycles = np.array([leg.shape[1] for leg in drawn])
     means = np.array([leg.mean(axis=(0, 1)) for leg in drawn])
-    scatter = np.concatenate([leg[0] - leg[0].mean(axis=0) for leg in drawn])
-    covariance = scatter.T @ scatter / (len(scatter) - len(drawn))
+    alike = drawn[: 1 + reference.of_joints.size]  # dry joints scatter more than this leg does
+    scatter = np.concatenate([leg[0] - leg[0].mean(axis=0) for leg in alike])
+    covariance = scatter.T @ scatter / (len(scatter) - len(alike))
     own = _part_of_cycle(drawn[0], covariance) / cycles
 
     def changes(legs: Ints, grid: Floats) -> Changes:
@@ -439,18 +443,14 @@ def signature_model(reference: TorqueReference, sensor: TorqueSensor) -> Signatu
         grid, variance = (np.take_along_axis(one, place, 1) for one in (grid, variance))
         return Changes(grid, np.take_along_axis(found, place[:, :, None], 1), variance)
 
-    of_joints, of_bodies = reference.of_joints, reference.of_bodies
-    clearance_m = np.array([reference.clearance_m[[0, *legs], k] for k, legs in enumerate(of_joints)])
-    masses = np.tile([1.0, *MASSES], (len(of_bodies), 1))
-    return SignatureModel(
-        sensor,
-        means[0],
-        changes(of_joints, clearance_m),
-        covariance,
-        float(own[1]),
-        changes(of_bodies, masses),
-        _of_places(reference, sensor),
+    clearance_m = [reference.clearance_m[[0, *legs], k] for k, legs in enumerate(reference.of_joints)]
+    joints = changes(reference.of_joints, np.array(clearance_m))
+    masses, friction = (
+        changes(legs, np.tile([1.0, *factors], (len(legs), 1)))
+        for legs, factors in ((reference.of_masses, MASSES), (reference.of_frictions, FRICTIONS))
     )
+    places = _of_places(reference, sensor)
+    return SignatureModel(sensor, means[0], joints, covariance, float(own[1]), masses, friction, places)
 
 
 def _of_places(reference: TorqueReference, sensor: TorqueSensor) -> Floats:

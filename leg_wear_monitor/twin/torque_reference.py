@@ -44,9 +44,9 @@ WIDER = (1.2, 1.35, 1.5, 2.0, 3.0, 5.0, 8.0)  # factors on the expected clearanc
 
 WORN, NARROWER = 1.2, 0.8  # a clearance over the new one, and a factor on the others beside it
 
-# factors on the mass of one body at a time: half a kilogram on a foot, two on a thigh. Files and ledgers know
-# such legs by their places alone, so that other factors need a place for them there
-MASSES = (0.75, 1.4)
+# factors on the mass of one body at a time (half a kilogram on a foot, two on a thigh), and on the friction
+# of all joints. Files and ledgers know such legs by their places alone: others would need one for them there
+MASSES, FRICTIONS = (0.75, 1.4), (0.6, 1.5, 2.2, 3.2)
 
 # of each body's mass and length, and factors on the friction in the joints and on the stiffness of a drive
 # that is not rigid (a quarter of its resonance's width): up and down, all of them at once
@@ -71,7 +71,7 @@ class TorqueReference:
     clearance_m : (legs, k) array
         Mean radial clearances of each leg; the first leg is the expected one, then each joint is wider in
         turn, all sizes of the first joint before those of the next. The last legs, if their clearances are
-        the expected ones, have another mass of each body in turn, as of MASSES.
+        the expected ones, have another mass of each body in turn, then another friction.
     torque_nm : tuple of (cycles, POINTS) arrays
         Mean drive torque between equal steps of time of a gait cycle, which begins at the profile's angle 0.
     parameters : LegParameters
@@ -94,18 +94,28 @@ class TorqueReference:
         return bool((self.clearance_m == self.clearance_m[0]).all())
 
     @property
-    def of_bodies(self) -> Ints:
-        """Indices (bodies, masses) of legs with another mass of a body; (0, masses) where there are none."""
-        number, legs = len(MASSES) * len(self.parameters.mass), len(self.clearance_m)
-        there = number < legs and (self.clearance_m[-number:] == self.clearance_m[0]).all()
-        has_some = there and not self.is_of_parameters
-        return np.arange(legs - number if has_some else legs, legs).reshape(-1, len(MASSES))
+    def of_masses(self) -> Ints:
+        """Indices (bodies, masses) of legs with another mass of a body; (0, masses) without such legs."""
+        number = self._of_factors - len(FRICTIONS)
+        return (np.arange(max(0, number)) + 1 + self.of_joints.size).reshape(-1, len(MASSES))
+
+    @property
+    def of_frictions(self) -> Ints:
+        """Indices (1, frictions) of legs with another friction; (0, frictions) without such legs."""
+        number, legs = min(self._of_factors, len(FRICTIONS)), len(self.clearance_m)
+        return np.arange(legs - number, legs).reshape(-1, len(FRICTIONS))
+
+    @property
+    def _of_factors(self) -> int:
+        """Number of the last legs, which have another mass or friction."""
+        number = len(MASSES) * len(self.parameters.mass) + len(FRICTIONS)
+        are_there = (self.clearance_m[-number:] == self.clearance_m[0]).all() and not self.is_of_parameters
+        return number if are_there else 0
 
     @property
     def of_joints(self) -> Ints:
         """Indices (k, sizes) of legs with another clearance of a joint."""
-        others = len(self.clearance_m) - self.of_bodies.size
-        return np.arange(1, others).reshape(self.clearance_m.shape[1], -1)
+        return np.arange(1, len(self.clearance_m) - self._of_factors).reshape(self.clearance_m.shape[1], -1)
 
     def in_order_of(self, mechanism: Mechanism, names: Sequence[str]) -> "TorqueReference":
         """The same with bodies in the order of a mechanism, instead of that of their names.
@@ -116,9 +126,10 @@ class TorqueReference:
         order = [names.index(name) for name in mechanism.bodies]
         if order == sorted(order):
             return attrs.evolve(self, parameters=parameters)
-        others = 1 if self.is_of_parameters else 1 + self.of_joints.size
-        of_bodies = self.of_bodies[order].ravel().tolist() if self.is_whole and self.of_bodies.size else []
-        torque_nm = (*self.torque_nm[:others], *(self.torque_nm[leg] for leg in of_bodies))
+        legs = [0] if self.is_of_parameters else [0, *self.of_joints.flat]
+        if self.is_whole and self._of_factors:
+            legs += [*self.of_masses[order].flat, *self.of_frictions.flat]
+        torque_nm = tuple(self.torque_nm[leg] for leg in legs if leg < len(self.torque_nm))
         return attrs.evolve(self, parameters=parameters, torque_nm=torque_nm)
 
     @property
@@ -364,7 +375,7 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
         profile: CrankProfile,
         parameters: LegParameters | None = None,
     ) -> None:
-        """Begin a reference: the expected leg, then each joint wider, then each body of another mass.
+        """Begin a reference: the expected leg, then each joint wider, then legs of other factors.
 
         Parameters
         ----------
@@ -388,7 +399,7 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
                 other = centre.copy()
                 other[k] = size
                 legs.append(Leg(parameters, other))
-        self._begin([*legs, *_of_masses(parameters, centre)], depth, profile)
+        self._begin([*legs, *_of_factors(parameters, centre)], depth, profile)
 
     def begin_expected(
         self, clearance_m: Floats, depth: Floats, profile: CrankProfile, parameters: LegParameters
@@ -408,10 +419,9 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
         if part.is_of_parameters:
             legs = _changed(part.parameters, part.clearance_m[0])
         else:
-            of_bodies, expected_m = part.of_bodies.size, part.clearance_m[0]
-            others = part.clearance_m[: len(part.clearance_m) - of_bodies]
+            others = part.clearance_m[: 1 + part.of_joints.size]
             legs = [Leg(part.parameters, clearance_m) for clearance_m in others]
-            legs += _of_masses(part.parameters, expected_m) if of_bodies else []
+            legs += _of_factors(part.parameters, part.clearance_m[0]) if part.of_frictions.size else []
         self._begin(legs, depth, part.profile)
         self._done = part.torque_nm
         self._periods = -(-self._cost(legs[: len(self._done)]) // PACE)
@@ -483,11 +493,12 @@ def _changed(near: LegParameters, clearance_m: Floats) -> list[Leg]:
     return legs
 
 
-def _of_masses(near: LegParameters, clearance_m: Floats) -> list[Leg]:
-    """Legs with one body of another mass, all masses of the first body before those of the next."""
-    each = np.eye(len(near.mass))
-    masses = [near.mass * (1.0 + (factor - 1.0) * one) for one in each for factor in MASSES]
-    return [Leg(attrs.evolve(near, mass=mass), clearance_m) for mass in masses]
+def _of_factors(near: LegParameters, clearance_m: Floats) -> list[Leg]:
+    """Legs with another mass of each body in turn, then with another friction."""
+    masses = [near.mass * factor**one for one in np.eye(len(near.mass)) for factor in MASSES]
+    changed = [attrs.evolve(near, mass=mass) for mass in masses]
+    changed += [attrs.evolve(near, friction=near.friction * factor) for factor in FRICTIONS]
+    return [Leg(one, clearance_m) for one in changed]
 
 
 def _lower_priority() -> None:

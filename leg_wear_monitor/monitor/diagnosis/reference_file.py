@@ -197,7 +197,10 @@ def _reference(parts: Any, i: int, bodies: int, joints: int) -> TorqueReference:
     if min(friction, compliance, damping, load_sigma) < 0.0 or speed == 0.0:
         raise ValueError("friction, compliance, damping or a sigma is below 0, or speed is 0")
     leg = LegParameters(mass, length, friction, compliance, damping, load, load_sigma)
-    return TorqueReference(CrankProfile(speed, cosine, sine), clearance_m, (expected, *torque), leg)
+    found = TorqueReference(CrankProfile(speed, cosine, sine), clearance_m, (expected, *torque), leg)
+    if (len(torque) - found.of_masses.size - found.of_frictions.size) % joints:
+        raise ValueError(f"its {len(torque)} other legs are not as many for each of {joints} joints")
+    return found
 
 
 def _checked(parts: Any, name: str, shape: tuple[int | None, ...]) -> Any:

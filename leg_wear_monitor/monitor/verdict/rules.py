@@ -138,7 +138,7 @@ RULES = (
     ),
     _cause("TORQUE_NOISE", "it has more or less noise than before", State.WATCH),
     _cause("TORQUE_BIAS", "it has a constant part that friction cannot be"),
-    _cause("FRICTION_CHANGED", "the friction of the drive has changed", State.WATCH),
+    _cause("FRICTION_CHANGED", "the friction has changed", State.WATCH),
     Rule(
         code="IMPACT_FORCE",
         state=State.INSPECT,

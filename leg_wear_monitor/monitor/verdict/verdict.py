@@ -148,6 +148,7 @@ EVIDENCE = {
     Cause.BIAS: ("impossible_friction", "N m"),
     Cause.FRICTION: ("friction", "N m"),
     Cause.LOAD_FRICTION: ("load_friction", ""),
+    Cause.JOINT_FRICTION: ("joint_friction_fraction", ""),
     Cause.LOAD: ("foot_load", "N"),
     Cause.MASS: ("mass_fraction", ""),
     Cause.LENGTH: ("length_fraction", ""),
@@ -227,6 +228,9 @@ class CauseWords:
                 return f"the part of the torque that is friction has {_way(one)} by {size}, of 1"
             case Cause.LOAD:
                 return f"a load of {size} {'lifts' if one.value > 0.0 else 'pulls down'} the foot"
+            case Cause.JOINT_FRICTION:
+                percent = estimate(100.0 * abs(one.value), 100.0 * one.sigma, "%")
+                return f"the friction in the joints has {_way(one)} by {percent}"
             case Cause.MASS | Cause.LENGTH:
                 percent = estimate(100.0 * abs(one.value), 100.0 * one.sigma, "%")
                 return f"body {one.subject} is {percent} {_COMPARED[one.cause][one.value > 0.0]}"
@@ -255,6 +259,8 @@ class CauseWords:
                 return f"{_ZERO}, drive_torque.sign, scale and gear_ratio{more}"
             case Cause.FRICTION | Cause.LOAD_FRICTION:
                 return f"{_ZERO}, the lubrication and the temperature of the drive"
+            case Cause.JOINT_FRICTION:
+                return "check the lubrication of the joints, and look for dirt in them"
             case Cause.LOAD:
                 return "check the load and the ground at the foot"
             case Cause.MASS:

@@ -94,6 +94,9 @@ DAMAGES = {
     "no reference": lambda path: changed(path, references=np.array(0)),
     "a later format": lambda path: changed(path, format=np.array(99)),
     "not finite": lambda path: changed(path, mass_1=np.full(7, np.nan)),
+    "a leg more": lambda path: changed(
+        path, clearance_m_0=np.full((4, 5), 3e-4), torque_nm_0=np.ones((3, 2, 512), np.float16)
+    ),
     "a leg less": lambda path: changed(path, clearance_m_0=np.full((3, 5), 3e-4)),
     "text as numbers": lambda path: changed(path, friction_0=np.array("much")),
     "a crank that stands": lambda path: changed(path, speed_radps_0=np.array(0.0)),
@@ -135,7 +138,9 @@ def test_references_are_the_same_each_time_and_those_of_a_leg_at_each_cadence(le
     (again,) = reference_file.simulated_references(leg, (-57.0,))
     for torque, same in zip(two.torque_nm, again.torque_nm, strict=True):
         np.testing.assert_array_equal(torque, same)
-    assert [len(torque) for torque in one.torque_nm] == [2, 1, 1] + one.of_bodies.size * [1]
+    assert [len(torque) for torque in one.torque_nm] == [2, 1, 1] + (
+        one.of_masses.size + one.of_frictions.size
+    ) * [1]
     assert one.profile.cadence_rpm == pytest.approx(60.0)
     assert parts == sorted(parts) and parts[-1] == 1.0
 

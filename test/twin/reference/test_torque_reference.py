@@ -13,6 +13,7 @@ from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.twin import torque_reference
 from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
 from leg_wear_monitor.twin.torque_reference import (
+    FRICTIONS,
     HEAVIER,
     LONGER,
     MASSES,
@@ -100,28 +101,30 @@ def whole(simulated) -> TorqueReference:
 
 
 def test_each_joint_is_wider_in_turn(whole) -> None:
-    of_bodies = len(MASSES) * len(whole.parameters.mass)
-    assert [len(torque) for torque in whole.torque_nm] == [2] + (2 * len(WIDER) + of_bodies) * [1]
+    of_factors = len(MASSES) * len(whole.parameters.mass) + len(FRICTIONS)
+    assert [len(torque) for torque in whole.torque_nm] == [2] + (2 * len(WIDER) + of_factors) * [1]
     np.testing.assert_allclose(whole.clearance_m[1 : 1 + len(WIDER), 0], FRESH_M * np.array(WIDER))
     assert (whole.clearance_m[1 : 1 + len(WIDER), 1:] == FRESH_M).all()
     np.testing.assert_array_equal(whole.parameters.mass, 1.0)
 
 
-def test_the_last_legs_have_another_mass_of_a_body_in_turn(small, whole, short) -> None:
+def test_the_last_legs_have_another_mass_of_a_body_in_turn_or_another_friction(small, whole, short) -> None:
     assert whole.of_joints.tolist() == [[1, 2], [3, 4]]
-    assert whole.of_bodies.tolist() == [[5, 6], [7, 8], [9, 10]]
-    heavier = LegParameters.none(small).mass * np.array([1.0, MASSES[1], 1.0])
-    own = attrs.evolve(LegParameters.none(small), mass=heavier)
-    other = TorqueReferenceRun(own.applied(small))
-    other.begin(NEW, UNWORN, STEADY)
-    np.testing.assert_array_equal(finished(other).torque_nm[0][:1], whole.torque_nm[8])
+    assert whole.of_masses.tolist() == [[5, 6], [7, 8], [9, 10]]
+    assert whole.of_frictions.tolist() == [[11, 12, 13, 14]]
+    none = LegParameters.none(small)
+    heavier = attrs.evolve(none, mass=none.mass * np.array([1.0, MASSES[1], 1.0]))
+    for own, leg in ((heavier, 8), (attrs.evolve(none, friction=FRICTIONS[2]), 13)):
+        other = TorqueReferenceRun(own.applied(small))
+        other.begin(NEW, UNWORN, STEADY)
+        np.testing.assert_array_equal(finished(other).torque_nm[0][:1], whole.torque_nm[leg])
 
 
 def test_legs_of_bodies_follow_the_order_of_a_mechanism(small, whole) -> None:
     names = list(small.bodies)
     turned = attrs.evolve(small, bodies=dict(reversed(small.bodies.items())))
     found = whole.in_order_of(turned, names)
-    for leg, same in enumerate([0, 1, 2, 3, 4, 9, 10, 7, 8, 5, 6]):
+    for leg, same in enumerate([0, 1, 2, 3, 4, 9, 10, 7, 8, 5, 6, 11, 12, 13, 14]):
         np.testing.assert_array_equal(found.torque_nm[leg], whole.torque_nm[same])
     assert_same(found.in_order_of(small, names[::-1]), whole)
     part = attrs.evolve(whole, torque_nm=whole.torque_nm[:8])
@@ -134,7 +137,7 @@ def test_a_worn_joint_is_also_new_and_the_others_narrower(small, short) -> None:
     run.begin(FRESH_M * np.array([1.0, 3.0]), UNWORN, STEADY)
     found = finished(run)
     sizes = len(WIDER) + 1
-    assert len(found.torque_nm) == 1 + 2 * sizes + len(MASSES) * len(small.bodies)
+    assert found.of_joints.shape == (2, sizes)
     np.testing.assert_allclose(found.clearance_m[2 * sizes, 1], FRESH_M)
     np.testing.assert_allclose(found.clearance_m[sizes, 0], 0.8 * FRESH_M)
 

@@ -39,7 +39,7 @@ CADENCES = 6  # of which the references of a leg are kept
 CYCLES = 20  # simulated for each wider leg, and twice as many for each other one
 
 _PERIODS = 4  # evaluation periods in a commanded gait cycle
-PACE = 6  # simulated gait cycles in an evaluation period, a quarter cycle; a core does twice as many
+PACE = 8  # simulated gait cycles in an evaluation period, a quarter cycle; a core does half as many more
 WIDER = (1.2, 1.35, 1.5, 2.0, 3.0, 5.0, 8.0)  # factors on the expected clearance, one joint at a time
 
 WORN, NARROWER = 1.2, 0.8  # a clearance over the new one, and a factor on the others beside it

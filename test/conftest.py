@@ -8,6 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import settings
 from matplotlib.figure import Figure
@@ -116,3 +117,15 @@ def document() -> Callable[[str], Any]:
 def data() -> Path:
     """Directory of the reference data."""
     return Path(__file__).parent / "data"
+
+
+@pytest.fixture
+def solve_of_any_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`numpy.linalg.solve` refuses what numpy 1 takes for a stack of vectors and numpy 2 for one matrix."""
+    solve = np.linalg.solve
+
+    def strict(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        assert a.ndim == b.ndim or (a.ndim, b.ndim) == (2, 1), (a.shape, b.shape)
+        return solve(a, b)
+
+    monkeypatch.setattr(np.linalg, "solve", strict)

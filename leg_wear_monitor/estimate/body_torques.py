@@ -106,7 +106,7 @@ def torque_coefficients(linkage: Linkage, q: Floats) -> tuple[Floats, Floats]:
     """
     arrays, jacobian = linkage.arrays, jacobians(linkage, q)
     v, a, work = np.zeros_like(q), np.zeros_like(q), np.empty((q.shape[1], 2))
-    v[:, 1:] = np.linalg.solve(jacobian, drive_column(linkage)[:, None]).reshape(len(q), -1, 3)
+    v[:, 1:] = np.linalg.solve(jacobian, drive_column(linkage)[None, :, None]).reshape(len(q), -1, 3)
     a[:, 1:] = np.linalg.solve(jacobian, gammas(linkage, q, v, 0.0)[:, :, None]).reshape(len(q), -1, 3)
     resting, moving = np.empty_like(q), np.empty_like(q)
     applied_forces_at(arrays, q, np.zeros_like(q), work, resting)

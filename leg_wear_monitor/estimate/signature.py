@@ -527,10 +527,10 @@ def without_scatter(
     walk = np.where(is_alike, np.minimum(np.abs(wider)[:, None], np.abs(wider)), 0.0)
     total = _STEEPNESS[:, None, None] * walk + scatter
     # minus twice the logarithms of the likelihoods (steepness, F), less a constant
-    square = (measured * np.linalg.solve(total, measured)).sum(axis=1)
+    square = (measured * np.linalg.solve(total, measured[None])).sum(axis=1)
     unlikely = np.linalg.slogdet(total)[1][:, None] + square
     best = (unlikely + _ALIKE * unlikely.mean(axis=1, keepdims=True)).argmin(axis=0)
-    taken = _STEEPNESS[:, None, None] * np.linalg.solve(total, walk).swapaxes(1, 2)
+    taken = _STEEPNESS[:, None, None] * np.linalg.solve(total, walk[None]).swapaxes(1, 2)
     left = _STEEPNESS[:, None] * np.diagonal(walk - taken @ walk, axis1=1, axis2=2)
     found = np.einsum("fst,tf->sf", taken[best], measured)
     return found @ (axes * root) @ axes.T, left[best].mean(axis=0)

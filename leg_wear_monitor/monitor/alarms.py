@@ -288,7 +288,8 @@ FAULT_CODES = {
     LEDGER_NOT_WRITTEN: "the ledger cannot be written",
     LEDGER_INTERRUPTED: "an earlier run was interrupted",
     SAMPLES_DROPPED: "the node is overloaded: samples were dropped",
-    SAMPLES_NOT_PUBLISHED: "the node is overloaded: values of samples are not published",
+    SAMPLES_NOT_PUBLISHED: "the node is overloaded: values of samples are not published, or late while it "
+    "records",
     TOPICS: "an input topic has no publisher, several, another type, not the crank, a torque about another "
     "axis, or messages are lost",
     RECORDING_STOPPED: "the recording of the node has stopped",

@@ -313,15 +313,16 @@ class Load:
         return delay_s > COARSE_FROM_S
 
 
-def load_status(load: Load, inbox: Inbox) -> Status:
-    """Status of the load; starts a new reporting interval."""
+def load_status(load: Load, inbox: Inbox, is_recorded: bool = False) -> Status:
+    """Status of the load; starts a new reporting interval. What is recorded is published, if late."""
     dropped = inbox.shed + load.lost
     level, message, code = Level.OK, "keeps up", alarms.NO_FAULT
     if dropped > load.dropped_reported:
         level, message = Level.ERROR, "overloaded: samples were dropped and their wear is not counted"
         code = alarms.SAMPLES_DROPPED
     elif load.worst_delay_s > COARSE_FROM_S:
-        level, message = Level.WARN, "overloaded: forces and torques of samples are not published"
+        left = "published late" if is_recorded else "not published"
+        level, message = Level.WARN, f"overloaded: forces and torques of samples are {left}"
         code = alarms.SAMPLES_NOT_PUBLISHED
     values = {
         "received": float(inbox.received),

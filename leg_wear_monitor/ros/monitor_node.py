@@ -384,7 +384,7 @@ class MonitorNode(ClosingNode):
             self._send_state()
         status = (
             *self._monitor.status(),
-            load_status(self._load, self._inbox),
+            load_status(self._load, self._inbox, self._black_box.on),
             recording_status(self._black_box),
             self._epochs.status(),
         )

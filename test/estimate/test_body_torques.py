@@ -4,8 +4,8 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.estimate.body_torques import body_torques
-from leg_wear_monitor.mechanism.position import build_linkage, one_cycle
+from leg_wear_monitor.estimate.body_torques import body_torques, torque_coefficients
+from leg_wear_monitor.mechanism.position import build_linkage, ideal_motion, one_cycle
 from leg_wear_monitor.twin.reference import LegParameters
 
 POINTS = 240
@@ -30,3 +30,11 @@ def test_their_sum_is_the_torque_of_the_leg(leg, speed, acceleration) -> None:
     expected = one_cycle(build_linkage(leg), POINTS, speed, acceleration).drive_torque
     found = np.array([1.0, speed, speed**2, acceleration]) @ body_torques(leg).own
     np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
+
+
+@pytest.mark.usefixtures("solve_of_any_numpy")
+def test_they_are_solved_alike_by_the_oldest_numpy(leg) -> None:
+    """Seen before: with the numpy of Ubuntu 24.04 (1.26), each start of a monitor ended in a traceback."""
+    linkage = build_linkage(leg)
+    own, _ = torque_coefficients(linkage, ideal_motion(linkage, np.linspace(0.0, 6.0, 7), 1.0).q)
+    assert np.isfinite(own).all()

@@ -189,6 +189,7 @@ def test_a_change_of_few_phases_is_kept() -> None:
     assert np.mean(kept, axis=0)[1:].min() > 0.85
 
 
+@pytest.mark.usefixtures("solve_of_any_numpy")
 def test_a_large_change_stays_as_it_is() -> None:
     random = np.random.default_rng(6)
     true = np.abs(WIDER)[:, None] * 20.0 * random.standard_normal(160)

@@ -121,7 +121,11 @@ def test_falling_behind_is_told_and_then_over() -> None:
     assert load_status(load, box).level is Level.OK
     assert load.note(1.0)
     load.note(0.0)
-    assert load_status(load, box).level is Level.WARN
+    told = load_status(load, box)
+    assert (told.level, told.message.endswith("samples are not published")) == (Level.WARN, True)
+    load.worst_delay_s = 1.0
+    told = load_status(load, box, is_recorded=True)  # then they are
+    assert (told.level, told.message.endswith("samples are published late")) == (Level.WARN, True)
     for number in range(5):
         box.add(JOINT_STATE, b"", number)
     told = load_status(load, box)

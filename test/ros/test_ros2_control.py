@@ -19,6 +19,7 @@ from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
+from leg_wear_monitor.gait.config import GaitConfig, KnockConfig
 from leg_wear_monitor.messages import encode
 from leg_wear_monitor.messages.cdr import Decoder
 from leg_wear_monitor.messages.names import wanted_interfaces
@@ -26,6 +27,7 @@ from leg_wear_monitor.messages.streams import definition, types
 from leg_wear_monitor.monitor.config.parameters import load_config
 from leg_wear_monitor.ros import inputs
 from leg_wear_monitor.ros.generated_type import generated_class, type_description
+from leg_wear_monitor.state import State
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "ros2_control"
 ME = "/leg_wear_monitor"
@@ -44,44 +46,68 @@ def stand_ins() -> Any:
     return module
 
 
-def test_the_leg_on_ros2_control_is_healthy(stage: Any, stand_ins: Any, monkeypatch: Any) -> None:
-    """NaN, another publisher's joints and a sensor that turns with the foot included."""
-    given = load_config(EXAMPLE / "monitor.yaml")
-    torque, load = given.drive_torque, given.foot_load
-    # before the monitor, which would call it silent while its kernels are compiled
-    robot = stand_ins.Robot(
-        context=stage.node.context,
-        cli_args=["--ros-args", "-r", "foot_sensor_broadcaster:~/wrench:=foot_load"],
-    )
-    monitor = stage.monitor(
-        crank_joint=given.crank_joint,
-        drive_torque__source=torque.source,
-        drive_torque__interface=torque.interface,
-        drive_torque__scale=torque.scale,
-        drive_torque__gear_ratio=torque.gear_ratio,
-        drive__temperature_interface=given.drive.temperature_interface,
-        foot_load__source=load.source,
-        foot_load__frame=load.frame,
-        load__model=given.load.model,
-    )
-    alarms = stage.listen(f"{ME}/alarms", DiagnosticArray, latched=True)
-    for topic in ("joint_states", "dynamic_joint_states", "foot_load"):
-        stage.wait_for(lambda topic=topic: stage.node.count_subscribers(topic) > 0, topic)
-        stage.wait_for(lambda topic=topic: monitor.node.count_publishers(topic) > 0, topic)
-    numbers, sent = itertools.count(1), 0
+class Walking:
+    """The stand-ins and a monitor with the parameters of the example, which walk as one asks.
 
-    def status_after(seconds: float) -> dict[str, Any]:
-        nonlocal sent
-        for number in itertools.islice(numbers, round(seconds * stand_ins.UPDATE_HZ)):
-            sent += robot.update(number, START_NS)
-            stage.wait_for(lambda sent=sent: monitor.received >= sent, "a message on its way")
-        stage.wait_for(lambda: monitor.waiting == 0, "the monitor to take what it got")
+    Attributes
+    ----------
+    monitor : Monitor
+        Of the stage.
+    """
+
+    def __init__(self, stage: Any, stand_ins: Any, leg: Any = None) -> None:
+        given = load_config(EXAMPLE / "monitor.yaml")
+        torque, load = given.drive_torque, given.foot_load
+        # before the monitor, which would call it silent while its kernels are compiled
+        self._robot = stand_ins.Robot(
+            leg,
+            context=stage.node.context,
+            cli_args=["--ros-args", "-r", "foot_sensor_broadcaster:~/wrench:=foot_load"],
+        )
+        self.monitor = stage.monitor(
+            crank_joint=given.crank_joint,
+            drive_torque__source=torque.source,
+            drive_torque__interface=torque.interface,
+            drive_torque__scale=torque.scale,
+            drive_torque__gear_ratio=torque.gear_ratio,
+            drive__temperature_interface=given.drive.temperature_interface,
+            foot_load__source=load.source,
+            foot_load__frame=load.frame,
+            load__model=given.load.model,
+        )
+        self._stage, self._rate_hz = stage, stand_ins.UPDATE_HZ
+        self._numbers, self._sent = itertools.count(1), 0
+        for topic in ("joint_states", "dynamic_joint_states", "foot_load"):
+            stage.wait_for(lambda topic=topic: stage.node.count_subscribers(topic) > 0, topic)
+            stage.wait_for(lambda topic=topic: self.monitor.node.count_publishers(topic) > 0, topic)
+
+    def status_after(self, seconds: float) -> dict[str, Any]:
+        """Walk on; the statuses afterwards."""
+        monitor = self.monitor
+        for number in itertools.islice(self._numbers, round(seconds * self._rate_hz)):
+            self._sent += self._robot.update(number, START_NS)
+            self._stage.wait_for(lambda: monitor.received >= self._sent, "a message on its way")
+        self._stage.wait_for(lambda: monitor.waiting == 0, "the monitor to take what it got")
         return {one.name: one for one in monitor.node.monitor.status()}
 
-    status = status_after(SECONDS)
+    def end(self) -> None:
+        """Take the robot down."""
+        for node in self._robot.nodes:
+            node.destroy_node()
+
+
+def test_the_leg_on_ros2_control_is_healthy(stage: Any, stand_ins: Any) -> None:
+    """NaN, another publisher's joints and a sensor that turns with the foot included."""
+    walking = Walking(stage, stand_ins)
+    node = walking.monitor.node
+    alarms = stage.listen(f"{ME}/alarms", DiagnosticArray, latched=True)
+    status = walking.status_after(SECONDS)
     # a node that was late with a turn, as on a busy machine, does not know rates until it has caught up
     stage.wait_for(
-        lambda: not math.isnan(status["input"].values["torque_rate_hz"]) or status.update(status_after(1.0)),
+        lambda: (
+            not math.isnan(status["input"].values["torque_rate_hz"])
+            or status.update(walking.status_after(1.0))
+        ),
         "the rate of the torque",
     )
     stage.wait_for(lambda: bool(alarms), "the alarms")
@@ -90,12 +116,24 @@ def test_the_leg_on_ros2_control_is_healthy(stage: Any, stand_ins: Any, monkeypa
     assert status["input"].values["foot_load_rate_hz"] == pytest.approx(200.0, rel=0.05)
     assert status["torque"].message == "measured as predicted"
     # 25 °C at the start, and 60 °C after half an hour
-    assert 25.0 < monitor.node.monitor.state.drive.temperature_c.value < 26.0
+    assert 25.0 < node.monitor.state.drive.temperature_c.value < 26.0
     assert status["diagnosis"].values["drive_temperature_c"] == pytest.approx(25.5, abs=0.5)
-    topics = {one.name: one for one in monitor.node._supervision.statuses(())}["topics"]
+    topics = {one.name: one for one in node._supervision.statuses(())}["topics"]
     assert "expected one" not in topics.message
-    for node in robot.nodes:
-        node.destroy_node()
+    walking.end()
+
+
+def test_an_opened_knee_is_shown_by_the_current_in_the_air(stage: Any, stand_ins: Any) -> None:
+    """As the page has it, 0.452 mm ± 0.032 mm; and what the sensor at the foot shows in the air."""
+    leg = GaitConfig(knock=KnockConfig(joint="G", at_s=0.0, clearance_m=0.45e-3))
+    walking = Walking(stage, stand_ins, leg)
+    status = walking.status_after(13.0)
+    verdict = walking.monitor.node.monitor.verdict.verdict
+    assert (verdict.state, verdict.joints) == (State.INSPECT, ("G",))
+    shown_m = walking.monitor.node.monitor.state.clearances["G"].believed_m
+    assert shown_m == pytest.approx(0.45e-3, abs=5.0 * 0.032e-3)
+    assert "its sensor is stuck, or the leg walks in the air" in status["foot_load"].message
+    walking.end()
 
 
 def test_joint_states_are_those_of_joint_state_broadcaster(stage: Any, stand_ins: Any) -> None:

@@ -170,14 +170,14 @@ class CauseWords:
     crank, torque : Crank, DriveTorque
     speed_radps : float
         Mean speed of the crank; NaN if it is not known.
-    diagnosis : Diagnosis or None
+    diagnosis : Diagnosis
         With the temperatures of the drive.
     """
 
     crank: Crank
     torque: DriveTorque
     speed_radps: float = math.nan
-    diagnosis: Diagnosis | None = None
+    diagnosis: Diagnosis = Diagnosis()
 
     def explanation(self, explained: TorqueExplanation) -> str:
         """All alternatives with their values, and what stays unexplained."""
@@ -285,7 +285,7 @@ class CauseWords:
     def _temperatures(self) -> str:
         """Temperatures of the drive now and when the leg was commissioned; empty where one is not known."""
         found = self.diagnosis
-        if found is None or found.temperature_c is None or found.commissioned_c is None:
+        if found.temperature_c is None or found.commissioned_c is None:
             return ""
         return (
             f" (the drive is at {found.temperature_c:.0f} °C, and was at {found.commissioned_c:.0f} °C then)"

@@ -369,14 +369,13 @@ OF_TORQUE = frozenset((*(spec.name() for spec in TORQUE), "input_torque"))
 """Names of the alarms whose values need a drive torque."""
 
 INPUT_KINDS = tuple(dict.fromkeys(spec.kind for spec in OF_INPUT))
-KINDS = tuple(dict.fromkeys(spec.kind for spec in ALL))
-UNITS = {spec.kind: spec.unit for spec in ALL}
-FIGURES = {spec.kind: spec.figure for spec in ALL}
+KINDS: "dict[str, AlarmSpec[Any]]" = {spec.kind: spec for spec in ALL}
+"""The kinds of alarms, each with a spec: those of one kind have the same unit and figure."""
 
 
 def with_its_unit(alarm: Alarm) -> Alarm:
     """An alarm of a ledger, which does not keep units, with that of its kind."""
-    return attrs.evolve(alarm, unit=UNITS.get(alarm.kind, ""))
+    return attrs.evolve(alarm, unit=KINDS[alarm.kind].unit if alarm.kind in KINDS else "")
 
 
 QUANTITIES = {

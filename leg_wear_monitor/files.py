@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 from xml.etree import ElementTree
 
-from leg_wear_monitor.errors import ConfigError, LegWearError
+from leg_wear_monitor.errors import ConfigError, LegWearError, system_asked
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,7 +40,7 @@ def write_whole(path: Path, content: bytes) -> None:
     """
     target = path.resolve()
     part = target.with_name(f".{target.name}.part")
-    try:
+    with system_asked(path, "cannot be written"):
         target.parent.mkdir(parents=True, exist_ok=True)
         with _alone(part) as file:
             try:
@@ -52,8 +52,6 @@ def write_whole(path: Path, content: bytes) -> None:
                 with suppress(OSError):  # the first fault is the one to report
                     part.unlink()
                 raise
-    except OSError as error:
-        raise ConfigError(str(path), "", f"cannot be written: {error.strerror}") from error
 
 
 @contextmanager

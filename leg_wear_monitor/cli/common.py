@@ -12,7 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from leg_wear_monitor.errors import ConfigError, ConfigWarning, LegWearError, closed_on_interrupt
+from leg_wear_monitor.errors import (
+    ConfigError,
+    ConfigWarning,
+    LegWearError,
+    closed_on_interrupt,
+    system_asked,
+)
 from leg_wear_monitor.files import write_whole
 
 if TYPE_CHECKING:
@@ -388,10 +394,6 @@ def write_directory(path: Path, files: Mapping[str, bytes | None]) -> list[Path]
     list of pathlib.Path
         The files written, in the order given.
     """
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError(str(path), "", f"cannot be made: {error.strerror}") from error
     for name, content in files.items():
         if content is None:
             (path / name).unlink(missing_ok=True)
@@ -407,11 +409,8 @@ def _is_stream(path: Path) -> bool:
 
 def _try(option: str, path: Path, directory: Path) -> None:
     """Only writing tells: rights, a read-only file system, and an administrator whom rights do not stop."""
-    try:
-        with tempfile.TemporaryFile(dir=directory):
-            return
-    except OSError as error:
-        raise ConfigError(option, str(path), f"cannot be written: {error.strerror}") from error
+    with system_asked(option, "cannot be written", path), tempfile.TemporaryFile(dir=directory):
+        return
 
 
 def page_of(summary: "ReplaySummary") -> bytes:

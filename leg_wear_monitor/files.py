@@ -8,13 +8,17 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
 from xml.etree import ElementTree
+
+import attrs
 
 from leg_wear_monitor.errors import ConfigError, LegWearError, system_asked
 
 if TYPE_CHECKING:
     import pandas as pd
+
+_Record = TypeVar("_Record", bound=attrs.AttrsInstance)
 
 
 # Files that are written whole or not at all.
@@ -155,6 +159,12 @@ def finite_or_none(value: float | None) -> float | None:
 def or_nan(value: float | None) -> float:
     """A number out of JSON or a table, NaN for None."""
     return math.nan if value is None else value
+
+
+def with_same_fields(kind: type[_Record], of: object, **own: Any) -> _Record:
+    """A record of the attributes of another object with the same names, and of its own values."""
+    names = attrs.fields_dict(kind).keys() - own.keys()
+    return kind(**own, **{name: getattr(of, name) for name in names})
 
 
 # Where the files that come with the package are: config/, launch/, bags/.

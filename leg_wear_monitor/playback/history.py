@@ -16,7 +16,7 @@ from leg_wear_monitor.messages.leg_markers import LegMarkers
 from leg_wear_monitor.messages.leg_motion import CycleMotion, whole_cycles
 from leg_wear_monitor.messages.outputs import ALARMS, DIAGNOSTICS, FORECAST, STATE, VERDICT, Messages
 from leg_wear_monitor.messages.streams import ForecastTimes, topic_of
-from leg_wear_monitor.monitor.alarms import Alarm
+from leg_wear_monitor.monitor.alarms import Alarm, has_changed
 from leg_wear_monitor.monitor.config.parameters import NODE
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, Reports, SampleReports
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
@@ -102,8 +102,7 @@ class History:
         """Add the alarms of a list that have changed."""
         for alarm in alarms.alarms:
             before = self._before.get(alarm.name, Alarm(kind=alarm.kind, subject=alarm.subject))
-            shown = (alarm.level, alarm.present, alarm.acknowledged)
-            if shown != (before.level, before.present, before.acknowledged):
+            if has_changed(before, alarm):
                 self._before[alarm.name] = alarm
                 self.worst[alarm.kind] = max(self.worst.get(alarm.kind, Level.OK), alarm.level)
                 if len(self.changes) < _MOST_CHANGES:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from leg_wear_monitor.monitor.config.settings import Alarms, MonitorConfig
     from leg_wear_monitor.monitor.gait_evidence import TorqueBounds
     from leg_wear_monitor.monitor.inputs import InputGuard, InputHealth
-    from leg_wear_monitor.monitor.reports import CycleReport, JointReport
+    from leg_wear_monitor.monitor.reports import JointReport
 
 
 # The monitor's alarms, one entry each: board, units, status, command line and docs are derived from it.
@@ -52,15 +52,6 @@ class LimitSource:
     def by_joint(self, own: tuple[float, ...], of_all: float) -> float:
         """The joint's own limit if there are limits per joint, otherwise the common one."""
         return own[self.joint] if own else of_all
-
-
-@attrs.frozen
-class CycleEvidence:
-    """A gait cycle, the values of its torque alarms, and the commanded cadence [rpm]."""
-
-    report: "CycleReport"
-    torque: Mapping[str, float]
-    commanded_rpm: float
 
 
 def _usual(alarms: "Alarms") -> int:
@@ -86,7 +77,8 @@ class AlarmSpec(Generic[_E]):
     meaning, limit_words : str
         For operators: meaning of the value, and the parameters of its limit.
     value : callable
-        Value from the evidence: a joint's report, a gait cycle, the input's health or its guard.
+        Value from the evidence: a joint's report, the input's health or its guard; of those of a gait cycle
+        and of its foot load, which are values by their kinds, the one of this kind.
     limit : callable
         Limit of ERROR.
     on_delay : callable
@@ -109,7 +101,7 @@ class AlarmSpec(Generic[_E]):
     quantity: str
     meaning: str
     limit_words: str
-    value: Callable[[_E], float]
+    value: Callable[[_E], float] = attrs.field()
     limit: Callable[[LimitSource], float]
     on_delay: Callable[["Alarms"], int] = _usual
     is_least: bool = False
@@ -117,6 +109,10 @@ class AlarmSpec(Generic[_E]):
     is_latched: bool = True
     far: float = math.inf
     figure: Figure | None = None
+
+    @value.default
+    def _by_kind(self) -> Callable[[Any], float]:
+        return lambda values: values.get(self.kind, math.nan)
 
     def new(self, joint: str = "") -> Alarm:
         """The alarm in its initial state."""
@@ -198,25 +194,23 @@ DEPARTURE: "AlarmSpec[JointReport]" = AlarmSpec(
     value=lambda joint: joint.seen.surely_m if joint.seen else math.nan,
     limit=lambda of: of.config.limits.clearance_departure_m,
 )
-MISMATCH: "AlarmSpec[CycleEvidence]" = AlarmSpec(
+MISMATCH: "AlarmSpec[Mapping[str, float]]" = AlarmSpec(
     kind="torque_mismatch",
     quantity="unexplained fraction of the drive torque",
     meaning="RMS of the torque that repeats over the last gait cycles, and that foot load, friction and lag "
     "do not explain, as a fraction of the predicted RMS",
     limit_words="`limits.torque_mismatch`",
-    value=lambda cycle: cycle.report.torque_mismatch,
     limit=lambda of: of.config.limits.torque_mismatch,
     # what impacts scatter at 45 rpm reaches the limit once in some thousand gait cycles, three times in a row
     # once in 300 000, and 1.3 times the limit at most; a torque that is wrong as received is known at once
     far=1.5,
 )
-CADENCE: "AlarmSpec[CycleEvidence]" = AlarmSpec(
+CADENCE: "AlarmSpec[Mapping[str, float]]" = AlarmSpec(
     kind="cadence",
     unit="rpm",
     quantity="departure from the commanded cadence",
     meaning="departure from the commanded cadence, rpm",
     limit_words="`cadence.tolerance_rpm`",
-    value=lambda cycle: abs(cycle.report.cadence_rpm - cycle.commanded_rpm),
     limit=lambda of: of.config.cadence.tolerance_rpm,
 )
 SOURCES: "AlarmSpec[InputGuard]" = AlarmSpec(
@@ -231,7 +225,7 @@ SOURCES: "AlarmSpec[InputGuard]" = AlarmSpec(
 
 JOINT: "tuple[AlarmSpec[JointReport], ...]" = (IMPACT, CLEARANCE, GROWTH, LIFE, MATERIAL)
 ENCODERS = (DEPARTURE,)
-TORQUE: "tuple[AlarmSpec[CycleEvidence], ...]" = (
+TORQUE: "tuple[AlarmSpec[Mapping[str, float]], ...]" = (
     MISMATCH,
     AlarmSpec(
         kind=BIAS,
@@ -240,7 +234,6 @@ TORQUE: "tuple[AlarmSpec[CycleEvidence], ...]" = (
         meaning="constant drive torque outside the bounds of friction, N m: it drives, or exceeds "
         "`drive_torque.max_friction_nm`",
         limit_words="`limits.torque_bias_nm`",
-        value=lambda cycle: cycle.torque.get(BIAS, math.nan),
         limit=lambda of: of.bounds.bias_nm,
     ),
     AlarmSpec(
@@ -249,7 +242,6 @@ TORQUE: "tuple[AlarmSpec[CycleEvidence], ...]" = (
         quantity="change of the constant drive torque since commissioning",
         meaning="change of the constant drive torque since this leg was commissioned, N m",
         limit_words="`limits.torque_drift_nm`",
-        value=lambda cycle: cycle.torque.get(DRIFT, math.nan),
         limit=lambda of: of.bounds.drift_nm,
     ),
     AlarmSpec(
@@ -258,7 +250,6 @@ TORQUE: "tuple[AlarmSpec[CycleEvidence], ...]" = (
         quantity="delay of the measured torque",
         meaning="delay of the measured torque, late or early, s",
         limit_words="`drive_torque.max_lag_s`",
-        value=lambda cycle: cycle.torque.get(LAG, math.nan),
         limit=lambda of: of.bounds.max_lag_s,
     ),
 )
@@ -289,7 +280,6 @@ def _foot_load(kind: str, quantity: str, meaning: str, subject: str = "") -> Any
         quantity=quantity,
         meaning=f"{meaning}. Only with `foot_load.source`",
         limit_words=f"{FOOT_LOAD_LIMITS[kind]:g}",
-        value=lambda values: values.get(kind, math.nan),
         limit=lambda _: FOOT_LOAD_LIMITS[kind],
         is_latched=not subject,
     )

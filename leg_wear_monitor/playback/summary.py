@@ -226,9 +226,9 @@ def settings_of(config: MonitorConfig, mechanism: Mechanism) -> ReplayMonitor:
 
 def leg_shape(mechanism: Mechanism) -> ReplayLeg:
     """A mechanism as a picture needs it."""
-    outline, reach = outline_of(mechanism), reach_of(mechanism, None, PHASES)
+    (bodies, joints), reach = outline_of(mechanism), reach_of(mechanism, None, PHASES)
     return ReplayLeg(
-        bodies_m={body: _places(corners) for body, corners in outline.bodies.items()},
+        bodies_m={body: _places(corners) for body, corners in bodies.items()},
         joints={
             name: LegJoint(
                 label=mechanism.joints[name].label,
@@ -236,7 +236,7 @@ def leg_shape(mechanism: Mechanism) -> ReplayLeg:
                 is_on_ground=is_on_ground(mechanism, name),
                 body=carriers(mechanism, name)[1].removeprefix(GROUND),
             )
-            for name, place in outline.joints.items()
+            for name, place in joints.items()
         },
         poses=_poses(reach) if reach.turns else {},
     )

@@ -1,6 +1,7 @@
 """Parameters of the inputs: crank, further encoders, drive torque, gait, tracker."""
 
 import math
+from functools import partial
 from typing import Any
 
 import attrs
@@ -9,6 +10,7 @@ from leg_wear_monitor.configuration import FieldError, choice, described, quanti
 from leg_wear_monitor.twin import sample
 
 LIVE = {"live": True}  # may change while the monitor runs
+live_quantity = partial(quantity, metadata=LIVE)
 
 TORQUE_SOURCES = WRENCH, FLOAT64, EFFORT, INTERFACE = ("wrench", "float64", "effort", "interface")
 KNOWN, AT_START = ZEROS = ("known", "at_start")
@@ -166,31 +168,28 @@ class DriveTorque:
         at_most=1.0e4,
         default=1.0,
     )
-    max_friction_nm: float = quantity(
+    max_friction_nm: float = live_quantity(
         "N m",
         "largest friction of the drive, on the crank; a constant torque beyond is a bias; 0: 0.3 of the "
         "predicted RMS",
         at_least=0.0,
         at_most=1.0e6,
         default=0.0,
-        metadata=LIVE,
     )
-    max_lag_s: float = quantity(
+    max_lag_s: float = live_quantity(
         "s",
         "largest time by which the measured torque is late or early, beyond what drive.lag_s and "
         "drive.bandwidth_hz declare; above it, crank.offset_rad may be off",
         above=0.0,
         at_most=1.0,
         default=0.005,
-        metadata=LIVE,
     )
-    saturation_nm: float = quantity(
+    saturation_nm: float = live_quantity(
         "N m",
         "torque on the crank at which the sensor saturates; 0: unknown",
         at_least=0.0,
         at_most=1.0e6,
         default=0.0,
-        metadata=LIVE,
     )
 
 
@@ -251,13 +250,12 @@ class Cadence:
         default=60.0,
         check=_turns,
     )
-    tolerance_rpm: float = quantity(
+    tolerance_rpm: float = live_quantity(
         "rpm",
         "largest departure from the commanded speed at which predictions are valid",
         above=0.0,
         at_most=1200.0,
         default=6.0,
-        metadata=LIVE,
     )
 
     def allows(self, rpm: float) -> bool:

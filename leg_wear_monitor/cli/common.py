@@ -6,6 +6,7 @@ import tempfile
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -114,6 +115,8 @@ def path_option(name: str, metavar: str, text: str, *, required: bool = False, *
     return option(name, metavar, text, type=kind, required=required)
 
 
+file_option = partial(path_option, dir_okay=False)
+
 mechanism_option: Option = option(
     "--mechanism",
     "FILE",
@@ -133,12 +136,8 @@ config_option: Option = path_option(
     "--config", "FILE", "Parameter file of the node.  [default: the one that comes with the package]"
 )
 
-ledger_option: Option = path_option(
-    "--ledger",
-    "FILE",
-    "Ledger to write into.  [default: the one in the parameters]",
-    dir_okay=False,
-    exists=True,
+ledger_option: Option = file_option(
+    "--ledger", "FILE", "Ledger to write into.  [default: the one in the parameters]", exists=True
 )
 
 node_option: Option = option(

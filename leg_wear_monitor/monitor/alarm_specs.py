@@ -132,6 +132,11 @@ class AlarmSpec(Generic[_E]):
         return Limit(first, error, alarms.deadband, delay, self.is_least, self.is_latched, self.far)
 
 
+def _parameter(name: str) -> dict[str, Any]:
+    """Limit of an alarm that is a parameter of the section ``limits``."""
+    return {"limit_words": f"`limits.{name}`", "limit": lambda of: getattr(of.config.limits, name)}
+
+
 IMPACT: "AlarmSpec[JointReport]" = AlarmSpec(
     kind="impact_force",
     unit="N",
@@ -159,9 +164,8 @@ GROWTH: "AlarmSpec[JointReport]" = AlarmSpec(
     unit="m/h",
     quantity="growth of the mean radial clearance",
     meaning="growth of the mean radial clearance, m/h",
-    limit_words="`limits.growth_m_per_hour`",
+    **_parameter("growth_m_per_hour"),
     value=lambda joint: math.nan if joint.growth_mps is None else 3600.0 * joint.growth_mps,
-    limit=lambda of: of.config.limits.growth_m_per_hour,
     figure=Figure.GROWTH,
 )
 LIFE: "AlarmSpec[JointReport]" = AlarmSpec(
@@ -169,9 +173,8 @@ LIFE: "AlarmSpec[JointReport]" = AlarmSpec(
     unit="h",
     quantity="p10 of the remaining life",
     meaning="hours of walking that the joint exceeds with a probability of 90 %, h",
-    limit_words="`limits.remaining_life_h`",
+    **_parameter("remaining_life_h"),
     value=lambda joint: joint.forecast.hours.p10 if joint.forecast and joint.forecast.hours else math.nan,
-    limit=lambda of: of.config.limits.remaining_life_h,
     is_least=True,
     figure=Figure.FORECAST,
 )
@@ -190,17 +193,15 @@ DEPARTURE: "AlarmSpec[JointReport]" = AlarmSpec(
     quantity="difference between the clearance from encoders and the counted clearance",
     meaning="difference between the clearance from further encoders and the counted one, m; 0 below four "
     "standard deviations. Only with `encoders.names`",
-    limit_words="`limits.clearance_departure_m`",
+    **_parameter("clearance_departure_m"),
     value=lambda joint: joint.seen.surely_m if joint.seen else math.nan,
-    limit=lambda of: of.config.limits.clearance_departure_m,
 )
 MISMATCH: "AlarmSpec[Mapping[str, float]]" = AlarmSpec(
     kind="torque_mismatch",
     quantity="unexplained fraction of the drive torque",
     meaning="RMS of the torque that repeats over the last gait cycles, and that foot load, friction and lag "
     "do not explain, as a fraction of the predicted RMS",
-    limit_words="`limits.torque_mismatch`",
-    limit=lambda of: of.config.limits.torque_mismatch,
+    **_parameter("torque_mismatch"),
     # what impacts scatter at 45 rpm reaches the limit once in some thousand gait cycles, three times in a row
     # once in 300 000, and 1.3 times the limit at most; a torque that is wrong as received is known at once
     far=1.5,
@@ -264,9 +265,8 @@ def _rate(name: str) -> "AlarmSpec[InputHealth]":
         unit="Hz",
         quantity=f"rate of usable {name} samples",
         meaning=f"rate of usable {name} samples, Hz",
-        limit_words="`limits.min_rate_hz`",
+        **_parameter("min_rate_hz"),
         value=lambda health: health.rate_hz[name],
-        limit=lambda of: of.config.limits.min_rate_hz,
         is_least=True,
         is_latched=False,
     )
@@ -328,26 +328,23 @@ INPUT: "tuple[AlarmSpec[InputHealth], ...]" = (
         kind="input_samples",
         quantity="fraction of unusable samples",
         meaning="fraction of samples that could not be used: faulty, repeated, late, stray stamp, far off",
-        limit_words="`limits.bad_sample_fraction`",
+        **_parameter("bad_sample_fraction"),
         value=lambda health: health.bad_fraction,
-        limit=lambda of: of.config.limits.bad_sample_fraction,
     ),
     AlarmSpec(
         kind="input_gaps",
         quantity="fraction of unmonitored time",
         meaning="fraction of the time that was not monitored",
-        limit_words="`limits.lost_time_fraction`",
+        **_parameter("lost_time_fraction"),
         value=lambda health: health.lost_fraction,
-        limit=lambda of: of.config.limits.lost_time_fraction,
         is_latched=False,
     ),
     AlarmSpec(
         kind="input_torque",
         quantity="fraction of stuck or saturated torque samples",
         meaning="fraction of torque samples that are saturated, or repeat the largest or the smallest",
-        limit_words="`limits.stuck_torque_fraction`",
+        **_parameter("stuck_torque_fraction"),
         value=lambda health: health.stuck_torque_fraction,
-        limit=lambda of: of.config.limits.stuck_torque_fraction,
     ),
 )
 

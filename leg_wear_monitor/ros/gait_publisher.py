@@ -62,11 +62,7 @@ class PublisherConfig(GaitConfig):
     time_scale: float = quantity("", "simulated seconds per second", above=0.0, at_most=1000.0, default=1.0)
     precompute: bool = described("simulate the whole gait before publishing; needs a duration", default=False)
     wait_for_subscribers: int = quantity(
-        "",
-        "number of subscribers of each topic to wait for before the start",
-        at_least=0,
-        at_most=100,
-        default=0,
+        "", "number of subscribers of each topic to wait for before the start", within=(0, 100), default=0
     )
     truth: TruthConfig = described("what is known of the leg", factory=TruthConfig)
 

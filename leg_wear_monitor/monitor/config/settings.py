@@ -74,8 +74,7 @@ class Limits:
     remaining_life_h: float = live_quantity(
         "h",
         "least remaining life of a joint (p10 of its forecast); 0: at its end",
-        at_least=0.0,
-        at_most=1.0e6,
+        within=(0.0, 1.0e6),
         default=0.0,
     )
     torque_mismatch: float = live_quantity(
@@ -88,15 +87,13 @@ class Limits:
     torque_bias_nm: float = live_quantity(
         "N m",
         "constant drive torque outside 0 to drive_torque.max_friction_nm; 0: a tenth of the predicted RMS",
-        at_least=0.0,
-        at_most=1.0e6,
+        within=(0.0, 1.0e6),
         default=0.0,
     )
     torque_drift_nm: float = live_quantity(
         "N m",
         "change of the constant drive torque since this leg was commissioned; 0: 0.15 of the predicted RMS",
-        at_least=0.0,
-        at_most=1.0e6,
+        within=(0.0, 1.0e6),
         default=0.0,
     )
     min_rate_hz: float = live_quantity(
@@ -130,19 +127,14 @@ class Alarms:
     deadband: float = live_quantity(
         "",
         "fraction of a limit by which a value must fall below it before the level falls",
-        at_least=0.0,
-        at_most=0.9,
+        within=(0.0, 0.9),
         default=0.05,
     )
     on_delay_cycles: int = live_quantity(
-        "",
-        "consecutive gait cycles beyond a limit before the level rises",
-        at_least=1,
-        at_most=1000,
-        default=3,
+        "", "consecutive gait cycles beyond a limit before the level rises", within=(1, 1000), default=3
     )
     knock_on_delay_cycles: int = live_quantity(
-        "", "on-delay of the alarms of impact forces", at_least=1, at_most=1000, default=1
+        "", "on-delay of the alarms of impact forces", within=(1, 1000), default=1
     )
 
 
@@ -151,7 +143,7 @@ class Growth:
     """How growth is averaged."""
 
     window_cycles: int = quantity(
-        "", "gait cycles over which growth is averaged", at_least=3, at_most=10000, default=30
+        "", "gait cycles over which growth is averaged", within=(3, 10000), default=30
     )
 
 
@@ -163,8 +155,7 @@ class LedgerFile:
     checkpoint_s: float = quantity(
         "s",
         "longest time between two entries while the leg moves, plus an evaluation period of a quarter cycle",
-        at_least=0.01,
-        at_most=600.0,
+        within=(0.01, 600.0),
         default=5.0,
     )
     skip_counted: bool = described(
@@ -188,7 +179,7 @@ class Diagnostics:
     """What goes to /diagnostics."""
 
     period_s: float = quantity(
-        "s", "time between two messages on /diagnostics", at_least=0.1, at_most=2.0, default=1.0
+        "s", "time between two messages on /diagnostics", within=(0.1, 2.0), default=1.0
     )
 
 
@@ -208,8 +199,7 @@ class TorqueDiagnosis:
     false_alarm_hours: float = quantity(
         "h",
         "mean time of walking between two false findings; longer: changes are found later",
-        at_least=1.0,
-        at_most=1.0e6,
+        within=(1.0, 1.0e6),
         default=240.0,
     )
 
@@ -233,22 +223,19 @@ class MonitorConfig:
     clearances_m: tuple[float, ...] = quantity(
         "m",
         "radial clearances when new, one for all clearance joints or one each; empty: those of the file",
-        at_least=1.0e-6,
-        at_most=0.1,
+        within=(1.0e-6, 0.1),
         default=(),
     )
     wear_coefficients_per_pa: tuple[float, ...] = quantity(
         "1/Pa",
         "K/H of both surfaces, one for all clearance joints or one each; empty: those of the file",
-        at_least=0.0,
-        at_most=1.0e-6,
+        within=(0.0, 1.0e-6),
         default=(),
     )
     wear_acceleration: float = quantity(
         "",
         "factor on all wear; other than 1 for demonstrations only, above 1000 with a warning",
-        at_least=1.0e-9,
-        at_most=1.0e5,
+        within=(1.0e-9, 1.0e5),
         default=1.0,
     )
     crank_joint: str = described("name of the crank in joint_states", default="crank", check=_filled)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterator
 from enum import Enum, IntEnum
 from functools import cache
 from pathlib import Path
-from typing import Any, get_args, get_origin
+from typing import Any, TypeVar, cast, get_args, get_origin
 
 import attrs
 import cattrs
@@ -72,10 +72,12 @@ def unknown_fault(what: str, name: str, known: Collection[str], listed: str) -> 
 MOST = 1.0e30  # in SI units: squares, and ratios to the smallest, stay finite
 
 _Hook = Callable[[Any, Any], Any]
+_T = TypeVar("_T")
+
 _FAULTS = (ClassValidationError, FieldError)
 
 
-def structure(value: Any, kind: Any, source: str, key: str) -> Any:
+def structure(value: Any, kind: type[_T], source: str, key: str) -> _T:
     """Convert the value of a key in a file to the type ``kind``.
 
     Raises
@@ -84,7 +86,7 @@ def structure(value: Any, kind: Any, source: str, key: str) -> Any:
         Naming source, the key at fault, its value and what was expected.
     """
     try:
-        return _part(key, value, kind)
+        return cast(_T, _part(key, value, kind))
     except FieldError as error:
         raise ConfigError(source, error.key, error.fault) from error
 

@@ -89,8 +89,7 @@ def received_state(text: str, source: str) -> LegState:
     version = record.pop("schema_version", None)
     if version != SCHEMA_VERSION:
         raise ConfigError(source, "schema_version", f"{version!r} is not {SCHEMA_VERSION}")
-    state: LegState = structure(record, LegState, source, "")
-    return state
+    return structure(record, LegState, source, "")
 
 
 def _clean(part: Any) -> Any:

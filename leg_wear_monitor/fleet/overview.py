@@ -322,8 +322,7 @@ def overview_of(record: Any, source: str) -> FleetOverview:
         fault = f"{reprlib.repr(version)} is not {SCHEMA_VERSION}, the version that this command reads"
         raise ConfigError(source, "schema_version", f"{fault}; run fleet update again")
     parts = {name: part for name, part in record.items() if name != "schema_version"}
-    overview: FleetOverview = structure(parts, FleetOverview, source, "")
-    return overview
+    return structure(parts, FleetOverview, source, "")
 
 
 # Makes the overview of a fleet from the records of its legs.

@@ -215,8 +215,7 @@ def string(text: str) -> bytes:
     """One message of std_msgs/String."""
     layout = Layout()
     layout.text(text)
-    raw: bytes = layout.messages(1)[0].tobytes()
-    return raw
+    return layout.messages(1).tobytes()
 
 
 def diagnostic_array(
@@ -243,8 +242,7 @@ def diagnostic_array(
         for key, value in values.items():
             layout.text(key)
             layout.text(value)
-    raw: bytes = layout.messages(1)[0].tobytes()
-    return raw
+    return layout.messages(1).tobytes()
 
 
 # Messages of visualization_msgs/MarkerArray, of which only stamps and moving points differ.

@@ -587,5 +587,4 @@ def summary_of(record: Any, source: str) -> ReplaySummary:
         fault = f"{reprlib.repr(version)} is not {SCHEMA_VERSION}, the version that this command reads"
         raise ConfigError(source, "schema_version", f"{fault}; replay the recording again")
     parts = {name: part for name, part in record.items() if name != "schema_version"}
-    summary: ReplaySummary = structure(parts, ReplaySummary, source, "")
-    return summary
+    return structure(parts, ReplaySummary, source, "")

@@ -57,8 +57,7 @@ def load_settings(name: str, path: str | Path | None = None) -> Study:
 
 def parse_settings(name: str, document: Any, source: str) -> Study:
     """Convert the plain mapping of a study's file to typed settings; see `load_settings`."""
-    settings: Study = structure(document, STUDIES[name], source, "")
-    return settings
+    return structure(document, STUDIES[name], source, "")
 
 
 # Checksums that bind a stored result to its origin.

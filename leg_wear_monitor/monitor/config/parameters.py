@@ -131,10 +131,9 @@ def structured(kind: type[_Config], values: Mapping[str, Any], source: str) -> _
             place = place.setdefault(section, {})
         place[last] = list(value) if isinstance(value, tuple) else value
     try:
-        config: _Config = structure(nested, kind, source, "")
+        return structure(nested, kind, source, "")
     except ConfigError as error:
         raise ConfigError(source, error.key, _with_bounds(error, known)) from error
-    return config
 
 
 def values_of(config: Any) -> dict[str, Any]:

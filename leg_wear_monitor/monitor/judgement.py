@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import attrs
 
@@ -213,15 +214,7 @@ def leg_state(parts: Parts, findings: Sequence[Finding], situation: Situation) -
         load=_load(parts.foot_load.load if parts.foot_load else FootLoad(), diagnosis),
         diagnosis=_diagnosis(last, diagnosis, explained),
         alarms=LegAlarms(now=tuple(map(leg_alarm, alarms.values()))),
-        life_answers=answers({joint.joint: joint.forecast for joint in last.joints}, last.forecast)
-        if last
-        else {},
-        first_probability=last.forecast.first_probability
-        if last and last.forecast and Figure.FORECAST not in verdict.not_valid
-        else {},
-        life=life_of({joint.joint: joint.forecast for joint in last.joints}, last.forecast, verdict)
-        if last
-        else {},
+        **(life_of({one.joint: one.forecast for one in last.joints}, last.forecast, verdict) if last else {}),
     )
 
 
@@ -275,18 +268,15 @@ def joint_clearance(
 
 def life_of(
     joints: Mapping[str, JointForecast | None], leg: LegForecast | None, verdict: Verdict
-) -> dict[str, LifeHours | None]:
-    """Remaining life of each joint and of the ``leg`` by their forecasts, as far as it is believed."""
+) -> dict[str, Any]:
+    """Of a `LegState`, the remaining life of each joint and of the ``leg``, as far as it is believed."""
     told: dict[str, JointForecast | LegForecast | None] = {**joints, "leg": leg}
-    if Figure.FORECAST in verdict.not_valid:
-        return dict.fromkeys(told)
-    return {name: life_hours(each.hours) if each else None for name, each in told.items()}
-
-
-def answers(joints: Mapping[str, JointForecast | None], leg: LegForecast | None) -> dict[str, str]:
-    """What their forecasts can say of each joint and of the ``leg``."""
-    told: dict[str, JointForecast | LegForecast | None] = {**joints, "leg": leg}
-    return {name: each.answer.value for name, each in told.items() if each is not None}
+    is_valid = Figure.FORECAST not in verdict.not_valid
+    return {
+        "life": {name: life_hours(each.hours) if each and is_valid else None for name, each in told.items()},
+        "life_answers": {name: each.answer.value for name, each in told.items() if each},
+        "first_probability": leg.first_probability if leg and is_valid else {},
+    }
 
 
 def life_hours(hours: Quantiles | None) -> LifeHours | None:

@@ -161,10 +161,12 @@ def or_nan(value: float | None) -> float:
     return math.nan if value is None else value
 
 
-def with_same_fields(kind: type[_Record], of: object, **own: Any) -> _Record:
-    """A record of the attributes of another object with the same names, and of its own values."""
+def with_same_fields(kind: type[_Record], *of: object, **own: Any) -> _Record:
+    """A record of the attributes of other objects, the first one that has it, and of its own values."""
     names = attrs.fields_dict(kind).keys() - own.keys()
-    return kind(**own, **{name: getattr(of, name) for name in names})
+    return kind(
+        **own, **{name: getattr(next(one for one in of if hasattr(one, name)), name) for name in names}
+    )
 
 
 # Where the files that come with the package are: config/, launch/, bags/.

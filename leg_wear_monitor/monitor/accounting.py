@@ -216,10 +216,9 @@ class Accounting:
         return with_same_fields(
             Lost,
             intake,
+            guard,
             unmonitored_s=self.unmonitored_s,
             already_counted=self.state.skipped,
-            conflicting=guard.conflicting,
-            implausible=guard.implausible,
             outliers=intake.outliers + intake.load_outliers,
             gaps_lost=max(0, intake.lost - pauses.number),
             paused_s=pauses.total_s,

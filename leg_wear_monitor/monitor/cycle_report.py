@@ -44,12 +44,8 @@ def cycle_report(
     return with_same_fields(
         CycleReport,
         torque,
+        statistics,
         cycle=parts.accounting.state.cycles,
-        begin_ns=statistics.begin_ns,
-        stamp_ns=statistics.stamp_ns,
-        cadence_rpm=statistics.cadence_rpm,
-        moving_s=statistics.moving_s,
-        bridged_s=statistics.bridged_s,
         joints=tuple(_joint_report(parts, k, statistics, forecast, seen, diagnosis) for k in joints),
         torque_samples=torque.samples,
         measured_torque_rms_nm=float(torque.measured_rms_nm),
@@ -57,7 +53,6 @@ def cycle_report(
         residual_torque_rms_nm=float(torque.residual_rms_nm),
         torque_mismatch=_mismatch(torque),
         forecast=forecast.leg,
-        is_followed=statistics.is_followed,
     )
 
 

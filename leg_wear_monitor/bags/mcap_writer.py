@@ -4,7 +4,6 @@ import struct
 import zlib
 from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import attrs
@@ -158,9 +157,7 @@ class McapWriter:
     def __enter__(self) -> "McapWriter":
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def channel(self, topic: str, type_name: str, qos: Qos = RELIABLE) -> int:

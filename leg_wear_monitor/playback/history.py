@@ -2,9 +2,8 @@
 
 from array import array
 from collections import deque
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from pathlib import Path
-from types import TracebackType
 
 import numpy as np
 
@@ -178,13 +177,9 @@ class Sink:
     def __enter__(self) -> "Sink":
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if kind is None:
-            self._writer.close()
-            return
-        with suppress(RecordingError):  # report the original error, not one from closing the file
+    def __exit__(self, kind: object, *_: object) -> None:
+        # report the original error, not one from closing the file
+        with suppress(RecordingError) if kind else nullcontext():
             self._writer.close()
 
     def take(self, reports: Reports, stamp_ns: int) -> None:

@@ -161,12 +161,33 @@ def or_nan(value: float | None) -> float:
     return math.nan if value is None else value
 
 
+def number_of(text: str | None) -> float:
+    """The number that a text of a table or a message is; NaN where it is none."""
+    try:
+        return float(text or "nan")
+    except ValueError:
+        return math.nan
+
+
 def with_same_fields(kind: type[_Record], *of: object, **own: Any) -> _Record:
     """A record of the attributes of other objects, the first one that has it, and of its own values."""
     names = attrs.fields_dict(kind).keys() - own.keys()
     return kind(
         **own, **{name: getattr(next(one for one in of if hasattr(one, name)), name) for name in names}
     )
+
+
+Stamp = tuple[int, int, int]
+"""Time [ns], size and inode of a file."""
+
+
+def stamp_of(path: Path) -> Stamp:
+    """What changes when a file is written or replaced; zeros where there is none."""
+    try:
+        stat = path.stat()
+    except OSError:
+        return 0, 0, 0
+    return stat.st_mtime_ns, stat.st_size, stat.st_ino
 
 
 # Where the files that come with the package are: config/, launch/, bags/.

@@ -91,6 +91,19 @@ def structure(value: Any, kind: type[_T], source: str, key: str) -> _T:
         raise ConfigError(source, error.key, error.fault) from error
 
 
+def structure_of_version(
+    record: Any, kind: type[_T], version: int, source: str, again: str, missing: int | None = None
+) -> _T:
+    """Convert an object that a command has written, of one ``schema_version``; ``again`` makes it anew."""
+    record = structure(record, dict[str, Any], source, "")
+    found = record.get("schema_version", missing)
+    if found != version:
+        fault = f"{reprlib.repr(found)} is not {version}, the version that this command reads; {again}"
+        raise ConfigError(source, "schema_version", fault)
+    parts = {name: part for name, part in record.items() if name != "schema_version"}
+    return structure(parts, kind, source, "")
+
+
 def choose(kind: Any, pick: Callable[[Any], tuple[Any, Any]]) -> None:
     """Structure a type as another one: for a value, ``pick`` returns that type and its value."""
 

@@ -80,6 +80,26 @@ class ConfigWarning(UserWarning):
     """A usable setting that is probably a mistake; the command line prints it as one line."""
 
 
+@contextmanager
+def system_asked(
+    source: object, fault: str, key: object = "", error_of: type[ConfigError] = ConfigError
+) -> Iterator[None]:
+    """Within this context, what the system refuses is an error of a file or an option.
+
+    Parameters
+    ----------
+    source, key : object
+        As of ConfigError.
+    fault : str
+        Such as ``cannot be read``; the reason of the system follows.
+    error_of : type of ConfigError
+    """
+    try:
+        yield
+    except OSError as error:
+        raise error_of(str(source), str(key), f"{fault}: {error.strerror}") from error
+
+
 # Optional modules.
 
 

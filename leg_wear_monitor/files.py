@@ -8,13 +8,17 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
 from xml.etree import ElementTree
 
-from leg_wear_monitor.errors import ConfigError, LegWearError
+import attrs
+
+from leg_wear_monitor.errors import ConfigError, LegWearError, system_asked
 
 if TYPE_CHECKING:
     import pandas as pd
+
+_Record = TypeVar("_Record", bound=attrs.AttrsInstance)
 
 
 # Files that are written whole or not at all.
@@ -40,7 +44,7 @@ def write_whole(path: Path, content: bytes) -> None:
     """
     target = path.resolve()
     part = target.with_name(f".{target.name}.part")
-    try:
+    with system_asked(path, "cannot be written"):
         target.parent.mkdir(parents=True, exist_ok=True)
         with _alone(part) as file:
             try:
@@ -52,8 +56,6 @@ def write_whole(path: Path, content: bytes) -> None:
                 with suppress(OSError):  # the first fault is the one to report
                     part.unlink()
                 raise
-    except OSError as error:
-        raise ConfigError(str(path), "", f"cannot be written: {error.strerror}") from error
 
 
 @contextmanager
@@ -157,6 +159,35 @@ def finite_or_none(value: float | None) -> float | None:
 def or_nan(value: float | None) -> float:
     """A number out of JSON or a table, NaN for None."""
     return math.nan if value is None else value
+
+
+def number_of(text: str | None) -> float:
+    """The number that a text of a table or a message is; NaN where it is none."""
+    try:
+        return float(text or "nan")
+    except ValueError:
+        return math.nan
+
+
+def with_same_fields(kind: type[_Record], *of: object, **own: Any) -> _Record:
+    """A record of the attributes of other objects, the first one that has it, and of its own values."""
+    names = attrs.fields_dict(kind).keys() - own.keys()
+    return kind(
+        **own, **{name: getattr(next(one for one in of if hasattr(one, name)), name) for name in names}
+    )
+
+
+Stamp = tuple[int, int, int]
+"""Time [ns], size and inode of a file."""
+
+
+def stamp_of(path: Path) -> Stamp:
+    """What changes when a file is written or replaced; zeros where there is none."""
+    try:
+        stat = path.stat()
+    except OSError:
+        return 0, 0, 0
+    return stat.st_mtime_ns, stat.st_size, stat.st_ino
 
 
 # Where the files that come with the package are: config/, launch/, bags/.

@@ -153,9 +153,8 @@ def deposit_wear(contacts, surfaces, k, ex, ey, angle_b, angle_j, integral, out_
     sector = TURN / n
     turning = math.cos(sector), math.sin(sector)
     towards = math.floor((math.atan2(ey, ex) - angle_b) / sector) % n
-    for beside in range(
-        2 * _BESIDE + 1
-    ):  # on a worn flank the overlap may begin some sectors beside; search order 0, 1, -1, 2, ...
+    # on a worn flank the overlap may begin some sectors beside; search order 0, 1, -1, 2, ...
+    for beside in range(2 * _BESIDE + 1):
         aside = (beside + 1) // 2
         centre = (towards + (aside if beside % 2 == 1 else -aside)) % n
         right, count_right = _weigh_arc(

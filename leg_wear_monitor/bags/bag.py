@@ -30,7 +30,7 @@ from leg_wear_monitor.bags.mcap_file import Due, McapFile, Piece
 from leg_wear_monitor.bags.mcap_layout import ZSTD_MAGIC, Channel, expand_message, expanded
 from leg_wear_monitor.bags.table_file import CSV, PARQUET, TableFile
 from leg_wear_monitor.configuration.strict import events_with_depth
-from leg_wear_monitor.errors import printable
+from leg_wear_monitor.errors import printable, system_asked
 from leg_wear_monitor.messages.streams import Stream, streams_of
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin import TORQUE
@@ -236,10 +236,8 @@ def _directory(path: Path, findings: list[Finding]) -> list[BagFile]:
 
 def _recordings(path: Path, findings: list[Finding]) -> list[str]:
     """Names of the recording files in a directory (recognized by name), ordered by file number."""
-    try:
+    with system_asked(path, "cannot be read", error_of=RecordingError):
         named = sorted((file for file in path.iterdir() if _NAME.fullmatch(file.name)), key=_by_number)
-    except OSError as error:
-        raise RecordingError(str(path), "", f"cannot be read: {error.strerror}") from error
     names = []
     for file in named:
         what = irregular_kind(_mode(file) or 0)

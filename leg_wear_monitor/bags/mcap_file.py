@@ -25,7 +25,7 @@ _BYTES_PER_SEGMENT = 400  # memory of one segment [bytes]
 _LAST_STANDARD_OPCODE, _FIRST_PRIVATE_OPCODE = 0x0F, 0x80  # opcodes between them are not MCAP
 _MOST_DEFINITIONS = 4096  # schemas and channels read from one segment
 # role of each channel: a scan reads definitions and times only
-_ALL_IGNORED = np.full(2**16, mcap_layout.IGNORED, np.uint8)
+_ALL_IGNORED = np.full(2**16, mcap_layout.IGNORED, np.int64)
 
 
 def by_scan(file: IO[bytes], size: int, budget: Budget) -> mcap_layout.Layout:
@@ -242,7 +242,7 @@ class McapFile:
         types : dict
             Stream code by channel number.
         """
-        roles = np.zeros(2**16, np.uint8)
+        roles = np.zeros(2**16, np.int64)
         roles[list(self.channels)] = mcap_layout.IGNORED
         for number, code in types.items():
             roles[number] = code
@@ -250,7 +250,7 @@ class McapFile:
             yield Due(segment.start_ns, partial(self._piece, segment, roles))
         self._report_missing(types, self._read)
 
-    def _piece(self, segment: mcap_layout.Segment, roles: NDArray[np.uint8]) -> Piece | None:
+    def _piece(self, segment: mcap_layout.Segment, roles: NDArray[np.int64]) -> Piece | None:
         """Messages of a segment; None if it is damaged."""
         try:
             data = np.frombuffer(self._verified_content(segment), np.uint8)
@@ -271,7 +271,7 @@ class McapFile:
         return data
 
     def _messages(
-        self, segment: mcap_layout.Segment, data: NDArray[np.uint8], roles: NDArray[np.uint8]
+        self, segment: mcap_layout.Segment, data: NDArray[np.uint8], roles: NDArray[np.int64]
     ) -> NDArray[np.void]:
         """Messages of requested channels in a segment: counted first, then read."""
         counts = np.zeros(1, mcap_layout.COUNTS)

@@ -107,20 +107,13 @@ ATTACHMENT, METADATA_RECORD = 0x09, 0x0C
 RECORD_HEAD = 9  # opcode and length
 _MESSAGE_HEAD = 22  # channel, sequence, log time, publish time
 
-UNKNOWN, IGNORED = 0, 255
+UNKNOWN, IGNORED = 0, -1
 """Roles of a channel beside the codes of streams: not defined in the file, and not asked for."""
 
-COUNTS = np.dtype(
-    [
-        ("wanted", "i8"),
-        ("definitions", "i8"),
-        ("unknown_channel", "i8"),
-        ("foreign", "i8"),
-        ("first_log_time_ns", "i8"),
-        ("last_log_time_ns", "i8"),
-        ("read", "i8"),
-    ]
-)
+_COUNTED = (
+    "wanted", "definitions", "unknown_channel", "foreign", "first_log_time_ns", "last_log_time_ns", "read",
+)  # fmt: skip
+COUNTS = np.dtype([(name, "i8") for name in _COUNTED])
 """What a walk met: messages asked for, schemas and channels, messages of no channel, records of no known
 kind, the range of log times of all messages, and how many bytes hold whole records."""
 
@@ -144,7 +137,7 @@ def walk(data, roles, out_messages, out_definitions, out_counts):
     Parameters
     ----------
     data : (bytes,) array of uint8
-    roles : (65536,) array of uint8
+    roles : (65536,) array of int64
         What a channel's messages are, by its number: `UNKNOWN`, `IGNORED` or a stream's code.
     out_messages : (any,) array of MESSAGE
         Messages asked for, as many as fit; empty to count them only.
@@ -152,9 +145,9 @@ def walk(data, roles, out_messages, out_definitions, out_counts):
         Positions of schemas and channels, as many as fit.
     out_counts : (1,) array of COUNTS
     """
-    at, end = np.int64(0), np.int64(data.shape[0])
-    wanted, definitions, unknown, foreign = np.int64(0), np.int64(0), np.int64(0), np.int64(0)
-    first, last = np.int64(2**63 - 1), np.int64(-1)
+    at, end, counts = np.int64(0), np.int64(data.shape[0]), out_counts[0]
+    counts["wanted"], counts["definitions"], counts["unknown_channel"], counts["foreign"] = 0, 0, 0, 0
+    counts["first_log_time_ns"], counts["last_log_time_ns"] = 2**63 - 1, -1
     while at + RECORD_HEAD <= end:
         opcode, length = data[at], unsigned(data, at + 1, 8)
         body = at + RECORD_HEAD
@@ -162,33 +155,27 @@ def walk(data, roles, out_messages, out_definitions, out_counts):
             break
         if opcode == MESSAGE_RECORD and length >= _MESSAGE_HEAD:
             log_time = unsigned(data, body + 6, 8)
-            first, last = min(first, log_time), max(last, log_time)
+            counts["first_log_time_ns"] = min(counts["first_log_time_ns"], log_time)
+            counts["last_log_time_ns"] = max(counts["last_log_time_ns"], log_time)
             role = roles[unsigned(data, body, 2)]
             if role == UNKNOWN:
-                unknown += 1
+                counts["unknown_channel"] += 1
             elif role != IGNORED:
-                if wanted < out_messages.shape[0]:
-                    out_messages[wanted]["begin"] = body + _MESSAGE_HEAD
-                    out_messages[wanted]["end"] = body + length
-                    out_messages[wanted]["log_time_ns"] = log_time
-                    out_messages[wanted]["publish_time_ns"] = unsigned(data, body + 14, 8)
-                    out_messages[wanted]["type"] = role
-                wanted += 1
+                if counts["wanted"] < out_messages.shape[0]:
+                    message = out_messages[counts["wanted"]]
+                    message["begin"], message["end"] = body + _MESSAGE_HEAD, body + length
+                    message["log_time_ns"], message["type"] = log_time, role
+                    message["publish_time_ns"] = unsigned(data, body + 14, 8)
+                counts["wanted"] += 1
         elif opcode in (SCHEMA, CHANNEL):
-            if definitions < out_definitions.shape[0]:
-                out_definitions[definitions] = at
-            definitions += 1
+            if counts["definitions"] < out_definitions.shape[0]:
+                out_definitions[counts["definitions"]] = at
+            counts["definitions"] += 1
         # rosbag2 writes metadata beside the messages of a file without chunks; private records stand anywhere
         elif opcode not in (ATTACHMENT, METADATA_RECORD) and opcode < 0x80:
-            foreign += 1
+            counts["foreign"] += 1
         at = body + length
-    out_counts[0]["wanted"] = wanted
-    out_counts[0]["definitions"] = definitions
-    out_counts[0]["unknown_channel"] = unknown
-    out_counts[0]["foreign"] = foreign
-    out_counts[0]["first_log_time_ns"] = first
-    out_counts[0]["last_log_time_ns"] = last
-    out_counts[0]["read"] = at
+    counts["read"] = at
 
 
 # Locations of the messages in an MCAP file, from its index; without a sound one, see `mcap_file.by_scan`.

@@ -4,7 +4,6 @@ import struct
 import zlib
 from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import attrs
@@ -17,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.bags.mcap_layout import HEAD, MAGIC
+from leg_wear_monitor.errors import system_asked
 from leg_wear_monitor.messages.qos import RELIABLE, Qos
 from leg_wear_monitor.messages.streams import definition
 
@@ -145,10 +145,8 @@ class McapWriter:
         self._channels: dict[int, Channel] = {}
         self._indexes: list[ChunkIndex] = []
         self._counts: dict[int, int] = {}
-        try:
+        with system_asked(path, "cannot be written", error_of=RecordingError):
             self._file = self.path.open("wb", buffering=0)
-        except OSError as error:
-            raise RecordingError(str(path), "", f"cannot be written: {error.strerror}") from error
         self._at = 0
         try:
             self._write(MAGIC + _written(Header(PROFILE, LIBRARY)))
@@ -159,9 +157,7 @@ class McapWriter:
     def __enter__(self) -> "McapWriter":
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def channel(self, topic: str, type_name: str, qos: Qos = RELIABLE) -> int:

@@ -132,9 +132,8 @@ class _Compact:
 
 
 _ROWS = 65536
-_OF_A_FOOTER = (
-    400  # memory of the parsed footer per byte, at worst: a column of no more than a start has 3 bytes
-)
+# memory of the parsed footer per byte, at worst: a column of no more than a start has 3 bytes
+_OF_A_FOOTER = 400
 _MOST_ROWS = 2**53
 _NO_CHECKSUMS = "has pages without checksums: a damaged number in them would not be detected"
 

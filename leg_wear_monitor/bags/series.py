@@ -3,8 +3,10 @@
 Which of the joints is the crank, and which torque drives it, `commissioning` and `play` then find out.
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack
+from typing import Any
 
 import attrs
 import numpy as np
@@ -87,8 +89,7 @@ class Signals:
 _PUBLISHED = tuple(each.name.lstrip("~") for each in (outputs.CLEARANCES, outputs.IMPACTS, outputs.TORQUE))
 # Interfaces of a joint that are no candidates: three are no torques, and joint_states has the effort, too.
 _NO_CANDIDATES = ("position", "velocity", "acceleration", "effort")
-_MOST_CHANNELS = 250  # numbers of channels have eight bits in `bags.mcap_file`, which itself uses 0 and 255
-_MOST_JOINTS = 200  # of a channel, to bound the work: each joint is decoded by itself
+_MOST_JOINTS = 200  # of a topic, to bound the work: each joint is decoded by itself
 _NAMING_MESSAGES = 20  # first messages of a piece, whose joint names are read
 _NO_JOINT = "(no joint)"  # name of a crank joint that no message has
 
@@ -153,6 +154,10 @@ def read_signals(
                     read += piece.stored
                     progress(min(1.0, read / total))
         findings += unreadable + skipped + [each for source in sources for each in source.file.findings]
+    numbers = Counter(name.topic for name in collected if isinstance(name, JointName) or name.interface)
+    crowded = (topic for topic, number in numbers.items() if number >= _MOST_JOINTS)
+    only = f"only the first {_MOST_JOINTS} of its joints are read"
+    findings += [Finding(bag_files[0].path, f"{topic}: {only}", Severity.NOTE) for topic in crowded]
     return _signals(collected), findings
 
 
@@ -165,7 +170,7 @@ def _select(
     Elsewhere that is the code of the stream. Here several topics may have the same stream, so it is the place
     of topic and stream in the returned list, counted from 1.
     """
-    selected: _Selected = []
+    selected: dict[tuple[str, Stream], int] = {}
     findings: list[Finding] = []
     for source in sources:
         for number, channel in sorted(source.file.channels.items()):
@@ -179,11 +184,8 @@ def _select(
             except RecordingError as error:
                 findings.append(Finding(path, f"{error.key} {error.fault}: it is not read", Severity.NOTE))
                 continue
-            if (channel.topic, stream) not in selected:
-                selected.append((channel.topic, stream))
-            if (index := selected.index((channel.topic, stream))) < _MOST_CHANNELS:
-                source.types[number] = 1 + index
-    return selected, findings
+            source.types[number] = selected.setdefault((channel.topic, stream), 1 + len(selected))
+    return list(selected), findings
 
 
 def _stream(
@@ -298,17 +300,12 @@ def _first_decodable(source: str, data: NDArray[np.uint8], messages: NDArray[np.
 
 def _signals(collected: dict[JointName | TorqueSource, _Parts]) -> Signals:
     """Join the parts of each series that is not empty; time 0 is the first stamp of all series."""
-    full = {name: parts for name, parts in collected.items() if any(len(part[0]) for part in parts)}
-    first_ns = min(
-        (int(part[0].min()) for parts in full.values() for part in parts if len(part[0])), default=0
-    )
-    found = {name: _joined(parts, first_ns) for name, parts in full.items()}
+    full: dict[JointName | TorqueSource, Any] = {}
+    for name, parts in collected.items():
+        if any(len(stamps) for stamps, _, _ in parts):
+            full[name] = [np.concatenate(column) for column in zip(*parts, strict=True)]
+    first_ns = min((int(stamps.min()) for stamps, _, _ in full.values()), default=0)
+    found = {name: series(ns, values, recording, first_ns) for name, (ns, values, recording) in full.items()}
     joints = {name: one for name, one in found.items() if isinstance(name, JointName)}
     torques = {name: one for name, one in found.items() if isinstance(name, TorqueSource)}
     return Signals(joints, torques)
-
-
-def _joined(parts: _Parts, first_ns: int) -> Series:
-    """One series from its parts."""
-    stamps, values, recording = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return series(stamps, values, recording, first_ns)

@@ -6,13 +6,20 @@ import tempfile
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from leg_wear_monitor.errors import ConfigError, ConfigWarning, LegWearError, closed_on_interrupt
+from leg_wear_monitor.errors import (
+    ConfigError,
+    ConfigWarning,
+    LegWearError,
+    closed_on_interrupt,
+    system_asked,
+)
 from leg_wear_monitor.files import write_whole
 
 if TYPE_CHECKING:
@@ -108,6 +115,8 @@ def path_option(name: str, metavar: str, text: str, *, required: bool = False, *
     return option(name, metavar, text, type=kind, required=required)
 
 
+file_option = partial(path_option, dir_okay=False)
+
 mechanism_option: Option = option(
     "--mechanism",
     "FILE",
@@ -127,12 +136,8 @@ config_option: Option = path_option(
     "--config", "FILE", "Parameter file of the node.  [default: the one that comes with the package]"
 )
 
-ledger_option: Option = path_option(
-    "--ledger",
-    "FILE",
-    "Ledger to write into.  [default: the one in the parameters]",
-    dir_okay=False,
-    exists=True,
+ledger_option: Option = file_option(
+    "--ledger", "FILE", "Ledger to write into.  [default: the one in the parameters]", exists=True
 )
 
 node_option: Option = option(
@@ -388,10 +393,6 @@ def write_directory(path: Path, files: Mapping[str, bytes | None]) -> list[Path]
     list of pathlib.Path
         The files written, in the order given.
     """
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError(str(path), "", f"cannot be made: {error.strerror}") from error
     for name, content in files.items():
         if content is None:
             (path / name).unlink(missing_ok=True)
@@ -407,11 +408,8 @@ def _is_stream(path: Path) -> bool:
 
 def _try(option: str, path: Path, directory: Path) -> None:
     """Only writing tells: rights, a read-only file system, and an administrator whom rights do not stop."""
-    try:
-        with tempfile.TemporaryFile(dir=directory):
-            return
-    except OSError as error:
-        raise ConfigError(option, str(path), f"cannot be written: {error.strerror}") from error
+    with system_asked(option, "cannot be written", path), tempfile.TemporaryFile(dir=directory):
+        return
 
 
 def page_of(summary: "ReplaySummary") -> bytes:

@@ -262,9 +262,12 @@ def changes(found: list[Item]) -> dict[str, Any]:
     return {item.name: item.value for item in found if "." in item.name or item.name == "crank_joint"}
 
 
-def _rival(found: Found, name: str) -> dict[str, Any]:
+def _chosen(found: Found, name: str, **own: Any) -> Item:
+    """A choice among candidates, with the best one that differs in it."""
     rival = found.choice.rivals.get(name)
-    return {"other": _value(name, rival), "other_mismatch": rival.candidate.fit.mismatch} if rival else {}
+    if rival:
+        own |= {"other": _value(name, rival), "other_mismatch": rival.candidate.fit.mismatch}
+    return Item(name=name, mismatch=found.fit.mismatch, **own)
 
 
 def _value(name: str, rival: Rival) -> str | int | float:
@@ -279,23 +282,16 @@ def _value(name: str, rival: Rival) -> str | int | float:
 
 
 def _crank(found: Found) -> Iterator[Item]:
-    one, mismatch = found.fit, found.fit.mismatch
-    ratio, is_exact = gear(found)
-    yield Item(
-        name="crank_joint",
-        value=found.best.joint.joint,
-        mismatch=mismatch,
-        remark=f"in {found.best.joint.topic}",
-        **_rival(found, "crank_joint"),
-    )
-    yield Item(name="crank.sign", value=one.direction, mismatch=mismatch, **_rival(found, "crank.sign"))
-    yield Item(
-        name="crank.gear_ratio",
+    one, (ratio, is_exact) = found.fit, gear(found)
+    joint = found.best.joint
+    yield _chosen(found, "crank_joint", value=joint.joint, remark=f"in {joint.topic}")
+    yield _chosen(found, "crank.sign", value=one.direction)
+    yield _chosen(
+        found,
+        "crank.gear_ratio",
         value=ratio,
         sigma=one.gear_ratio * one.sigma["ratio"] / abs(one.ratio),
-        mismatch=mismatch,
         remark=f"measured {one.gear_ratio:.7g}" if is_exact else "not a fraction of small numbers",
-        **_rival(found, "crank.gear_ratio"),
     )
     last = max(one.offset_rad)
     yield Item(
@@ -305,29 +301,18 @@ def _crank(found: Found) -> Iterator[Item]:
         sigma=offset_sigma_rad(found),
         remark="clearances shift the torque's phase"
         + ("" if found.timing.is_lag_separated else ", at one cadence a lag as well"),
-        mismatch=mismatch,
+        mismatch=one.mismatch,
     )
 
 
 def _torque(found: Found) -> Iterator[Item]:
     one, torque = found.fit, found.best.torque
-    yield Item(
-        name="drive_torque.source",
-        value=torque.source,
-        mismatch=one.mismatch,
-        remark=torque.label,
-        **_rival(found, "drive_torque.source"),
-    )
+    yield _chosen(found, "drive_torque.source", value=torque.source, remark=torque.label)
     if torque.source == WRENCH:
         yield Item(name="drive_torque.axis", value=torque.component)
     if torque.source == INTERFACE:
         yield Item(name="drive_torque.interface", value=torque.interface)
-    yield Item(
-        name="drive_torque.sign",
-        value=one.torque_sign,
-        mismatch=one.mismatch,
-        **_rival(found, "drive_torque.sign"),
-    )
+    yield _chosen(found, "drive_torque.sign", value=one.torque_sign)
     scale, turns = _scale(found)
     total = 1.0 / abs(one.gain)
     yield Item(

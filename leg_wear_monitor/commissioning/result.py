@@ -11,7 +11,7 @@ from leg_wear_monitor.bags.findings import Finding
 from leg_wear_monitor.configuration import part_document
 from leg_wear_monitor.errors import LegWearError, printable
 from leg_wear_monitor.files import data_frame, json_text
-from leg_wear_monitor.monitor.config.parameters import MARK, PARAMETERS, values_of
+from leg_wear_monitor.monitor.config.parameters import MARK, PARAMETERS, nested, values_of
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin.torque_reference import TorqueReference
 
@@ -89,20 +89,16 @@ _ALWAYS_WRITTEN = ("mechanism", "crank_joint", "crank.", "drive_torque.", "caden
 def parameter_text(config: MonitorConfig, remarks: Sequence[str]) -> str:
     """Text of a parameter file, with remarks as comments at its head."""
     head = "".join(f"# {printable(line)}\n" for line in (*_HEAD_LINES, *remarks))
-    tree: dict[str, Any] = {}
-    for name, value in values_of(config).items():
-        if value == () or (value == PARAMETERS[name].default and not name.startswith(_ALWAYS_WRITTEN)):
-            continue
-        *sections, last = name.split(".")
-        place = tree
-        for section in sections:
-            place = place.setdefault(section, {})
-        place[last] = list(value) if isinstance(value, tuple) else value
+    written = {
+        name: value
+        for name, value in values_of(config).items()
+        if value != () and (value != PARAMETERS[name].default or name.startswith(_ALWAYS_WRITTEN))
+    }
     stream = StringIO()
     yaml: Any = YAML(typ="safe", pure=True)
     yaml.default_flow_style = False
     yaml.sort_base_mapping_type_on_output = False
-    yaml.dump({"/**": {MARK: tree}}, stream)
+    yaml.dump({"/**": {MARK: nested(written)}}, stream)
     return head + stream.getvalue()
 
 

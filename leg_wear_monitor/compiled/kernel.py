@@ -198,9 +198,8 @@ def store(entry: Any, directory: Path) -> None:
 
             def rebuild(self, context: Any, stored: Any) -> Any:
                 result = super().rebuild(context, stored)
-                result.library._shared_module = (
-                    None  # to be linked with it is an error, not an empty function
-                )
+                # to be linked with it is an error, not an empty function
+                result.library._shared_module = None
                 return result
 
         class Cache(FunctionCache):  # type: ignore[misc]

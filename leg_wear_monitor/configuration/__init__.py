@@ -106,6 +106,7 @@ def quantity(
     above: float | None = None,
     at_least: float | None = None,
     at_most: float | None = None,
+    within: tuple[float, float] | None = None,
     usual: tuple[float, float] | None = None,
     doubt: str | Callable[[float], str] = USUAL,
     default: Any = attrs.NOTHING,
@@ -122,6 +123,8 @@ def quantity(
         What it is, in one line.
     above, at_least, at_most : float, optional
         Bounds, the first exclusive.
+    within : tuple of float, optional
+        Both of `at_least` and `at_most`.
     usual : tuple of float, optional
         Least and most of its size beyond which `doubts` names it.
     doubt : str or callable
@@ -139,6 +142,7 @@ def quantity(
     FieldError
         When an instance is made, with a text such as ``mass: -4.0 is not above 0 kg``.
     """
+    at_least, at_most = within or (at_least, at_most)
 
     def fault(value: Any) -> str | None:
         for number in value if isinstance(value, tuple) else (value,):

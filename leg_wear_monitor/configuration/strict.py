@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterator
 from enum import Enum, IntEnum
 from functools import cache
 from pathlib import Path
-from typing import Any, get_args, get_origin
+from typing import Any, TypeVar, cast, get_args, get_origin
 
 import attrs
 import cattrs
@@ -72,10 +72,12 @@ def unknown_fault(what: str, name: str, known: Collection[str], listed: str) -> 
 MOST = 1.0e30  # in SI units: squares, and ratios to the smallest, stay finite
 
 _Hook = Callable[[Any, Any], Any]
+_T = TypeVar("_T")
+
 _FAULTS = (ClassValidationError, FieldError)
 
 
-def structure(value: Any, kind: Any, source: str, key: str) -> Any:
+def structure(value: Any, kind: type[_T], source: str, key: str) -> _T:
     """Convert the value of a key in a file to the type ``kind``.
 
     Raises
@@ -84,9 +86,22 @@ def structure(value: Any, kind: Any, source: str, key: str) -> Any:
         Naming source, the key at fault, its value and what was expected.
     """
     try:
-        return _part(key, value, kind)
+        return cast(_T, _part(key, value, kind))
     except FieldError as error:
         raise ConfigError(source, error.key, error.fault) from error
+
+
+def structure_of_version(
+    record: Any, kind: type[_T], version: int, source: str, again: str, missing: int | None = None
+) -> _T:
+    """Convert an object that a command has written, of one ``schema_version``; ``again`` makes it anew."""
+    record = structure(record, dict[str, Any], source, "")
+    found = record.get("schema_version", missing)
+    if found != version:
+        fault = f"{reprlib.repr(found)} is not {version}, the version that this command reads; {again}"
+        raise ConfigError(source, "schema_version", fault)
+    parts = {name: part for name, part in record.items() if name != "schema_version"}
+    return structure(parts, kind, source, "")
 
 
 def choose(kind: Any, pick: Callable[[Any], tuple[Any, Any]]) -> None:

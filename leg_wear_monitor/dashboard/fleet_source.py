@@ -11,13 +11,12 @@ from leg_wear_monitor.dashboard.source import (
     SCRIPT,
     Content,
     Freshness,
-    Stamps,
     Words,
     live_settings,
-    stamps_of,
     unreadable,
 )
 from leg_wear_monitor.errors import ConfigError, LegWearError
+from leg_wear_monitor.files import Stamp, stamp_of
 from leg_wear_monitor.fleet.description import fleet_directory, load_fleet
 from leg_wear_monitor.fleet.overview import FILE, FleetOverview, described, load_overview
 from leg_wear_monitor.playback.result import summary_of
@@ -62,8 +61,8 @@ class FleetSource:
     def _read(self) -> FleetOverview:
         return described(load_overview(self._home), load_fleet(self._description))
 
-    def _stamps_now(self) -> Stamps:
-        return stamps_of(self._description, self._home / FILE)
+    def _stamps_now(self) -> tuple[Stamp, Stamp]:
+        return stamp_of(self._description), stamp_of(self._home / FILE)
 
     def renew(self) -> bool:
         """Read description and overview again if one of them has changed."""
@@ -100,7 +99,7 @@ class FleetSource:
         """Since when the fleet was not updated."""
         if self._fault:
             return unreadable(self._fault, OLD_AFTER_S)
-        _, (written_ns, _) = self._stamps
+        _, (written_ns, *_) = self._stamps
         age_s = max(0.0, self._clock() - 1.0e-9 * written_ns)
         return Freshness(age_s, "the fleet was not updated; run leg-wear-monitor fleet update", OLD_AFTER_S)
 

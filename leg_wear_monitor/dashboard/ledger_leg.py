@@ -9,15 +9,14 @@ from leg_wear_monitor.dashboard.source import (
     NO_VERDICT,
     Content,
     Freshness,
-    Stamps,
     leg_content,
     leg_setup,
-    stamps_of,
     unreadable,
     view_of,
     words_of,
 )
 from leg_wear_monitor.errors import printable
+from leg_wear_monitor.files import stamp_of
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarm_specs import with_its_unit
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -70,7 +69,7 @@ class LedgerLeg:
     ) -> None:
         self._path, self._clock = path, clock
         self._setup, self._binding = leg_setup(config, mechanism), binding_of(mechanism, config)
-        self._read_stamps: Stamps = ()
+        self._read_stamp = 0, 0, 0
         self._failures = 0
         self._fault = ""
         self._content: LedgerContent | None = None
@@ -81,28 +80,24 @@ class LedgerLeg:
 
     def renew(self) -> bool:
         """Read the ledger if it has changed; whether there is something else to show."""
-        return self._stamps() != self._read_stamps and (self._read() or self._failures == _TRIES)
+        return stamp_of(self._path) != self._read_stamp and (self._read() or self._failures == _TRIES)
 
     def _read(self) -> bool:
-        stamps = self._stamps()
+        stamp = stamp_of(self._path)
         try:
             self._content = read_ledger(self._path, self._binding)
         except LedgerError as error:
             self._failures += 1
             self._fault = str(error)
             return False
-        self._failures, self._fault, self._read_stamps = 0, "", stamps
+        self._failures, self._fault, self._read_stamp = 0, "", stamp
         return True
-
-    def _stamps(self) -> Stamps:
-        return stamps_of(self._path)
 
     def freshness(self) -> Freshness:
         """Since when nothing was written."""
         if self._failures >= _TRIES:
             return unreadable(self._fault, OLD_AFTER_S)
-        written_ns = max(time_ns for time_ns, _ in self._read_stamps)
-        return Freshness(max(0.0, self._clock() - 1.0e-9 * written_ns), _SILENCE, OLD_AFTER_S)
+        return Freshness(max(0.0, self._clock() - 1.0e-9 * self._read_stamp[0]), _SILENCE, OLD_AFTER_S)
 
     def content(self) -> Content:
         """The page."""

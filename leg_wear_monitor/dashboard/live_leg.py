@@ -24,7 +24,7 @@ from leg_wear_monitor.dashboard.source import (
     words_of,
 )
 from leg_wear_monitor.errors import ConfigError, printable
-from leg_wear_monitor.files import finite_or_none, or_nan, received_json
+from leg_wear_monitor.files import finite_or_none, number_of, or_nan, received_json
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, SEEN_COLUMNS, SUMMARY_COLUMNS
 from leg_wear_monitor.playback.result import ReplayHistory, ReplayStatus, ReplaySummary
@@ -49,7 +49,7 @@ def received_status(name: str, level: int, message: str, values: Mapping[str, st
         name=printable(name),
         level=Level(min(max(level, Level.OK), Level.ERROR)),
         message=printable(message),
-        values={printable(key): _number(value) for key, value in first if key != _CODE},
+        values={printable(key): number_of(value) for key, value in first if key != _CODE},
         fault_code=printable(values.get(_CODE, "")),
     )
 
@@ -61,13 +61,6 @@ def own_statuses(node: str, statuses: Iterable[ReplayStatus]) -> dict[str, Repla
         name = status.name.removeprefix(prefix)
         own[name] = attrs.evolve(status, name=name)
     return own
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
 
 
 def received_state(text: str, source: str) -> LegState:
@@ -89,8 +82,7 @@ def received_state(text: str, source: str) -> LegState:
     version = record.pop("schema_version", None)
     if version != SCHEMA_VERSION:
         raise ConfigError(source, "schema_version", f"{version!r} is not {SCHEMA_VERSION}")
-    state: LegState = structure(record, LegState, source, "")
-    return state
+    return structure(record, LegState, source, "")
 
 
 def _clean(part: Any) -> Any:

@@ -5,6 +5,8 @@ import threading
 from collections import deque
 from collections.abc import Mapping
 
+import attrs
+
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.reach import reach_of
 from leg_wear_monitor.mechanism.spec import Mechanism
@@ -39,10 +41,7 @@ class MotionFeed:
             for joint, motion in frame.joints.items()
             if joint in clearances
         }
-        torque = frame.torque and {
-            "measured_nm": frame.torque.measured_nm,
-            "predicted_nm": frame.torque.predicted_nm,
-        }
+        torque = frame.torque and attrs.asdict(frame.torque)
         shown = {"angle": round(57.29577951 * frame.crank_angle_rad, 1), "joints": joints, "torque": torque}
         with self._lock:
             self._number += 1

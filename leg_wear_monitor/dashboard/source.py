@@ -3,7 +3,6 @@
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Protocol
 
 import attrs
@@ -302,23 +301,6 @@ class Freshness:
 def unreadable(fault: str, old_after_s: float) -> Freshness:
     """Freshness of what cannot be read any more, for a reason in words."""
     return Freshness(None, f"NOT READABLE: {printable(fault)}; what is shown is old", old_after_s)
-
-
-Stamps = tuple[tuple[int, int], ...]
-"""Time [ns] and size of files."""
-
-
-def stamps_of(*paths: Path) -> Stamps:
-    """What changes when one of the files is written; zeros for a file that is not there."""
-    return tuple(map(_stamp, paths))
-
-
-def _stamp(path: Path) -> tuple[int, int]:
-    try:
-        stat = path.stat()
-    except OSError:
-        return 0, 0
-    return stat.st_mtime_ns, stat.st_size
 
 
 @attrs.frozen(kw_only=True)

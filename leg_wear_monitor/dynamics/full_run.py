@@ -246,9 +246,8 @@ def advance_full(model, surfaces, state, polynomial, t_end, toe, statistics, wor
 # The full-coordinate formulation as a `Run`.
 
 
-TOLERANCE_M = (
-    1.0e-10  # local error of a step in every coordinate [m, rad]; the energy residual is 1e-3 of the losses
-)
+# local error of a step in every coordinate [m, rad]; the energy residual is 1e-3 of the losses
+TOLERANCE_M = 1.0e-10
 TOLERANCE_RATE = 1.0e4  # 1/s: ratio of the velocities' tolerance to it, the reciprocal duration of a contact
 
 

@@ -223,6 +223,12 @@ def _joint(setup: Setup, statistics: RunStatistics, joint: int, worn: Floats, cy
     )
 
 
+_OF_A_LOAD = (
+    "mean_pressure_pa", "p99_pressure_pa", "mean_sliding_speed_mps", "mean_pressure_speed_pa_mps",
+    "outside_limits",
+)  # fmt: skip
+
+
 def _loaded(forces: JointResult, setup: Setup, k: int, rubbing_w: float) -> JointResult:
     """Pressure and sliding speed of clearance joint k; ``rubbing_w`` is the mean of F_N |v_t| [W]."""
     load = bushing_of(setup.linkage.mechanism, setup.clearance_joints[k]).load(
@@ -231,11 +237,7 @@ def _loaded(forces: JointResult, setup: Setup, k: int, rubbing_w: float) -> Join
     psi, doubt = _contact(setup, k, forces.p99_force_n)
     return attrs.evolve(
         forces,
-        mean_pressure_pa=load.mean_pressure_pa,
-        p99_pressure_pa=load.p99_pressure_pa,
-        mean_sliding_speed_mps=load.mean_sliding_speed_mps,
-        mean_pressure_speed_pa_mps=load.mean_pressure_speed_pa_mps,
-        outside_limits=load.outside_limits,
+        **{name: getattr(load, name) for name in _OF_A_LOAD},
         holds_for=regime_of(setup.linkage.mechanism.clearances[setup.clearance_joints[k]]),
         contact_half_angle_deg=math.degrees(psi),
         outside_contact_law=doubt,

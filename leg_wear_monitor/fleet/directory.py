@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.errors import ConfigError, LegWearError, printable
+from leg_wear_monitor.errors import ConfigError, LegWearError, printable, system_asked
 from leg_wear_monitor.files import remove_parts, write_whole
 from leg_wear_monitor.monitor.ledger.file import last_changes_of, measurements_of
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS, History
@@ -23,21 +23,7 @@ if TYPE_CHECKING:
     from leg_wear_monitor.playback.summary import ReplayResult
 
 
-# Directories of a fleet, and lines of its files, which are written whole or not at all.
-
-
-def make_directory(path: Path) -> None:
-    """Make a directory if it does not exist.
-
-    Raises
-    ------
-    ConfigError
-        If the disk does not take it.
-    """
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError(str(path), "", f"cannot be made: {error.strerror}") from error
+# Lines of the files of a fleet, which are written whole or not at all.
 
 
 def append_line(path: Path, line: str) -> None:
@@ -48,15 +34,13 @@ def append_line(path: Path, line: str) -> None:
     ConfigError
         If the disk does not take it.
     """
-    try:
+    with system_asked(path, "cannot be written"):
         path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("a+b") as file:
             file.truncate(_whole_bytes(path))
             file.write(line.encode() + b"\n")
             file.flush()
             os.fsync(file.fileno())
-    except OSError as error:
-        raise ConfigError(str(path), "", f"cannot be written: {error.strerror}") from error
 
 
 def _whole_bytes(path: Path) -> int:
@@ -230,10 +214,8 @@ def json_object(path: Path) -> Line:
     ConfigError
         If it cannot be read, or is none.
     """
-    try:
+    with system_asked(path, "cannot be read"):
         return _object(path.read_bytes(), str(path))
-    except OSError as error:
-        raise ConfigError(str(path), "", f"cannot be read: {error.strerror}") from error
 
 
 def _object(content: bytes, source: str) -> Line:
@@ -265,11 +247,9 @@ def locked(out: Path, *, waits: bool = False) -> Iterator[None]:
     ConfigError
         If another process updates it, or it cannot be written to.
     """
-    try:
+    with system_asked(out, "cannot be written"):
         out.mkdir(parents=True, exist_ok=True)
         file = (out / ".lock").open("ab")
-    except OSError as error:
-        raise ConfigError(str(out), "", f"cannot be written: {error.strerror}") from error
     with file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | (0 if waits else fcntl.LOCK_NB))

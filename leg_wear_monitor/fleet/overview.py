@@ -2,7 +2,6 @@
 
 import json
 import math
-import reprlib
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any
 import attrs
 
 from leg_wear_monitor.configuration import part_document
-from leg_wear_monitor.configuration.strict import structure
+from leg_wear_monitor.configuration.strict import structure, structure_of_version
 from leg_wear_monitor.errors import ConfigError, printable
 from leg_wear_monitor.files import json_text, write_whole
 from leg_wear_monitor.fleet.description import FleetDescription, FleetLeg
@@ -316,14 +315,7 @@ def load_overview(path: str | Path) -> FleetOverview:
 
 def overview_of(record: Any, source: str) -> FleetOverview:
     """The overview of a plain object, as `FleetOverview.to_dict` gives it."""
-    record = structure(record, dict[str, Any], source, "")
-    version = record.get("schema_version")
-    if version != SCHEMA_VERSION:
-        fault = f"{reprlib.repr(version)} is not {SCHEMA_VERSION}, the version that this command reads"
-        raise ConfigError(source, "schema_version", f"{fault}; run fleet update again")
-    parts = {name: part for name, part in record.items() if name != "schema_version"}
-    overview: FleetOverview = structure(parts, FleetOverview, source, "")
-    return overview
+    return structure_of_version(record, FleetOverview, SCHEMA_VERSION, source, "run fleet update again")
 
 
 # Makes the overview of a fleet from the records of its legs.

@@ -34,7 +34,7 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     LearnedPriors,
     nominal_per_pa,
 )
-from leg_wear_monitor.monitor.judgement import answers, joint_clearance, leg_alarm, life_of, with_measured
+from leg_wear_monitor.monitor.judgement import joint_clearance, leg_alarm, life_of, with_measured
 from leg_wear_monitor.monitor.ledger.entry import Entry, JointWear, Measurement
 from leg_wear_monitor.monitor.ledger.file import copy_of, measurements_of
 from leg_wear_monitor.monitor.ledger.ledger import Ledger, open_ledger
@@ -307,7 +307,7 @@ def _renew(leg: FleetLeg, directory: LegDirectory) -> None:
         for joint, one in measured
         if joint in before
     }
-    life = life_of(forecasts, told.leg, verdict)
+    lives = life_of(forecasts, told.leg, verdict)
     summary = summary_of(json_object(directory.summary), str(directory.summary))
     summary = attrs.evolve(
         summary,
@@ -321,9 +321,7 @@ def _renew(leg: FleetLeg, directory: LegDirectory) -> None:
             for joint, one in summary.joints.items()
         },
         clearances=clearances,
-        life=life,
-        life_answers=answers(forecasts, told.leg),
-        first_probability={} if Figure.FORECAST in verdict.not_valid else told.leg.first_probability,
+        **lives,
         forecast=leg_forecast(told.leg, verdict),
         measurements=forecaster.measurements,
         alarms=attrs.evolve(summary.alarms, now=_alarms(entry, summary.alarms.now)),
@@ -331,7 +329,7 @@ def _renew(leg: FleetLeg, directory: LegDirectory) -> None:
         status=_status(summary.status, verdict, mechanism.clearance_joints, new_parts),
     )
     write_whole(directory.summary, summary.to_json().encode())
-    found = {"verdict": verdict, "clearances": clearances, "life": life, "knows": knows}
+    found = {"verdict": verdict, "clearances": clearances, "life": lives["life"], "knows": knows}
     directory.renew({**line, **part_document(found)})
 
 

@@ -22,7 +22,6 @@ from leg_wear_monitor.fleet.directory import (
     LegDirectory,
     arrow,
     locked,
-    make_directory,
     read_tables,
     table_of,
     write_table,
@@ -388,7 +387,6 @@ class Fleet:
         out : str or pathlib.Path
             Directory; created if it does not exist.
         """
-        make_directory(Path(out))
         files = []
         for name in TABLES:
             table = self.table(name)

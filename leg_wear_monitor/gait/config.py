@@ -1,6 +1,8 @@
 """Every parameter of the synthetic leg: default, unit, bounds and meaning, declared once."""
 
+from functools import partial
 from itertools import pairwise
+from typing import Any
 
 import attrs
 
@@ -17,9 +19,12 @@ AVERAGE, INSTANT = SAMPLINGS = ("average", "instant")
 TEMPLATE, TREADMILL = GROUND_SHAPES = ("template", "treadmill")
 
 
-def _fraction(doc: str) -> float:
-    fraction: float = quantity("", doc, at_least=0.0, at_most=1.0, default=0.0)
-    return fraction
+def _not_negative(unit: str, doc: str, default: Any = 0.0, at_most: float | None = None) -> Any:
+    return quantity(unit, doc, at_least=0.0, at_most=at_most, default=default)
+
+
+_fraction = partial(_not_negative, "", at_most=1.0)
+_shift = partial(quantity, "", at_least=-0.3, at_most=0.3, default=0.0)
 
 
 def _at_most_four(names: tuple[str, ...]) -> str | None:
@@ -45,9 +50,7 @@ class PaceConfig:
         default=(60.0,),
     )
     ramp_s: float = quantity("s", "duration of a change of speed", above=0.0, default=0.5)
-    ripple: float = quantity(
-        "", "speed ripple, as a fraction of the speed", at_least=0.0, at_most=0.9, default=0.0
-    )
+    ripple: float = _fraction("speed ripple, as a fraction of the speed", at_most=0.9)
     ripple_per_turn: float = quantity("", "waves of the ripple in a turn", above=0.0, default=2.0)
 
     def __attrs_post_init__(self) -> None:
@@ -63,17 +66,13 @@ class EncoderConfig:
     """The crank's encoder."""
 
     rate_hz: float = quantity("Hz", "messages a second", above=0.0, at_most=10000.0, default=200.0)
-    noise_rad: float = quantity("rad", "noise of the angle, standard deviation", at_least=0.0, default=1.0e-3)
-    velocity_noise_radps: float = quantity(
-        "rad/s", "noise of the velocity, standard deviation", at_least=0.0, default=0.05
-    )
-    counts_per_turn: float = quantity(
-        "", "steps of the angle in a turn, 0 for none", at_least=0.0, default=16384.0
-    )
+    noise_rad: float = _not_negative("rad", "noise of the angle, standard deviation", 1.0e-3)
+    velocity_noise_radps: float = _not_negative("rad/s", "noise of the velocity, standard deviation", 0.05)
+    counts_per_turn: float = _not_negative("", "steps of the angle in a turn, 0 for none", 16384.0)
     offset_rad: float = quantity("rad", "reading at crank angle 0", default=0.0)
     wrapped: bool = described("wrap the angle to a turn; otherwise it is continuous", default=False)
-    restarts_s: tuple[float, ...] = quantity(
-        "s", "times at which the encoder starts anew at 0; none if empty", at_least=0.0, default=()
+    restarts_s: tuple[float, ...] = _not_negative(
+        "s", "times at which the encoder starts anew at 0; none if empty", ()
     )
 
 
@@ -89,9 +88,7 @@ class JointEncodersConfig:
     joints: tuple[str, ...] = described(
         "revolute joint of each encoder; the angle is from the bushing's body to the journal's", default=()
     )
-    noise_rad: float = quantity(
-        "rad", "noise of the angles, standard deviation", at_least=0.0, default=1.0e-4
-    )
+    noise_rad: float = _not_negative("rad", "noise of the angles, standard deviation", 1.0e-4)
     offsets_rad: tuple[float, ...] = quantity("rad", "offset of each reading; 0 if empty", default=())
     scale_errors: tuple[float, ...] = quantity("", "relative scale error of each; 0 if empty", default=())
 
@@ -118,8 +115,8 @@ class TorqueSensorConfig:
         "what a reading is: the average since the one before, or the torque at its instant",
         default=AVERAGE,
     )
-    noise_nm: float = quantity("N m", "noise, standard deviation", at_least=0.0, default=0.05)
-    resolution_nm: float = quantity("N m", "step of the reading, 0 for none", at_least=0.0, default=0.01)
+    noise_nm: float = _not_negative("N m", "noise, standard deviation", 0.05)
+    resolution_nm: float = _not_negative("N m", "step of the reading, 0 for none", 0.01)
     offset_nm: float = quantity("N m", "reading without torque", default=0.0)
 
 
@@ -133,16 +130,12 @@ class FootLoadSensorConfig:
         default=NO_LOAD,
     )
     rate_hz: float = quantity("Hz", "messages a second", above=0.0, at_most=10000.0, default=200.0)
-    noise_n: float = quantity("N", "noise of each component, standard deviation", at_least=0.0, default=1.0)
+    noise_n: float = _not_negative("N", "noise of each component, standard deviation", 1.0)
     scale: float = quantity("", "reading over force; negative: its sign is reversed", default=1.0)
     zero_n: float = quantity("N", "vertical reading without force", default=0.0)
     zero_drift_n_per_s: float = quantity("N/s", "growth of that", default=0.0)
-    stuck_from_s: float = quantity(
-        "s", "time from which the reading stays; 0: never", at_least=0.0, default=0.0
-    )
-    silent_from_s: float = quantity(
-        "s", "time from which no message comes; 0: never", at_least=0.0, default=0.0
-    )
+    stuck_from_s: float = _not_negative("s", "time from which the reading stays; 0: never")
+    silent_from_s: float = _not_negative("s", "time from which no message comes; 0: never")
     is_swapped: bool = described("read the foot of the other leg, half a turn later", default=False)
 
 
@@ -150,49 +143,30 @@ class FootLoadSensorConfig:
 class TransportConfig:
     """Faults of the messages between a sensor and the monitor."""
 
-    jitter_s: float = quantity(
-        "s", "jitter of the sampling time, standard deviation", at_least=0.0, default=1.0e-4
-    )
+    jitter_s: float = _not_negative("s", "jitter of the sampling time, standard deviation", 1.0e-4)
     drop_fraction: float = _fraction("fraction of messages that are lost")
     duplicate_fraction: float = _fraction("fraction of messages that arrive twice")
     late_fraction: float = _fraction("fraction of messages that arrive late, after newer ones")
-    late_s: float = quantity("s", "delay of late messages", at_least=0.0, default=0.02)
+    late_s: float = _not_negative("s", "delay of late messages", 0.02)
     fault_fraction: float = _fraction("fraction of messages that are malformed, each fault in turn")
-    gaps_s: tuple[float, ...] = quantity(
-        "s", "start times of gaps without messages", at_least=0.0, default=()
-    )
-    gap_s: float = quantity("s", "length of a gap", at_least=0.0, default=0.5)
+    gaps_s: tuple[float, ...] = _not_negative("s", "start times of gaps without messages", ())
+    gap_s: float = _not_negative("s", "length of a gap", 0.5)
 
 
 @attrs.frozen(kw_only=True)
 class LoadConfig:
     """Loads and friction of which the monitor has no message: it has to find them from the torque."""
 
-    toe_force_n: float = quantity(
-        "N", "upward force of the ground on the toe while it moves backwards", at_least=0.0, default=0.0
+    toe_force_n: float = _not_negative("N", "upward force of the ground on the toe while it moves backwards")
+    friction_nm: float = _not_negative("N m", "friction of the drive, against its motion")
+    person_kg: float = _not_negative(
+        "kg", "mass of a person one of whose legs hangs on thigh, shank and foot", at_most=300.0
     )
-    friction_nm: float = quantity(
-        "N m", "friction of the drive, against its motion", at_least=0.0, default=0.0
+    ground_n: float = _not_negative(
+        "N", "largest vertical force of the ground on the toe in stance, mean over steps; 0 in the air"
     )
-    person_kg: float = quantity(
-        "kg",
-        "mass of a person one of whose legs hangs on thigh, shank and foot",
-        at_least=0.0,
-        at_most=300.0,
-        default=0.0,
-    )
-    ground_n: float = quantity(
-        "N",
-        "largest vertical force of the ground on the toe in stance, mean over steps; 0 in the air",
-        at_least=0.0,
-        default=0.0,
-    )
-    fore_aft: float = quantity(
-        "",
-        "largest fore-aft force of the ground, over the largest vertical one",
-        at_least=0.0,
-        at_most=1.0,
-        default=FORE_AFT,
+    fore_aft: float = _fraction(
+        "largest fore-aft force of the ground, over the largest vertical one", FORE_AFT
     )
     shape: str = choice(
         GROUND_SHAPES,
@@ -207,36 +181,18 @@ class LoadConfig:
     fore_aft_waves: tuple[float, ...] = quantity(
         "", "another fore-aft shape, likewise; it brakes where it is positive", default=()
     )
-    heel_strike_shift: float = quantity(
-        "",
-        "delay of the heel strike from the nominal one by the toe's motion, in gait cycles",
-        at_least=-0.3,
-        at_most=0.3,
-        default=0.0,
+    heel_strike_shift: float = _shift(
+        "delay of the heel strike from the nominal one by the toe's motion, in gait cycles"
     )
-    toe_off_shift: float = quantity(
-        "", "delay of the toe-off, likewise", at_least=-0.3, at_most=0.3, default=0.0
+    toe_off_shift: float = _shift("delay of the toe-off, likewise")
+    amplitude_scatter: float = _fraction(
+        "standard deviation of the ground's force from step to step, over its mean", 0.1, at_most=0.3
     )
-    amplitude_scatter: float = quantity(
-        "",
-        "standard deviation of the ground's force from step to step, over its mean",
-        at_least=0.0,
-        at_most=0.3,
-        default=0.1,
+    timing_scatter: float = _fraction(
+        "standard deviation of the stance's time from step to step, in gait cycles", 0.02, at_most=0.1
     )
-    timing_scatter: float = quantity(
-        "",
-        "standard deviation of the stance's time from step to step, in gait cycles",
-        at_least=0.0,
-        at_most=0.1,
-        default=0.02,
-    )
-    heel_strike_transient: float = quantity(
-        "",
-        "peak of 20 ms that the heel strike adds to the vertical force, over its largest value",
-        at_least=0.0,
-        at_most=3.0,
-        default=0.0,
+    heel_strike_transient: float = _fraction(
+        "peak of 20 ms that the heel strike adds to the vertical force, over its largest value", at_most=3.0
     )
 
 
@@ -245,7 +201,7 @@ class KnockConfig:
     """A bushing that breaks: the joint's clearance is another one from an instant on."""
 
     joint: str = described("the clearance joint, none if empty", default="")
-    at_s: float = quantity("s", "when", at_least=0.0, default=5.0)
+    at_s: float = _not_negative("s", "when", 5.0)
     clearance_m: float = quantity("m", "radial clearance after the break", above=0.0, default=1.0e-3)
 
 
@@ -257,14 +213,14 @@ class GaitConfig:
         "mechanism file, or the name of one that comes with the package", default="bionic_leg"
     )
     seed: int = quantity("", "seed of all noise; equal seeds give equal data", at_least=0, default=0)
-    duration_s: float = quantity("s", "duration of the gait, 0 for no end", at_least=0.0, default=0.0)
+    duration_s: float = _not_negative("s", "duration of the gait, 0 for no end")
     clearance_joints: tuple[str, ...] = described(
         "clearance joints; the mechanism's own if empty", default=()
     )
     clearances_m: tuple[float, ...] = quantity(
         "m", "radial clearances of the clearance joints; the mechanism's own if empty", above=0.0, default=()
     )
-    wear_acceleration: float = quantity("", "factor on all wear coefficients", at_least=0.0, default=1.0)
+    wear_acceleration: float = _not_negative("", "factor on all wear coefficients", 1.0)
     pace: PaceConfig = described("how the crank turns", factory=PaceConfig)
     encoder: EncoderConfig = described("the crank's encoder", factory=EncoderConfig)
     joint_encoders: JointEncodersConfig = described("encoders on further joints", factory=JointEncodersConfig)

@@ -14,6 +14,7 @@ the chosen bushings does not.
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -367,17 +368,15 @@ class BushingChoices:
             # a wear coefficient that stood beside the present pair is not that of another one
             pair: dict[str, Any] = settings_of(load_material(name))
             known: dict[str, Any] = {key: tuple(value) for key, value in pair.items() if key in _OF_A_PAIR}
-            for diameter in self.diameters_m:
-                for width in self.widths_m:
-                    for clearance in self.clearances_m:
-                        yield attrs.evolve(
-                            own,
-                            material=name,
-                            bushing_radius=0.5 * diameter,
-                            width=width,
-                            radial_clearance=clearance,
-                            **known,
-                        )
+            for diameter, width, clearance in product(self.diameters_m, self.widths_m, self.clearances_m):
+                yield attrs.evolve(
+                    own,
+                    material=name,
+                    bushing_radius=0.5 * diameter,
+                    width=width,
+                    radial_clearance=clearance,
+                    **known,
+                )
 
 
 def design(
@@ -439,8 +438,8 @@ def design(
     for k, bushing in enumerate(own):
         now = candidate(mechanism, loads, k, bushing, limit_m)
         found.append(now)
-        present = BushingChoices(
-            materials=choices.materials,
+        present = attrs.evolve(
+            choices,
             diameters_m=(2.0 * bushing.bushing_radius,),
             widths_m=(bushing.width,),
             clearances_m=(bushing.radial_clearance,),

@@ -31,7 +31,7 @@ class DutyPart:
     """Hours a day at one load and cadence, as a duty file has it."""
 
     load_n: float = quantity(
-        "N", "largest vertical force of the ground on the toe, 0 in the air", at_least=0.0, at_most=1.0e4
+        "N", "largest vertical force of the ground on the toe, 0 in the air", within=(0.0, 1.0e4)
     )
     hours_per_day: float = quantity("h", "hours a day", above=0.0, at_most=24.0)
     speed_rpm: float | None = quantity(

@@ -118,8 +118,7 @@ class LifeSettings:
     perturb_fraction: float = quantity(
         "",
         "journals start up to this fraction of the smallest clearance from the centre",
-        at_least=0.0,
-        at_most=1.0,
+        within=(0.0, 1.0),
         default=0.5,
     )
     jump: JumpControl = described("how far a jump may go", factory=JumpControl)

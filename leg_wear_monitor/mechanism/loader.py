@@ -196,13 +196,12 @@ def _settings(defaults: dict[str, Any], own: Any, source: str, name: str) -> Cle
             merged = _over(merged, of_pair)
         merged = _over(merged, given)
     try:
-        settings: Clearance = structure(merged, Clearance, source, "")
+        return structure(merged, Clearance, source, "")
     except ConfigError as error:
         key = error.key.split(".")[0]
         if key in defaults and key not in own:
             place = "clearances.defaults"
         raise ConfigError(source, f"{place}.{error.key}", error.fault) from error
-    return settings
 
 
 def _of_pair(given: dict[str, Any], source: str, place: str) -> dict[str, Any]:
@@ -314,7 +313,7 @@ def load_mechanism(name_or_path: str | Path = "bionic_leg") -> spec.Mechanism:
 
 def parse_mechanism(document: Any, source: str) -> spec.Mechanism:
     """A mechanism from the contents of a YAML file, a plain mapping; see `load_mechanism`."""
-    file = structure(document, _File, source, "")
+    file: Any = structure(document, _File, source, "")
     values = {key: getattr(file, key) for key in _KEYS}
     values["clearances"], values["clearance_joints"] = clearance_joints(file.clearances, file.joints, source)
     mechanism = spec.Mechanism(**values, source=source)

@@ -12,6 +12,7 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.errors import ConfigError, ConfigWarning
+from leg_wear_monitor.files import number_of
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN, Linkage, build_linkage, one_cycle, point_motion
 from leg_wear_monitor.mechanism.spec import GROUND, Body, Mechanism, PhaseLoad, TrackDrive, Vector
@@ -252,17 +253,10 @@ def _column(path: Path, rows: Sequence[Mapping[str, str]], name: str) -> Floats:
         if name == _OF_FORCE[-1]:
             return np.zeros(len(rows))
         raise ConfigError(str(path), name, f"there is no such column, the file has {', '.join(rows[0])}")
-    found = np.array([_number(row[name]) for row in rows], float)
+    found = np.array([number_of(row[name]) for row in rows], float)
     for i in np.flatnonzero(~np.isfinite(found)).tolist():
         raise ConfigError(str(path), name, f"row {i + 1}: {rows[i][name]!r} is not a finite number")
     return found
-
-
-def _number(text: str | None) -> float:
-    try:
-        return float(text or "nan")
-    except ValueError:
-        return math.nan
 
 
 def upwards(mechanism: Mechanism) -> Floats:

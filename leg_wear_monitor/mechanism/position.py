@@ -513,23 +513,14 @@ def rotated(vector: ArrayLike, angle: ArrayLike) -> Floats:
 # The ideal mechanism at crank angle 0 as places in its plane, for pictures.
 
 
-@attrs.frozen(eq=False)
-class Outline:
-    """Shapes and places [m].
+def outline_of(mechanism: Mechanism) -> tuple[dict[str, Floats], dict[str, Floats]]:
+    """Outline of a mechanism [m].
 
-    Attributes
-    ----------
+    Returns
+    -------
     bodies : dict of str to (n, 2) array
         Corners of each moving body.
     joints : dict of str to (2,) array
-    """
-
-    bodies: dict[str, Floats]
-    joints: dict[str, Floats]
-
-
-def outline_of(mechanism: Mechanism) -> Outline:
-    """Outline of a mechanism.
 
     Raises
     ------
@@ -546,7 +537,7 @@ def outline_of(mechanism: Mechanism) -> Outline:
         body: corners({point: place(body, point) for point in mechanism.points_of(body)})
         for body in mechanism.bodies
     }
-    return Outline(bodies, {joint: place(mechanism.sides(joint)[1], joint) for joint in mechanism.joints})
+    return bodies, {joint: place(mechanism.sides(joint)[1], joint) for joint in mechanism.joints}
 
 
 def is_on_ground(mechanism: Mechanism, joint: str) -> bool:

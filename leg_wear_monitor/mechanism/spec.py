@@ -27,7 +27,7 @@ class Friction:
     """Coulomb friction with a ramp around zero slip speed."""
 
     law: str = choice(FRICTION_LAWS, "shape of the ramp", default="ambrosio")
-    coefficient: float = quantity("", "friction coefficient", at_least=0.0, at_most=2.0, default=0.0)
+    coefficient: float = quantity("", "friction coefficient", within=(0.0, 2.0), default=0.0)
     ramp: tuple[float, float] = quantity(
         "m/s",
         "slip speeds where friction begins and is full",
@@ -73,12 +73,12 @@ class Clearance:
     youngs_modulus: Pair = quantity(
         "Pa", "Young's modulus", above=0.0, usual=(1.0e6, 2.0e12), doubt=_modulus_slip
     )
-    poissons_ratio: Pair = quantity("", "Poisson's ratio", at_least=0.0, at_most=0.5)
+    poissons_ratio: Pair = quantity("", "Poisson's ratio", within=(0.0, 0.5))
     normal_law: str = choice(NORMAL_LAWS, "law of the normal force", default="lankarani-nikravesh")
     # where the loss goes by 1/restitution, a smaller one is beyond the tolerance of steps in clearance
     # coordinates: mean forces are right at 0.02, up to 4 % low at 0.01, and to 21 % at 0.003 (physics.md
     # section 4)
-    restitution: float = quantity("", "coefficient of restitution", at_least=0.02, at_most=1.0, default=0.9)
+    restitution: float = quantity("", "coefficient of restitution", within=(0.02, 1.0), default=0.9)
     friction: Friction = described("friction, a mapping of the keys below", default=Friction())
     film: Film | None = described("oil or grease, a mapping of the keys below", default=None)
     wear_coefficient: Pair = quantity(

@@ -35,15 +35,7 @@ from leg_wear_monitor.twin.sample import (
     Samples,
 )
 
-MESSAGE = np.dtype(
-    [
-        ("begin", "i8"),
-        ("end", "i8"),
-        ("log_time_ns", "i8"),
-        ("publish_time_ns", "i8"),
-        ("type", "i8"),
-    ]
-)
+MESSAGE = np.dtype([(name, "i8") for name in ("begin", "end", "log_time_ns", "publish_time_ns", "type")])
 """One message among bytes: from where to where, when it was recorded and sent, and its stream's code."""
 
 _KIND = np.full(1 + max(stream.code for stream in STREAMS), -1)

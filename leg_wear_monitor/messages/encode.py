@@ -3,7 +3,7 @@
 import itertools
 import math
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -65,18 +65,25 @@ class Layout:
         self.count(len(content))
         self.body += content
 
+    def texts(self, texts: Collection[str]) -> None:
+        """Add a sequence of strings."""
+        self.count(len(texts))
+        for text in texts:
+            self.text(text)
+
     def column(self, values: NDArray[Any]) -> None:
         """Add numbers that differ between messages, shape (n, any)."""
         self.align(values.dtype.itemsize)
         self.columns.append((len(self.body), values))
         self.body += bytes(values.dtype.itemsize * values.shape[1])
 
-    def header(self, stamp_ns: NDArray[np.int64], frame_id: str) -> None:
-        """Add a std_msgs/Header."""
-        seconds, rest = np.divmod(stamp_ns, _SECOND)
+    def header(self, stamp_ns: ArrayLike, frame_id: str) -> int:
+        """Add a std_msgs/Header for each of some stamps; returns their number."""
+        seconds, rest = np.divmod(np.atleast_1d(np.asarray(stamp_ns, np.int64)), _SECOND)
         self.column(seconds.astype("<i4")[:, None])
         self.column(rest.astype("<u4")[:, None])
         self.text(frame_id)
+        return len(seconds)
 
     def messages(self, n: int) -> NDArray[np.uint8]:
         """All messages, one per row."""
@@ -115,17 +122,14 @@ def joint_states(
     (n, bytes) array of uint8
         A message a row.
     """
-    stamps = np.atleast_1d(np.asarray(stamp_ns, np.int64))
     layout = Layout()
-    layout.header(stamps, frame_id)
-    layout.count(len(names))
-    for name in names:
-        layout.text(name)
+    n = layout.header(stamp_ns, frame_id)
+    layout.texts(names)
     for values in (position, velocity, effort):
         layout.count(0 if values is None else len(names))
         if values is not None and names:
-            layout.column(np.asarray(values, "<f8").reshape(len(stamps), len(names)))
-    return layout.messages(len(stamps))
+            layout.column(np.asarray(values, "<f8").reshape(n, len(names)))
+    return layout.messages(n)
 
 
 def wrenches(
@@ -150,13 +154,12 @@ def wrenches(
     (n, bytes) array of uint8
         A message a row.
     """
-    stamps = np.atleast_1d(np.asarray(stamp_ns, np.int64))
     layout = Layout()
-    layout.header(stamps, frame_id)
+    n = layout.header(stamp_ns, frame_id)
     for values in (force, torque):
-        column = np.zeros((len(stamps), 3)) if values is None else np.asarray(values, float)
-        layout.column(column.astype("<f8").reshape(len(stamps), 3))
-    return layout.messages(len(stamps))
+        column = np.zeros((n, 3)) if values is None else np.asarray(values, float)
+        layout.column(column.astype("<f8").reshape(n, 3))
+    return layout.messages(n)
 
 
 def dynamic_joint_states(
@@ -177,22 +180,17 @@ def dynamic_joint_states(
     (n, bytes) array of uint8
         A message a row.
     """
-    stamps = np.atleast_1d(np.asarray(stamp_ns, np.int64))
     layout = Layout()
-    layout.header(stamps, frame_id)
-    layout.count(len(interfaces))
-    for joint in interfaces:
-        layout.text(joint)
+    n = layout.header(stamp_ns, frame_id)
+    layout.texts(interfaces)
     layout.count(len(interfaces))
     for values in interfaces.values():
-        layout.count(len(values))
-        for name in values:
-            layout.text(name)
+        layout.texts(values)
         layout.count(len(values))
         if values:
-            columns = [np.broadcast_to(np.asarray(each, "<f8"), len(stamps)) for each in values.values()]
+            columns = [np.broadcast_to(np.asarray(each, "<f8"), n) for each in values.values()]
             layout.column(np.stack(columns, axis=1))
-    return layout.messages(len(stamps))
+    return layout.messages(n)
 
 
 def float64s(values: ArrayLike) -> NDArray[np.uint8]:
@@ -215,8 +213,7 @@ def string(text: str) -> bytes:
     """One message of std_msgs/String."""
     layout = Layout()
     layout.text(text)
-    raw: bytes = layout.messages(1)[0].tobytes()
-    return raw
+    return layout.messages(1).tobytes()
 
 
 def diagnostic_array(
@@ -233,7 +230,7 @@ def diagnostic_array(
     frame_id : str
     """
     layout = Layout()
-    layout.header(np.array([stamp_ns], np.int64), frame_id)
+    layout.header(stamp_ns, frame_id)
     layout.count(len(statuses))
     for name, level, message, hardware_id, values in statuses:
         layout.body.append(level)
@@ -243,8 +240,7 @@ def diagnostic_array(
         for key, value in values.items():
             layout.text(key)
             layout.text(value)
-    raw: bytes = layout.messages(1)[0].tobytes()
-    return raw
+    return layout.messages(1).tobytes()
 
 
 # Messages of visualization_msgs/MarkerArray, of which only stamps and moving points differ.

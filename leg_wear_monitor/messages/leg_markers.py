@@ -228,9 +228,8 @@ class LegMarkers:
         before_ns = np.concatenate([[self._last_ns], samples.stamp_ns[:-1]])
         for i in np.flatnonzero(samples.stamp_ns // PERIOD_NS != before_ns // PERIOD_NS).tolist():
             stamp_ns = int(samples.stamp_ns[i])
-            if (
-                stamp_ns < before_ns[i]
-            ):  # what is later than all stamps of the new time base is of the old one
+            # what is later than all stamps of a new time base is of the old one
+            if stamp_ns < before_ns[i]:
                 self._take(int(samples.stamp_ns[-1]) + 1, _NEVER_NS)
                 self._drawn_ns = 0
             elif 0 < before_ns[i] < stamp_ns - SILENT_NS:

@@ -164,16 +164,14 @@ class Messages:
         """The message of `CLEARANCES` for a gait cycle."""
         joints = cycle.joints
         growth = [or_nan(joint.growth_mps) for joint in joints]
-        row = encode.joint_states(
+        return encode.joint_states(
             [cycle.stamp_ns],
             self._clearances,
             position=[[joint.clearance_m for joint in joints]],
             velocity=[growth],
             effort=[[joint.peak_force_n for joint in joints]],
             frame_id=self.config.frame_id,
-        )
-        raw: bytes = row[0].tobytes()
-        return raw
+        ).tobytes()
 
     def forecast(self, cycle: CycleReport) -> bytes:
         """The message of `FORECAST` after a gait cycle: remaining life of each joint and of the leg."""

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.files import with_same_fields
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.monitor.alarm_specs import CLEARANCE
 from leg_wear_monitor.monitor.alarms import Alarm
@@ -212,20 +213,14 @@ class Accounting:
     def lost(self, guard: InputGuard) -> Lost:
         """Samples and time that were not integrated so far, with those that a guard has withheld."""
         intake, pauses = self._twin.intake, self.state.pauses
-        return Lost(
+        return with_same_fields(
+            Lost,
+            intake,
+            guard,
             unmonitored_s=self.unmonitored_s,
             already_counted=self.state.skipped,
-            faulty=intake.faulty,
-            conflicting=guard.conflicting,
-            implausible=guard.implausible,
-            duplicates=intake.duplicates,
-            late=intake.late,
-            stray_stamps=intake.stray_stamps,
             outliers=intake.outliers + intake.load_outliers,
-            gaps_bridged=intake.gaps_bridged,
             gaps_lost=max(0, intake.lost - pauses.number),
-            backward_jumps=intake.backward_jumps,
-            failures=intake.failures,
             paused_s=pauses.total_s,
         )
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from leg_wear_monitor.monitor.config.settings import Alarms, MonitorConfig
     from leg_wear_monitor.monitor.gait_evidence import TorqueBounds
     from leg_wear_monitor.monitor.inputs import InputGuard, InputHealth
-    from leg_wear_monitor.monitor.reports import CycleReport, JointReport
+    from leg_wear_monitor.monitor.reports import JointReport
 
 
 # The monitor's alarms, one entry each: board, units, status, command line and docs are derived from it.
@@ -52,15 +52,6 @@ class LimitSource:
     def by_joint(self, own: tuple[float, ...], of_all: float) -> float:
         """The joint's own limit if there are limits per joint, otherwise the common one."""
         return own[self.joint] if own else of_all
-
-
-@attrs.frozen
-class CycleEvidence:
-    """A gait cycle, the values of its torque alarms, and the commanded cadence [rpm]."""
-
-    report: "CycleReport"
-    torque: Mapping[str, float]
-    commanded_rpm: float
 
 
 def _usual(alarms: "Alarms") -> int:
@@ -86,7 +77,8 @@ class AlarmSpec(Generic[_E]):
     meaning, limit_words : str
         For operators: meaning of the value, and the parameters of its limit.
     value : callable
-        Value from the evidence: a joint's report, a gait cycle, the input's health or its guard.
+        Value from the evidence: a joint's report, the input's health or its guard; of those of a gait cycle
+        and of its foot load, which are values by their kinds, the one of this kind.
     limit : callable
         Limit of ERROR.
     on_delay : callable
@@ -109,7 +101,7 @@ class AlarmSpec(Generic[_E]):
     quantity: str
     meaning: str
     limit_words: str
-    value: Callable[[_E], float]
+    value: Callable[[_E], float] = attrs.field()
     limit: Callable[[LimitSource], float]
     on_delay: Callable[["Alarms"], int] = _usual
     is_least: bool = False
@@ -117,6 +109,10 @@ class AlarmSpec(Generic[_E]):
     is_latched: bool = True
     far: float = math.inf
     figure: Figure | None = None
+
+    @value.default
+    def _by_kind(self) -> Callable[[Any], float]:
+        return lambda values: values.get(self.kind, math.nan)
 
     def new(self, joint: str = "") -> Alarm:
         """The alarm in its initial state."""
@@ -134,6 +130,11 @@ class AlarmSpec(Generic[_E]):
         first = error / warn if self.is_least else warn * error
         delay = self.on_delay(alarms)
         return Limit(first, error, alarms.deadband, delay, self.is_least, self.is_latched, self.far)
+
+
+def _parameter(name: str) -> dict[str, Any]:
+    """Limit of an alarm that is a parameter of the section ``limits``."""
+    return {"limit_words": f"`limits.{name}`", "limit": lambda of: getattr(of.config.limits, name)}
 
 
 IMPACT: "AlarmSpec[JointReport]" = AlarmSpec(
@@ -163,9 +164,8 @@ GROWTH: "AlarmSpec[JointReport]" = AlarmSpec(
     unit="m/h",
     quantity="growth of the mean radial clearance",
     meaning="growth of the mean radial clearance, m/h",
-    limit_words="`limits.growth_m_per_hour`",
+    **_parameter("growth_m_per_hour"),
     value=lambda joint: math.nan if joint.growth_mps is None else 3600.0 * joint.growth_mps,
-    limit=lambda of: of.config.limits.growth_m_per_hour,
     figure=Figure.GROWTH,
 )
 LIFE: "AlarmSpec[JointReport]" = AlarmSpec(
@@ -173,9 +173,8 @@ LIFE: "AlarmSpec[JointReport]" = AlarmSpec(
     unit="h",
     quantity="p10 of the remaining life",
     meaning="hours of walking that the joint exceeds with a probability of 90 %, h",
-    limit_words="`limits.remaining_life_h`",
+    **_parameter("remaining_life_h"),
     value=lambda joint: joint.forecast.hours.p10 if joint.forecast and joint.forecast.hours else math.nan,
-    limit=lambda of: of.config.limits.remaining_life_h,
     is_least=True,
     figure=Figure.FORECAST,
 )
@@ -194,29 +193,25 @@ DEPARTURE: "AlarmSpec[JointReport]" = AlarmSpec(
     quantity="difference between the clearance from encoders and the counted clearance",
     meaning="difference between the clearance from further encoders and the counted one, m; 0 below four "
     "standard deviations. Only with `encoders.names`",
-    limit_words="`limits.clearance_departure_m`",
+    **_parameter("clearance_departure_m"),
     value=lambda joint: joint.seen.surely_m if joint.seen else math.nan,
-    limit=lambda of: of.config.limits.clearance_departure_m,
 )
-MISMATCH: "AlarmSpec[CycleEvidence]" = AlarmSpec(
+MISMATCH: "AlarmSpec[Mapping[str, float]]" = AlarmSpec(
     kind="torque_mismatch",
     quantity="unexplained fraction of the drive torque",
     meaning="RMS of the torque that repeats over the last gait cycles, and that foot load, friction and lag "
     "do not explain, as a fraction of the predicted RMS",
-    limit_words="`limits.torque_mismatch`",
-    value=lambda cycle: cycle.report.torque_mismatch,
-    limit=lambda of: of.config.limits.torque_mismatch,
+    **_parameter("torque_mismatch"),
     # what impacts scatter at 45 rpm reaches the limit once in some thousand gait cycles, three times in a row
     # once in 300 000, and 1.3 times the limit at most; a torque that is wrong as received is known at once
     far=1.5,
 )
-CADENCE: "AlarmSpec[CycleEvidence]" = AlarmSpec(
+CADENCE: "AlarmSpec[Mapping[str, float]]" = AlarmSpec(
     kind="cadence",
     unit="rpm",
     quantity="departure from the commanded cadence",
     meaning="departure from the commanded cadence, rpm",
     limit_words="`cadence.tolerance_rpm`",
-    value=lambda cycle: abs(cycle.report.cadence_rpm - cycle.commanded_rpm),
     limit=lambda of: of.config.cadence.tolerance_rpm,
 )
 SOURCES: "AlarmSpec[InputGuard]" = AlarmSpec(
@@ -231,7 +226,7 @@ SOURCES: "AlarmSpec[InputGuard]" = AlarmSpec(
 
 JOINT: "tuple[AlarmSpec[JointReport], ...]" = (IMPACT, CLEARANCE, GROWTH, LIFE, MATERIAL)
 ENCODERS = (DEPARTURE,)
-TORQUE: "tuple[AlarmSpec[CycleEvidence], ...]" = (
+TORQUE: "tuple[AlarmSpec[Mapping[str, float]], ...]" = (
     MISMATCH,
     AlarmSpec(
         kind=BIAS,
@@ -240,7 +235,6 @@ TORQUE: "tuple[AlarmSpec[CycleEvidence], ...]" = (
         meaning="constant drive torque outside the bounds of friction, N m: it drives, or exceeds "
         "`drive_torque.max_friction_nm`",
         limit_words="`limits.torque_bias_nm`",
-        value=lambda cycle: cycle.torque.get(BIAS, math.nan),
         limit=lambda of: of.bounds.bias_nm,
     ),
     AlarmSpec(
@@ -249,7 +243,6 @@ TORQUE: "tuple[AlarmSpec[CycleEvidence], ...]" = (
         quantity="change of the constant drive torque since commissioning",
         meaning="change of the constant drive torque since this leg was commissioned, N m",
         limit_words="`limits.torque_drift_nm`",
-        value=lambda cycle: cycle.torque.get(DRIFT, math.nan),
         limit=lambda of: of.bounds.drift_nm,
     ),
     AlarmSpec(
@@ -258,7 +251,6 @@ TORQUE: "tuple[AlarmSpec[CycleEvidence], ...]" = (
         quantity="delay of the measured torque",
         meaning="delay of the measured torque, late or early, s",
         limit_words="`drive_torque.max_lag_s`",
-        value=lambda cycle: cycle.torque.get(LAG, math.nan),
         limit=lambda of: of.bounds.max_lag_s,
     ),
 )
@@ -273,9 +265,8 @@ def _rate(name: str) -> "AlarmSpec[InputHealth]":
         unit="Hz",
         quantity=f"rate of usable {name} samples",
         meaning=f"rate of usable {name} samples, Hz",
-        limit_words="`limits.min_rate_hz`",
+        **_parameter("min_rate_hz"),
         value=lambda health: health.rate_hz[name],
-        limit=lambda of: of.config.limits.min_rate_hz,
         is_least=True,
         is_latched=False,
     )
@@ -289,7 +280,6 @@ def _foot_load(kind: str, quantity: str, meaning: str, subject: str = "") -> Any
         quantity=quantity,
         meaning=f"{meaning}. Only with `foot_load.source`",
         limit_words=f"{FOOT_LOAD_LIMITS[kind]:g}",
-        value=lambda values: values.get(kind, math.nan),
         limit=lambda _: FOOT_LOAD_LIMITS[kind],
         is_latched=not subject,
     )
@@ -338,26 +328,23 @@ INPUT: "tuple[AlarmSpec[InputHealth], ...]" = (
         kind="input_samples",
         quantity="fraction of unusable samples",
         meaning="fraction of samples that could not be used: faulty, repeated, late, stray stamp, far off",
-        limit_words="`limits.bad_sample_fraction`",
+        **_parameter("bad_sample_fraction"),
         value=lambda health: health.bad_fraction,
-        limit=lambda of: of.config.limits.bad_sample_fraction,
     ),
     AlarmSpec(
         kind="input_gaps",
         quantity="fraction of unmonitored time",
         meaning="fraction of the time that was not monitored",
-        limit_words="`limits.lost_time_fraction`",
+        **_parameter("lost_time_fraction"),
         value=lambda health: health.lost_fraction,
-        limit=lambda of: of.config.limits.lost_time_fraction,
         is_latched=False,
     ),
     AlarmSpec(
         kind="input_torque",
         quantity="fraction of stuck or saturated torque samples",
         meaning="fraction of torque samples that are saturated, or repeat the largest or the smallest",
-        limit_words="`limits.stuck_torque_fraction`",
+        **_parameter("stuck_torque_fraction"),
         value=lambda health: health.stuck_torque_fraction,
-        limit=lambda of: of.config.limits.stuck_torque_fraction,
     ),
 )
 
@@ -369,14 +356,13 @@ OF_TORQUE = frozenset((*(spec.name() for spec in TORQUE), "input_torque"))
 """Names of the alarms whose values need a drive torque."""
 
 INPUT_KINDS = tuple(dict.fromkeys(spec.kind for spec in OF_INPUT))
-KINDS = tuple(dict.fromkeys(spec.kind for spec in ALL))
-UNITS = {spec.kind: spec.unit for spec in ALL}
-FIGURES = {spec.kind: spec.figure for spec in ALL}
+KINDS: "dict[str, AlarmSpec[Any]]" = {spec.kind: spec for spec in ALL}
+"""The kinds of alarms, each with a spec: those of one kind have the same unit and figure."""
 
 
 def with_its_unit(alarm: Alarm) -> Alarm:
     """An alarm of a ledger, which does not keep units, with that of its kind."""
-    return attrs.evolve(alarm, unit=UNITS.get(alarm.kind, ""))
+    return attrs.evolve(alarm, unit=KINDS[alarm.kind].unit if alarm.kind in KINDS else "")
 
 
 QUANTITIES = {

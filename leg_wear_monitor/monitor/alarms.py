@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterable
 from datetime import UTC, datetime
 from functools import cache
+from operator import attrgetter
 
 import attrs
 
@@ -236,13 +237,12 @@ def cleared(alarm: Alarm) -> Alarm:
     return Alarm(kind=alarm.kind, subject=alarm.subject, unit=alarm.unit)
 
 
+_SHOWN_STATE = attrgetter("level", "present", "acknowledged")
+
+
 def has_changed(before: Alarm, after: Alarm) -> bool:
     """Whether the state shown to operators has changed: level, presence or acknowledgement."""
-    return (before.level, before.present, before.acknowledged) != (
-        after.level,
-        after.present,
-        after.acknowledged,
-    )
+    return _SHOWN_STATE(before) != _SHOWN_STATE(after)
 
 
 # Stable names of what is wrong, one with each status: those of alarms, and those of the parts of a monitor.

@@ -7,6 +7,7 @@ import attrs
 
 from leg_wear_monitor.estimate.cause import Change
 from leg_wear_monitor.estimate.mismatch import explanation
+from leg_wear_monitor.files import with_same_fields
 from leg_wear_monitor.monitor.alarm_specs import MISMATCH
 from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate, ClearanceObservation
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
@@ -40,30 +41,18 @@ def cycle_report(
     """
     torque, diagnosis = statistics.torque, parts.diagnosis
     joints = range(len(parts.clearance_joints))
-    return CycleReport(
+    return with_same_fields(
+        CycleReport,
+        torque,
+        statistics,
         cycle=parts.accounting.state.cycles,
-        begin_ns=statistics.begin_ns,
-        stamp_ns=statistics.stamp_ns,
-        cadence_rpm=statistics.cadence_rpm,
-        moving_s=statistics.moving_s,
-        bridged_s=statistics.bridged_s,
         joints=tuple(_joint_report(parts, k, statistics, forecast, seen, diagnosis) for k in joints),
         torque_samples=torque.samples,
         measured_torque_rms_nm=float(torque.measured_rms_nm),
         predicted_torque_rms_nm=float(torque.predicted_rms_nm),
         residual_torque_rms_nm=float(torque.residual_rms_nm),
         torque_mismatch=_mismatch(torque),
-        load_n=float(torque.load_n),
-        load_sigma_n=float(torque.load_sigma_n),
-        load_acting_n=float(torque.load_acting_n),
-        friction_nm=float(torque.friction_nm),
-        load_friction=float(torque.load_friction),
-        load_friction_sigma=float(torque.load_friction_sigma),
-        torque_lag_s=float(torque.torque_lag_s),
-        friction_sigma_nm=float(torque.friction_sigma_nm),
-        torque_lag_sigma_s=float(torque.torque_lag_sigma_s),
         forecast=forecast.leg,
-        is_followed=statistics.is_followed,
     )
 
 

@@ -12,7 +12,7 @@ from leg_wear_monitor.compiled.kernel import Records, entry, new_records
 from leg_wear_monitor.estimate.cause import NamedCause
 from leg_wear_monitor.estimate.mismatch import Allowed
 from leg_wear_monitor.monitor import alarm_specs
-from leg_wear_monitor.monitor.alarm_specs import AlarmSpec, CycleEvidence, LimitSource
+from leg_wear_monitor.monitor.alarm_specs import AlarmSpec, LimitSource
 from leg_wear_monitor.monitor.alarms import Alarm, Limit, acknowledged, cleared, evaluated, has_changed
 from leg_wear_monitor.monitor.config.fitting import largest_lag_s
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -440,8 +440,11 @@ class AlarmEvaluation:
 
     def _of_cycle(self, report: CycleReport, record: TorqueRecord) -> dict[str, float]:
         """Values of a gait cycle that was followed, by the names of their alarms."""
-        torque = torque_values(report, record, self.torque_bounds)
-        cycle = CycleEvidence(report, torque, self.config.cadence.commanded_rpm)
+        cycle = {
+            **torque_values(report, record, self.torque_bounds),
+            alarm_specs.MISMATCH.kind: report.torque_mismatch,
+            alarm_specs.CADENCE.kind: abs(report.cadence_rpm - self.config.cadence.commanded_rpm),
+        }
         values = {spec.name(): spec.value(cycle) for spec in (*alarm_specs.TORQUE, *alarm_specs.GAIT)}
         if not self.config.cadence.allows(report.cadence_rpm):
             del values[alarm_specs.MISMATCH.name()]

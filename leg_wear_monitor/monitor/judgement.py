@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import attrs
 
@@ -45,23 +46,23 @@ from leg_wear_monitor.state import (
 from leg_wear_monitor.twin.statistics import Tracking
 
 
-def verdict_report(parts: Parts) -> VerdictReport:
-    """The verdict now."""
+def verdict_report(parts: Parts, situation: Situation | None = None) -> VerdictReport:
+    """The verdict now; the situation is made if it is not given."""
     stamp_ns, sampling = parts.twin.intake.stamp_ns, parts.twin.sampling
-    found = findings(situation_of(parts))
+    found = findings(situation or situation_of(parts))
     if sampling:
         found = with_sampling(found, sampling, parts.clearance_joints, parts.accounting.sampling_sigma_m)
     return VerdictReport(stamp_ns, dated(found, parts.state.findings, stamp_ns))
 
 
-def update_verdict(parts: Parts) -> tuple[VerdictReport, ...]:
+def update_verdict(parts: Parts, situation: Situation | None = None) -> tuple[VerdictReport, ...]:
     """The verdict if it has changed since the last call; it is then an event, too.
 
     To be called where the state does not depend on how the samples are cut into blocks: at the end of an
     evaluation period.
     """
     before = verdict_of(parts.state.findings) if parts.state.findings else None
-    report = verdict_report(parts)
+    report = verdict_report(parts, situation)
     parts.state.findings, now = report.findings, report.verdict
     if not has_changed(before, now):
         return ()
@@ -78,10 +79,10 @@ def is_forecast_valid(parts: Parts, found: Sequence[Finding]) -> bool:
     return parts.evaluation.holds() and not invalid
 
 
-def evaluate_clearances(parts: Parts) -> tuple[AlarmList, ...]:
+def evaluate_clearances(parts: Parts, joints: Sequence[JointSituation]) -> tuple[AlarmList, ...]:
     """Compare clearances by measurement and by estimate with their limits: at once, for none scatters."""
     board, values, sources = parts.evaluation.board, {}, {}
-    for joint in joint_situations(parts):
+    for joint in joints:
         name = alarm_specs.CLEARANCE.name(joint.joint)
         known = alarm_value(joint, board.alarms[name])
         if known is not None:
@@ -102,7 +103,7 @@ def situation_of(parts: Parts) -> Situation:
     last, explained = parts.state.last, parts.state.mismatch.explanation
     alarms, diagnosis = evaluation.board.alarms, parts.diagnosis
     return Situation(
-        joints=joint_situations(parts, diagnosis),
+        joints=_joint_situations(parts, diagnosis),
         alarms=tuple(alarms.values()),
         quantities=alarm_specs.QUANTITIES,
         has_cycle=last is not None,
@@ -128,10 +129,9 @@ def situation_of(parts: Parts) -> Situation:
     )
 
 
-def joint_situations(parts: Parts, diagnosis: Diagnosis | None = None) -> tuple[JointSituation, ...]:
+def _joint_situations(parts: Parts, diagnosis: Diagnosis) -> tuple[JointSituation, ...]:
     """What is known of each joint's clearance now."""
     last, measured, joints = parts.state.last, parts.measured, parts.clearance_joints
-    diagnosis = diagnosis or parts.diagnosis
     counted_m, limits_m = parts.twin.clearance_mean_m.tolist(), parts.evaluation.board.clearance_limits_m
     walked, found = parts.accounting.state, []
     for k, (joint, part) in enumerate(zip(joints, walked.parts, strict=True)):
@@ -193,9 +193,9 @@ _FACTORS = (Cause.SCALE, Cause.SIGN)
 _TURN = 2.0 * math.pi
 
 
-def leg_state(parts: Parts, findings: Sequence[Finding]) -> LegState:
+def leg_state(parts: Parts, findings: Sequence[Finding], situation: Situation) -> LegState:
     """State of the leg now, with the verdict of some findings."""
-    last, verdict, diagnosis = parts.state.last, verdict_of(findings), parts.diagnosis
+    last, verdict, diagnosis = parts.state.last, verdict_of(findings), situation.diagnosis
     explained, alarms = parts.state.mismatch.explanation, parts.evaluation.board.alarms
     return LegState(
         stamp_ns=parts.twin.intake.stamp_ns,
@@ -208,21 +208,13 @@ def leg_state(parts: Parts, findings: Sequence[Finding]) -> LegState:
                 findings,
                 parts.mechanism.clearances[joint.joint].radial_clearance,
             )
-            for joint in joint_situations(parts, diagnosis)
+            for joint in situation.joints
         },
         drive=_drive(last, diagnosis, explained),
         load=_load(parts.foot_load.load if parts.foot_load else FootLoad(), diagnosis),
         diagnosis=_diagnosis(last, diagnosis, explained),
         alarms=LegAlarms(now=tuple(map(leg_alarm, alarms.values()))),
-        life_answers=answers({joint.joint: joint.forecast for joint in last.joints}, last.forecast)
-        if last
-        else {},
-        first_probability=last.forecast.first_probability
-        if last and last.forecast and Figure.FORECAST not in verdict.not_valid
-        else {},
-        life=life_of({joint.joint: joint.forecast for joint in last.joints}, last.forecast, verdict)
-        if last
-        else {},
+        **(life_of({one.joint: one.forecast for one in last.joints}, last.forecast, verdict) if last else {}),
     )
 
 
@@ -276,18 +268,15 @@ def joint_clearance(
 
 def life_of(
     joints: Mapping[str, JointForecast | None], leg: LegForecast | None, verdict: Verdict
-) -> dict[str, LifeHours | None]:
-    """Remaining life of each joint and of the ``leg`` by their forecasts, as far as it is believed."""
+) -> dict[str, Any]:
+    """Of a `LegState`, the remaining life of each joint and of the ``leg``, as far as it is believed."""
     told: dict[str, JointForecast | LegForecast | None] = {**joints, "leg": leg}
-    if Figure.FORECAST in verdict.not_valid:
-        return dict.fromkeys(told)
-    return {name: life_hours(each.hours) if each else None for name, each in told.items()}
-
-
-def answers(joints: Mapping[str, JointForecast | None], leg: LegForecast | None) -> dict[str, str]:
-    """What their forecasts can say of each joint and of the ``leg``."""
-    told: dict[str, JointForecast | LegForecast | None] = {**joints, "leg": leg}
-    return {name: each.answer.value for name, each in told.items() if each is not None}
+    is_valid = Figure.FORECAST not in verdict.not_valid
+    return {
+        "life": {name: life_hours(each.hours) if each and is_valid else None for name, each in told.items()},
+        "life_answers": {name: each.answer.value for name, each in told.items() if each},
+        "first_probability": leg.first_probability if leg and is_valid else {},
+    }
 
 
 def life_hours(hours: Quantiles | None) -> LifeHours | None:

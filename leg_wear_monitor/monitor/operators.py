@@ -24,8 +24,8 @@ from leg_wear_monitor.monitor.gait_evidence import NO_MISMATCH
 from leg_wear_monitor.monitor.judgement import (
     evaluate_clearances,
     is_forecast_valid,
-    joint_situations,
     shown,
+    situation_of,
     update_verdict,
     verdict_report,
     with_measured,
@@ -213,7 +213,7 @@ def renew_forecast(parts: Parts) -> CycleReport | None:
 
 
 def _situation(parts: Parts, joint: str) -> JointSituation:
-    return next(each for each in joint_situations(parts) if each.joint == joint)
+    return next(each for each in situation_of(parts).joints if each.joint == joint)
 
 
 def _note_alarms(parts: Parts, stamp_ns: int) -> None:
@@ -222,10 +222,11 @@ def _note_alarms(parts: Parts, stamp_ns: int) -> None:
 
 def _compare(parts: Parts, joint: str, stamp_ns: int) -> None:
     """Compare a new measurement with the limit; it ends an alarm of the clearance that it contradicts."""
-    for change in evaluate_clearances(parts):
+    joints = situation_of(parts).joints
+    for change in evaluate_clearances(parts, joints):
         parts.accounting.note_alarms(change)
     board, name = parts.evaluation.board, alarm_specs.CLEARANCE.name(joint)
-    if _ends(_situation(parts, joint), board.alarms[name]):
+    if any(each.joint == joint and _ends(each, board.alarms[name]) for each in joints):
         board.acknowledge_one(name)
         _note_alarms(parts, stamp_ns)  # that of the measurement, by which a withdrawal finds it
 

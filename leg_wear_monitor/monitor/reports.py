@@ -321,15 +321,9 @@ def latest(report: CycleReport, followed: CycleReport | None) -> CycleReport:
     if report.is_followed or followed is None:
         return report
     own = ("cycle", "begin_ns", "stamp_ns", "cadence_rpm", "moving_s", "bridged_s", "forecast")
+    forces = ("peak_force_n", "p99_force_n", "mean_force_n", "impacts", "load")
     joints = tuple(
-        attrs.evolve(
-            new,
-            peak_force_n=old.peak_force_n,
-            p99_force_n=old.p99_force_n,
-            mean_force_n=old.mean_force_n,
-            impacts=old.impacts,
-            load=old.load,
-        )
+        attrs.evolve(new, **{name: getattr(old, name) for name in forces})
         for new, old in zip(report.joints, followed.joints, strict=True)
     )
     return attrs.evolve(followed, joints=joints, **{name: getattr(report, name) for name in own})

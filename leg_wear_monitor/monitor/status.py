@@ -52,12 +52,9 @@ from leg_wear_monitor.twin.statistics import Sampling, Tracking
 def zero_status(crank_zero: CrankZero) -> Status:
     """The zero of the crank's encoder and its runner-up, or why it is not known."""
     state, zero = crank_zero.state, crank_zero.state.zero
+    found = ("offset_rad", "sigma_rad", "mismatch", "other_rad", "other_mismatch")
     values = {
-        "offset_rad": zero.offset_rad if zero else math.nan,
-        "sigma_rad": zero.sigma_rad if zero else math.nan,
-        "mismatch": zero.mismatch if zero else math.nan,
-        "other_rad": zero.other_rad if zero else math.nan,
-        "other_mismatch": zero.other_mismatch if zero else math.nan,
+        **{name: getattr(zero, name, math.nan) for name in found},
         "turns": float(zero.turns if zero else state.turns),
         "least_turns": float(LEAST_TURNS),
         "times_found": float(state.times_found),
@@ -65,8 +62,8 @@ def zero_status(crank_zero: CrankZero) -> Status:
     }
     if zero is None:
         return Status("crank zero", Level.WARN, crank_zero.cause, values, CRANK_ZERO)
-    found = estimate(zero.offset_rad, zero.sigma_rad, "rad")
-    return Status("crank zero", Level.OK, f"crank angle at joint position 0: {found}", values)
+    offset = estimate(zero.offset_rad, zero.sigma_rad, "rad")
+    return Status("crank zero", Level.OK, f"crank angle at joint position 0: {offset}", values)
 
 
 # All statuses, each from the part of the monitor that it is about.

@@ -29,6 +29,7 @@ from leg_wear_monitor.monitor.judgement import (
     evaluate_clearances,
     is_forecast_valid,
     leg_state,
+    situation_of,
     update_verdict,
     verdict_report,
 )
@@ -62,7 +63,7 @@ from leg_wear_monitor.monitor.reports import (
     latest,
 )
 from leg_wear_monitor.monitor.status import statuses
-from leg_wear_monitor.monitor.verdict.situation import SEEN, is_held
+from leg_wear_monitor.monitor.verdict.situation import SEEN, Situation, is_held
 from leg_wear_monitor.monitor.verdict.verdict import Finding
 from leg_wear_monitor.state import LegState
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples, SamplingSettings
@@ -179,12 +180,13 @@ class WearMonitor:
             # the verdict, and what measurements of the gait say of the leg, at the ends of periods alone
             if ends_period:
                 before = len(changes)
-                changed = self._end_period(changes)
+                situation = self._end_period(changes)
+                changed = update_verdict(parts, situation)
                 verdicts += changed
                 is_new = bool(changed) or parts.state.has_ended or len(changes) > before
                 parts.state.has_ended = False
                 if is_new and self.reports_states:
-                    states.append(self._state_report(parts.state.findings))
+                    states.append(self._state_report(parts.state.findings, situation))
             self._accounting.keep_if_due(self._board.alarms.values())
         samples_ = joined(sampled, len(self.clearance_joints))
         return Reports(samples_, tuple(cycles), tuple(changes), self.lost, tuple(verdicts), tuple(states))
@@ -256,8 +258,8 @@ class WearMonitor:
         state.torque = state.torque.with_cycle(statistics, report, is_sound, why)
         self._accounting.state.commissioned = state.torque.totals
 
-    def _end_period(self, changes: list[AlarmList]) -> tuple[VerdictReport, ...]:
-        """Evaluate the input, what encoders and torque show, and the verdict; its change, if there is one."""
+    def _end_period(self, changes: list[AlarmList]) -> Situation:
+        """Evaluate the input, and what encoders and torque show; what the verdict then depends on."""
         parts = self._parts
         self._take_changes(parts.evaluation.end_period(self._accounting.state.skipped), changes)
         if parts.encoders:
@@ -265,8 +267,9 @@ class WearMonitor:
             if new:
                 self._accounting.note(new)
         observe_torque(parts)
-        self._take_changes(evaluate_clearances(parts), changes)
-        return update_verdict(parts)
+        situation = situation_of(parts)
+        self._take_changes(evaluate_clearances(parts, situation.joints), changes)
+        return attrs.evolve(situation, alarms=tuple(self._board.alarms.values()))
 
     def _take_changes(self, changed: tuple[AlarmList, ...], changes: list[AlarmList]) -> None:
         """Add changes of alarms to the reports and to the ledger; a sampled replay follows what comes."""
@@ -304,10 +307,11 @@ class WearMonitor:
     @property
     def state_report(self) -> VerdictReport:
         """The verdict now, with the state of the leg."""
-        return self._state_report(self.verdict.findings)
+        situation = situation_of(self._parts)
+        return self._state_report(verdict_report(self._parts, situation).findings, situation)
 
-    def _state_report(self, findings: tuple[Finding, ...]) -> VerdictReport:
-        leg = leg_state(self._parts, findings)
+    def _state_report(self, findings: tuple[Finding, ...], situation: Situation) -> VerdictReport:
+        leg = leg_state(self._parts, findings, situation)
         return VerdictReport(leg.stamp_ns, findings, leg)
 
     @property

@@ -2,9 +2,8 @@
 
 from array import array
 from collections import deque
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from pathlib import Path
-from types import TracebackType
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from leg_wear_monitor.messages.leg_markers import LegMarkers
 from leg_wear_monitor.messages.leg_motion import CycleMotion, whole_cycles
 from leg_wear_monitor.messages.outputs import ALARMS, DIAGNOSTICS, FORECAST, STATE, VERDICT, Messages
 from leg_wear_monitor.messages.streams import ForecastTimes, topic_of
-from leg_wear_monitor.monitor.alarms import Alarm
+from leg_wear_monitor.monitor.alarms import Alarm, has_changed
 from leg_wear_monitor.monitor.config.parameters import NODE
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, Reports, SampleReports
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
@@ -102,8 +101,7 @@ class History:
         """Add the alarms of a list that have changed."""
         for alarm in alarms.alarms:
             before = self._before.get(alarm.name, Alarm(kind=alarm.kind, subject=alarm.subject))
-            shown = (alarm.level, alarm.present, alarm.acknowledged)
-            if shown != (before.level, before.present, before.acknowledged):
+            if has_changed(before, alarm):
                 self._before[alarm.name] = alarm
                 self.worst[alarm.kind] = max(self.worst.get(alarm.kind, Level.OK), alarm.level)
                 if len(self.changes) < _MOST_CHANGES:
@@ -179,13 +177,9 @@ class Sink:
     def __enter__(self) -> "Sink":
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if kind is None:
-            self._writer.close()
-            return
-        with suppress(RecordingError):  # report the original error, not one from closing the file
+    def __exit__(self, kind: object, *_: object) -> None:
+        # report the original error, not one from closing the file
+        with suppress(RecordingError) if kind else nullcontext():
             self._writer.close()
 
     def take(self, reports: Reports, stamp_ns: int) -> None:

@@ -11,7 +11,7 @@ from leg_wear_monitor.bags.bag import Recordable, listed_recordings
 from leg_wear_monitor.bags.budget import DEFAULT_MB
 from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
 from leg_wear_monitor.bags.reader import Block, Recording
-from leg_wear_monitor.errors import printable
+from leg_wear_monitor.errors import printable, system_asked
 from leg_wear_monitor.files import unfinished
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.config.parameters import NODE, load_config
@@ -230,15 +230,11 @@ def _part(directory: Path, files: list[Path]) -> Iterator[Path]:
     path = directory / REPORTS_FILE
     if any(path.resolve() == file.resolve() for file in files):
         raise RecordingError(str(path), "", "is to be read and written, expected another directory")
-    try:
+    with system_asked(directory, "cannot be made", error_of=RecordingError):
         directory.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise RecordingError(str(directory), "", f"cannot be made: {error.strerror}") from error
     with ExitStack() as stack:
-        try:
+        with system_asked(path, "cannot be written", error_of=RecordingError):
             part = stack.enter_context(unfinished(path))
-        except OSError as error:
-            raise RecordingError(str(path), "", f"cannot be written: {error.strerror}") from error
         yield part
 
 

@@ -1,6 +1,5 @@
 """The result of a replay as classes, which give JSON and tables."""
 
-import reprlib
 from collections.abc import Iterator, Mapping, Sequence
 from enum import Enum
 from typing import TYPE_CHECKING, Any, get_args
@@ -8,8 +7,7 @@ from typing import TYPE_CHECKING, Any, get_args
 import attrs
 
 from leg_wear_monitor.bags.findings import Severity
-from leg_wear_monitor.configuration.strict import structure
-from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.configuration.strict import structure_of_version
 from leg_wear_monitor.files import data_frame, finite_or_none
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.materials import BushingLoad
@@ -581,11 +579,5 @@ def summary_of(record: Any, source: str) -> ReplaySummary:
     ConfigError
         If the object has another version, or is no summary; it names the key at fault.
     """
-    record = structure(record, dict[str, Any], source, "")
-    version = record.get("schema_version", 1)
-    if version != SCHEMA_VERSION:
-        fault = f"{reprlib.repr(version)} is not {SCHEMA_VERSION}, the version that this command reads"
-        raise ConfigError(source, "schema_version", f"{fault}; replay the recording again")
-    parts = {name: part for name, part in record.items() if name != "schema_version"}
-    summary: ReplaySummary = structure(parts, ReplaySummary, source, "")
-    return summary
+    again = "replay the recording again"
+    return structure_of_version(record, ReplaySummary, SCHEMA_VERSION, source, again, missing=1)

@@ -5,13 +5,14 @@ What the verdict does not believe has no remaining life.
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import attrs
 import numpy as np
 
 from leg_wear_monitor.bags.findings import Finding
 from leg_wear_monitor.errors import printable
+from leg_wear_monitor.files import with_same_fields
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.position import carriers, is_on_ground, outline_of, rotated
 from leg_wear_monitor.mechanism.reach import Reach, reach_of
@@ -79,7 +80,6 @@ _RANGED = (
     "load_n",
     "friction_nm",
 )
-_Record = TypeVar("_Record", EncoderEvidence, ReplaySampling, ReplayStatus)
 
 _LONGER, _LONGER_S = 1.05, 1.0  # stamps may span this factor times, plus these seconds, the logged time
 
@@ -175,9 +175,9 @@ class ReplayResult(Drawable):
             forecast=told,
             measurements=tuple(monitor.measurements),
             walked=monitor.walked,
-            status=tuple(_view(ReplayStatus, status) for status in monitor.status()),
+            status=tuple(with_same_fields(ReplayStatus, status) for status in monitor.status()),
             lost=monitor.lost,
-            sampling=_view(ReplaySampling, monitor.sampling) if monitor.sampling else None,
+            sampling=with_same_fields(ReplaySampling, monitor.sampling) if monitor.sampling else None,
             history=_history(self.history),
             wear_depth_m=_wear(self),
             motion=self.history.motion if is_known else (),
@@ -196,26 +196,16 @@ class ReplayResult(Drawable):
             self.end_ns = int(stamps[-1])
 
 
-def _view(kind: type[_Record], of: object) -> _Record:
-    """A record of the attributes of another one with the same names."""
-    return kind(**{field.name: getattr(of, field.name) for field in attrs.fields(kind)})
-
-
 def _recording(result: ReplayResult) -> ReplayRecording:
-    return ReplayRecording(
+    return with_same_fields(
+        ReplayRecording,
+        result,
         files=tuple(printable(str(path)) for path in result.files),
         topics={role: printable(topic) for role, topic in result.topics.items()},
-        time=result.time,
-        is_partial=result.is_partial,
         findings=tuple(
             ReplayFinding(file=printable(str(one.file)), text=one.text, weight=one.severity)
             for one in result.findings
         ),
-        crank_samples=result.crank_samples,
-        torque_samples=result.torque_samples,
-        begin_ns=result.begin_ns,
-        end_ns=result.end_ns,
-        duration_s=result.duration_s,
     )
 
 
@@ -236,9 +226,9 @@ def settings_of(config: MonitorConfig, mechanism: Mechanism) -> ReplayMonitor:
 
 def leg_shape(mechanism: Mechanism) -> ReplayLeg:
     """A mechanism as a picture needs it."""
-    outline, reach = outline_of(mechanism), reach_of(mechanism, None, PHASES)
+    (bodies, joints), reach = outline_of(mechanism), reach_of(mechanism, None, PHASES)
     return ReplayLeg(
-        bodies_m={body: _places(corners) for body, corners in outline.bodies.items()},
+        bodies_m={body: _places(corners) for body, corners in bodies.items()},
         joints={
             name: LegJoint(
                 label=mechanism.joints[name].label,
@@ -246,7 +236,7 @@ def leg_shape(mechanism: Mechanism) -> ReplayLeg:
                 is_on_ground=is_on_ground(mechanism, name),
                 body=carriers(mechanism, name)[1].removeprefix(GROUND),
             )
-            for name, place in outline.joints.items()
+            for name, place in joints.items()
         },
         poses=_poses(reach) if reach.turns else {},
     )
@@ -289,18 +279,15 @@ def _joint(history: History, k: int, joint: JointReport, verdict: Verdict) -> Re
         history.joint_column(name)[:, k]
         for name in ("clearance_m", "peak_force_n", "mean_force_n", "impacts")
     )
-    return ReplayJoint(
+    return with_same_fields(
+        ReplayJoint,
+        joint,
         opened_m=float(clearance[-1] - clearance[0]),
-        growth_m_per_cycle=joint.growth_m_per_cycle,
-        growth_error_m_per_cycle=joint.growth_error_m_per_cycle,
-        growth_mps=joint.growth_mps,
         forecast=joint_forecast(joint.forecast, verdict),
         peak_force_n=_of_known(np.max, peak),
         mean_force_n=_of_known(np.mean, mean),
-        encoders=_view(EncoderEvidence, joint.seen) if joint.seen else None,
+        encoders=with_same_fields(EncoderEvidence, joint.seen) if joint.seen else None,
         impacts=int(np.nansum(impacts)),
-        load=joint.load,
-        sampling_sigma_m=joint.sampling_sigma_m,
     )
 
 

@@ -20,7 +20,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Header
 
 from leg_wear_monitor.configuration import described, quantity
-from leg_wear_monitor.errors import ConfigError, LegWearError
+from leg_wear_monitor.errors import ConfigError, LegWearError, system_asked
 from leg_wear_monitor.files import json_text
 from leg_wear_monitor.gait.config import CONTACT, FLOAT64, GaitConfig
 from leg_wear_monitor.gait.leg import SyntheticLeg
@@ -62,11 +62,7 @@ class PublisherConfig(GaitConfig):
     time_scale: float = quantity("", "simulated seconds per second", above=0.0, at_most=1000.0, default=1.0)
     precompute: bool = described("simulate the whole gait before publishing; needs a duration", default=False)
     wait_for_subscribers: int = quantity(
-        "",
-        "number of subscribers of each topic to wait for before the start",
-        at_least=0,
-        at_most=100,
-        default=0,
+        "", "number of subscribers of each topic to wait for before the start", within=(0, 100), default=0
     )
     truth: TruthConfig = described("what is known of the leg", factory=TruthConfig)
 
@@ -222,14 +218,10 @@ class GaitPublisher(ClosingNode):
 
     def close(self) -> None:
         """Write the ground truth, if a file is configured."""
-        path = self.config.truth.path
-        if not path:
-            return
-        try:
+        if path := self.config.truth.path:
             truth = {"start_ns": self._start_ns, **self._leg.truth()}
-            Path(path).write_text(json_text(truth))
-        except OSError as error:
-            raise LegWearError(f"truth.path: {path}: cannot be written: {error.strerror}") from error
+            with system_asked(f"truth.path: {path}", "cannot be written"):
+                Path(path).write_text(json_text(truth))
 
     def _publisher(self, kind: type, topic: str, qos: QoSProfile) -> Publisher:
         return self.create_publisher(

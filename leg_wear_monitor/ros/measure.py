@@ -5,7 +5,6 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
-import attrs
 import rclpy
 from rcl_interfaces.msg import Parameter, ParameterType, SetParametersResult
 from rcl_interfaces.srv import SetParametersAtomically
@@ -44,27 +43,8 @@ _WANTED = {
 _OPTIONAL = ("accept",)
 
 
-@attrs.frozen(kw_only=True)
-class MeasureRequest:
-    """A measured clearance, as the service takes it.
-
-    Attributes
-    ----------
-    joint : str
-    clearance_m, sigma_m : float
-        Mean radial clearance, and its standard deviation.
-    accept : bool
-        Whether the forecast uses it even if it contradicts the model.
-    """
-
-    joint: str
-    clearance_m: float
-    sigma_m: float
-    accept: bool = False
-
-
-def request_of(parameters: Sequence[Parameter]) -> MeasureRequest:
-    """The request that parameters contain.
+def request_of(parameters: Sequence[Parameter]) -> dict[str, Any]:
+    """The measured clearance that parameters contain, as `WearMonitor.measure` takes it.
 
     Raises
     ------
@@ -83,7 +63,7 @@ def request_of(parameters: Sequence[Parameter]) -> MeasureRequest:
     for name, (kind, meaning) in _WANTED.items():
         if name not in values and name not in _OPTIONAL:
             raise ConfigError(name, "", f"is missing, expected a {kind}: {meaning}")
-    return MeasureRequest(**values)
+    return values
 
 
 def _value(one: Parameter) -> Any:
@@ -94,7 +74,7 @@ def _value(one: Parameter) -> Any:
     return getattr(one.value, field)
 
 
-def measured(monitor: WearMonitor, wanted: MeasureRequest, stamp_ns: int) -> str:
+def measured(monitor: WearMonitor, wanted: dict[str, Any], stamp_ns: int) -> str:
     """Enter a measured clearance into a running monitor; what came of it, in one line.
 
     Raises
@@ -102,9 +82,7 @@ def measured(monitor: WearMonitor, wanted: MeasureRequest, stamp_ns: int) -> str
     LegWearError
         For a joint without clearance, or impossible values; then nothing is entered.
     """
-    found = monitor.measure(
-        wanted.joint, wanted.clearance_m, wanted.sigma_m, stamp_ns, WHO, accept=wanted.accept
-    )
+    found = monitor.measure(**wanted, stamp_ns=stamp_ns, who=WHO)
     limit_m = monitor.clearance_limits_m[monitor.clearance_joints.index(found.measurement.joint)]
     lines = found.told(limit_m, monitor.config.limits.warn_fraction, monitor.measurements[:-1])
     return with_storage("; ".join(lines), not_stored(monitor))
@@ -124,7 +102,7 @@ def with_storage(reply: str, fault: str) -> str:
     return f"{reply}; {NOT_STORED}: {fault}" if fault else reply
 
 
-def offer_measure(node: Node, act: Callable[[MeasureRequest], str]) -> None:
+def offer_measure(node: Node, act: Callable[[dict[str, Any]], str]) -> None:
     """Create the service; an action enters what was measured and returns what came of it."""
 
     def answer(

@@ -32,7 +32,7 @@ from leg_wear_monitor.monitor.reports import Reports, Status
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor, open_monitor
 from leg_wear_monitor.ros.health import Load, load_status, recording_status
 from leg_wear_monitor.ros.inputs import Inbox, Inputs, check_stamps
-from leg_wear_monitor.ros.measure import MeasureRequest, measured, not_stored, offer_measure, with_storage
+from leg_wear_monitor.ros.measure import measured, not_stored, offer_measure, with_storage
 from leg_wear_monitor.ros.outputs import BlackBox, MarkerTopic, MotionTopic, Outlets
 from leg_wear_monitor.ros.parameters import Parameters
 from leg_wear_monitor.ros.running import ClosingNode, release_memory, repeated, run, spin
@@ -432,7 +432,7 @@ class MonitorNode(ClosingNode):
         self._monitor.save()
         return f"saved in {self._monitor.config.ledger.path}"
 
-    def _measure(self, wanted: MeasureRequest) -> str:
+    def _measure(self, wanted: dict[str, Any]) -> str:
         text = measured(self._monitor, wanted, audit_time(self._ros_now_ns()))
         self._markers.operated()
         self._send_state_and_forecast()

@@ -16,7 +16,7 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.configuration.strict import structure
-from leg_wear_monitor.errors import ConfigError, ConfigWarning
+from leg_wear_monitor.errors import ConfigError, ConfigWarning, system_asked
 from leg_wear_monitor.files import json_text, package_version, share_directory, write_whole
 from leg_wear_monitor.mechanism.loader import is_file_name, load_mechanism, read_yaml, shipped_mechanisms
 from leg_wear_monitor.studies.kinds import STUDIES
@@ -57,8 +57,7 @@ def load_settings(name: str, path: str | Path | None = None) -> Study:
 
 def parse_settings(name: str, document: Any, source: str) -> Study:
     """Convert the plain mapping of a study's file to typed settings; see `load_settings`."""
-    settings: Study = structure(document, STUDIES[name], source, "")
-    return settings
+    return structure(document, STUDIES[name], source, "")
 
 
 # Checksums that bind a stored result to its origin.
@@ -198,10 +197,8 @@ class StudyDirectory:
                     "",
                     f"contains the study {present}, expected {manifest['study']} or a new directory",
                 )
-        try:
+        with system_asked(self.path, "cannot be made"):
             (self.path / POINTS).mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise ConfigError(str(self.path), "", f"cannot be made: {error.strerror}") from error
         write_whole(self.path / MECHANISM, mechanism_text.encode())
         whole = {"format": _FORMAT, **manifest}
         whole["checksum"] = text_checksum(canonical(whole), mechanism_text)
@@ -396,7 +393,5 @@ def _manifest(
 def _mechanism_text(mechanism: str) -> str:
     """Text of a mechanism file."""
     path = Path(mechanism) if is_file_name(Path(mechanism)) else shipped_mechanisms()[mechanism]
-    try:
+    with system_asked(mechanism, "cannot be read"):
         return path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(mechanism, "", f"cannot be read: {error.strerror}") from error

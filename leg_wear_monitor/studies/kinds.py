@@ -48,19 +48,17 @@ class Exponent:
     renewals: int = quantity(
         "",
         "renormalisations of the distance per cycle, a power of 2",
-        at_least=1,
-        at_most=SAMPLES,
+        within=(1, SAMPLES),
         default=64,
         check=lambda times: None if SAMPLES % times == 0 else f"{times} does not divide {SAMPLES}",
     )
     distance: float = quantity(
-        "", "distance after renormalisation, in clearances", at_least=1.0e-12, at_most=1.0e-3, default=1.0e-8
+        "", "distance after renormalisation, in clearances", within=(1.0e-12, 1.0e-3), default=1.0e-8
     )
     tolerance_m: float = quantity(
         "m",
         "local error allowed in a step; larger errors, as of simulate, add to the growth",
-        at_least=1.0e-15,
-        at_most=1.0e-6,
+        within=(1.0e-15, 1.0e-6),
         default=1.0e-10,
     )
 
@@ -93,7 +91,7 @@ class Chaos(OneSet):
     others: tuple[Names, ...] = described("other sets whose exponents are compared", default=())
     section_cycles: int = count_field("points of a Poincaré map, one a cycle", 2, 1000)
     section_crank_angle_deg: float = quantity(
-        "deg", "crank angle of the map", at_least=0.0, at_most=360.0, default=0.0
+        "deg", "crank angle of the map", within=(0.0, 360.0), default=0.0
     )
     exponent: Exponent = described("how the Lyapunov exponent is measured", factory=Exponent)
     bifurcation: Bifurcation = described("parameters of the diagrams")
@@ -147,8 +145,7 @@ class Laws(OneSet):
     friction_coefficients: tuple[float, ...] = quantity(
         "",
         "friction coefficients, each with the mechanism's own laws",
-        at_least=0.0,
-        at_most=2.0,
+        within=(0.0, 2.0),
         default=(0.02, 0.05, 0.1),
     )
 
@@ -183,10 +180,10 @@ class Legs(OneClearance):
 
     legs: int = count_field("drawn legs, those that do not walk included", 1, 260)
     length_tolerance: float = quantity(
-        "", "lengths of ground and bodies are drawn within 1 ± this", at_least=0.0, at_most=0.5, default=0.1
+        "", "lengths of ground and bodies are drawn within 1 ± this", within=(0.0, 0.5), default=0.1
     )
     mass_tolerance: float = quantity(
-        "", "masses of bodies are drawn within 1 ± this", at_least=0.0, at_most=0.9, default=0.3
+        "", "masses of bodies are drawn within 1 ± this", within=(0.0, 0.9), default=0.3
     )
     draw_seed: int = count_field("seed of the lengths and masses", 0, 1)
 
@@ -345,16 +342,11 @@ class Life:
     opens_m: float = quantity(
         "m",
         "opening of the mean clearance of the joint that wears fastest",
-        at_least=1.0e-7,
-        at_most=0.1,
+        within=(1.0e-7, 0.1),
         default=1.0e-4,
     )
     jump_m: float = quantity(
-        "m",
-        "deepest change of a surface that a jump may make",
-        at_least=1.0e-9,
-        at_most=0.1,
-        default=1.0e-5,
+        "m", "deepest change of a surface that a jump may make", within=(1.0e-9, 0.1), default=1.0e-5
     )
     cycles: int = count_field("gait cycles simulated and averaged before each jump", 2, 6)
     runs: int = count_field("lives with different initial conditions", 2, 4)
@@ -400,8 +392,7 @@ class Load(OneSet):
     loads_n: tuple[float, ...] = quantity(
         "N",
         "largest vertical forces of the ground on the toe in stance, one per point; 0 in the air",
-        at_least=0.0,
-        at_most=10_000.0,
+        within=(0.0, 10_000.0),
         check=check_rising,
     )
     life: Life = described("how far wear is followed", factory=Life)

@@ -62,20 +62,18 @@ def some_of(known: Names) -> Callable[[Names], str | None]:
 
 def count_field(doc: str, least: int, default: int) -> Any:
     """A setting that counts something; ``doc`` says what, for a user."""
-    return quantity("", doc, at_least=least, at_most=_MOST, default=default)
+    return quantity("", doc, within=(least, _MOST), default=default)
 
 
 def clearance_field() -> Any:
     """The setting of a study in which all clearance joints have the same clearance."""
-    return quantity(
-        "m", "radial clearance of the clearance joints", at_least=1.0e-6, at_most=0.1, default=3.0e-4
-    )
+    return quantity("m", "radial clearance of the clearance joints", within=(1.0e-6, 0.1), default=3.0e-4)
 
 
 def clearances_field() -> Any:
     """The setting of a study over the clearance: one for each point, of all clearance joints."""
     return quantity(
-        "m", "radial clearances of the clearance joints", at_least=1.0e-6, at_most=0.1, check=check_rising
+        "m", "radial clearances of the clearance joints", within=(1.0e-6, 0.1), check=check_rising
     )
 
 
@@ -85,13 +83,13 @@ _DIRECTION = "in the direction of the mechanism's drive"
 def speed_field() -> Any:
     """The setting of a study at one crank speed."""
     what = f"speed of the crank, {_DIRECTION}"
-    return quantity("rpm", what, at_least=0.1, at_most=10_000.0, default=60.0)
+    return quantity("rpm", what, within=(0.1, 10_000.0), default=60.0)
 
 
 def speeds_field() -> Any:
     """The setting of a study over the crank speed: one for each point."""
     what = f"speeds of the crank, {_DIRECTION}"
-    return quantity("rpm", what, at_least=0.1, at_most=10_000.0, check=check_rising)
+    return quantity("rpm", what, within=(0.1, 10_000.0), check=check_rising)
 
 
 def clearance_joints_field() -> Any:
@@ -187,8 +185,7 @@ class Ensemble:
     perturb_fraction: float = quantity(
         "",
         "journals start up to this fraction of the clearance from the centre",
-        at_least=0.0,
-        at_most=1.0,
+        within=(0.0, 1.0),
         default=0.3,
     )
     seed: int = count_field("seed of the initial conditions", 0, 1)

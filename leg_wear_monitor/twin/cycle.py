@@ -271,28 +271,21 @@ def cycle_statistics(
     not_compared: NotCompared | None, load_peak_n: float,
 ) -> CycleStatistics:  # fmt: skip
     """Statistics of a cycle at its end from a `LEG_STATE`; ``before`` (2, k) [m]: initial clearances."""
-    joint, motion, now = contacts.joint, leg.motion, clearances(contacts, depth)
-    moving = float(statistics.time[0])
-    return CycleStatistics(
-        cycle=int(motion.cycles),
-        begin_ns=int(motion.cycle_begin_ns),
-        stamp_ns=stamp,
-        direction=1 if motion.cut_rises else -1,
-        moving_s=moving,
-        bridged_s=float(motion.cycle_bridged_ns) * 1.0e-9,
+    joint, moving = contacts.joint, float(statistics.time[0])
+    tracked = tracked_cycle(leg, stamp, contacts, depth, moving)
+    return attrs.evolve(
+        tracked,
         peak_force_n=statistics.peak[joint],
         p99_force_n=np.array([percentile(statistics.force_time[j], 0.99) for j in joint]),
         mean_force_n=statistics.integral[joint, FORCE] / moving,
         impacts=statistics.impacts[joint],
         contact_fraction=statistics.integral[joint, CONTACT] / moving,
         archard_j=statistics.integral[joint, ARCHARD],
-        clearance_mean_m=now[0],
-        clearance_max_m=now[1],
-        growth_mean_m=now[0] - before[0],
+        growth_mean_m=tracked.clearance_mean_m - before[0],
         torque=torque,
         torque_profile=profile,
         not_compared=not_compared,
-        load=load_profile(leg),
+        is_followed=True,
         load_peak_n=load_peak_n,
     )
 

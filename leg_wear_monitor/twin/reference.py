@@ -33,9 +33,8 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 # A leg whose masses, lengths and friction are not quite those of the mechanism file.
 
 
-MASS_TOLERANCE = (
-    0.05  # standard deviation of a body's mass about that of the file, where nothing else is known
-)
+# standard deviation of a body's mass about that of the file, where nothing else is known
+MASS_TOLERANCE = 0.05
 
 
 # of the crank on its coupling, with the mean inertia of the ideal leg: belts and elastomer couplings lose 30

@@ -48,17 +48,11 @@ gives (0, 1) or (0, 0). The temperature is the drive's, and comes with its torqu
 NO_FAULT, EMPTY, WRONG_LENGTH, MISSING_JOINT, NOT_FINITE, ZERO_STAMP, UNDECODABLE, WRONG_TYPE = range(8)
 # A further fault, found by the tracker.
 OUT_OF_RANGE = 8
-FAULTS = {
-    NO_FAULT: "none",
-    EMPTY: "empty",
-    WRONG_LENGTH: "wrong_length",
-    MISSING_JOINT: "missing_joint",
-    NOT_FINITE: "not_finite",
-    ZERO_STAMP: "zero_stamp",
-    UNDECODABLE: "undecodable",
-    WRONG_TYPE: "wrong_type",
-    OUT_OF_RANGE: "out_of_range",
-}
+_NAMES = (
+    *("none", "empty", "wrong_length", "missing_joint", "not_finite"),
+    *("zero_stamp", "undecodable", "wrong_type", "out_of_range"),
+)
+FAULTS = dict(enumerate(_NAMES))
 """Names of the faults, as used in keys of diagnostics."""
 
 
@@ -370,25 +364,21 @@ class SamplingSettings:
 # Counts of samples and times from the state of tracker and follower.
 
 
+_SAME = (
+    *("received", "duplicates", "late", "stray_stamps", "outliers", "velocity_outliers", "load_outliers"),
+    *("gaps_bridged", "lost", "backward_jumps", "reversals"),
+)  # counts of the tracker by the same names
+
+
 def intake(tracker: Records, leg: Records, kinds: Iterable[int] = KINDS) -> Intake:
     """Counts of a tracker's `TRACKER_STATE` and a follower's `LEG_STATE`, of the kinds that are read."""
     count, clock = values_of(tracker["counts"]), values_of(tracker["clock"])
     motion = values_of(leg["motion"])
     out = clock["out_since_ns"] != 0 and not clock["followed"]
     return Intake(
-        received=count["received"],
+        **{name: count[name] for name in _SAME},
         faulty={name: int(count["faults"][fault]) for fault, name in FAULTS.items() if fault != NO_FAULT},
         used={KINDS[code].name: int(count["used"][code]) for code in kinds},
-        duplicates=count["duplicates"],
-        late=count["late"],
-        stray_stamps=count["stray_stamps"],
-        outliers=count["outliers"],
-        velocity_outliers=count["velocity_outliers"],
-        load_outliers=count["load_outliers"],
-        gaps_bridged=count["gaps_bridged"],
-        lost=count["lost"],
-        backward_jumps=count["backward_jumps"],
-        reversals=count["reversals"],
         failures=motion["failures"],
         bridged_s=count["bridged_ns"] * 1.0e-9,
         moving_s=motion["moving_ns"] * 1.0e-9,

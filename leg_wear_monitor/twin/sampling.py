@@ -371,14 +371,6 @@ def _ratio(above: Floats, below: Floats) -> Floats:
 
 
 @attrs.define(eq=False)
-class _Growing:
-    """The cycles of one condition in the present block."""
-
-    growth_m: list[Floats]
-    depth_m: Floats
-
-
-@attrs.define(eq=False)
 class SampledState:
     """State of a sampled replay.
 
@@ -400,8 +392,8 @@ class SampledState:
         Gait cycles since the leg was left.
     followed : int
         Gait cycles that were followed and counted.
-    growing : dict of Condition to _Growing
-        The present block.
+    growing : dict of Condition to (list of (k,) arrays, (k, 2, N) array)
+        The present block: growth of each cycle and wear of all, by condition [m].
     """
 
     plan: SamplingPlan
@@ -413,19 +405,19 @@ class SampledState:
     left_ns: int = 0
     passed: int = 0
     followed: int = 0
-    growing: dict[Condition, _Growing] = attrs.field(factory=dict)
+    growing: dict[Condition, tuple[list[Floats], Floats]] = attrs.field(factory=dict)
 
     def add(self, condition: Condition, growth_m: Floats, depth_m: Floats) -> None:
         """Add a followed gait cycle to the present block: growth (k,), and wear (k, 2, N) [m]."""
-        own = self.growing.setdefault(condition, _Growing([], np.zeros_like(depth_m)))
-        own.growth_m.append(np.asarray(growth_m))
-        own.depth_m += depth_m
+        growths, depth = self.growing.setdefault(condition, ([], np.zeros_like(depth_m)))
+        growths.append(np.asarray(growth_m))
+        depth += depth_m
 
     def end_block(self) -> Floats:
         """End the present block; returns the correction of the wear so far (k, 2, N) [m]."""
         correction = np.zeros_like(self.depth)
-        for condition, own in self.growing.items():
-            block = Block(np.array(own.growth_m), own.depth_m / len(own.growth_m))
+        for condition, (growths, depth) in self.growing.items():
+            block = Block(np.array(growths), depth / len(growths))
             correction += self.wear.end_block(condition, block)
             self.plan.note_block(condition, block.cycles)
         self.growing = {}

@@ -160,6 +160,9 @@ class TrackerState(NamedTuple):
     queue: Records
 
 
+_TIMES = ("reorder_window", "bridge_limit", "mark_gap", "backward_jump", "acquire", "stop_hold", "settle")
+
+
 def _nanoseconds(time_s: float) -> int:
     return round(1.0e9 * time_s)
 
@@ -169,14 +172,9 @@ def tracker_model(settings: TrackerSettings) -> Records:
     s, w, reference = settings, 2.0 * np.pi * settings.bandwidth_hz, 1.0 / 200.0
     models, speed = new_records(1, TRACKER_MODEL), abs(settings.commanded_speed_radps)
     model = record_of(models)
-    model.reorder_window_ns = _nanoseconds(s.reorder_window_s)
+    for name in _TIMES:
+        models[f"{name}_ns"] = _nanoseconds(getattr(s, f"{name}_s"))
     model.lag_ns = _nanoseconds(s.lag)
-    model.bridge_limit_ns = _nanoseconds(s.bridge_limit_s)
-    model.mark_gap_ns = _nanoseconds(s.mark_gap_s)
-    model.backward_jump_ns = _nanoseconds(s.backward_jump_s)
-    model.acquire_ns = _nanoseconds(s.acquire_s)
-    model.stop_hold_ns = _nanoseconds(s.stop_hold_s)
-    model.settle_ns = _nanoseconds(s.settle_s)
     model.node_interval_ns = _nanoseconds(s.node_interval)
     model.run_up_ns = _nanoseconds(_RUN_UPS / s.bandwidth_hz)
     model.angle_noise = s.encoder_noise_rad**2 * reference

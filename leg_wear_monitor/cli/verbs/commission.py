@@ -32,19 +32,17 @@ if TYPE_CHECKING:
     "Parameter file that names the mechanism; parameters that are not measured are kept.  "
     "[default: the one that comes with the package]",
 )
-@common.path_option(
+@common.file_option(
     "--out",
     "FILE",
     "Write the proposed parameters, such as monitor.yaml; nothing is written if a choice is not "
     "certain, and a file that exists is kept unless everything is determined and fits.",
-    dir_okay=False,
 )
-@common.path_option(
+@common.file_option(
     "--reference",
     "FILE",
     "Simulate a torque reference of the leg under the recorded motion of its crank, about a minute, and "
     "write it, such as leg.reference.npz; the proposed parameters name it.",
-    dir_okay=False,
 )
 @common.option("--joint-states", "TOPIC", "Topic of the crank.  [default: all are tried]")
 @common.option("--drive-torque", "TOPIC", "Topic of the torque.  [default: all are tried]")
@@ -132,11 +130,10 @@ def _run(
     "CSV file with the mean force of the ground on the toe over one gait cycle: columns crank_angle [rad], "
     "foot_load (up) and foot_load_along [N].  [default: the leg walks in the air]",
 )
-@common.path_option(
+@common.file_option(
     "--out",
     "FILE",
     "File to write, such as leg.reference.npz, for the parameter diagnosis.reference.",
-    dir_okay=False,
     required=True,
 )
 def reference(

@@ -249,15 +249,11 @@ _NODE = "/leg_wear_monitor"
     is_flag=False,
     flag_value=_NODE,
 )
-@common.path_option(
-    "--ledger",
-    "FILE",
-    "A ledger instead, which a monitor may be writing meanwhile.",
-    dir_okay=False,
-    exists=True,
+@common.file_option(
+    "--ledger", "FILE", "A ledger instead, which a monitor may be writing meanwhile.", exists=True
 )
-@common.path_option(
-    "--fleet", "FLEET.yaml", "A fleet instead, as the last fleet update left it.", dir_okay=False, exists=True
+@common.file_option(
+    "--fleet", "FLEET.yaml", "A fleet instead, as the last fleet update left it.", exists=True
 )
 @common.config_option
 @common.option(

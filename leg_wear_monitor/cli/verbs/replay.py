@@ -52,11 +52,8 @@ TIMES = ("header", "log", "publish")
 @common.option("--crank-joint", "NAME", "The crank's name.  [default: crank_joint of the parameters]")
 @common.memory_option
 @common.sample_option
-@common.path_option(
-    "--ledger",
-    "FILE",
-    "Ledger to continue or to begin; the one in the parameters is never touched.",
-    dir_okay=False,
+@common.file_option(
+    "--ledger", "FILE", "Ledger to continue or to begin; the one in the parameters is never touched."
 )
 @click.option("--allow-partial", is_flag=True, help="Exit with 0 even if parts of the recording are lost.")
 @common.option(

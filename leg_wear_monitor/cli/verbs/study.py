@@ -11,7 +11,7 @@ import click
 
 from leg_wear_monitor.cli import common
 from leg_wear_monitor.errors import ConfigError, ConfigWarning, LegWearError, printable
-from leg_wear_monitor.files import share_directory
+from leg_wear_monitor.files import Stamp, share_directory, stamp_of
 from leg_wear_monitor.mechanism import NORMAL_LAWS
 
 if TYPE_CHECKING:
@@ -120,8 +120,6 @@ _SUFFIXES = (".html", ".svg", _URDF)
 _OURS = b"leg-wear-monitor draw"  # near the begin of what this verb writes
 _POLL_S = 0.2
 
-_Stamp = tuple[int, int, int]
-
 
 @click.command(short_help="Draw a mechanism, working or not.")
 @click.argument("mechanism", metavar="MECHANISM")
@@ -227,11 +225,11 @@ def _content(drawing: "Drawing", target: Path, watch: bool) -> bytes:
 def _watch(mechanism: str, target: Path, forces: bool, crank_angle: float | None) -> int:
     """Draw whenever the file has changed, until Ctrl-C; a fault in it is one line, until the next save."""
     source = _source(mechanism)
-    drawn: _Stamp | None = None
+    drawn: Stamp | None = None
     try:
         while True:
-            stamp = _stamp(source)
-            if stamp is not None and stamp != drawn:
+            stamp = stamp_of(source)
+            if any(stamp) and stamp != drawn:  # there is none while an editor replaces it
                 drawn = stamp
                 try:
                     _draw(mechanism, target, forces, crank_angle, watch=True)
@@ -265,15 +263,6 @@ def _source(mechanism: str) -> Path:
     if source is None or not source.is_file():
         raise ConfigError(mechanism, "", "there is no such file to watch")
     return source
-
-
-def _stamp(source: Path) -> _Stamp | None:
-    """What changes when a file is saved; None while an editor replaces it."""
-    try:
-        stat = source.stat()
-    except OSError:
-        return None
-    return stat.st_mtime_ns, stat.st_size, stat.st_ino
 
 
 # ``leg-wear-monitor simulate``: the leg offline, ideal or with clearances.

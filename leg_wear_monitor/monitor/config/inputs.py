@@ -1,6 +1,7 @@
 """Parameters of the inputs: crank, further encoders, drive torque, gait, tracker."""
 
 import math
+from functools import partial
 from typing import Any
 
 import attrs
@@ -9,6 +10,7 @@ from leg_wear_monitor.configuration import FieldError, choice, described, quanti
 from leg_wear_monitor.twin import sample
 
 LIVE = {"live": True}  # may change while the monitor runs
+live_quantity = partial(quantity, metadata=LIVE)
 
 TORQUE_SOURCES = WRENCH, FLOAT64, EFFORT, INTERFACE = ("wrench", "float64", "effort", "interface")
 KNOWN, AT_START = ZEROS = ("known", "at_start")
@@ -44,8 +46,7 @@ class Crank:
     offset_rad: float = quantity(
         "rad",
         "crank angle at joint position 0",
-        at_least=-100.0,
-        at_most=100.0,
+        within=(-100.0, 100.0),
         usual=(0.0, math.tau),
         doubt="{value:g} rad is more than a turn; degrees for rad?",
         default=0.0,
@@ -53,8 +54,7 @@ class Crank:
     gear_ratio: float = quantity(
         "",
         "turns of the joint per turn of the crank; if not 1, the position must be continuous, not wrapped",
-        at_least=1.0e-4,
-        at_most=1.0e4,
+        within=(1.0e-4, 1.0e4),
         default=1.0,
     )
     zero: str = choice(
@@ -102,23 +102,20 @@ class Encoders:
     signs: tuple[float, ...] = quantity(
         "",
         "1.0 if an encoder turns in the direction of the mechanism's angles, else -1.0; empty: all 1.0",
-        at_least=-1.0,
-        at_most=1.0,
+        within=(-1.0, 1.0),
         default=(),
         check=_signs,
     )
     commissioning_cycles: int = quantity(
         "",
         "gait cycles for the estimate of a new encoder's offset and scale; then both are fixed",
-        at_least=20,
-        at_most=10000,
+        within=(20, 10000),
         default=100,
     )
     window_cycles: int = quantity(
         "",
         "gait cycles from which clearances are estimated; a sudden change shows after half of them",
-        at_least=20,
-        at_most=2000,
+        within=(20, 2000),
         default=60,
     )
 
@@ -155,42 +152,32 @@ class DriveTorque:
     scale: float = quantity(
         "",
         "factor on the torque, for its unit and the gear's efficiency",
-        at_least=1.0e-6,
-        at_most=1.0e6,
+        within=(1.0e-6, 1.0e6),
         default=1.0,
     )
     gear_ratio: float = quantity(
-        "",
-        "turns of the sensor's shaft per turn of the crank",
-        at_least=1.0e-4,
-        at_most=1.0e4,
-        default=1.0,
+        "", "turns of the sensor's shaft per turn of the crank", within=(1.0e-4, 1.0e4), default=1.0
     )
-    max_friction_nm: float = quantity(
+    max_friction_nm: float = live_quantity(
         "N m",
         "largest friction of the drive, on the crank; a constant torque beyond is a bias; 0: 0.3 of the "
         "predicted RMS",
-        at_least=0.0,
-        at_most=1.0e6,
+        within=(0.0, 1.0e6),
         default=0.0,
-        metadata=LIVE,
     )
-    max_lag_s: float = quantity(
+    max_lag_s: float = live_quantity(
         "s",
         "largest time by which the measured torque is late or early, beyond what drive.lag_s and "
         "drive.bandwidth_hz declare; above it, crank.offset_rad may be off",
         above=0.0,
         at_most=1.0,
         default=0.005,
-        metadata=LIVE,
     )
-    saturation_nm: float = quantity(
+    saturation_nm: float = live_quantity(
         "N m",
         "torque on the crank at which the sensor saturates; 0: unknown",
-        at_least=0.0,
-        at_most=1.0e6,
+        within=(0.0, 1.0e6),
         default=0.0,
-        metadata=LIVE,
     )
 
 
@@ -210,7 +197,7 @@ class FootLoad:
     )
     sign: int = _sign("1 if a force is positive that pushes the foot along the axis or up, else -1")
     scale: float = quantity(
-        "", "factor on the force, for its unit: 1000.0 for kN", at_least=1.0e-6, at_most=1.0e6, default=1.0
+        "", "factor on the force, for its unit: 1000.0 for kN", within=(1.0e-6, 1.0e6), default=1.0
     )
 
     def __attrs_post_init__(self) -> None:
@@ -231,8 +218,7 @@ class Load:
     person_kg: float = quantity(
         "kg",
         "mass of a person one of whose legs hangs on thigh, shank and foot; 0 for none",
-        at_least=0.0,
-        at_most=300.0,
+        within=(0.0, 300.0),
         default=0.0,
     )
 
@@ -244,20 +230,18 @@ class Cadence:
     commanded_rpm: float = quantity(
         "rpm",
         "commanded crank speed, negative for clockwise, at least 0.1 either way",
-        at_least=-1200.0,
-        at_most=1200.0,
+        within=(-1200.0, 1200.0),
         usual=(10.0, 1200.0),
         doubt=_is_slow,
         default=60.0,
         check=_turns,
     )
-    tolerance_rpm: float = quantity(
+    tolerance_rpm: float = live_quantity(
         "rpm",
         "largest departure from the commanded speed at which predictions are valid",
         above=0.0,
         at_most=1200.0,
         default=6.0,
-        metadata=LIVE,
     )
 
     def allows(self, rpm: float) -> bool:
@@ -269,25 +253,21 @@ class Cadence:
 class Tracker:
     """How the crank's motion is estimated from its samples."""
 
-    bandwidth_hz: float = quantity(
-        "Hz", "bandwidth of the crank's tracker", at_least=1.0, at_most=100.0, default=8.0
-    )
+    bandwidth_hz: float = quantity("Hz", "bandwidth of the crank's tracker", within=(1.0, 100.0), default=8.0)
     lag_s: float = quantity(
         "s",
         "delay of the leg behind the newest sample, for smoothing; 0: 0.8 / bandwidth_hz",
-        at_least=0.0,
-        at_most=1.0,
+        within=(0.0, 1.0),
         default=0.0,
     )
     node_interval_s: float = quantity(
         "s",
         "time between the nodes of the leg's motion, for which a sample waits at most; 0: 0.2 / bandwidth_hz",
-        at_least=0.0,
-        at_most=0.2,
+        within=(0.0, 0.2),
         default=0.0,
     )
     reorder_window_s: float = quantity(
-        "s", "time for which a sample waits for earlier ones", at_least=0.0, at_most=0.5, default=0.02
+        "s", "time for which a sample waits for earlier ones", within=(0.0, 0.5), default=0.02
     )
     gap_limit_s: float = quantity(
         "s",

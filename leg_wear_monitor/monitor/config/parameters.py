@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from operator import attrgetter
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeVar
@@ -118,34 +119,33 @@ def structured(kind: type[_Config], values: Mapping[str, Any], source: str) -> _
     ConfigError
         Naming source, parameter, value, unit and bounds of an unusable value.
     """
-    nested: dict[str, Any] = {}
     known = parameters_of(kind)
     for name, value in values.items():
         if name not in known:
             fault = unknown_fault("parameter", name, known, "docs/reference/parameters.md lists all")
             raise ConfigError(source, name, fault)
         _check_type(known[name], value, source)
-        *sections, last = name.split(".")
-        place = nested
-        for section in sections:
-            place = place.setdefault(section, {})
-        place[last] = list(value) if isinstance(value, tuple) else value
     try:
-        config: _Config = structure(nested, kind, source, "")
+        return structure(nested(values), kind, source, "")
     except ConfigError as error:
         raise ConfigError(source, error.key, _with_bounds(error, known)) from error
-    return config
 
 
 def values_of(config: Any) -> dict[str, Any]:
     """Value of every parameter of a configuration by dotted name, arrays as tuples."""
-    values = {}
-    for name in parameters_of(type(config)):
-        value: Any = config
-        for step in name.split("."):
-            value = getattr(value, step)
-        values[name] = value
-    return values
+    return {name: attrgetter(name)(config) for name in parameters_of(type(config))}
+
+
+def nested(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Values by dotted name as the sections of a file, arrays as lists."""
+    tree: dict[str, Any] = {}
+    for name, value in values.items():
+        *sections, last = name.split(".")
+        place = tree
+        for section in sections:
+            place = place.setdefault(section, {})
+        place[last] = list(value) if isinstance(value, tuple) else value
+    return tree
 
 
 def changed(config: _Config, changes: Mapping[str, Any], source: str = "parameters") -> _Config:

@@ -25,9 +25,7 @@ def _figure(unit: str, doc: str, least: float, most: float) -> float:
         return f"{value!r} is not within its bounds, expected {bounds}, or {NOT_DECLARED} if not declared"
 
     text = f"{doc}; {NOT_DECLARED:g}: that of drive.type, or estimated"
-    number: float = quantity(
-        unit, text, at_least=NOT_DECLARED, at_most=most, default=NOT_DECLARED, check=fault
-    )
+    number: float = quantity(unit, text, within=(NOT_DECLARED, most), default=NOT_DECLARED, check=fault)
     return number
 
 
@@ -41,8 +39,7 @@ class DriveParameters:
     gear_ratio: float = quantity(
         "",
         "turns of the drive's output per turn of the crank, for the figures of drive.type",
-        at_least=1.0e-4,
-        at_most=1.0e4,
+        within=(1.0e-4, 1.0e4),
         default=1.0,
     )
     lag_s: float = _figure("s", "time by which the measured torque is late", 0.0, 1.0)
@@ -129,43 +126,32 @@ class Forecasting:
         "",
         "standard deviation of the logarithm of a joint's wear coefficient about the given one; 0: the "
         "spread of the joint's material pair, or 0.7 where that gives none",
-        at_least=0.0,
-        at_most=3.0,
+        within=(0.0, 3.0),
         default=0.0,
         check=_not_next_to_0,
     )
     load_sigma: float = quantity(
         "",
         "standard deviation of the logarithm of future wear per cycle, because load and pace vary",
-        at_least=0.0,
-        at_most=3.0,
+        within=(0.0, 3.0),
         default=0.1,
     )
     model_sigma: float = quantity(
         "",
         "standard deviation of the logarithm of the growth, which is assumed constant without simulated "
         "lives, and beyond them (docs/explanation/forecast.md)",
-        at_least=0.0,
-        at_most=3.0,
+        within=(0.0, 3.0),
         default=0.4,
     )
     clearance_sigma_m: float = quantity(
-        "m", "standard deviation of a new joint's clearance", at_least=1.0e-9, at_most=1.0e-3, default=5.0e-6
+        "m", "standard deviation of a new joint's clearance", within=(1.0e-9, 1.0e-3), default=5.0e-6
     )
-    duty_hours_per_day: float = quantity("h", "walking per day", at_least=0.01, at_most=24.0, default=8.0)
+    duty_hours_per_day: float = quantity("h", "walking per day", within=(0.01, 24.0), default=8.0)
     duty_sigma: float = quantity(
-        "",
-        "standard deviation of the logarithm of the walking per day",
-        at_least=0.0,
-        at_most=3.0,
-        default=0.2,
+        "", "standard deviation of the logarithm of the walking per day", within=(0.0, 3.0), default=0.2
     )
     window_cycles: int = quantity(
-        "",
-        "gait cycles over which the growth of the forecast is averaged",
-        at_least=10,
-        at_most=100000,
-        default=2000,
+        "", "gait cycles over which the growth of the forecast is averaged", within=(10, 100000), default=2000
     )
     life: str = described(
         "file that `leg-wear-monitor life --lives 16 --json` wrote for this leg: how growth changes as all "

@@ -16,6 +16,7 @@ from leg_wear_monitor.monitor.config.inputs import (
     FootLoad,
     Load,
     Tracker,
+    live_quantity,
 )
 from leg_wear_monitor.monitor.config.sections import DriveParameters, Forecasting
 from leg_wear_monitor.monitor.config.tables import TableInput
@@ -29,15 +30,10 @@ def _filled(text: str) -> str | None:
 class Limits:
     """Where alarms begin: ERROR at the limit, WARN at a fraction of it."""
 
-    warn_fraction: float = quantity(
-        "",
-        "fraction of a limit at which the level WARN begins",
-        above=0.0,
-        at_most=1.0,
-        default=0.8,
-        metadata=LIVE,
+    warn_fraction: float = live_quantity(
+        "", "fraction of a limit at which the level WARN begins", above=0.0, at_most=1.0, default=0.8
     )
-    impact_force_n: float = quantity(
+    impact_force_n: float = live_quantity(
         "N",
         "impact force in a joint, peak of a gait cycle",
         above=0.0,
@@ -45,9 +41,8 @@ class Limits:
         usual=(10.0, 1.0e7),
         doubt="{value:g} N is less than a leg weighs; kN for N?",
         default=10000.0,
-        metadata=LIVE,
     )
-    joint_impact_force_n: tuple[float, ...] = quantity(
+    joint_impact_force_n: tuple[float, ...] = live_quantity(
         "N",
         "impact-force limit of each clearance joint, instead of the common one",
         above=0.0,
@@ -55,78 +50,67 @@ class Limits:
         usual=(10.0, 1.0e7),
         doubt="{value:g} N is less than a leg weighs; kN for N?",
         default=(),
-        metadata=LIVE,
     )
-    clearance_m: float = quantity(
-        "m", "mean radial clearance of a joint", above=0.0, at_most=0.1, default=0.0006, metadata=LIVE
+    clearance_m: float = live_quantity(
+        "m", "mean radial clearance of a joint", above=0.0, at_most=0.1, default=0.0006
     )
-    joint_clearance_m: tuple[float, ...] = quantity(
+    joint_clearance_m: tuple[float, ...] = live_quantity(
         "m",
         "clearance limit of each clearance joint, instead of the common one",
         above=0.0,
         at_most=0.1,
         default=(),
-        metadata=LIVE,
     )
-    clearance_departure_m: float = quantity(
+    clearance_departure_m: float = live_quantity(
         "m",
         "difference between the clearance from further encoders and the counted one",
         above=0.0,
         at_most=0.1,
         default=0.0001,
-        metadata=LIVE,
     )
-    growth_m_per_hour: float = quantity(
-        "m/h", "growth of a joint's mean clearance", above=0.0, at_most=1.0, default=1.0e-6, metadata=LIVE
+    growth_m_per_hour: float = live_quantity(
+        "m/h", "growth of a joint's mean clearance", above=0.0, at_most=1.0, default=1.0e-6
     )
-    remaining_life_h: float = quantity(
+    remaining_life_h: float = live_quantity(
         "h",
         "least remaining life of a joint (p10 of its forecast); 0: at its end",
-        at_least=0.0,
-        at_most=1.0e6,
+        within=(0.0, 1.0e6),
         default=0.0,
-        metadata=LIVE,
     )
-    torque_mismatch: float = quantity(
+    torque_mismatch: float = live_quantity(
         "",
         "RMS of the drive torque that load, friction and lag do not explain, fraction of the predicted RMS",
         above=0.0,
         at_most=100.0,
         default=0.1,
-        metadata=LIVE,
     )
-    torque_bias_nm: float = quantity(
+    torque_bias_nm: float = live_quantity(
         "N m",
         "constant drive torque outside 0 to drive_torque.max_friction_nm; 0: a tenth of the predicted RMS",
-        at_least=0.0,
-        at_most=1.0e6,
+        within=(0.0, 1.0e6),
         default=0.0,
-        metadata=LIVE,
     )
-    torque_drift_nm: float = quantity(
+    torque_drift_nm: float = live_quantity(
         "N m",
         "change of the constant drive torque since this leg was commissioned; 0: 0.15 of the predicted RMS",
-        at_least=0.0,
-        at_most=1.0e6,
+        within=(0.0, 1.0e6),
         default=0.0,
-        metadata=LIVE,
     )
-    min_rate_hz: float = quantity(
-        "Hz", "least rate of crank samples", above=0.0, at_most=1.0e5, default=40.0, metadata=LIVE
+    min_rate_hz: float = live_quantity(
+        "Hz", "least rate of crank samples", above=0.0, at_most=1.0e5, default=40.0
     )
-    bad_sample_fraction: float = quantity(
-        "", "fraction of unusable samples", above=0.0, at_most=1.0, default=0.05, metadata=LIVE
+    bad_sample_fraction: float = live_quantity(
+        "", "fraction of unusable samples", above=0.0, at_most=1.0, default=0.05
     )
-    stuck_torque_fraction: float = quantity(
+    stuck_torque_fraction: float = live_quantity(
         "",
         "fraction of torque samples that are saturated, or repeat the largest or the smallest",
         above=0.0,
         at_most=1.0,
         default=0.3,
-        metadata=LIVE,
     )
-    lost_time_fraction: float = quantity(
-        "", "fraction of the time that was not monitored", above=0.0, at_most=1.0, default=0.05, metadata=LIVE
+    lost_time_fraction: float = live_quantity(
+        "", "fraction of the time that was not monitored", above=0.0, at_most=1.0, default=0.05
     )
 
     def of_clearances(self, joints: int) -> tuple[str, tuple[float, ...]]:
@@ -140,29 +124,17 @@ class Limits:
 class Alarms:
     """When a level changes."""
 
-    deadband: float = quantity(
+    deadband: float = live_quantity(
         "",
         "fraction of a limit by which a value must fall below it before the level falls",
-        at_least=0.0,
-        at_most=0.9,
+        within=(0.0, 0.9),
         default=0.05,
-        metadata=LIVE,
     )
-    on_delay_cycles: int = quantity(
-        "",
-        "consecutive gait cycles beyond a limit before the level rises",
-        at_least=1,
-        at_most=1000,
-        default=3,
-        metadata=LIVE,
+    on_delay_cycles: int = live_quantity(
+        "", "consecutive gait cycles beyond a limit before the level rises", within=(1, 1000), default=3
     )
-    knock_on_delay_cycles: int = quantity(
-        "",
-        "on-delay of the alarms of impact forces",
-        at_least=1,
-        at_most=1000,
-        default=1,
-        metadata=LIVE,
+    knock_on_delay_cycles: int = live_quantity(
+        "", "on-delay of the alarms of impact forces", within=(1, 1000), default=1
     )
 
 
@@ -171,7 +143,7 @@ class Growth:
     """How growth is averaged."""
 
     window_cycles: int = quantity(
-        "", "gait cycles over which growth is averaged", at_least=3, at_most=10000, default=30
+        "", "gait cycles over which growth is averaged", within=(3, 10000), default=30
     )
 
 
@@ -183,8 +155,7 @@ class LedgerFile:
     checkpoint_s: float = quantity(
         "s",
         "longest time between two entries while the leg moves, plus an evaluation period of a quarter cycle",
-        at_least=0.01,
-        at_most=600.0,
+        within=(0.01, 600.0),
         default=5.0,
     )
     skip_counted: bool = described(
@@ -208,7 +179,7 @@ class Diagnostics:
     """What goes to /diagnostics."""
 
     period_s: float = quantity(
-        "s", "time between two messages on /diagnostics", at_least=0.1, at_most=2.0, default=1.0
+        "s", "time between two messages on /diagnostics", within=(0.1, 2.0), default=1.0
     )
 
 
@@ -228,8 +199,7 @@ class TorqueDiagnosis:
     false_alarm_hours: float = quantity(
         "h",
         "mean time of walking between two false findings; longer: changes are found later",
-        at_least=1.0,
-        at_most=1.0e6,
+        within=(1.0, 1.0e6),
         default=240.0,
     )
 
@@ -253,22 +223,19 @@ class MonitorConfig:
     clearances_m: tuple[float, ...] = quantity(
         "m",
         "radial clearances when new, one for all clearance joints or one each; empty: those of the file",
-        at_least=1.0e-6,
-        at_most=0.1,
+        within=(1.0e-6, 0.1),
         default=(),
     )
     wear_coefficients_per_pa: tuple[float, ...] = quantity(
         "1/Pa",
         "K/H of both surfaces, one for all clearance joints or one each; empty: those of the file",
-        at_least=0.0,
-        at_most=1.0e-6,
+        within=(0.0, 1.0e-6),
         default=(),
     )
     wear_acceleration: float = quantity(
         "",
         "factor on all wear; other than 1 for demonstrations only, above 1000 with a warning",
-        at_least=1.0e-9,
-        at_most=1.0e5,
+        within=(1.0e-9, 1.0e5),
         default=1.0,
     )
     crank_joint: str = described("name of the crank in joint_states", default="crank", check=_filled)

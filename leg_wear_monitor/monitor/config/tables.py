@@ -100,15 +100,13 @@ class TableInput:
         "",
         "counts of the encoders in a turn of their joint, for positions in counts, such as 4096 for 12 bits; "
         "0: positions are in another unit",
-        at_least=0.0,
-        at_most=1.0e12,
+        within=(0.0, 1.0e12),
         default=0.0,
     )
     rate_hz: float = quantity(
         "Hz",
         "rows per second of a table without a column of the time; 0: there is input.columns.stamp",
-        at_least=0.0,
-        at_most=1.0e6,
+        within=(0.0, 1.0e6),
         default=0.0,
     )
     start: str = described(

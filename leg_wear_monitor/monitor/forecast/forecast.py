@@ -412,7 +412,7 @@ class ForecastBasis:
 
 def forecast(
     now: Sequence[JointCondition],
-    coefficient_estimates: Sequence[CoefficientEstimate],
+    estimates: Sequence[CoefficientEstimate],
     settings: Forecasting,
     law: GrowthLaw,
     *,
@@ -424,7 +424,7 @@ def forecast(
     Parameters
     ----------
     now : sequence of JointCondition
-    coefficient_estimates : sequence of CoefficientEstimate
+    estimates : sequence of CoefficientEstimate
         Of their wear coefficients.
     settings : Forecasting
     law : GrowthLaw
@@ -434,7 +434,7 @@ def forecast(
     valid : bool
         Whether the model holds for what the leg does.
     """
-    clearance_m, base_m, duty_h = _legs(now, coefficient_estimates, settings, law)
+    clearance_m, base_m, duty_h = _legs(now, estimates, settings, law)
     clearances = [quantiles(row) for row in clearance_m]
     answers = [each.answer(q.p50, valid) for each, q in zip(now, clearances, strict=True)]
     limit = np.array([each.limit_m for each in now])
@@ -446,12 +446,10 @@ def forecast(
             answer=a,
             **_life(a, end, cycle_s, day),
             clearance_m=q,
-            measurements=coefficient_estimate.observations,
-            prior=coefficient_estimate.prior,
+            measurements=one.observations,
+            prior=one.prior,
         )
-        for a, end, q, coefficient_estimate in zip(
-            answers, ends, clearances, coefficient_estimates, strict=True
-        )
+        for a, end, q, one in zip(answers, ends, clearances, estimates, strict=True)
     )
     answer = _leg_answer(answers)
     # a joint of no or of unknown growth does not end the leg, though its clearance may be at the limit
@@ -469,7 +467,7 @@ def forecast(
 
 def _legs(
     now: Sequence[JointCondition],
-    coefficient_estimates: Sequence[CoefficientEstimate],
+    estimates: Sequence[CoefficientEstimate],
     settings: Forecasting,
     law: GrowthLaw,
 ) -> tuple[Floats, Floats, Floats]:
@@ -479,19 +477,12 @@ def _legs(
     """
     k = len(now)
     fractions, normals = even_fractions(3 * k + 2), even_normals(3 * k + 2)
-    log_factor = np.array(
-        [
-            coefficient_estimate.log_factors(row)
-            for coefficient_estimate, row in zip(coefficient_estimates, fractions, strict=False)
-        ]
-    )
+    log_factor = np.array([one.log_factors(row) for one, row in zip(estimates, fractions, strict=False)])
     excess = np.array(
         [
-            np.interp(own, coefficient_estimate.log_factor, coefficient_estimate.excess_m)
-            + np.hypot(coefficient_estimate.excess_sigma_m, np.exp(own) * each.wear_sigma_m) * row
-            for own, coefficient_estimate, row, each in zip(
-                log_factor, coefficient_estimates, normals[k:], now, strict=False
-            )
+            np.interp(own, one.log_factor, one.excess_m)
+            + np.hypot(one.excess_sigma_m, np.exp(own) * each.wear_sigma_m) * row
+            for own, one, row, each in zip(log_factor, estimates, normals[k:], now, strict=False)
         ]
     )
     fresh, wear, growth, error, limit = (
@@ -499,8 +490,7 @@ def _legs(
         for name in ("fresh_m", "wear_m", "growth_m", "growth_error_m", "limit_m")
     )
     known, before = (
-        np.array([[getattr(each.known, name)] for each in coefficient_estimates])
-        for name in ("clearance_m", "wear_m")
+        np.array([[getattr(each.known, name)] for each in estimates]) for name in ("clearance_m", "wear_m")
     )
     clearance = np.maximum(known + excess + np.exp(log_factor) * (wear - before), 0.0)
     relative = np.divide(error, growth, out=np.zeros_like(error), where=growth > 0.0)

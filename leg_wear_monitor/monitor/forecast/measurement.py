@@ -27,41 +27,22 @@ from leg_wear_monitor.monitor.ledger.entry import JointWear, Measurement, Recoun
 LEAST = 5  # measurements, below which fractions have no meaning
 
 
-@attrs.frozen
-class Validity:
-    """Predicted against measured.
+def validity(measurements: Sequence[Measurement]) -> str:
+    """What measurements say of the forecasts before each of them, in a line for operators.
 
-    Attributes
-    ----------
-    measurements : int
-    within : int
-        Of them between p10 and p90 of what was expected: 80 % in the long run.
-    bias : float
-        Mean probability with which less was expected, less one half: above 0, joints wear faster than
-        forecast; from -0.5 to 0.5.
+    Those that contradict the model count, too, and withdrawn ones do not. In the long run 80 % are between
+    the p10 and the p90 of what was expected.
     """
-
-    measurements: int
-    within: int
-    bias: float
-
-    @property
-    def words(self) -> str:
-        """In a line, for operators."""
-        text = f"{self.within} of {self.measurements} measured clearances were between expected p10 and p90"
-        if self.measurements < LEAST:
-            return f"{text}; too few to evaluate the forecast"
-        # a mean of n even numbers from 0 to 1 has a standard deviation of 1 / sqrt(12 n)
-        if abs(self.bias) * np.sqrt(12.0 * self.measurements) < 2.0:
-            return f"{text}; no bias found"
-        return f"{text}; joints wear {'faster' if self.bias > 0.0 else 'slower'} than forecast"
-
-
-def validity(measurements: Sequence[Measurement]) -> Validity:
-    """What measurements say of the forecasts before each of them; contradictions too, not withdrawn ones."""
     below = np.array([m.expected_below for m in measurements if not m.is_withdrawn])
     within = int(np.count_nonzero((below >= 0.1) & (below <= 0.9)))
-    return Validity(len(below), within, float(below.mean() - 0.5) if len(below) else 0.0)
+    text = f"{within} of {len(below)} measured clearances were between expected p10 and p90"
+    if len(below) < LEAST:
+        return f"{text}; too few to evaluate the forecast"
+    bias = float(below.mean() - 0.5)  # above 0, joints wear faster than forecast
+    # a mean of n even numbers from 0 to 1 has a standard deviation of 1 / sqrt(12 n)
+    if abs(bias) * np.sqrt(12.0 * len(below)) < 2.0:
+        return f"{text}; no bias found"
+    return f"{text}; joints wear {'faster' if bias > 0.0 else 'slower'} than forecast"
 
 
 CONTRADICTS = 0.00135  # probability of a tail: three standard deviations of a normal one
@@ -157,8 +138,8 @@ class MeasurementResult:
             used = "uses" if now.counts else "does not use"
             lines.append(f"the joint has opened otherwise than counted; the forecast {used} the measurement")
             lines += self.words[-1:] if now.counts else []
-            return (*lines, validity([*earlier, now]).words)
-        return (*lines, *self.words, validity([*earlier, now]).words)
+            return (*lines, validity([*earlier, now]))
+        return (*lines, *self.words, validity([*earlier, now]))
 
     def has_findings(self, limit_m: float) -> bool:
         """Whether the caller has to act: the measurement contradicts the model, or is at the limit."""

@@ -75,7 +75,7 @@ class LearnedCoefficient:
     wear_coefficient_per_pa: float = quantity(
         "1/Pa", "median of the wear coefficients of bushing and journal together", above=0.0
     )
-    sigma: float = quantity("", "standard deviation of its logarithm", at_least=1.0e-6, at_most=10.0)
+    sigma: float = quantity("", "standard deviation of its logarithm", within=(1.0e-6, 10.0))
     basis: str = described("what was measured for it")
 
 

@@ -73,8 +73,7 @@ def measured_figures() -> Mapping[str, MeasuredFigure]:
         If the file is damaged.
     """
     document = read_document(share_directory() / FIGURES_FILE, FIGURES_FILE)
-    figures: dict[str, MeasuredFigure] = structure(document, dict[str, MeasuredFigure], FIGURES_FILE, "")
-    return figures
+    return structure(document, dict[str, MeasuredFigure], FIGURES_FILE, "")
 
 
 OF_CODE: Mapping[str, tuple[str, ...]] = {

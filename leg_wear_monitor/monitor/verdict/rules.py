@@ -3,6 +3,8 @@
 docs/reference/monitor.md lists them; a test compares the two.
 """
 
+from functools import partial
+
 from leg_wear_monitor.monitor import alarms
 from leg_wear_monitor.monitor.verdict import subject_rules
 from leg_wear_monitor.monitor.verdict.situation import (
@@ -17,6 +19,10 @@ from leg_wear_monitor.monitor.verdict.situation import (
 )
 from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, NONE, Finding
 from leg_wear_monitor.state import Figure, Level, State
+
+_stop, _inspect, _not_monitored, _watch = (
+    partial(Rule, state=state) for state in (State.STOP, State.INSPECT, State.NOT_MONITORED, State.WATCH)
+)
 
 _ACKNOWLEDGE = (
     "then acknowledge the alarms: `leg-wear-monitor acknowledge --config FILE --ledger FILE`, or "
@@ -61,9 +67,8 @@ _FOOT_LOAD = {
 
 def _foot_load(kind: str) -> Rule:
     """Rule of a fault of the foot load's sensor."""
-    return Rule(
+    return _inspect(
         code=kind.upper(),
-        state=State.INSPECT,
         hits=raised(kind, least=Level.ERROR),
         why=f"{alarms.FOOT_LOAD_WORDS[kind]} (the {{quantity}} is {{value}}, limit {{limit}})"
         "{past}{acts}",
@@ -73,24 +78,21 @@ def _foot_load(kind: str) -> Rule:
 
 
 RULES = (
-    Rule(
+    _stop(
         code="CLEARANCE",
-        state=State.STOP,
         hits=subject_rules.counted_at_limit,
         why="the {known} clearance of joint {joint} is {value} (limit {limit}){past}",
         do=_REPLACE,
     ),
-    Rule(
+    _stop(
         code="CLEARANCE_SEEN",
-        state=State.STOP,
         hits=subject_rules.seen_at_limit,
         why="according to {by}, the clearance of joint {joint} is {value} (limit {limit}){past}{doubt}",
         do=_REPLACE,
         not_valid=EVERYTHING,
     ),
-    Rule(
+    _stop(
         code="CLEARANCE_BELIEVED",
-        state=State.STOP,
         hits=subject_rules.believed_at_limit,
         why="counting and measurements together give a clearance of {value} in joint {joint} (limit {limit})",
         do=_REPLACE,
@@ -98,24 +100,21 @@ RULES = (
     _cause("TORQUE_SIGN", "its sign is reversed", not_valid=EVERYTHING),
     _cause("TORQUE_SCALE", "its size is wrong"),
     _cause("TORQUE_TIMING", "its time does not fit the crank angle"),
-    Rule(
+    _inspect(
         code="CLEARANCE_CHANGED",
-        state=State.INSPECT,
         hits=subject_rules.diagnosed,
         why="the drive torque shows a {change}",
         do=_ROCK,
         not_valid=EVERYTHING,
     ),
-    Rule(
+    _inspect(
         code="CLEARANCE_CORRECTED",
-        state=State.INSPECT,
         hits=subject_rules.corrected,
         why="the drive torque showed a {change}; the counted clearance is corrected",
         do=_ROCK,
     ),
-    Rule(
+    _inspect(
         code="CLEARANCE_DEPARTURE",
-        state=State.INSPECT,
         hits=subject_rules.departing,
         why="the encoders show a clearance of joint {joint} that differs from the counted one by {value} "
         "(limit {limit}){past}",
@@ -125,9 +124,8 @@ RULES = (
     _cause("TORQUE_MASS", "a body has another mass", not_valid=EVERYTHING),
     _cause("MECHANISM_CHANGED", "it does not fit the counted leg", not_valid=EVERYTHING),
     _cause("TORQUE_LOAD", "a load acts at the foot", State.WATCH, OF_THE_MODEL),
-    Rule(
+    _inspect(
         code="TORQUE_MISMATCH",
-        state=State.INSPECT,
         hits=subject_rules.mismatch,
         why="the drive torque does not fit the counted leg, so the forecast is not valid: {value} of the "
         "predicted RMS is not explained (limit {limit}){past}{causes}",
@@ -139,148 +137,129 @@ RULES = (
     _cause("TORQUE_NOISE", "it has more or less noise than before", State.WATCH),
     _cause("TORQUE_BIAS", "it has a constant part that friction cannot be"),
     _cause("FRICTION_CHANGED", "the friction has changed", State.WATCH),
-    Rule(
+    _inspect(
         code="IMPACT_FORCE",
-        state=State.INSPECT,
         hits=raised("impact_force", least=Level.ERROR),
         why="the impact force in joint {joint} is {value} (limit {limit}){past}",
         do=f"{_ROCK}; check its lubrication and the cadence; {_ACKNOWLEDGE}",
     ),
-    Rule(
+    _inspect(
         code="GROWTH",
-        state=State.INSPECT,
         hits=raised("growth", least=Level.ERROR),
         why="the clearance of joint {joint} grows by {value} (limit {limit}){past}",
         do=f"{_ROCK}; check its lubrication and for dirt; {_ACKNOWLEDGE}",
     ),
-    Rule(
+    _inspect(
         code="REMAINING_LIFE",
-        state=State.INSPECT,
         hits=raised("remaining_life", least=Level.ERROR),
         why="joint {joint} reaches its limit within {value} with a probability of 10 % (limit {limit}){past}",
         do=f"{_ROCK}; plan its replacement; {_ACKNOWLEDGE}",
     ),
-    Rule(
+    _not_monitored(
         code=alarms.ALREADY_COUNTED,
-        state=State.NOT_MONITORED,
         hits=subject_rules.all_counted,
         why="everything that was received is in the ledger already: nothing was counted",
         do="nothing, if a recording was replayed again; for its report, replay it without a ledger; "
         "on a live leg, check the clock of the samples",
         not_valid=OF_THE_GAIT,
     ),
-    Rule(
+    _not_monitored(
         code=alarms.CRANK_ZERO,
-        state=State.NOT_MONITORED,
         hits=subject_rules.without_zero,
         why="{cause}",
         do="let the leg walk steadily at the commanded cadence; if the zero is still not found, check the "
         "drive torque and its parameters, or set crank.zero to known and crank.offset_rad",
         not_valid=OF_THE_GAIT,
     ),
-    Rule(
+    _not_monitored(
         code="NOT_FOLLOWED",
-        state=State.NOT_MONITORED,
         hits=subject_rules.unfollowed,
         why="{cause}",
         do=f"repair the input of the crank; {_COUNTED}",
         not_valid=OF_THE_GAIT,
     ),
-    Rule(
+    _not_monitored(
         code="BAD_INPUT",
-        state=State.NOT_MONITORED,
         hits=blinding,
         why="the {quantity} is {value} (limit {limit}){causes}",
         do=f"repair the input; {_COUNTED}",
         not_valid=OF_THE_GAIT,
     ),
-    Rule(
+    _not_monitored(
         code="NOT_THIS_LEG",
-        state=State.NOT_MONITORED,
         hits=subject_rules.doubtful,
         why="the gait does not fit this leg: {cause}",
         do="compare the parameters with the leg: mechanism, cadence, crank and drive_torque",
         not_valid=EVERYTHING,
     ),
-    Rule(
+    _not_monitored(
         code=NO_GAIT_CYCLE,
-        state=State.NOT_MONITORED,
         hits=subject_rules.no_cycle,
         why="the monitor has not received a whole gait cycle yet",
         do=f"let the leg walk; if it walks already: {_COUNTED}",
     ),
     *map(_foot_load, _FOOT_LOAD),
-    Rule(
+    _watch(
         code="FOOT_LOAD_MISSING",
-        state=State.WATCH,
         hits=of_foot_load,
         why="the {quantity} is {value} (limit {limit}){acts}",
         do="repair the sensor of the foot load or its publisher, or set foot_load.source to none",
         not_valid=OF_THE_GAIT,
     ),
-    Rule(
+    _watch(
         code="MATERIAL_LIMIT",
-        state=State.WATCH,
         hits=subject_rules.outside_limits,
         why="joint {joint}: {outside}; its wear coefficient does not hold",
         do="compare the material of the mechanism file with the part, and load and cadence with its limits; "
         f"until then, measure the clearance of joint {{joints}} regularly; {_ACKNOWLEDGE}",
         not_valid=(Figure.GROWTH, Figure.FORECAST),
     ),
-    Rule(
+    _watch(
         code="PART_REPLACED",
-        state=State.WATCH,
         hits=subject_rules.replaced,
         why="joint {joint} was replaced on {when}, {cycles} gait cycles ago",
         do="confirm by walking: let the leg walk on at the commanded cadence, and see the verdict then",
     ),
-    Rule(
+    _watch(
         code="NO_DRIVE_TORQUE",
-        state=State.WATCH,
         hits=subject_rules.no_torque,
         why="joints {joints} cannot be observed: {cause}",
         do="provide the drive torque (drive_torque.source); until then, rock the joints by hand regularly",
     ),
-    Rule(
+    _watch(
         code="TORQUE_NOT_COMPARED",
-        state=State.WATCH,
         hits=subject_rules.not_compared,
         why="the comparison of the drive torque needs more gait cycles{causes}",
         do="let the leg walk on",
     ),
-    Rule(
+    _watch(
         code="NOT_OBSERVED",
-        state=State.WATCH,
         hits=subject_rules.not_observed,
         why="the drive torque does not show the clearances of joints {joints} yet{causes}",
         do="let the leg walk on at a steady cadence{next}; until then, rock these joints by hand regularly",
     ),
-    Rule(
+    _watch(
         code="CADENCE",
-        state=State.WATCH,
         hits=subject_rules.other_cadence,
         why="the leg {walks}; the commanded cadence is {commanded} ± {tolerance}",
         do=f"walk at the commanded cadence, or set cadence.commanded_rpm; {_ACKNOWLEDGE}",
         not_valid=(Figure.FORECAST,),
     ),
-    Rule(
+    _watch(
         code="ENCODER",
-        state=State.WATCH,
         hits=subject_rules.encoder_faults,
         why="encoder {cause}",
         do="repair the encoder, or remove it from encoders.names",
     ),
-    Rule(
+    _watch(
         code="CLEARANCE_NEAR",
-        state=State.WATCH,
         hits=raised("clearance", most=Level.WARN),
         why="the {known} clearance of joint {joint} is {value}, near its limit of {limit}{past}",
         do="order the journal and the bushing of joint {joints}; at the next stop, rock the joint, measure "
         f"its radial clearance and enter it: {_MEASURE}",
     ),
-    Rule(
+    _watch(
         code="ALARM",
-        state=State.WATCH,
         hits=raised(),
         why="alarm: the {quantity} is {value} (limit {limit}){past}",
         do=f"see the status of the joint or the input; {_ACKNOWLEDGE}",

@@ -127,8 +127,8 @@ class Situation:
     doubts : tuple of str
         Why the last gait cycle is unlikely to be one of this leg.
     encoder_faults : tuple of str
-    diagnosis : Diagnosis or None
-        What the drive torque shows; None without an estimator.
+    diagnosis : Diagnosis
+        What the drive torque shows.
     explained : TorqueExplanation or None
         What explains a torque mismatch; None without one, and in its first gait cycles.
     crank, drive_torque : Crank, DriveTorque
@@ -154,7 +154,7 @@ class Situation:
     tolerance_rpm: float = math.nan
     doubts: tuple[str, ...] = ()
     encoder_faults: tuple[str, ...] = ()
-    diagnosis: Diagnosis | None = None
+    diagnosis: Diagnosis = Diagnosis()
     explained: TorqueExplanation | None = None
     crank: Crank = Crank()
     drive_torque: DriveTorque = DriveTorque()

@@ -101,10 +101,9 @@ def mismatch(situation: Situation) -> Sequence[Hit]:
 
 def changes(situation: Situation) -> tuple[Change, ...]:
     """What the drive torque shows that has changed; empty without an estimator."""
-    diagnosis = situation.diagnosis
-    if diagnosis is None or diagnosis.state is not DiagnosisState.CHANGED:
+    if situation.diagnosis.state is not DiagnosisState.CHANGED:
         return ()
-    return tuple(change for change in diagnosis.changes if not change.is_corrected)
+    return tuple(change for change in situation.diagnosis.changes if not change.is_corrected)
 
 
 def words_of(change: Change, situation: Situation) -> str:
@@ -124,8 +123,7 @@ def words_of(change: Change, situation: Situation) -> str:
 
 def doubt(situation: Situation) -> str:
     """Why what the drive torque shows is not sure; empty if it is."""
-    reason = situation.diagnosis.reason if situation.diagnosis else ""
-    return f"; {reason}" if reason else ""
+    return f"; {situation.diagnosis.reason}" if situation.diagnosis.reason else ""
 
 
 def words_for(situation: Situation) -> CauseWords:
@@ -244,8 +242,7 @@ def replaced(situation: Situation) -> Sequence[Hit]:
 
 def _is_confirmed(each: JointSituation, situation: Situation) -> bool:
     """Whether encoders or the drive torque show the counted clearance of a new part already."""
-    found = situation.diagnosis
-    is_as_counted = found is not None and found.state is DiagnosisState.AS_COUNTED
+    is_as_counted = situation.diagnosis.state is DiagnosisState.AS_COUNTED
     return bool(each.seen) and (is_as_counted or each.is_used)
 
 
@@ -266,8 +263,8 @@ def diagnosed(situation: Situation) -> Sequence[Hit]:
 
 def corrected(situation: Situation) -> Sequence[Hit]:
     """Changes by which counted clearances were corrected."""
-    found = situation.diagnosis.changes if situation.diagnosis else ()
-    return [_clearance_hit(change, situation) for change in found if change.is_corrected]
+    found = (change for change in situation.diagnosis.changes if change.is_corrected)
+    return [_clearance_hit(change, situation) for change in found]
 
 
 def _clearance_hit(change: Change, situation: Situation, addition: str = "") -> Hit:
@@ -354,7 +351,7 @@ def not_observed(situation: Situation) -> Sequence[Hit]:
     choice of somebody, and does not raise this.
     """
     found = situation.diagnosis
-    if found is None or found.state not in (DiagnosisState.WAITING, DiagnosisState.AS_COUNTED):
+    if found.state not in (DiagnosisState.WAITING, DiagnosisState.AS_COUNTED):
         return []
     blind = [each.joint for each in situation.joints if not each.seen]
     if not blind or not situation.has_cycle or not situation.has_torque:
@@ -413,11 +410,9 @@ def nothing_found(situation: Situation) -> Sequence[Hit]:
     return [Hit(words={"observed": observed}, evidence=evidence)]
 
 
-def _compared(found: Diagnosis | None) -> str:
+def _compared(found: Diagnosis) -> str:
     """What the torque shows of the clearances of a healthy leg, and what comes next; empty if nothing."""
-    if found is None:
-        return ""
-    if found.state is DiagnosisState.OFF:
+    if found.state is DiagnosisState.OFF and found.reason:
         return f"; the torque is not compared with wider joints: {found.reason}"
     known = [each for each in found.sigma_m if not math.isnan(each)]
     told = [f"{found.cycles} gait cycles show clearances to ± {amount(max(known), 'm')}"] if known else []

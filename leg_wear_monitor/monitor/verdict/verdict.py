@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 import attrs
 
 from leg_wear_monitor.estimate.cause import Cause, Change, NamedCause, TorqueExplanation
+from leg_wear_monitor.files import with_same_fields
 from leg_wear_monitor.monitor.alarms import amount, guide_of
 from leg_wear_monitor.monitor.config.inputs import AT_START, Crank, DriveTorque
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
@@ -72,12 +73,10 @@ def verdict_of(findings: Sequence[Finding]) -> Verdict:
     for each in (each for finding in (lead, *findings) for each in finding.evidence):
         evidence.setdefault(each.name, each)
     found = {figure for finding in findings for figure in finding.not_valid}
-    return Verdict(
-        state=lead.state,
-        joints=lead.joints,
+    return with_same_fields(
+        Verdict,
+        lead,
         why=lead.why + _unmonitored(lead, findings),
-        since_ns=lead.since_ns,
-        do=lead.do,
         evidence=tuple(evidence.values()),
         not_valid=tuple(figure for figure in Figure if figure in found),
         fault_code="_".join((lead.code, *lead.joints)),
@@ -171,14 +170,14 @@ class CauseWords:
     crank, torque : Crank, DriveTorque
     speed_radps : float
         Mean speed of the crank; NaN if it is not known.
-    diagnosis : Diagnosis or None
+    diagnosis : Diagnosis
         With the temperatures of the drive.
     """
 
     crank: Crank
     torque: DriveTorque
     speed_radps: float = math.nan
-    diagnosis: Diagnosis | None = None
+    diagnosis: Diagnosis = Diagnosis()
 
     def explanation(self, explained: TorqueExplanation) -> str:
         """All alternatives with their values, and what stays unexplained."""
@@ -291,7 +290,7 @@ class CauseWords:
     def _temperatures(self) -> str:
         """Temperatures of the drive now and when the leg was commissioned; empty where one is not known."""
         found = self.diagnosis
-        if found is None or found.temperature_c is None or found.commissioned_c is None:
+        if found.temperature_c is None or found.commissioned_c is None:
             return ""
         return (
             f" (the drive is at {found.temperature_c:.0f} °C, and was at {found.commissioned_c:.0f} °C then)"

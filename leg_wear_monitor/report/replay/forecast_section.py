@@ -107,7 +107,7 @@ def _validity(measurements: Sequence[Measurement]) -> Chart:
     return Chart(
         name="measurements",
         alt="Each measured clearance in its predicted distribution",
-        caption=f"{validity(measurements).words}. In the long run 80 % lie between p10 and p90.",
+        caption=f"{validity(measurements)}. In the long run 80 % lie between p10 and p90.",
         x=Series("gait cycles of the part", "", cycles),
         ends=(0.0, max(1.05 * float(cycles.max(initial=0.0)), 1.0)),
         panels=[Panel(title, series, low=-0.02, high=1.02, height=240)],

@@ -5,7 +5,7 @@ import math
 import attrs
 
 from leg_wear_monitor.files import or_nan, share_directory
-from leg_wear_monitor.monitor.alarm_specs import FIGURES
+from leg_wear_monitor.monitor.alarm_specs import KINDS
 from leg_wear_monitor.monitor.alarms import amount, joint_of, raised_words, time_words
 from leg_wear_monitor.monitor.verdict.decision import decision_of, figures_of
 from leg_wear_monitor.monitor.verdict.situation import COUNTED
@@ -92,7 +92,7 @@ def _alarm_doubt(summary: ReplaySummary, alarm: LegAlarm) -> str:
     if alarm.name in (each.name for each in summary.verdict.evidence[:1]):
         return ""
     kind, _, subject = alarm.name.partition(" ")
-    figure, clearance = FIGURES.get(kind), summary.clearances.get(subject)
+    figure, clearance = KINDS[kind].figure if kind in KINDS else None, summary.clearances.get(subject)
     if figure is Figure.CLEARANCES and clearance and clearance.believed_by not in (None, COUNTED):
         return ""
     return not_valid(summary.verdict, figure) if figure else ""

@@ -14,7 +14,7 @@ RecordBuilder = pytest.importorskip("mcap.data_stream").RecordBuilder
 
 pytestmark = pytest.mark.plain
 
-ROLES = np.zeros(2**16, np.uint8)
+ROLES = np.zeros(2**16, np.int64)
 ROLES[[1, 2, 3]] = JOINT_STATE, WRENCH_STAMPED, IGNORED
 UNKNOWN_CHANNEL = 4
 

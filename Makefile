@@ -138,7 +138,7 @@ docs-check: .venv/installed .venv-tools/installed
 # The part of it that CI has time for: uncompiled, where it is quick.
 test-oldest-quick: .venv-oldest/installed
 	NUMBA_DISABLE_JIT=1 .venv-oldest/bin/python -m pytest $(TWO) -W default -m "plain and not slow" \
-		test/contact test/messages test/monitor
+		test/contact test/estimate test/messages test/monitor
 
 clean:
 	rm -rf .venv .venv-python* .venv-oldest .venv-without-ros .venv-tools .venv-docs build dist docs/lessons *.egg-info .coverage .hypothesis .import_linter_cache .*_cache

@@ -225,6 +225,8 @@ class CauseWords:
                 return f"the constant torque has {_way(one)} by {size} since this leg was commissioned"
             case Cause.LOAD_FRICTION:
                 return f"the part of the torque that is friction has {_way(one)} by {size}, of 1"
+            case Cause.LOAD if isinstance(one, Change) and one.counted:
+                return f"the load at the foot has {_way(one)} by {size}"
             case Cause.LOAD:
                 return f"a load of {size} {'lifts' if one.value > 0.0 else 'pulls down'} the foot"
             case Cause.JOINT_FRICTION:
@@ -261,7 +263,7 @@ class CauseWords:
             case Cause.JOINT_FRICTION:
                 return "check the lubrication of the joints, and look for dirt in them"
             case Cause.LOAD:
-                return "check the load and the ground at the foot"
+                return "check the load at the foot; if the leg walks on the ground, set load.model to ground"
             case Cause.MASS:
                 return (
                     f"check for loose or added parts, and the mass of {one.subject} in the mechanism's file"

@@ -141,6 +141,7 @@ CASES = [
     (shown(Cause.NOISE), State.WATCH, "TORQUE_NOISE", ()),
     (shown(Cause.LOAD), State.WATCH, "TORQUE_LOAD", (Figure.GROWTH, Figure.IMPACT_FORCES, Figure.FORECAST)),
     (shown(Cause.FRICTION), State.WATCH, "FRICTION_CHANGED", ()),
+    (shown(Cause.JOINT_FRICTION), State.WATCH, "FRICTION_CHANGED", ()),
     ({"diagnosis": Diagnosis(state=DiagnosisState.AS_COUNTED)}, State.WATCH, "NOT_OBSERVED", ()),
     (raised("clearance_departure G", Level.WARN), State.WATCH, "ALARM_G", ()),
     (raised("clearance_departure G"), State.INSPECT, "CLEARANCE_DEPARTURE_G", ALL),
@@ -526,6 +527,26 @@ def test_a_name_that_is_not_sure_is_said_to_be_so() -> None:
     at_limit = judged(diagnosis=unsure, joints=seen("torque", 6.7e-4, 3.0e-5))
     assert f"(limit 0.6 mm); {reason}" in at_limit.why
     assert reason not in judged(diagnosis=unsure, joints=seen("encoders", 6.7e-4, 3.0e-5)).why
+
+
+@pytest.mark.parametrize(
+    ("cause", "values", "words", "remedy"),
+    [
+        (
+            Cause.JOINT_FRICTION,
+            (-0.5, 0.1, 0.0),
+            "the friction in the joints has fallen by 50 %",
+            "lubrication",
+        ),
+        (Cause.LOAD, (290.0, 5.0, 0.0), "a load of 290 N ± 5 N lifts the foot", "set load.model to ground"),
+        (Cause.LOAD, (-290.0, 5.0, 290.0), "the load at the foot has fallen by 290 N", "check the load"),
+    ],
+)
+def test_a_cause_is_said_with_its_size_and_what_to_do(cause, values, words, remedy) -> None:
+    value, sigma, counted = values
+    found = attrs.evolve(change(cause, value=value, sigma=sigma), counted=counted)
+    verdict = judged(diagnosis=diagnosis(found))
+    assert words in verdict.why and remedy in verdict.do
 
 
 @pytest.mark.parametrize("now, then", [(-5.0, 41.4), (-5.0, math.nan), (math.nan, 41.4)])

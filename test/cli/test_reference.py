@@ -22,7 +22,7 @@ def test_references_of_two_cadences_are_written_and_named(run, tmp_path: Path, m
     monkeypatch.setattr(torque_reference, "_SETTLING", 0)
     result = run("reference", "bionic_leg", "--cadence", "57", "--cadence", "-60", "--out", "leg.npz")
     assert result.exit_code == 0, result.stderr
-    assert "bionic_leg at 57 rpm: 6 legs, 1 gait cycles each" in result.stdout
+    assert "bionic_leg at 57 rpm: 24 legs, 1 gait cycles each" in result.stdout
     assert "written: leg.npz, after " in result.stdout
     assert result.stderr == ""  # no progress bar in a pipe
     (tmp_path / "monitor.yaml").write_text("/**: {ros__parameters: {diagnosis: {reference: leg.npz}}}")

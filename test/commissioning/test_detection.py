@@ -131,7 +131,7 @@ def test_without_a_reference_the_joints_are_not_judged(walked: MakeWalk) -> None
     result = with_detections(RESULT, walked(rpm=45.0), None)
     assert result.joints == ()
     assert "there is no torque reference of bionic_leg at 45 rpm" in result.reference_used
-    assert "in 39 gait cycles (52 s); --reference FILE simulates it now" in result.reference_used
+    assert "in 43 gait cycles (57 s); --reference FILE simulates it now" in result.reference_used
 
 
 def test_a_reference_that_is_asked_for_is_simulated_and_named(

@@ -111,7 +111,7 @@ def test_what_the_guides_say_of_this_recording_is_about_what_it_gives(knocked, g
     joint = json.loads((knocked[0] / "out" / "summary.json").read_text())["clearances"]["G"]
     value, sigma = (1e3 * joint[name] for name in ("believed_m", "believed_sigma_m"))
     text = (share_directory() / "docs" / guide).read_text(encoding="utf-8")
-    (told,) = re.findall(r"(1\.\d+) mm ± (0\.\d+) mm", text)
+    (told,) = re.findall(r"(2\.\d+) mm ± (0\.\d+) mm", text)
     assert abs(float(told[0]) - value) < 0.5 * sigma
     assert float(told[1]) == pytest.approx(sigma, rel=0.3)
 

@@ -34,6 +34,7 @@ from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.parameters import config_from, values_of
 from leg_wear_monitor.monitor.config.sections import drive_figures
 from leg_wear_monitor.monitor.config.settings import LedgerFile, MonitorConfig
+from leg_wear_monitor.monitor.diagnosis.gait_cycles import find_sensor, signed_cycle
 from leg_wear_monitor.monitor.diagnosis.reference_file import (
     read_references,
     shipped_references,
@@ -49,8 +50,6 @@ from leg_wear_monitor.monitor.diagnosis.state import (
     NotUsed,
     SignedCycle,
     TorqueState,
-    find_sensor,
-    signed_cycle,
 )
 from leg_wear_monitor.monitor.reports import CycleReport
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor

@@ -9,6 +9,7 @@ import numpy as np
 from leg_wear_monitor.estimate.cause import (
     CORRECTED_FROM,
     SURE_LOG_ODDS,
+    SURE_OF_NAME,
     SURE_SIGMAS,
     Cause,
     Change,
@@ -17,14 +18,14 @@ from leg_wear_monitor.estimate.change_detector import first_changed
 from leg_wear_monitor.estimate.clearance_fit import ClearanceFit, best_fit, start_of, starts_of, with_rivals
 from leg_wear_monitor.estimate.drive import DIRECT
 from leg_wear_monitor.estimate.explanations import MODEL_ERROR, Explanation, change_of, with_doubt
-from leg_wear_monitor.estimate.signature import CommissionedTorque, with_noise_of
+from leg_wear_monitor.estimate.signature import with_noise_of
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.diagnosis.references import LegModels
+from leg_wear_monitor.monitor.diagnosis.references import COMMISSIONING_CYCLES, LegModels
 from leg_wear_monitor.monitor.diagnosis.state import (
+    Interim,
     SignedCycle,
     TorqueState,
-    temperature_of,
 )
 
 SETTLING_CYCLES = 10  # since a change, before the counted clearances are corrected by it
@@ -100,6 +101,7 @@ class Evidence:
             return
         self._test(state, cycle, config)
         self._explain(state, config)
+        self._settle_told(state, config)
 
     def review(self, state: TorqueState, config: MonitorConfig) -> None:
         """Evaluate all kept cycles again, because the reference or the baseline has changed."""
@@ -123,8 +125,7 @@ class Evidence:
         """
         explainer = self._models.explainer(state)  # of the baseline before
         state.cycles = tuple(cycle for cycle in state.cycles if cycle.begin_ns >= change.since_ns)
-        signatures, before = state.signatures, state.commissioned
-        sigma_m = counted_m.copy()
+        before, sigma_m = state.commissioned, counted_m.copy()
         if before is not None and before.before is not None:  # joints that were corrected since stay known
             sigma_m = np.where(before.is_unknown, counted_m, before.sigma_m)
         sigma_m[explainer.joints.index(change.subject)] = change.sigma
@@ -132,18 +133,10 @@ class Evidence:
             signatures_before = before.signatures - before.mean + explainer.baseline.offset
             before = before.before or attrs.evolve(before, signatures=signatures_before)
         state.forget_baselines()
-        state.commissioned = CommissionedTorque(
-            state.cycles[-1].end_ns,
-            counted_m,
-            signatures,
-            sigma_m,
-            before.channel if before else DIRECT,
-            state.profile.speed,
-            temperature_of(state.cycles),
-            before=before,
+        channel = before.channel if before else DIRECT
+        state.commissioned = state.baseline(
+            state.cycles, counted_m, sigma_m=sigma_m, channel=channel, before=before
         )
-        if state.sensor is not None:
-            state.commissioned = state.commissioned.measured_by(state.sensor)
         state.settled = (*state.settled, attrs.evolve(change, is_corrected=True))
 
     def compare_with_before(self, state: TorqueState, is_last: bool = False) -> Change | None:
@@ -227,6 +220,10 @@ class Evidence:
         explanations: Sequence[Explanation] = ()
         if since_ns or state.commissioned is None:
             explanations = self._models.explainer(state).explanations(mean, len(cycles), state.counted_m)
+        if state.interim is not None:
+            explanations = self._beside_told(state, cycles, explanations, config)
+            cycles = cycles[-len(state.cycles) :]
+            mean = np.mean([cycle.signature for cycle in cycles], axis=0)
         # a leg that is not that of the reference has no names and no clearances
         is_known = state.commissioned or state.changes or state.is_load_other
         if not (is_known or self._fits(state, explanations, since_ns)):
@@ -243,6 +240,50 @@ class Evidence:
         self._keep_least(state, change, config)
         if change is None and state.is_load_new and not (state.is_load_other or state.commissioned):
             _tell_wide(state, self._models.explainer(state).joints, since_ns or cycles[0].begin_ns)
+
+    def _settle_told(self, state: TorqueState, config: MonitorConfig) -> None:
+        """Compare with a leg that stays changed otherwise than by a clearance from now on.
+
+        Otherwise it hides a joint that opens: G that broke out to 2 mm after a mass had been put on the foot
+        was that mass for good (2026-11-27).
+        """
+        is_other = state.is_load_new or state.is_load_other
+        if state.commissioned is None or not state.changes or is_other:
+            return
+        change = state.changes[-1]
+        since = tuple(cycle for cycle in state.cycles if cycle.begin_ns >= change.since_ns)
+        if change.cause in (Cause.CLEARANCE, Cause.NOISE) or len(since) < COMMISSIONING_CYCLES:
+            return
+        known = state.commissioned
+        baseline = state.baseline(since, state.counted_m, sigma_m=known.sigma_m, channel=known.channel)
+        state.interim, state.changes = Interim((*state.standing, change), baseline), ()
+        state.detector, state.fit_due = self._models.detector(state, config).fresh(), 0
+
+    def _beside_told(
+        self,
+        state: TorqueState,
+        cycles: Sequence[SignedCycle],
+        explanations: Sequence[Explanation],
+        config: MonitorConfig,
+    ) -> Sequence[Explanation]:
+        """Explanations of what changed beside the told changes, or, where these are over, of all that did.
+
+        They are over where the last gait cycles are those of the commissioned leg, and are others where one
+        of these causes alone explains as well, with another size, what would be a further one.
+        """
+        recent = cycles if explanations else cycles[-SETTLING_CYCLES:]
+        mean = np.mean([cycle.signature for cycle in recent], axis=0)
+        explainer = self._models.explainer(state, is_commissioned=True)
+        alone = explainer.explanations(mean, len(recent), state.counted_m)
+        change, told = change_of(alone, 0), [(one.cause, one.subject) for one in state.standing]
+        is_over = change is None
+        if explanations and change is not None and (change.cause, change.subject) in told:
+            is_over = alone[0].misfit <= explanations[0].misfit + 2.0 * SURE_OF_NAME
+        if not is_over:
+            return explanations
+        state.forget_interims()
+        state.cycles, state.detector = tuple(recent), self._models.detector(state, config).fresh()
+        return alone if explanations else ()
 
     def _since_ns(self, state: TorqueState, config: MonitorConfig) -> int:
         """Stamp since when the leg has changed, as told before or as detected now; 0 where it has not."""

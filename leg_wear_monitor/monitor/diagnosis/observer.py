@@ -22,6 +22,7 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.sections import drive_figures
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.evidence import Evidence, correction_of
+from leg_wear_monitor.monitor.diagnosis.gait_cycles import find_sensor, signed_cycle
 from leg_wear_monitor.monitor.diagnosis.reasons import doubt, missing, next_step, other_sensor
 from leg_wear_monitor.monitor.diagnosis.references import (
     COMMISSIONING_CYCLES,
@@ -39,9 +40,6 @@ from leg_wear_monitor.monitor.diagnosis.state import (
     NotUsed,
     TorqueSamples,
     TorqueState,
-    find_sensor,
-    signed_cycle,
-    temperature_of,
 )
 from leg_wear_monitor.state import FootLoad
 from leg_wear_monitor.twin.reference import LegParameters
@@ -298,11 +296,12 @@ class TorqueObserver(KeepsSamples):
     def diagnosis(self) -> Diagnosis:
         """What the drive torque shows now."""
         state, known = self.state, self.state.commissioned
-        is_old = not state.cycles or (len(state.unused) == UNUSED_CYCLES and not state.changes)
+        is_told = state.changes or state.standing
+        is_old = not state.cycles or (len(state.unused) == UNUSED_CYCLES and not is_told)
         is_old = (is_old or state.detector is None) and not (state.is_load_new and state.not_corrected)
         found = Diagnosis(
             next_step=next_step(state, self._references, self.config),
-            changes=state.settled,
+            changes=state.settled + state.standing,
             cycles_not_used=state.not_used,
             channel=state.sensor.channel if state.sensor else DIRECT,
             load=self._load,
@@ -321,23 +320,25 @@ class TorqueObserver(KeepsSamples):
             clearance_m=tuple(clearance_m.tolist()),
             sigma_m=tuple(sigma_m.tolist()),
             least_m=state.surely_m(self.config.alarms.on_delay_cycles),
-            changes=state.settled + state.changes,
+            changes=state.told,
         )
 
     def _observed(self, fit: ClearanceFit) -> tuple[Floats, Floats]:
         """Observable clearances and their standard deviations, NaN for the others.
 
         Nor is a joint observable that no test would find as wide as is corrected. A joint that the fit of all
-        joints does not show, or only as somebody measured it, is known from its own change. Where the
-        reference is not that of the leg, a change can have the name of another joint, and no clearance is
-        known.
+        joints does not show, or only as somebody measured it, is known from its own change, and so is one
+        that opened in a leg that stays changed otherwise. Where the reference is not that of the leg, a
+        change can have the name of another joint, and no clearance is known.
         """
         if not self.models.fits(self.state):
             nothing = np.full(len(fit.clearance_m), math.nan)
             return nothing, nothing
         observable = fit.sigma_m <= np.maximum(_ESTIMATED_M, _ESTIMATED * fit.clearance_m)
         known = self.state.commissioned
-        if known is not None and known.is_as_counted:  # a corrected one is known from its correction
+        if self.state.standing:
+            observable &= False
+        elif known is not None and known.is_as_counted:  # a corrected one is known from its correction
             unseen_m = self.models.detector(self.state, self.config).unseen_m(WINDOW_CYCLES)
             observable &= unseen_m <= CORRECTED_FROM * self.state.counted_m
         clearance_m, sigma_m = (
@@ -399,21 +400,13 @@ class TorqueObserver(KeepsSamples):
         state = self.state
         if state.commissioned is not None or state.changes or len(state.cycles) < COMMISSIONING_CYCLES:
             return
-        if state.sensor is None:
-            raise RuntimeError("there are no samples yet")
-        known = CommissionedTorque(
-            state.cycles[-1].end_ns,
-            state.counted_m,
-            state.signatures,
-            speed=state.profile.speed,
-            temperature_c=temperature_of(state.cycles),
-        )
+        known = state.baseline(state.cycles, state.counted_m)
         # what a correction left unknown is not known better at another cadence
         corrected = state.corrected
         if corrected is not None:
             sigma_m = np.where(corrected.is_unknown, state.counted_m, corrected.sigma_m)
             known = attrs.evolve(known, sigma_m=sigma_m, channel=corrected.channel)
-        state.commissioned = known.measured_by(state.sensor)
+        state.commissioned = known
         if state.is_load_new and state.load_rounds >= LOAD_ROUNDS:  # the new load explains what was told
             state.is_load_new, state.settled = False, state.corrections
         elif state.is_load_new:
@@ -425,6 +418,7 @@ class TorqueObserver(KeepsSamples):
         state = self.state
         state.counted_m = np.asarray(counted_m, float).copy()
         state.forget_cycles()
+        state.forget_interims()
         state.detector, state.has_failed = None, False
         state.changes, state.carried_n, state.least_m = (), (), ()
 

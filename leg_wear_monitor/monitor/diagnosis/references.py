@@ -93,9 +93,12 @@ class LegModels:
         """Compute the torque's derivatives by masses and lengths now: later, samples would wait too long."""
         body_torques(self._mechanism)
 
-    def explainer(self, state: TorqueState) -> Explainer:
-        """Possible explanations of the measured torque: other clearances and other causes."""
-        return self._of(state).explainer
+    def explainer(self, state: TorqueState, is_commissioned: bool = False) -> Explainer:
+        """Possible explanations of the measured torque: other clearances and other causes.
+
+        Beside what was told of a leg that stays changed, or ``is_commissioned``: of all that changed.
+        """
+        return self._of(state, is_commissioned).explainer
 
     def explainer_since(
         self, before: signature.CommissionedTorque, reference: TorqueReference, state: TorqueState
@@ -112,7 +115,7 @@ class LegModels:
         """What the estimate rests on; None without one."""
         if state.fit is None or not state.cycles:
             return None
-        explainer = self.explainer(state)
+        explainer = self.explainer(state, is_commissioned=True)
         measured = state.signatures[-max(state.fit_cycles, 1) :].mean(axis=0) - explainer.baseline.offset
         expected = (explainer.model.at(each)[0] for each in (state.counted_m, state.fit.clearance_m))
         return ExplainedTorque(*(each[: len(each) // 2] for each in (measured, *expected)))
@@ -134,7 +137,7 @@ class LegModels:
         commissioned = state.commissioned
         if state.reference is None or commissioned is None or not commissioned.is_as_counted:
             return 0.0
-        own = self._of(state)
+        own = self._of(state, is_commissioned=True)
         if own.misfit is None:
             own.misfit = misfit(own.explainer.model, own.explainer.nuisances, commissioned)
         return own.misfit
@@ -160,7 +163,7 @@ class LegModels:
 
     def ground_load(self, state: TorqueState, reference: TorqueReference) -> GroundLoad:
         """Force of the ground on the commissioned leg; the reference may be one under another force."""
-        own, known, sensor = self._of(state), state.commissioned, state.sensor
+        own, known, sensor = self._of(state, is_commissioned=True), state.commissioned, state.sensor
         if known is None or sensor is None:
             raise RuntimeError("the leg is not commissioned yet")
         linkage = build_linkage(reference.parameters.in_air.applied(self._mechanism))
@@ -178,22 +181,22 @@ class LegModels:
         return self.misfit(state) < (_UNLIKE_ON_GROUND if is_shape else identification.UNLIKE_FILE)
 
     def is_sure(self, state: TorqueState) -> bool:
-        """Whether a clearance may be corrected: the leg is known, and its drive passes enough."""
+        """Whether a clearance may be corrected: the leg is known and as it was, its drive passes enough."""
         is_near = self.misfit(state) < CORRECTED_TO or (state.is_loaded and state.rounds >= ROUNDS)
-        is_of_load = not (state.is_load_new or state.is_load_other)
-        return is_of_load and self.is_of_file(state) and is_near and not state.is_narrow
+        is_changed = state.is_load_new or state.is_load_other or bool(state.standing)
+        return not is_changed and self.is_of_file(state) and is_near and not state.is_narrow
 
-    def _of(self, state: TorqueState) -> _ModelsOfState:
+    def _of(self, state: TorqueState, is_commissioned: bool = False) -> _ModelsOfState:
         """Models of a state: kept ones if its reference, sensor and baseline are the same, or new ones."""
-        reference, sensor, known = state.reference, state.sensor, state.commissioned
+        reference, sensor = state.reference, state.sensor
+        known = state.commissioned if is_commissioned else state.compared_with
         if reference is None or sensor is None:
             raise RuntimeError("there is no reference yet")
         for one in self._kept:
             if one.reference is reference and one.commissioned is known and one.sensor == sensor:
                 return one
-        made = _ModelsOfState(
-            reference, sensor, known, explainer_of(self._mechanism, reference, sensor, known)
-        )
+        explainer = explainer_of(self._mechanism, reference, sensor, known)
+        made = _ModelsOfState(reference, sensor, known, explainer)
         self._kept = [made, *self._kept][:_MOST_KEPT]
         return made
 
@@ -473,7 +476,7 @@ class References:
                 state.parameters = legs.parameters
                 self._begin(state.parameters, counted_m, depth, legs.profile)
         elif state.commissioned is not None:
-            explainer = self._models.explainer(state)
+            explainer = self._models.explainer(state, is_commissioned=True)
             state.parameters = identification.identified_leg(
                 legs, explainer.model, explainer.nuisances, state.commissioned, self._is_drive_known
             )

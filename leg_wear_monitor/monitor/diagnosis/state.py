@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import attrs
 import numpy as np
@@ -13,11 +13,9 @@ from leg_wear_monitor.estimate.change_detector import DetectorState
 from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
 from leg_wear_monitor.estimate.drive import DIRECT, Channel
 from leg_wear_monitor.estimate.ground_load import GroundLoad
-from leg_wear_monitor.estimate.signature import CommissionedTorque, TorqueSensor, averaged, signatures
+from leg_wear_monitor.estimate.signature import CommissionedTorque, TorqueSensor
 from leg_wear_monitor.files import finite_or_none
-from leg_wear_monitor.mechanism.arrays import Floats, Ints
-from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.shown import Shown
 from leg_wear_monitor.state import FootLoad
 from leg_wear_monitor.twin import TORQUE
@@ -25,26 +23,19 @@ from leg_wear_monitor.twin.reference import (
     UNLIKE,
     CrankProfile,
     LegParameters,
-    cycle_profile,
     mean_profile,
 )
 from leg_wear_monitor.twin.sample import (
     GAIT_SAMPLE,
-    INSTANT,
     Samples,
     has_value_of,
     is_valid,
     newest,
     of_crank,
-    within,
 )
 from leg_wear_monitor.twin.torque_reference import CADENCES, TorqueReference
 
 # Samples of the crank and of the drive torque, kept until their gait cycle ends.
-
-
-_LOST = 1.5  # periods of the sensor: in a longer time between two samples, some were lost
-_LEAST_CRANK_SAMPLES = 40  # in a gait cycle, for its profile
 
 
 @attrs.frozen(eq=False)
@@ -66,61 +57,10 @@ class TorqueSamples:
         return TorqueSamples(newest(self.crank, stamp_ns), newest(self.torque, stamp_ns))
 
 
-class CycleTorque(NamedTuple):
-    """Drive torque over a gait cycle.
-
-    ``angle`` (n,) crank angle [rad], ``torque`` (n,) [N m], ``step`` (n,) torque less that of the sample
-    before [N m], NaN where that was lost; ``profile`` how the crank turned; ``jitter`` median departure of
-    the times between samples from the sensor's period, as a fraction of it; ``temperature_c`` mean
-    temperature of the drive, NaN where it is not measured.
-    """
-
-    angle: Floats
-    torque: Floats
-    step: Floats
-    profile: CrankProfile
-    jitter: float
-    temperature_c: float
-
-
-def _jitter(between_ns: Ints, period_ns: float) -> float:
-    """Median departure of times between samples (n,) from a period, as a fraction of it."""
-    return float(np.median(np.abs(between_ns - period_ns))) / period_ns
-
-
 def mean_of(values: Floats) -> float:
     """Mean of those values (n,) that are finite; NaN without any."""
     known = values[np.isfinite(values)]
     return float(known.mean()) if len(known) else math.nan
-
-
-def cycle_torque(kept: TorqueSamples, begin_ns: int, end_ns: int, sensor: TorqueSensor) -> CycleTorque | None:
-    """Drive torque between two passages of the crank's zero; None where samples are too few.
-
-    Samples that come faster than signatures need are averaged.
-    """
-    cranks, torques = within(kept.crank, begin_ns, end_ns), within(kept.torque, begin_ns, end_ns)
-    crank_ns, crank = cranks["stamp_ns"], cranks["crank_angle_rad"]
-    torque_ns, torque = torques["stamp_ns"], torques["torque_nm"]
-    if len(crank_ns) < _LEAST_CRANK_SAMPLES or len(torque_ns) < 2 * sensor.together:
-        return None
-    turned: Floats = np.asarray(np.unwrap(crank, period=TURN), dtype=np.float64)
-    since_s = np.asarray(1.0e-9 * (crank_ns - begin_ns), dtype=np.float64)
-    profile = cycle_profile(since_s, turned, 1.0e-9 * (end_ns - begin_ns))
-    gap = np.diff(torque_ns, prepend=torque_ns[0]) > _LOST * 1.0e9 * sensor.period_s
-    # the ends are passages of zero, which torques may be nearer to than the first and the last crank angle
-    ends = TURN * np.round(turned[[0, -1]] / TURN)
-    place = np.concatenate([[begin_ns], crank_ns, [end_ns]])
-    angle = np.interp(torque_ns, place, np.concatenate([ends[:1], turned, ends[1:]]))
-    if sensor.together > 1:
-        angle = angle[sensor.together - 1 :: sensor.together]
-        torque = averaged(torque, sensor.together)
-        gap = averaged(gap.astype(float), sensor.together) > 0.0
-        angle = angle[: len(torque)]
-    step = np.diff(torque, prepend=np.nan)
-    step[gap] = np.nan
-    jitter = _jitter(np.diff(torque_ns), 1.0e9 * sensor.period_s)
-    return CycleTorque(angle, torque, step, profile, jitter, mean_of(torques["temperature_c"]))
 
 
 # What the measured drive torque shows of the clearances, compared with those that the monitor counts.
@@ -193,7 +133,7 @@ class Diagnosis(Shown):
         row as an alarm waits for; minus infinity before.
     changes : tuple of Change
         Significant departures, the oldest first: those by which counted clearances were corrected, and, where
-        the state is CHANGED, the one that is not settled yet.
+        the state is CHANGED, those of a leg that stays changed, and the one that is not settled yet.
     channel : Channel
         Delay, low-pass and load friction of the drive by the commissioned gait cycles; of a drive that adds
         nothing before.
@@ -268,6 +208,22 @@ def temperature_of(cycles: Sequence[SignedCycle]) -> float:
 
 
 @attrs.frozen(eq=False)
+class Interim:
+    """A leg that stays changed otherwise than by a clearance: joints that open then are seen beside it.
+
+    Attributes
+    ----------
+    changes : tuple of Change
+        What was told of it, the oldest first.
+    baseline : CommissionedTorque
+        Of the gait cycles since.
+    """
+
+    changes: tuple[Change, ...]
+    baseline: CommissionedTorque
+
+
+@attrs.frozen(eq=False)
 class AtCadence:
     """What is known of a leg at one cadence, more precisely under one motion of the crank.
 
@@ -281,6 +237,7 @@ class AtCadence:
         The last gait cycles.
     is_final : bool
         Whether a reference with the identified parameters explained the leg less well.
+    interim : Interim or None
     """
 
     reference: TorqueReference
@@ -288,6 +245,7 @@ class AtCadence:
     commissioned: CommissionedTorque | None = None
     cycles: tuple[SignedCycle, ...] = ()
     is_final: bool = False
+    interim: Interim | None = None
 
 
 @attrs.define
@@ -314,6 +272,8 @@ class TorqueState:
         At the reference's cadence.
     is_final : bool
         As of `AtCadence`.
+    interim : Interim or None
+        What gait cycles are compared with instead of the baseline.
     set_aside : tuple of AtCadence
         Other cadences, the last one first.
     baselines : tuple of CommissionedTorque
@@ -370,6 +330,7 @@ class TorqueState:
     cycles: tuple[SignedCycle, ...] = ()
     commissioned: CommissionedTorque | None = None
     is_final: bool = False
+    interim: Interim | None = None
     set_aside: tuple[AtCadence, ...] = ()
     baselines: tuple[CommissionedTorque, ...] = ()
     detector: DetectorState | None = None
@@ -404,6 +365,13 @@ class TorqueState:
         """Signatures (n, F) of the kept cycles."""
         return np.array([cycle.signature for cycle in self.cycles])
 
+    def baseline(self, cycles: Sequence[SignedCycle], counted_m: Floats, **more: Any) -> CommissionedTorque:
+        """Baseline of some gait cycles by the present sensor; ``more`` are further attributes."""
+        signatures, temperature_c = np.array([one.signature for one in cycles]), temperature_of(cycles)
+        own = {"speed": self.profile.speed, "temperature_c": temperature_c, **more}
+        found = CommissionedTorque(cycles[-1].end_ns, counted_m, signatures, **own)
+        return found.measured_by(self.sensor) if self.sensor else found
+
     @property
     def profile(self) -> CrankProfile:
         """Mean motion of the crank in the kept cycles, or in those that wait where there are none."""
@@ -435,8 +403,8 @@ class TorqueState:
         """All cadences with a reference, the present one first."""
         if self.reference is None or self.sensor is None:
             return self.set_aside
-        own = AtCadence(self.reference, self.sensor, self.commissioned, self.cycles, self.is_final)
-        return own, *self.set_aside
+        known = self.commissioned, self.cycles, self.is_final, self.interim
+        return AtCadence(self.reference, self.sensor, *known), *self.set_aside
 
     @property
     def all_commissioned(self) -> tuple[CommissionedTorque, ...]:
@@ -444,14 +412,33 @@ class TorqueState:
         return (*(one.commissioned for one in self.known if one.commissioned), *self.baselines)
 
     @property
+    def compared_with(self) -> CommissionedTorque | None:
+        """What gait cycles are compared with: the baseline, or the leg that stays changed."""
+        return self.interim.baseline if self.interim else self.commissioned
+
+    @property
     def corrections(self) -> tuple[Change, ...]:
         """Changes by which the counted clearances were corrected."""
         return tuple(change for change in self.settled if change.is_corrected)
 
     @property
+    def standing(self) -> tuple[Change, ...]:
+        """Told changes that later gait cycles are seen beside; at a cadence without any, those of another."""
+        if self.interim is not None:
+            return self.interim.changes
+        others = next((one.interim.changes for one in self.set_aside if one.interim), ())
+        again = [(one.cause, one.subject) for one in self.changes]
+        return tuple(one for one in others if (one.cause, one.subject) not in again)
+
+    @property
+    def told(self) -> tuple[Change, ...]:
+        """All changes, the oldest first."""
+        return self.settled + self.standing + self.changes
+
+    @property
     def not_corrected(self) -> tuple[Change, ...]:
-        """Changes by which they were not."""
-        return tuple(change for change in self.settled + self.changes if not change.is_corrected)
+        """Changes by which counted clearances were not corrected."""
+        return tuple(change for change in self.told if not change.is_corrected)
 
     @property
     def not_by_load(self) -> tuple[Change, ...]:
@@ -475,7 +462,7 @@ class TorqueState:
         """Make another cadence the present one; what was found of changes stays."""
         self.set_aside = tuple(each for each in self.known if each is not one)[: CADENCES - 1]
         self.reference, self.sensor, self.commissioned = one.reference, one.sensor, one.commissioned
-        self.cycles, self.is_final, self.fit_due = one.cycles, one.is_final, 0
+        self.cycles, self.is_final, self.interim, self.fit_due = one.cycles, one.is_final, one.interim, 0
 
     def begin_cadence(self, reference: TorqueReference) -> None:
         """Begin a new cadence with the gait cycles that waited for its reference.
@@ -510,7 +497,7 @@ class TorqueState:
         """Go on with another sensor; baselines, gait cycles and what they show are of the former one."""
         self.baselines, known = self.all_commissioned, self.known
         self.forget_cycles()
-        self.sensor, self.reference, self.set_aside = sensor, None, ()
+        self.sensor, self.reference, self.interim, self.set_aside = sensor, None, None, ()
         self.detector, self.fit, self.changes, self.least_m = None, None, (), ()
         for one in reversed(known):
             baseline = self.take_baseline(one.reference.profile.speed)
@@ -546,64 +533,23 @@ class TorqueState:
         """Forget the baselines with gait cycles after a stamp, at all cadences."""
         self._baselines_as(lambda one: None if one.stamp_ns > since_ns else one)
 
+    def forget_interims(self) -> None:
+        """Compare with the baselines again, at all cadences: what was told beside them is over."""
+        self.interim = None
+        self.set_aside = tuple(attrs.evolve(one, interim=None) for one in self.set_aside)
+
     def _baselines_as(self, of: Callable[[CommissionedTorque], CommissionedTorque | None]) -> None:
         """Replace the baselines of all cadences; None forgets one."""
-        self.commissioned = self.commissioned and of(self.commissioned)
+
+        def interim(one: Interim | None) -> Interim | None:
+            baseline = of(one.baseline) if one else None
+            return attrs.evolve(one, baseline=baseline) if one and baseline else None
+
+        self.commissioned, self.interim = self.commissioned and of(self.commissioned), interim(self.interim)
         self.set_aside = tuple(
-            attrs.evolve(one, commissioned=one.commissioned and of(one.commissioned))
+            attrs.evolve(
+                one, commissioned=one.commissioned and of(one.commissioned), interim=interim(one.interim)
+            )
             for one in self.set_aside
         )
         self.baselines = tuple(filter(None, map(of, self.baselines)))
-
-
-# Gait cycles with the signature of their torque, from the samples that an observer keeps.
-
-
-# of the sensor's period: steps between samples at times that are more irregular say nothing of its roughness
-_JITTER = 0.15
-
-# of the period: one so near the border between two rounded ones may be either of them in another run
-_ROUNDED = (1.0, 0.995, 1.005)
-
-
-def find_sensor(
-    state: TorqueState, begin_ns: int, end_ns: int, config: MonitorConfig, size_nm: float
-) -> None:
-    """Find the sensor's period in the first gait cycle with torques, and again where its rate has changed.
-
-    What is known of the leg is not given up for a short disturbance, nor a change that was found.
-    """
-    own = state.sensor
-    is_known = state.reference is not None or len(state.waiting) >= FIRST_CYCLES
-    last = (NotUsed.JITTER,) * (UNUSED_CYCLES if is_known else UNUSABLE_CYCLES)
-    if own is not None and (state.changes or state.unused[-len(last) :] != last):
-        return
-    between_ns = np.diff(within(state.samples.torque, begin_ns, end_ns)["stamp_ns"])
-    period_ns = float(np.median(between_ns)) if len(between_ns) > 1 else math.nan
-    if math.isnan(period_ns) or (own is not None and _jitter(between_ns, period_ns) > _JITTER):
-        return
-    near = [float(f"{part * (1.0e-9 * period_ns):.2g}") for part in _ROUNDED]
-    known = {one.period_s for one in state.baselines}
-    period_s = next((one for one in near if one in known), near[0])
-    # as commanded: a reference, and all of its signatures, are for one cadence
-    cycle_s = 60.0 / abs(config.cadence.commanded_rpm)
-    if own is None or own.period_s != period_s:
-        is_instant = config.drive_torque.sampling == INSTANT
-        state.measure_with(TorqueSensor(period_s, cycle_s, size_nm, is_instant))
-
-
-def signed_cycle(state: TorqueState, begin_ns: int, end_ns: int) -> SignedCycle | NotUsed:
-    """A gait cycle between two stamps, or why it has no signature."""
-    sensor = state.sensor
-    if sensor is None or not sensor.phases:
-        return NotUsed.GAP
-    torque = cycle_torque(state.samples, begin_ns, end_ns, sensor)
-    if torque is None:
-        return NotUsed.GAP
-    if torque.jitter > _JITTER:
-        return NotUsed.JITTER
-    first = np.zeros(len(torque.angle), np.int64)
-    signature = signatures(first, torque.angle, torque.torque, torque.step, sensor)[0]
-    if not np.isfinite(signature).all():
-        return NotUsed.GAP
-    return SignedCycle(begin_ns, end_ns, signature, torque.profile, torque.temperature_c)

@@ -16,9 +16,8 @@ from leg_wear_monitor.mechanism.person import nominal_stance
 from leg_wear_monitor.mechanism.position import TURN, build_linkage
 from leg_wear_monitor.monitor.config.inputs import Load
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.diagnosis import evidence, reasons, references
+from leg_wear_monitor.monitor.diagnosis import evidence, gait_cycles, reasons, references
 from leg_wear_monitor.monitor.diagnosis import observer as observer_module
-from leg_wear_monitor.monitor.diagnosis import state as state_module
 from leg_wear_monitor.monitor.diagnosis.evidence import SETTLING_CYCLES, correction_of
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
@@ -49,7 +48,7 @@ def short():
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(torque_reference, "CYCLES", 1)
         patched.setattr(torque_reference, "PACE", 1)
-        for where in (observer_module, reasons):
+        for where in (observer_module, reasons, evidence):
             patched.setattr(where, "COMMISSIONING_CYCLES", COMMISSIONING_CYCLES)
         yield
 
@@ -644,6 +643,40 @@ def test_a_mass_on_the_leg_is_no_joint(commissioned, beside_a_mass) -> None:
     assert found.state is DiagnosisState.CHANGED
 
 
+def test_a_joint_that_opens_in_a_leg_that_stays_changed_is_told_beside_that(commissioned, reference) -> None:
+    """Seen before: G that broke out after the torque had become late was that lag for good."""
+    observer, late = commissioned(), [0] * (COMMISSIONING_CYCLES + 8)
+    assert walk_on(observer, reference, late, delay_s=0.01) == []
+    (change,) = observer.diagnosis.changes
+    assert change.cause in (Cause.LAG, Cause.TIMING)
+    assert np.isnan(observer.diagnosis.clearance_m).all()  # of a joint that opened as the torque became late
+
+    observer = commissioned()
+    assert walk_on(observer, reference, [*late, *[leg_number(2, 5.0)] * 6], delay_s=0.01) == []
+    found = observer.diagnosis
+    lag, opened = found.changes
+    assert (lag.cause, opened.cause, opened.subject) == (change.cause, Cause.CLEARANCE, "G")
+    assert opened.is_sure
+    assert abs(opened.value - 1.5e-3) < 2.0 * opened.sigma
+    assert np.isfinite(found.clearance_m).tolist() == [joint == "G" for joint in JOINTS]
+    assert found.least_m[2] > MonitorConfig().limits.clearance_m
+
+
+def test_a_change_that_is_over_is_not_told_and_the_clearances_are_known_again(
+    leg, commissioned, reference
+) -> None:
+    observer, heavy = commissioned(), int(reference.of_masses[list(leg.bodies).index("foot"), 1])
+    numbers = [heavy] * (COMMISSIONING_CYCLES + 8)
+    walk_on(observer, reference, numbers)
+    assert [change.cause for change in observer.diagnosis.changes] == [Cause.MASS]
+
+    observer = commissioned()
+    walk_on(observer, reference, numbers + [0] * 14)
+    found = observer.diagnosis
+    assert (found.state, found.changes) == (DiagnosisState.AS_COUNTED, ())
+    assert np.abs(np.array(found.clearance_m) - NEW).max() < 4.0 * np.max(found.sigma_m)
+
+
 @pytest.mark.parametrize("load_n", [300.0, 50.0])
 def test_a_leg_that_is_put_on_the_ground_has_a_load_and_no_wide_joint(
     leg, commissioned, reference, load_n: float
@@ -907,7 +940,8 @@ SLOWER_NS = round(10**9 / 0.95)
 @pytest.fixture
 def two_cadences(leg, reference, monkeypatch) -> TorqueObserver:
     """An observer with references at 60 and 57 rpm that soon has a baseline at each."""
-    monkeypatch.setattr(observer_module, "COMMISSIONING_CYCLES", 10)
+    for where in (observer_module, evidence):
+        monkeypatch.setattr(where, "COMMISSIONING_CYCLES", 10)
     monkeypatch.setattr(references, "UNLIKE_CYCLES", 3)
     slower = attrs.evolve(reference, profile=CrankProfile.steady(0.95 * TURN))
     return observer_of(leg, references=[slower])
@@ -929,6 +963,18 @@ def test_each_cadence_has_its_own_baseline_and_reference(two_cadences, reference
     assert observer.diagnosis.cycles_not_used == {"unlike": 3}
     assert observer.state.reference.profile.speed == TURN
     assert not observer.state.changes
+
+
+def test_a_told_change_stays_told_once_at_another_cadence(leg, two_cadences, reference) -> None:
+    observer, block = two_cadences, samples(reference, [0] * 20)
+    heavy = samples(reference, [int(reference.of_masses[list(leg.bodies).index("foot"), 1])] * 20)
+    at = walk_at(observer, block, 10**9, START_NS)
+    at = walk_at(observer, block, SLOWER_NS, at)
+    at = walk_at(observer, heavy, 10**9, at)
+    assert observer.state.interim is not None
+    for cycles in (1, 1, 8, 8):
+        at = walk_at(observer, heavy, SLOWER_NS, at, cycles)
+        assert [change.cause for change in observer.diagnosis.changes] == [Cause.MASS]
 
 
 def test_what_a_correction_left_unknown_is_not_known_at_another_cadence(two_cadences, reference) -> None:
@@ -1096,7 +1142,7 @@ def test_the_rate_is_found_again_where_the_first_gait_cycles_had_another(leg, co
 def test_what_is_known_of_a_leg_is_given_up_for_another_rate_only_where_it_stays(
     commissioned, reference, monkeypatch
 ) -> None:
-    monkeypatch.setattr(state_module, "UNUSED_CYCLES", 4)
+    monkeypatch.setattr(gait_cycles, "UNUSED_CYCLES", 4)
     observer = commissioned()
     known, seen = observer.state.commissioned, observer.state.reference
 

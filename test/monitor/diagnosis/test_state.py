@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 
 from leg_wear_monitor.estimate.signature import SimulatedSensor, TorqueSensor, signatures
 from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.monitor.diagnosis.gait_cycles import cycle_torque
 from leg_wear_monitor.monitor.diagnosis.state import (
     WINDOW_CYCLES,
     SignedCycle,
     TorqueSamples,
     TorqueState,
-    cycle_torque,
 )
 from leg_wear_monitor.twin.reference import POINTS, CrankProfile, LegParameters
 from leg_wear_monitor.twin.sample import CRANK, TORQUE, gait_samples

@@ -1157,7 +1157,7 @@ def test_what_is_known_of_a_leg_is_given_up_for_another_rate_only_where_it_stays
     assert observer.state.sensor.period_s == 0.01 and observer.state.reference is seen
     assert observer.state.commissioned is None
     assert "now 100 Hz, means, 40 phases" in observer.diagnosis.reason
-    later = SimpleNamespace(since_ns=2 * START_NS)
+    later = opening("A", 4e-4, 1e-5, 2 * START_NS)
     observer.state.changes = (later,)  # a change that was found stays
     at(COMMISSIONING_CYCLES + 11, 6, of=1)
     assert observer.state.sensor.period_s == 0.01

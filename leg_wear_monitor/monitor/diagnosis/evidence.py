@@ -268,17 +268,22 @@ class Evidence:
     ) -> Sequence[Explanation]:
         """Explanations of what changed beside the told changes, or, where these are over, of all that did.
 
-        They are over where the last gait cycles are those of the commissioned leg, and are others where one
-        of these causes alone explains as well, with another size, what would be a further one.
+        They are over where the last gait cycles are those of the commissioned leg; they are others where one
+        of these causes alone explains as well, with another size, what would be a further one, and where what
+        was unknown is known by now.
         """
         recent = cycles if explanations else cycles[-SETTLING_CYCLES:]
         mean = np.mean([cycle.signature for cycle in recent], axis=0)
         explainer = self._models.explainer(state, is_commissioned=True)
         alone = explainer.explanations(mean, len(recent), state.counted_m)
         change, told = change_of(alone, 0), [(one.cause, one.subject) for one in state.standing]
-        is_over = change is None
-        if explanations and change is not None and (change.cause, change.subject) in told:
-            is_over = alone[0].misfit <= explanations[0].misfit + 2.0 * SURE_OF_NAME
+        if change is None:
+            is_over = True
+        elif explanations:
+            as_well = explanations[0].misfit + 2.0 * SURE_OF_NAME
+            is_over = (change.cause, change.subject) in told and alone[0].misfit <= as_well
+        else:
+            is_over = (Cause.UNKNOWN, "") in told and change.cause is not Cause.UNKNOWN
         if not is_over:
             return explanations
         state.forget_interims()

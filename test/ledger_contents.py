@@ -1,4 +1,9 @@
-"""What an entry of a ledger holds, to the bit, to be compared."""
+"""What an entry of a ledger holds, to the bit, to be compared; and a ledger in the midst of a transaction."""
+
+import shutil
+import sqlite3
+from contextlib import closing
+from pathlib import Path
 
 import attrs
 
@@ -13,3 +18,16 @@ def contents(entry: Entry | None) -> object:
     alarms = [(a.kind, a.subject, a.level, a.present, a.acknowledged, a.raised_ns) for a in entry.alarms]
     spans = entry.spans, entry.loads
     return entry.stamp_ns, joints, sorted(entry.totals.items()), sorted(alarms), spans
+
+
+def keep_journal(path: Path, journal: Path, cut: Path | None = None) -> None:
+    """Copy a ledger's journal, and the ledger, in the midst of a transaction, as a power cut leaves them."""
+    with closing(sqlite3.connect(path, isolation_level=None)) as db:
+        db.execute("PRAGMA cache_size = 1")
+        db.execute("BEGIN")
+        db.execute("UPDATE surface SET depth = zeroblob(length(depth))")
+        db.execute("UPDATE span SET end_ns = 1")
+        shutil.copy(f"{path}-journal", journal)
+        if cut:
+            shutil.copy(path, cut)
+        db.execute("ROLLBACK")

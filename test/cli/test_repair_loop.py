@@ -175,21 +175,6 @@ def test_a_repair_in_the_ledger_of_a_fleet_shows_at_the_next_update(run, tmp_pat
     assert "forecasts: 1 renewed" in run(*update).stdout
 
 
-@pytest.mark.slow  # monitor/alarms/test_alarm.py holds it for a value, the next test what is kept
-def test_acknowledged_alarms_clear_once_their_values_have_returned(run, ledger, tmp_path):
-    first = run("acknowledge", "--ledger", ledger)
-    assert (first.exit_code, first.stdout) == (
-        0,
-        "cleared: none; still present: clearance G, torque_mismatch\n",
-    )
-    config = tmp_path / "leg.yaml"
-    config.write_text((BAGS / "healthy.yaml").read_text().replace("healthy", "knocking"))
-    run("replay", str(BAGS / "healthy.mcap"), "--config", str(config), "--ledger", ledger, "--json", "s.json")
-    found = json.loads((tmp_path / "s.json").read_text())
-    assert not any(alarm["level"] != "OK" for alarm in found["alarms"]["now"])
-    assert run("acknowledge", "--ledger", ledger).stdout == "cleared: none; still present: none\n"
-
-
 def test_acknowledged_alarms_are_kept_as_such_but_not_by_a_dry_run(run, ledger, tmp_path):
     before = (tmp_path / "wear.ledger").read_bytes()
     told = run("acknowledge", "--ledger", ledger, "--dry-run").stdout

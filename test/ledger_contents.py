@@ -4,6 +4,7 @@ import shutil
 import sqlite3
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import attrs
 
@@ -18,6 +19,12 @@ def contents(entry: Entry | None) -> object:
     alarms = [(a.kind, a.subject, a.level, a.present, a.acknowledged, a.raised_ns) for a in entry.alarms]
     spans = entry.spans, entry.loads
     return entry.stamp_ns, joints, sorted(entry.totals.items()), sorted(alarms), spans
+
+
+def rows_of(path: Path, query: str) -> list[Any]:
+    """What a query finds in a ledger."""
+    with closing(sqlite3.connect(path)) as db:
+        return db.execute(query).fetchall()
 
 
 def keep_journal(path: Path, journal: Path, cut: Path | None = None) -> None:

@@ -1,14 +1,14 @@
 """Wear to be kept, without a leg that made it."""
 
-import sqlite3
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import closing
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 import pytest
+from ledger_contents import rows_of
 
 from leg_wear_monitor import Mechanism, WearMonitor
 from leg_wear_monitor import open_ledger as wear_ledger
@@ -81,12 +81,7 @@ def reopened(open_ledger: Callable[..., Ledger], entry_at: Callable[[int], Entry
 @pytest.fixture
 def rows(tmp_path: Path) -> Callable[[str], list[Any]]:
     """What a query finds in the ledger of this test."""
-
-    def found(query: str) -> list[Any]:
-        with closing(sqlite3.connect(tmp_path / "wear.ledger")) as db:
-            return db.execute(query).fetchall()
-
-    return found
+    return partial(rows_of, tmp_path / "wear.ledger")
 
 
 @pytest.fixture

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from ledger_contents import rows_of
+from told import as_new
 
 from leg_wear_monitor import Mechanism, WearMonitor
 from leg_wear_monitor import open_ledger as wear_ledger
@@ -130,11 +131,10 @@ def gait() -> Callable[..., Samples]:
 @pytest.fixture(scope="session")
 def new_monitor(leg: Mechanism) -> Callable[..., WearMonitor]:
     """Makes a monitor of the default leg as new, without a ledger; always the same one: tables take time."""
-    one = WearMonitor(leg)
-    new = one.snapshot()
+    renewed = as_new(WearMonitor(leg))
 
     def again(values: Mapping[str, Any] = MappingProxyType({})) -> WearMonitor:
-        one.restore(new)
+        one = renewed()
         one.configure(config_from(values))
         return one
 

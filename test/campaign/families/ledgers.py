@@ -13,7 +13,7 @@ from pathlib import Path
 
 import attrs
 import numpy as np
-from ledger_contents import keep_journal
+from ledger_contents import contents, keep_journal
 
 from campaign.case import Case, Outcome
 
@@ -96,7 +96,6 @@ def _open(path: Path):  # type: ignore[no-untyped-def]
 
 def _state(ledger) -> str:  # type: ignore[no-untyped-def]
     """All that a monitor takes from a ledger."""
-    from ledger_contents import contents
 
     parts = (
         contents(ledger.entry),

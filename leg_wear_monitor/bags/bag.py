@@ -271,7 +271,7 @@ def _by_number(path: Path) -> tuple[list[tuple[int, str]], str]:
 
 
 def find_topic(
-    stream: Stream, given: str | None, topics: Iterable[str], where: str, beside: str | None = None
+    stream: Stream, given: str | None, topics: Iterable[str], where: str, beside: str | None
 ) -> str | None:
     """Topic of a stream: the given one, else its name beside the crank's, in the root, or in one namespace.
 

@@ -206,7 +206,7 @@ _MOST_BAD = 10
 
 
 def leg_overview(
-    leg: FleetLeg, directory: LegDirectory, before: LegOverview | None, fault: str = ""
+    leg: FleetLeg, directory: LegDirectory, before: LegOverview | None, fault: str
 ) -> LegOverview:
     """A leg at a glance.
 

@@ -386,7 +386,7 @@ def of_joint(arrays: Arrays, name: str, joint: str) -> Spread:
     return spread(arrays[name][:, k, BUSHING].max(axis=1) if name == DEPTH else arrays[name][..., k])
 
 
-def worst_zone(arrays: Arrays, joint: str, fraction: float = 0.9) -> tuple[float, float] | None:
+def worst_zone(arrays: Arrays, joint: str, fraction: float) -> tuple[float, float] | None:
     """Narrowest zone of a joint's bushing that contains a fraction of its wear, averaged over runs.
 
     Begin and end [deg] in the bushing's frame, as `wear_zone` returns them; None without wear.

@@ -31,13 +31,14 @@ if TYPE_CHECKING:
 
 
 @cache
-def package_digest() -> str:
-    """Digest of all sources of this package."""
-    home = Path(__file__).parent
-    digest = hashlib.sha256()
+def package_digest(*parts: str) -> str:
+    """Digest of the sources in files and folders of this package; of all without."""
+    home, digest = Path(__file__).parent, hashlib.sha256()
     for source in sorted(home.rglob("*.py")):
-        digest.update(f"{source.relative_to(home).as_posix()}\n".encode())
-        digest.update(source.read_bytes())
+        path = source.relative_to(home)
+        if not parts or path.parts[0] in parts or path.as_posix() in parts:
+            digest.update(f"{path.as_posix()}\n".encode())
+            digest.update(source.read_bytes())
     return digest.hexdigest()[:20]
 
 

@@ -16,6 +16,8 @@ from ruamel.yaml import YAML
 from ruamel.yaml.parser import Parser
 
 from leg_wear_monitor import Mechanism, load_mechanism
+from leg_wear_monitor.compiled import cache as code_cache
+from leg_wear_monitor.compiled import kernel
 from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.mechanism.position import Linkage, build_linkage
 
@@ -32,6 +34,21 @@ else:  # the extra `bags` is not installed
 # the first example may wait for a compilation, so there is no deadline
 settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=50)
 settings.load_profile("repeatable")
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """An empty cache of compiled code, as a new process would find it."""
+
+    def forget() -> None:
+        for cached in (code_cache._home, code_cache.code_directory, kernel.cache_directory):
+            cached.cache_clear()
+
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    forget()
+    yield tmp_path / "cache" / "leg_wear_monitor"
+    monkeypatch.undo()
+    forget()
 
 
 def untraced(call: Callable[..., Any]) -> Callable[..., Any]:

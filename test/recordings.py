@@ -126,12 +126,15 @@ def write_bag():
 
 
 @pytest.fixture(scope="session")
-def write_database(store):
-    """Write messages of known types as a .db3 bag with rosbags' own writer."""
+def write_rosbag(store):
+    """Write messages of known types as a bag directory with rosbags' own writer."""
     rosbag2 = pytest.importorskip("rosbags.rosbag2")
 
-    def write(directory, sent):
-        with rosbag2.Writer(directory, version=9, storage_plugin=rosbag2.StoragePlugin.SQLITE3) as writer:
+    def write(directory, sent, storage, mode="NONE"):
+        writer = rosbag2.Writer(directory, version=9, storage_plugin=rosbag2.StoragePlugin[storage])
+        if mode != "NONE":
+            writer.set_compression(rosbag2.CompressionMode[mode], rosbag2.CompressionFormat.ZSTD)
+        with writer:
             ours = [each for each in sent if each.type in store.types]
             connections = {
                 topic: writer.add_connection(topic, kind, typestore=store)
@@ -139,10 +142,15 @@ def write_database(store):
             }
             for each in ours:
                 writer.write(connections[each.topic], each.log_time_ns, each.raw)
-        (path,) = directory.glob("*.db3")
-        return path
+        return directory
 
     return write
+
+
+@pytest.fixture(scope="session")
+def write_database(write_rosbag):
+    """The file of such a bag in SQLite."""
+    return lambda directory, sent: next(write_rosbag(directory, sent, "SQLITE3").glob("*.db3"))
 
 
 @pytest.fixture(scope="session")

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from leg_wear_monitor.compiled import cache
 from leg_wear_monitor.compiled.cache import code_directory, fault_of, make_private
 from leg_wear_monitor.errors import ConfigWarning
 
@@ -169,27 +168,10 @@ def test_where_no_place_is_safe_nothing_is_kept(shared):
 
 
 @pytest.mark.plain
-def test_the_usual_place_is_taken_without_a_word(tmp_path, monkeypatch):
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    cache._home.cache_clear()
+def test_the_usual_place_is_taken_without_a_word(place):
     with warnings.catch_warnings():
         warnings.simplefilter("error", ConfigWarning)
-        assert code_directory("a leaf of this test") == tmp_path / "leg_wear_monitor" / "a leaf of this test"
-    cache._home.cache_clear()
-
-
-@pytest.fixture
-def place(tmp_path, monkeypatch):
-    """An empty cache, in a process that has not looked for one."""
-
-    def forget():
-        cache._home.cache_clear()
-        code_directory.cache_clear()
-
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
-    forget()
-    yield tmp_path / "cache" / "leg_wear_monitor"
-    forget()
+        assert code_directory("a leaf of this test") == place / "a leaf of this test"
 
 
 @pytest.mark.plain

@@ -83,12 +83,9 @@ def _check_simple(text: str) -> None:
 def _structured(information: Any) -> tuple[list[str], dict[str, str]]:
     names = [Path(name).name for name in information["relative_file_paths"]]
     topics = [topic["topic_metadata"] for topic in information.get("topics_with_message_count", [])]
-    types = {topic["name"]: topic["type"] for topic in topics if _is_text(topic["name"], topic["type"])}
+    named = [(topic["name"], topic["type"]) for topic in topics]
+    types = {name: kind for name, kind in named if isinstance(name, str) and isinstance(kind, str)}
     return list(dict.fromkeys(names)), types
-
-
-def _is_text(*values: object) -> bool:
-    return all(isinstance(value, str) for value in values)
 
 
 # Resolve what a user names to an ordered list of recordings: bags (plain, split, compressed) and tables.
@@ -274,7 +271,7 @@ def _by_number(path: Path) -> tuple[list[tuple[int, str]], str]:
 
 
 def find_topic(
-    stream: Stream, given: str | None, topics: Iterable[str], where: str, beside: str | None = None
+    stream: Stream, given: str | None, topics: Iterable[str], where: str, beside: str | None
 ) -> str | None:
     """Topic of a stream: the given one, else its name beside the crank's, in the root, or in one namespace.
 

@@ -195,10 +195,6 @@ def better(name: str, found: Found) -> str:
     return _WAYS[name](found) if name in _WAYS else ""
 
 
-def _gear(found: Found) -> str:
-    return "" if gear(found)[1] else "enter the ratio of the teeth"
-
-
 def _offset(found: Found) -> str:
     by_lag = found.timing.lag_sigma_s * found.turned_radps
     if by_lag <= found.fit.error.phase_rad:
@@ -214,14 +210,6 @@ def _lag(found: Found) -> str:
     return _FURTHER if found.timing.is_lag_separated else _TWO_CADENCES
 
 
-def _sampling(found: Found) -> str:
-    return "" if found.sampling.value else "ask the drive's manual"
-
-
-def _better_scale(_found: Found) -> str:
-    return "measure the torque of a known weight on the crank"
-
-
 def _bandwidth(found: Found) -> str:
     one = found.low_pass
     if one is not None and one.is_told and not math.isfinite(one.bandwidth_hz):
@@ -229,18 +217,16 @@ def _bandwidth(found: Found) -> str:
     return "declare drive.bandwidth_hz, or walk faster: stronger impacts show it better"
 
 
-def _load_friction(found: Found) -> str:
-    return f"declare drive.load_friction: clearances change it by {found.fit.error.load_friction:.2g}"
-
-
 _WAYS: Mapping[str, Callable[[Found], str]] = {
-    "crank.gear_ratio": _gear,
+    "crank.gear_ratio": lambda found: "" if gear(found)[1] else "enter the ratio of the teeth",
     "crank.offset_rad": _offset,
-    "drive_torque.scale": _better_scale,
-    "drive_torque.sampling": _sampling,
+    "drive_torque.scale": lambda _: "measure the torque of a known weight on the crank",
+    "drive_torque.sampling": lambda found: "" if found.sampling.value else "ask the drive's manual",
     "lag": _lag,
     "bandwidth": _bandwidth,
-    "load friction": _load_friction,
+    "load friction": lambda found: (
+        f"declare drive.load_friction: clearances change it by {found.fit.error.load_friction:.2g}"
+    ),
 }
 
 

@@ -178,7 +178,8 @@ def _unchanged(path: Path, files: Mapping[str, Any]) -> Found | None:
 def look(path: Path, leg: FleetLeg, files: Mapping[str, Any]) -> Found:
     """Read what identifies a recording: its first stamp, and all of its bytes unless the index has them."""
     size, changed_ns = state_of(path)
-    key, begin_ns, fault, is_passing = _text_key(str(path)), 0, "", False
+    name = str(path).encode("utf-8", "surrogateescape")
+    key, begin_ns, fault, is_passing = hashlib.sha256(name).hexdigest()[:_KEY_DIGITS], 0, "", False
     same = _unchanged(path, files)
     try:
         key = same.key if same and not same.fault else _digest(files_of(path))
@@ -229,10 +230,6 @@ def _digest(files: list[Path]) -> str:
         with reading([path]), path.open("rb") as file:
             total.update(hashlib.file_digest(file, "sha256").digest())
     return total.hexdigest()[:_KEY_DIGITS]
-
-
-def _text_key(text: str) -> str:
-    return hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()[:_KEY_DIGITS]
 
 
 def scan(leg: FleetLeg, files: Mapping[str, Any]) -> list[Found]:

@@ -206,7 +206,7 @@ _MOST_BAD = 10
 
 
 def leg_overview(
-    leg: FleetLeg, directory: LegDirectory, before: LegOverview | None, fault: str = ""
+    leg: FleetLeg, directory: LegDirectory, before: LegOverview | None, fault: str
 ) -> LegOverview:
     """A leg at a glance.
 
@@ -310,12 +310,7 @@ def load_overview(path: str | Path) -> FleetOverview:
         raise ConfigError(str(place), "", f"cannot be read: {error.strerror}; run fleet update") from error
     except ValueError as error:
         raise ConfigError(str(place), "", "is not JSON; run fleet update again") from error
-    return overview_of(record, str(place))
-
-
-def overview_of(record: Any, source: str) -> FleetOverview:
-    """The overview of a plain object, as `FleetOverview.to_dict` gives it."""
-    return structure_of_version(record, FleetOverview, SCHEMA_VERSION, source, "run fleet update again")
+    return structure_of_version(record, FleetOverview, SCHEMA_VERSION, str(place), "run fleet update again")
 
 
 # Makes the overview of a fleet from the records of its legs.

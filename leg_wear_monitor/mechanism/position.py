@@ -390,7 +390,8 @@ def one_cycle(linkage: Linkage, points: int, speed: float, acceleration: float =
 
     The speed [rad/s] and the acceleration [rad/s^2] are the same at every step.
     """
-    return _motion(linkage, _even_angles(points), _one_cycle_positions(linkage, points), speed, acceleration)
+    q = _solved_positions(_geometry_of(linkage), points).copy()
+    return _motion(linkage, _even_angles(points), q, speed, acceleration)
 
 
 def check_cycle(linkage: Linkage) -> None:
@@ -425,11 +426,6 @@ def _geometry_of(linkage: Linkage) -> _Geometry:
         com_poses(linkage.mechanism), [linkage.mechanism.assembly.crank_angle, arrays.drive_body]
     )
     return _Geometry(linkage, b"".join(array.tobytes() for array in (*shape, start)))
-
-
-def _one_cycle_positions(linkage: Linkage, points: int) -> Floats:
-    """Coordinates q (points, n, 3) over one turn, cached by the linkage's geometry."""
-    return _solved_positions(_geometry_of(linkage), points).copy()
 
 
 # A twin, studies and tests need the turn of one linkage several times, with other loads and speeds.

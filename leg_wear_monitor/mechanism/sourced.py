@@ -77,11 +77,6 @@ UNITS = {
 }
 
 
-def units_of(dimension: str) -> list[str]:
-    """Names of the units that measure this."""
-    return [name for name, unit in UNITS.items() if unit.dimension == dimension]
-
-
 # Numbers with their source, as material files have them.
 
 
@@ -167,7 +162,7 @@ class WearCoefficient(SourcedValue):
 def unit_fault(dimension: str, value: SourcedValue) -> str | None:
     """What is wrong with the unit or the sign of a value that measures this; None if nothing is."""
     if UNITS[value.unit].dimension != dimension:
-        known = " or ".join(units_of(dimension))
+        known = " or ".join(name for name, unit in UNITS.items() if unit.dimension == dimension)
         return f"unit {value.unit!r} is not one of {dimension}, expected {known}"
     if dimension != "temperature" and not (value.central > 0.0 and min(value.range or (0.0,)) >= 0.0):
         return f"{value.central!r} {value.unit} is not above 0"

@@ -127,7 +127,7 @@ class Alarm:
 
 
 def next_level(
-    level: Level, value: float, limit: Limit, beyond: tuple[int, int], cycles: int = 1
+    level: Level, value: float, limit: Limit, beyond: tuple[int, int], cycles: int
 ) -> tuple[Level, tuple[int, int]]:
     """Level after a value, and the numbers of gait cycles with values beyond WARN and ERROR.
 

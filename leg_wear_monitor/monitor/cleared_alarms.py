@@ -43,7 +43,7 @@ def cleared_at(ledger: Ledger, stamps: Collection[int], now: Mapping[str, Alarm]
     return tuple(found)
 
 
-def rested_on(alarms: Iterable[Alarm], joint: str, named: Iterable[str] = ()) -> tuple[str, ...]:
+def rested_on(alarms: Iterable[Alarm], joint: str, named: Iterable[str]) -> tuple[str, ...]:
     """Names of the raised alarms that rested on the part of a joint that was replaced.
 
     The joint's own ones; and the torque mismatch if this joint explains it: if its clearance was at a limit,

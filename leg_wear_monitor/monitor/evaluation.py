@@ -61,7 +61,7 @@ def specs_of(
 
 
 def limits_of(
-    config: MonitorConfig, clearance_joints: tuple[str, ...], torque_size_nm: float = 1.0
+    config: MonitorConfig, clearance_joints: tuple[str, ...], torque_size_nm: float
 ) -> dict[str, Limit]:
     """Limit of every alarm by its name; ``torque_size_nm`` is the RMS of the predicted drive torque."""
     bounds = torque_bounds(config, torque_size_nm, largest_lag_s(config))

@@ -378,7 +378,7 @@ class InputHealth:
     stuck_torque_fraction: float
 
 
-def input_health(before: Intake, after: Intake, torque: TorqueRange, is_whole: bool = True) -> InputHealth:
+def input_health(before: Intake, after: Intake, torque: TorqueRange, is_whole: bool) -> InputHealth:
     """Health of the input between two counts.
 
     Parameters

@@ -322,8 +322,8 @@ def read_rocked(
     recording: Recordable,
     config: MonitorConfig,
     joint: str,
-    loads: Sequence[str] = (),
-    progress: Callable[[float], None] = lambda _fraction: None,
+    loads: Sequence[str],
+    progress: Callable[[float], None],
 ) -> Rocked:
     """Read the angle of a joint, and the sum of the loads.
 

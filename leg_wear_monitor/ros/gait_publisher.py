@@ -73,11 +73,6 @@ class PublisherConfig(GaitConfig):
 Message: TypeAlias = JointState | WrenchStamped | Float64 | Bool
 
 
-def time_message(stamp: int) -> Time:
-    """A stamp [ns] as a message."""
-    return Time(sec=stamp // 1_000_000_000, nanosec=stamp % 1_000_000_000)
-
-
 def sensor_message(reading: Reading, start_ns: int, config: PublisherConfig) -> Message | bytes:
     """Message of a reading; raw bytes for a fault that makes it undecodable."""
     message = _whole(reading, start_ns, config)
@@ -89,7 +84,8 @@ def sensor_message(reading: Reading, start_ns: int, config: PublisherConfig) -> 
 
 
 def _whole(reading: Reading, start_ns: int, config: PublisherConfig) -> Message:
-    stamp = time_message(stamp_ns(reading, start_ns))
+    sec, nanosec = divmod(stamp_ns(reading, start_ns), 1_000_000_000)
+    stamp = Time(sec=sec, nanosec=nanosec)
     if reading.kind == CRANK:
         return _joint_state(reading, stamp, config)
     if reading.kind == LOAD:
@@ -182,7 +178,8 @@ class GaitPublisher(ClosingNode):
             self._blocks = self._walk()
             if self.config.precompute:
                 self._blocks = iter(list(self._blocks))
-        qos = QoSProfile(depth=200, reliability=self._reliability())
+        policy = ReliabilityPolicy.RELIABLE if self.config.reliable else ReliabilityPolicy.BEST_EFFORT
+        qos = QoSProfile(depth=200, reliability=policy)
         sources = {TORQUE: self.config.torque_sensor.source, LOAD: self.config.foot_load_sensor.source}
         self._by_kind: dict[int, Publisher] = {
             stream.kind: self._publisher(message_class(stream.type), stream.topic, qos)
@@ -227,9 +224,6 @@ class GaitPublisher(ClosingNode):
         return self.create_publisher(
             kind, topic, qos, qos_overriding_options=QoSOverridingOptions.with_default_policies()
         )
-
-    def _reliability(self) -> ReliabilityPolicy:
-        return ReliabilityPolicy.RELIABLE if self.config.reliable else ReliabilityPolicy.BEST_EFFORT
 
     def _heard(self) -> bool:
         wanted = self.config.wait_for_subscribers

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from datetime import UTC, datetime
+from typing import TypeVar
 
 import attrs
 
@@ -11,8 +12,10 @@ from leg_wear_monitor.monitor.alarms import INPUT_SILENCE, Alarm, Limit, acknowl
 from leg_wear_monitor.monitor.reports import AlarmList, Status
 from leg_wear_monitor.ros.inputs import Inbox, InputTopic, refusals, several
 from leg_wear_monitor.ros.outputs import BlackBox
-from leg_wear_monitor.state import Level
+from leg_wear_monitor.state import LegAlarm, Level
 from leg_wear_monitor.twin import CRANK, KINDS
+
+_Alarm = TypeVar("_Alarm", Alarm, LegAlarm)
 
 # Detection of silent inputs (no usable samples), which only the node can do because it has a clock.
 #
@@ -184,13 +187,14 @@ class NodeAlarms:
 
     def beside(self, alarms: AlarmList) -> AlarmList:
         """Merge the monitor's alarms with those of the node."""
-        if not self.raised:
-            return alarms
-        named = {alarm.name: alarm for alarm in alarms.alarms}
-        for own in self.raised:
-            if own.name not in named or own.level > named[own.name].level:
-                named[own.name] = own
-        return attrs.evolve(alarms, alarms=tuple(named.values()))
+        return attrs.evolve(alarms, alarms=with_worse(alarms.alarms, self.raised)) if self.raised else alarms
+
+
+def with_worse(alarms: Iterable[_Alarm], own: Iterable[_Alarm]) -> tuple[_Alarm, ...]:
+    """Alarms, and own ones where there is none of that name or one of a lower level."""
+    named = {alarm.name: alarm for alarm in alarms}
+    named |= {one.name: one for one in own if one.name not in named or one.level > named[one.name].level}
+    return tuple(named.values())
 
 
 # Check that ROS time advances.

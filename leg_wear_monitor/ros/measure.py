@@ -162,7 +162,7 @@ def measure_on(
     return str(result.reason)
 
 
-def trigger_on(monitor: str, name: str, wait_s: float, times: int = 1) -> str:
+def trigger_on(monitor: str, name: str, wait_s: float, times: int) -> str:
     """Call a service without arguments of a running monitor.
 
     Parameters

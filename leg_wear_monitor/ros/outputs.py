@@ -183,11 +183,11 @@ class BlackBox:
     def write(self, topic: str, log_time_ns: int, raw: bytes | NDArray[np.uint8]) -> None:
         """Record a message, or several of equal length (n, bytes)."""
         self._with_stops(lambda stops: stops.keep(topic, log_time_ns, raw))
-        if self._writer is not None:
-            try:
-                self.recorded += put(self._writer, self._channels[topic], log_time_ns, raw)
-            except LegWearError as error:
-                self._fail(error)
+
+        def record(writer: "McapWriter") -> None:
+            self.recorded += put(writer, self._channels[topic], log_time_ns, raw)
+
+        self._with_writer(record)
 
     def stop(self, now_ns: int) -> None:
         """Write the seconds around a STOP, where that is asked for."""
@@ -196,21 +196,13 @@ class BlackBox:
     def flush(self) -> None:
         """Write buffered messages to the disk."""
         self._with_stops(StopRecorder.flush)
-        if self._writer is not None:
-            try:
-                self._writer.flush()
-            except LegWearError as error:
-                self._fail(error)
+        self._with_writer(lambda writer: writer.flush())
 
     def close(self) -> None:
         """Finish the files."""
         self._with_stops(StopRecorder.close)
-        if self._writer is not None:
-            try:
-                self._writer.close()
-            except LegWearError as error:
-                self._fail(error)
-            self._writer = None
+        self._with_writer(lambda writer: writer.close())
+        self._writer = None
 
     def _with_stops(self, use: Callable[[StopRecorder], None]) -> None:
         """Use the recorder of stops, if there is one; a disk failure ends it, and not the monitor."""
@@ -220,12 +212,16 @@ class BlackBox:
             except LegWearError as error:
                 self.fault, self._stops = str(error), None
 
-    def _fail(self, error: LegWearError) -> None:
-        """Stop recording: written data stay readable, and a disk failure must not stop the monitor."""
-        self.fault, writer, self._writer = str(error), self._writer, None
+    def _with_writer(self, use: Callable[["McapWriter"], None]) -> None:
+        """Use the writer, if there is one; a disk failure ends the recording, and not the monitor."""
+        writer = self._writer
         if writer is not None:
-            with suppress(LegWearError):  # already reported
-                writer.close()
+            try:
+                use(writer)
+            except LegWearError as error:
+                self.fault, self._writer = str(error), None
+                with suppress(LegWearError):  # already reported
+                    writer.close()
 
 
 def _writer(parameter: str, path: Path, report: Callable[[str], None]) -> "McapWriter":

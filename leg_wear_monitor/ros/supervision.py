@@ -212,11 +212,8 @@ class Supervision:
         report, leg = self.verdict(report), report.leg
         if leg is None or not self._alarms.raised:
             return report
-        named = {alarm.name: alarm for alarm in leg.alarms.now}
-        for own in map(leg_alarm, self._alarms.raised):
-            if own.name not in named or own.level > named[own.name].level:
-                named[own.name] = own
-        return attrs.evolve(report, leg=attrs.evolve(leg, alarms=LegAlarms(now=tuple(named.values()))))
+        now = health.with_worse(leg.alarms.now, map(leg_alarm, self._alarms.raised))
+        return attrs.evolve(report, leg=attrs.evolve(leg, alarms=LegAlarms(now=now)))
 
     def _with_axis(self, finding: Finding) -> Finding:
         """A finding about the drive torque with its cause, if the torque is about another axis."""

@@ -28,11 +28,6 @@ from leg_wear_monitor.workers import Job, run_jobs
 # Settings of studies from YAML files.
 
 
-def shipped_study(name: str) -> Path:
-    """Description of a study that comes with the package."""
-    return share_directory() / "config" / "studies" / f"{name}.yaml"
-
-
 def load_settings(name: str, path: str | Path | None = None) -> Study:
     """Read the description of a study.
 
@@ -50,7 +45,7 @@ def load_settings(name: str, path: str | Path | None = None) -> Study:
     """
     if name not in STUDIES:
         raise ConfigError("study", "", f"{name!r} is not one of {', '.join(STUDIES)}")
-    place = shipped_study(name) if path is None else Path(path)
+    place = share_directory() / "config" / "studies" / f"{name}.yaml" if path is None else Path(path)
     source = place.name if path is None else str(path)
     return parse_settings(name, read_yaml(place, source), source)
 

@@ -9,9 +9,7 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Sequence
-from functools import cache
 from itertools import pairwise
-from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
 import attrs
@@ -21,6 +19,7 @@ from numpy.typing import ArrayLike
 from leg_wear_monitor.configuration import FieldError, described, quantity
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.wear import BUSHING, wear_zone
+from leg_wear_monitor.workers import package_digest
 
 # Settings that several studies share, and their validation.
 
@@ -158,17 +157,9 @@ Found = Sequence[tuple[Point, Arrays]]
 """Points of a study, each with its result."""
 
 
-@cache
 def code_digest() -> str:
     """Digest of the sources that produce results: the physics, and the tasks of studies."""
-    home = Path(__file__).parents[1]
-    sources = [source for folder in _FOLDERS for source in (home / folder).rglob("*.py")]
-    sources += [home / name for name in _FILES]
-    digest = hashlib.sha256()
-    for source in sorted(sources):
-        digest.update(f"{source.relative_to(home).as_posix()}\n".encode())
-        digest.update(source.read_bytes())
-    return digest.hexdigest()[:20]
+    return package_digest(*_FOLDERS, *_FILES)
 
 
 # Base classes of studies: question, settings, points.
@@ -395,7 +386,7 @@ def of_joint(arrays: Arrays, name: str, joint: str) -> Spread:
     return spread(arrays[name][:, k, BUSHING].max(axis=1) if name == DEPTH else arrays[name][..., k])
 
 
-def worst_zone(arrays: Arrays, joint: str, fraction: float = 0.9) -> tuple[float, float] | None:
+def worst_zone(arrays: Arrays, joint: str, fraction: float) -> tuple[float, float] | None:
     """Narrowest zone of a joint's bushing that contains a fraction of its wear, averaged over runs.
 
     Begin and end [deg] in the bushing's frame, as `wear_zone` returns them; None without wear.

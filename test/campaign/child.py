@@ -8,6 +8,7 @@ import sys
 import tempfile
 import time
 import traceback
+from collections.abc import Callable
 from pathlib import Path
 
 from campaign.case import CRASHED, Case, Outcome, Ran
@@ -49,6 +50,30 @@ def ran(case: Case, directory: Path, idle_mb: float) -> Ran:
         is_late=is_late,
         verdict=_verdict(directory / "verdict"),
     )
+
+
+def done(call: Callable[[], object], kill_after_s: float | None = None) -> bool:
+    """Call a function in a silent process of its own, which may be killed; whether it came to its end."""
+    pid = os.fork()
+    if pid == 0:
+        code = CRASHED
+        try:
+            nothing = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nothing, 1)
+            os.dup2(nothing, 2)
+            call()
+            code = 0
+        finally:
+            os._exit(code)
+    if kill_after_s is not None:
+        time.sleep(kill_after_s)
+        os.kill(pid, signal.SIGKILL)
+    _, status = os.waitpid(pid, 0)
+    if os.WIFSIGNALED(status):
+        return False
+    if os.WEXITSTATUS(status):
+        raise RuntimeError(f"it ended with exit code {os.WEXITSTATUS(status)}")
+    return True
 
 
 def idle_mb() -> float:

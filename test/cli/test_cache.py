@@ -8,7 +8,7 @@ import pytest
 
 from leg_wear_monitor.cli import kernels
 from leg_wear_monitor.cli.common import compilation, is_compiled
-from leg_wear_monitor.compiled import cache, kernel
+from leg_wear_monitor.compiled import kernel
 from leg_wear_monitor.workers import run_here
 
 pytestmark = pytest.mark.plain
@@ -16,21 +16,6 @@ pytestmark = pytest.mark.plain
 
 def nothing() -> None:
     """A job that is done at once."""
-
-
-@pytest.fixture
-def place(tmp_path, monkeypatch):
-    """An empty cache of its own, as a new process would find it."""
-
-    def forget():
-        for cached in (cache._home, cache.code_directory, kernel.cache_directory):
-            cached.cache_clear()
-
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
-    forget()
-    yield tmp_path / "cache" / "leg_wear_monitor"
-    monkeypatch.undo()
-    forget()
 
 
 def test_it_prints_where_and_how_much(run, place):

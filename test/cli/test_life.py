@@ -117,11 +117,6 @@ def test_the_table_of_a_life_has_its_first_and_its_last_point(points):
     assert (rows[0], rows[-1], len(set(rows))) == (1, points, min(points, 12))
 
 
-def test_life_refuses_what_cannot_be(run):
-    assert run(*ONE, "--limit-m", "-1").exit_code == 2
-    assert run(*ONE, "--clearances", "Z").exit_code == 2
-
-
 @pytest.mark.plain
 @pytest.mark.parametrize(
     ("options", "said"),

@@ -1,10 +1,9 @@
 """`measure`: a clearance into the ledger, and what it is told."""
 
 import json
-import sqlite3
-from contextlib import closing
 
 import pytest
+from ledger_contents import rows_of
 
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.parameters import load_config
@@ -19,8 +18,7 @@ def ledger(worn_ledger):
 
 
 def rows(path):
-    with closing(sqlite3.connect(path)) as db:
-        return db.execute("SELECT joint, clearance_m, wear_m, cycles, counts FROM measurement").fetchall()
+    return rows_of(path, "SELECT joint, clearance_m, wear_m, cycles, counts FROM measurement")
 
 
 def test_a_measurement_is_kept_and_explained(run, ledger):
@@ -91,17 +89,15 @@ def test_what_is_near_the_limit_or_at_it_is_said_and_at_it_the_caller_has_to_act
 
 
 def alarms(path):
-    with closing(sqlite3.connect(path)) as db:
-        now = db.execute("SELECT subject, level, acknowledged, worst, cause FROM alarm").fetchall()
-        changes = db.execute("SELECT subject, level FROM alarm_history").fetchall()
-    return now, changes
+    now = rows_of(path, "SELECT subject, level, acknowledged, worst, cause FROM alarm")
+    return now, rows_of(path, "SELECT subject, level FROM alarm_history")
 
 
 def verdict(path):
-    with closing(sqlite3.connect(path)) as db:
-        last = "SELECT state, fault_code, evidence FROM verdict ORDER BY id DESC LIMIT 1"
-        state, code, evidence = db.execute(last).fetchone()
-    return state, code, json.loads(evidence)
+    ((*told, evidence),) = rows_of(
+        path, "SELECT state, fault_code, evidence FROM verdict ORDER BY id DESC LIMIT 1"
+    )
+    return *told, json.loads(evidence)
 
 
 @pytest.mark.parametrize(

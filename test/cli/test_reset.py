@@ -1,11 +1,9 @@
 """`reset`: a replaced part into a ledger, as the service of a node does it."""
 
-import sqlite3
-from contextlib import closing
-
 import attrs
 import numpy as np
 import pytest
+from ledger_contents import rows_of
 
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.alarms import Alarm
@@ -51,13 +49,11 @@ def last_verdict(path):
 
 
 def history(path):
-    with closing(sqlite3.connect(path)) as db:
-        return db.execute("SELECT kind, subject, level FROM alarm_history ORDER BY id").fetchall()
+    return rows_of(path, "SELECT kind, subject, level FROM alarm_history ORDER BY id")
 
 
 def audits(path):
-    with closing(sqlite3.connect(path)) as db:
-        return db.execute("SELECT what, joint, cycles, moving_s, undoes FROM audit").fetchall()
+    return rows_of(path, "SELECT what, joint, cycles, moving_s, undoes FROM audit")
 
 
 @pytest.mark.plain

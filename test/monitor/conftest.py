@@ -1,14 +1,15 @@
 """Wear to be kept, without a leg that made it."""
 
-import sqlite3
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import closing
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 import pytest
+from ledger_contents import rows_of
+from told import as_new
 
 from leg_wear_monitor import Mechanism, WearMonitor
 from leg_wear_monitor import open_ledger as wear_ledger
@@ -81,12 +82,7 @@ def reopened(open_ledger: Callable[..., Ledger], entry_at: Callable[[int], Entry
 @pytest.fixture
 def rows(tmp_path: Path) -> Callable[[str], list[Any]]:
     """What a query finds in the ledger of this test."""
-
-    def found(query: str) -> list[Any]:
-        with closing(sqlite3.connect(tmp_path / "wear.ledger")) as db:
-            return db.execute(query).fetchall()
-
-    return found
+    return partial(rows_of, tmp_path / "wear.ledger")
 
 
 @pytest.fixture
@@ -135,11 +131,10 @@ def gait() -> Callable[..., Samples]:
 @pytest.fixture(scope="session")
 def new_monitor(leg: Mechanism) -> Callable[..., WearMonitor]:
     """Makes a monitor of the default leg as new, without a ledger; always the same one: tables take time."""
-    one = WearMonitor(leg)
-    new = one.snapshot()
+    renewed = as_new(WearMonitor(leg))
 
     def again(values: Mapping[str, Any] = MappingProxyType({})) -> WearMonitor:
-        one.restore(new)
+        one = renewed()
         one.configure(config_from(values))
         return one
 

@@ -52,25 +52,6 @@ def clearances(result: ReplayResult) -> np.ndarray:
     return np.array([joint.counted_m for joint in result.summary().clearances.values()])
 
 
-# Relative bounds of the deviation from a whole replay, as measured in test/twin/test_sampled_twin.py for as
-# long a walk and a smaller sample.
-OFF = np.array([0.013, 0.13, 0.12, 0.16, 0.21])
-
-
-@pytest.mark.slow  # twin/test_sampled_twin.py holds it for the twin alone
-@pytest.mark.chaotic
-def test_the_wear_is_that_of_a_whole_replay(sampled, walk, config):
-    whole = lw.replay(walk, config)
-    assert len(sampled.history) == len(whole.history)
-    np.testing.assert_array_equal(sampled.history.stamp_ns, whole.history.stamp_ns)
-    sigma = np.array([joint.sampling_sigma_m for joint in sampled.summary().joints.values()])
-    assert (sigma > 0.0).all()
-    worn = clearances(whole) - 3.0e-4
-    assert (np.abs(clearances(sampled) - clearances(whole)) < OFF * worn).all()
-    assert whole.monitor.sampling is None
-    assert whole.summary().sampling is None
-
-
 def test_the_summary_says_what_was_followed(sampled):
     summary = sampled.summary()
     told = summary.sampling

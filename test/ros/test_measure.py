@@ -1,9 +1,7 @@
 """A clearance measured while the monitor runs: by the command line, in a process of its own, too."""
 
-import sqlite3
 import subprocess
 import sys
-from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -12,6 +10,7 @@ pytest.importorskip("rclpy")
 
 from click.testing import CliRunner, Result
 from diagnostic_msgs.msg import DiagnosticArray
+from ledger_contents import rows_of
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter
 
@@ -25,8 +24,7 @@ def measure(*arguments: str) -> Result:
 
 
 def rows(path: Path) -> list[tuple[object, ...]]:
-    with closing(sqlite3.connect(path)) as db:
-        return db.execute("SELECT joint, clearance_m, sigma_m, who, counts FROM measurement").fetchall()
+    return rows_of(path, "SELECT joint, clearance_m, sigma_m, who, counts FROM measurement")
 
 
 def asked(stage, **values):

@@ -3,13 +3,12 @@
 import json
 import os
 import signal
-import sqlite3
 import subprocess
 import sys
-from contextlib import closing
 from pathlib import Path
 
 import pytest
+from ledger_contents import rows_of
 
 from leg_wear_monitor.cli.start import LOADING
 
@@ -23,8 +22,7 @@ def started(verb: str, log: Path, *arguments: str) -> "subprocess.Popen[bytes]":
 
 
 def closed_runs(ledger: Path) -> list[tuple[int]]:
-    with closing(sqlite3.connect(ledger)) as db:
-        return db.execute("SELECT closed FROM run").fetchall()
+    return rows_of(ledger, "SELECT closed FROM run")
 
 
 def test_sigterm_ends_both_nodes_in_order(stage, tmp_path: Path) -> None:

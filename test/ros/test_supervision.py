@@ -1,10 +1,8 @@
 """What the node tells of silence, of alarms and of its own faults: by itself, and over real DDS."""
 
 import math
-import sqlite3
 import threading
 import time
-from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -13,6 +11,7 @@ pytest.importorskip("rclpy")
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
+from ledger_contents import rows_of
 from made_node import made_node
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, qos_profile_sensor_data
@@ -362,8 +361,7 @@ def test_what_is_missing_because_the_node_was_late_is_no_fault_of_the_sender(
 
 def history(ledger: Path) -> list[tuple[str, int]]:
     """Changed alarms of a ledger with the level that was shown, in their order."""
-    with closing(sqlite3.connect(ledger)) as db:
-        rows = db.execute("SELECT kind, subject, level FROM alarm_history ORDER BY id").fetchall()
+    rows = rows_of(ledger, "SELECT kind, subject, level FROM alarm_history ORDER BY id")
     return [(f"{kind} {subject}".rstrip(), level) for kind, subject, level in rows]
 
 

@@ -111,13 +111,10 @@ def _kernels() -> str:
 def _files(names: tuple[str, ...]) -> Mapping[str, Callable[[], str]]:
     files, parameters = {}, None
     for name in names:
-        files[name] = partial(_table, name, parameters) if _is_table(name) else partial(_file, name)
+        is_table = name.lower().endswith((".csv", ".parquet"))
+        files[name] = partial(_table, name, parameters) if is_table else partial(_file, name)
         parameters = name if name.endswith((".yaml", ".yml")) else parameters
     return files
-
-
-def _is_table(name: str) -> bool:
-    return name.lower().endswith((".csv", ".parquet"))
 
 
 def _table(name: str, parameters: str | None) -> str:

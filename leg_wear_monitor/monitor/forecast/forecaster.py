@@ -273,8 +273,8 @@ class Forecaster:
         wear_m: Floats,
         limits_m: Sequence[float],
         is_valid: Callable[[], bool],
-        sampling_sigma_m: Floats | None = None,
-        model: ModelError | None = None,
+        sampling_sigma_m: Floats,
+        model: ModelError,
     ) -> Forecast:
         """Forecast after a gait cycle: a new one if it is due, else the last.
 
@@ -287,9 +287,9 @@ class Forecaster:
             Of the mean clearances.
         is_valid : callable
             Whether the leg is in the range of the model.
-        sampling_sigma_m : (k,) array, optional
+        sampling_sigma_m : (k,) array
             Standard deviation of the wear, because not all gait cycles were followed [m].
-        model : ModelError, optional
+        model : ModelError
             What the growth may be off by the load.
         """
         state = self.state
@@ -309,16 +309,13 @@ class Forecaster:
         wear_m: Floats,
         limits_m: Sequence[float],
         is_valid: bool,
-        sampling_sigma_m: Floats | None = None,
-        model: ModelError | None = None,
+        sampling_sigma_m: Floats,
+        model: ModelError,
     ) -> Forecast:
         """A new forecast from the present state; parameters as in `after`."""
         state = self.state
         rates = [growth_rate(window) for window in state.growth]
         state.known = _known(rates)
-        if sampling_sigma_m is None:
-            sampling_sigma_m = np.zeros(len(wear_m))
-        model = model or ModelError.none(len(wear_m))
         now = [
             JointCondition(
                 joint=joint,

@@ -44,11 +44,6 @@ class ModelError:
     sensitivity: Floats
     load: Floats
 
-    @classmethod
-    def none(cls, joints: int) -> "ModelError":
-        """Of a leg that is known."""
-        return cls(*np.zeros((3, joints)))
-
     def relative(self, k: int, growth_m: float) -> float:
         """Standard deviation of a joint's growth a gait cycle, as a fraction of it.
 

@@ -245,7 +245,7 @@ class ClearanceAtWear:
 
 
 def known_clearances(
-    settings: Forecasting, fresh_m: float, corrections: Sequence[Recount] = ()
+    settings: Forecasting, fresh_m: float, corrections: Sequence[Recount]
 ) -> list[ClearanceAtWear]:
     """Known clearances of a part, the oldest first.
 

@@ -128,10 +128,17 @@ class _Own(NamedTuple):
     tables: Sequence[Table] = ()
 
 
+_OwnOf = Callable[[StudyResults, Found], _Own]
+
+
 def _sections(results: StudyResults) -> list[Section]:
     """The template: question, conclusions, own pictures, a cycle, curves, wear and tables of the points."""
     found, sweep = results.of("response"), STUDIES[results.study].sweep
-    own = _swept(sweep, found) if sweep else _PAGES.get(results.study, _points)(results, found)
+    own = (
+        _swept(sweep, found)
+        if sweep
+        else _PAGES.get(results.study, _by(findings.disturbance))(results, found)
+    )
     sections = [_asked(results), Section("Conclusions", [Sentences(own.sentences)]), *own.sections]
     if not found:
         return sections
@@ -187,13 +194,15 @@ def _compared(found: Found, sentences: list[str], head: str = "clearance joints"
     return _Own(sentences, [Section("Side by side", [gallery])], head)
 
 
-def _points(_results: StudyResults, found: Found) -> _Own:
-    """Of a study that has no page of its own: its points side by side."""
-    return _compared(found, findings.disturbance(found)) if found else _Own([], [])
+def _by(*of: Callable[[Found], list[str]], head: str = "clearance joints") -> _OwnOf:
+    """Of a study whose points are shown side by side: the sentences of its questions."""
 
+    def own(_results: StudyResults, found: Found) -> _Own:
+        return (
+            _compared(found, [text for each in of for text in each(found)], head) if found else _Own([], [])
+        )
 
-def _location(_results: StudyResults, found: Found) -> _Own:
-    return _compared(found, findings.disturbance(found) + findings.places(found))
+    return own
 
 
 def _multi(_results: StudyResults, found: Found) -> _Own:
@@ -206,14 +215,6 @@ def _multi(_results: StudyResults, found: Found) -> _Own:
         *findings.zones([whole]),
     ]
     return _compared(found, sentences)
-
-
-def _laws(_results: StudyResults, found: Found) -> _Own:
-    return _compared(found, findings.laws(found), "law")
-
-
-def _lubrication(_results: StudyResults, found: Found) -> _Own:
-    return _compared(found, findings.lubrication(found) + findings.disturbance(found), "lubricant")
 
 
 def _load(results: StudyResults, found: Found) -> _Own:
@@ -268,11 +269,11 @@ def _legs(results: StudyResults, _found: Found) -> _Own:
     return _Own(findings.claims(claims), [Section("Claims", [claim_table(claims)]), *decides])
 
 
-_PAGES: dict[str, Callable[[StudyResults, Found], _Own]] = {
-    "location": _location,
+_PAGES: dict[str, _OwnOf] = {
+    "location": _by(findings.disturbance, findings.places),
     "multi": _multi,
-    "laws": _laws,
-    "lubrication": _lubrication,
+    "laws": _by(findings.laws, head="law"),
+    "lubrication": _by(findings.lubrication, findings.disturbance, head="lubricant"),
     "load": _load,
     "wear": _wear,
     "chaos": _chaos,

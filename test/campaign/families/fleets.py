@@ -1,21 +1,20 @@
 """Fleets: updates killed at random instants, files damaged, names, links and copies that mislead."""
 
-import os
 import random
 import shutil
-import signal
 import sqlite3
 import tempfile
 import time
 from collections.abc import Callable
 from contextlib import closing
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import pyarrow  # noqa: F401 - without it, the family is left out
 from short_walk import torque_of_a_cycle, write_walk
 
 from campaign.case import Case, Outcome
+from campaign.child import done
 from campaign.warm_twin import keep_twin
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.cli.main import cli
@@ -199,21 +198,8 @@ def _command(*line: str) -> int:
 
 def _update(directory: Path, out: Path, kill_after_s: float | None = None, workers: int = 1) -> None:
     """Update in a process of its own, which may be killed."""
-    pid = os.fork()
-    if pid == 0:
-        for stream in (1, 2):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
-        try:
-            update_fleet(load_fleet(directory / "fleet.yaml"), out, workers=workers)
-            os._exit(0)
-        finally:
-            os._exit(70)
-    if kill_after_s is not None:
-        time.sleep(kill_after_s)
-        os.kill(pid, signal.SIGKILL)
-    _, status = os.waitpid(pid, 0)
-    if kill_after_s is None and status:
-        raise RuntimeError(f"the update ended with status {status}")
+    fleet = load_fleet(directory / "fleet.yaml")
+    done(partial(update_fleet, fleet, out, workers=workers), kill_after_s)
 
 
 def _contents(out: Path) -> dict[str, object]:

@@ -1,20 +1,19 @@
 """Replays killed at random instants and repeated: ledger, reports and summary as if nothing had happened."""
 
 import json
-import os
 import random
-import signal
 import sqlite3
 import tempfile
 import time
 from contextlib import closing
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import attrs
 
 from campaign.case import Case, Outcome
+from campaign.child import done
 from campaign.warm_twin import keep_twin
 
 KILLS = 2  # in each case
@@ -48,13 +47,13 @@ def _killed(directory: Path, kind: int, choose: random.Random) -> tuple[Outcome,
     whole, after = _whole(kind), []
     for _ in range(KILLS):
         delay_s = whole.took_s * choose.uniform(0.0, 1.1)
-        if _run(directory, delay_s):
+        if done(partial(_replay, directory), delay_s):
             break
         after.append(round(delay_s, 3))
         if _is_done(directory, whole):
             break
     if not _is_done(directory, whole):
-        _run(directory)
+        done(partial(_replay, directory))
     found = _result(directory)
     wrong = [name for name, value in attrs.asdict(whole).items() if found.get(name, value) != value]
     text = f"killed after {after} s"
@@ -66,31 +65,7 @@ def _is_done(directory: Path, whole: "_Whole") -> bool:
     return (directory / "wear.ledger").exists() and _rows(directory / "wear.ledger") == whole.rows
 
 
-def _run(directory: Path, kill_after_s: float | None = None) -> bool:
-    """Replay in a process of its own; whether it came to its end."""
-    sys_stdout = os.open(os.devnull, os.O_WRONLY)
-    pid = os.fork()
-    if pid == 0:
-        code = 70
-        try:
-            os.dup2(sys_stdout, 1)
-            os.dup2(sys_stdout, 2)
-            code = _replay(directory)
-        finally:
-            os._exit(code)
-    os.close(sys_stdout)
-    if kill_after_s is not None:
-        time.sleep(kill_after_s)
-        os.kill(pid, signal.SIGKILL)
-    _, status = os.waitpid(pid, 0)
-    if os.WIFSIGNALED(status):
-        return False
-    if os.WEXITSTATUS(status):
-        raise RuntimeError(f"the replay ended with exit code {os.WEXITSTATUS(status)}")
-    return True
-
-
-def _replay(directory: Path) -> int:
+def _replay(directory: Path) -> None:
     import leg_wear_monitor as lw
 
     out = directory / "out"
@@ -100,7 +75,6 @@ def _replay(directory: Path) -> int:
         out=out,
         finish=lambda result: (out / "summary.json").write_text(result.summary().to_json()),
     )
-    return 0
 
 
 # --- what an uninterrupted one gives ---
@@ -122,7 +96,7 @@ def _whole(kind: int) -> _Whole:
         directory = Path(place)
         _begun(kind, directory)
         began = time.perf_counter()
-        _run(directory)
+        done(partial(_replay, directory))
         return _Whole(**_result(directory), took_s=time.perf_counter() - began)
 
 

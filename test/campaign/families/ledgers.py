@@ -13,6 +13,7 @@ from pathlib import Path
 
 import attrs
 import numpy as np
+from ledger_contents import contents, keep_journal
 
 from campaign.case import Case, Outcome
 
@@ -95,7 +96,6 @@ def _open(path: Path):  # type: ignore[no-untyped-def]
 
 def _state(ledger) -> str:  # type: ignore[no-untyped-def]
     """All that a monitor takes from a ledger."""
-    from ledger_contents import contents
 
     parts = (
         contents(ledger.entry),
@@ -264,7 +264,7 @@ def _sql(directory: Path, rng: np.random.Generator) -> str:
 def _journal_of_another_time(directory: Path, _rng: np.random.Generator) -> str:
     copy = directory / "copy"
     copy.write_bytes(_made().earlier[_NAME])
-    _keep_journal(copy, directory / f"{_NAME}-journal")
+    keep_journal(copy, directory / f"{_NAME}-journal")
     copy.unlink()
     return ""
 
@@ -272,7 +272,7 @@ def _journal_of_another_time(directory: Path, _rng: np.random.Generator) -> str:
 def _journal_of_its_own(directory: Path, rng: np.random.Generator) -> str:
     """A transaction cut off; its journal whole, damaged, cut or gone."""
     kept, journal = directory / "kept", directory / f"{_NAME}-journal"
-    _keep_journal(directory / _NAME, kept, directory / "cut")
+    keep_journal(directory / _NAME, kept, directory / "cut")
     shutil.move(directory / "cut", directory / _NAME)
     content = bytearray(kept.read_bytes())
     kept.unlink()
@@ -281,18 +281,6 @@ def _journal_of_its_own(directory: Path, rng: np.random.Generator) -> str:
         change(content, rng)
     journal.write_bytes(content)
     return ""
-
-
-def _keep_journal(path: Path, journal: Path, cut: Path | None = None) -> None:
-    with closing(sqlite3.connect(path, isolation_level=None)) as db:
-        db.execute("PRAGMA cache_size = 1")
-        db.execute("BEGIN")
-        db.execute("UPDATE surface SET depth = zeroblob(length(depth))")
-        db.execute("UPDATE span SET end_ns = 1")
-        shutil.copy(path.with_name(path.name + "-journal"), journal)
-        if cut:
-            shutil.copy(path, cut)
-        db.execute("ROLLBACK")
 
 
 def _wal_beside(directory: Path, _rng: np.random.Generator) -> str:

@@ -4,6 +4,7 @@ import json
 
 import attrs
 import pytest
+from ledger_contents import measured
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.fleet.learning import learn, pair_of, parts_of
@@ -15,7 +16,6 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     prior_source,
     usual_prior,
 )
-from leg_wear_monitor.monitor.ledger.entry import Measurement
 
 pytestmark = pytest.mark.plain
 
@@ -23,21 +23,9 @@ MECHANISM, SETTINGS, NEW_M = load_mechanism("bionic_leg"), Forecasting(), 3.0e-4
 USUAL = usual_prior(SETTINGS, MECHANISM.clearances["A"])
 
 
-def measurement(joint="A", factor=2.0, replaced_ns=0, counts=True, withdrawn_ns=0):
+def measurement(joint="A", factor=2.0, **own):
     """A measured clearance after 60 µm of counted wear."""
-    return Measurement(
-        stamp_ns=1,
-        joint=joint,
-        who="ann",
-        clearance_m=NEW_M + factor * 6.0e-5,
-        sigma_m=2.0e-6,
-        wear_m=6.0e-5,
-        cycles=9,
-        replaced_ns=replaced_ns,
-        expected_below=0.5,
-        counts=counts,
-        withdrawn_ns=withdrawn_ns,
-    )
+    return measured(joint=joint, clearance_m=NEW_M + factor * 6.0e-5, **own)
 
 
 def parts(leg, *measurements, replaced_ns=None, **lots):

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import attrs
+import ledger_contents
 import pytest
 
 from leg_wear_monitor import load_mechanism
@@ -14,7 +15,6 @@ from leg_wear_monitor.fleet.renew import learn_fleet
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.wear_coefficients import read_priors
-from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.ledger.ledger import open_ledger
 
 pytestmark = pytest.mark.plain
@@ -34,12 +34,7 @@ def measured(out, of, clearance_m, withdrawn=False):
     path.parent.mkdir(parents=True)
     settings = attrs.evolve(of.config, ledger=attrs.evolve(of.config.ledger, path=str(path)))
     ledger = open_ledger(fitted(load_mechanism(settings.mechanism), settings), settings)
-    ledger.note(
-        Measurement(
-            stamp_ns=1, joint="A", who="ann", clearance_m=clearance_m, sigma_m=2e-6, wear_m=6e-5, cycles=9,
-            replaced_ns=0, expected_below=0.5, counts=True,
-        )
-    )  # fmt: skip
+    ledger.note(ledger_contents.measured(clearance_m=clearance_m))
     ledger.record()
     ledger.close()
     if withdrawn:

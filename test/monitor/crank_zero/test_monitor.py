@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 import attrs
 import numpy as np
 import pytest
-from told import status_of
+from told import as_new, status_of
 
 from leg_wear_monitor import Mechanism, WearMonitor
 from leg_wear_monitor.errors import ConfigError
@@ -20,15 +20,8 @@ ZERO_RAD = 2.4
 
 @pytest.fixture(scope="module")
 def fresh(leg: Mechanism) -> Callable[[], WearMonitor]:
-    """A monitor of an encoder that starts at zero, as new; always the same one."""
-    one = WearMonitor(leg, config_from({"crank.zero": "at_start", "diagnosis.enabled": False}))
-    new = one.snapshot()
-
-    def again() -> WearMonitor:
-        one.restore(new)
-        return one
-
-    return again
+    """Gives a monitor of an encoder that starts at zero."""
+    return as_new(WearMonitor(leg, config_from({"crank.zero": "at_start", "diagnosis.enabled": False})))
 
 
 def cycles_of(monitor: WearMonitor, samples: Samples, block: int = 97) -> Iterator[CycleReport]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from told import status_of
+from told import as_new, status_of
 
 from leg_wear_monitor import ConfigError, WearMonitor
 from leg_wear_monitor.mechanism.position import TURN
@@ -68,15 +68,8 @@ def quick(monitor):
 
 @pytest.fixture(scope="module")
 def new_watch(leg):
-    """Makes a monitor with encoders as new; always the same one."""
-    one = quick(WearMonitor(leg, config_from(WATCHED)))
-    new = one.snapshot()
-
-    def again():
-        one.restore(new)
-        return one
-
-    return again
+    """Gives a monitor with encoders."""
+    return as_new(quick(WearMonitor(leg, config_from(WATCHED))))
 
 
 @pytest.fixture(scope="module")

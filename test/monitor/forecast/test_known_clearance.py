@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from ledger_contents import measured
 
 from leg_wear_monitor.estimate.cause import Cause, Change
 from leg_wear_monitor.fleet.learning import parts_of
@@ -18,7 +19,7 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     estimate_coefficient,
     measured_factor,
 )
-from leg_wear_monitor.monitor.ledger.entry import CorrectedClearance, Measurement
+from leg_wear_monitor.monitor.ledger.entry import CorrectedClearance
 
 FRESH, SETTINGS = 3.0e-4, Forecasting(wear_coefficient_sigma=0.7)
 BEFORE, OPENED, SIGMA = 6.0e-5, 1.0e-3, 4.0e-5  # wear counted before, clearance that the torque shows
@@ -94,11 +95,8 @@ def test_two_corrections_each_count_from_themselves():
 
 @pytest.mark.plain
 def test_a_fleet_learns_from_a_corrected_part_what_a_part_that_wore_alike_teaches(leg):
-    measured = Measurement(
-        stamp_ns=7, joint="A", who="ann", clearance_m=OPENED + 1.8e-5, sigma_m=2e-6,
-        wear_m=CORRECTED.wear_m + 1e-5, cycles=10, replaced_ns=0, expected_below=0.5, counts=True,
-    )  # fmt: skip
-    given = leg, SETTINGS, [measured], {}
+    one = measured(clearance_m=OPENED + 1.8e-5, wear_m=CORRECTED.wear_m + 1e-5)
+    given = leg, SETTINGS, [one], {}
     blind, aware = (
         next(p for p in parts_of("left", *given, corrections=each) if p.joint == "A")
         for each in ((), [CORRECTED])

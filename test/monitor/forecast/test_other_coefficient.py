@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from ledger_contents import measured
 
 from leg_wear_monitor.fleet.learning import parts_of
 from leg_wear_monitor.fleet.renew import _with_parts
@@ -25,7 +26,6 @@ from leg_wear_monitor.monitor.ledger.entry import (
     CorrectedClearance,
     Entry,
     JointWear,
-    Measurement,
     coefficient_spans,
 )
 
@@ -163,12 +163,13 @@ def test_a_line_names_the_joints_and_both_coefficients(leg):
 
 @pytest.mark.plain
 def test_a_fleet_learns_the_same_coefficient_whatever_is_nominal(leg):
-    measured = Measurement(
-        stamp_ns=7, joint="A", who="ann", clearance_m=MEASURED.clearance_m, sigma_m=2e-6, wear_m=WEAR,
-        cycles=10, replaced_ns=0, expected_below=0.5, counts=True,
-    )  # fmt: skip
     own = Clearance(**{**attrs.asdict(leg.clearances["A"], recurse=False), "wear_coefficient": (WAS, WAS)})
-    given = attrs.evolve(leg, clearances=leg.clearances | {"A": own}), SETTINGS, [measured], {}
+    given = (
+        attrs.evolve(leg, clearances=leg.clearances | {"A": own}),
+        SETTINGS,
+        [measured(clearance_m=MEASURED.clearance_m, wear_m=WEAR)],
+        {},
+    )
     spans = coefficient_spans([part(WEAR)], {"A": 2.0 * WAS})
     (one,) = (each for each in parts_of("left", *given, corrections=spans) if each.joint == "A")
     assert one.factor * one.nominal_per_pa == pytest.approx(1.8 * WAS, rel=0.01)

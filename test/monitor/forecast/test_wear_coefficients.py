@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor import ConfigError, load_mechanism
+from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.forecast.measurement import measure
 from leg_wear_monitor.monitor.forecast.wear_coefficients import ClearanceAtWear, estimate_coefficient
@@ -173,16 +173,6 @@ def test_a_clock_that_has_jumped_is_said_and_changes_nothing():
     early, right = found(worn(6e-5), 0.42, stamp_ns=HOUR, kept_ns=3 * HOUR), found(worn(6e-5), 0.42)
     assert "the clock is 2 h before the ledger's last entry" in early.words[0]
     np.testing.assert_array_equal(early.after.weight, right.after.weight)
-
-
-@pytest.mark.parametrize(
-    ("clearance_m", "sigma_m"), [(0.0, 1e-6), (0.2, 1e-6), (3e-4, 0.0), (math.nan, 1e-6)]
-)
-def test_figures_that_cannot_be_are_refused(clearance_m, sigma_m):
-    with pytest.raises(ConfigError, match=r"mm is not (between|a standard deviation)"):
-        measure(
-            PRIOR, CLEARANCE, worn(0.0), (), clearance_m=clearance_m, sigma_m=sigma_m, stamp_ns=1, who="ann"
-        )
 
 
 def test_wear_that_was_counted_by_samples_teaches_as_much_less_as_it_is_uncertain():

@@ -7,7 +7,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from ledger_contents import contents
+from ledger_contents import contents, keep_journal
 
 from leg_wear_monitor.estimate.signature import CommissionedTorque
 from leg_wear_monitor.monitor.alarms import Alarm
@@ -131,21 +131,9 @@ def test_a_log_of_sqlite_put_beside_it_is_refused(open_ledger, full, tmp_path):
     assert_refused(open_ledger, full, "wear.ledger-wal beside it belongs to another ledger; move it away")
 
 
-def in_a_transaction(path, target):
-    """Copies of a ledger and of its journal in the midst of a transaction, as a power cut leaves them."""
-    with closing(sqlite3.connect(path, isolation_level=None)) as db:
-        db.execute("PRAGMA cache_size = 1")
-        db.execute("BEGIN")
-        db.execute("UPDATE surface SET depth = zeroblob(length(depth))")
-        db.execute("UPDATE span SET end_ns = 1")
-        shutil.copy(path, target)
-        shutil.copy(f"{path}-journal", f"{target}-journal")
-        db.execute("ROLLBACK")
-
-
 def test_a_transaction_that_was_cut_off_is_undone(open_ledger, full, entry_at, tmp_path):
     target = tmp_path / "cut.ledger"
-    in_a_transaction(full, target)
+    keep_journal(full, tmp_path / "cut.ledger-journal", target)
     assert target.read_bytes() != full.read_bytes()
     assert contents(open_ledger(path=target).entry) == contents(entry_at(2))
 
@@ -153,11 +141,11 @@ def test_a_transaction_that_was_cut_off_is_undone(open_ledger, full, entry_at, t
 def test_a_journal_of_another_time_is_refused_and_nothing_is_undone_with_it(
     open_ledger, full, entry_at, tmp_path
 ):
-    in_a_transaction(full, tmp_path / "cut.ledger")
+    keep_journal(full, tmp_path / "kept")
     ledger = open_ledger()
     ledger.keep(entry_at(9), closed=True)
     ledger.close()
-    shutil.copy(tmp_path / "cut.ledger-journal", f"{full}-journal")
+    shutil.copy(tmp_path / "kept", f"{full}-journal")
     assert_refused(
         open_ledger, full, "with wear.ledger-journal beside it, it .* of another file or time: move it away"
     )

@@ -8,7 +8,7 @@ from contextlib import closing
 import attrs
 import numpy as np
 import pytest
-from ledger_contents import contents
+from ledger_contents import contents, measured
 
 from leg_wear_monitor.estimate.signature import CommissionedTorque
 from leg_wear_monitor.mechanism.loader import load_mechanism
@@ -21,7 +21,6 @@ from leg_wear_monitor.monitor.ledger.entry import (
     Binding,
     ClearancePoint,
     ForecastPoint,
-    Measurement,
     SimulatedReference,
     binding_of,
 )
@@ -35,11 +34,6 @@ from leg_wear_monitor.twin.torque_reference import CYCLES, TorqueReference
 pytestmark = pytest.mark.plain
 
 SECOND = 10**9
-
-MEASURED = Measurement(
-    stamp_ns=1, joint="A", who="ann", clearance_m=3e-4, sigma_m=1e-6, wear_m=1e-5, cycles=3,
-    replaced_ns=0, expected_below=0.3, counts=True,
-)  # fmt: skip
 
 
 def test_what_is_kept_is_there_again(open_ledger, entry_at):
@@ -383,7 +377,7 @@ def test_baselines_are_of_the_parts_since_the_last_reset_whatever_the_clocks_say
 
 def test_a_measurement_that_is_withdrawn_is_kept_and_told_as_withdrawn(open_ledger):
     ledger = open_ledger()
-    ledger.note(MEASURED)
+    ledger.note(measured())
     ledger.record()
     ledger.close()
     ledger = open_ledger()

@@ -214,7 +214,10 @@ def test_a_torque_in_the_namespace_of_another_leg_is_not_read(tmp_path, sent, wr
 
 def test_what_cannot_be_used_is_refused_by_name(tmp_path, sent, write_bag, read):
     torque_only = [each for each in sent if each.topic == "/drive_torque"]
-    with pytest.raises(RecordingError, match=r"a.mcap: joint_states: is not a topic .* it has /drive_torque; select .* --joint-states"):
+    with pytest.raises(
+        RecordingError,
+        match=r"a.mcap: joint_states: is not a topic .* it has /drive_torque; select .* --joint-states",
+    ):
         read(write_bag(tmp_path / "a.mcap", torque_only))
     joints_only = [each for each in sent if each.topic == "/joint_states"]
     _, recording = read(write_bag(tmp_path / "b.mcap", joints_only))

@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 def fleet(ctx: click.Context) -> None:
     """Keep the ledgers, tables and the overview of many legs."""
     if ctx.invoked_subcommand is None:
-        raise click.UsageError(f"no verb of fleet, expected one of {', '.join(fleet.list_commands(ctx))}", ctx)
+        raise click.UsageError(
+            f"no verb of fleet, expected one of {', '.join(fleet.list_commands(ctx))}", ctx
+        )
 
 
 @fleet.command(short_help="Count the recordings that are not counted yet.")
@@ -170,13 +172,15 @@ def _compile(chains: Sequence["Chain"]) -> None:
 def _print_counts(done: "FleetUpdate", out: Path) -> None:
     from leg_wear_monitor.fleet.overview import FILE, load_overview
 
-    if done.is_up_to_date:
+    overview = load_overview(out)
+    if done.is_up_to_date and not any(leg.recordings.counted for leg in overview.legs):
+        click.echo("nothing to count, and nothing is counted yet")
+    elif done.is_up_to_date:
         click.echo("everything is in the ledger already")
     else:
         click.echo(f"recordings: {done.counted} counted now")
         if done.renewed:
             click.echo(f"forecasts: {done.renewed} renewed after measurements or repairs")
-    overview = load_overview(out)
     states = [f"{number} {state.replace('_', ' ')}" for state, number in overview.counts.items() if number]
     click.echo(f"legs: {', '.join(states)}")
     if demonstrations := [leg.id for leg in overview.legs if leg.is_accelerated]:

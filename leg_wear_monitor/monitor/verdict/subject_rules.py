@@ -325,7 +325,8 @@ def no_torque(situation: Situation) -> Sequence[Hit]:
 
 def _fault_of_torque(situation: Situation) -> str:
     if not situation.has_torque:
-        return "there is no drive torque"
+        is_effort = situation.drive_torque.source == "effort"
+        return f"there is no drive torque{': the effort of the crank is empty or NaN' if is_effort else ''}"
     stuck = [each for each in situation.alarms if each.kind == "input_torque" and each.present is Level.ERROR]
     return "the drive torque is stuck or saturated" if stuck else ""
 

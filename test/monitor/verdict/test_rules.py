@@ -446,9 +446,14 @@ WAITING = Diagnosis(state=DiagnosisState.WAITING, reason="gait cycles: 2 of 5")
     ("missing", "seen_by", "why"),
     [
         ({"has_torque": False}, "the encoders show", "joints G cannot be observed: there is no drive torque"),
+        (
+            {"has_torque": False, "drive_torque": DriveTorque(source="effort")},
+            "the encoders show",
+            "there is no drive torque: the effort of the crank is empty or NaN",
+        ),
         ({"diagnosis": WAITING}, "the drive torque agrees", "of joints G yet: gait cycles: 2 of 5"),
     ],
-    ids=["torque", "diagnosis"],
+    ids=["torque", "effort", "diagnosis"],
 )
 def test_joints_that_encoders_show_need_no_torque_and_no_diagnosis(missing, seen_by, why) -> None:
     eyes = seen_as_new("encoders")

@@ -296,11 +296,12 @@ def unit_doubts(rows: Rows, config: MonitorConfig) -> Iterator[str]:
         turned = (turned + math.pi) % TURN - math.pi
     ahead = steps_s > 0.0
     turns = float(turned[ahead].sum()) / TURN
+    if abs(turns) < _LEAST_TURNS / _MOST_RADIANS:
+        return
     has_turned = abs(turns) >= _LEAST_TURNS
-    if not has_turned:  # unless it turns all the time, as an angle in radians that is read in degrees
-        step, mean = float(np.median(turned[ahead])), TURN * turns / max(1, np.count_nonzero(ahead))
-        if abs(turns) < _LEAST_TURNS / _MOST_RADIANS or not 0.5 < step / mean < 2.0:
-            return
+    # below that only if it turns all the time, as an angle in radians that is read in degrees
+    if not has_turned and not 0.5 < float(np.median(turned[ahead]) / turned[ahead].mean()) < 2.0:
+        return
     if hint := _cadence(60.0 * turns / float(steps_s[ahead].sum()), has_turned, config):
         yield hint
     if CRANK_SPEED in rows.values:

@@ -8,7 +8,7 @@ from leg_wear_monitor.dynamics import simulation
 # arguments, and what the line must say
 WRONG = [
     ("", ["no verb", "check, ", "--help"]),
-    ("fleet", ["error: no verb of fleet, expected one of export, report, update (see", "fleet --help"]),
+    ("fleet", ["error: Missing command. (see", "fleet --help)"]),
     ("simulat", ["'simulat'", "check, ", "did you mean simulate?"]),
     ("simulate --clearence A", ["--clearence", "--clearance"]),
     ("simulate bionic_leg", ["bionic_leg", "unexpected"]),

@@ -15,14 +15,9 @@ if TYPE_CHECKING:
     from leg_wear_monitor.fleet.update import FleetUpdate, Followed
 
 
-@click.group(short_help="Monitor many legs from their recordings.", invoke_without_command=True)
-@click.pass_context
-def fleet(ctx: click.Context) -> None:
+@click.group(short_help="Monitor many legs from their recordings.", no_args_is_help=False)
+def fleet() -> None:
     """Keep the ledgers, tables and the overview of many legs."""
-    if ctx.invoked_subcommand is None:
-        raise click.UsageError(
-            f"no verb of fleet, expected one of {', '.join(fleet.list_commands(ctx))}", ctx
-        )
 
 
 @fleet.command(short_help="Count the recordings that are not counted yet.")

@@ -310,10 +310,14 @@ def find_topic(
         return None
     near = [topic for topic in recorded if topic.endswith(f"/{name}")]
     if len(near) > 1:
-        of_torque = stream.kind == TORQUE  # whichever topic brings it
-        option = "--drive-torque" if of_torque else f"--{name}".replace("_", "-")
-        raise RecordingError(where, name, f"could be {listed(near)}, select one with {option}")
+        raise RecordingError(where, name, f"could be {listed(near)}, select one with {_option(stream)}")
     return near[0] if near else None
+
+
+def _option(stream: Stream) -> str:
+    """Option of the command line that names a stream's topic."""
+    of_torque = stream.kind == TORQUE  # whichever topic brings it
+    return "--drive-torque" if of_torque else f"--{stream.topic}".replace("_", "-")
 
 
 def check_channel(stream: Stream, channel: Channel, known_type: str, where: str) -> None:
@@ -482,6 +486,8 @@ def assign(
                 source.select(stream, topic)
             continue
         text = f"is not a topic of the recording, it has {listed(recorded)}"
+        if set(recorded) - set(topics.values()):  # one of them may be it, under another name
+            text += f"; select one with {_option(stream)}"
         if stream.is_needed:
             raise RecordingError(str(first), stream.topic, text)
         findings.append(Finding(first, f"{stream.topic}: {text}", Severity.NOTE))

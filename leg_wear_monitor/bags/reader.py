@@ -528,9 +528,12 @@ def _time(table: TableFile, columns: tuple[Column, ...]) -> str:
 
 def _column(table: TableFile, column: Column) -> str:
     counts, unit = table.counts, _SI.get(column.key, "rad")
-    found = f"{counts.measured.get(column.key, 0)} values"
+    number = counts.measured.get(column.key, 0)
+    found = f"{number} values"
     if column.key in counts.least:
         found += f", {counts.least[column.key]:.4g} to {counts.most[column.key]:.4g} {unit}"
+    elif number:
+        found += ", all of them NaN or infinite"
     return f"{column.key} {_named(column)}: {found}"
 
 

@@ -273,6 +273,7 @@ def _parsed(texts: Sequence[str]) -> NDArray[np.int64]:
 
 _LEAST_ROWS = 50
 _LEAST_TURNS = 2.0
+_MOST_RADIANS = 360.0 / TURN  # as which fraction of its turns an angle in radians is read in degrees
 _SAME = 1.02  # a wrapped angle reaches its turn within a sample
 _NEAR = 1.5  # a hint fits if it gives the speed within this factor
 _FAR = 2.0  # beyond this factor of the commanded speed no gait cycle counts (`monitor.evaluation`)
@@ -295,9 +296,13 @@ def unit_doubts(rows: Rows, config: MonitorConfig) -> Iterator[str]:
         turned = (turned + math.pi) % TURN - math.pi
     ahead = steps_s > 0.0
     turns = float(turned[ahead].sum()) / TURN
-    if abs(turns) < _LEAST_TURNS:
+    if abs(turns) < _LEAST_TURNS / _MOST_RADIANS:
         return
-    if hint := _cadence(60.0 * turns / float(steps_s[ahead].sum()), config):
+    has_turned = abs(turns) >= _LEAST_TURNS
+    # below that only if it turns all the time, as an angle in radians that is read in degrees
+    if not has_turned and not 0.5 < float(np.median(turned[ahead]) / turned[ahead].mean()) < 2.0:
+        return
+    if hint := _cadence(60.0 * turns / float(steps_s[ahead].sum()), has_turned, config):
         yield hint
     if CRANK_SPEED in rows.values:
         speed = rows.values[CRANK_SPEED][chosen][1:][ahead]
@@ -329,13 +334,13 @@ def _other_turn(angle: Floats, config: MonitorConfig) -> str:
     return ""
 
 
-def _cadence(joint_rpm: float, config: MonitorConfig) -> str:
-    """Doubt about the time or the angle, if another unit gives the commanded cadence."""
+def _cadence(joint_rpm: float, has_turned: bool, config: MonitorConfig) -> str:
+    """Doubt about the angle, or the time once it has turned, if another unit gives the commanded cadence."""
     units, found = config.input.units, []
     rpm, commanded = abs(joint_rpm) / config.crank.gear_ratio, abs(config.cadence.commanded_rpm)
     if 1.0 / _FAR <= rpm / commanded <= _FAR:
         return ""
-    if units.stamp in tables.STAMPS and not config.input.rate_hz:
+    if has_turned and units.stamp in tables.STAMPS and not config.input.rate_hz:
         for other, power in tables.STAMPS.items():
             found.append((rpm * 10.0 ** (tables.STAMPS[units.stamp] - power), "input.units.stamp", other))
     factor, divisor = config.input.angle_scale

@@ -437,8 +437,8 @@ def _torques(torques: dict[TorqueSource, Series]) -> dict[TorqueSource, Series]:
     """Torques that are not constant."""
     if not torques:
         raise LegWearError(
-            "no torque was recorded: expected geometry_msgs/msg/WrenchStamped, std_msgs/msg/Float64, or the "
-            "effort of the crank in its sensor_msgs/msg/JointState"
+            "no torque was recorded, or only NaN: expected geometry_msgs/msg/WrenchStamped, "
+            "std_msgs/msg/Float64, or the effort of the crank in its sensor_msgs/msg/JointState"
         )
     varying = {name: each for name, each in torques.items() if float(each.value.std()) > 0.0}
     if not varying:

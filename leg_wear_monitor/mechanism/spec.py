@@ -59,6 +59,10 @@ def _modulus_slip(modulus: float) -> str:
     return f"{USUAL}, steel has 2.1e11; {meant} for Pa?"
 
 
+USUAL_WEAR = 0.0, 1.0e-9  # 1/Pa
+WEAR_SLIP = f"{USUAL}; K for K/H, 1/MPa for 1/Pa, or mm^3/(N m), which is 1e-9 1/Pa?"
+
+
 @attrs.frozen(kw_only=True)
 class Clearance:
     """Settings of a revolute clearance joint; pairs are (bushing, journal)."""
@@ -85,8 +89,8 @@ class Clearance:
         "1/Pa",
         "K/H of Archard's law",
         at_least=0.0,
-        usual=(0.0, 1.0e-9),
-        doubt=f"{USUAL}; K for K/H, or 1/MPa for 1/Pa?",
+        usual=USUAL_WEAR,
+        doubt=WEAR_SLIP,
         default=(0.0, 0.0),
     )
     stiffness: float | None = quantity(

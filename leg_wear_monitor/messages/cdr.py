@@ -412,13 +412,18 @@ class Decoder:
         out = samples, angles, force
         names = self._crank, self._interface, self._thermal, self._encoders
         decode(data, messages, *names, self._ends, self._axis, self._effort, *out)
-        samples["foot_force_n"] = force * self._force_scale
         samples["encoder_rad"] = np.nan
         samples["encoder_rad"][:, : len(self._ends)] = angles * self._signs
-        samples["crank_angle_rad"] *= self._crank_scale
-        samples["crank_angle_rad"] += self._offset_rad
-        samples["crank_velocity_radps"] *= self._crank_scale
-        samples["torque_nm"] *= self._torque_scale
+        with np.errstate(over="ignore"):
+            samples["foot_force_n"] = force * self._force_scale
+            samples["crank_angle_rad"] *= self._crank_scale
+            samples["crank_angle_rad"] += self._offset_rad
+            samples["crank_velocity_radps"] *= self._crank_scale
+            samples["torque_nm"] *= self._torque_scale
+        overflown = np.isinf(samples["foot_force_n"]).any(axis=1)
+        for name in ("crank_angle_rad", "crank_velocity_radps", "torque_nm"):
+            overflown |= np.isinf(samples[name])
+        samples["fault"][overflown & (samples["fault"] == NO_FAULT)] = NOT_FINITE
         return mark_zero_stamps(samples)
 
     def one(self, raw: bytes, kind: int, log_time_ns: int = 0) -> Samples:

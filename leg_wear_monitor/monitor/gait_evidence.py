@@ -150,9 +150,8 @@ class GaitEvidence:
         if rate < needed:
             return f"crank samples come at {rate:.3g} Hz, too few: {commanded:.3g} rpm need {needed:.3g} Hz"
         if turns < 2.0:
-            return (
-                f"the crank turns {turns:.2g} times in {self._passed_s:.3g} s: less than a whole gait cycle"
-            )
+            short = "a whole gait cycle" if turns < 1.0 else "two turns, in which there is a whole gait cycle"
+            return f"the crank turns {turns:.2f} times in {self._passed_s:.3g} s: less than {short}"
         if not _SLOWEST <= rpm / abs(commanded) <= _FASTEST:
             return f"the crank turns at {rpm:.3g} rpm, the commanded cadence is {abs(commanded):.3g} rpm"
         return f"the crank turns {turns:.3g} times, but its motion cannot be followed over a whole gait cycle"

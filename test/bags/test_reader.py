@@ -199,11 +199,19 @@ def test_a_torque_in_the_namespace_of_another_leg_is_not_read(tmp_path, sent, wr
 
 def test_what_cannot_be_used_is_refused_by_name(tmp_path, sent, write_bag, read):
     torque_only = [each for each in sent if each.topic == "/drive_torque"]
-    with pytest.raises(RecordingError, match=r"a.mcap: joint_states: is not a topic .* it has /drive_torque"):
+    with pytest.raises(
+        RecordingError,
+        match=r"a.mcap: joint_states: is not a topic .* it has /drive_torque; select .* --joint-states",
+    ):
         read(write_bag(tmp_path / "a.mcap", torque_only))
     joints_only = [each for each in sent if each.topic == "/joint_states"]
     _, recording = read(write_bag(tmp_path / "b.mcap", joints_only))
     assert any("drive_torque: is not a topic" in str(finding) for finding in recording.findings)
+    assert not any("select" in str(finding) for finding in recording.findings)
+    other = [attrs.evolve(each, topic="/motor/torque") for each in torque_only]
+    _, recording = read(write_bag(tmp_path / "d.mcap", joints_only + other))
+    (note,) = recording.findings
+    assert str(note).endswith("it has /joint_states, /motor/torque; select one with --drive-torque")
     config = MonitorConfig(drive_torque=DriveTorque(source="float64"))
     expected = "/drive_torque: is of type geometry_msgs/msg/WrenchStamped, expected std_msgs/msg/Float64"
     with pytest.raises(RecordingError, match=expected):

@@ -8,6 +8,7 @@ from leg_wear_monitor.dynamics import simulation
 # arguments, and what the line must say
 WRONG = [
     ("", ["no verb", "check, ", "--help"]),
+    ("fleet", ["error: Missing command. (see", "fleet --help)"]),
     ("simulat", ["'simulat'", "check, ", "did you mean simulate?"]),
     ("simulate --clearence A", ["--clearence", "--clearance"]),
     ("simulate bionic_leg", ["bionic_leg", "unexpected"]),

@@ -31,6 +31,13 @@ def test_it_writes_the_pages_that_have_changed(run, fleet):
     assert "changed: 1" in run(*COMMAND).stdout
 
 
+def test_a_fleet_without_a_recording_has_nothing_in_its_ledgers(run, tmp_path):
+    (tmp_path / "fleet.yaml").write_text("legs:\n  - {id: a, recordings: none*.mcap}\n")
+    done = run("fleet", "update", "fleet.yaml", "--out", "out")
+    assert done.stdout.splitlines()[0] == "nothing to count, and nothing is counted yet"
+    assert "none*.mcap matches no recording" in done.stderr
+
+
 @pytest.mark.parametrize("text", ["{", "{}", '{"schema_version": 99}'])
 def test_a_summary_that_makes_no_page_costs_its_page_only(run, fleet, text):
     (fleet / "legs" / "a" / "summary.json").write_text(text)

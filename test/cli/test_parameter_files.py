@@ -38,6 +38,24 @@ def test_a_parameter_file_in_order_is_told_in_one_line(run, tmp_path):
         assert part in line
 
 
+@pytest.mark.plain
+def test_the_sections_of_all_monitors_of_a_file_are_checked(run, refused, tmp_path):
+    both = """
+/**: {ros__parameters: {cadence.commanded_rpm: 30.0}}
+/left/leg_wear_monitor: {ros__parameters: {crank_joint: left_crank}}
+/right/leg_wear_monitor: {ros__parameters: {cadence.commanded_rpm: -30.0}}
+/controller_manager: {ros__parameters: {update_rate: 100}}
+"""
+    (tmp_path / "both.yaml").write_text(both)
+    result = run("check", "both.yaml")
+    assert (result.exit_code, result.stderr) == (0, "")
+    left, right = result.stdout.splitlines()
+    assert "/left/leg_wear_monitor: " in left and left.endswith("30 rpm, hardware left")
+    assert "/right/leg_wear_monitor: " in right and right.endswith("-30 rpm, hardware right")
+    (tmp_path / "both.yaml").write_text(both.replace("crank_joint", "crank_joynt"))
+    assert "both.yaml: crank_joynt: unknown parameter" in refused("check", "both.yaml")
+
+
 def test_lives_that_end_before_the_limit_are_told_by_check_and_at_the_start_of_a_replay(run, tmp_path):
     (tmp_path / "mine.yaml").write_text(BEGIN + "limits: {clearance_m: 0.0008}")
     for line in (("check", "mine.yaml"), ("replay", "none.mcap", "--config", "mine.yaml")):

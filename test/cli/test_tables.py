@@ -46,6 +46,22 @@ def test_check_warns_of_what_is_lost_or_doubtful(run, table: Path) -> None:
     assert "with input.units.stamp 'ms' it would turn at 60 rpm" in result.stderr
 
 
+def test_check_says_that_no_value_of_a_column_can_be_used(run, table: Path) -> None:
+    head, *rows = table.read_text().splitlines()
+    nothing = [
+        ",".join(
+            [
+                "nan" if name == "tau" else cell
+                for name, cell in zip(head.split(","), row.split(","), strict=True)
+            ]
+        )
+        for row in rows
+    ]
+    table.write_text("\n".join([head, *nothing, ""]))
+    told = run("check", "monitor.yaml", "leg.csv").stdout
+    assert "drive_torque from 'tau' in N mm: 1000 values, all of them NaN or infinite" in told
+
+
 def test_a_missing_column_is_one_line(refused, table: Path) -> None:
     for verb in ("check", "replay", "commission"):
         line = refused(verb, "leg.csv")

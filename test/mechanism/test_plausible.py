@@ -100,6 +100,11 @@ def test_what_was_understood_has_units(linkage_of, leg):
 
 
 PARAMETERS = [
+    (
+        {"wear_coefficients_per_pa": [1e-15, 1e-15, 1e-6, 1e-15, 1e-15]},
+        "wear_coefficients_per_pa: 1e-06 1/Pa, usual are below 1e-9 1/Pa",
+        "mm^3/(N m), which is 1e-9 1/Pa?",
+    ),
     ({"cadence.commanded_rpm": 6.2832}, "cadence.commanded_rpm: 6.2832 rpm is 9.55 s", "is 60 rpm"),
     (
         {"wear_acceleration": 5000.0},

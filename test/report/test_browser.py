@@ -151,6 +151,28 @@ def test_the_page_of_a_mechanism_moves_and_fits(document, tmp_path):
     assert found[0]["slider"]["arrows"] == 4
 
 
+CUT = """
+window.addEventListener("load", () => setTimeout(() => {
+  const found = Array.from(document.querySelectorAll("iframe")).map((frame) => {
+    const page = frame.contentDocument;
+    page.querySelectorAll("details").forEach((part) => { part.open = true; });
+    const codes = Array.from(page.querySelectorAll(".guide td:first-child code"));
+    const words = codes.filter((code) => !code.textContent.includes(" "));
+    return {words: words.length, cut: words.filter((code) => code.getClientRects().length > 1).length};
+  });
+  document.getElementById("found").textContent = JSON.stringify(found);
+}, 500));
+"""
+
+
+def test_codes_of_a_guide_are_whole(tmp_path):
+    summary = made_up_summary()
+    summary = attrs.evolve(summary, verdict=attrs.evolve(summary.verdict, fault_code="CLEARANCE_SEEN_A"))
+    found, _ = browse([page_html(replay_page(summary))], tmp_path, CUT)
+    assert all(page["words"] >= 4 for page in found)
+    assert [page["cut"] for page in found] == [0, 0]
+
+
 def test_what_is_wrong_would_be_seen(tmp_path):
     """A page that is too wide, lacks its picture and its script."""
     page = '<div style="width:2000px">wide</div><img src="data:image/png;base64,AAAA">'

@@ -135,11 +135,14 @@ def _table(name: str, parameters: str | None) -> str:
 def _file(name: str) -> str:
     """Check a file as what it is."""
     from leg_wear_monitor.mechanism.loader import is_file_name, read_yaml
-    from leg_wear_monitor.monitor.config.parameters import is_parameter_file
+    from leg_wear_monitor.monitor.config.parameters import is_parameter_file, monitors_of
 
     document = read_yaml(Path(name), name) if is_file_name(name) else None
     if is_parameter_file(document):
-        return _parameters(name)
+        nodes = monitors_of(document)
+        if len(nodes) <= 1:
+            return _parameters(name, *nodes)
+        return f"\n{'':13} ".join(f"{node}: {_parameters(name, node)}" for node in nodes)
     from leg_wear_monitor.fleet.description import is_fleet_file
 
     return _fleet(name) if is_fleet_file(document) else _mechanism(name)
@@ -160,14 +163,16 @@ def _fleet(path: str) -> str:
     return f"\n{'':13} ".join(line for line, _ in pairs if line)
 
 
-def _parameters(path: str) -> str:
+def _parameters(path: str, node: str | None = None) -> str:
     """Read the monitor's parameters, and say what they are set to."""
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.monitor.config.fitting import fitted, parameter_doubts, twin_settings
     from leg_wear_monitor.monitor.config.parameters import load_config
     from leg_wear_monitor.monitor.forecast.forecaster import life_doubts
 
-    config = load_config(path)
+    config = load_config(path, node)
+    if node:
+        config = config.on_node(node)
     leg = fitted(load_mechanism(config.mechanism), config, path)
     twin_settings(config, path)
     common.warn_of(path, (*parameter_doubts(config, leg), *life_doubts(config, leg)))

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from leg_wear_monitor.fleet.update import FleetUpdate, Followed
 
 
-@click.group(short_help="Monitor many legs from their recordings.")
+@click.group(short_help="Monitor many legs from their recordings.", no_args_is_help=False)
 def fleet() -> None:
     """Keep the ledgers, tables and the overview of many legs."""
 
@@ -167,13 +167,15 @@ def _compile(chains: Sequence["Chain"]) -> None:
 def _print_counts(done: "FleetUpdate", out: Path) -> None:
     from leg_wear_monitor.fleet.overview import FILE, load_overview
 
-    if done.is_up_to_date:
+    overview = load_overview(out)
+    if done.is_up_to_date and not any(leg.recordings.counted for leg in overview.legs):
+        click.echo("nothing to count, and nothing is counted yet")
+    elif done.is_up_to_date:
         click.echo("everything is in the ledger already")
     else:
         click.echo(f"recordings: {done.counted} counted now")
         if done.renewed:
             click.echo(f"forecasts: {done.renewed} renewed after measurements or repairs")
-    overview = load_overview(out)
     states = [f"{number} {state.replace('_', ' ')}" for state, number in overview.counts.items() if number]
     click.echo(f"legs: {', '.join(states)}")
     if demonstrations := [leg.id for leg in overview.legs if leg.is_accelerated]:

@@ -199,6 +199,7 @@ MOST_ACCELERATION = 1000.0  # that of the demonstration, config/demo.yaml; 5000 
 def parameter_doubts(config: MonitorConfig, leg: Mechanism) -> tuple[Doubt, ...]:
     """All doubtful values of a configuration, for the mechanism that `fitted` returned."""
     return (
+        *doubts(config),
         *doubts(config.cadence, "cadence."),
         *doubts(config.crank, "crank."),
         *_limits(config, leg),

@@ -263,6 +263,12 @@ def parse_config(document: Any, source: str, node: str | None = None) -> Monitor
     return config_from({name: value for name, value in values.items() if not _OF_ROS.fullmatch(name)}, source)
 
 
+def monitors_of(document: Any) -> tuple[str, ...]:
+    """Full names of the monitors that sections of a parameter file are for, and no others."""
+    names = (name for name, _ in _sections(document))
+    return tuple(dict.fromkeys(name for name in names if name.endswith(NODE) and "*" not in name))
+
+
 def _node_of(sections: Sequence[str]) -> str:
     """The node in the root namespace, or the only monitor node of a file such as a dump."""
     only, *others = sections

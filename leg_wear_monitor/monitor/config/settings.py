@@ -7,6 +7,7 @@ from these classes. A section is a class, so `limits.clearance_m` is the paramet
 import attrs
 
 from leg_wear_monitor.configuration import described, quantity
+from leg_wear_monitor.mechanism.spec import USUAL_WEAR, WEAR_SLIP
 from leg_wear_monitor.monitor.config.inputs import (
     LIVE,
     Cadence,
@@ -230,6 +231,8 @@ class MonitorConfig:
         "1/Pa",
         "K/H of both surfaces, one for all clearance joints or one each; empty: those of the file",
         within=(0.0, 1.0e-6),
+        usual=USUAL_WEAR,
+        doubt=WEAR_SLIP,
         default=(),
     )
     wear_acceleration: float = quantity(

@@ -235,8 +235,8 @@ RULES = (
     _watch(
         code="NOT_OBSERVED",
         hits=subject_rules.not_observed,
-        why="the drive torque does not show the clearances of joints {joints} yet{causes}",
-        do="let the leg walk on at a steady cadence{next}; until then, rock these joints by hand regularly",
+        why="the drive torque does not show the clearances of joints {joints}{causes}",
+        do="{then}rock these joints by hand regularly",
     ),
     _watch(
         code="CADENCE",

@@ -325,7 +325,8 @@ def no_torque(situation: Situation) -> Sequence[Hit]:
 
 def _fault_of_torque(situation: Situation) -> str:
     if not situation.has_torque:
-        return "there is no drive torque"
+        is_effort = situation.drive_torque.source == "effort"
+        return f"there is no drive torque{': the effort of the crank is empty or NaN' if is_effort else ''}"
     stuck = [each for each in situation.alarms if each.kind == "input_torque" and each.present is Level.ERROR]
     return "the drive torque is stuck or saturated" if stuck else ""
 
@@ -357,13 +358,17 @@ def not_observed(situation: Situation) -> Sequence[Hit]:
     if not blind or not situation.has_cycle or not situation.has_torque:
         return []
     cause = f": {found.reason}" if found.reason else ""
-    upcoming = f": {found.next_step}" if found.next_step else ""
+    then = ""
+    if found.next_step or found.state is DiagnosisState.WAITING:
+        cause = f" yet{cause}"
+        upcoming = f": {found.next_step}" if found.next_step else ""
+        then = f"let the leg walk on at a steady cadence{upcoming}; until then, "
     unused = tuple(
         Evidence(f"cycles not used: {reason}", float(number), math.nan, "")
         for reason, number in found.cycles_not_used.items()
     )
     joints = ", ".join(map(situation.joint_words, blind))
-    return [Hit(words={"joints": joints, "causes": cause, "next": upcoming}, evidence=unused)]
+    return [Hit(words={"joints": joints, "causes": cause, "then": then}, evidence=unused)]
 
 
 def other_cadence(situation: Situation) -> Sequence[Hit]:

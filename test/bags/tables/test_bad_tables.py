@@ -133,10 +133,17 @@ def turning(rpm, turn=2.0 * np.pi, wrapped=True):
     return {"time": times, "crank_angle": angle % turn if wrapped else angle, "drive_torque": times}
 
 
+def standing_first():
+    """An angle in degrees that rests, and turns at 60 rpm for the last 57th of its ten seconds."""
+    columns = turning(60.0, 360.0, wrapped=False)
+    return columns | {"crank_angle": np.maximum(columns["crank_angle"], columns["crank_angle"][-35])}
+
+
 @pytest.mark.parametrize(
     ("columns", "parameters", "doubt"),
     [
         (turning(60.0), {}, ""),
+        (standing_first(), {"units.crank_angle": "deg"}, ""),
         (turning(-60.0, wrapped=False), {}, ""),
         (turning(40.0, 360.0), {"units.crank_angle": "deg"}, ""),
         (turning(55.0, 360.0), {}, "in 'rad' a turn is 6.283: is it in 'deg' (input.units.crank_angle)?"),
@@ -146,6 +153,11 @@ def turning(rpm, turn=2.0 * np.pi, wrapped=True):
             turning(60.0, 360.0, wrapped=False),
             {},
             "with input.units.crank_angle 'deg' it would turn at 60 rpm",
+        ),
+        (
+            turning(60.0, wrapped=False),
+            {"units.crank_angle": "deg"},
+            "at 1.05 rpm, commanded are 60 rpm; with input.units.crank_angle 'rad' it would turn at 60 rpm",
         ),
         (turning(60.0), {"units.stamp": "ms"}, "with input.units.stamp 's' it would turn at 60 rpm"),
         (turning(60.0) | {"v": np.full(2000, 6.3)}, {"columns.crank_speed": "v"}, ""),

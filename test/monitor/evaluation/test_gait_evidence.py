@@ -86,6 +86,8 @@ def test_what_is_missing_is_named() -> None:
     assert seen(rate_hz=1.0) == "no two of 4 crank samples follow each other within 0.5 s"
     assert seen(rate_hz=5.0) == "crank samples come at 5.26 Hz, too few: 60 rpm need 12 Hz"
     assert seen(seconds=1.0) == "the crank turns 0.99 times in 0.995 s: less than a whole gait cycle"
+    almost = "1.95 times in 1.96 s: less than two turns, in which there is a whole gait cycle"
+    assert seen(seconds=1.96) == f"the crank turns {almost}"
     assert seen(rpm=3.0, seconds=60.0) == "the crank turns at 3 rpm, the commanded cadence is 60 rpm"
     assert seen().startswith("the crank turns 3.99 times, but its motion cannot be followed")
 

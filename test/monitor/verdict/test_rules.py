@@ -256,6 +256,16 @@ def test_every_rule_is_the_verdict_of_some_case() -> None:
     assert {rule.code for rule in RULES} == reached
 
 
+@pytest.mark.parametrize("next_step", ["", "clearances are compared in 3 gait cycles (3 s)"])
+def test_a_leg_is_to_walk_on_only_where_that_shows_more(next_step: str) -> None:
+    """J on the ground does not show, however long the leg walks."""
+    shown = Diagnosis(state=DiagnosisState.AS_COUNTED, clearance_m=(3e-4, math.nan), next_step=next_step)
+    verdict = judged(diagnosis=shown, joints=(seen_as_new("torque")[0], NEW[1]))
+    walk_on = f"let the leg walk on at a steady cadence: {next_step}; until then, " if next_step else ""
+    assert verdict.why.endswith(f"of joints G{' yet' if next_step else ''}")
+    assert verdict.do == f"{walk_on}rock these joints by hand regularly"
+
+
 def test_a_mismatch_without_a_diagnosis_is_told_as_what_it_is() -> None:
     verdict = judged(
         alarms=(alarm("torque_mismatch", value=0.35, limit=0.1),),
@@ -436,9 +446,14 @@ WAITING = Diagnosis(state=DiagnosisState.WAITING, reason="gait cycles: 2 of 5")
     ("missing", "seen_by", "why"),
     [
         ({"has_torque": False}, "the encoders show", "joints G cannot be observed: there is no drive torque"),
+        (
+            {"has_torque": False, "drive_torque": DriveTorque(source="effort")},
+            "the encoders show",
+            "there is no drive torque: the effort of the crank is empty or NaN",
+        ),
         ({"diagnosis": WAITING}, "the drive torque agrees", "of joints G yet: gait cycles: 2 of 5"),
     ],
-    ids=["torque", "diagnosis"],
+    ids=["torque", "effort", "diagnosis"],
 )
 def test_joints_that_encoders_show_need_no_torque_and_no_diagnosis(missing, seen_by, why) -> None:
     eyes = seen_as_new("encoders")

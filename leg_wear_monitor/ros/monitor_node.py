@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +18,14 @@ from std_srvs.srv import Trigger
 from leg_wear_monitor.dynamics.clearance.stepper import advance_beside
 from leg_wear_monitor.errors import LegWearError, closed_on_interrupt
 from leg_wear_monitor.mechanism.loader import load_mechanism
+from leg_wear_monitor.mechanism.plausible import doubts
 from leg_wear_monitor.messages import outputs
 from leg_wear_monitor.messages.cdr import Decoder
 from leg_wear_monitor.messages.outputs import Messages
 from leg_wear_monitor.messages.qos import SENSOR_DATA
 from leg_wear_monitor.messages.streams import STREAMS, ForecastTimes
 from leg_wear_monitor.monitor.alarms import ADVICE, ALREADY_COUNTED, Alarm
-from leg_wear_monitor.monitor.config.fitting import acceleration_doubts, check_limits
+from leg_wear_monitor.monitor.config.fitting import check_limits, parameter_doubts
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.forecaster import life_doubts
 from leg_wear_monitor.monitor.ledger.entry import JointWear
@@ -262,8 +264,8 @@ class MonitorNode(ClosingNode):
         joints, leg = ", ".join(self._monitor.clearance_joints), self._monitor.mechanism.name
         rpm = f"{config.cadence.commanded_rpm:g} rpm"
         self.get_logger().info(f"monitoring joints {joints} of {leg} at {rpm}, hardware {config.hardware}")
-        doubts = *acceleration_doubts(config), *life_doubts(config, mechanism)
-        for doubt in (*doubts, *self._monitor.coefficient_doubts):
+        told = doubts(load_mechanism(config.mechanism)), parameter_doubts(config, mechanism)
+        for doubt in chain(*told, life_doubts(config, mechanism), self._monitor.coefficient_doubts):
             self.get_logger().warning(str(doubt))
 
     @property

@@ -113,6 +113,13 @@ def test_another_wear_coefficient_than_that_of_the_ledger_is_told(run, bag, comp
     assert any(each.startswith(line) for each in complaints(again))
 
 
+def test_a_value_in_another_unit_is_doubted(run, bag, complaints, tmp_path):
+    config = tmp_path / "monitor.yaml"
+    config.write_text("/**:\n  ros__parameters:\n    wear_coefficients_per_pa: [2.0e-7]\n")
+    (line,) = (each for each in complaints(run("replay", str(bag), "--config", config)) if "usual" in each)
+    assert line.startswith(f"warning: {config}: wear_coefficients_per_pa: 2e-07 1/Pa, usual are below")
+
+
 @pytest.mark.no_cover
 def test_a_summary_changed_anywhere_gives_a_page_or_one_line(run, bag, tmp_path, unpainted):
     run("replay", str(bag), "--out", "out")

@@ -620,6 +620,8 @@ class CommissionedTorque:
     before : CommissionedTorque or None
         Before a correction: what signatures had in addition to those of the model. The other joints are still
         to be compared with it.
+    is_interim : bool
+        Whether it is of a leg that stays changed, which is no baseline.
     """
 
     stamp_ns: int
@@ -633,6 +635,7 @@ class CommissionedTorque:
     together: int = 1
     is_instant: bool = False
     before: "CommissionedTorque | None" = None
+    is_interim: bool = False
 
     @sigma_m.default
     def _as_counted(self) -> Floats:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import attrs
 
-from leg_wear_monitor.estimate.cause import Change
+from leg_wear_monitor.estimate.cause import Cause, Change
 from leg_wear_monitor.estimate.mismatch import explanation
 from leg_wear_monitor.files import with_same_fields
 from leg_wear_monitor.monitor.alarm_specs import MISMATCH
@@ -205,11 +205,18 @@ def _note_torque(parts: Parts, torque: TorqueObserver, before: TorqueState) -> N
 
     To simulate a reference again takes a minute of walking.
     """
-    known, stamp_ns = before.all_commissioned, parts.twin.intake.followed_stamp_ns
-    found = torque.state.all_commissioned if not torque.state.is_load_new else ()
-    for one in found:
-        if all(one is not other for other in known):
-            parts.accounting.note(one)
+    state, stamp_ns = torque.state, parts.twin.intake.followed_stamp_ns
+    known = (*before.all_commissioned, *(one.baseline for one in before.all_interims))
+    found = state.all_commissioned if not state.is_load_new else ()
+    # a baseline that follows ends what was told of a leg that stayed changed
+    is_over = len(state.all_interims) < len(before.all_interims)
+    # a load is known from the twin's motion alone
+    interims = (
+        each for each in state.all_interims if all(one.cause is not Cause.LOAD for one in each.changes)
+    )
+    for baseline in (*found, *(each.baseline for each in interims)):
+        if is_over or all(baseline is not other for other in known):
+            parts.accounting.note(baseline)
     names, made = tuple(parts.mechanism.bodies), [one.reference for one in before.known]
     for reference in torque.simulated_references:
         if all(reference is not other for other in made):

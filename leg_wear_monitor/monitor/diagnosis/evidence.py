@@ -205,6 +205,8 @@ class Evidence:
         """Renew the clearances, and the change if there is one."""
         if state.is_load_other and state.not_by_load:
             return  # stays as told
+        if state.interim is not None and not state.interim.changes:
+            state.interim = self._known_again(state, state.interim)
         # the gait cycles since the change, if there is one: often at first, then now and then
         since_ns = self._since_ns(state, config)
         cycles = [cycle for cycle in state.cycles if cycle.begin_ns >= since_ns]
@@ -221,7 +223,7 @@ class Evidence:
         if since_ns or state.commissioned is None:
             explanations = self._models.explainer(state).explanations(mean, len(cycles), state.counted_m)
         if state.interim is not None:
-            explanations = self._beside_told(state, cycles, explanations, config)
+            explanations = self._beside_told(state, cycles, explanations)
             cycles = cycles[-len(state.cycles) :]
             mean = np.mean([cycle.signature for cycle in cycles], axis=0)
         # a leg that is not that of the reference has no names and no clearances
@@ -250,21 +252,24 @@ class Evidence:
         is_other = state.is_load_new or state.is_load_other
         if state.commissioned is None or not state.changes or is_other:
             return
-        change = state.changes[-1]
+        change, known = state.changes[-1], state.commissioned
         since = tuple(cycle for cycle in state.cycles if cycle.begin_ns >= change.since_ns)
         if change.cause in (Cause.CLEARANCE, Cause.NOISE) or len(since) < COMMISSIONING_CYCLES:
             return
-        known = state.commissioned
-        baseline = state.baseline(since, state.counted_m, sigma_m=known.sigma_m, channel=known.channel)
+        baseline = state.baseline(
+            since, state.counted_m, sigma_m=known.sigma_m, channel=known.channel, is_interim=True
+        )
         state.interim, state.changes = Interim((*state.standing, change), baseline), ()
         state.detector, state.fit_due = self._models.detector(state, config).fresh(), 0
 
+    def _known_again(self, state: TorqueState, interim: Interim) -> Interim | None:
+        """What was told of a leg that stayed changed in the run before; None where nothing is left of it."""
+        known, explainer = interim.baseline, self._models.explainer(state, is_commissioned=True)
+        found = change_of(explainer.explanations(known.mean, known.cycles, known.clearance_m), known.stamp_ns)
+        return Interim((found,), known) if found else None
+
     def _beside_told(
-        self,
-        state: TorqueState,
-        cycles: Sequence[SignedCycle],
-        explanations: Sequence[Explanation],
-        config: MonitorConfig,
+        self, state: TorqueState, cycles: Sequence[SignedCycle], explanations: Sequence[Explanation]
     ) -> Sequence[Explanation]:
         """Explanations of what changed beside the told changes, or, where these are over, of all that did.
 
@@ -287,7 +292,7 @@ class Evidence:
         if not is_over:
             return explanations
         state.forget_interims()
-        state.cycles, state.detector = tuple(recent), self._models.detector(state, config).fresh()
+        state.cycles = tuple(recent)
         return alone if explanations else ()
 
     def _since_ns(self, state: TorqueState, config: MonitorConfig) -> int:

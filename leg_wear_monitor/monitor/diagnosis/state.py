@@ -214,7 +214,7 @@ class Interim:
     Attributes
     ----------
     changes : tuple of Change
-        What was told of it, the oldest first.
+        What was told of it, the oldest first; empty before it is known in a further run.
     baseline : CommissionedTorque
         Of the gait cycles since.
     """
@@ -422,6 +422,11 @@ class TorqueState:
         return tuple(change for change in self.settled if change.is_corrected)
 
     @property
+    def all_interims(self) -> tuple[Interim, ...]:
+        """Those of all cadences."""
+        return tuple(one.interim for one in self.known if one.interim)
+
+    @property
     def standing(self) -> tuple[Change, ...]:
         """Told changes that later gait cycles are seen beside; at a cadence without any, those of another."""
         if self.interim is not None:
@@ -471,9 +476,10 @@ class TorqueState:
         """
         if self.sensor is None:
             raise RuntimeError("there are no samples yet")
-        own = self.take_baseline(reference.profile.speed)
-        cycles = [one for one in self.waiting if one.profile.is_like(reference.profile)]
-        self.turn_to(AtCadence(reference, self.sensor, own, tuple(cycles)))
+        own, changed = (self.take_baseline(reference.profile.speed, which) for which in (False, True))
+        cycles = tuple(one for one in self.waiting if one.profile.is_like(reference.profile))
+        interim = Interim((), changed) if own and changed else None
+        self.turn_to(AtCadence(reference, self.sensor, own, cycles, interim=interim))
         self.waiting = ()
 
     def turn_towards(self, profile: CrankProfile) -> None:
@@ -482,14 +488,17 @@ class TorqueState:
         if other is not None and not (self.reference and self.reference.profile.is_like(profile)):
             self.turn_to(other)
 
-    def take_baseline(self, speed: float) -> CommissionedTorque | None:
+    def take_baseline(self, speed: float, is_interim: bool = False) -> CommissionedTorque | None:
         """The baseline of the sensor at a speed of the crank, which is not among the others any more.
+
+        Or, ``is_interim``, that of a leg that stays changed.
 
         Forces of inertia depend on the speed: compared with the baseline of 60 rpm, a healthy leg at 57 rpm
         had a wide joint A. Roughness depends on the rate, and on how many samples are averaged.
         """
         alike = (one for one in self.baselines if not one.speed or abs(one.speed / speed - 1.0) <= UNLIKE)
-        own = next((one for one in alike if self.sensor and one.is_of(self.sensor)), None)
+        of_kind = (one for one in alike if one.is_interim is is_interim)
+        own = next((one for one in of_kind if self.sensor and one.is_of(self.sensor)), None)
         self.baselines = tuple(one for one in self.baselines if one is not own)
         return own
 

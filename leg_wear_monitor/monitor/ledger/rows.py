@@ -209,7 +209,7 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
         case CommissionedTorque(before=before):
             if before is not None:
                 add(db, "torque_commissioning", _baseline_values(before) | {"is_before": 1})
-            add(db, "torque_commissioning", _baseline_values(event) | {"is_before": 0})
+            add(db, "torque_commissioning", _baseline_values(event) | {"is_before": 2 * event.is_interim})
         case IdentifiedLeg(stamp_ns, bodies, parameters):
             add(db, "identified_leg", {"stamp_ns": stamp_ns, **_leg_values(bodies, parameters)})
         case SimulatedReference():
@@ -388,9 +388,11 @@ def read_commissioned(db: sqlite3.Connection) -> Commissioned | None:
 def read_commissioned_torques(db: sqlite3.Connection) -> list[CommissionedTorque]:
     """Stored signatures of the drive torque of the present parts: the last ones of each cadence.
 
-    Those before a correction, or before it was known better, have other standard deviations.
+    Those before a correction, or before it was known better, have other standard deviations. A leg that stays
+    changed has one of its own, as long as no baseline of its cadence follows.
     """
     found: list[CommissionedTorque] = []
+    interims: list[CommissionedTorque] = []
     last = None
     for row in db.execute(
         "SELECT stamp_ns, cycles, speed_radps, delay_s, time_constant_s, load_friction, second_order, "
@@ -404,6 +406,10 @@ def read_commissioned_torques(db: sqlite3.Connection) -> list[CommissionedTorque
             stamp_ns, clearance_m, signatures.reshape(cycles, -1), sigma_m, channel, speed,
             or_nan(row[11]), or_nan(row[12]), row[13], bool(row[14]),
         )  # fmt: skip
+        if row[15] == 2:  # of a leg that stays changed
+            if not any(_is_alike(one, other) for other in found + interims):
+                interims.append(attrs.evolve(one, is_interim=True))
+            continue
         if row[15]:
             found = [attrs.evolve(each, before=one) if each is last else each for each in found]
             continue
@@ -411,9 +417,14 @@ def read_commissioned_torques(db: sqlite3.Connection) -> list[CommissionedTorque
         # those of unknown clearances grow with them; another correction has others
         if found and not np.allclose(one.sigma_m, found[0].sigma_m, rtol=0.1, atol=0.0):
             break
-        if not any(abs(one.speed - other.speed) <= UNLIKE * abs(other.speed) for other in found):
+        if not any(_is_alike(one, other) for other in found):
             found.append(one)
-    return found[:CADENCES]
+    return found[:CADENCES] + interims
+
+
+def _is_alike(one: CommissionedTorque, other: CommissionedTorque) -> bool:
+    """Whether two are of the same cadence."""
+    return abs(one.speed - other.speed) <= UNLIKE * abs(other.speed)
 
 
 _LEG = "stamp_ns, bodies, mass, length, friction, compliance_rad_per_nm, damping_ratio, load_n, load_sigma"

@@ -134,7 +134,8 @@ CREATE TABLE commissioning (
 -- order of the low-pass, averaging), the mean speed of the crank, 0 where not known, the temperature of the
 -- drive as far as it was measured, and the sensor: its period, how many of its samples were averaged into
 -- one, and whether these are instants. A row with is_before 1 is before the correction of the next row, with
--- what its signatures had in addition to those of the model
+-- what its signatures had in addition to those of the model; one with 2 is of a leg that stays changed, until
+-- a baseline of its cadence follows
 CREATE TABLE torque_commissioning (
     id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, cycles INTEGER NOT NULL, clearance_m BLOB NOT NULL,
     signatures BLOB NOT NULL, sigma_m BLOB NOT NULL, delay_s REAL NOT NULL, time_constant_s REAL NOT NULL,

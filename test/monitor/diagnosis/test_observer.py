@@ -1067,6 +1067,25 @@ def test_a_stored_baseline_is_used_from_the_first_cycles_on(leg, commissioned, r
     assert (change.cause, change.subject) == (Cause.CLEARANCE, "J")
 
 
+def test_a_leg_that_stays_changed_is_known_again_in_the_next_run(leg, commissioned, reference) -> None:
+    observer, heavy = commissioned(), int(reference.of_masses[list(leg.bodies).index("foot"), 1])
+    walk_on(observer, reference, [heavy] * (COMMISSIONING_CYCLES + 4))
+    known, (told,) = observer.state.commissioned, observer.diagnosis.changes
+    kept = [known, observer.state.interim.baseline]
+
+    second = observer_of(leg, commissioned=kept)
+    walk(second, samples(reference, [heavy] * 7, seed=2))
+    (again,) = second.diagnosis.changes
+    assert (again.cause, again.subject) == (told.cause, told.subject) == (Cause.MASS, "foot")
+    assert abs(again.value - told.value) < told.sigma
+    assert second.state.interim.baseline is kept[1]
+
+    healthy = observer_of(leg, commissioned=kept)
+    walk(healthy, samples(reference, [0] * 7, seed=2))
+    assert (healthy.diagnosis.state, healthy.diagnosis.changes) == (DiagnosisState.AS_COUNTED, ())
+    assert healthy.state.commissioned is known
+
+
 def test_a_small_opening_is_reported_and_not_corrected(commissioned, reference) -> None:
     observer = commissioned()
     assert walk_on(observer, reference, [leg_number(0, 1.2)] * 20) == []

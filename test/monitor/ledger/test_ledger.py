@@ -363,6 +363,18 @@ def test_references_and_baselines_are_kept_for_each_cadence(reopened) -> None:
     assert [(one.stamp_ns, one.before) for one in found.commissioned_torques] == [(20, None), (21, None)]
 
 
+def test_a_leg_that_stays_changed_is_kept_until_a_baseline_of_its_cadence_follows(reopened) -> None:
+    known, slow, changed, again = (
+        CommissionedTorque(ns, np.full(5, 3e-4), np.ones((4, 6)), speed=speed, is_interim=ns >= 20)
+        for ns, speed in ((10, 6.0), (11, 4.5), (20, 6.02), (21, 6.0))
+    )
+    for noted, kept in (((known, slow), [11, 10]), ((changed, again), [11, 10, 21]), ((known,), [10, 11])):
+        found = reopened(*noted)
+        stamps = [(one.stamp_ns, one.is_interim) for one in found.commissioned_torques]
+        assert stamps == [(ns, ns >= 20) for ns in kept]
+        found.close()
+
+
 @pytest.mark.parametrize("what", ["reset_wear", "undo_reset"])
 @pytest.mark.parametrize("reset_ns", [5, 50])
 def test_baselines_are_of_the_parts_since_the_last_reset_whatever_the_clocks_say(

@@ -9,7 +9,6 @@ import numpy as np
 from leg_wear_monitor.estimate.cause import (
     CORRECTED_FROM,
     SURE_LOG_ODDS,
-    SURE_OF_NAME,
     SURE_SIGMAS,
     Cause,
     Change,
@@ -249,8 +248,7 @@ class Evidence:
         Otherwise it hides a joint that opens: G that broke out to 2 mm after a mass had been put on the foot
         was that mass for good (2026-11-27).
         """
-        is_other = state.is_load_new or state.is_load_other
-        if state.commissioned is None or not state.changes or is_other:
+        if state.commissioned is None or not state.changes or state.is_load_new or state.is_load_other:
             return
         change, known = state.changes[-1], state.commissioned
         since = tuple(cycle for cycle in state.cycles if cycle.begin_ns >= change.since_ns)
@@ -259,6 +257,9 @@ class Evidence:
         baseline = state.baseline(
             since, state.counted_m, sigma_m=known.sigma_m, channel=known.channel, is_interim=True
         )
+        if change.cause in (Cause.LAG, Cause.TIMING) and state.reference and state.sensor:
+            behind = self._models.channel(state.reference, state.sensor, baseline).channel
+            baseline = attrs.evolve(baseline, channel=behind)
         state.interim, state.changes = Interim((*state.standing, change), baseline), ()
         state.detector, state.fit_due = self._models.detector(state, config).fresh(), 0
 
@@ -285,8 +286,7 @@ class Evidence:
         if change is None:
             is_over = True
         elif explanations:
-            as_well = explanations[0].misfit + 2.0 * SURE_OF_NAME
-            is_over = (change.cause, change.subject) in told and alone[0].misfit <= as_well
+            is_over = (change.cause, change.subject) in told and alone[0].misfit <= explanations[0].misfit
         else:
             is_over = (Cause.UNKNOWN, "") in told and change.cause is not Cause.UNKNOWN
         if not is_over:
@@ -412,10 +412,8 @@ def _changed_load(state: TorqueState, change: Change) -> Change | None:
     cycles = sum(one.begin_ns >= change.since_ns for one in state.cycles)
     earlier = state.carried_n[: -(cycles + _AMIDST)]
     now = state.carried_n[-max(_LEAST_CYCLES, min(cycles - _AMIDST, SETTLING_CYCLES)) :]
-    if told and told.cause is Cause.LOAD:
-        before_n = told.counted
-    else:
-        before_n = float(np.mean(earlier)) if earlier else math.nan
+    known_n = float(np.mean(earlier)) if earlier else math.nan
+    before_n = told.counted if told and told.cause is Cause.LOAD else known_n
     value_n, sigma_n = float(np.mean(now)) - before_n, max(1.0, float(np.std(now)) / math.sqrt(len(now)))
     if not abs(value_n) >= max(_LOAD_CHANGE_N, _LOAD_SIGMAS * sigma_n):  # nor where it is not known
         return None

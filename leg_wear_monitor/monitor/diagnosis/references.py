@@ -188,8 +188,8 @@ class LegModels:
 
     def _of(self, state: TorqueState, is_commissioned: bool = False) -> _ModelsOfState:
         """Models of a state: kept ones if its reference, sensor and baseline are the same, or new ones."""
-        reference, sensor = state.reference, state.sensor
-        known = state.commissioned if is_commissioned else state.compared_with
+        reference, own = state.reference, (state.sensor, state.commissioned)
+        sensor, known = own if is_commissioned else state.compared_with
         if reference is None or sensor is None:
             raise RuntimeError("there is no reference yet")
         for one in self._kept:

@@ -412,9 +412,12 @@ class TorqueState:
         return (*(one.commissioned for one in self.known if one.commissioned), *self.baselines)
 
     @property
-    def compared_with(self) -> CommissionedTorque | None:
-        """What gait cycles are compared with: the baseline, or the leg that stays changed."""
-        return self.interim.baseline if self.interim else self.commissioned
+    def compared_with(self) -> tuple[TorqueSensor | None, CommissionedTorque | None]:
+        """The sensor, and what gait cycles are compared with: the baseline, or a leg that stays changed."""
+        if self.interim is None or self.sensor is None:
+            return self.sensor, self.commissioned
+        changed = self.interim.baseline
+        return attrs.evolve(self.sensor, channel=changed.channel), changed
 
     @property
     def corrections(self) -> tuple[Change, ...]:

@@ -73,6 +73,11 @@ class PublisherConfig(GaitConfig):
 Message: TypeAlias = JointState | WrenchStamped | Float64 | Bool
 
 
+def time_message(stamp: int) -> Time:
+    """A stamp [ns] as a message."""
+    return Time(sec=stamp // 1_000_000_000, nanosec=stamp % 1_000_000_000)
+
+
 def sensor_message(reading: Reading, start_ns: int, config: PublisherConfig) -> Message | bytes:
     """Message of a reading; raw bytes for a fault that makes it undecodable."""
     message = _whole(reading, start_ns, config)
@@ -84,8 +89,7 @@ def sensor_message(reading: Reading, start_ns: int, config: PublisherConfig) -> 
 
 
 def _whole(reading: Reading, start_ns: int, config: PublisherConfig) -> Message:
-    sec, nanosec = divmod(stamp_ns(reading, start_ns), 1_000_000_000)
-    stamp = Time(sec=sec, nanosec=nanosec)
+    stamp = time_message(stamp_ns(reading, start_ns))
     if reading.kind == CRANK:
         return _joint_state(reading, stamp, config)
     if reading.kind == LOAD:

@@ -37,6 +37,11 @@ _WHOLLY = 1.5
 # which they do not tell apart, leave 1.5 to 1.7, and a mass on the thigh 1.8 to 3.6 (2026-11-27)
 _WHOLE = 1.4
 
+# by which the logarithms of odds over the next cause are divided beside a told change, as the model is not
+# of such a leg: beside twice the friction, G at 0.50 mm was B, with odds of e^12 over G. Right names have
+# e^62 and more beside a lag, e^118 and more at 2 mm, e^19 to e^38 at 0.5 to 0.6 mm beside a mass (2026-11-27)
+_BESIDE = 5.0
+
 _LEAST_CYCLES = 2  # since a change, before it is explained: the first contains the change itself
 _LEAST_CYCLES_UNLIKE = 6  # where the leg is not that of its reference: two strange steps are no change
 _FIT_EVERY = 10  # gait cycles, but for the first ones of a change
@@ -236,11 +241,13 @@ class Evidence:
         fit = self._fit(state, mean, len(cycles), change, explanations if since_ns else ())
         if change is not None and fit.square > _WHOLE:
             change = with_doubt(change, explanations)
+        if change is not None and state.standing:
+            change = attrs.evolve(change, runner_up_log_odds=change.runner_up_log_odds / _BESIDE)
         state.fit, state.fit_cycles = fit, len(cycles)
         self._tell(state, change, since_ns, len(cycles), config)
         self._keep_least(state, change, config)
         if change is None and state.is_load_new and not (state.is_load_other or state.commissioned):
-            _tell_wide(state, self._models.explainer(state).joints, since_ns or cycles[0].begin_ns)
+            _tell_wide(state, fit, self._models.explainer(state).joints, since_ns or cycles[0].begin_ns)
 
     def _settle_told(self, state: TorqueState, config: MonitorConfig) -> None:
         """Compare with a leg that stays changed otherwise than by a clearance from now on.
@@ -427,21 +434,19 @@ def _changed_load(state: TorqueState, change: Change) -> Change | None:
     )
 
 
-def _tell_wide(state: TorqueState, joints: Sequence[str], since_ns: int) -> None:
+def _tell_wide(state: TorqueState, fit: ClearanceFit, joints: Sequence[str], since_ns: int) -> None:
     """Tell a joint that is wider by all clearances at once, before the baseline under a new load hides it.
 
     With doubt, as the load was found with what the joint changes of the torque.
     """
-    if state.fit is None:
-        return
-    beyond = (state.fit.clearance_m - state.counted_m) / state.fit.sigma_m
+    beyond = (fit.clearance_m - state.counted_m) / fit.sigma_m
     k = int(np.argmax(beyond))
     change = Change(
         cause=Cause.CLEARANCE,
         subject=joints[k],
         since_ns=since_ns,
-        value=float(state.fit.clearance_m[k]),
-        sigma=float(state.fit.sigma_m[k]),
+        value=float(fit.clearance_m[k]),
+        sigma=float(fit.sigma_m[k]),
         counted=float(state.counted_m[k]),
         log_odds=0.5 * float(beyond[k]) ** 2,
         runner_up=Cause.LOAD.value,

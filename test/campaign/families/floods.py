@@ -3,6 +3,7 @@
 Each ends with a gait: the node has to be alive, to follow it, and to have said what it lost.
 """
 
+import time
 from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
@@ -112,8 +113,10 @@ def _burst(stage: Stage, rng: np.random.Generator) -> int:
     at_once = int(rng.integers(1_000, _MANY))
     publish = stage.publisher(JointState, "joint_states")
     raw = list(live.walk(0.0, 2.5, 1.0e4))
-    for message in raw:
-        stage.monitor._receive(stage.monitor._supervision.inputs[0], message)
+    inbox, crank = stage.monitor._inbox, stage.monitor._supervision.inputs[0]
+    with inbox.lock:
+        for message in raw:
+            inbox.add(crank.stream.code, message, time.time_ns())
     stage.settle()
     return len(raw) + stage.send(publish, raw[:at_once], together=at_once)
 

@@ -54,7 +54,7 @@ def changed(walk: np.ndarray, size_nm: float, lever: np.ndarray) -> Iterator[tup
 def ratios(detector: ChangeDetector, cycles: np.ndarray) -> np.ndarray:
     """What each gait cycle adds to each test (n, tests)."""
     tests = len(detector.fresh().sums)
-    far = DetectorState(np.full(tests, FAR), np.zeros(tests, np.int64), np.ones(tests, np.int64))
+    far = DetectorState(np.full(tests, FAR), np.zeros(tests, np.int64))
     return np.array([detector.with_cycle(far, cycle, 0).sums - FAR for cycle in cycles])
 
 

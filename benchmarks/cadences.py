@@ -189,11 +189,13 @@ def told(looks: Sequence[Look]) -> None:
     cycles = [one for look in looks for one in look.cycles]
     print("\n| cadence | gait cycles | mismatch: median, 99 %, largest | peak force of a joint: same [N] |")
     for rpm in CADENCES:
-        some = [one for one in cycles if abs(one.cadence_rpm / rpm - 1.0) < 0.01]
-        mismatch = np.nanpercentile([one.torque_mismatch for one in some], [50, 99, 100])
-        peak = np.percentile([max(joint.peak_force_n for joint in one.joints) for one in some], [50, 99, 100])
-        row = f"{rpm:g} rpm", len(some), ", ".join(f"{x:.3f}" for x in mismatch)
-        print(f"| {' | '.join(map(str, row))} | {', '.join(f'{x:.0f}' for x in peak)} |")
+        at_this = [one for one in cycles if abs(one.cadence_rpm / rpm - 1.0) < 0.01]
+        mismatch = np.nanpercentile([one.torque_mismatch for one in at_this], [50, 99, 100])
+        peak = np.percentile(
+            [max(joint.peak_force_n for joint in one.joints) for one in at_this], [50, 99, 100]
+        )
+        columns = f"{rpm:g} rpm", len(at_this), ", ".join(f"{x:.3f}" for x in mismatch)
+        print(f"| {' | '.join(map(str, columns))} | {', '.join(f'{x:.0f}' for x in peak)} |")
 
 
 def opened(monitor: WearMonitor, walk: Walk, random: np.random.Generator) -> str:

@@ -18,9 +18,8 @@ from diagnosis import BODIES, LEGS, NEW, kept, truth
 
 from leg_wear_monitor import MonitorConfig, WearMonitor, load_mechanism, twin
 from leg_wear_monitor.dynamics.full_run import FullRun
-from leg_wear_monitor.dynamics.run import FORCE, TORQUE, new_run_statistics, quintic
+from leg_wear_monitor.dynamics.run import FORCE, TORQUE, new_run_statistics, percentile, quintic
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.dynamics.statistics import percentile
 from leg_wear_monitor.gait.config import PaceConfig
 from leg_wear_monitor.gait.leg import Pace
 from leg_wear_monitor.mechanism.spec import Mechanism

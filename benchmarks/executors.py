@@ -17,6 +17,7 @@ from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
+from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import JointState
 
 EXECUTORS = {"single": SingleThreadedExecutor, "multi": MultiThreadedExecutor, "events": EventsExecutor}
@@ -45,7 +46,7 @@ def publish(rate_hz: float, seconds: float) -> None:
         for publisher, data in publishers:
             publisher.publish(data)
     time.sleep(0.2)
-    rclpy.try_shutdown()
+    try_shutdown()
 
 
 def subscribe(name: str, raw: bool, rate_hz: float, seconds: float) -> None:
@@ -72,7 +73,7 @@ def subscribe(name: str, raw: bool, rate_hz: float, seconds: float) -> None:
     print(f"{name:7} {'raw' if raw else 'typed':6} {fraction:6.1%} of a core, lost {1 - got[0] / sent:7.3%}")
     executor.shutdown()
     node.destroy_node()
-    rclpy.try_shutdown()
+    try_shutdown()
 
 
 def main() -> None:

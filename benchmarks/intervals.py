@@ -121,8 +121,7 @@ def compare(name: str, starts: int, full: bool) -> None:
     case = CASES[name]
     setup = setup_of(case)
     kinds: dict[str, Callable[[int], Run]] = {
-        str(count): lambda start, count=count: run_of(case, count, start)  # type: ignore[misc]
-        for count in COUNTS
+        str(count): lambda start, count=count: run_of(case, count, start) for count in COUNTS
     }
     if full and not case.compliant:
         kinds["full"] = lambda _: FullRun(setup_of(case), tolerance_m=1e-9)

@@ -44,7 +44,7 @@ def every_cycle(leg: Mechanism, cycles: int) -> tuple[np.ndarray, float]:
 
 
 def lived(leg: Mechanism, settings: LifeSettings, factor: object, limit_m: float, cycles: float) -> Life:
-    run = LifeRun(leg, settings, wear_factor=factor)  # type: ignore[arg-type]
+    run = LifeRun(leg, settings, wear_factor=factor)
     return simulate_life(run, limit_m=limit_m, horizon_cycles=cycles)
 
 

@@ -16,7 +16,14 @@ from hidden_lives import LIMIT_M, HiddenLife, read
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.monitor.config.sections import Forecasting
-from leg_wear_monitor.monitor.forecast.forecast import Forecast, GrowthLaw, JointCondition, forecast
+from leg_wear_monitor.monitor.forecast.forecast import (
+    Forecast,
+    GrowthLaw,
+    JointCondition,
+    JointForecast,
+    LegForecast,
+    forecast,
+)
 from leg_wear_monitor.monitor.forecast.forecaster import law_of
 from leg_wear_monitor.monitor.forecast.wear_coefficients import ClearanceAtWear, estimate_coefficient
 
@@ -123,7 +130,9 @@ def evaluated(case: Case, law: GrowthLaw, random: np.random.Generator) -> np.nda
     first = [each.joint for each in case.now].index(str(without.leg.first))
     one = Forecast(joints=tuple(f.joints[k] for k, f in enumerate(singly)), leg=singly[first].leg)
     truth = np.append(case.remain, case.remain.min())
-    rows = [[*f.joints, f.leg] for f in (without, one, told(case, law, observations))]
+    rows: list[list[JointForecast | LegForecast]] = [
+        [*f.joints, f.leg] for f in (without, one, told(case, law, observations))
+    ]
     bands = np.array([[attrs.astuple(each.cycles) for each in row] for row in rows])
     return np.asarray(bands / truth[:, None])
 

@@ -33,6 +33,7 @@ from mcap.reader import make_reader
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
+from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import JointState
 
 from leg_wear_monitor.gait.config import (
@@ -105,7 +106,7 @@ def publish(legs: int, rate_hz: float, rpm: float, seconds: float, load_hz: floa
             sent += 1
     print(sent, flush=True)
     time.sleep(2.5)
-    rclpy.try_shutdown()
+    try_shutdown()
 
 
 class Listener(Node):
@@ -237,10 +238,12 @@ def main() -> None:
         for leg, rows in enumerate(seen):
             report(leg, sent, rows, listener)
     finally:
-        for process in (*nodes, source):
+        for process in nodes:
             process.terminate()
             process.wait()
-        rclpy.try_shutdown()
+        source.terminate()
+        source.wait()
+        try_shutdown()
         hearing.join()
     for leg in range(args.legs if args.record else 0):
         replay(leg, args)

@@ -5,6 +5,7 @@ import statistics
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from mcap.reader import make_reader
@@ -63,7 +64,7 @@ def rosbags_decoded(path: Path) -> tuple[float, float]:
     angle = torque = 0.0
     with AnyReader([path]) as reader:
         for connection, _, raw in reader.messages():
-            message = reader.deserialize(raw, connection.msgtype)
+            message: Any = reader.deserialize(raw, connection.msgtype)
             if connection.topic == "/joint_states":
                 angle += float(message.position[message.name.index("crank")])
             else:

@@ -40,7 +40,7 @@ def right_hand_side(setup: Setup, run: FullRun, approach: Floats) -> RightHandSi
     cs, force, phi, jac, gamma, schur, lam, drive, contact = (part.shape for part in full_scratch(model))
 
     @numba.njit(error_model="numpy")
-    def derivative(t, y):  # type: ignore[no-untyped-def]
+    def derivative(t, y):
         scratch = FullScratch(
             np.empty(cs), np.empty(force), np.empty(phi), np.empty(jac), np.empty(gamma), np.empty(schur),
             np.empty(lam), np.empty(drive), np.empty(contact),

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.utilities import try_shutdown
 from stand_ins import Robot
 
 from leg_wear_monitor.gait.config import GaitConfig, KnockConfig, LoadConfig
@@ -54,7 +55,7 @@ def main(argv: Sequence[str]) -> int:
                     rclpy.spin_once(node, timeout_sec=0.1)
         finally:
             monitor.send_signal(signal.SIGINT)
-    rclpy.try_shutdown()
+    try_shutdown()
     if verdicts:
         print(f"verdict: {verdicts[-1]}")
     return int(monitor.returncode or not verdicts)

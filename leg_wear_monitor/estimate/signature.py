@@ -621,7 +621,7 @@ class CommissionedTorque:
         Before a correction: what signatures had in addition to those of the model. The other joints are still
         to be compared with it.
     is_interim : bool
-        Whether it is of a leg that stays changed, which is no baseline.
+        Whether it is of a leg with a lasting change, which is no baseline.
     """
 
     stamp_ns: int

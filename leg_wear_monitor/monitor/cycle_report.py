@@ -208,7 +208,7 @@ def _note_torque(parts: Parts, torque: TorqueObserver, before: TorqueState) -> N
     state, stamp_ns = torque.state, parts.twin.intake.followed_stamp_ns
     known = (*before.all_commissioned, *(one.baseline for one in before.all_interims))
     found = state.all_commissioned if not state.is_load_new else ()
-    # a baseline that follows ends what was told of a leg that stayed changed
+    # a baseline that follows ends the interim
     is_over = len(state.all_interims) < len(before.all_interims)
     # a load is known from the twin's motion alone
     interims = (

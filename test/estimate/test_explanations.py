@@ -90,7 +90,7 @@ def test_a_joint_that_the_torque_does_not_show_is_not_known(explainer) -> None:
 
 
 def test_joints_that_explain_a_change_as_well_widen_each_other(explainer) -> None:
-    """I at 0.45 mm behind a belt looked like G at 0.33 mm, and was told as 0.31 ± 0.01 mm."""
+    """I at 0.45 mm behind a belt looked like G at 0.33 mm, and was reported as 0.31 ± 0.01 mm."""
     model = explainer.model
     alike = with_changes(model, model.joints.change[[0, 1, 1]])
     one = Explainer(alike, JOINTS, explainer.baseline, explainer.nuisances)
@@ -229,13 +229,13 @@ def test_usual_friction_is_no_change_of_clearances(explainer) -> None:
     assert (np.abs(fit.clearance_m - NEW) < 4.0 * fit.sigma_m).all()
 
 
-@pytest.mark.parametrize(("spreads", "is_told"), [(0.0, False), (1.0, False), (8.0, True)])
-def test_friction_is_a_change_only_where_it_is_unusual(explainer, spreads: float, is_told: bool) -> None:
-    """Seen before: friction of -0.005 ± 0.019 N m was told for hours, with odds of e^4."""
+@pytest.mark.parametrize(("spreads", "is_reported"), [(0.0, False), (1.0, False), (8.0, True)])
+def test_friction_is_a_change_only_where_it_is_unusual(explainer, spreads: float, is_reported: bool) -> None:
+    """Seen before: friction of -0.005 ± 0.019 N m was reported for hours, with odds of e^4."""
     extra = spreads * 0.3 * explainer.nuisances[0].column
     found = explainer.explanations(measured(explainer, NEW, 60, 2, extra), 60, NEW)
     change = change_of(found, 5)
-    assert (change is not None) is is_told
+    assert (change is not None) is is_reported
     if change is not None:
         assert change.cause is Cause.FRICTION
         assert change.value == pytest.approx(spreads * 0.3, abs=4.0 * change.sigma)

@@ -150,11 +150,11 @@ def test_a_bias_is_told_beside_a_wrong_factor(leg, walked, factor, bias, word) -
 def test_at_one_speed_an_offset_and_a_lag_are_both_named(leg, walked) -> None:
     found = explained(leg, walked(lag=0.05))
     assert found is not None and [one.cause for one in found.named] == [TIMING]
-    told = words(found)
+    text = words(found)
     assert (
-        "behind its measured angle" in told and "late: at one speed the two cannot be distinguished" in told
+        "behind its measured angle" in text and "late: at one speed the two cannot be distinguished" in text
     )
-    assert "ms late" in told and "50" in told
+    assert "ms late" in text and "50" in text
     ahead = explained(leg, walked(offset=-0.3))
     assert ahead is not None and "ahead of its measured angle" in words(ahead) and "early" in words(ahead)
     assert "crank.offset_rad to 0.8" in remedied(ahead, **{"crank.offset_rad": 0.5})
@@ -173,8 +173,8 @@ def test_at_two_speeds_an_offset_and_a_lag_are_told_apart(
     found = explained(leg, walked(30, speeds=(57.0, 63.0), **wrong))
     assert found is not None and [one.cause for one in found.named] == [cause]
     assert found.named[0].value == pytest.approx(value, abs=4.0 * found.named[0].sigma)
-    told = words(found)
-    assert there in told and absent not in told and "cannot be distinguished" not in told
+    text = words(found)
+    assert there in text and absent not in text and "cannot be distinguished" not in text
 
 
 def test_a_factor_is_compared_with_known_mistakes(leg, walked) -> None:
@@ -196,9 +196,9 @@ def test_a_factor_is_compared_with_known_mistakes(leg, walked) -> None:
 def test_a_torque_of_nothing_like_this_leg_has_no_named_cause(leg, walked) -> None:
     found = explained(leg, walked(factor=1.0, extra=lambda angle: 12.0 * np.sin(5.0 * angle)))
     assert found is not None and not found.named and not found.is_input_fault
-    told = words(found)
-    assert "explains half of it" in told and "stays unexplained" in told
-    assert f"{found.after:.3g} ± {found.after_sigma:.3g}" in told
+    text = words(found)
+    assert "explains half of it" in text and "stays unexplained" in text
+    assert f"{found.after:.3g} ± {found.after_sigma:.3g}" in text
 
 
 def test_a_reversed_sign_on_a_leg_that_does_not_fit_is_named_with_what_remains(leg, walked) -> None:
@@ -210,8 +210,8 @@ def test_a_reversed_sign_on_a_leg_that_does_not_fit_is_named_with_what_remains(l
 def test_two_causes_that_explain_alike_are_both_told_and_none_is_sure(leg, walked) -> None:
     found = explained(leg, walked(body="shank", more=0.5, noise=1.0))
     assert found is not None and len(found.alternatives) > 1 and not found.named and not found.is_input_fault
-    told = words(found)
-    assert "shank" in told and "times the predicted one" in told and "cannot be distinguished" in told
+    text = words(found)
+    assert "shank" in text and "times the predicted one" in text and "cannot be distinguished" in text
 
 
 def test_too_few_samples_explain_nothing(leg, walked) -> None:

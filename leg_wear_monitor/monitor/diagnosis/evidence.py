@@ -37,8 +37,8 @@ _WHOLLY = 1.5
 # which they do not tell apart, leave 1.5 to 1.7, and a mass on the thigh 1.8 to 3.6 (2026-11-27)
 _WHOLE = 1.4
 
-# by which the logarithms of odds over the next cause are divided beside a told change, as the model is not
-# of such a leg: beside twice the friction, G at 0.50 mm was B, with odds of e^12 over G. Right names have
+# by which the logarithms of odds over the next cause are divided beside an interim, as the model is not of
+# such a leg: beside twice the friction, G at 0.50 mm was B, with odds of e^12 over G. Right names have
 # e^62 and more beside a lag, e^118 and more at 2 mm, e^19 to e^38 at 0.5 to 0.6 mm beside a mass (2026-11-27)
 _BESIDE = 5.0
 
@@ -105,20 +105,20 @@ class Evidence:
             return
         self._test(state, cycle, config)
         self._explain(state, config)
-        self._settle_told(state, config)
+        self._begin_interim(state, config)
 
     def review(self, state: TorqueState, config: MonitorConfig) -> None:
         """Evaluate all kept cycles again, because the reference or the baseline has changed."""
         self._know_sensor(state)
         if not state.is_compared:  # what was found at another cadence stays
             return
-        told = state.changes
+        reported = state.changes
         state.detector, state.changes, state.fit_due = None, (), 0
         for cycle in state.cycles:
             self._test(state, cycle, config)
         self._explain(state, config)
-        if told and state.changes and state.changes[-1].subject == told[-1].subject:
-            state.changes = (_since(state.changes[-1], told[-1].since_ns, state),)
+        if reported and state.changes and state.changes[-1].subject == reported[-1].subject:
+            state.changes = (_since(state.changes[-1], reported[-1].since_ns, state),)
 
     def settle(self, state: TorqueState, change: Change, counted_m: Floats) -> None:
         """Make the gait cycles since a change those of the commissioned leg, with clearances (k,) [m].
@@ -208,7 +208,7 @@ class Evidence:
     def _explain(self, state: TorqueState, config: MonitorConfig) -> None:
         """Renew the clearances, and the change if there is one."""
         if state.is_load_other and state.not_by_load:
-            return  # stays as told
+            return  # what is reported stays
         if state.interim is not None and not state.interim.changes:
             state.interim = self._known_again(state, state.interim)
         # the gait cycles since the change, if there is one: often at first, then now and then
@@ -227,13 +227,13 @@ class Evidence:
         if since_ns or state.commissioned is None:
             explanations = self._models.explainer(state).explanations(mean, len(cycles), state.counted_m)
         if state.interim is not None:
-            explanations = self._beside_told(state, cycles, explanations)
+            explanations = self._beside_interim(state, cycles, explanations)
             cycles = cycles[-len(state.cycles) :]
             mean = np.mean([cycle.signature for cycle in cycles], axis=0)
         # a leg that is not that of the reference has no names and no clearances
         is_known = state.commissioned or state.changes or state.is_load_other
         if not (is_known or self._fits(state, explanations, since_ns)):
-            self._tell(state, None, since_ns, len(cycles), config)
+            self._report(state, None, since_ns, len(cycles), config)
             state.fit, state.least_m = None, ()
             return
         change = self._change(state, explanations, since_ns) if since_ns else None
@@ -241,19 +241,19 @@ class Evidence:
         fit = self._fit(state, mean, len(cycles), change, explanations if since_ns else ())
         if change is not None and fit.square > _WHOLE:
             change = with_doubt(change, explanations)
-        if change is not None and state.standing:
+        if change is not None and state.interim_changes:
             change = attrs.evolve(change, runner_up_log_odds=change.runner_up_log_odds / _BESIDE)
         state.fit, state.fit_cycles = fit, len(cycles)
-        self._tell(state, change, since_ns, len(cycles), config)
+        self._report(state, change, since_ns, len(cycles), config)
         self._keep_least(state, change, config)
         if change is None and state.is_load_new and not (state.is_load_other or state.commissioned):
-            _tell_wide(state, fit, self._models.explainer(state).joints, since_ns or cycles[0].begin_ns)
+            _report_wide(state, fit, self._models.explainer(state).joints, since_ns or cycles[0].begin_ns)
 
-    def _settle_told(self, state: TorqueState, config: MonitorConfig) -> None:
-        """Compare with a leg that stays changed otherwise than by a clearance from now on.
+    def _begin_interim(self, state: TorqueState, config: MonitorConfig) -> None:
+        """From now on, compare with the leg as it has changed, unless the change is of a clearance.
 
-        Otherwise it hides a joint that opens: G that broke out to 2 mm after a mass had been put on the foot
-        was that mass for good (2026-11-27).
+        Otherwise the change hides a joint that opens: G that broke out to 2 mm after a mass had been put on
+        the foot was that mass for good (2026-11-27).
         """
         if state.commissioned is None or not state.changes or state.is_load_new or state.is_load_other:
             return
@@ -267,21 +267,21 @@ class Evidence:
         if change.cause in (Cause.LAG, Cause.TIMING) and state.reference and state.sensor:
             behind = self._models.channel(state.reference, state.sensor, baseline).channel
             baseline = attrs.evolve(baseline, channel=behind)
-        state.interim, state.changes = Interim((*state.standing, change), baseline), ()
+        state.interim, state.changes = Interim((*state.interim_changes, change), baseline), ()
         state.detector, state.fit_due = self._models.detector(state, config).fresh(), 0
 
     def _known_again(self, state: TorqueState, interim: Interim) -> Interim | None:
-        """What was told of a leg that stayed changed in the run before; None where nothing is left of it."""
+        """What changed in the run before, found again; None where nothing is left of it."""
         known, explainer = interim.baseline, self._models.explainer(state, is_commissioned=True)
         found = change_of(explainer.explanations(known.mean, known.cycles, known.clearance_m), known.stamp_ns)
         return Interim((found,), known) if found else None
 
-    def _beside_told(
+    def _beside_interim(
         self, state: TorqueState, cycles: Sequence[SignedCycle], explanations: Sequence[Explanation]
     ) -> Sequence[Explanation]:
-        """Explanations of what changed beside the told changes, or, where these are over, of all that did.
+        """Explanations of what changed beside the interim, or, where that is over, of all that changed.
 
-        They are over where the last gait cycles are those of the commissioned leg; they are others where one
+        It is over where the last gait cycles are those of the commissioned leg, and it is another where one
         of these causes alone explains as well, with another size, what would be a further one, and where what
         was unknown is known by now.
         """
@@ -289,13 +289,13 @@ class Evidence:
         mean = np.mean([cycle.signature for cycle in recent], axis=0)
         explainer = self._models.explainer(state, is_commissioned=True)
         alone = explainer.explanations(mean, len(recent), state.counted_m)
-        change, told = change_of(alone, 0), [(one.cause, one.subject) for one in state.standing]
+        change, reported = change_of(alone, 0), [(one.cause, one.subject) for one in state.interim_changes]
         if change is None:
             is_over = True
         elif explanations:
-            is_over = (change.cause, change.subject) in told and alone[0].misfit <= explanations[0].misfit
+            is_over = (change.cause, change.subject) in reported and alone[0].misfit <= explanations[0].misfit
         else:
-            is_over = (Cause.UNKNOWN, "") in told and change.cause is not Cause.UNKNOWN
+            is_over = (Cause.UNKNOWN, "") in reported and change.cause is not Cause.UNKNOWN
         if not is_over:
             return explanations
         state.forget_interims()
@@ -303,16 +303,16 @@ class Evidence:
         return alone if explanations else ()
 
     def _since_ns(self, state: TorqueState, config: MonitorConfig) -> int:
-        """Stamp since when the leg has changed, as told before or as detected now; 0 where it has not."""
+        """Stamp since when the leg has changed, as reported before or as detected now; 0 where it has not."""
         if state.changes:
             return state.changes[-1].since_ns
         detector = self._models.detector(state, config)
         return detector.detected_ns(state.detector) if state.detector else 0
 
-    def _tell(
+    def _report(
         self, state: TorqueState, change: Change | None, since_ns: int, cycles: int, config: MonitorConfig
     ) -> None:
-        """Tell a change; where none explains what was detected once it had time to settle, test anew."""
+        """Report a change; where none explains what was detected once it had time to settle, test anew."""
         if change is not None:
             state.changes = (change,)
         elif since_ns and cycles >= SETTLING_CYCLES:
@@ -409,18 +409,18 @@ def _changed_load(state: TorqueState, change: Change) -> Change | None:
     """The change that the load at the foot is, where the twin finds another one since; else None.
 
     Its shape is another one than that of the column for it, and impacts change where it presses the joints:
-    put on the ground, a healthy leg was A or J, *or something else*. What was surely named before stays told,
-    and a leg that has a reference under a load, or is to get one, follows that.
+    put on the ground, a healthy leg was A or J, *or something else*. What was surely named before stays, and
+    a leg that has a reference under a load, or is to get one, follows that.
     """
-    told = state.changes[-1] if state.changes else None
+    reported = state.changes[-1] if state.changes else None
     follows = state.is_loaded or state.is_load_new or state.is_load_other
-    if follows or state.commissioned is None or (told and told.is_sure):
+    if follows or state.commissioned is None or (reported and reported.is_sure):
         return None
     cycles = sum(one.begin_ns >= change.since_ns for one in state.cycles)
     earlier = state.carried_n[: -(cycles + _AMIDST)]
     now = state.carried_n[-max(_LEAST_CYCLES, min(cycles - _AMIDST, SETTLING_CYCLES)) :]
     known_n = float(np.mean(earlier)) if earlier else math.nan
-    before_n = told.counted if told and told.cause is Cause.LOAD else known_n
+    before_n = reported.counted if reported and reported.cause is Cause.LOAD else known_n
     value_n, sigma_n = float(np.mean(now)) - before_n, max(1.0, float(np.std(now)) / math.sqrt(len(now)))
     if not abs(value_n) >= max(_LOAD_CHANGE_N, _LOAD_SIGMAS * sigma_n):  # nor where it is not known
         return None
@@ -434,8 +434,8 @@ def _changed_load(state: TorqueState, change: Change) -> Change | None:
     )
 
 
-def _tell_wide(state: TorqueState, fit: ClearanceFit, joints: Sequence[str], since_ns: int) -> None:
-    """Tell a joint that is wider by all clearances at once, before the baseline under a new load hides it.
+def _report_wide(state: TorqueState, fit: ClearanceFit, joints: Sequence[str], since_ns: int) -> None:
+    """Report a joint that is wider by all clearances at once, before the baseline under a new load hides it.
 
     With doubt, as the load was found with what the joint changes of the torque.
     """
@@ -456,10 +456,10 @@ def _tell_wide(state: TorqueState, fit: ClearanceFit, joints: Sequence[str], sin
         state.changes = (change,)
 
 
-def _since(change: Change, told_ns: int, state: TorqueState) -> Change:
+def _since(change: Change, earlier_ns: int, state: TorqueState) -> Change:
     """A change since an earlier stamp, if all kept gait cycles belong to it: older ones are forgotten."""
     is_whole = change.since_ns <= state.cycles[0].begin_ns
-    return attrs.evolve(change, since_ns=min(change.since_ns, told_ns)) if is_whole else change
+    return attrs.evolve(change, since_ns=min(change.since_ns, earlier_ns)) if is_whole else change
 
 
 def _is_of_reference(explanations: Sequence[Explanation]) -> bool:

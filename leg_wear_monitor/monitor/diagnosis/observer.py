@@ -296,12 +296,12 @@ class TorqueObserver(KeepsSamples):
     def diagnosis(self) -> Diagnosis:
         """What the drive torque shows now."""
         state, known = self.state, self.state.commissioned
-        is_told = state.changes or state.standing
-        is_old = not state.cycles or (len(state.unused) == UNUSED_CYCLES and not is_told)
+        is_changed = state.changes or state.interim_changes
+        is_old = not state.cycles or (len(state.unused) == UNUSED_CYCLES and not is_changed)
         is_old = (is_old or state.detector is None) and not (state.is_load_new and state.not_corrected)
         found = Diagnosis(
             next_step=next_step(state, self._references, self.config),
-            changes=state.settled + state.standing,
+            changes=state.settled + state.interim_changes,
             cycles_not_used=state.not_used,
             channel=state.sensor.channel if state.sensor else DIRECT,
             load=self._load,
@@ -320,7 +320,7 @@ class TorqueObserver(KeepsSamples):
             clearance_m=tuple(clearance_m.tolist()),
             sigma_m=tuple(sigma_m.tolist()),
             least_m=state.surely_m(self.config.alarms.on_delay_cycles),
-            changes=state.told,
+            changes=state.all_changes,
         )
 
     def _observed(self, fit: ClearanceFit) -> tuple[Floats, Floats]:
@@ -328,7 +328,7 @@ class TorqueObserver(KeepsSamples):
 
         Nor is a joint observable that no test would find as wide as is corrected. A joint that the fit of all
         joints does not show, or only as somebody measured it, is known from its own change, and so is one
-        that opened in a leg that stays changed otherwise. Where the reference is not that of the leg, a
+        that opened beside the changes of an interim. Where the reference is not that of the leg, a
         change can have the name of another joint, and no clearance is known.
         """
         if not self.models.fits(self.state):
@@ -336,7 +336,7 @@ class TorqueObserver(KeepsSamples):
             return nothing, nothing
         observable = fit.sigma_m <= np.maximum(_ESTIMATED_M, _ESTIMATED * fit.clearance_m)
         known = self.state.commissioned
-        if self.state.standing:
+        if self.state.interim_changes:
             observable &= False
         elif known is not None and known.is_as_counted:  # a corrected one is known from its correction
             unseen_m = self.models.detector(self.state, self.config).unseen_m(WINDOW_CYCLES)
@@ -407,7 +407,7 @@ class TorqueObserver(KeepsSamples):
             sigma_m = np.where(corrected.is_unknown, state.counted_m, corrected.sigma_m)
             known = attrs.evolve(known, sigma_m=sigma_m, channel=corrected.channel)
         state.commissioned = known
-        if state.is_load_new and state.load_rounds >= LOAD_ROUNDS:  # the new load explains what was told
+        if state.is_load_new and state.load_rounds >= LOAD_ROUNDS:  # the new load explains what was reported
             state.is_load_new, state.settled = False, state.corrections
         elif state.is_load_new:
             state.load_rounds, state.renewed_n = 0, float(np.mean(state.carried_n))
@@ -426,7 +426,7 @@ class TorqueObserver(KeepsSamples):
         """Commission the leg anew where it carries another load than that of its reference.
 
         Once for each load: what the twin finds, or a sensor, may differ from the force of the reference. A
-        joint that was named before stays told until the leg is compared with a reference of the new load.
+        joint that was named before stays reported until the leg is compared with a reference of the new load.
         """
         state = self.state
         is_found = state.commissioned is None and state.load_rounds >= LOAD_ROUNDS

@@ -73,7 +73,7 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
     if state.is_load_new and state.changes:
         names = ", ".join(one.subject for one in state.changes)
         return f"the load at the foot has changed, and {names} may have opened meanwhile: measure it"
-    if state.standing:
+    if state.interim_changes:
         return "the leg stays changed: clearances are not known, and a joint that opens from now on is named"
     if models.is_sure(state):
         if state.fit is None or state.commissioned is None or state.changes:

@@ -96,7 +96,7 @@ class LegModels:
     def explainer(self, state: TorqueState, is_commissioned: bool = False) -> Explainer:
         """Possible explanations of the measured torque: other clearances and other causes.
 
-        Beside what was told of a leg that stays changed, or ``is_commissioned``: of all that changed.
+        Beside the changes of the interim, if there is one; or, ``is_commissioned``, of all that changed.
         """
         return self._of(state, is_commissioned).explainer
 
@@ -183,7 +183,7 @@ class LegModels:
     def is_sure(self, state: TorqueState) -> bool:
         """Whether a clearance may be corrected: the leg is known and as it was, its drive passes enough."""
         is_near = self.misfit(state) < CORRECTED_TO or (state.is_loaded and state.rounds >= ROUNDS)
-        is_changed = state.is_load_new or state.is_load_other or bool(state.standing)
+        is_changed = state.is_load_new or state.is_load_other or bool(state.interim_changes)
         return not is_changed and self.is_of_file(state) and is_near and not state.is_narrow
 
     def _of(self, state: TorqueState, is_commissioned: bool = False) -> _ModelsOfState:

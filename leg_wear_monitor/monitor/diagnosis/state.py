@@ -133,7 +133,7 @@ class Diagnosis(Shown):
         row as an alarm waits for; minus infinity before.
     changes : tuple of Change
         Significant departures, the oldest first: those by which counted clearances were corrected, and, where
-        the state is CHANGED, those of a leg that stays changed, and the one that is not settled yet.
+        the state is CHANGED, those of the interim, and the one that is not settled yet.
     channel : Channel
         Delay, low-pass and load friction of the drive by the commissioned gait cycles; of a drive that adds
         nothing before.
@@ -209,12 +209,12 @@ def temperature_of(cycles: Sequence[SignedCycle]) -> float:
 
 @attrs.frozen(eq=False)
 class Interim:
-    """A leg that stays changed otherwise than by a clearance: joints that open then are seen beside it.
+    """A leg with a lasting change that is not of a clearance: joints that open then are seen beside it.
 
     Attributes
     ----------
     changes : tuple of Change
-        What was told of it, the oldest first; empty before it is known in a further run.
+        What has changed, the oldest first; empty before it is known in a further run.
     baseline : CommissionedTorque
         Of the gait cycles since.
     """
@@ -413,7 +413,7 @@ class TorqueState:
 
     @property
     def compared_with(self) -> tuple[TorqueSensor | None, CommissionedTorque | None]:
-        """The sensor, and what gait cycles are compared with: the baseline, or a leg that stays changed."""
+        """The sensor, and what gait cycles are compared with: the baseline, or that of the interim."""
         if self.interim is None or self.sensor is None:
             return self.sensor, self.commissioned
         changed = self.interim.baseline
@@ -430,8 +430,8 @@ class TorqueState:
         return tuple(one.interim for one in self.known if one.interim)
 
     @property
-    def standing(self) -> tuple[Change, ...]:
-        """Told changes that later gait cycles are seen beside; at a cadence without any, those of another."""
+    def interim_changes(self) -> tuple[Change, ...]:
+        """Changes that later gait cycles are seen beside; at a cadence without any, those of another."""
         if self.interim is not None:
             return self.interim.changes
         others = next((one.interim.changes for one in self.set_aside if one.interim), ())
@@ -439,14 +439,14 @@ class TorqueState:
         return tuple(one for one in others if (one.cause, one.subject) not in again)
 
     @property
-    def told(self) -> tuple[Change, ...]:
+    def all_changes(self) -> tuple[Change, ...]:
         """All changes, the oldest first."""
-        return self.settled + self.standing + self.changes
+        return self.settled + self.interim_changes + self.changes
 
     @property
     def not_corrected(self) -> tuple[Change, ...]:
         """Changes by which counted clearances were not corrected."""
-        return tuple(change for change in self.told if not change.is_corrected)
+        return tuple(change for change in self.all_changes if not change.is_corrected)
 
     @property
     def not_by_load(self) -> tuple[Change, ...]:
@@ -494,7 +494,7 @@ class TorqueState:
     def take_baseline(self, speed: float, is_interim: bool = False) -> CommissionedTorque | None:
         """The baseline of the sensor at a speed of the crank, which is not among the others any more.
 
-        Or, ``is_interim``, that of a leg that stays changed.
+        Or, ``is_interim``, that of an interim.
 
         Forces of inertia depend on the speed: compared with the baseline of 60 rpm, a healthy leg at 57 rpm
         had a wide joint A. Roughness depends on the rate, and on how many samples are averaged.
@@ -546,7 +546,7 @@ class TorqueState:
         self._baselines_as(lambda one: None if one.stamp_ns > since_ns else one)
 
     def forget_interims(self) -> None:
-        """Compare with the baselines again, at all cadences: what was told beside them is over."""
+        """Compare with the baselines again, at all cadences: the changes of the interims are over."""
         self.interim = None
         self.set_aside = tuple(attrs.evolve(one, interim=None) for one in self.set_aside)
 

@@ -388,8 +388,8 @@ def read_commissioned(db: sqlite3.Connection) -> Commissioned | None:
 def read_commissioned_torques(db: sqlite3.Connection) -> list[CommissionedTorque]:
     """Stored signatures of the drive torque of the present parts: the last ones of each cadence.
 
-    Those before a correction, or before it was known better, have other standard deviations. A leg that stays
-    changed has one of its own, as long as no baseline of its cadence follows.
+    Those before a correction, or before it was known better, have other standard deviations. A leg with
+    a lasting change has one of its own, as long as no baseline of its cadence follows.
     """
     found: list[CommissionedTorque] = []
     interims: list[CommissionedTorque] = []
@@ -406,7 +406,7 @@ def read_commissioned_torques(db: sqlite3.Connection) -> list[CommissionedTorque
             stamp_ns, clearance_m, signatures.reshape(cycles, -1), sigma_m, channel, speed,
             or_nan(row[11]), or_nan(row[12]), row[13], bool(row[14]),
         )  # fmt: skip
-        if row[15] == 2:  # of a leg that stays changed
+        if row[15] == 2:  # of a leg with a lasting change
             if not any(_is_alike(one, other) for other in found + interims):
                 interims.append(attrs.evolve(one, is_interim=True))
             continue

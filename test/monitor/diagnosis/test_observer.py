@@ -327,17 +327,17 @@ def test_two_joints_that_look_like_a_wider_one_are_not_corrected(
     assert (correction_of(state, leg.clearance_joints) is not None) is is_corrected
 
 
-@pytest.mark.parametrize(("size_m", "is_told"), [(3.7e-4, False), (4.5e-4, True)])
+@pytest.mark.parametrize(("size_m", "is_reported"), [(3.7e-4, False), (4.5e-4, True)])
 def test_before_a_baseline_what_is_not_corrected_is_part_of_it(
-    new, reference, monkeypatch, size_m: float, is_told: bool
+    new, reference, monkeypatch, size_m: float, is_reported: bool
 ) -> None:
     """Seen before: a leg that came with G at 0.37 mm never got a baseline, and saw no other joint."""
     found = opening("G", size_m, 2e-5, START_NS)
     monkeypatch.setattr(evidence, "change_of", lambda *_: found)
     observer = new()
     walk(observer, samples(reference, [0] * COMMISSIONING_CYCLES), end=9)
-    told = observer._evidence._change(observer.state, (), START_NS + 5 * 10**9)
-    assert (told is not None) is is_told
+    change = observer._evidence._change(observer.state, (), START_NS + 5 * 10**9)
+    assert (change is not None) is is_reported
 
 
 CHANNELS = [
@@ -519,9 +519,9 @@ def test_a_joint_that_was_named_stays_told_while_the_load_at_the_foot_has_change
     observer, first, opened = on_ground, COMMISSIONING_CYCLES, leg_number(2, 1.5)
     block = samples(reference, [0] * first + [opened] * 40)
     walk(observer, block, begin=first, end=first + 6, load_n=300.0)
-    (told,) = observer.diagnosis.changes
-    assert told.subject == "G"
-    assert told.is_sure
+    (change,) = observer.diagnosis.changes
+    assert change.subject == "G"
+    assert change.is_sure
     for cycle in range(first + 6, first + 30):
         assert walk(observer, block, begin=cycle, end=cycle + 1, load_n=600.0) == []
         now = observer.diagnosis
@@ -756,7 +756,7 @@ def test_whether_another_joint_opened_with_the_corrected_one_is_seen_by_a_refere
 def test_an_opening_beside_a_correction_that_a_measurement_contradicts_is_told_until_both_agree(
     commissioned, reference, monkeypatch
 ) -> None:
-    """Seen before: nobody told it, and all others stayed unknown for good."""
+    """Seen before: it was not reported, and all others stayed unknown for good."""
     monkeypatch.setattr(evidence, "_WHOLLY", 3.0)
     observer, wider = commissioned(), about(reference, 0, 1.5)
     block, at, counted = corrected_beside(observer, reference, wider, leg_number(2, 1.5), 55)
@@ -1070,14 +1070,14 @@ def test_a_stored_baseline_is_used_from_the_first_cycles_on(leg, commissioned, r
 def test_a_leg_that_stays_changed_is_known_again_in_the_next_run(leg, commissioned, reference) -> None:
     observer, heavy = commissioned(), int(reference.of_masses[list(leg.bodies).index("foot"), 1])
     walk_on(observer, reference, [heavy] * (COMMISSIONING_CYCLES + 4))
-    known, (told,) = observer.state.commissioned, observer.diagnosis.changes
+    known, (change,) = observer.state.commissioned, observer.diagnosis.changes
     kept = [known, observer.state.interim.baseline]
 
     second = observer_of(leg, commissioned=kept)
     walk(second, samples(reference, [heavy] * 7, seed=2))
     (again,) = second.diagnosis.changes
-    assert (again.cause, again.subject) == (told.cause, told.subject) == (Cause.MASS, "foot")
-    assert abs(again.value - told.value) < told.sigma
+    assert (again.cause, again.subject) == (change.cause, change.subject) == (Cause.MASS, "foot")
+    assert abs(again.value - change.value) < change.sigma
     assert second.state.interim.baseline is kept[1]
 
     healthy = observer_of(leg, commissioned=kept)
@@ -1116,8 +1116,8 @@ def test_a_baseline_is_of_one_sensor_and_what_is_done_is_told(leg, commissioned,
     assert not any(known.is_of(other) for other in others)
     second = observer_of(leg, commissioned=[known.measured_by(faster)])
     walk(second, samples(reference, [0] * (COMMISSIONING_CYCLES + 1)), end=8)
-    told = "another torque sensor (1000 Hz, means, 5 averaged, 80 phases; now 200 Hz, means, 80 phases)"
-    assert second.state.commissioned is None and told in second.diagnosis.reason
+    reason = "another torque sensor (1000 Hz, means, 5 averaged, 80 phases; now 200 Hz, means, 80 phases)"
+    assert second.state.commissioned is None and reason in second.diagnosis.reason
     assert second.diagnosis.reason.endswith("the leg is commissioned again")
     assert second.diagnosis.clearance_m  # as of any leg that was not commissioned
     second.state.commissioned = second.state.sensor and known

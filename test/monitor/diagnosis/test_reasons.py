@@ -168,8 +168,8 @@ def test_a_force_on_the_foot_that_has_two_sizes_is_not_observable() -> None:
     on_ground = SimpleNamespace(**vars(IDLE), is_load_left_out=lambda _: False)
     models = SimpleNamespace(is_sure=lambda _: False)
     now = state(reference=of_reference(), cycles=cycles(50), commissioned=known(), load=load)
-    told = doubt(now, on_ground, models)
-    assert told.endswith("not observable: 40 N and 95 N explain its drive torque as well")
+    reason = doubt(now, on_ground, models)
+    assert reason.endswith("not observable: 40 N and 95 N explain its drive torque as well")
     now.load = attrs.evolve(load, other_n=math.nan)
     assert "not observable" not in doubt(now, on_ground, models)
 
@@ -192,7 +192,7 @@ def test_no_joint_is_corrected_where_the_drive_hides_it_or_the_leg_is_not_known_
     """Behind a mean over 40 ms, I at 0.45 mm was corrected as J; a mean over 20 ms is 22 Hz."""
     models = LegModels(load_mechanism("bionic_leg"))
 
-    def told(misfit: float, channel: Channel, cycle_s: float = 1.0) -> tuple[bool, str]:
+    def found(misfit: float, channel: Channel, cycle_s: float = 1.0) -> tuple[bool, str]:
         sensor = attrs.evolve(SENSOR, channel=channel, cycle_s=cycle_s)
         reference = SimpleNamespace(parameters=SimpleNamespace(load=np.zeros((0, 2))))
         now = state(reference=reference, sensor=sensor, commissioned=known(), cycles=cycles(50))
@@ -200,9 +200,9 @@ def test_no_joint_is_corrected_where_the_drive_hides_it_or_the_leg_is_not_known_
             return models.is_sure(now), doubt(now, IDLE, models)
 
     hidden = "the drive passes 11 Hz of the torque: names of joints are not sure, none is corrected"
-    assert told(0.4, Channel(mean_s=0.04)) == (False, hidden)
-    assert told(0.4, Channel(mean_s=0.02)) == (True, "") == told(0.4, Channel(mean_s=0.04), cycle_s=2.0)
-    is_sure, reason = told(0.7, DIRECT)
+    assert found(0.4, Channel(mean_s=0.04)) == (False, hidden)
+    assert found(0.4, Channel(mean_s=0.02)) == (True, "") == found(0.4, Channel(mean_s=0.04), cycle_s=2.0)
+    is_sure, reason = found(0.7, DIRECT)
     assert not is_sure and reason.startswith("the model does not fit this leg")
 
 

@@ -109,9 +109,9 @@ def test_a_damaged_file_is_one_line(leg, written, damage) -> None:
     damage(written)
     with pytest.raises(
         ConfigError, match=r"leg\.npz: is not a file of torque references, or is damaged: ."
-    ) as told:
+    ) as refused:
         read_references(written, leg)
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(refused.value)
 
 
 def test_a_missing_file_is_one_line(leg, tmp_path) -> None:

@@ -51,7 +51,7 @@ _SURE, _WORSE = 2.0, 3.0  # standard deviations of a load, and a factor on what 
 # hardly change the wear, but keep the leg from being identified
 _LEAST_N = 25.0
 _UNIT_N = 100.0
-_STANDS = 0.05  # of the peak of a force, above which the foot stands
+_IN_STANCE = 0.05  # of the peak of a force, above which the foot is on the ground
 # of the fit, which has several minima: 69 N and a toe-off later by 0.04 left over 2.5, 100 N left over
 # 2.2 (2026-11-25). Sizes, and toe-offs in standard deviations, where it begins
 _STARTS_N, _TOE_OFFS, _ROUNDS = (50.0, 200.0, 600.0), (-2.0, 0.0, 2.0), 4
@@ -115,8 +115,8 @@ def stance_phases(up: Floats, speed: float) -> tuple[float, float]:
     (float, float)
         Where the force rises above and falls below a twentieth of its peak; NaN if it does so more than once.
     """
-    stands = up > _STANDS * up.max()
-    begin, end = (np.flatnonzero(stands & ~np.roll(stands, step)) for step in (1, -1))
+    in_stance = up > _IN_STANCE * up.max()
+    begin, end = (np.flatnonzero(in_stance & ~np.roll(in_stance, step)) for step in (1, -1))
     if len(begin) != 1:
         return math.nan, math.nan
     ends = float(begin[0] / len(up)), float(end[0] / len(up))
@@ -210,10 +210,10 @@ class _Leg:
 def _shapes(stance: Stance, points: int) -> tuple[Floats, Floats]:
     """Template and harmonics (1 + harmonics, points) of the vertical and of the fore-aft force."""
     s = stance.fractions(points)
-    stands = s <= 1.0  # elsewhere all are 0
+    in_stance = s <= 1.0  # elsewhere all are 0
     found = np.zeros((2, 1 + _HARMONICS, points))
-    found[:, 0, stands] = stance_template(s[stands])
-    found[:, 1:, stands] = np.sin(0.5 * TURN * np.outer(np.arange(1, _HARMONICS + 1), s[stands]))
+    found[:, 0, in_stance] = stance_template(s[in_stance])
+    found[:, 1:, in_stance] = np.sin(0.5 * TURN * np.outer(np.arange(1, _HARMONICS + 1), s[in_stance]))
     return found[0], found[1]
 
 

@@ -173,8 +173,8 @@ def stance_template(s: Floats) -> tuple[Floats, Floats]:
 
     The fore-aft force is positive where it points as the toe moves: it brakes.
     """
-    vertical, stands = _vertical(s), s <= 1.0
-    return np.where(stands, vertical / _PEAK, 0.0), np.where(stands, np.sin(TURN * s), 0.0)
+    vertical, in_stance = _vertical(s), s <= 1.0
+    return np.where(in_stance, vertical / _PEAK, 0.0), np.where(in_stance, np.sin(TURN * s), 0.0)
 
 
 def nominal_stance(linkage: Linkage) -> Stance:

@@ -122,7 +122,7 @@ def _why_none(crank: Series, cadence: Cadence) -> str:
     )
 
 
-# The crank's zero from the phase of the drive torque, or why it cannot be told.
+# The crank's zero from the phase of the drive torque, or why it cannot be found.
 
 
 LEAST_TURNS = 3  # two were enough for sensors that average; the third shows what repeats
@@ -161,7 +161,7 @@ class Zero:
 
 
 def zero_of(walk: Walk, model: TorqueModel, sampling: str) -> Zero | str:
-    """The crank's zero from a walk of at least `LEAST_TURNS`; else why it cannot be told.
+    """The crank's zero from a walk of at least `LEAST_TURNS`; else why it cannot be found.
 
     Parameters
     ----------

@@ -144,7 +144,7 @@ class CrankZeroState:
     turns : int
         Turns of the present walk.
     why : str
-        Why no zero could be told; empty while there was no attempt.
+        Why no zero was found; empty while there was no attempt.
     attempts : int
         Attempts in vain of this search.
     rest : int
@@ -339,7 +339,7 @@ class CrankZero:
         state.waiting = (*state.waiting, _NONE)
 
     def _found(self, walk: Walk) -> Zero | str:
-        """The zero from the newest turns, else from all; else why it cannot be told."""
+        """The zero from the newest turns, else from all; else why it cannot be found."""
         sampling = self._config.drive_torque.sampling
         if walk.turns > LEAST_TURNS:
             # a fault of the torque that is over must not be waited out

@@ -32,7 +32,7 @@ from leg_wear_monitor.monitor.inputs import (
     with_torques,
 )
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, JointReport
-from leg_wear_monitor.monitor.verdict.situation import is_held
+from leg_wear_monitor.monitor.verdict.situation import is_observed
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import NO_LOAD, Samples
@@ -106,10 +106,10 @@ class AlarmBoard:
         )
 
     @property
-    def held(self) -> tuple[str, ...]:
+    def observed(self) -> tuple[str, ...]:
         """Alarms of clearances that are present because of something else than counting."""
         names = map(alarm_specs.CLEARANCE.name, self._clearance_joints)
-        return tuple(name for name in names if is_held(self.alarms[name]))
+        return tuple(name for name in names if is_observed(self.alarms[name]))
 
     def evaluate(
         self,
@@ -210,7 +210,8 @@ class AlarmBoard:
 #
 # They follow from the samples in their order of arrival alone: however those are cut into blocks, the monitor
 # looks at the same instants. A period ends when two samples in a row lie outside of it; one alone may have a
-# stray stamp. It also ends after many samples that bring no time, or a stream of such would never be judged.
+# stray stamp. It also ends after many samples without a later time, or a stream of such would never be
+# evaluated.
 
 
 A_CYCLE = 4
@@ -434,7 +435,7 @@ class AlarmEvaluation:
         else:
             values = self._of_tracked(report)
         values |= sensor
-        for name in self.board.held:  # it is evaluated with all that is known, at the period's end
+        for name in self.board.observed:  # it is evaluated with all that is known, at the period's end
             values.pop(name, None)
         return self.board.evaluate(values, report.stamp_ns, impact_factor=factor)
 

@@ -270,11 +270,13 @@ def life_of(
     joints: Mapping[str, JointForecast | None], leg: LegForecast | None, verdict: Verdict
 ) -> dict[str, Any]:
     """Of a `LegState`, the remaining life of each joint and of the ``leg``, as far as it is believed."""
-    told: dict[str, JointForecast | LegForecast | None] = {**joints, "leg": leg}
+    forecasts: dict[str, JointForecast | LegForecast | None] = {**joints, "leg": leg}
     is_valid = Figure.FORECAST not in verdict.not_valid
     return {
-        "life": {name: life_hours(each.hours) if each and is_valid else None for name, each in told.items()},
-        "life_answers": {name: each.answer.value for name, each in told.items() if each},
+        "life": {
+            name: life_hours(each.hours) if each and is_valid else None for name, each in forecasts.items()
+        },
+        "life_answers": {name: each.answer.value for name, each in forecasts.items() if each},
         "first_probability": leg.first_probability if leg and is_valid else {},
     }
 

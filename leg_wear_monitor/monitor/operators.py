@@ -55,7 +55,7 @@ from leg_wear_monitor.monitor.verdict.situation import (
     KnownClearance,
     Situation,
     alarm_value,
-    is_held,
+    is_observed,
     is_surely_below,
 )
 from leg_wear_monitor.monitor.verdict.verdict import dated, verdict_of
@@ -414,7 +414,7 @@ def _judged(
     name, board = alarm_specs.CLEARANCE.name(one.joint), AlarmBoard(config, leg.clearance_joints)
     board.restore(entry.alarms)
     before, value = board.alarms[name], alarm_value(one, board.alarms[name])
-    is_shown = before.present is Level.ERROR and is_held(before, SEEN)  # only who showed it takes it back
+    is_shown = before.present is Level.ERROR and is_observed(before, SEEN)  # only who showed it takes it back
     if value is not None and not is_shown:
         sources = {name: (value.sigma_m, value.by)}
         board.evaluate({name: value.clearance_m}, stamp_ns, config.alarms.on_delay_cycles, sources)

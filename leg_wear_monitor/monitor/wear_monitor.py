@@ -63,7 +63,7 @@ from leg_wear_monitor.monitor.reports import (
     latest,
 )
 from leg_wear_monitor.monitor.status import statuses
-from leg_wear_monitor.monitor.verdict.situation import SEEN, Situation, is_held
+from leg_wear_monitor.monitor.verdict.situation import SEEN, Situation, is_observed
 from leg_wear_monitor.monitor.verdict.verdict import Finding
 from leg_wear_monitor.state import LegState
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples, SamplingSettings
@@ -556,7 +556,7 @@ class WearMonitor:
             return
         if self._parts.state.findings:
             is_noted = bool(update_verdict(self._parts))
-            if not is_noted and any(is_held(alarm, SEEN) for alarm in self.alarms.alarms):
+            if not is_noted and any(is_observed(alarm, SEEN) for alarm in self.alarms.alarms):
                 # the ledger's verdict names the last estimate
                 last = self.verdict
                 self._accounting.note(VerdictEvent(last.stamp_ns, last.verdict))

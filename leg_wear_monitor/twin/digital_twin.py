@@ -217,7 +217,7 @@ class SampledFollower(LegFollower):
             own.passed += 1
             return
         if not was_followed:
-            self._take_up(stamp)
+            self._follow_again(stamp)
         if motion.counts == SETTLING and not own.plan.is_settling:
             motion.counts = COUNTED
 
@@ -230,7 +230,7 @@ class SampledFollower(LegFollower):
         own.left_ns = stamp - int(motion.base_ns) - round(1.0e9 * self._stepper.time)
         motion.counts, own.passed = TRACKED, 0
 
-    def _take_up(self, stamp: int) -> None:
+    def _follow_again(self, stamp: int) -> None:
         """Follow again from a passage of crank angle 0: the journals are where they were left."""
         own, motion, polynomial = self._sampled, self.state.motion, self._leg.polynomial
         motion.base_ns = stamp - round(1.0e9 * self._stepper.time) - own.left_ns

@@ -173,7 +173,7 @@ EVALUATED = np.dtype(
         ("angle", "f8"),  # of the crank [rad], NaN while the leg does not run
         # mean drive torque since the previous sample, with the drive's friction [N m]; NaN while at rest
         ("torque", "f8"),
-        ("measured", "f8"),  # drive torque that the sample brings [N m], NaN without one
+        ("measured", "f8"),  # drive torque of the sample [N m], NaN without one
     ]
 )
 """The leg at a sample."""

@@ -371,8 +371,8 @@ def shape_torque(linkage: Linkage) -> float:
     stance = nominal_stance(linkage)
     _, velocity, _ = point_motion(one_cycle(linkage, PHASES, 1.0), linkage, *toe)
     other = _VERTICAL * (velocity @ stance.up), _FORE_AFT * (velocity @ stance.back)
-    stands = stance.fractions() <= 1.0
-    return float(np.sqrt(np.mean(np.where(stands, np.hypot(*other), 0.0) ** 2)))
+    in_stance = stance.fractions() <= 1.0
+    return float(np.sqrt(np.mean(np.where(in_stance, np.hypot(*other), 0.0) ** 2)))
 
 
 def load_signature(linkage: Linkage, force: Floats | None = None) -> Floats:

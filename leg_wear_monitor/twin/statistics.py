@@ -63,7 +63,7 @@ class SampleStatistics:
     contact_force_n : (n, k) array
         Forces in the clearance joints at the sample, of contact and film together.
     measured_torque_nm : (n,) array
-        Drive torque that the sample brings, while tracking is lost, too; NaN without one.
+        Drive torque of the sample, also while tracking is lost; NaN without one.
     eccentricity_m : (n, k, 2) array
         Centre of each journal from the centre of its bushing, in the plane of the leg.
     """

@@ -25,9 +25,9 @@ def ground(rpm: float = 60.0, **load: Any) -> Ground:
 
 
 def starts_and_ends(force: Floats) -> tuple[float, float]:
-    """Crank angles [turns] between which the force stands on the leg."""
-    stands = np.flatnonzero(force[:, 1])
-    return stands[0] / POINTS, stands[-1] / POINTS
+    """Crank angles [turns] between which a force acts on the foot."""
+    in_stance = np.flatnonzero(force[:, 1])
+    return in_stance[0] / POINTS, in_stance[-1] / POINTS
 
 
 @pytest.mark.plain

@@ -40,7 +40,7 @@ def heard(config: GaitConfig = CLEAN, **transport: Any) -> list[Reading]:
     return list(readings(EvenLeg(), changed))  # type: ignore[arg-type]
 
 
-def told(reading: Reading) -> tuple[int, float, float]:
+def key(reading: Reading) -> tuple[int, float, float]:
     """What a reading is, whenever it arrives."""
     return reading.kind, reading.taken_s, reading[4] if reading.kind == CRANK else reading.torque_nm
 
@@ -94,8 +94,8 @@ def test_they_arrive_in_order_and_none_is_made_up(
     delay = arrival - np.array([reading.taken_s for reading in got])
     assert (np.diff(arrival) >= 0.0).all()
     assert np.minimum(delay, np.abs(delay - late_s)).max() < 1e-12
-    count = Counter(told(reading) for reading in got)
-    assert set(count) <= {told(reading) for reading in heard()}
+    count = Counter(key(reading) for reading in got)
+    assert set(count) <= {key(reading) for reading in heard()}
     assert max(count.values()) <= 2
 
 

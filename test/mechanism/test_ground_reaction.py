@@ -38,9 +38,9 @@ def test_the_foot_brakes_then_pushes_while_the_toe_moves_backwards(name):
     force = stance.force(points=POINTS)
     position, velocity, _ = point_motion(one_cycle(linkage, POINTS, 1.0), linkage, *linkage.mechanism.toe)
     vertical, along = force @ stance.up, force @ stance.back
-    stands = vertical > 0.0
-    assert (velocity[stands] @ stance.back > 0.0).all()
-    assert stands[(position @ stance.up).argmin()]
+    in_stance = vertical > 0.0
+    assert (velocity[in_stance] @ stance.back > 0.0).all()
+    assert in_stance[(position @ stance.up).argmin()]
     assert vertical.max() == pytest.approx(1.0, abs=1e-3)
     assert along.max() == pytest.approx(FORE_AFT, rel=1e-2)
     soon = round(stance.heel_strike * POINTS) + np.arange(1, POINTS // 10)

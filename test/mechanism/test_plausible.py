@@ -84,7 +84,7 @@ def test_what_does_not_move_names_what_is_doubted(document):
 
 
 def test_what_was_understood_has_units(linkage_of, leg):
-    told = " | ".join(understood(linkage_of("bionic_leg")))
+    text = " | ".join(understood(linkage_of("bionic_leg")))
     for part in (
         "largest link 0.6148 m (coupler)",
         "heaviest mass 3.5 kg (thigh)",
@@ -93,7 +93,7 @@ def test_what_was_understood_has_units(linkage_of, leg):
         "E 207 GPa",
         "clearance 0.3 mm in a radius of 10 mm (3 %)",
     ):
-        assert part in told
+        assert part in text
     assert "crank driven by 0.033 N m" in understood(linkage_of("andrews"))
     back = attrs.evolve(leg, drive=attrs.evolve(leg.drive, speed=-leg.drive.speed))
     assert "crank 60 rpm clockwise" in understood(linkage_of("bionic_leg")._replace(mechanism=back))

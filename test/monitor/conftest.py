@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from ledger_contents import rows_of
-from told import as_new
+from reported import as_new
 
 from leg_wear_monitor import Mechanism, WearMonitor
 from leg_wear_monitor import open_ledger as wear_ledger

@@ -3,7 +3,7 @@
 import attrs
 import numpy as np
 import pytest
-from told import status_of
+from reported import status_of
 
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver

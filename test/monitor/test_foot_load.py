@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 from readings_as_samples import samples
-from told import raised, status_of
+from reported import raised, status_of
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.errors import ConfigError

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from reported import raised, status_of
 from ruamel.yaml import YAML
-from told import raised, status_of
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.mechanism.loader import shipped_mechanisms
@@ -18,13 +18,13 @@ SECONDS = 8
 
 def leg_with(path: Path, pressure_speed: float | None, material: str = "") -> lw.Mechanism:
     """The default leg whose joint A has a pair of its own with this limit, or a pair of the package."""
-    yaml, told = YAML(), {"source": "a test", "conditions": "none"}
+    yaml, source = YAML(), {"source": "a test", "conditions": "none"}
     document: dict[str, Any] = {"name": "own", "title": "own", "lubricant": "grease", "regime": "greased"}
     for side in ("bushing", "journal"):
-        wear = {"value": 1e-15, "unit": "1/Pa", **told}
+        wear = {"value": 1e-15, "unit": "1/Pa", **source}
         document[side] = {"material": "steel", "wear_coefficient": wear}
     if pressure_speed is not None:
-        limit = {"value": pressure_speed, "unit": "Pa m/s", **told}
+        limit = {"value": pressure_speed, "unit": "Pa m/s", **source}
         document["limits"] = {"pressure_speed": limit}
     yaml.dump(document, path / "own.yaml")
     leg = YAML(typ="safe").load(shipped_mechanisms()["bionic_leg"])
@@ -64,7 +64,7 @@ def test_a_joint_beyond_a_limit_has_no_valid_growth_nor_life(tmp_path):
 
 
 def test_a_joint_within_its_limits_is_all_right_and_one_without_coefficient_says_so(tmp_path):
-    """DU has limits and no coefficient: no wear is counted, and no life is told."""
+    """DU has limits and no coefficient: no wear is counted, and no life is known."""
     monitor = walked(leg_with(tmp_path, None, "du-on-steel-dry"))
     values = status_of(monitor, "joint A").values
     assert values["pressure_speed_limit_pa_mps"] == 1.8e6

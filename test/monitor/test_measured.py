@@ -6,7 +6,7 @@ from pathlib import Path
 import attrs
 import numpy as np
 import pytest
-from told import status_of
+from reported import status_of
 
 from leg_wear_monitor import open_ledger
 from leg_wear_monitor.dashboard.ledger_leg import LedgerLeg
@@ -32,11 +32,11 @@ def test_a_measured_clearance_stands_beside_the_counted_one_and_raises_its_alarm
     counted_m = status_of(monitor, "joint G").values["clearance_m"]
     found = monitor.measure("G", 5.8e-4, 5e-6, START_NS, "ann", accept=True)
     assert found.measurement.counts
-    told = status_of(monitor, "joint G")
-    assert (told.level, told.fault_code) == (Level.WARN, "CLEARANCE_G")
-    assert "0.58 mm ± 0.005 mm was measured, 0.3 mm is counted" in told.message
-    assert told.values["clearance_m"] == counted_m
-    assert told.values["measured_clearance_m"] == 5.8e-4
+    status = status_of(monitor, "joint G")
+    assert (status.level, status.fault_code) == (Level.WARN, "CLEARANCE_G")
+    assert "0.58 mm ± 0.005 mm was measured, 0.3 mm is counted" in status.message
+    assert status.values["clearance_m"] == counted_m
+    assert status.values["measured_clearance_m"] == 5.8e-4
     assert status_of(monitor, "joint A").level is Level.OK
     monitor.measure("G", 6.1e-4, 5e-6, START_NS, "ann", accept=True)
     assert status_of(monitor, "joint G").level is Level.ERROR
@@ -75,8 +75,8 @@ def test_what_contradicts_the_model_raises_the_alarm_too_and_a_new_part_ends_it(
     monitor.reset_wear("G", START_NS + 1, "ann")
     monitor.update(gait(3.0, begin_s=2.5))
     assert "measured" not in status_of(monitor, "joint G").message
-    told = status_of(monitor, "joint G")  # nobody has to acknowledge what was of the old part
-    assert (told.level, told.fault_code) == (Level.WARN, "PART_REPLACED_G")
+    status = status_of(monitor, "joint G")  # nobody has to acknowledge what was of the old part
+    assert (status.level, status.fault_code) == (Level.WARN, "PART_REPLACED_G")
     assert not any(alarm.level for alarm in monitor.alarms.alarms if alarm.subject == "G")
 
 
@@ -132,11 +132,11 @@ def test_what_contradicts_a_measurement_of_the_changed_leg_is_not_corrected(
     if measured_s:
         monitor.update(gait(measured_s))
     shows(monitor, monkeypatch, since_s)
-    told = set()
-    monkeypatch.setattr(TorqueObserver, "contradicted", lambda _, *of: told.add(of[1:]))
+    contradicted = set()
+    monkeypatch.setattr(TorqueObserver, "contradicted", lambda _, *of: contradicted.add(of[1:]))
     monitor.measure("G", measured_m, 2.0e-5, START_NS + round(1e9 * measured_s), "ann")
     monitor.update(gait(1.5, begin_s=measured_s))
-    assert told == (set() if is_corrected else {(measured_m, 2.0e-5)})
+    assert contradicted == (set() if is_corrected else {(measured_m, 2.0e-5)})
     assert monitor.state.clearances["G"].counted_m == pytest.approx(
         4.8e-4 if is_corrected else 3.0e-4, rel=1e-3
     )
@@ -197,10 +197,10 @@ def test_a_measurement_and_a_torque_that_disagree_are_told_with_what_to_do(
     monkeypatch.setattr(TorqueObserver, "diagnosis", shown)
     monitor.update(gait(3.0))
     words = "joint G disagree, so its counted clearance is not corrected: measure it again"
-    for clearance_m, is_told in ((3.1e-4, True), (4.7e-4, False)):
+    for clearance_m, is_reported in ((3.1e-4, True), (4.7e-4, False)):
         monitor.measure("G", clearance_m, 2.0e-5, START_NS + 3 * 10**9, "ann")
         for text in (status_of(monitor, "diagnosis").message, monitor.verdict.verdict.why):
-            assert (words in text) == is_told
+            assert (words in text) == is_reported
     monitor.measure("G", 3.1e-4, 2.0e-5, START_NS + 3 * 10**9, "ann")
     both = "the drive torque (0.48 mm ± 0.038 mm) and a measurement (0.31 mm ± 0.02 mm) of joint G disagree"
     assert both in monitor.verdict.verdict.why

@@ -134,8 +134,8 @@ def test_a_restored_monitor_tells_the_same_of_a_latched_stop(walker):
 def test_a_measurement_that_contradicts_ends_the_stop_and_says_so(walker):
     walker.walks(shown(2.05e-3, 3e-4))
     found = walker.monitor.measure("knee", 3.1e-4, 1e-5, START_NS, "ann")
-    told = "; ".join(found.told(6e-4, 0.8, ()))
-    assert "the drive torque showed 2.05 mm ± 0.3 mm, and this measurement contradicts it" in told
+    text = "; ".join(found.lines(6e-4, 0.8, ()))
+    assert "the drive torque showed 2.05 mm ± 0.3 mm, and this measurement contradicts it" in text
     assert walker.verdict.state.value != "stop"
     assert walker.walks(shown(2.05e-3, 3e-4)) == []  # the same estimate says nothing new
     walker.restart()
@@ -148,9 +148,9 @@ def test_a_measurement_that_contradicts_ends_the_stop_and_says_so(walker):
 def test_a_measurement_that_agrees_says_so_and_the_stop_stays(walker):
     walker.walks(shown(2.05e-3, 3e-4))
     found = walker.monitor.measure("G", 2.0e-3, 5e-5, START_NS, "ann")
-    told = found.told(6e-4, 0.8, ())
-    assert "this agrees with what the drive torque shows, 2.05 mm ± 0.3 mm" in told
-    assert not any("contradicts" in line for line in told)
+    lines = found.lines(6e-4, 0.8, ())
+    assert "this agrees with what the drive torque shows, 2.05 mm ± 0.3 mm" in lines
+    assert not any("contradicts" in line for line in lines)
     assert walker.verdict.state.value == "stop"
 
 

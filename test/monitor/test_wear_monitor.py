@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from readings_as_samples import samples
-from told import raised, status_of
+from reported import raised, status_of
 
 from leg_wear_monitor.errors import ConfigError, LegWearError
 from leg_wear_monitor.gait.config import GaitConfig, KnockConfig
@@ -283,15 +283,15 @@ def test_a_reorder_window_longer_than_a_bridged_gap_is_refused():
 
 
 def test_a_program_that_is_late_and_lost_nothing_reports_as_one_that_keeps_up(new_monitor, gait):
-    walk, told, rates = gait(8.0), [], []
+    walk, reports, rates = gait(8.0), [], []
     for is_late in (False, True):
         one = new_monitor()
         one.note_late(is_late)
-        told.append(said([one.update(walk[:600])]))
+        reports.append(said([one.update(walk[:600])]))
         rates.append(status_of(one, "input").values["crank_rate_hz"])
         one.update(walk[600::20])  # most is missing
         rates.append(status_of(one, "input").values["crank_rate_hz"])
         one.note_late(False)
-    assert told[0] == told[1]
+    assert reports[0] == reports[1]
     assert rates[0] == rates[2] > 100.0
     assert rates[1] < 20.0 and math.isnan(rates[3])

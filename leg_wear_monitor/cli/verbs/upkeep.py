@@ -146,9 +146,9 @@ def _triggered(node: str, service: str, wait_s: float, times: int = 1) -> int:
     """Have a running monitor do it, print its reply, and return the exit code."""
     from leg_wear_monitor.monitor.forecast.measurement import NOT_STORED
 
-    told = common.trigger(node, service, wait_s, times)
-    click.echo(told)
-    return common.WITH_FINDINGS if NOT_STORED in told else 0
+    reply = common.trigger(node, service, wait_s, times)
+    click.echo(reply)
+    return common.WITH_FINDINGS if NOT_STORED in reply else 0
 
 
 # ``leg-wear-monitor acknowledge``: alarms that an operator has seen to.
@@ -310,9 +310,9 @@ def _on_node(node: str, joint: str, clearance_m: float, sigma_m: float, accept: 
     from leg_wear_monitor.monitor.forecast.measurement import asks_to_act
     from leg_wear_monitor.ros.measure import measure_on
 
-    told = measure_on(node, joint, clearance_m, sigma_m, accept, wait_s)
-    click.echo(told)
-    return common.WITH_FINDINGS if asks_to_act(told) else 0
+    reply = measure_on(node, joint, clearance_m, sigma_m, accept, wait_s)
+    click.echo(reply)
+    return common.WITH_FINDINGS if asks_to_act(reply) else 0
 
 
 def _measured(
@@ -359,5 +359,5 @@ def _measured(
         entry, eased = measured_in(kept, leg, settings, found.measurement)
         kept.record(entry)
         found = attrs.evolve(found, eased=eased)
-    told = found.told(limit_m, settings.limits.warn_fraction, kept.measurements)
-    return told, found.has_findings(limit_m)
+    lines = found.lines(limit_m, settings.limits.warn_fraction, kept.measurements)
+    return lines, found.has_findings(limit_m)

@@ -125,7 +125,7 @@ def build_tables(
     basis = basis.with_contacts(linkage, contacts) if basis else build_basis(linkage, contacts, points)
     if like is not None:
         return _with_levers(like, linkage, basis)
-    held, joints = _held_rows(linkage, basis)
+    ideal, joints = _ideal_rows(linkage, basis)
     bodies = linkage.arrays.joint_body[contacts.joint]
     return ClearanceTables(
         motion=_motion(linkage, contacts, basis),
@@ -135,7 +135,7 @@ def build_tables(
         by_e=_by_e(linkage, contacts, basis),
         parts=_parts(_accelerations(basis)["coriolis"]),
         bend=_in_blocks(_bend(basis).reshape(len(basis.gamma) + 1, 2 * len(contacts.joint), -1)),
-        **_spins(bodies, basis, held),
+        **_spins(bodies, basis, ideal),
     )
 
 
@@ -174,8 +174,8 @@ def _with_levers(tables: ClearanceTables, linkage: Linkage, basis: Basis) -> Cle
         first, columns = start_of(name, shapes), part.reshape(len(part), -1)
         motion[:-1, first : first + columns.shape[1]] = columns
         motion[-1, first : first + columns.shape[1]] = columns[0]
-    held, _ = _held_rows(linkage, basis)
-    reaction[:-1, -k:] = _friction_reactions(basis, held)
+    ideal, _ = _ideal_rows(linkage, basis)
+    reaction[:-1, -k:] = _friction_reactions(basis, ideal)
     reaction[-1] = reaction[0]
     slopes, first = _lever_slopes(basis)[_coarse(len(basis.s))], start_of("lever_drive", changing_shapes(k))
     for i in range(k):
@@ -313,7 +313,7 @@ def _stored(_linkage: Linkage, _contacts: ContactArrays, basis: Basis) -> Floats
     return np.concatenate([rows, rows[:1]])
 
 
-def _held_rows(linkage: Linkage, basis: Basis) -> tuple[list[int], Ints]:
+def _ideal_rows(linkage: Linkage, basis: Basis) -> tuple[list[int], Ints]:
     """Rows of the Jacobian for the drive and the ideal joints (r,), and the joint of each."""
     rows, joints = [linkage.rows.drive_row], [DRIVE]
     for closure, start in zip(linkage.rows.closure.tolist(), linkage.rows.row.tolist(), strict=True):
@@ -325,7 +325,7 @@ def _held_rows(linkage: Linkage, basis: Basis) -> tuple[list[int], Ints]:
 
 def _reaction(linkage: Linkage, _contacts: ContactArrays, basis: Basis) -> Floats:
     """Table ``reaction``."""
-    mass, (rows, _) = basis.mass[:, None], _held_rows(linkage, basis)
+    mass, (rows, _) = basis.mass[:, None], _ideal_rows(linkage, basis)
     by = [-basis.force[:, :, None], mass * basis.drive[:, :, None], mass * basis.drive_t[:, :, None]]
     by += [basis.drag[:, :, -1:], mass * basis.s, 2.0 * mass * basis.s_t]
     by.append(basis.drag[:, :, :-1])

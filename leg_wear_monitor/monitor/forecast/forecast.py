@@ -554,8 +554,8 @@ def lifetime_values(forecast: JointForecast | LegForecast) -> dict[str, float]:
 
 def answer_words(forecast: JointForecast) -> str:
     """What can be said of a joint's life, and what it holds for."""
-    held = "" if forecast.prior is None else f"; {_basis(forecast.prior)}"
-    return f"{forecast.answer.value}{held}"
+    basis = "" if forecast.prior is None else f"; {_basis(forecast.prior)}"
+    return f"{forecast.answer.value}{basis}"
 
 
 def bases(forecasts: Mapping[str, JointForecast]) -> list[str]:

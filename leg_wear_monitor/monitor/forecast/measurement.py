@@ -108,8 +108,8 @@ class MeasurementResult:
             line += f": the alarm clearance {now.joint} is acknowledged with it"
         return [line]
 
-    def told(self, limit_m: float, warn_fraction: float, earlier: Sequence[Measurement]) -> tuple[str, ...]:
-        """The measurement and what came of it, for people, a line each.
+    def lines(self, limit_m: float, warn_fraction: float, earlier: Sequence[Measurement]) -> tuple[str, ...]:
+        """The measurement and what came of it, for operators, a line each.
 
         Parameters
         ----------
@@ -147,9 +147,9 @@ class MeasurementResult:
         return is_odd or self.measurement.clearance_m >= limit_m
 
 
-def asks_to_act(told: str) -> bool:
+def asks_to_act(reply: str) -> bool:
     """Whether a node's reply to a measurement contains a finding, or that the measurement is not stored."""
-    return any(words in told for words in (AT_LIMIT, CONTRADICTION, NOT_STORED))
+    return any(words in reply for words in (AT_LIMIT, CONTRADICTION, NOT_STORED))
 
 
 def last_measured(measurements: Sequence[Measurement], joint: str, replaced_ns: int) -> Measurement | None:

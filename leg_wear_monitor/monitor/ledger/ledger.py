@@ -115,7 +115,7 @@ class Ledger:
         self.fault = ""
         self._whole_s: float | None = None  # time in motion at the last whole surfaces of this run
         try:
-            with _damage_told(self.path):
+            with _damage_refused(self.path):
                 self._read(self._db)
             self._begin()
         except BaseException:
@@ -408,7 +408,7 @@ def read_ledger(path: Path, binding: Binding) -> LedgerContent:
     with copy_of(path) as copy:
         if not copy.is_file():
             raise LedgerError(f"{path}: cannot be read: there is no such file")
-        with closing(connect(copy, binding)) as db, _damage_told(path):
+        with closing(connect(copy, binding)) as db, _damage_refused(path):
             last = "id IN (SELECT max(id) FROM forecast GROUP BY joint)"
             return LedgerContent(
                 entry=rows.read_entry(db),
@@ -421,8 +421,8 @@ def read_ledger(path: Path, binding: Binding) -> LedgerContent:
 
 
 @contextmanager
-def _damage_told(path: Path) -> Iterator[None]:
-    """Tell rows that cannot be what was written in one line."""
+def _damage_refused(path: Path) -> Iterator[None]:
+    """Refuse rows that cannot be what was written, in one line."""
     try:
         yield
     except (sqlite3.Error, ValueError, TypeError) as error:

@@ -239,10 +239,10 @@ def _audit_values(was: JointWear) -> dict[str, Any]:
 
 def _verdict_values(verdict: Verdict) -> dict[str, Any]:
     """Values of a verdict's row, lists as JSON."""
-    told = verdict.to_dict()
-    texts = {name: json.dumps(told[name], allow_nan=False) for name in _VERDICT_LISTS}
-    told["to_do"] = told.pop("do")
-    return told | texts
+    values = verdict.to_dict()
+    texts = {name: json.dumps(values[name], allow_nan=False) for name in _VERDICT_LISTS}
+    values["to_do"] = values.pop("do")
+    return values | texts
 
 
 def _baseline_values(baseline: CommissionedTorque) -> dict[str, Any]:

@@ -277,6 +277,6 @@ RULES = (
 
 def findings(situation: Situation) -> tuple[Finding, ...]:
     """All rules that hold in a situation, in the order of the table; that of a healthy leg only alone."""
-    held = (rule.found(situation) for rule in RULES)
-    found = tuple(finding for finding in held if finding is not None)
+    results = (rule.found(situation) for rule in RULES)
+    found = tuple(finding for finding in results if finding is not None)
     return tuple(finding for finding in found if finding.code != NONE) or found

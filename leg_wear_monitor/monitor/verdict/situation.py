@@ -285,16 +285,16 @@ def joint_status(joint: str, is_known: bool, findings: Sequence[Finding | Verdic
 def alarm_value(joint: JointSituation, alarm: Alarm) -> KnownClearance | None:
     """The clearance that its alarm is evaluated with at the end of a period; None to leave it as it is.
 
-    A counted clearance is evaluated once a gait cycle instead, unless the alarm is held by another source.
+    A counted clearance is evaluated once a gait cycle instead, unless another source keeps the alarm present.
     """
     known, sure, shown = judged(joint), surely_at(joint.limit_m, joint.seen), surest(joint.seen)
     if sure is not None and sure.clearance_m > known.clearance_m:
         return sure
     # what the torque said, only the torque takes back: a new run shows nothing for a while
     is_back = shown is not None and _takes_back(shown, joint.limit_m)
-    if is_held(alarm, SEEN) and known.clearance_m < joint.limit_m and not is_back:
+    if is_observed(alarm, SEEN) and known.clearance_m < joint.limit_m and not is_back:
         return None
-    return None if known.by == COUNTED and not is_held(alarm) else known
+    return None if known.by == COUNTED and not is_observed(alarm) else known
 
 
 def _takes_back(shown: KnownClearance, limit_m: float) -> bool:
@@ -303,7 +303,7 @@ def _takes_back(shown: KnownClearance, limit_m: float) -> bool:
     return is_below or is_surely_below(limit_m, shown.clearance_m, shown.sigma_m)
 
 
-def is_held(alarm: Alarm, by: Sequence[str] = (MEASURED, BOTH, *SEEN)) -> bool:
+def is_observed(alarm: Alarm, by: Sequence[str] = (MEASURED, BOTH, *SEEN)) -> bool:
     """Whether an alarm of the clearance is present because of what some sources say, not counting alone."""
     return alarm.present is not Level.OK and alarm.cause in by
 
@@ -490,7 +490,7 @@ def hit_of(alarm: Alarm, situation: Situation, **words: str) -> Hit:
         past = f" (since {time_words(alarm.raised_ns)}; now within its limit)"
     own, noun = joint_of(alarm.name), situation.quantity(alarm)
     joint = situation.joint_words(own)
-    told = {
+    texts = {
         "quantity": f"{noun} of joint {joint}" if own else noun,
         "joint": joint,
         "value": amount(value, alarm.unit),
@@ -502,14 +502,14 @@ def hit_of(alarm: Alarm, situation: Situation, **words: str) -> Hit:
     evidence: tuple[Evidence, ...] = ()
     each = _measured(alarm, value, situation)
     if each is not None and each.measured is not None:
-        told["known"] = "measured" if value <= each.measured.clearance_m else "estimated"
-        told["past"] += f"; {each.measured.words} was measured, {amount(each.counted_m, 'm')} is counted"
+        texts["known"] = "measured" if value <= each.measured.clearance_m else "estimated"
+        texts["past"] += f"; {each.measured.words} was measured, {amount(each.counted_m, 'm')} is counted"
         evidence = (
             *known_evidence(f"measured clearance {each.joint}", each.measured, each.limit_m),
             Evidence(f"counted clearance {each.joint}", each.counted_m, each.limit_m, "m"),
         )
     return Hit(
-        words=told | words,
+        words=texts | words,
         joint=own,
         since_ns=alarm.raised_ns,
         evidence=(Evidence(alarm.name, value, alarm.limit, alarm.unit), *evidence),

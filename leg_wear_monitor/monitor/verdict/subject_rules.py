@@ -44,11 +44,11 @@ def _explained(code: str, situation: Situation) -> list[Hit]:
     if not named or named[0].cause.fault_code != code:
         return []
     words = words_for(situation)
-    told = {"causes": f": {_in_words(situation)}", "remedy": " and ".join(map(words.remedy, named))}
+    texts = {"causes": f": {_in_words(situation)}", "remedy": " and ".join(map(words.remedy, named))}
     alarms = raised("torque_mismatch")(situation)
     since_ns = alarms[0].since_ns if alarms else 0
     evidence = tuple(map(_evidence, named))
-    return [Hit(words=told, since_ns=since_ns, evidence=evidence, state=State.INSPECT)]
+    return [Hit(words=texts, since_ns=since_ns, evidence=evidence, state=State.INSPECT)]
 
 
 def _beyond_limits(code: str, situation: Situation) -> list[Hit]:
@@ -61,11 +61,11 @@ def _beyond_limits(code: str, situation: Situation) -> list[Hit]:
         alarm = hit.evidence[0].name  # the evidence of a raised alarm is the alarm's value, by its name
         cause = situation.torque_causes.get(alarm)
         sentence = f"; {words.cause(cause)}" if cause else ""
-        told = {
+        texts = {
             "causes": ": the {quantity} is {value} (limit {limit}){past}".format(**hit.words) + sentence,
             "remedy": words.remedy(cause or NamedCause(CAUSES_OF_ALARMS[alarm], 0.0, 0.0)),
         }
-        hits.append(Hit(words=told, since_ns=hit.since_ns, evidence=hit.evidence, state=State.INSPECT))
+        hits.append(Hit(words=texts, since_ns=hit.since_ns, evidence=hit.evidence, state=State.INSPECT))
     return hits
 
 
@@ -76,7 +76,7 @@ def _diagnosed(code: str, situation: Situation) -> list[Hit]:
         Hit(
             words={
                 "causes": f": {words_of(change, situation)}{doubt(situation)}",
-                "remedy": words_for(situation).remedy(_as_told(change, situation)),
+                "remedy": words_for(situation).remedy(_named_cause(change, situation)),
             },
             since_ns=change.since_ns,
             evidence=(_evidence(change),),
@@ -88,9 +88,9 @@ def _diagnosed(code: str, situation: Situation) -> list[Hit]:
 def mismatch(situation: Situation) -> Sequence[Hit]:
     """The drive torque is not that of the counted leg; with what may cause it, as far as that is known."""
     words = words_for(situation)
-    told = [*map(words.cause, situation.torque_causes.values())]
-    told += [words_of(change, situation) for change in changes(situation)]
-    causes = f"; possible cause: {'; '.join(told)}" if told else ""
+    possible = [*map(words.cause, situation.torque_causes.values())]
+    possible += [words_of(change, situation) for change in changes(situation)]
+    causes = f"; possible cause: {'; '.join(possible)}" if possible else ""
     if situation.explained is not None:
         causes = f"; {_in_words(situation)}{causes}"
     return [
@@ -115,7 +115,7 @@ def words_of(change: Change, situation: Situation) -> str:
         if change.value < change.counted:
             words += ", less than before: if its part was replaced, reset the joint"
     else:
-        words = words_for(situation).cause(_as_told(change, situation))
+        words = words_for(situation).cause(_named_cause(change, situation))
     if change.runner_up and change.runner_up_log_odds < SURE_OF_NAME:
         words += f" (or {change.runner_up})"
     return words
@@ -132,8 +132,8 @@ def words_for(situation: Situation) -> CauseWords:
     return CauseWords(situation.crank, situation.drive_torque, speed, situation.diagnosis)
 
 
-def _as_told(change: Change, situation: Situation) -> NamedCause:
-    """A lag, which the diagnosis finds at one cadence, as the angle that it cannot be told from."""
+def _named_cause(change: Change, situation: Situation) -> NamedCause:
+    """A lag, which the diagnosis finds at one cadence, as the angle that it cannot be distinguished from."""
     speed = situation.cadence_rpm * math.pi / 30.0
     if change.cause is not Cause.LAG or not abs(speed) > 0.0:
         return change
@@ -154,7 +154,7 @@ def _evidence(one: NamedCause) -> Evidence:
 # Conditions on clearances: those that the forecast believes, and those that measurements show.
 
 
-CONFIRMED_CYCLES = 20  # gait cycles of a new part; another leg is told in fewer
+CONFIRMED_CYCLES = 20  # gait cycles of a new part; another leg is found in fewer
 
 
 def believed_at_limit(situation: Situation) -> Sequence[Hit]:
@@ -338,8 +338,8 @@ def not_compared(situation: Situation) -> Sequence[Hit]:
     for alarm in situation.alarms:
         if alarm.kind == "torque_mismatch" and alarm.level is Level.OK and alarm.beyond[1]:
             hit = hit_of(alarm, situation)
-            told = ": {value} of the predicted RMS is not explained (limit {limit})".format(**hit.words)
-            return [attrs.evolve(hit, words={"causes": told})]
+            causes = ": {value} of the predicted RMS is not explained (limit {limit})".format(**hit.words)
+            return [attrs.evolve(hit, words={"causes": causes})]
     is_known = not math.isnan(situation.mismatch) or not situation.unobserved
     return [] if is_known else [Hit(words={"causes": ""})]
 
@@ -420,8 +420,8 @@ def _compared(found: Diagnosis) -> str:
     if found.state is DiagnosisState.OFF and found.reason:
         return f"; the torque is not compared with wider joints: {found.reason}"
     known = [each for each in found.sigma_m if not math.isnan(each)]
-    told = [f"{found.cycles} gait cycles show clearances to ± {amount(max(known), 'm')}"] if known else []
-    return "".join(f"; {each}" for each in (*told, found.next_step) if each)
+    shown = [f"{found.cycles} gait cycles show clearances to ± {amount(max(known), 'm')}"] if known else []
+    return "".join(f"; {each}" for each in (*shown, found.next_step) if each)
 
 
 def _said(cause: str) -> Sequence[Hit]:

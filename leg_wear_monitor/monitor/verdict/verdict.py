@@ -189,9 +189,9 @@ class CauseWords:
                 "no reversed sign, factor, crank angle, lag, load at the foot or mass of a body explains "
                 f"half of it: {rest}; {other}"
             )
-        told = [" and ".join(map(self.cause, causes)) for causes in explained.alternatives]
-        words = ", or ".join([*told[:_MOST], *(["others"] if len(told) > _MOST else [])])
-        if len(told) > 1:
+        alternatives = [" and ".join(map(self.cause, causes)) for causes in explained.alternatives]
+        words = ", or ".join([*alternatives[:_MOST], *(["others"] if len(alternatives) > _MOST else [])])
+        if len(alternatives) > 1:
             words += " (these explain the torque equally well and cannot be distinguished)"
         if abs(explained.bias.value) > _SURE * explained.bias.sigma:
             words += f"; {self.cause(explained.bias)}"
@@ -335,17 +335,17 @@ _STATES = {
 
 def diagnosis_words(diagnosis: Diagnosis, joints: Sequence[str]) -> str:
     """State, reason, and the joints (k,) that the drive torque does not show."""
-    told = [_STATES[diagnosis.state]]
+    sentences = [_STATES[diagnosis.state]]
     if diagnosis.reason:
-        told.append(diagnosis.reason)
+        sentences.append(diagnosis.reason)
     if diagnosis.next_step:
-        told.append(diagnosis.next_step)
+        sentences.append(diagnosis.next_step)
     hidden = unseen(diagnosis, joints)
     if diagnosis.clearance_m and hidden:
-        told.append(f"not observable: {', '.join(hidden)}")
+        sentences.append(f"not observable: {', '.join(hidden)}")
     if diagnosis.bodies:
-        told.append("wear is counted with the masses, lengths and friction that the drive torque shows")
-    return "; ".join(told)
+        sentences.append("wear is counted with the masses, lengths and friction that the drive torque shows")
+    return "; ".join(sentences)
 
 
 def unseen(diagnosis: Diagnosis, joints: Sequence[str]) -> tuple[str, ...]:

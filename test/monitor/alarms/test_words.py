@@ -39,8 +39,8 @@ def test_of_estimates_the_last_one_is_told_and_is_not_called_the_worst() -> None
     alarm = Alarm(kind="clearance", subject="G", unit="m")
     for value in (2.1e-3, 1.65e-3):
         alarm = evaluated(alarm, value, Limit(5e-4, 6e-4, 0.05), 10**9, 1, 4e-4, "torque")
-    told = raised_words(state_of(alarm), alarm.worst, alarm.limit, "m", alarm.raised_ns, alarm.cause)
-    assert told == "present, last estimate 1.65 mm, limit 0.6 mm, since 1.000 s"
+    words = raised_words(state_of(alarm), alarm.worst, alarm.limit, "m", alarm.raised_ns, alarm.cause)
+    assert words == "present, last estimate 1.65 mm, limit 0.6 mm, since 1.000 s"
 
 
 def test_the_worst_of_a_rate_is_the_least() -> None:

@@ -21,5 +21,5 @@ def test_the_shipped_file_holds_every_parameter_but_empty_lists_at_its_default()
             for name in (names(value, f"{prefix}{key}.") if isinstance(value, dict) else [prefix + key])
         ]
 
-    told = names(document["/**"]["ros__parameters"])
-    assert told == [name for name, parameter in PARAMETERS.items() if parameter.default != ()]
+    shipped = names(document["/**"]["ros__parameters"])
+    assert shipped == [name for name, parameter in PARAMETERS.items() if parameter.default != ()]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 import attrs
 import numpy as np
 import pytest
-from told import as_new, status_of
+from reported import as_new, status_of
 
 from leg_wear_monitor import Mechanism, WearMonitor
 from leg_wear_monitor.errors import ConfigError

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from told import as_new, status_of
+from reported import as_new, status_of
 
 from leg_wear_monitor import ConfigError, WearMonitor
 from leg_wear_monitor.mechanism.position import TURN

@@ -1,4 +1,4 @@
-"""What no drive can do is told: biases, drifts, lags and crank offsets, by name."""
+"""What no drive can do is named: biases, drifts, lags and crank offsets, by name."""
 
 import math
 from types import SimpleNamespace

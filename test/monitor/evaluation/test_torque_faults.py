@@ -1,10 +1,10 @@
-"""A torque that no drive has is told by its name, on a leg that is healthy otherwise."""
+"""A torque that no drive has is named, on a leg that is healthy otherwise."""
 
 import math
 
 import numpy as np
 import pytest
-from told import raised, status_of
+from reported import raised, status_of
 
 pytest.importorskip("mcap")
 

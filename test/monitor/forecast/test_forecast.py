@@ -39,30 +39,30 @@ def alone(now=NOW, settings=SETTINGS, observations=(), **more):
 
 
 def test_with_the_coefficient_alone_unknown_life_is_lognormal():
-    told = alone(settings=SURE)
-    assert told.answer is Answer.KNOWN
-    assert told.cycles.p50 == pytest.approx(2e7, rel=0.01)
+    result = alone(settings=SURE)
+    assert result.answer is Answer.KNOWN
+    assert result.cycles.p50 == pytest.approx(2e7, rel=0.01)
     spread = math.exp(Z * USUAL_SPREAD)
-    assert told.cycles.p90 / told.cycles.p50 == pytest.approx(spread, rel=0.02)
-    assert told.cycles.p50 / told.cycles.p10 == pytest.approx(spread, rel=0.02)
-    assert told.hours.p50 == pytest.approx(told.cycles.p50 / 3600.0)
-    assert told.days.p50 == pytest.approx(told.hours.p50 / 8.0)
+    assert result.cycles.p90 / result.cycles.p50 == pytest.approx(spread, rel=0.02)
+    assert result.cycles.p50 / result.cycles.p10 == pytest.approx(spread, rel=0.02)
+    assert result.hours.p50 == pytest.approx(result.cycles.p50 / 3600.0)
+    assert result.days.p50 == pytest.approx(result.hours.p50 / 8.0)
 
 
 def test_what_is_not_known_adds_up_in_squares():
     load = attrs.evolve(SURE, load_sigma=0.5)
     noisy = attrs.evolve(NOW, growth_error_m=0.3 * NOW.growth_m)
-    told = alone(noisy, load)
+    result = alone(noisy, load)
     both = math.sqrt(0.7**2 + 0.5**2 + 0.3**2)
-    assert math.log(told.cycles.p90 / told.cycles.p10) == pytest.approx(2.0 * Z * both, rel=0.03)
+    assert math.log(result.cycles.p90 / result.cycles.p10) == pytest.approx(2.0 * Z * both, rel=0.03)
 
 
 def test_lives_that_end_early_leave_the_rest_of_the_way_unknown():
     """Lives to 0.31 mm say nothing of 0.6 mm: p10 to p90 are as wide as without lives."""
     now = np.array([NOW.fresh_m])
-    told = attrs.evolve(SURE, model_sigma=0.4, wear_coefficient_sigma=0.01)
+    sure = attrs.evolve(SURE, model_sigma=0.4, wear_coefficient_sigma=0.01)
     law = GrowthLaw(np.zeros((1, 1)), now, np.array([3.1e-4]), np.array([0.01]), lives=5)
-    found, without = (alone(settings=told, law=one).cycles for one in (law, no_law(now, 0.4)))
+    found, without = (alone(settings=sure, law=one).cycles for one in (law, no_law(now, 0.4)))
     assert np.log(found.p90 / found.p10) == pytest.approx(np.log(without.p90 / without.p10), rel=0.06)
 
 
@@ -95,70 +95,70 @@ def test_a_measurement_narrows_and_moves_the_forecast():
 )
 def test_what_cannot_be_known_is_said(changes, answer):
     valid = changes.pop("valid", True)
-    told = whole([attrs.evolve(NOW, **changes)], valid=valid)
-    for each in (told.joints[0], told.leg):
+    result = whole([attrs.evolve(NOW, **changes)], valid=valid)
+    for each in (result.joints[0], result.leg):
         assert (each.answer, each.cycles, each.hours, each.days) == (answer, None, None, None)
-    assert (told.leg.first, told.leg.first_probability) == (None, {})
+    assert (result.leg.first, result.leg.first_probability) == (None, {})
 
 
 def test_at_the_limit_nothing_remains_whatever_else():
-    told = whole([B, attrs.evolve(NOW, wear_m=3.1e-4, growth_m=None)], valid=False)
-    for each in (told.joints[1], told.leg):
+    result = whole([B, attrs.evolve(NOW, wear_m=3.1e-4, growth_m=None)], valid=False)
+    for each in (result.joints[1], result.leg):
         assert each.answer is Answer.AT_LIMIT
         assert attrs.astuple(each.cycles) == (0.0, 0.0, 0.0)
-    assert told.joints[0].answer is Answer.OUTSIDE_VALIDITY
-    assert told.leg.first_probability == {"B": 0.0, "A": 1.0}
+    assert result.joints[0].answer is Answer.OUTSIDE_VALIDITY
+    assert result.leg.first_probability == {"B": 0.0, "A": 1.0}
 
 
 def test_a_leg_of_one_joint_lasts_as_long_as_it():
-    told = whole([NOW])
-    assert told.leg.cycles == told.joints[0].cycles
-    assert told.leg.days == told.joints[0].days
-    assert (told.leg.first, told.leg.first_probability) == ("A", {"A": 1.0})
+    result = whole([NOW])
+    assert result.leg.cycles == result.joints[0].cycles
+    assert result.leg.days == result.joints[0].days
+    assert (result.leg.first, result.leg.first_probability) == ("A", {"A": 1.0})
 
 
 def test_a_leg_ends_with_the_first_of_two_lognormal_lives():
     """The smaller of two; the probability that it is A's is that of a difference of normals."""
-    told = whole([NOW, B], SURE).leg
+    result = whole([NOW, B], SURE).leg
     gap = math.log(NOW.growth_m / B.growth_m) / (math.sqrt(2.0) * USUAL_SPREAD)
-    assert told.first == "A"
-    assert told.first_probability["A"] == pytest.approx(statistics.NormalDist().cdf(gap), abs=0.01)
+    assert result.first == "A"
+    assert result.first_probability["A"] == pytest.approx(statistics.NormalDist().cdf(gap), abs=0.01)
     random = np.random.default_rng(0)
     lives = np.array([[2e7], [6e7]]) / np.exp(USUAL_SPREAD * random.standard_normal((2, 200_000)))
     expected = np.quantile(lives.min(axis=0), (0.1, 0.5, 0.9))
-    np.testing.assert_allclose(attrs.astuple(told.cycles), expected, rtol=0.03)
+    np.testing.assert_allclose(attrs.astuple(result.cycles), expected, rtol=0.03)
 
 
 def test_a_joint_without_a_growth_rate_leaves_the_leg_partly_known():
-    told = whole([NOW, attrs.evolve(B, growth_m=None)])
-    assert [each.answer for each in told.joints] == [Answer.KNOWN, Answer.NOT_ENOUGH_DATA]
-    assert told.leg.answer is Answer.PARTLY_KNOWN
-    assert told.leg.cycles == told.joints[0].cycles
+    result = whole([NOW, attrs.evolve(B, growth_m=None)])
+    assert [each.answer for each in result.joints] == [Answer.KNOWN, Answer.NOT_ENOUGH_DATA]
+    assert result.leg.answer is Answer.PARTLY_KNOWN
+    assert result.leg.cycles == result.joints[0].cycles
 
 
 def test_a_joint_without_a_growth_rate_does_not_end_the_leg_by_what_its_clearance_may_be():
     """Seen before: the leg was at its limit now with 10 %, of a joint that is said to be left out."""
     near = attrs.evolve(B, growth_m=None, wear_m=2.8e-4)
     unsure = attrs.evolve(SURE, clearance_sigma_m=2e-5)
-    told = whole([NOW, near], unsure)
-    assert told.joints[1].clearance_m.p90 > near.limit_m
-    assert (told.leg.answer, told.leg.cycles) == (Answer.PARTLY_KNOWN, told.joints[0].cycles)
-    assert told.leg.first_probability == {"A": 1.0, "B": 0.0}
+    result = whole([NOW, near], unsure)
+    assert result.joints[1].clearance_m.p90 > near.limit_m
+    assert (result.leg.answer, result.leg.cycles) == (Answer.PARTLY_KNOWN, result.joints[0].cycles)
+    assert result.leg.first_probability == {"A": 1.0, "B": 0.0}
 
 
 @pytest.mark.parametrize("wear_m", [0.0, 2.98e-4])
 def test_a_joint_that_does_not_grow_never_ends_the_leg(wear_m):
     """Nor by a clearance that may be at its limit."""
-    told = whole([NOW, attrs.evolve(B, growth_m=0.0, wear_m=wear_m)])
-    assert (told.leg.answer, told.leg.cycles) == (Answer.KNOWN, told.joints[0].cycles)
-    assert told.leg.first_probability == {"A": 1.0, "B": 0.0}
+    result = whole([NOW, attrs.evolve(B, growth_m=0.0, wear_m=wear_m)])
+    assert (result.leg.answer, result.leg.cycles) == (Answer.KNOWN, result.joints[0].cycles)
+    assert result.leg.first_probability == {"A": 1.0, "B": 0.0}
 
 
 def test_a_day_has_24_hours():
     walking = attrs.evolve(SURE, duty_hours_per_day=24.0, duty_sigma=1.0)
-    told = alone(settings=walking)
-    assert told.days.p10 >= told.hours.p10 / 24.0
-    assert told.days.p50 > told.hours.p50 / 24.0
+    result = alone(settings=walking)
+    assert result.days.p10 >= result.hours.p10 / 24.0
+    assert result.days.p50 > result.hours.p50 / 24.0
 
 
 @given(st.floats(-1.0, 1.0))
@@ -166,7 +166,7 @@ def test_a_measured_joint_tells_of_one_that_it_acts_upon(coupling):
     """A is half as much wider again than the twin has it, and stays so: half of that is in B's past."""
     law = GrowthLaw(np.array([[0.0, 0.0], [coupling, 0.0]]), np.full(2, 3e-4), np.full(2, 1e-3), np.zeros(2))
     worn = attrs.evolve(NOW, wear_m=1e-4, growth_m=0.0)
-    told = whole([worn, B], SURE, [(0, ClearanceAtWear(4.5e-4, 1e-8, 1e-4))], law).joints[1].cycles
+    result = whole([worn, B], SURE, [(0, ClearanceAtWear(4.5e-4, 1e-8, 1e-4))], law).joints[1].cycles
     expected = alone(B, SURE, law=no_law(np.array([3e-4]), 0.0)).cycles
     apart = math.log(4.5e-4 / 4e-4)
-    assert math.log(expected.p50 / told.p50) == pytest.approx(0.5 * coupling * apart, abs=1e-3)
+    assert math.log(expected.p50 / result.p50) == pytest.approx(0.5 * coupling * apart, abs=1e-3)

@@ -39,14 +39,14 @@ def forecaster(leg):
 
 @pytest.mark.plain
 def test_a_forecast_is_renewed_once_growth_is_known_and_then_once_a_minute(forecaster):
-    told = walked(forecaster, range(1, 125))
-    renewed = [i for i in range(1, len(told)) if told[i] is not told[i - 1]]
+    forecasts = walked(forecaster, range(1, 125))
+    renewed = [i for i in range(1, len(forecasts)) if forecasts[i] is not forecasts[i - 1]]
     assert renewed == [9, 69]
-    assert [one.answer for one in told[0].joints] == [Answer.NOT_ENOUGH_DATA] * 5
-    assert [one.answer for one in told[-1].joints] == [Answer.KNOWN] * 5
+    assert [one.answer for one in forecasts[0].joints] == [Answer.NOT_ENOUGH_DATA] * 5
+    assert [one.answer for one in forecasts[-1].joints] == [Answer.KNOWN] * 5
     # sooner than if growth stayed as it is: it rises as clearances open
-    assert 1.2e7 < told[-1].joints[0].cycles.p50 < 1.45e7
-    assert told[-1].leg.cycles.p50 < told[-1].joints[0].cycles.p50
+    assert 1.2e7 < forecasts[-1].joints[0].cycles.p50 < 1.45e7
+    assert forecasts[-1].leg.cycles.p50 < forecasts[-1].joints[0].cycles.p50
 
 
 @pytest.mark.plain
@@ -73,8 +73,8 @@ def test_a_load_that_is_not_sure_widens_growth_and_life(leg):
 
 @pytest.mark.plain
 def test_a_stamp_that_goes_back_renews_it_too(forecaster):
-    told = walked(forecaster, [*range(1000, 1030), *range(5, 10)])
-    assert told[29] is not told[30]
+    forecasts = walked(forecaster, [*range(1000, 1030), *range(5, 10)])
+    assert forecasts[29] is not forecasts[30]
 
 
 @pytest.mark.plain
@@ -87,14 +87,20 @@ def test_outside_validity_is_an_answer(forecaster):
 def test_a_replaced_part_is_not_known(forecaster):
     walked(forecaster, range(1, 80))
     forecaster.replaced("G", 80 * 10**9)
-    (told,) = walked(forecaster, [80])
-    assert [one.answer is Answer.NOT_ENOUGH_DATA for one in told.joints] == [False, False, True, False, False]
+    (forecast,) = walked(forecaster, [80])
+    assert [one.answer is Answer.NOT_ENOUGH_DATA for one in forecast.joints] == [
+        False,
+        False,
+        True,
+        False,
+        False,
+    ]
 
 
 @pytest.mark.plain
 def test_what_encoders_show_tightens_the_forecast_and_the_newest_replaces_the_last(forecaster):
-    def spread(told):
-        return told.cycles.p90 / told.cycles.p10
+    def spread(forecast):
+        return forecast.cycles.p90 / forecast.cycles.p10
 
     before = walked(forecaster, range(1, 80), worn=1e-4)[-1].joints[0]
     assert forecaster.use_estimate(0, ClearanceAtWear(4.2e-4, 2e-5, 1e-4), 0)
@@ -120,9 +126,9 @@ def test_the_monitor_forecasts_and_learns(leg, gait):
     snapshot = monitor.snapshot()
     found = monitor.measure("A", 3.05e-4, 2e-6, 10**18, "ann")
     assert found.measurement.counts
-    told = monitor.update(gait(3.0, begin_s=14.0)).cycles[-1].joints[0].forecast
-    assert told.measurements == 1
-    assert told.clearance_m.p50 == pytest.approx(3.05e-4, abs=2e-6)
+    forecast = monitor.update(gait(3.0, begin_s=14.0)).cycles[-1].joints[0].forecast
+    assert forecast.measurements == 1
+    assert forecast.clearance_m.p50 == pytest.approx(3.05e-4, abs=2e-6)
     monitor.restore(snapshot)
     again = monitor.update(gait(3.0, begin_s=14.0)).cycles[-1].joints[0].forecast
     assert again == first

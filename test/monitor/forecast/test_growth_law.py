@@ -42,16 +42,16 @@ SPREAD = [np.array(f) for f in ((1, 1, 1), (1, 3, 1), (1, 1, 4), (0.3, 1, 2), (0
 
 @given(factors)
 def test_joints_that_do_not_act_on_each_other_last_as_long_as_they_grow(factor):
-    told = one(no_law(FRESH, 0.1), base=factor * BASE)
-    assert told == pytest.approx((LIMIT - FRESH) / (factor * BASE), rel=1e-9)
+    cycles = one(no_law(FRESH, 0.1), base=factor * BASE)
+    assert cycles == pytest.approx((LIMIT - FRESH) / (factor * BASE), rel=1e-9)
 
 
 def test_one_joint_whose_growth_rises_with_its_clearance_has_a_closed_form():
     law = GrowthLaw(np.array([[0.8]]), FRESH[:1], np.array([1e-3]), np.zeros(1))
-    told = one(law, FRESH[:1], BASE[:1], LIMIT[:1])
+    cycles = one(law, FRESH[:1], BASE[:1], LIMIT[:1])
     # integral of (c / c_0)^-b dc over growth when new
     expected = FRESH[0] / 0.2 * ((LIMIT[0] / FRESH[0]) ** 0.2 - 1.0) / BASE[0]
-    assert told == pytest.approx(expected, rel=1e-3)
+    assert cycles == pytest.approx(expected, rel=1e-3)
 
 
 @given(st.floats(0.05, 20.0), factors)
@@ -70,21 +70,21 @@ def test_a_wider_limit_is_reached_later(factor, k, wider):
 @given(factors)
 def test_steps_are_short_enough(factor):
     life = lived(factor)
-    told = one(base=factor * BASE, limit=life.clearance_m[-1])
-    np.testing.assert_allclose(told, life.cycles[-1], rtol=0.01)
+    cycles = one(base=factor * BASE, limit=life.clearance_m[-1])
+    np.testing.assert_allclose(cycles, life.cycles[-1], rtol=0.01)
 
 
 def test_a_joint_at_its_limit_stays_there_and_one_that_does_not_grow_never_ends():
     clearance, base = FRESH.copy(), BASE.copy()
     clearance[0], base[1] = 1.2 * LIMIT[0], 0.0
-    told = one(clearance=clearance, base=base)
-    assert told[0] == 0.0
-    assert told[1] == np.inf
+    cycles = one(clearance=clearance, base=base)
+    assert cycles[0] == 0.0
+    assert cycles[1] == np.inf
     # as if the first were at its limit just now
     rate = BASE[2] * np.exp(COUPLING[2, 0] * np.log(LIMIT[0] / FRESH[0]))
     held = attrs.evolve(LAW, coupling=np.diag(np.diag(COUPLING)))
     alone = cycles_to(held, FRESH[:, None], np.array([[0.0], [0.0], [rate]]), LIMIT)
-    assert told[2] == pytest.approx(alone[2, 0])
+    assert cycles[2] == pytest.approx(alone[2, 0])
 
 
 def test_beyond_what_lives_have_seen_growth_stays_as_it_is_there():
@@ -110,12 +110,12 @@ def test_the_law_is_found_again_in_its_own_lives():
 
 
 def test_what_lives_are_off_the_law_is_its_sigma():
-    """Factors that the law is not told: each joint's own, for all of its life."""
+    """Factors that the law does not know: each joint's own, for all of its life."""
     random = np.random.default_rng(1)
     lives = [lived(np.exp(0.5 * random.standard_normal(3))) for _ in range(40)]
     off = [np.exp(0.2 * random.standard_normal(3)) for _ in lives]
-    told = [attrs.evolve(life, factor=life.factor / x) for life, x in zip(lives, off, strict=True)]
-    assert fitted_law(told, sigma=0.9).sigma == pytest.approx(np.full(3, 0.2), rel=0.35)
+    known = [attrs.evolve(life, factor=life.factor / x) for life, x in zip(lives, off, strict=True)]
+    assert fitted_law(known, sigma=0.9).sigma == pytest.approx(np.full(3, 0.2), rel=0.35)
 
 
 def test_one_life_alone_does_not_tell_its_sigma():

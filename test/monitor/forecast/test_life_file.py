@@ -104,6 +104,6 @@ def test_the_shipped_lives_are_of_this_model(leg):
     """
     run = LifeRun(leg, LifeSettings(legs=2, cycles=6, seed=90))
     seen = run.points[0].rate
-    told = np.array([life.growth_m_per_cycle[0] / life.factor for life in read_lives(str(SHIPPED), leg)])
-    error = np.hypot(told.std(axis=0, ddof=1), seen.scatter)
-    assert (np.abs(seen.clearance - told.mean(axis=0)) < 4.0 * error).all()
+    growth = np.array([life.growth_m_per_cycle[0] / life.factor for life in read_lives(str(SHIPPED), leg)])
+    error = np.hypot(growth.std(axis=0, ddof=1), seen.scatter)
+    assert (np.abs(seen.clearance - growth.mean(axis=0)) < 4.0 * error).all()

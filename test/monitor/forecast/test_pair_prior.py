@@ -29,10 +29,10 @@ def own_pair(path: Path, **spreads: float | None) -> lw.Mechanism:
     """The default leg with a pair of its own: 3e-15 and 1e-15 1/Pa, with spreads."""
     document: dict[str, Any] = {"name": "own", "title": "own", "lubricant": "none", "regime": "dry"}
     for side, k in (("bushing", 3e-15), ("journal", 1e-15)):
-        told = {"source": "a test", "conditions": "none"}
-        wear: dict[str, Any] = {"value": k, "unit": "1/Pa", **told}
+        source = {"source": "a test", "conditions": "none"}
+        wear: dict[str, Any] = {"value": k, "unit": "1/Pa", **source}
         if spreads.get(side) is not None:
-            wear["spread"] = {"value": spreads[side], "unit": "ln", **told}
+            wear["spread"] = {"value": spreads[side], "unit": "ln", **source}
         document[side] = {"material": "steel", "wear_coefficient": wear}
     yaml = YAML()
     yaml.dump(document, path / "own.yaml")

@@ -9,22 +9,22 @@ from leg_wear_monitor.monitor.forecast.measurement import validity
 pytestmark = pytest.mark.plain
 
 
-def told_of(below):
+def line_of(below):
     return validity([measured(expected_below=float(fraction)) for fraction in below])
 
 
 def test_a_true_forecast_holds_four_fifths_and_has_no_bias():
-    told = told_of(np.random.default_rng(1).random(400))
-    assert int(told.split()[0]) / 400 == pytest.approx(0.8, abs=0.06)
-    assert told.endswith("no bias found")
+    line = line_of(np.random.default_rng(1).random(400))
+    assert int(line.split()[0]) / 400 == pytest.approx(0.8, abs=0.06)
+    assert line.endswith("no bias found")
 
 
 @pytest.mark.parametrize(("power", "word"), [(0.3, "faster"), (3.0, "slower")])
 def test_bias_is_said(power, word):
-    told = told_of(np.random.default_rng(1).random(40) ** power)
-    assert told.endswith(f"joints wear {word} than forecast")
+    line = line_of(np.random.default_rng(1).random(40) ** power)
+    assert line.endswith(f"joints wear {word} than forecast")
 
 
 def test_a_few_measurements_say_nothing():
-    assert "too few to evaluate" in told_of([0.99, 0.98])
+    assert "too few to evaluate" in line_of([0.99, 0.98])
     assert validity([]).startswith("0 of 0 ")

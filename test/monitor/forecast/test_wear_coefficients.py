@@ -75,14 +75,14 @@ def test_exact_measurements_are_believed_however_far_they_are_from_the_prior(pow
 
 @pytest.mark.parametrize("factor", [0.02, 60.0, 200.0, 5000.0])
 def test_an_accepted_measurement_moves_the_belief_as_far_as_it_says(factor):
-    told = found(worn(1e-6 if factor > 1.0 else 1e-4), 1e3 * (FRESH + factor * 1e-6), accept=True)
+    result = found(worn(1e-6 if factor > 1.0 else 1e-4), 1e3 * (FRESH + factor * 1e-6), accept=True)
     if factor > 1.0:
-        low, middle, high = np.exp(told.after.log_factors((0.1, 0.5, 0.9)))
+        low, middle, high = np.exp(result.after.log_factors((0.1, 0.5, 0.9)))
         assert middle == pytest.approx(factor, rel=0.5 if factor < 100.0 else 0.05)
         assert 0.0 < low < middle < high
-        assert f"{middle:.3g} times the nominal one" in told.words[-1]
+        assert f"{middle:.3g} times the nominal one" in result.words[-1]
     else:  # next to no wear where the twin has counted much
-        assert np.exp(told.after.log_factors(0.9)) < 0.2
+        assert np.exp(result.after.log_factors(0.9)) < 0.2
 
 
 @given(st.permutations(range(4)))
@@ -125,48 +125,48 @@ def test_measurements_that_repeat_the_same_model_are_expected_evenly():
 
 def test_a_measurement_says_in_words_what_it_taught():
     assert "it adds little" in found(worn(2e-7), 0.302).words[0]
-    told = found(worn(6e-5), 0.42)
-    assert not told.contradicts
-    assert told.measurement.counts
-    (line,) = told.words
+    result = found(worn(6e-5), 0.42)
+    assert not result.contradicts
+    assert result.measurement.counts
+    (line,) = result.words
     assert line.startswith("the wear coefficient is 1.9")
     assert "times smaller than before" in line
 
 
 def test_a_contradiction_is_said_and_kept_but_does_not_count():
-    told = found(worn(1e-5), 0.9)
-    assert (told.contradicts, told.measurement.counts) == (True, False)
-    assert "contradicts the model: the clearance of A is far larger" in told.words[0]
-    assert "if the part was replaced, reset its wear first" in told.words[1]
-    assert told.after.observations == 0
+    result = found(worn(1e-5), 0.9)
+    assert (result.contradicts, result.measurement.counts) == (True, False)
+    assert "contradicts the model: the clearance of A is far larger" in result.words[0]
+    assert "if the part was replaced, reset its wear first" in result.words[1]
+    assert result.after.observations == 0
     # and the next one is judged as if it had not been
-    assert not found(worn(1e-5), 0.31, [told.measurement]).contradicts
+    assert not found(worn(1e-5), 0.31, [result.measurement]).contradicts
     asked_for = found(worn(1e-5), 0.9, accept=True)
     assert (asked_for.measurement.counts, asked_for.after.observations) == (True, 1)
     assert asked_for.after.mean > 1.0
-    assert "--accept" in told.words[1] and "--accept" not in " ".join(asked_for.words)
+    assert "--accept" in result.words[1] and "--accept" not in " ".join(asked_for.words)
 
 
 def test_an_accepted_measurement_that_no_wear_explains_is_doubted_in_words():
     """Also where the drive torque shows it: it explains the clearance, not the coefficient."""
-    told = found(worn(5e-11), 0.63, accept=True)
-    assert "that is 6.5e-09 1/Pa, usual are below 1e-09 1/Pa" in told.words[-1]
-    shown = attrs.evolve(told, shown_m=0.6e-3, shown_sigma_m=0.05e-3, shown_by="the drive torque")
-    assert told.words[-1] in shown.told(1e-3, 0.8, [])
+    result = found(worn(5e-11), 0.63, accept=True)
+    assert "that is 6.5e-09 1/Pa, usual are below 1e-09 1/Pa" in result.words[-1]
+    shown = attrs.evolve(result, shown_m=0.6e-3, shown_sigma_m=0.05e-3, shown_by="the drive torque")
+    assert result.words[-1] in shown.lines(1e-3, 0.8, [])
     assert "usual" not in found(worn(1e-6), 0.33, accept=True).words[-1]
 
 
 def test_a_clearance_smaller_than_when_new_contradicts_too():
-    told = found(worn(6e-5), 0.2)
-    assert told.contradicts
-    assert "far smaller" in told.words[0]
+    result = found(worn(6e-5), 0.2)
+    assert result.contradicts
+    assert "far smaller" in result.words[0]
 
 
 def test_measurements_of_a_part_that_was_replaced_say_nothing_of_the_new_one():
     old = found(worn(6e-5), 0.42).measurement
-    told = found(worn(6e-5, replaced_ns=5), 0.34, [old])
-    assert told.before.observations == 0
-    assert told.after.observations == 1
+    result = found(worn(6e-5, replaced_ns=5), 0.34, [old])
+    assert result.before.observations == 0
+    assert result.after.observations == 1
 
 
 def test_a_clock_that_has_jumped_is_said_and_changes_nothing():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from told import raised, status_of
+from reported import raised, status_of
 
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin import CRANK, TORQUE
@@ -114,11 +114,11 @@ def test_a_stream_of_nothing_else_is_named_and_alarmed(new_monitor, gait, name, 
     stream = spoil(gait(4.0))
     reports = monitor.update(stream)
     assert not worn(monitor).any()
-    told = status_of(monitor, "input")
-    assert max(told.values.get(name, 0), told.values.get(f"faulty_{name}", 0)) > 0
-    assert told.values["received"] == len(stream)
+    status = status_of(monitor, "input")
+    assert max(status.values.get(name, 0), status.values.get(f"faulty_{name}", 0)) > 0
+    assert status.values["received"] == len(stream)
     assert raised(monitor) & {"input_samples", "input_gaps"}, reports.lost
-    assert told.level is Level.ERROR
+    assert status.level is Level.ERROR
 
 
 @pytest.mark.parametrize("spoil", [lambda s: spoiled(s, crank_angle_rad=1.0), lambda s: s[:1]])

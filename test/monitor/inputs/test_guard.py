@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from told import raised, status_of
+from reported import raised, status_of
 
 from leg_wear_monitor.monitor.inputs import InputGuard
 from leg_wear_monitor.state import Level
@@ -59,9 +59,9 @@ def test_two_sources_that_disagree_are_named_and_not_counted(monitor, gait, name
     alone, second = gait(3.0), SECOND_SOURCES[name](gait)
     monitor.update(interleaved(alone, second))
     assert "input_sources" in raised(monitor)
-    told = status_of(monitor, "input")
-    assert told.level is Level.ERROR
-    assert told.message.startswith("two series of crank angles interleave")
+    status = status_of(monitor, "input")
+    assert status.level is Level.ERROR
+    assert status.message.startswith("two series of crank angles interleave")
     assert status_of(monitor, "gait").level is Level.ERROR
     assert monitor.lost.conflicting > 0.5 * len(second)
     totals = status_of(monitor, "gait").values
@@ -152,10 +152,10 @@ def test_degrees_are_named_and_wear_nothing(monitor, gait, rate_hz, wrapped):
         samples["crank_angle_rad"] = np.unwrap(samples["crank_angle_rad"])
     samples["crank_angle_rad"] *= DEGREES
     reports = monitor.update(samples)
-    told = status_of(monitor, "input")
-    assert told.level is Level.ERROR
-    assert told.message.startswith("the crank's angle runs 57")
-    assert "degrees" in told.message
+    status = status_of(monitor, "input")
+    assert status.level is Level.ERROR
+    assert status.message.startswith("the crank's angle runs 57")
+    assert "degrees" in status.message
     assert not monitor.wear_depth_m.any()
     assert reports.cycles == ()
     assert monitor.lost.implausible > 0.9 * len(samples)
@@ -176,8 +176,8 @@ def test_a_gear_that_is_not_set_is_named(monitor, gait):
     samples = gait(2.0)
     samples["crank_angle_rad"] = 10.0 * np.unwrap(samples["crank_angle_rad"])
     monitor.update(samples)
-    told = status_of(monitor, "input").message
-    assert "crank.gear_ratio" in told and "degrees" not in told
+    message = status_of(monitor, "input").message
+    assert "crank.gear_ratio" in message and "degrees" not in message
 
 
 def test_why_samples_cannot_be_used_is_said_and_the_most_frequent_fault_is_not_taken_for_all(monitor, gait):
@@ -185,8 +185,8 @@ def test_why_samples_cannot_be_used_is_said_and_the_most_frequent_fault_is_not_t
     stream = gait(2.0)
     stream["fault"][100::4], stream["fault"][102::8] = ZERO_STAMP, EMPTY
     monitor.update(stream)
-    told = status_of(monitor, "input")
-    every, first = told.message.split(" samples are not used, ")
+    status = status_of(monitor, "input")
+    every, first = status.message.split(" samples are not used, ")
     unused, total = (int(number) for number in every.split(" of "))
     assert "set header.stamp" in first
     assert first.startswith(tuple(f"{n} of {total} samples have a zero stamp" for n in range(1, unused)))
@@ -202,9 +202,9 @@ def test_messages_without_the_crank_are_a_fault_only_if_none_has_it(monitor, gai
     others["fault"] = MISSING_JOINT
     both = np.concatenate([stream, others])
     monitor.update(both[np.argsort(both["stamp_ns"], kind="stable")])
-    told = status_of(monitor, "input")
-    assert told.values["faulty_missing_joint"] == len(others)
-    assert told.message == "see: input_rate torque"  # there is none in this gait, and no other fault
+    status = status_of(monitor, "input")
+    assert status.values["faulty_missing_joint"] == len(others)
+    assert status.message == "see: input_rate torque"  # there is none in this gait, and no other fault
     assert "input_samples" not in raised(monitor, Level.WARN)
     unnamed = gait(4.0, begin_s=6.0)
     unnamed["fault"] = MISSING_JOINT

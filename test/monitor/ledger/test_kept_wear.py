@@ -5,7 +5,7 @@ from itertools import pairwise
 import attrs
 import numpy as np
 import pytest
-from told import raised, status_of
+from reported import raised, status_of
 
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.monitor.accounting import next_point_s

@@ -17,7 +17,7 @@ from leg_wear_monitor.monitor.verdict.situation import (
     alarm_value,
     at_limit_by_estimate,
     believed,
-    is_held,
+    is_observed,
 )
 from leg_wear_monitor.monitor.verdict.verdict import verdict_of
 from leg_wear_monitor.state import Level, State
@@ -115,10 +115,10 @@ def test_a_clearance_at_its_limit_by_all_that_is_known_stays_so_between_the_gait
     """The end of each gait cycle, which judges the counted clearance, took it back: two changes a cycle."""
     joint = attrs.evolve(COUNTED, believed_m=6.5e-4)
     raised = after(NEW, joint=joint)
-    assert (raised.level, raised.cause, is_held(raised)) == (Level.ERROR, "both", True)
+    assert (raised.level, raised.cause, is_observed(raised)) == (Level.ERROR, "both", True)
     assert not has_changed(raised, after(raised, joint=joint))
     lower = after(raised, joint=attrs.evolve(joint, believed_m=3.5e-4))  # the forecast learned otherwise
-    assert (lower.level, lower.present, is_held(lower)) == (Level.ERROR, Level.OK, False)
+    assert (lower.level, lower.present, is_observed(lower)) == (Level.ERROR, Level.OK, False)
     assert after(NEW) is NEW
 
 

@@ -77,19 +77,19 @@ def test_no_figure_stands_elsewhere_in_the_package() -> None:
 def test_every_rule_is_a_decision(rule, has_life) -> None:
     joints = ("G",) if "{joint}" in rule.why else ()
     changes = {} if has_life else {"life": {}}
-    told = decided(rule.code, rule.state, joints, rule.not_valid, **changes)
-    for text in (told.certainty, told.urgency, told.if_wrong, told.check):
+    decision = decided(rule.code, rule.state, joints, rule.not_valid, **changes)
+    for text in (decision.certainty, decision.urgency, decision.if_wrong, decision.check):
         assert text and "{" not in text
-    assert bool(told.again) == (rule.state is State.HEALTHY)
-    assert 4 <= len(told.notes) <= 5
+    assert bool(decision.again) == (rule.state is State.HEALTHY)
+    assert 4 <= len(decision.notes) <= 5
 
 
 def test_a_stop_is_before_the_next_use_and_as_sure_as_it_was_measured() -> None:
-    told = decided()
-    assert told.urgency.startswith("before the next use")
-    assert "45 of 45 such stops are right on simulated legs" in told.certainty
-    assert "joint G (knee)" in told.check and "limit 0.6 mm" in told.check
-    assert "12 such" not in told.certainty and "11 of 12" in decided(by="encoders").certainty
+    decision = decided()
+    assert decision.urgency.startswith("before the next use")
+    assert "45 of 45 such stops are right on simulated legs" in decision.certainty
+    assert "joint G (knee)" in decision.check and "limit 0.6 mm" in decision.check
+    assert "12 such" not in decision.certainty and "11 of 12" in decided(by="encoders").certainty
 
 
 def test_a_change_is_as_sure_as_on_the_ground_where_the_leg_carries_a_load() -> None:

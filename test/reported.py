@@ -1,4 +1,4 @@
-"""What a monitor tells now, by name."""
+"""What a monitor reports now, by name."""
 
 from collections.abc import Callable
 

@@ -54,7 +54,7 @@ from leg_wear_monitor.monitor.verdict.verdict import CauseWords
 
 
 _SURE = 3.0
-_TOLD = 2.0  # standard deviations that have to be less than what is asked for
+_KNOWN_SIGMAS = 2.0  # standard deviations that have to be less than what is asked for
 _ANEW_RAD = 0.1  # by which offsets of two recordings of one absolute encoder do not differ
 _IN_DEGREES = math.degrees(1.0)
 _ROUGH_SCALE = 0.05
@@ -66,35 +66,35 @@ _AS_WELL = 1.02  # of the mismatch of another fit
 
 def not_told(found: proposal.Found) -> tuple[str, ...]:
     """Parameters that the recording does not determine, and why."""
-    told = list(found.doubts)
+    reasons = list(found.doubts)
     if not found.sampling.value:
-        told.append(f"drive_torque.sampling: {found.sampling.why}")
-    told += _lag(found)
+        reasons.append(f"drive_torque.sampling: {found.sampling.why}")
+    reasons += _lag(found)
     ratio, is_exact = proposal.gear(found)
     if not is_exact:
         error = found.fit.sigma["ratio"] / abs(found.fit.ratio)
         away = error * abs(float(found.fit.crank()[1].mean())) * 3600.0
-        told.append(
+        reasons.append(
             f"crank.gear_ratio: {ratio:.7g} is known to ± {error * ratio:.2g}, so the crank angle drifts "
             f"by up to {away:.2g} rad in an hour; enter the ratio of the teeth"
         )
     scale, rest = found.fit.sigma["gain"] / abs(found.fit.gain), repeating(found.fit)
     if scale > _ROUGH_SCALE:
-        told.append(f"drive_torque.scale: known to ± {100.0 * scale:.0f} % only; record longer")
+        reasons.append(f"drive_torque.scale: known to ± {100.0 * scale:.0f} % only; record longer")
     elif rest > _ROUGH_REST:
-        told.append(
+        reasons.append(
             f"drive_torque.scale: {100.0 * rest:.0f} % of the torque repeats and does not fit; the scale "
             "may be wrong by as much"
         )
-    return tuple(told)
+    return tuple(reasons)
 
 
 def findings(found: proposal.Found, load: Load | None, mechanism: Mechanism) -> tuple[str, ...]:
     """What does not fit, or cannot be used as it is."""
-    told = [_load(load)]
+    sentences = [_load(load)]
     if not found.doubts:  # of a leg that is not known, neither friction nor phases tell anything
-        told += [does_not_fit(found.fit, mechanism), _drives(found), _late(found), _anew(found)]
-    return tuple(filter(None, [*told, _position(found)]))
+        sentences += [does_not_fit(found.fit, mechanism), _drives(found), _late(found), _anew(found)]
+    return tuple(filter(None, [*sentences, _position(found)]))
 
 
 def _lag(found: proposal.Found) -> Iterator[str]:
@@ -107,8 +107,8 @@ def _lag(found: proposal.Found) -> Iterator[str]:
             f"lag: at one cadence, a torque that is late by 1 ms looks like {turned:.2g} rad of offset; "
             "record two cadences in one recording, or declare drive.lag_s"
         )
-    elif _TOLD * timing.error_s > most:
-        error = 1.0e3 * _TOLD * timing.error_s
+    elif _KNOWN_SIGMAS * timing.error_s > most:
+        error = 1.0e3 * _KNOWN_SIGMAS * timing.error_s
         yield (
             f"lag: known to ± {error:.2g} ms only, more than drive_torque.max_lag_s ({1.0e3 * most:g} ms), "
             "because clearances shift the torque's phase with the cadence; record cadences further apart"
@@ -368,12 +368,12 @@ def _found(
 
 
 def _result(facts: proposal.Found, load: Load | None, mechanism: Mechanism) -> CommissioningResult:
-    told = proposal.items(facts)
+    items = proposal.items(facts)
     proposed = None
     if not facts.doubts:
-        proposed = config_from({**values_of(facts.base), **proposal.changes(told)}, "commission")
+        proposed = config_from({**values_of(facts.base), **proposal.changes(items)}, "commission")
     return CommissioningResult(
-        items=tuple(told),
+        items=tuple(items),
         not_told=not_told(facts),
         findings=findings(facts, load, mechanism),
         notes=tuple(notes(facts)),

@@ -368,18 +368,18 @@ def with_detections(
                 f"--reference: the recording has {len(walk.cycles)} gait cycles at "
                 f"{walk.config.cadence.commanded_rpm:g} rpm with torques, expected at least {LEAST_CYCLES}"
             )
-        told = f"joints are not judged: fewer than {LEAST_CYCLES} gait cycles at the commanded cadence"
-        return attrs.evolve(result, reference_used=told)
+        used = f"joints are not judged: fewer than {LEAST_CYCLES} gait cycles at the commanded cadence"
+        return attrs.evolve(result, reference_used=used)
     if file is not None:
         (made,) = simulated_under(walk.mechanism, [walk.profile], progress)
         values = {**values_of(result.config), "diagnosis.reference": str(file)}
         result = attrs.evolve(result, reference=made, config=config_from(values, "commission"))
-        told = f"simulated for this recording, {file}"
-        return attrs.evolve(result, joints=joint_detections(walk, made), reference_used=told)
-    known, told = _known(walk)
+        used = f"simulated for this recording, {file}"
+        return attrs.evolve(result, joints=joint_detections(walk, made), reference_used=used)
+    known, used = _known(walk)
     if known is None:
         return attrs.evolve(result, reference_used=_none(walk))
-    return attrs.evolve(result, joints=joint_detections(walk, known), reference_used=told)
+    return attrs.evolve(result, joints=joint_detections(walk, known), reference_used=used)
 
 
 def _known(walk: Walk) -> tuple[TorqueReference | None, str]:

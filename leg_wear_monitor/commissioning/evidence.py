@@ -48,7 +48,7 @@ class LowPass:
     Attributes
     ----------
     time_constant_s : float
-        0 where none shows; NaN where it cannot be told.
+        0 where none shows; NaN where that is not known.
     log_sigma : float
         Standard deviation of its logarithm.
     least_hz : float
@@ -60,8 +60,8 @@ class LowPass:
     least_hz: float
 
     @property
-    def is_told(self) -> bool:
-        """Whether the recording tells if there is one."""
+    def is_known(self) -> bool:
+        """Whether the recording shows if there is one."""
         return math.isfinite(self.time_constant_s)
 
     @property
@@ -89,17 +89,17 @@ def low_pass_of(walk: Walk, reference: TorqueReference) -> LowPass | None:
     least_hz = min(_SHOWS_HZ, _OF_RATE / walk.sensor.period_s)
     shows = TURN * one.time_constant_s * least_hz > 0.99
     # a direct channel is what is taken where no other one is surely better
-    is_told = found.square <= _POOR and bool(one.delay_s or one.time_constant_s)
+    is_known = found.square <= _POOR and bool(one.delay_s or one.time_constant_s)
     log_sigma = _SPREAD + _BY_SQUARE * found.square
     time_constant_s = one.time_constant_s if shows else 0.0
-    return LowPass(time_constant_s if is_told else math.nan, log_sigma, least_hz)
+    return LowPass(time_constant_s if is_known else math.nan, log_sigma, least_hz)
 
 
 def low_pass_time(found: LowPass | None, declared: DriveFigures) -> tuple[float, float]:
     """Time constant of the low-pass that is declared or found, and its standard deviation [s]; 0 for none."""
     if math.isfinite(declared.bandwidth_hz):
         return 1.0 / (TURN * declared.bandwidth_hz), 0.0
-    if found is None or not found.is_told:
+    if found is None or not found.is_known:
         return 0.0, 0.0
     return found.time_constant_s, found.time_constant_s * found.log_sigma
 
@@ -165,15 +165,15 @@ def does_not_fit(one: Fit, mechanism: Mechanism) -> str:
     rest = repeating(one)
     if rest < _NOTABLE:
         return ""
-    told = (
+    sentence = (
         f"{100.0 * rest:.0f} % of the torque repeats with each turn and is not that of {mechanism.name}: "
         "other masses or lengths, a spring, a load, or impacts that a sensor of instants does not average"
     )
     body, change, explained = _heavier(one, mechanism)
     if explained < _EXPLAINS:
-        return f"{told}; no body's mass alone explains it"
+        return f"{sentence}; no body's mass alone explains it"
     more = f"{100.0 * abs(change):.0f} % {'more' if change > 0.0 else 'less'} mass and inertia of {body}"
-    return f"{told}; {more} would explain {100.0 * explained:.0f} % of it"
+    return f"{sentence}; {more} would explain {100.0 * explained:.0f} % of it"
 
 
 def _heavier(one: Fit, mechanism: Mechanism) -> tuple[str, float, float]:
@@ -287,7 +287,7 @@ def separates_lag(pair: Pair) -> bool:
 
 @attrs.frozen
 class Timing:
-    """When a torque is measured, as far as it can be told.
+    """When a torque is measured, as far as it is known.
 
     Attributes
     ----------
@@ -347,21 +347,21 @@ class Timing:
         return mean, math.sqrt(float(likely @ (lag - mean) ** 2))
 
 
-def timing_of(one: Fit, sampling: str, is_told: bool, declared_s: float = math.nan) -> Timing:
+def timing_of(one: Fit, sampling: str, is_sampling_known: bool, declared_s: float = math.nan) -> Timing:
     """Timing of a torque with a sampling, from a fit whose lag is free if the recording separates it.
 
     Parameters
     ----------
     one : Fit
     sampling : str
-    is_told : bool
-        Whether the recording tells the sampling.
+    is_sampling_known : bool
+        Whether the recording shows the sampling.
     declared_s : float
         Declared lag of the drive [s].
     """
     interval_s = one.pair.interval_s
     half, sigma_s = (0.5 * interval_s, _FILTERED * interval_s) if sampling == AVERAGE else (0.0, 0.0)
-    if not is_told:
+    if not is_sampling_known:
         sigma_s = 0.5 * interval_s
     if not separates_lag(one.pair):
         return Timing(False, math.nan, math.nan, half, sigma_s, declared_s)
@@ -424,7 +424,7 @@ _SURE_SAMPLING = 2.0  # standard deviations of the recording
 _STRANGE = 3.0  # what neither adds up to
 _LEAST = 1.0e-4  # below which it is rounding
 _NOISE_ERROR = 0.25  # relative error of the noise's variance
-_HIDDEN = 0.5  # of the rest's energy that is the sensor's noise, from which on nothing is told
+_HIDDEN = 0.5  # of the rest's energy that is the sensor's noise, from which on nothing is decided
 _LARGE = 0.3  # of the torque; smaller ones do not drown slow errors of 0.02, which add up; impacts: 0.5 to 2
 _NARROWER, _FLAT = 3.0, 0.5  # independent errors add up as much in narrow windows, slow ones less
 _ROUGH = 0.5  # energy of neighbours' steps as a fraction of that of independent ones; of impacts, 0.8 to 1.4
@@ -432,14 +432,14 @@ _ROUGH = 0.5  # energy of neighbours' steps as a fraction of that of independent
 
 @attrs.frozen
 class Sampling:
-    """What a torque sample is, as far as it can be told.
+    """What a torque sample is, as far as it is known.
 
     Attributes
     ----------
     value : str
-        ``average``, ``instant``, or empty if it cannot be told.
+        ``average``, ``instant``, or empty if it is not known.
     why : str
-        Why, or why it cannot.
+        Why, or why it is not.
     """
 
     value: str
@@ -456,15 +456,15 @@ def sampling_of(one: Fit, model: TorqueModel) -> Sampling:
         return _by_lag(one)
     near = min(_TYPICAL, key=lambda name: abs(math.log(max(added, _LEAST) / _TYPICAL[name])))
     odds = min(_odds(near, added - _SURE_SAMPLING * error), _odds(near, added + _SURE_SAMPLING * error))
-    told = (
+    sentence = (
         f"the errors of neighbouring samples add up to {added:.2g} ± {error:.1g} times those of independent "
         f"samples (averages: about {_TYPICAL[AVERAGE]:g}, instants: about {_TYPICAL[INSTANT]:g})"
     )
     if added > _STRANGE or (near == INSTANT and narrow < _FLAT * added):
-        return Sampling("", f"{told}: does a load change slowly?")
+        return Sampling("", f"{sentence}: does a load change slowly?")
     if odds < _SURE_ODDS:
-        return Sampling("", f"{told}: probably {near}, but this is not certain")
-    return Sampling(near, f"odds {'at least ' if odds >= _MOST_ODDS else ''}{odds:.0f} to 1: {told}")
+        return Sampling("", f"{sentence}: probably {near}, but this is not certain")
+    return Sampling(near, f"odds {'at least ' if odds >= _MOST_ODDS else ''}{odds:.0f} to 1: {sentence}")
 
 
 def _odds(name: str, added: float) -> float:

@@ -95,8 +95,10 @@ class Found:
         mismatch = self.fit.mismatch
         if mismatch < UNEXPLAINED:
             return self.choice.doubts
-        told = f"the torque: {100.0 * mismatch:.0f} % of its RMS is not that of this leg, whatever is chosen"
-        return (*self.choice.doubts, told)
+        sentence = (
+            f"the torque: {100.0 * mismatch:.0f} % of its RMS is not that of this leg, whatever is chosen"
+        )
+        return (*self.choice.doubts, sentence)
 
     @property
     def best(self) -> Candidate:
@@ -105,7 +107,7 @@ class Found:
 
     @property
     def used_sampling(self) -> str:
-        """What is found, or what the given parameters have if it cannot be told."""
+        """What is found, or what the given parameters have if it is not known."""
         return self.sampling.value or self.base.drive_torque.sampling
 
     @property
@@ -212,7 +214,7 @@ def _lag(found: Found) -> str:
 
 def _bandwidth(found: Found) -> str:
     one = found.low_pass
-    if one is not None and one.is_told and not math.isfinite(one.bandwidth_hz):
+    if one is not None and one.is_known and not math.isfinite(one.bandwidth_hz):
         return ""
     return "declare drive.bandwidth_hz, or walk faster: stronger impacts show it better"
 
@@ -239,8 +241,8 @@ _HALF_A_GEAR = 0.5, 1.5  # efficiencies with which a torque may be that of the m
 
 def items(found: Found) -> list[Item]:
     """Everything that was looked for, parameters first."""
-    told = [*_crank(found), *_torque(found), *_timing(found), *_noises(found)]
-    return [attrs.evolve(item, better=better(item.name, found)) for item in told]
+    quantities = [*_crank(found), *_torque(found), *_timing(found), *_noises(found)]
+    return [attrs.evolve(item, better=better(item.name, found)) for item in quantities]
 
 
 def changes(found: list[Item]) -> dict[str, Any]:
@@ -375,18 +377,18 @@ def _low_pass(found: Found) -> Iterator[Item]:
         return
     hz = one.bandwidth_hz
     value: str | float = hz
-    if not one.is_told:
-        told = "no low-pass is sure: the torque's noise hides it, or clearances and masses are others"
+    if not one.is_known:
+        remark = "no low-pass is sure: the torque's noise hides it, or clearances and masses are others"
     elif math.isfinite(hz):
-        told = "corner frequency of a low-pass between the crank and the torque's samples"
+        remark = "corner frequency of a low-pass between the crank and the torque's samples"
     else:
-        value, told = f"none below {one.least_hz:g}", "no low-pass shows"
+        value, remark = f"none below {one.least_hz:g}", "no low-pass shows"
     yield Item(
         name="bandwidth",
         value=value,
         unit="Hz",
         sigma=hz * one.log_sigma if math.isfinite(hz) else None,
-        remark=told + _declared(found.declared.bandwidth_hz, " Hz"),
+        remark=remark + _declared(found.declared.bandwidth_hz, " Hz"),
     )
 
 

@@ -213,13 +213,13 @@ class Choice:
     def doubts(self) -> tuple[str, ...]:
         """Why the choice is not sure; empty if it is."""
         rest = repeating(self.best.fit)
-        told = [f"{name}: {rival.doubt}" for name, rival in self.rivals.items() if rival.doubt]
+        sentences = [f"{name}: {rival.doubt}" for name, rival in self.rivals.items() if rival.doubt]
         if rest > ANOTHER_LEG:
-            told.append(
+            sentences.append(
                 f"another leg: {100.0 * rest:.0f} % of the torque repeats with each turn and is not that of "
                 "this mechanism, however it is turned"
             )
-        return tuple(told)
+        return tuple(sentences)
 
 
 def choose(found: list[Candidate]) -> Choice:

@@ -148,8 +148,8 @@ class PlayMeasurement:
     def is_sure(self) -> bool:
         """Whether nothing is doubtful, and all clearances that have an effect are told apart."""
         found = self.clearances
-        is_told = found is None or not (found.findings or found.not_told_apart)
-        return is_told and not any(play.findings for play in self.plays)
+        is_separated = found is None or not (found.findings or found.not_told_apart)
+        return is_separated and not any(play.findings for play in self.plays)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain object for JSON."""
@@ -157,8 +157,8 @@ class PlayMeasurement:
         plain["plays"] = [attrs.asdict(play) for play in self.plays]
         plain["clearances"] = None
         if self.clearances is not None:
-            told = {"not_told_apart": self.clearances.not_told_apart}
-            plain["clearances"] = {**attrs.asdict(self.clearances), **told}
+            joints = {"not_told_apart": self.clearances.not_told_apart}
+            plain["clearances"] = {**attrs.asdict(self.clearances), **joints}
         return plain
 
     def to_json(self) -> str:
@@ -520,7 +520,7 @@ def effects(model: AngleModel, crank_angle: Floats) -> Floats:
 def solved(names: Sequence[str], effect: Floats, play: Floats, sigma: Floats) -> Clearances:
     """Clearances by weighted least squares, for joints with effects (r, k) on plays (r,) [rad].
 
-    A joint is told if its standard deviation is below half of what the plays allow at most, so that the
+    A clearance is known if its standard deviation is below half of what the plays allow at most, so that the
     result says more than this bound.
     """
     shown = np.asarray(effect.any(axis=0))

@@ -93,27 +93,29 @@ def _findings(play: Play, expected_rad: float) -> list[str]:
 
 def notes(play: Play) -> tuple[str, ...]:
     """Notes on a play: the drift that was removed, the pushes that were left out."""
-    told = []
+    sentences = []
     if play.drift_rad > play.count_rad:
-        told.append(f"the angle drifted by {_mrad(play.drift_rad)} during the pushes; the drift is removed")
+        sentences.append(
+            f"the angle drifted by {_mrad(play.drift_rad)} during the pushes; the drift is removed"
+        )
     for number, what in (
         (play.moving, "the angle still moved at the end"),
         (play.short, "the joint stopped short of its end"),
         (play.outside, "the angle went beyond the others"),
     ):
         if number:
-            told.append(f"{_pushes(number)} left out: {what}")
+            sentences.append(f"{_pushes(number)} left out: {what}")
     if play.sprung:
-        told.append(
+        sentences.append(
             f"in {_pushes(play.sprung)} the joint sprang back while the signal kept its value; its outermost "
             "rest counts"
         )
     if not play.load:
-        told.append(
+        sentences.append(
             "without a load signal, the play is the distance between the places where the joint rests: a "
             "joint that rests before its end has more"
         )
-    return tuple(told)
+    return tuple(sentences)
 
 
 def _pushes(number: int) -> str:
@@ -228,11 +230,11 @@ def _with_side(time_s: Floats, angle: Floats, side: Sides, count: float, joint: 
 def _from_clusters(time_s: Floats, angle: Floats, count: float, joint: str) -> tuple[Plateaus, Fit]:
     """Plateaus and fit with the side from the angle itself, free of the drift."""
     level = angle - np.polynomial.Polynomial.fit(time_s, angle, 1)(time_s)
-    held = float(_sides(level, joint).is_held.mean())
-    if held < _LEAST_HELD:
+    fraction = float(_sides(level, joint).is_held.mean())
+    if fraction < _LEAST_HELD:
         fault = (
-            f"is between its outermost places for {100.0 * (1.0 - held):.0f} % of the time: it rests at more "
-            "than two places, give a load signal"
+            f"is between its outermost places for {100.0 * (1.0 - fraction):.0f} % of the time: it rests at "
+            "more than two places, give a load signal"
         )
         raise ConfigError(joint, "", fault)
     for _ in range(_PASSES):

@@ -316,7 +316,7 @@ def find_topic(
 
 def _option(stream: Stream) -> str:
     """Option of the command line that names a stream's topic."""
-    of_torque = stream.kind == TORQUE  # whichever topic brings it
+    of_torque = stream.kind == TORQUE  # whichever topic has it
     return "--drive-torque" if of_torque else f"--{stream.topic}".replace("_", "-")
 
 

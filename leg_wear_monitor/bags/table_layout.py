@@ -347,26 +347,30 @@ def _cadence(joint_rpm: float, has_turned: bool, config: MonitorConfig) -> str:
     for other, (its_factor, its_divisor) in tables.ANGLES.items():
         of_other = rpm * (its_factor / its_divisor) / (factor / divisor)
         found.append((of_other, "input.units.crank_angle", other))
-    told = f"the crank turns at {rpm:.3g} rpm, commanded are {commanded:g} rpm"
+    sentence = f"the crank turns at {rpm:.3g} rpm, commanded are {commanded:g} rpm"
     best, key, other = min(found, key=lambda each: abs(math.log(each[0] / commanded)))
     fits = 1.0 / _NEAR < best / commanded < _NEAR
-    return f"{told}; with {key} {other!r} it would turn at {best:.3g} rpm" if fits else ""
+    return f"{sentence}; with {key} {other!r} it would turn at {best:.3g} rpm" if fits else ""
 
 
 def _speed(speed: Floats, steps_s: Floats, turned: Floats, config: MonitorConfig) -> str:
     """Doubt about the column of the speed, if it is not the speed of the angle."""
     passed_s = float(steps_s.sum())
-    told, shown = float((speed * steps_s).sum()), float(turned.sum())
-    if not passed_s or abs(shown) < TURN or (told / shown > 1.0 / _APART and told / shown < _APART):
+    by_speed, by_angle = float((speed * steps_s).sum()), float(turned.sum())
+    if (
+        not passed_s
+        or abs(by_angle) < TURN
+        or (by_speed / by_angle > 1.0 / _APART and by_speed / by_angle < _APART)
+    ):
         return ""
     unit = config.input.units.crank_speed
     of_unit = tables.SPEEDS[unit][0] / tables.SPEEDS[unit][1]
     text = (
-        f"crank_speed is {told / passed_s / of_unit:.4g} {unit} in the mean, but the angle turns at "
-        f"{shown / passed_s / of_unit:.4g} {unit}"
+        f"crank_speed is {by_speed / passed_s / of_unit:.4g} {unit} in the mean, but the angle turns at "
+        f"{by_angle / passed_s / of_unit:.4g} {unit}"
     )
     for other, (factor, divisor) in tables.SPEEDS.items():
-        ratio = told / of_unit * (factor / divisor) / shown
+        ratio = by_speed / of_unit * (factor / divisor) / by_angle
         if other != unit and 1.0 / _APART < ratio < _APART:
             return f"{text}: is it in {other!r} (input.units.crank_speed)?"
     return f"{text}: one of the two columns or its unit is wrong"

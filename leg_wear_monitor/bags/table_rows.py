@@ -383,8 +383,8 @@ class Frame:
         lengths = {one.name: len(self._arrays[one.key]) for one in self._columns}
         self._rows = next(iter(lengths.values()))
         if len(set(lengths.values())) > 1:
-            told = ", ".join(f"{name} {length}" for name, length in lengths.items())
-            raise RecordingError(str(path), "", f"has columns of different lengths: {told}")
+            words = ", ".join(f"{name} {length}" for name, length in lengths.items())
+            raise RecordingError(str(path), "", f"has columns of different lengths: {words}")
         self.size = sum(array.nbytes for array in self._arrays.values())
 
     def parts(self) -> Iterator[table_layout.Rows]:

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 WITH_FINDINGS = 1
 """Exit code of a verb that is done, with findings that the caller must see."""
 
-# A number on the command line: finite, within bounds, and told with its unit when it is not.
+# A number on the command line: finite and within bounds, or refused with its unit.
 
 
 def bounded(

@@ -48,8 +48,8 @@ def print_commissioning(result: "CommissioningResult") -> None:
         ("does not fit", result.findings),
         ("note", result.notes),
     )
-    for label, told in texts:
-        for text in told:
+    for label, sentences in texts:
+        for text in sentences:
             console.print(f"{label}: {printable(text)}", soft_wrap=True)
     if result.config is None:
         console.print("no parameters are proposed, because a choice between them is not certain")

@@ -357,8 +357,8 @@ def _print_lifetimes(console: Console, report: "CycleReport", duty_hours: float)
     """How long each joint and the leg last: hours of walking, and days of duty; or why that is not known."""
     from leg_wear_monitor.monitor.forecast.forecast import Answer, bases
 
-    told = {joint.joint: joint.forecast for joint in report.joints if joint.forecast is not None}
-    both: dict[str, JointForecast | LegForecast] = {**told}
+    forecasts = {joint.joint: joint.forecast for joint in report.joints if joint.forecast is not None}
+    both: dict[str, JointForecast | LegForecast] = {**forecasts}
     if report.forecast is not None:
         both["leg"] = report.forecast
     if any(each.hours for each in both.values()):
@@ -368,23 +368,23 @@ def _print_lifetimes(console: Console, report: "CycleReport", duty_hours: float)
         names = [name for name, each in both.items() if each.answer is answer]
         if names and answer is not Answer.KNOWN:
             console.print(f"lasts  {', '.join(names)}: {answer.value}", soft_wrap=True)
-    for basis in bases(told):
+    for basis in bases(forecasts):
         console.print(f"lasts  {basis}", soft_wrap=True)
     console.print()
 
 
-def _lifetime_table(told: "Mapping[str, JointForecast | LegForecast]") -> Table:
+def _lifetime_table(forecasts: "Mapping[str, JointForecast | LegForecast]") -> Table:
     quantiles = (f"{fraction}\n{unit}" for unit in ("h", "days") for fraction in ("p10", "p50", "p90"))
     table = plain_table(("\nlasts", *quantiles), 1)
-    for name, each in told.items():
+    for name, each in forecasts.items():
         table.add_row(name, *_lifetime(each))
     return table
 
 
-def _lifetime(told: "JointForecast | LegForecast") -> list[str]:
+def _lifetime(forecast: "JointForecast | LegForecast") -> list[str]:
     from leg_wear_monitor.monitor.forecast.forecast import lifetime_values, three_digits
 
-    values = lifetime_values(told)
+    values = lifetime_values(forecast)
     keys = (f"{fraction}_{unit}" for unit in ("hours", "days") for fraction in ("p10", "p50", "p90"))
     return [three_digits(values[key]) if key in values else "-" for key in keys]
 

@@ -185,7 +185,7 @@ _TORQUE = {
 
 
 class LiveLeg:
-    """A source that is told what a monitor publishes, from any thread.
+    """A source that receives what a monitor publishes, from any thread.
 
     Parameters
     ----------

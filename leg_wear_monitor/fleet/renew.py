@@ -298,8 +298,8 @@ def _renew(leg: FleetLeg, directory: LegDirectory) -> None:
     recorded = before
     basis, before = _with_parts(entry, mechanism, basis, before)
     new_parts = tuple(joint for joint in before if before[joint] is not recorded[joint])
-    told = forecaster.again(basis, replaced_ns)
-    forecasts = dict(zip(mechanism.clearance_joints, told.joints, strict=True))
+    forecast = forecaster.again(basis, replaced_ns)
+    forecasts = dict(zip(mechanism.clearance_joints, forecast.joints, strict=True))
     measured = zip(mechanism.clearance_joints, forecaster.last_measured(replaced_ns), strict=True)
     alarms = {alarm.subject: alarm for alarm in entry.alarms if alarm.kind == CLEARANCE.kind} if entry else {}
     clearances = {
@@ -307,7 +307,7 @@ def _renew(leg: FleetLeg, directory: LegDirectory) -> None:
         for joint, one in measured
         if joint in before
     }
-    lives = life_of(forecasts, told.leg, verdict)
+    lives = life_of(forecasts, forecast.leg, verdict)
     summary = summary_of(json_object(directory.summary), str(directory.summary))
     summary = attrs.evolve(
         summary,
@@ -322,7 +322,7 @@ def _renew(leg: FleetLeg, directory: LegDirectory) -> None:
         },
         clearances=clearances,
         **lives,
-        forecast=leg_forecast(told.leg, verdict),
+        forecast=leg_forecast(forecast.leg, verdict),
         measurements=forecaster.measurements,
         alarms=attrs.evolve(summary.alarms, now=_alarms(entry, summary.alarms.now)),
         diagnosis=_diagnosis(new_parts) if new_parts else summary.diagnosis,
@@ -404,8 +404,8 @@ def _status(
     gone = {"verdict", "alarms", *(f"joint {joint}" for joint in joints)}
     if new_parts:
         gone |= {"torque", "diagnosis", "encoders"}
-    told = verdict_status(verdict)
-    line = ReplayStatus(**{name: getattr(told, name) for name in attrs.fields_dict(ReplayStatus)})
+    of_verdict = verdict_status(verdict)
+    line = ReplayStatus(**{name: getattr(of_verdict, name) for name in attrs.fields_dict(ReplayStatus)})
     return (line, *(status for status in before if status.name not in gone))
 
 

@@ -52,18 +52,18 @@ from leg_wear_monitor.wear import BUSHING, JOURNAL
 # Condition of the leg at the end of a replay; what the verdict does not believe has no remaining life.
 
 
-def joint_forecast(told: JointForecast | None, verdict: Verdict) -> JointForecast | None:
+def joint_forecast(forecast: JointForecast | None, verdict: Verdict) -> JointForecast | None:
     """A joint's forecast; without life and clearance if the verdict does not believe them."""
-    if told is None or Figure.FORECAST not in verdict.not_valid:
-        return told
-    return attrs.evolve(told, cycles=None, hours=None, days=None, clearance_m=None)
+    if forecast is None or Figure.FORECAST not in verdict.not_valid:
+        return forecast
+    return attrs.evolve(forecast, cycles=None, hours=None, days=None, clearance_m=None)
 
 
-def leg_forecast(told: LegForecast | None, verdict: Verdict) -> LegForecast | None:
+def leg_forecast(forecast: LegForecast | None, verdict: Verdict) -> LegForecast | None:
     """The leg's forecast; without its remaining life if the verdict does not believe that."""
-    if told is None or Figure.FORECAST not in verdict.not_valid:
-        return told
-    return attrs.evolve(told, cycles=None, hours=None, days=None, first_probability={}, first=None)
+    if forecast is None or Figure.FORECAST not in verdict.not_valid:
+        return forecast
+    return attrs.evolve(forecast, cycles=None, hours=None, days=None, first_probability={}, first=None)
 
 
 # The summary of a replay, from which its files and its page are made.
@@ -161,7 +161,7 @@ class ReplayResult(Drawable):
         is_known = self.is_believable and last is not None
         verdict, known = state.verdict, attrs.asdict(state, recurse=False)
         known["alarms"] = attrs.evolve(state.alarms, changes=_changes(self))
-        told = leg_forecast(last.forecast, verdict) if is_known and last else None
+        forecast = leg_forecast(last.forecast, verdict) if is_known and last else None
         return ReplaySummary(
             **(known if is_known else known | {"clearances": {}, "life": {}}),
             recording=_recording(self),
@@ -172,7 +172,7 @@ class ReplayResult(Drawable):
             cycles=len(self.history),
             gait=_gait(self),
             joints=_joints(self, verdict) if is_known else {},
-            forecast=told,
+            forecast=forecast,
             measurements=tuple(monitor.measurements),
             walked=monitor.walked,
             status=tuple(with_same_fields(ReplayStatus, status) for status in monitor.status()),

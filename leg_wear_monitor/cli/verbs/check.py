@@ -248,13 +248,13 @@ def drives(name: str | None, json_file: Path | None) -> None:
     from leg_wear_monitor.mechanism import sourced
 
     known = [sourced.load_drive(each) for each in ([name] if name is not None else sourced.drives())]
-    _told("drives", known, _drive_listed if name is None else _drive_in_full, json_file)
+    _report("drives", known, _drive_listed if name is None else _drive_in_full, json_file)
 
 
-def _told(
+def _report(
     kind: str, known: Sequence[_Sourced], lines: Callable[[_Sourced], list[str]], json_file: Path | None
 ) -> None:
-    """Print and write what files of the package say."""
+    """Print and write the values of files of the package."""
     common.check_outputs(json_file, None)
     document = {"schema_version": 1, kind: [one.to_dict() for one in known]}
     written = common.write_json(json_file, json_text(document))
@@ -296,7 +296,7 @@ def materials(name: str | None, json_file: Path | None) -> None:
 
     names = [name] if name is not None else loader.materials()
     pairs = [loader.load_material(each) for each in names]
-    _told("materials", pairs, _listed if name is None else _in_full, json_file)
+    _report("materials", pairs, _listed if name is None else _in_full, json_file)
 
 
 def _listed(pair: "Material") -> list[str]:

@@ -108,30 +108,30 @@ def _follow(description: Path, count: "Callable[[FleetDescription], FleetUpdate]
     from leg_wear_monitor.fleet.update import Followed
 
     signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
-    followed, told, fault = Followed(), set[tuple[str, str]](), ""
+    followed, reported, fault = Followed(), set[tuple[str, str]](), ""
     click.echo("following; ^C ends it")
     try:
-        _look(description, count, followed, told)
+        _look(description, count, followed, reported)
         while True:
             time.sleep(every_s)
             try:
-                _look(description, count, followed, told)
+                _look(description, count, followed, reported)
                 fault = ""
             except LegWearError as error:
                 if str(error) != fault:
                     fault = str(error)
                     click.echo(f"warning: {fault}; tried again", err=True)
     except KeyboardInterrupt:
-        return common.WITH_FINDINGS if told else 0
+        return common.WITH_FINDINGS if reported else 0
 
 
 def _look(
     description: Path,
     count: "Callable[[FleetDescription], FleetUpdate]",
     followed: "Followed",
-    told: set[tuple[str, str]],
+    reported: set[tuple[str, str]],
 ) -> None:
-    """Count what is complete, and tell what was not ``told`` yet."""
+    """Count what is complete, and report what is not among ``reported`` yet."""
     import warnings
 
     from leg_wear_monitor.errors import ConfigWarning
@@ -146,9 +146,9 @@ def _look(
         for line in chain.new:
             click.echo(f"{chain.leg.id}: {words_of(line)}")
     for leg, text in dict.fromkeys(done.findings):
-        if (leg, text) not in told:
+        if (leg, text) not in reported:
             click.echo(f"warning: {leg}: {text}", err=True)
-    told.update(done.findings)
+    reported.update(done.findings)
 
 
 def _compile(chains: Sequence["Chain"]) -> None:

@@ -305,24 +305,24 @@ def design(
 
 def design_lines(result: "Design", choices: "BushingChoices") -> list[str]:
     """The design as a table: each joint as it is, and the smallest bushing that lasts."""
-    told = [f"{result.mechanism}: {result.asked}"]
+    lines = [f"{result.mechanism}: {result.asked}"]
     for now in result.order:
-        told.append(f"{now.joint} now: {now.words}: {now.life_words}")
+        lines.append(f"{now.joint} now: {now.words}: {now.life_words}")
         lasting = result.of(now.joint)
         if lasting:
-            told.append(f"  smallest that lasts: {lasting[0].words}: {lasting[0].life_words}")
+            lines.append(f"  smallest that lasts: {lasting[0].words}: {lasting[0].life_words}")
         else:
-            told.append(
+            lines.append(
                 f"  none of {len(choices.materials)} pairs in the sizes tried lasts {result.hours:g} h"
             )
     in_the_air = "" if any(part.load_n for part in result.duty) else "in the air"
-    told += [
+    lines += [
         f"life of {one.joint} now: {in_the_air or f'10 % more load {one.load:+.0f} %'}, "
         f"10 % more cadence {one.cadence:+.0f} %, half the clearance when new {one.clearance:+.0f} %, "
         f"10 % wider {one.width:+.0f} %"
         for one in result.sensitivities
     ]
-    return [*told, result.first]
+    return [*lines, result.first]
 
 
 def _csv(result: "Design") -> bytes:

@@ -143,7 +143,7 @@ def drawing_html(drawing: Drawing, is_watched: bool = False) -> str:
     mechanism = reach.mechanism
     faults = [Section("What is wrong", [Sentences(found)])] if found else []
     everyday = understood(reach.linkage) if reach.turns and not found else []
-    told = [Section("In everyday units", [Sentences(everyday)])] if everyday else []
+    units = [Section("In everyday units", [Sentences(everyday)])] if everyday else []
     again = Fragment(render("drawing/reload.html"), template_text("drawing/reload.js"))
     reload = [Section("Redrawn on save", [again])] if is_watched else []
     page = Page(
@@ -153,7 +153,7 @@ def drawing_html(drawing: Drawing, is_watched: bool = False) -> str:
             *faults,
             Section("The mechanism", [_live(drawing)]),
             *reload,
-            *told,
+            *units,
             Section("Lengths", [_lengths(mechanism)]),
             Section("Joints", [_joints(reach, drawing.shown)]),
         ],

@@ -315,12 +315,12 @@ def _banner(overview: FleetOverview, day: Day) -> Banner:
     worst = max((each for each in Standing if found[each]), key=lambda each: each.severity)
     numbers = {words: sum(found[each] for each in group) for words, group in _GROUPS.items()}
     words = next(words for words, group in _GROUPS.items() if worst in group)
-    told = [f"{number} {each}" for each, number in numbers.items() if number or each != _DEMONSTRATIONS]
+    parts = [f"{number} {each}" for each, number in numbers.items() if number or each != _DEMONSTRATIONS]
     outdated = f"healthy, but without a recording of the last {day.fresh_days:g} days, or not updated"
     return Banner(
         symbol=worst.look[0],
         word=f"{numbers[words]} of {len(overview.legs)} {words}".upper(),
-        text=f"{', '.join(told)}.",
+        text=f"{', '.join(parts)}.",
         notes=[
             ("In detail", ", ".join(f"{found[each]} {each.value}" for each in reversed(Standing))),
             ("Outdated", outdated),

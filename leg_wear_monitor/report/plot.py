@@ -254,8 +254,8 @@ def _clearance_picture(state: LegState) -> Picture | None:
     axes.set_ylim(len(known) - 0.5, -0.5)
     axes.set_xlim(0.0, None)
     finish(axes, x="clearance [mm], two standard deviations; black: estimate beside it; red: limit")
-    told = "; ".join(f"{joint} {1.0e3 * (each.believed_m or 0.0):.3g} mm" for joint, each in known)
-    return Picture(image=svg(figure), alt=f"Clearances against their limits: {told}")
+    values = "; ".join(f"{joint} {1.0e3 * (each.believed_m or 0.0):.3g} mm" for joint, each in known)
+    return Picture(image=svg(figure), alt=f"Clearances against their limits: {values}")
 
 
 @_shown.register
@@ -345,8 +345,8 @@ def _fleet_picture(fleet: FleetOverview) -> Picture | None:
     axes.axhline(100.0, color=INK, linewidth=0.8, linestyle="--")
     axes.set_xlim(-0.6, len(used) - 0.4)
     finish(axes, x="legs, the most worn first; red: inspect or stop", y="most worn joint [% of limit]")
-    told = f"{used[0]:.3g} % in {worst[0].id}, {used[-1]:.3g} % in {worst[-1].id}"
-    return Picture(image=svg(figure), alt=f"Most worn joint of {len(used)} legs: {told}")
+    extremes = f"{used[0]:.3g} % in {worst[0].id}, {used[-1]:.3g} % in {worst[-1].id}"
+    return Picture(image=svg(figure), alt=f"Most worn joint of {len(used)} legs: {extremes}")
 
 
 @_shown.register

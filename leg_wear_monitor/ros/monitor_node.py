@@ -264,8 +264,8 @@ class MonitorNode(ClosingNode):
         joints, leg = ", ".join(self._monitor.clearance_joints), self._monitor.mechanism.name
         rpm = f"{config.cadence.commanded_rpm:g} rpm"
         self.get_logger().info(f"monitoring joints {joints} of {leg} at {rpm}, hardware {config.hardware}")
-        told = doubts(load_mechanism(config.mechanism)), parameter_doubts(config, mechanism)
-        for doubt in chain(*told, life_doubts(config, mechanism), self._monitor.coefficient_doubts):
+        found = doubts(load_mechanism(config.mechanism)), parameter_doubts(config, mechanism)
+        for doubt in chain(*found, life_doubts(config, mechanism), self._monitor.coefficient_doubts):
             self.get_logger().warning(str(doubt))
 
     @property

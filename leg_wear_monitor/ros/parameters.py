@@ -115,7 +115,7 @@ class ParameterNode(Node):
         """
         if msg_type is Clock:
             callback = self._times_of(callback)
-        with self._qos_told(topic):
+        with self._qos_checked(topic):
             return super().create_subscription(msg_type, topic, callback, *options, **named)
 
     def create_publisher(self, msg_type: Any, topic: str, *options: Any, **named: Any) -> Publisher:
@@ -126,11 +126,11 @@ class ParameterNode(Node):
         ConfigError
             If the quality of service that parameters set for this topic cannot be used.
         """
-        with self._qos_told(topic):
+        with self._qos_checked(topic):
             return super().create_publisher(msg_type, topic, *options, **named)
 
     @contextmanager
-    def _qos_told(self, topic: str) -> Iterator[None]:
+    def _qos_checked(self, topic: str) -> Iterator[None]:
         """Name the parameters of a quality of service that cannot be used: rclpy names no value."""
         of_topic = f"{_QOS_OVERRIDES}{self.resolve_topic_name(topic)}."
         given = {name: value for name, value in self.given.items() if name.startswith(of_topic)}
@@ -167,7 +167,7 @@ class ParameterNode(Node):
         be changed either: accounting and audit must not continue with another clock.
         """
         wanted = [self._typed(one) for one in parameter_list]
-        changes = [one for one in wanted if not self._stands(one)]
+        changes = [one for one in wanted if not self._is_unchanged(one)]
         if wanted and not changes:
             return SetParametersResult(successful=True)
         if any(one.name == _CLOCK for one in changes):
@@ -199,7 +199,7 @@ class ParameterNode(Node):
             return RosParameter(one.name, declared, float(one.value))
         return one
 
-    def _stands(self, one: RosParameter) -> bool:
+    def _is_unchanged(self, one: RosParameter) -> bool:
         """Whether a parameter is read-only and already has this value."""
         if not self.has_parameter(one.name):
             return False

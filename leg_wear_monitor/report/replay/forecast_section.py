@@ -24,7 +24,9 @@ def forecast_section(summary: ReplaySummary) -> Section:
     parts.append(Text(doubt, is_not_valid=True) if doubt else _table(summary))
     parts += [
         Text(f"The life of {basis}.")
-        for basis in bases({summary.leg.joint_words(name): told for name, told in _forecasts(summary)})
+        for basis in bases(
+            {summary.leg.joint_words(name): forecast for name, forecast in _forecasts(summary)}
+        )
     ]
     if summary.measurements:
         parts.append(_validity(summary.measurements))
@@ -36,14 +38,15 @@ def forecast_section(summary: ReplaySummary) -> Section:
 def _table(summary: ReplaySummary) -> Table:
     leg, chances = summary.forecast, summary.forecast.first_probability if summary.forecast else {}
     rows = []
-    for name, told in _forecasts(summary):
-        may_be = told.clearance_m
+    for name, forecast in _forecasts(summary):
+        may_be = forecast.clearance_m
         rows.append((
             summary.leg.joint_words(name),
             f"{1.0e3 * may_be.p10:.4f} to {1.0e3 * may_be.p90:.4f}" if may_be else "-",
-            *_lasts(told),
+            *_lasts(forecast),
             f"{100.0 * chances[name]:.0f}" if name in chances else "-",
-            told.answer.value + (f"; measured {told.measurements} times" if told.measurements else ""),
+            forecast.answer.value
+            + (f"; measured {forecast.measurements} times" if forecast.measurements else ""),
         ))  # fmt: skip
     if leg is not None:
         rows.append(("leg", "", *_lasts(leg), "", leg.answer.value))
@@ -64,10 +67,10 @@ def _forecasts(summary: ReplaySummary) -> list[tuple[str, JointForecast]]:
     return [(name, joint.forecast) for name, joint in summary.joints.items() if joint.forecast]
 
 
-def _lasts(told: JointForecast | LegForecast) -> list[str]:
+def _lasts(forecast: JointForecast | LegForecast) -> list[str]:
     return [
         three_digits(getattr(unit, fraction)) if unit else "-"
-        for unit in (told.hours, told.days)
+        for unit in (forecast.hours, forecast.days)
         for fraction in FRACTIONS
     ]
 

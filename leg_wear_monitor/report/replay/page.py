@@ -242,10 +242,10 @@ def _input(summary: ReplaySummary) -> _Card:
     if status:
         level = status.level
         parts = status.message.split("; ")
-        told = [part for part in parts if not part.startswith("see: ")] or parts
-        why += told[:_MOST_SENTENCES]
-        if len(told) > _MOST_SENTENCES:
-            why.append(f"{len(told) - _MOST_SENTENCES} more below")
+        sentences = [part for part in parts if not part.startswith("see: ")] or parts
+        why += sentences[:_MOST_SENTENCES]
+        if len(sentences) > _MOST_SENTENCES:
+            why.append(f"{len(sentences) - _MOST_SENTENCES} more below")
     if summary.recording.is_partial:
         level = max(level, Level.WARN)
         why.append("the recording is damaged or incomplete: only its readable part is used")

@@ -26,7 +26,7 @@ def estimates_of(exponents: Found) -> list[Estimate]:
     return [exponent(arrays["stretch_per_cycle"], 1.0, FORGET) for _, arrays in exponents]
 
 
-def foretold(exponents: Found) -> list[str]:
+def exponent_sentences(exponents: Found) -> list[str]:
     """Sentences on Lyapunov exponents: value, sign, and the growth of a small error."""
     sentences = []
     for (point, _), one in zip(exponents, estimates_of(exponents), strict=True):
@@ -88,7 +88,7 @@ def chaos_sections(results: StudyResults) -> list[Section]:
 def chaos_sentences(results: StudyResults) -> list[str]:
     """Exponents, scatter and periods of Poincaré maps, and how they change over a parameter."""
     return [
-        *foretold(results.of("exponent")),
+        *exponent_sentences(results.of("exponent")),
         *(_disorder(point, arrays) for point, arrays in _maps(results)),
         *(_over(*diagram) for diagram in _diagrams(results)),
     ]

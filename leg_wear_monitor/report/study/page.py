@@ -40,7 +40,7 @@ from leg_wear_monitor.report.study.chaos import (
     chaos_sections,
     chaos_sentences,
     estimates_of,
-    foretold,
+    exponent_sentences,
 )
 from leg_wear_monitor.report.study.figures import (
     Spreads,
@@ -236,7 +236,7 @@ def _load(results: StudyResults, found: Found) -> _Own:
     sentences = [
         *findings.load(found),
         *findings.lives(lives),
-        *foretold(exponents),
+        *exponent_sentences(exponents),
         *findings.regular_where(found),
     ]
     tables = [exponent_table(exponents, estimates, "load")] if exponents else []

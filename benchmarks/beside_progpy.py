@@ -71,13 +71,13 @@ def progpy_side(samples: int, step: float) -> None:
     took = time.perf_counter() - began
     quantiles = np.nanquantile(ends, (0.1, 0.5, 0.9)).tolist()
     off = np.abs(ends / life_of(fresh, factors) - 1.0)
-    told = {
+    result = {
         "quantiles": quantiles,
         "s": took,
         "off": float(np.nanmedian(off)),
         "lost": int(np.isnan(ends).sum()),
     }
-    print(json.dumps(told))
+    print(json.dumps(result))
 
 
 def life_of(fresh, factor):
@@ -105,10 +105,10 @@ def ours() -> tuple[np.ndarray, float]:
     )
     settings = Forecasting(wear_coefficient_sigma=SIGMA, load_sigma=LOAD_SIGMA, clearance_sigma_m=FRESH_SIGMA)
     began = time.perf_counter()
-    told = forecast(
+    life = forecast(
         [now], [estimate_coefficient(settings, FRESH)], settings, law, cycle_s=1.0, valid=True
     ).leg.cycles
-    return np.array([told.p10, told.p50, told.p90]), time.perf_counter() - began
+    return np.array([life.p10, life.p50, life.p90]), time.perf_counter() - began
 
 
 def main() -> None:
@@ -129,11 +129,11 @@ def main() -> None:
         done = subprocess.run(line, capture_output=True, text=True, check=False)
         if done.returncode:
             sys.exit(done.stderr)
-        told = json.loads(done.stdout.splitlines()[-1])
-        off = np.round(100 * (np.array(told["quantiles"]) / true - 1), 2)
+        result = json.loads(done.stdout.splitlines()[-1])
+        off = np.round(100 * (np.array(result["quantiles"]) / true - 1), 2)
         print(
-            f"progpy, {samples} samples, steps of {step:g} cycles: off by {off} %, {told['s']:.2f} s; "
-            f"each member by {100 * told['off']:.2g} % (median), {told['lost']} without an end"
+            f"progpy, {samples} samples, steps of {step:g} cycles: off by {off} %, {result['s']:.2f} s; "
+            f"each member by {100 * result['off']:.2g} % (median), {result['lost']} without an end"
         )
 
 

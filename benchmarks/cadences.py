@@ -170,7 +170,7 @@ def kind(second: int) -> str:
     return f"{speeds[-1]:g} rpm"
 
 
-def told(looks: Sequence[Look]) -> None:
+def show(looks: Sequence[Look]) -> None:
     """Print what was reported in the hour: from when on, how often, and which verdicts."""
     for begin in (0, 10, 20):
         print(f"\nfrom minute {begin} on: seconds, of them diagnosed, with a change named; verdicts")
@@ -223,7 +223,7 @@ def main() -> None:
     looks = list(looked(monitor, samples_of(known["hour"], random)))
     memory_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
     print(f"leg {options.leg}: {time.process_time() - begin:.0f} s of processor, {memory_mb:.0f} MB")
-    told(looks)
+    show(looks)
     then = monitor.snapshot()
     print("\n| joint at 0.45 mm, cadence | first named | in the end | verdict |")
     for case, walk in known.items():

@@ -184,7 +184,7 @@ def errors(truth: dict[str, Any], result: CommissioningResult) -> dict[str, floa
 
     scale, turns = found["drive_torque.scale"], float(found["drive_torque.gear_ratio"].value)
     measured = float(scale.remark.split()[-1])
-    told = {
+    sizes = {
         "offset": away("crank.offset_rad", truth["offset_rad"], TURN),
         "lag": away("lag", late_s(truth)),
         "scale": (measured - truth["factor"]) / (float(scale.sigma or 0.0) * turns),
@@ -192,7 +192,7 @@ def errors(truth: dict[str, Any], result: CommissioningResult) -> dict[str, floa
         "load friction": away("load friction", truth["load_friction"]),
         "bandwidth": _by_factor(found.get("bandwidth"), truth["bandwidth_hz"]),
     }
-    return {name: value for name, value in told.items() if math.isfinite(value)}
+    return {name: value for name, value in sizes.items() if math.isfinite(value)}
 
 
 def _by_factor(item: CommissioningItem | None, true: float) -> float:
@@ -221,7 +221,7 @@ def row(seed: int, truth: dict[str, Any], result: CommissioningResult, seconds: 
     offset = found["crank.offset_rad"]
     apart = (float(offset.value) - truth["offset_rad"] + math.pi) % TURN - math.pi
     factor = float(value("drive_torque.scale")) * float(value("drive_torque.gear_ratio"))
-    told = [text.split(":")[0].replace("drive_torque.", "") for text in result.not_told]
+    names = [text.split(":")[0].replace("drive_torque.", "") for text in result.not_told]
     cells = (
         f"{seed}",
         " and ".join(f"{speed:.0f}" for speed in truth["speeds_rpm"]),
@@ -238,7 +238,7 @@ def row(seed: int, truth: dict[str, Any], result: CommissioningResult, seconds: 
         pair("friction", truth["friction_nm"], 2),
         pair("load friction", truth["load_friction"], 3),
         f"{found['crank.sign'].mismatch:.3f}",
-        "; ".join([*told, *(text.split(" ± ")[0] for text in result.findings)]) or "-",
+        "; ".join([*names, *(text.split(" ± ")[0] for text in result.findings)]) or "-",
         f"{seconds:.1f}",
     )
     return f"| {' | '.join(map(str, cells))} |"

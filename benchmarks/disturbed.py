@@ -175,17 +175,17 @@ def watched(
             for _ in range(periods - 1):
                 one.end_period(counted, UNWORN)
             seen = one.diagnosis
-            told = [
+            texts = [
                 f"{change.cause.name} {change.subject}" for change in seen.changes if not change.is_corrected
             ]
             stops = zip(joints, seen.least_m, strict=False)
-            told += [f"stop {joint}" for joint, least_m in stops if least_m >= limit_m]
+            texts += [f"stop {joint}" for joint, least_m in stops if least_m >= limit_m]
             if correction is not None:
-                told.append(f"corrected {correction.subject} {1e3 * correction.value:.3f} mm")
+                texts.append(f"corrected {correction.subject} {1e3 * correction.value:.3f} mm")
                 counted = counted.copy()
                 counted[joints.index(correction.subject)] = correction.value
                 one.corrected(correction, counted)
-            found += [f"{i}: {text}" for text in told]
+            found += [f"{i}: {text}" for text in texts]
     return one, found
 
 
@@ -245,7 +245,7 @@ def main() -> None:
             for joint, size_mm in OPENINGS:
                 worn = cycles_of(joint, size_mm, peak_n, 6, given)
                 one, found = watched(leg, size, [*healthy, *worn])
-                told = {text.partition(": ")[2]: text.partition(":")[0] for text in reversed(found)}
+                first = {text.partition(": ")[2]: text.partition(":")[0] for text in reversed(found)}
                 seen, k = one.diagnosis, leg.clearance_joints.index(joint)
                 value = (
                     f"{1e3 * seen.clearance_m[k]:.3f} ± {1e3 * seen.sigma_m[k]:.3f}"
@@ -253,7 +253,7 @@ def main() -> None:
                     else "-"
                 )
                 when = ", ".join(
-                    f"{what} ({int(at) - COMMISSIONED + 1})" for what, at in reversed(told.items())
+                    f"{what} ({int(at) - COMMISSIONED + 1})" for what, at in reversed(first.items())
                 )
                 print(f"| {peak_n:.0f} | {given or '-'} | {joint} {size_mm} | {when} | {value} |", flush=True)
 

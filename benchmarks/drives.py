@@ -213,17 +213,17 @@ def main() -> None:
 
 def summary(found: list[str]) -> str:
     """Findings, each once, with the gait cycle of the first and their number."""
-    told: dict[str, list[int]] = {}
+    cycles_of: dict[str, list[int]] = {}
     for text in found:
         at, _, what = text.partition(": ")
-        told.setdefault(what, []).append(int(at))
-    return ", ".join(f"{what} ({at[0]}, {len(at)} cycles)" for what, at in told.items())
+        cycles_of.setdefault(what, []).append(int(at))
+    return ", ".join(f"{what} ({at[0]}, {len(at)} cycles)" for what, at in cycles_of.items())
 
 
 def when(found: list[str], since: int) -> str:
     """What was found, and the gait cycle since a change in which it first was."""
-    told = {text.partition(": ")[2]: int(text.partition(":")[0]) for text in reversed(found)}
-    return ", ".join(f"{what} ({at - since + 1})" for what, at in reversed(told.items()))
+    cycles_of = {text.partition(": ")[2]: int(text.partition(":")[0]) for text in reversed(found)}
+    return ", ".join(f"{what} ({at - since + 1})" for what, at in reversed(cycles_of.items()))
 
 
 if __name__ == "__main__":

@@ -221,13 +221,13 @@ def main() -> None:
                     ("ground, before the fit", None, GROUND),
                     ("ground", parameters, GROUND),
                 ):
-                    told = wear(peak_n, known, TwinSettings(load_shape=shape))
-                    print(f"  wear, load.model {what}: {told}", flush=True)
+                    ratios = wear(peak_n, known, TwinSettings(load_shape=shape))
+                    print(f"  wear, load.model {what}: {ratios}", flush=True)
         load = LoadConfig(ground_n=peak_n, shape=options.shape)
         for of_value, of_peak in ((0.0, 0.0), (0.05, 0.0), (0.0, 0.05)):
             force = sensed(real, HEALTHY + 3, load, 300, of_value, of_peak)
-            told = wear(peak_n, None, MEASURED_LOAD, force)
-            print(f"{peak_n:.0f} N measured, noise {of_value:g}, {of_peak:g}: wear {told}", flush=True)
+            ratios = wear(peak_n, None, MEASURED_LOAD, force)
+            print(f"{peak_n:.0f} N measured, noise {of_value:g}, {of_peak:g}: wear {ratios}", flush=True)
 
 
 if __name__ == "__main__":

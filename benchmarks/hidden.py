@@ -36,7 +36,7 @@ OFFSET, SCALE = np.array([0.01, -0.02, 0.015]), np.array([2e-3, -1e-3, 3e-3])
 COMMISSIONING, WINDOW = 100, 60
 COUNTS = (20, 40, 80, 160, 320)
 UNKNOWN = errors_of(Encoders(names=tuple(SENSORS.values()), joints=tuple(SENSORS)), None)
-UNKNOWN_M = 1.0e-3  # standard deviation of a clearance of which nothing is told
+UNKNOWN_M = 1.0e-3  # standard deviation of a clearance of which nothing is known
 
 
 def walked(
@@ -115,18 +115,18 @@ def commission(model, reference, walk, every, noise):
     return commissioned(UNKNOWN, new.fused(), [True] * len(SENSORS))
 
 
-def known(reference, held):
-    """The encoders' errors as held, and nothing of clearances."""
-    return prior_with(held, reference.clearance_m, UNKNOWN_M)
+def known(reference, encoder_errors):
+    """The encoders' errors as estimated, and nothing of clearances."""
+    return prior_with(encoder_errors, reference.clearance_m, UNKNOWN_M)
 
 
 def show_observability(leg, model, reference, walk):
     """What the monitor says that some of the encoders show, and by how much."""
     print("rad of RMS deviation that a metre of clearance makes beyond what others can")
-    held, names = commission(model, reference, walk, 5, 1e-4), list(SENSORS.values())
+    encoder_errors, names = commission(model, reference, walk, 5, 1e-4), list(SENSORS.values())
     for chosen in ([0], [1], [2], [0, 1], [0, 2], [1, 2], [0, 1, 2]):
         absent = [i for i in range(len(names)) if i not in chosen]
-        hidden = ClearanceRegression(model, reference, known(reference, held))
+        hidden = ClearanceRegression(model, reference, known(reference, encoder_errors))
         for crank, angles in read([part[-WINDOW:] for part in walk], 5, 1e-4, 5):
             angles[:, absent] = np.nan
             hidden.add(crank, angles)
@@ -149,13 +149,13 @@ def beyond_others(columns, sensors, shown):
         yield rms(a[:, i] - others @ np.linalg.lstsq(others, a[:, i], rcond=1.0e-9)[0])
 
 
-def show_convergence(leg, model, reference, held, walks, every, noise):
+def show_convergence(leg, model, reference, encoder_errors, walks, every, noise):
     """RMS of the errors over all legs but that with all joints worn, by cycles."""
     errors, sigmas = {n: [] for n in COUNTS}, {n: [] for n in COUNTS}
     for name, (clearance, *walk) in walks.items():
         if name == "all":
             continue
-        hidden = ClearanceRegression(model, reference, known(reference, held), most=COUNTS[-1])
+        hidden = ClearanceRegression(model, reference, known(reference, encoder_errors), most=COUNTS[-1])
         for count, cycle in enumerate(read([part[-COUNTS[-1] :] for part in walk], every, noise, 1), 1):
             hidden.add(*cycle)
             if count in COUNTS:
@@ -171,13 +171,13 @@ def show_convergence(leg, model, reference, held, walks, every, noise):
         print(f"  {n:>4} cycles: {cells}")
 
 
-def show_finding(leg, model, reference, held, walks, every, noise):
+def show_finding(leg, model, reference, encoder_errors, walks, every, noise):
     """After how many cycles of a leg that was new before a joint is found, and which one is named."""
     new = [part[COMMISSIONING : COMMISSIONING + WINDOW] for part in walks["none"][1:]]
     for name, (_, *walk) in walks.items():
         if name == "all":
             continue
-        hidden = ClearanceRegression(model, reference, known(reference, held), most=WINDOW)
+        hidden = ClearanceRegression(model, reference, known(reference, encoder_errors), most=WINDOW)
         first, named = None, {}
         for cycle in read(new, every, noise, 2):
             hidden.add(*cycle)
@@ -196,11 +196,11 @@ def show_finding(leg, model, reference, held, walks, every, noise):
         )
 
 
-def show_all_worn(leg, model, reference, held, walk):
+def show_all_worn(leg, model, reference, encoder_errors, walk):
     """A leg with all joints worn: by the reference of the new leg, then by one of what was found."""
     clearance, *walk = walk
     for again in range(3):
-        hidden = ClearanceRegression(model, reference, known(reference, held))
+        hidden = ClearanceRegression(model, reference, known(reference, encoder_errors))
         for cycle in read([part[:WINDOW] for part in walk], 5, 1e-4, 4):
             hidden.add(*cycle)
         found = hidden.fused()
@@ -208,7 +208,7 @@ def show_all_worn(leg, model, reference, held, walk):
         reference, _ = referred(leg, model, found.clearance_m)
 
 
-def show_locally_worn(leg, model, reference, held):
+def show_locally_worn(leg, model, reference, encoder_errors):
     """A leg worn where its joints bear: by the reference of a new one, then by one of what was counted."""
     depth = worn_by_archard(leg)
     opened = depth.sum(axis=1).mean(axis=1)
@@ -217,7 +217,7 @@ def show_locally_worn(leg, model, reference, held):
     for fraction in (0.0, 1.0, 0.5, 0.25):
         if fraction:
             reference, _ = referred(leg, model, FRESH + fraction * opened, fraction * depth)
-        hidden = ClearanceRegression(model, reference, known(reference, held))
+        hidden = ClearanceRegression(model, reference, known(reference, encoder_errors))
         for cycle in read(walk, 5, 1e-4, 4):
             hidden.add(*cycle)
         off = hidden.fused().clearance_m - FRESH - opened
@@ -238,13 +238,13 @@ def main() -> None:
         for every, rate in ((5, 200), (1, 1000)):
             print(f"\nnoise {noise:g} rad, {rate} Hz: RMS off (most) stated [um]")
             began = time.process_time()
-            held = commission(model, reference, walks["none"][1:], every, noise)
+            encoder_errors = commission(model, reference, walks["none"][1:], every, noise)
             print(f"  a cycle takes {1e3 * (time.process_time() - began) / COMMISSIONING:.2f} ms")
-            show_convergence(leg, model, reference, held, walks, every, noise)
-            show_finding(leg, model, reference, held, walks, every, noise)
+            show_convergence(leg, model, reference, encoder_errors, walks, every, noise)
+            show_finding(leg, model, reference, encoder_errors, walks, every, noise)
             if (noise, every) == (1e-4, 5):
-                show_all_worn(leg, model, reference, held, walks["all"])
-                show_locally_worn(leg, model, reference, held)
+                show_all_worn(leg, model, reference, encoder_errors, walks["all"])
+                show_locally_worn(leg, model, reference, encoder_errors)
 
 
 if __name__ == "__main__":

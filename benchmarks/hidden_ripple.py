@@ -73,9 +73,9 @@ def referred(
     return found
 
 
-def estimated(model: AngleModel, reference: AngleReference, held: EncoderErrors, cycles) -> np.ndarray:
+def estimated(model: AngleModel, reference: AngleReference, errors: EncoderErrors, cycles) -> np.ndarray:
     """Clearances (k,) [m] from some gait cycles."""
-    regression = ClearanceRegression(model, reference, prior_with(held, reference.clearance_m, UNKNOWN_M))
+    regression = ClearanceRegression(model, reference, prior_with(errors, reference.clearance_m, UNKNOWN_M))
     for cycle in cycles:
         regression.add(*cycle)
     return regression.fused().clearance_m
@@ -111,8 +111,8 @@ def main() -> None:
     new = walk("new", NEW, HEALTHY)
     profile = CrankProfile.steady(TURN) if options.steady else profile_of(new[:, :3])
     first, healthy = referred(leg, model, NEW, profile), cycles_of(new, random)
-    held = commission(model, first, healthy)
-    print("new", np.round(1e6 * estimated(model, first, held, healthy[COMMISSIONING:])), flush=True)
+    errors = commission(model, first, healthy)
+    print("new", np.round(1e6 * estimated(model, first, errors, healthy[COMMISSIONING:])), flush=True)
     for size in SIZES:
         for k, joint in enumerate(leg.clearance_joints):
             name = f"{joint} {1e3 * size:.2f}"
@@ -121,7 +121,7 @@ def main() -> None:
             cycles = cycles_of(walk(name, np.where(np.arange(5) == k, size, NEW), AFTER), random)
             reference = first
             for again in range(options.references):
-                found = estimated(model, reference, held, cycles)
+                found = estimated(model, reference, errors, cycles)
                 print(name, "reference", again, np.round(1e6 * found), flush=True)
                 if np.abs(found - reference.clearance_m).max() <= 1.0e-4 or again + 1 == options.references:
                     break

@@ -92,9 +92,9 @@ def ten_million(leg: Mechanism) -> None:
     coefficient_estimates = [estimate_coefficient(settings, 3e-4) for _ in now]
     for _ in range(2):  # the first makes the draws
         began = time.process_time()
-        told = forecast(now, coefficient_estimates, settings, law, cycle_s=1.0, valid=True)
+        found = forecast(now, coefficient_estimates, settings, law, cycle_s=1.0, valid=True)
     print(f"a forecast of all joints and the leg: {time.process_time() - began:.4f} s")
-    print(f"A {told.joints[0].cycles}, leg {told.leg.cycles}")
+    print(f"A {found.joints[0].cycles}, leg {found.leg.cycles}")
 
 
 def law_of_growth(leg: Mechanism) -> None:

@@ -110,7 +110,7 @@ def case_of(life: HiddenLife, now: float, twin: HiddenLife, joints: str, random:
     return Case(state, clearance, (life.ends() - now) / later)
 
 
-def told(case: Case, law: GrowthLaw, measured: dict[int, ClearanceAtWear]) -> Forecast:
+def forecast_of(case: Case, law: GrowthLaw, measured: dict[int, ClearanceAtWear]) -> Forecast:
     coefficient_estimates = [
         estimate_coefficient(SETTINGS, FRESH_M, [measured[k]] if k in measured else [])
         for k in range(len(case.now))
@@ -125,13 +125,13 @@ def evaluated(case: Case, law: GrowthLaw, random: np.random.Generator) -> np.nda
         k: ClearanceAtWear(float(case.clearance_m[k] + noise[k]), MEASURED_M, each.wear_m)
         for k, each in enumerate(case.now)
     }
-    without = told(case, law, {})
-    singly = [told(case, law, {k: observation}) for k, observation in observations.items()]
+    without = forecast_of(case, law, {})
+    singly = [forecast_of(case, law, {k: observation}) for k, observation in observations.items()]
     first = [each.joint for each in case.now].index(str(without.leg.first))
     one = Forecast(joints=tuple(f.joints[k] for k, f in enumerate(singly)), leg=singly[first].leg)
     truth = np.append(case.remain, case.remain.min())
     rows: list[list[JointForecast | LegForecast]] = [
-        [*f.joints, f.leg] for f in (without, one, told(case, law, observations))
+        [*f.joints, f.leg] for f in (without, one, forecast_of(case, law, observations))
     ]
     bands = np.array([[attrs.astuple(each.cycles) for each in row] for row in rows])
     return np.asarray(bands / truth[:, None])
@@ -139,13 +139,13 @@ def evaluated(case: Case, law: GrowthLaw, random: np.random.Generator) -> np.nda
 
 def row(name: str, ratio: np.ndarray) -> None:
     """A line of a table; (legs, 3 ways, 3 quantiles) over truth."""
-    held = 100.0 * ((ratio[..., 0] <= 1.0) & (ratio[..., 2] >= 1.0)).mean(axis=0)
+    within = 100.0 * ((ratio[..., 0] <= 1.0) & (ratio[..., 2] >= 1.0)).mean(axis=0)
     with np.errstate(all="ignore"):  # a joint that is held to be at its limit already remains for 0
         width, error = np.log(ratio[..., 2] / ratio[..., 0]), 100.0 * np.log(ratio[..., 1])
         narrower = np.nanmedian(width[:, :1] / width, axis=0)
     bias, off = np.nanmedian(error, axis=0), np.nanmedian(np.abs(error), axis=0)
     cells = "".join(
-        f"{held[w]:10.1f}{narrower[w]:6.1f}{off[w]:6.1f}{'(' + format(bias[w], '+.1f') + ')':>8}"
+        f"{within[w]:10.1f}{narrower[w]:6.1f}{off[w]:6.1f}{'(' + format(bias[w], '+.1f') + ')':>8}"
         for w in range(3)
     )
     print(f"{name:>6}{cells}")

@@ -118,7 +118,7 @@ class Listener(Node):
         self.stamps_s: list[list[float]] = [[] for _ in range(legs)]
         self.cycle_delays_s: list[list[float]] = [[] for _ in range(legs)]
         self.diagnoses = [""] * legs
-        self.told: list[dict[str, float]] = [{} for _ in range(legs)]
+        self.counts: list[dict[str, float]] = [{} for _ in range(legs)]
         self.hardware = {f"leg{leg}": leg for leg in range(legs)}
         deep = QoSProfile(depth=2000, reliability=ReliabilityPolicy.BEST_EFFORT)
         for leg in range(legs):
@@ -145,12 +145,12 @@ class Listener(Node):
         leg = self.hardware.get(message.status[0].hardware_id)
         if leg is None:
             return  # somebody else's in the same domain
-        told = self.told[leg]
+        counts = self.counts[leg]
         for status in message.status:
             if status.name.endswith(": diagnosis"):
                 self.diagnoses[leg] = status.message
             if status.name.endswith((": load", ": topics", ": input")):
-                told.update((one.key, float(one.value)) for one in status.values if one.key in SHOWN)
+                counts.update((one.key, float(one.value)) for one in status.values if one.key in SHOWN)
 
 
 def beyond_lag_s(stamps: np.ndarray, delays: np.ndarray) -> np.ndarray:
@@ -292,12 +292,12 @@ def rows(path: Path, table: str) -> list[tuple[object, ...]]:
 
 
 def report(leg: int, sent: int, rows: list[tuple[float, ...]], listener: Listener) -> None:
-    told, delays = listener.told[leg], np.array(listener.delays_s[leg])
+    counts, delays = listener.counts[leg], np.array(listener.delays_s[leg])
     clock, busy, memory = np.array(rows).T
     fraction = (busy[-2] - busy[0]) / (clock[-2] - clock[0])
     median, p99 = 1e3 * np.percentile(delays, [50, 99])
     print(
-        f"leg {leg}: sent {sent}, received {told['received']:.0f}, shed {told['shed_messages']:.0f}; "
+        f"leg {leg}: sent {sent}, received {counts['received']:.0f}, shed {counts['shed_messages']:.0f}; "
         f"{fraction:.1%} of a core; memory {memory[0]:.0f} to {memory[-1]:.0f} MB; "
         f"stamp to report: median {median:.0f} ms, p99 {p99:.0f} ms, worst {1e3 * delays.max():.0f} ms "
         f"of {len(delays)}"

@@ -89,8 +89,8 @@ def _opened(case: dict[str, float]) -> str:
 
 
 def _corrections(found: list[str], before: int) -> str:
-    told = (text.partition(": corrected ") for text in found)
-    return ", ".join(f"{what} ({int(at) - before + 1})" for at, _, what in told) or "none"
+    corrections = (text.partition(": corrected ") for text in found)
+    return ", ".join(f"{what} ({int(at) - before + 1})" for at, _, what in corrections) or "none"
 
 
 def _sizes(one: TorqueObserver) -> str:

@@ -98,14 +98,14 @@ def unpainted(monkeypatch: pytest.MonkeyPatch) -> None:
 def traps(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """The current directory: its modules have the names of all that a new process imports, and tell of it."""
     home = tmp_path_factory.mktemp("traps")
-    told = home / "told"
+    marks = home / "told"
     for name in {*sys.stdlib_module_names, "leg_wear_monitor", "loky", "numba", "numpy", "sitecustomize"}:
-        trap = f"open({str(told)!r}, 'a').write({name!r} + '\\n')\nraise SystemExit(66)\n"
+        trap = f"open({str(marks)!r}, 'a').write({name!r} + '\\n')\nraise SystemExit(66)\n"
         (home / f"{name}.py").write_text(trap)
     monkeypatch.chdir(home)
     monkeypatch.setattr(sys, "path", [path for path in sys.path if path])  # as a console script has it
     yield home
-    assert not told.exists(), f"modules of the current directory were imported: {told.read_text()}"
+    assert not marks.exists(), f"modules of the current directory were imported: {marks.read_text()}"
 
 
 @pytest.fixture(scope="session")

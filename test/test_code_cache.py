@@ -131,12 +131,12 @@ def test_a_directory_laid_in_advance_by_another_user_is_not_used(shared, tmp_pat
     for path in (laid, laid.parent):
         os.chown(path, NOBODY, NOBODY)
     (tmp_path / "file").write_text("")
-    (place,), told = where(KERNELS, TMPDIR=str(shared), HOME=str(tmp_path / "file"))
+    (place,), output = where(KERNELS, TMPDIR=str(shared), HOME=str(tmp_path / "file"))
     assert not any(laid.iterdir())
     assert Path(place).parents[1].parent == shared
     assert not Path(place).is_relative_to(laid.parent)
-    assert f"{laid.parent} belongs to another user (uid {NOBODY})" in told
-    assert "compiled code is not stored" in told
+    assert f"{laid.parent} belongs to another user (uid {NOBODY})" in output
+    assert "compiled code is not stored" in output
     assert not Path(place).exists()  # gone with the process
 
 
@@ -144,27 +144,27 @@ def test_a_directory_that_was_asked_for_and_is_refused_is_told_once(shared, tmp_
     """Child processes go where their parent went and say nothing."""
     (shared / "asked" / "leg_wear_monitor").mkdir(parents=True)
     (shared / "asked" / "leg_wear_monitor").chmod(0o777)
-    places, told = where(TWICE, NUMBA_CACHE_DIR=str(shared / "asked"), HOME=str(tmp_path / "home"))
+    places, output = where(TWICE, NUMBA_CACHE_DIR=str(shared / "asked"), HOME=str(tmp_path / "home"))
     assert places == [str(tmp_path / "home" / ".cache" / "leg_wear_monitor" / "leaf")] * 2
-    assert told.count("ConfigWarning") == 1
-    assert "NUMBA_CACHE_DIR: " in told
-    assert "can be written to by others (chmod go-w" in told
+    assert output.count("ConfigWarning") == 1
+    assert "NUMBA_CACHE_DIR: " in output
+    assert "can be written to by others (chmod go-w" in output
 
 
 def test_child_processes_share_what_goes_with_their_parent(shared):
     shared.joinpath(f"leg_wear_monitor-{os.geteuid()}").write_text("in the way")
-    places, told = where(TWICE, TMPDIR=str(shared), HOME="/dev/null")
+    places, output = where(TWICE, TMPDIR=str(shared), HOME="/dev/null")
     assert places[0] == places[1]
-    assert told.count("compiled code is not stored") == 1
+    assert output.count("compiled code is not stored") == 1
     assert [path.name for path in shared.iterdir()] == [f"leg_wear_monitor-{os.geteuid()}"]
 
 
 def test_where_no_place_is_safe_nothing_is_kept(shared):
     """A temporary directory whose entries anybody can rename."""
     shared.chmod(0o777)
-    places, told = where(TMPDIR=str(shared), HOME="/dev/null")
+    places, output = where(TMPDIR=str(shared), HOME="/dev/null")
     assert places == ["None"]
-    assert "can be written to by others" in told
+    assert "can be written to by others" in output
 
 
 @pytest.mark.plain

@@ -30,8 +30,8 @@ def test_decisions_are_numbered_without_holes_and_listed():
 
 def test_every_public_name_has_its_place_in_the_reference_of_python():
     pages = "".join(path.read_text() for path in DOCS.glob("reference/python/*.rst"))
-    told = re.findall(r"^\.\. auto(?:function|class|exception):: (\w+)$", pages, re.MULTILINE)
-    assert sorted(told) == sorted(lw.__all__)
+    documented = re.findall(r"^\.\. auto(?:function|class|exception):: (\w+)$", pages, re.MULTILINE)
+    assert sorted(documented) == sorted(lw.__all__)
 
 
 def test_the_pictures_on_top_are_there_and_light():

@@ -50,8 +50,10 @@ def fields_of(kind: type, prefix: str = "") -> Iterator[tuple[str, "attrs.Attrib
             yield f"{prefix}{field.name}", field
 
 
-def bounds(told: Any, words: dict[str, str]) -> str:
-    return ", ".join(f"{word} {told[key]:g}" for key, word in words.items() if told.get(key) is not None)
+def bounds(metadata: Any, words: dict[str, str]) -> str:
+    return ", ".join(
+        f"{word} {metadata[key]:g}" for key, word in words.items() if metadata.get(key) is not None
+    )
 
 
 def value(of: Any) -> str:
@@ -70,14 +72,14 @@ def study_keys(_name: str) -> str:
             fields[key] = field
 
     def row(key: str, field: "attrs.Attribute[Any]") -> Iterator[str]:
-        default, told = field.default, field.metadata
-        yield from (f"`{key}`", told["unit"])
+        default, metadata = field.default, field.metadata
+        yield from (f"`{key}`", metadata["unit"])
         if default is attrs.NOTHING:
             yield "required"
         else:
             yield ", ".join(map(str, default)) if isinstance(default, tuple) else str(default)
-        yield bounds(told, WORDS)
-        yield from ("all" if len(users[key]) == len(STUDIES) else ", ".join(users[key]), told["doc"])
+        yield bounds(metadata, WORDS)
+        yield from ("all" if len(users[key]) == len(STUDIES) else ", ".join(users[key]), metadata["doc"])
 
     return table(
         "key | unit | default | bounds | studies | what it is", (row(*one) for one in fields.items())
@@ -125,10 +127,10 @@ def mechanism_keys(name: str) -> str:
         return f"`{value(field.default)}`" if is_plain else "none"
 
     def row(field: "attrs.Attribute[Any]") -> Iterator[str]:
-        told = field.metadata
-        names = ", ".join(f"`{name}`" for name in told.get("names", ()))
-        yield from (f"`{field.name}`", told["unit"].replace("^2", "²"))
-        yield from (names or bounds(told, SIGNS), default(field), told["doc"])
+        metadata = field.metadata
+        names = ", ".join(f"`{name}`" for name in metadata.get("names", ()))
+        yield from (f"`{field.name}`", metadata["unit"].replace("^2", "²"))
+        yield from (names or bounds(metadata, SIGNS), default(field), metadata["doc"])
 
     fields = attrs.fields(getattr(spec, name.removeprefix("keys of ")))
     keys = [field for field in fields if "doc" in field.metadata and not field.metadata.get("flat")]
@@ -206,7 +208,7 @@ def of_drives(name: str) -> str:
 
 def ledger_tables(_name: str) -> str:
     comments = re.findall(r"((?:^-- .*\n)+)CREATE TABLE (\w+)", TABLES, re.MULTILINE)
-    told = {name: " ".join(line[3:] for line in text.splitlines()) for text, name in comments}
+    remarks = {name: " ".join(line[3:] for line in text.splitlines()) for text, name in comments}
     units = {"ns": "ns", "s": "s", "m": "m", "pa": "1/Pa", "cycles": "gait cycles"}
     lines = [f"The format is {FORMAT} (`PRAGMA user_version`)."]
     with closing(sqlite3.connect(":memory:", isolation_level=None)) as db:
@@ -217,7 +219,7 @@ def ledger_tables(_name: str) -> str:
             for _, name, kind, not_null, _, key in db.execute(f"PRAGMA table_info({one})"):
                 remark = "key" if key else "" if not_null else "may be null"
                 rows.append((f"`{name}`", kind, units.get(name.split("_")[-1], ""), remark))
-            words = told[one][0].upper() + told[one][1:]
+            words = remarks[one][0].upper() + remarks[one][1:]
             lines += ["", f"## {one}", "", f"{words}.", "", table("column | type | unit |", rows).rstrip()]
     return "\n".join([*lines, ""])
 
@@ -271,14 +273,14 @@ def meanings() -> Iterator[tuple[str, str]]:
 
 
 def codes(_name: str) -> str:
-    told: dict[str, list[str]] = {}
+    by_code: dict[str, list[str]] = {}
     for code, line in meanings():
-        told.setdefault(code, []).append(line)
-    for code, lines in told.items():
+        by_code.setdefault(code, []).append(line)
+    for code, lines in by_code.items():
         path = guide_of(code)
         title = (ROOT / path).read_text(encoding="utf-8").partition("\n")[0].removeprefix("# ")
         lines.append(f"- Guide: [{title}](../{path.removeprefix('docs/')}).")
-    return "\n".join("\n".join([f"## {code}", "", *told[code], ""]) for code in sorted(told))
+    return "\n".join("\n".join([f"## {code}", "", *by_code[code], ""]) for code in sorted(by_code))
 
 
 PAGES: dict[str, Callable[[str], str]] = {

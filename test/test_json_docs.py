@@ -54,7 +54,7 @@ _LOAD = "number", "Pa m/s", "Mean of pressure times sliding speed when new."
 
 
 def life() -> Iterator[Row]:
-    told = descriptions(Life)
+    texts = descriptions(Life)
     yield "mechanism", "text", "", "Name of the mechanism."
     yield "fingerprint", "text", "", "Checksum of the mechanism; a forecast refuses the lives of another leg."
     yield "validity.<joint>.holds_for", "text", "", "Material pair and regime that its life holds for."
@@ -71,12 +71,12 @@ def life() -> Iterator[Row]:
     yield "validity.<joint>.outside_contact_law", "text or null", "", beyond
     yield VERSION
     for name in ("cycles", "error_m"):
-        yield name, "list of numbers", unit_of(name), told[name]
+        yield name, "list of numbers", unit_of(name), texts[name]
     further = ("clearance_m", "growth_m_per_cycle")
     for name in (*further, "clearance_max_m", "worst_sector_deg", "peak_force_n"):
-        yield f"joints.<joint>.{name}", "list of numbers", unit_of(name), told[name]
+        yield f"joints.<joint>.{name}", "list of numbers", unit_of(name), texts[name]
     name = "part_growth_m_per_cycle"
-    words = f"{told[name].removesuffix('.')}, load by load; with a duty only."
+    words = f"{texts[name].removesuffix('.')}, load by load; with a duty only."
     yield f"joints.<joint>.{name}", "list of lists of numbers", unit_of(name), words
     yield "duty", "object", "", "Hours a day under each load, of `--duty`; missing without one."
     yield "duty.peak_n", "list of numbers", "N", "Largest vertical force of the ground on the toe."
@@ -91,34 +91,34 @@ def life() -> Iterator[Row]:
     yield "wear_factor.<joint>", "number", "", "Factor on the wear coefficients of this life."
     yield "further[]", "object", "", "Lives with other wear coefficients, in short."
     yield "further[].wear_factor.<joint>", "number", "", "As above."
-    yield "further[].cycles", "list of numbers", unit_of("cycles"), told["cycles"]
+    yield "further[].cycles", "list of numbers", unit_of("cycles"), texts["cycles"]
     for name in further:
-        yield f"further[].joints.<joint>.{name}", "list of numbers", unit_of(name), told[name]
+        yield f"further[].joints.<joint>.{name}", "list of numbers", unit_of(name), texts[name]
 
 
 def commissioning() -> Iterator[Row]:
-    told = descriptions(lw.CommissioningResult)
+    texts = descriptions(lw.CommissioningResult)
     yield VERSION
-    yield "turns", "number", "", told["turns"]
+    yield "turns", "number", "", texts["turns"]
     yield "is_sure", "true or false", "", lw.CommissioningResult.is_sure.__doc__ or ""
-    yield "items[]", "object", "", told["items"]
+    yield "items[]", "object", "", texts["items"]
     yield from rows_of(lw.CommissioningItem, "items[].")
-    yield "not_enough_to_tell[]", "text", "", told["not_told"]
-    yield "findings[]", "text", "", told["findings"]
-    yield "notes[]", "text", "", told["notes"]
-    yield "joints[]", "object", "", told["joints"]
+    yield "not_enough_to_tell[]", "text", "", texts["not_told"]
+    yield "findings[]", "text", "", texts["findings"]
+    yield "notes[]", "text", "", texts["notes"]
+    yield "joints[]", "object", "", texts["joints"]
     yield from rows_of(JointDetection, "joints[].")
     yield "judgement", "text", "", lw.CommissioningResult.judgement.__doc__ or ""
-    yield "reference_used", "text", "", told["reference_used"]
+    yield "reference_used", "text", "", texts["reference_used"]
 
 
 def play() -> Iterator[Row]:
-    told = descriptions(PlayMeasurement)
+    texts = descriptions(PlayMeasurement)
     yield VERSION
     yield "is_sure", "true or false", "", PlayMeasurement.is_sure.__doc__ or ""
-    yield "plays[]", "object", "", told["plays"]
+    yield "plays[]", "object", "", texts["plays"]
     yield from rows_of(Play, "plays[].")
-    yield "clearances", "object or null", "", told["clearances"]
+    yield "clearances", "object or null", "", texts["clearances"]
     yield "clearances.joints[]", "object", "", descriptions(Clearances)["joints"]
     yield from rows_of(JointClearance, "clearances.joints[].")
     yield "clearances.findings[]", "text", "", descriptions(Clearances)["findings"]
@@ -172,10 +172,10 @@ def example(name: str) -> Any:
         joints = (JointClearance(joint="G", rad_per_m=(5.0,), most_m=0.001),)
         return json.loads(PlayMeasurement(plays=(one,), clearances=Clearances(joints=joints)).to_json())
     item = lw.CommissioningItem(name="crank.sign", value=1)
-    told = {"not_told": ("lag",), "findings": ("load",), "notes": ("note",)}
+    reasons = {"not_told": ("lag",), "findings": ("load",), "notes": ("note",)}
     cycles = {"clearances_m": (6.0e-4,), "cycles": (2.0,), "named_cycles": (math.nan,)}
     joint = JointDetection(joint="J", is_good=False, runner_up="", **cycles)
-    return lw.CommissioningResult(items=(item,), config=None, turns=1.0, joints=(joint,), **told).to_dict()
+    return lw.CommissioningResult(items=(item,), config=None, turns=1.0, joints=(joint,), **reasons).to_dict()
 
 
 @pytest.mark.plain
@@ -193,10 +193,10 @@ def test_every_field_is_described(name: str) -> None:
 
 @pytest.mark.parametrize("name", DOCUMENTS)
 def test_the_page_has_the_fields_of_a_document_and_no_others(name: str) -> None:
-    told = [(path.removesuffix("[]"), kind) for path, kind, _, _ in DOCUMENTS[name]()]
+    documented = [(path.removesuffix("[]"), kind) for path, kind, _, _ in DOCUMENTS[name]()]
     written = set(leaves(example(name)))
-    assert [leaf for leaf in written if not any(is_of(path, leaf) for path, _ in told)] == []
-    plain = [path for path, kind in told if not kind.startswith("object")]
+    assert [leaf for leaf in written if not any(is_of(path, leaf) for path, _ in documented)] == []
+    plain = [path for path, kind in documented if not kind.startswith("object")]
     assert [path for path in plain if not any(is_of(path, leaf) for leaf in written)] == []
 
 

@@ -83,5 +83,5 @@ def test_targets_and_verbs_of_every_page_are_there():
     for page in pages:
         text = page.read_text(encoding="utf-8")
         assert set(re.findall(r"`make ([a-z-]+)`", text)) <= targets, page
-        told = re.findall(r"(?:^|`)leg-wear-monitor ([a-z][a-z-]*)", text, re.MULTILINE)
-        assert set(told) <= verbs, page
+        named = re.findall(r"(?:^|`)leg-wear-monitor ([a-z][a-z-]*)", text, re.MULTILINE)
+        assert set(named) <= verbs, page

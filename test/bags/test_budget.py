@@ -1,4 +1,4 @@
-"""What a recording claims does not decide how much memory it gets; what it is not given, it is told of."""
+"""What a recording claims does not decide how much memory it gets; what it is not given is reported."""
 
 import os
 import struct

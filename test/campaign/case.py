@@ -46,7 +46,7 @@ class Ran:
 
 
 def never(_ran: Ran) -> str:
-    """An ``unsound`` for cases that have to be refused or told of."""
+    """An ``unsound`` for cases that have to be refused or reported."""
     return "nothing was said"
 
 
@@ -70,7 +70,7 @@ class Case:
         None, is the verdict: an Outcome and a text.
     prepare : callable, optional
         Called before, in the parent, with the same directory: what it takes is not measured.
-    is_told : callable
+    is_reported : callable
         Whether what was printed names the fault.
     unsound : callable
         Why what was printed is wrong; empty if it is what it would be without damage, or rightly so.
@@ -83,7 +83,7 @@ class Case:
     description: str
     run: Callable[[Path], tuple[Outcome, str] | None]
     prepare: Callable[[Path], object] | None = None
-    is_told: Callable[[Ran], bool] = says
+    is_reported: Callable[[Ran], bool] = says
     unsound: Callable[[Ran], str] = never
     memory_mb: float = 600.0
     seconds: float = 60.0
@@ -106,7 +106,7 @@ def evaluated(case: Case, ran: Ran) -> tuple[Outcome, str]:
         if len(lines) == 1:
             return Outcome.REFUSED, lines[0]
         return Outcome.CRASH, f"refused in {len(lines)} lines, expected one"
-    if case.is_told(ran):
+    if case.is_reported(ran):
         return Outcome.REPORTED, lines[0] if lines else ""
     why = case.unsound(ran)
     return (Outcome.SILENT, why) if why else (Outcome.SOUND, "")

@@ -89,7 +89,7 @@ class Stage:
         given_up = time.monotonic() + _PATIENCE_S
         while not until():
             if time.monotonic() > given_up:
-                raise TimeoutError(f"waited in vain for {what}; {self.told()}")
+                raise TimeoutError(f"waited in vain for {what}; {self.reported()}")
             self._executor.spin_once(timeout_sec=0.01)
 
     def send(self, publish: Callable[[object], None], messages: Iterable[object], together: int = 20) -> int:
@@ -128,8 +128,8 @@ class Stage:
 
         self.monitor._messages.diagnostics = kept  # type: ignore[method-assign]
 
-    def told(self) -> str:
-        """All that input, topics and load have said."""
+    def reported(self) -> str:
+        """All messages of input, topics and load."""
         return " | ".join(
             text for name in ("input", "topics", "load") for text in self.messages.get(name, ())
         )

@@ -89,7 +89,7 @@ def damaged(seed: int) -> Case:
 
 
 def compared(*paths: Path, true: Samples | None = None) -> tuple[Outcome, str]:
-    """What came of reading: told, as undamaged, or wrong without a word."""
+    """What came of reading: reported, as undamaged, or wrong without a word."""
     try:
         samples, recording = recordings_stored.read(*paths)
     except LegWearError as error:

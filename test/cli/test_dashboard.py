@@ -91,7 +91,7 @@ def test_it_serves_until_a_signal(ledger, name, host):
             assert process.wait(30) == 0
     finally:
         process.kill()
-        _, told = process.communicate()
-    warnings = told.splitlines()
+        _, stderr = process.communicate()
+    warnings = stderr.splitlines()
     assert len(warnings) == (host != "127.0.0.1")
     assert all("no password" in warning for warning in warnings)

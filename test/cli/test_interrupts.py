@@ -56,8 +56,8 @@ def test_while_modules_are_imported(tmp_path, module):
 
 
 def test_while_kernels_are_compiled(tmp_path):
-    code, (told, *rest) = interrupted(tmp_path, "check", "jansen_leg")
-    assert told.startswith("compiling numerical kernels")
+    code, (line, *rest) = interrupted(tmp_path, "check", "jansen_leg")
+    assert line.startswith("compiling numerical kernels")
     assert (code, rest) == (130, ["error: interrupted"])
 
 
@@ -66,8 +66,8 @@ def test_the_ledger_of_a_replay_that_is_still_compiling_is_left_in_order(tmp_pat
     pytest.importorskip("mcap")
     ledger, bag = tmp_path / "wear.db", share_directory() / "bags" / "healthy.mcap"
     line = ("replay", str(bag), "--ledger", str(ledger))
-    code, told = interrupted(tmp_path, *line, below="open_monitor")
-    assert (code, told[-1]) == (130, "error: interrupted")
+    code, lines = interrupted(tmp_path, *line, below="open_monitor")
+    assert (code, lines[-1]) == (130, "error: interrupted")
     with sqlite3.connect(ledger) as db:
         assert db.execute("SELECT closed FROM run").fetchall() == []
     db.close()

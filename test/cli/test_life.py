@@ -65,8 +65,8 @@ def test_life_tells_regime_limits_and_the_makers_own_life(run, refused, shipped,
     assert rule.exit_code == 0
     assert "B not counted: its pair gives no wear coefficient" in rule.stdout
     assert "nan" not in rule.stdout
-    (told,) = [one for one in rule.stdout.splitlines() if one.startswith("B: maker's rating life ")]
-    assert "all factors 1; its formula holds from 0.025 MPa m/s" in told
+    (rating,) = [one for one in rule.stdout.splitlines() if one.startswith("B: maker's rating life ")]
+    assert "all factors 1; its formula holds from 0.025 MPa m/s" in rating
     (tmp_path / "beside.yaml").write_text(
         text.replace("wear_coefficient: 1.0e-15", f"{pair}\n    wear_coefficient: 1.0e-15")
     )
@@ -77,7 +77,7 @@ def test_life_tells_regime_limits_and_the_makers_own_life(run, refused, shipped,
         in result.stdout
     )
     assert result.stdout.count("maker's rating life") == 2
-    assert told in result.stdout  # the formula knows nothing of a coefficient
+    assert rating in result.stdout  # the formula knows nothing of a coefficient
 
 
 def test_a_factor_on_the_wear_is_told_beside_the_coefficient(run):

@@ -40,13 +40,15 @@ def test_terminal_page_summary_and_status_agree(run, bag, tmp_path, unpainted):
     rows = {line.split()[0]: line.split() for line in result.stdout.splitlines() if line.strip()}
     lasting = result.stdout.split("lasts", 1)[1].splitlines()
     for name, joint in record["joints"].items():
-        told = joint["forecast"]
-        assert told["answer"].startswith("from the growth so far")
-        words = [three_digits(told[unit][fraction]) for unit in ("hours", "days") for fraction in FRACTIONS]
+        forecast = joint["forecast"]
+        assert forecast["answer"].startswith("from the growth so far")
+        words = [
+            three_digits(forecast[unit][fraction]) for unit in ("hours", "days") for fraction in FRACTIONS
+        ]
         assert [line.split()[1:] for line in lasting if line.startswith(f"{name} ")] == [words]
         assert re.search(r"\s*".join(f"<td[^>]*>{re.escape(word)}</td>" for word in words), page)
         assert [status[f"joint {name}"][f"{fraction}_days"] for fraction in FRACTIONS] == list(
-            told["days"].values()
+            forecast["days"].values()
         )
         assert rows[name][0] == name
     assert [line.split()[0] for line in lasting if line.startswith("leg ")] == ["leg"]

@@ -1,4 +1,4 @@
-"""`measure`: a clearance into the ledger, and what it is told."""
+"""`measure`: a clearance into the ledger, and the reply."""
 
 import json
 
@@ -94,10 +94,10 @@ def alarms(path):
 
 
 def verdict(path):
-    ((*told, evidence),) = rows_of(
+    ((*row, evidence),) = rows_of(
         path, "SELECT state, fault_code, evidence FROM verdict ORDER BY id DESC LIMIT 1"
     )
-    return *told, json.loads(evidence)
+    return *row, json.loads(evidence)
 
 
 @pytest.mark.parametrize(
@@ -144,15 +144,15 @@ def test_a_stop_by_a_limit_of_the_leg_is_not_judged_by_another_one(run, refused,
         alarms=(Alarm(kind="clearance", subject="G", present=Level.ERROR, sigma=1e-5, **stop),)
     )
     arguments = ("measure", "G", "0.5", "--sigma", "0.01", "--ledger", str(path))
-    told = "the limit of joint G is 0.45 mm in the ledger and 0.6 mm without parameters"
-    assert told in refused(*arguments)
+    fault = "the limit of joint G is 0.45 mm in the ledger and 0.6 mm without parameters"
+    assert fault in refused(*arguments)
     assert (rows(path), verdict(path)[0]) == ([], "stop")
     assert "at its limit" in run(*arguments, "--config", "mine.yaml").stdout
     assert verdict(path)[0] == "stop"
-    assert told in refused("measure", "--withdraw", "last", "--ledger", str(path))
+    assert fault in refused("measure", "--withdraw", "last", "--ledger", str(path))
     assert run("measure", "--withdraw", "last", "--ledger", str(path), "--config", "mine.yaml").exit_code == 0
     for verb in (("acknowledge",), ("reset", "A"), ("reset", "A", "--undo")):
-        assert told in refused(*verb, "--ledger", str(path))
+        assert fault in refused(*verb, "--ledger", str(path))
     assert verdict(path)[0] == "stop"
 
 

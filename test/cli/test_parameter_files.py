@@ -59,5 +59,5 @@ def test_the_sections_of_all_monitors_of_a_file_are_checked(run, refused, tmp_pa
 def test_lives_that_end_before_the_limit_are_told_by_check_and_at_the_start_of_a_replay(run, tmp_path):
     (tmp_path / "mine.yaml").write_text(BEGIN + "limits: {clearance_m: 0.0008}")
     for line in (("check", "mine.yaml"), ("replay", "none.mcap", "--config", "mine.yaml")):
-        told = run(*line).stderr.splitlines()[0]
-        assert told.startswith("warning: mine.yaml: forecast.life: the lives of this leg that come with")
+        warning = run(*line).stderr.splitlines()[0]
+        assert warning.startswith("warning: mine.yaml: forecast.life: the lives of this leg that come with")

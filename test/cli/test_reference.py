@@ -107,12 +107,12 @@ def test_the_load_of_references_is_told(run, tmp_path: Path) -> None:
     loaded = attrs.evolve(few, parameters=attrs.evolve(few.parameters, load=load))
     with (tmp_path / "leg.npz").open("wb") as file:
         reference_file.write_references(file, leg, [few, loaded])
-    told = ", references at 60, 60 rpm, 1 of 2 under 300 N on the foot"
+    text = ", references at 60, 60 rpm, 1 of 2 under 300 N on the foot"
     for model, end in (("none", ", not used with load.model none\n"), ("ground", "\n")):
         (tmp_path / "monitor.yaml").write_text(
             f"/**: {{ros__parameters: {{load: {{model: {model}}}, diagnosis: {{reference: leg.npz}}}}}}"
         )
-        assert told + end in run("check", "monitor.yaml").stdout
+        assert text + end in run("check", "monitor.yaml").stdout
 
 
 @pytest.mark.parametrize(

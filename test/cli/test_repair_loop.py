@@ -36,7 +36,7 @@ def ledger(knocked, tmp_path):
 
 
 def test_verdict_status_json_and_terminal_tell_one_story_of_the_joint(knocked):
-    place, told = knocked
+    place, output = knocked
     found = json.loads((place / "out" / "summary.json").read_text())
     evidence = found["verdict"]["evidence"][0]
     joint = found["clearances"]["G"]
@@ -47,7 +47,7 @@ def test_verdict_status_json_and_terminal_tell_one_story_of_the_joint(knocked):
     (status,) = (each for each in found["status"] if each["name"] == "joint G")
     assert (status["level"], status["fault_code"]) == ("ERROR", "CLEARANCE_SEEN_G")
     assert status["values"]["believed_m"] == joint["believed_m"]
-    (row,) = (line for line in told.splitlines() if line.startswith("G (knee)"))
+    (row,) = (line for line in output.splitlines() if line.startswith("G (knee)"))
     assert row.split()[2] == f"{1e3 * joint['believed_m']:.3f}"
     alarm = next(each for each in found["alarms"]["now"] if each["name"] == "clearance G")
     assert alarm["worst"] == joint["believed_m"]
@@ -114,9 +114,9 @@ def test_what_the_guides_say_of_this_recording_is_about_what_it_gives(knocked, g
     joint = json.loads((knocked[0] / "out" / "summary.json").read_text())["clearances"]["G"]
     value, sigma = (1e3 * joint[name] for name in ("believed_m", "believed_sigma_m"))
     text = (share_directory() / "docs" / guide).read_text(encoding="utf-8")
-    (told,) = re.findall(r"(2\.\d+) mm ± (0\.\d+) mm", text)
-    assert abs(float(told[0]) - value) < 0.5 * sigma
-    assert float(told[1]) == pytest.approx(sigma, rel=0.3)
+    (estimate,) = re.findall(r"(2\.\d+) mm ± (0\.\d+) mm", text)
+    assert abs(float(estimate[0]) - value) < 0.5 * sigma
+    assert float(estimate[1]) == pytest.approx(sigma, rel=0.3)
 
 
 def test_a_measurement_is_compared_with_what_the_torque_shows(run, ledger):
@@ -179,8 +179,8 @@ def test_a_repair_in_the_ledger_of_a_fleet_shows_at_the_next_update(run, tmp_pat
 
 def test_acknowledged_alarms_are_kept_as_such_but_not_by_a_dry_run(run, ledger, tmp_path):
     before = (tmp_path / "wear.ledger").read_bytes()
-    told = run("acknowledge", "--ledger", ledger, "--dry-run").stdout
-    assert told.splitlines()[-1] == "dry run: nothing was written"
+    output = run("acknowledge", "--ledger", ledger, "--dry-run").stdout
+    assert output.splitlines()[-1] == "dry run: nothing was written"
     assert (tmp_path / "wear.ledger").read_bytes() == before
     done = run("acknowledge", "--ledger", ledger)
     assert done.stdout == "cleared: none; still present: clearance G, torque_mismatch\n"

@@ -61,9 +61,9 @@ def test_a_reset_gives_new_surfaces_and_keeps_the_history(run, ledger):
     before, spans = content(ledger)
     result = run("reset", "G", "--ledger", str(ledger))
     assert (result.exit_code, result.stderr) == (0, "")
-    told = "joint G: new surfaces, 60 um of wear from 4000 gait cycles are set to 0, history kept"
+    reply = "joint G: new surfaces, 60 um of wear from 4000 gait cycles are set to 0, history kept"
     assert result.stdout.splitlines() == [
-        f"{told}; --undo reverts it",
+        f"{reply}; --undo reverts it",
         "alarms cleared: clearance G, impact_force G; still present: clearance A",
         "confirm by walking: the next gait cycles show whether the repair is good",
     ]

@@ -50,7 +50,7 @@ def test_the_page_is_drawn_again_from_the_data_alone(run, done, tmp_path):
 
 
 def test_a_fault_of_the_page_is_not_blamed_on_the_data(run, done, monkeypatch):
-    """Checksums have told by then that nothing was altered."""
+    """Checksums have shown by then that nothing was altered."""
     monkeypatch.setattr("leg_wear_monitor.report.study.page.study_page", lambda _results: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         run("report", "out")

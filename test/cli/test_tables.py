@@ -26,8 +26,8 @@ def table(tmp_path: Path) -> Path:
 def test_check_says_what_is_understood_of_a_table(run, table: Path) -> None:
     result = run("check", "monitor.yaml", "leg.csv")
     assert result.exit_code == 0, result.stderr
-    told = [line.strip() for line in result.stdout.splitlines()[1:]]
-    assert told == [
+    lines = [line.strip() for line in result.stdout.splitlines()[1:]]
+    assert lines == [
         "leg.csv       table of 1000 rows over 4.995 s, 200 rows a second; time from 't' in ms",
         "crank_angle from 'q' in deg: 1000 values, 0 to 6.252 rad",
         "drive_torque from 'tau' in N mm: 1000 values, 0 to 8 N m",
@@ -58,8 +58,8 @@ def test_check_says_that_no_value_of_a_column_can_be_used(run, table: Path) -> N
         for row in rows
     ]
     table.write_text("\n".join([head, *nothing, ""]))
-    told = run("check", "monitor.yaml", "leg.csv").stdout
-    assert "drive_torque from 'tau' in N mm: 1000 values, all of them NaN or infinite" in told
+    output = run("check", "monitor.yaml", "leg.csv").stdout
+    assert "drive_torque from 'tau' in N mm: 1000 values, all of them NaN or infinite" in output
 
 
 def test_a_missing_column_is_one_line(refused, table: Path) -> None:

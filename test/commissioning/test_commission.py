@@ -63,8 +63,8 @@ def check(robot: Robot, result: CommissioningResult, seconds: float) -> None:
     assert torque.source == robot.source
     assert torque.axis == robot.axis or robot.source != WRENCH
     assert torque.scale * torque.gear_ratio == pytest.approx(robot.scale, rel=TORQUE)
-    told = " ".join(result.not_told)
-    if "crank.gear_ratio" in told:
+    text = " ".join(result.not_told)
+    if "crank.gear_ratio" in text:
         turned = TURN * seconds  # at 60 rpm
         assert abs(crank.gear_ratio / robot.gear_ratio - 1.0) * turned < 2.0 * PHASE_RAD
         return

@@ -36,10 +36,10 @@ def test_hostile_yaml_is_one_line(tmp_path, what):
     text, said = HOSTILE[what]
     (tmp_path / "x.yaml").write_text(text)
     for load in (load_mechanism, load_config):
-        with pytest.raises(ConfigError) as told:
+        with pytest.raises(ConfigError) as error:
             load(tmp_path / "x.yaml")
-        assert "\n" not in str(told.value)
-        assert said in str(told.value) or "is not a ROS parameter file" in str(told.value)
+        assert "\n" not in str(error.value)
+        assert said in str(error.value) or "is not a ROS parameter file" in str(error.value)
     assert not (tmp_path / "pwned").exists()
 
 

@@ -33,10 +33,10 @@ def test_the_page_says_verdict_joints_and_lives(leg):
 def test_a_joint_that_opens_changes_verdict_alarms_and_joints(leg):
     before = leg.content()
     stop = {"state": State.STOP, "joints": ("G",), "fault_code": "CLEARANCE_G", "do": "stop it"}
-    told = state_of(11, **stop)
-    wide = attrs.evolve(told.clearances["G"], believed_m=7e-4, counted_m=7e-4, status=State.STOP)
-    told = attrs.evolve(told, clearances={**told.clearances, "G": wide}, alarms=raised("clearance G"))
-    leg.take_state(told.to_json())
+    state = state_of(11, **stop)
+    wide = attrs.evolve(state.clearances["G"], believed_m=7e-4, counted_m=7e-4, status=State.STOP)
+    state = attrs.evolve(state, clearances={**state.clearances, "G": wide}, alarms=raised("clearance G"))
+    leg.take_state(state.to_json())
     after = leg.content()
     assert leg.content().page == before.page
     assert "STOP" in after.regions["verdict"] and "Stop it".lower() in after.regions["verdict"].lower()
@@ -126,12 +126,12 @@ def shown(setup, clock, name, node=NODE):
         walk(leg, second)
     evidence = (Evidence(name, 1.0, 2.0, name),)
     verdict = {"state": State.STOP, "why": name, "do": name, "fault_code": name, "evidence": evidence}
-    told = attrs.evolve(state_of(4, **verdict), alarms=raised("clearance G", state=name))
-    joint = attrs.evolve(told.clearances["G"], believed_by=name, seen_m=4e-4, seen_by=(name,))
-    told = attrs.evolve(
-        told, clearances={**told.clearances, "G": joint, name: joint}, life_answers={"A": name}, life={}
+    state = attrs.evolve(state_of(4, **verdict), alarms=raised("clearance G", state=name))
+    joint = attrs.evolve(state.clearances["G"], believed_by=name, seen_m=4e-4, seen_by=(name,))
+    state = attrs.evolve(
+        state, clearances={**state.clearances, "G": joint, name: joint}, life_answers={"A": name}, life={}
     )
-    leg.take_state(told.to_json())
+    leg.take_state(state.to_json())
     leg.take_peaks({name: 1.0, "G": 2.0})
     return leg.content()
 

@@ -48,8 +48,8 @@ def run() -> Callable[..., Done]:
         finally:
             for number, handler in handlers.items():
                 signal.signal(number, handler)
-        told = err.getvalue().splitlines()
-        return Done(code, out.getvalue(), [line for line in told if line.startswith(FAULTS)])
+        lines = err.getvalue().splitlines()
+        return Done(code, out.getvalue(), [line for line in lines if line.startswith(FAULTS)])
 
     return call
 

@@ -24,7 +24,7 @@ def promised(entry: str) -> str:
     """Names and argument of an option, and what its help says in brackets: default, bounds, required."""
     name, _, rest = entry.partition("\n") if "  " not in entry.split("\n")[0] else entry.partition("  ")
     brackets = re.findall(r"\[((?:default:|required|x?[<>=\d.]+x?)[^]]*)\]", " ".join(rest.split()))
-    return "  " + "  ".join([name.strip(), *(each for told in brackets for each in told.split("; "))])
+    return "  " + "  ".join([name.strip(), *(each for bracket in brackets for each in bracket.split("; "))])
 
 
 def commands(help_of: Callable[..., str], *verb: str) -> Iterator[str]:

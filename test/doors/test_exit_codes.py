@@ -86,6 +86,6 @@ def test_what_could_not_be_is_one_line_that_names_it(run, line: str, said: str) 
     before = sorted(Path().iterdir())
     done = run(*line.split())
     assert (done.code, done.out) == (2, "")
-    (told,) = done.lines
-    assert told.startswith("error: ") and said in told
+    (fault,) = done.lines
+    assert fault.startswith("error: ") and said in fault
     assert sorted(Path().iterdir()) == before

@@ -34,10 +34,10 @@ def test_a_simulation_has_these_fields_and_no_others(run, unknown, model: str) -
     short = ("--mechanism", "four_bar", "--model", model, "--cycles", 1, "--trace", 4)
     done = run("simulate", *short, "--json", "-")
     assert done.code == 0
-    told = json.loads(done.out)
-    assert unknown("simulation", told) == set()
-    assert told.pop("wall_s") * told.pop("real_time_factor") == pytest.approx(told["simulated_s"])
-    assert told == json.loads(lw.simulate("four_bar", model=model, cycles=1, trace=4).to_json())
+    written = json.loads(done.out)
+    assert unknown("simulation", written) == set()
+    assert written.pop("wall_s") * written.pop("real_time_factor") == pytest.approx(written["simulated_s"])
+    assert written == json.loads(lw.simulate("four_bar", model=model, cycles=1, trace=4).to_json())
 
 
 if __name__ == "__main__":

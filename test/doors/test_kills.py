@@ -37,7 +37,7 @@ def parameters(home: Path) -> str:
     return str(file)
 
 
-def told(reports) -> list[object]:
+def reported(reports) -> list[object]:
     """What reports say, to the bit."""
     cycles = [repr(cycle) for each in reports for cycle in each.cycles]
     alarms = [repr(change) for each in reports for change in (*each.alarms, *each.verdicts)]
@@ -50,9 +50,9 @@ def test_a_restored_monitor_reports_to_the_bit_what_the_first_one_did(walker) ->
     for block in blocks[:23]:
         monitor.update(block)
     middle = monitor.snapshot()
-    first, worn = told([monitor.update(block) for block in blocks[23:]]), monitor.wear_depth_m.tobytes()
+    first, worn = reported([monitor.update(block) for block in blocks[23:]]), monitor.wear_depth_m.tobytes()
     monitor.restore(middle)
-    assert told([monitor.update(np.concatenate(blocks[23:]))]) == first
+    assert reported([monitor.update(np.concatenate(blocks[23:]))]) == first
     assert monitor.wear_depth_m.tobytes() == worn
     assert len(first[0]) >= 3
 

@@ -169,9 +169,9 @@ def test_python_gives_what_the_command_line_writes_byte_for_byte(bag: Replayed, 
     result = lw.replay(bag.path, bag.path.with_suffix(".yaml"), out=tmp_path)
     assert (tmp_path / "reports.mcap").read_bytes() == (bag.out / "reports.mcap").read_bytes()
     clock = {"wall_s", "real_time_factor", "made_with"}
-    told = json.loads(result.summary().to_json())
-    assert told.keys() == bag.found.keys()
-    assert [key for key in told.keys() - clock if told[key] != bag.found[key]] == []
+    summary = json.loads(result.summary().to_json())
+    assert summary.keys() == bag.found.keys()
+    assert [key for key in summary.keys() - clock if summary[key] != bag.found[key]] == []
 
 
 def test_the_page_is_one_file_that_the_data_give_again(bag: Replayed, run) -> None:

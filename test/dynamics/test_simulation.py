@@ -253,7 +253,7 @@ def test_a_mechanism_can_be_given_by_name_and_by_path(leg, tmp_path):
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(given, said):
-    with pytest.raises(ConfigError) as told:
+    with pytest.raises(ConfigError) as error:
         simulate(**{"mechanism": "bionic_leg", **given})
-    assert said in str(told.value)
-    assert "\n" not in str(told.value)
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)

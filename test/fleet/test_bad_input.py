@@ -100,8 +100,8 @@ def test_when_the_parameters_are_mended_it_is_counted(lab, command, tmp_path):
     lab("a/1.csv", names=["t_ms", "angle_deg", "torque"])
     assert command("fleet", "update")[0] == 1
     (tmp_path / "lab.yaml").write_text(CONFIG.replace("torque_Nmm", "torque"))
-    code, told, warned = command("fleet", "update")
-    assert (code, told[0], warned) == (0, "recordings: 1 counted now", [])
+    code, lines, warned = command("fleet", "update")
+    assert (code, lines[0], warned) == (0, "recordings: 1 counted now", [])
 
 
 @pytest.mark.parametrize(("factor", "size"), [(1.0, "only "), (1.0e6, "")])
@@ -116,18 +116,18 @@ def test_a_unit_that_is_wrong_by_1000(lab, command, factor, size):
 def test_a_clock_that_begins_anew_in_each_file(lab, command):
     lab("a/1.csv", begin_ms=5)
     lab("a/2.csv", begin_ms=5, seed=1)
-    code, told, (line,) = command("fleet", "update")
-    assert code == 1 and told[0] == "recordings: 1 counted now"
+    code, lines, (line,) = command("fleet", "update")
+    assert code == 1 and lines[0] == "recordings: 1 counted now"
     assert line.startswith("warning: a: a/") and "csv: already counted; " in line
     assert "all of its time is that of recordings before it" in line and "its clock is wrong" in line
-    assert any("stamps without a date" in told for told in command("check")[1])
+    assert any("stamps without a date" in each for each in command("check")[1])
 
 
 def test_clocks_that_overlap_in_part(lab, command, tmp_path):
     lab("a/1.csv")
     lab("a/2.csv", begin_ms=BEGIN_MS + 2000, seed=1)
-    code, told, warned = command("fleet", "update")
-    assert (code, warned, told[0]) == (0, [], "recordings: 2 counted now")
+    code, lines, warned = command("fleet", "update")
+    assert (code, warned, lines[0]) == (0, [], "recordings: 2 counted now")
     log = (tmp_path / "fleet/legs/a/log").read_text().splitlines()
     assert "s of it are in the ledger already: not counted again" in log[1]
 
@@ -135,14 +135,14 @@ def test_clocks_that_overlap_in_part(lab, command, tmp_path):
 def test_check_says_what_was_understood(lab, command):
     lab("a/1.csv")
     lab("a/2.csv", begin_ms=BEGIN_MS + 60_000)
-    code, told, warned = command(
+    code, lines, warned = command(
         "check", legs='{id: a, recordings: "a/*", lot: x}, {id: b, recordings: "b/*"}'
     )
     assert code == 1
-    assert told[0].startswith("lab.yaml      parameters of the monitor: bionic_leg")
-    assert "fleet of 2 legs, 2 recordings, kept in " in told[1]
-    assert told[2].strip().startswith("a: 2 recordings, 0.0") and told[2].endswith(
+    assert lines[0].startswith("lab.yaml      parameters of the monitor: bionic_leg")
+    assert "fleet of 2 legs, 2 recordings, kept in " in lines[1]
+    assert lines[2].strip().startswith("a: 2 recordings, 0.0") and lines[2].endswith(
         "parameters lab.yaml; lot x"
     )
-    assert told[3].strip() == "b: 0 recordings, 0 MB; parameters lab.yaml"
+    assert lines[3].strip() == "b: 0 recordings, 0 MB; parameters lab.yaml"
     assert len(warned) == 1 and warned[0].endswith("legs.b.recordings: b/* matches no recording")

@@ -43,10 +43,10 @@ def test_followed_it_outlasts_another_update_and_a_description_that_is_half_writ
     runner = CliRunner(mix_stderr=False) if old else CliRunner()
     arguments = ["fleet", "update", str(path), "--out", str(tmp_path / "out"), "--workers", "1", "--follow"]
     done = runner.invoke(cli, arguments)
-    told = [line for line in done.stderr.splitlines() if "matches no recording" not in line]
-    assert done.exit_code == 0 and len(told) == 2, done.output
-    assert told[0].endswith("is being updated by another process; wait for its end; tried again")
-    assert told[1].startswith(f"warning: {path}: ") and told[1].endswith("; tried again")
+    lines = [line for line in done.stderr.splitlines() if "matches no recording" not in line]
+    assert done.exit_code == 0 and len(lines) == 2, done.output
+    assert lines[0].endswith("is being updated by another process; wait for its end; tried again")
+    assert lines[1].startswith(f"warning: {path}: ") and lines[1].endswith("; tried again")
 
 
 @pytest.fixture

@@ -128,18 +128,18 @@ def test_what_the_system_could_not_read_is_named_and_tried_again(
 
 
 def test_interrupted_between_two_recordings_it_goes_on_there(home, updated, update, tmp_path):
-    told = []
+    lines = []
 
     def interrupt(*line):
-        told.append(line)
-        if len(told) == 2:
+        lines.append(line)
+        if len(lines) == 2:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         update(home / "fleet.yaml", tmp_path, report=interrupt)
     assert not (tmp_path / "fleet.json").exists()
     update(home / "fleet.yaml", tmp_path, report=interrupt)
-    assert len(told) == 4
+    assert len(lines) == 4
     assert contents(tmp_path) == contents(updated)
 
 
@@ -174,9 +174,9 @@ def test_a_line_that_was_cut_off_is_written_again(home, updated, update, tmp_pat
 def test_a_copy_counts_once(walk, describe, update, tmp_path):
     path = walk(tmp_path / "a/1.mcap")
     shutil.copy(path, tmp_path / "a/2.mcap")
-    description, out, told = describe(tmp_path, "a"), tmp_path / "out", []
-    assert update(description, out, report=lambda *line: told.append(line)).counted == 1
-    assert told[0] == ("a", "a/2.mcap: is a copy of a/1.mcap, counted once")
+    description, out, lines = describe(tmp_path, "a"), tmp_path / "out", []
+    assert update(description, out, report=lambda *line: lines.append(line)).counted == 1
+    assert lines[0] == ("a", "a/2.mcap: is a copy of a/1.mcap, counted once")
     path.rename(tmp_path / "a/3.mcap")
     assert update(description, out).counted == 0
     shutil.copy(tmp_path / "a/3.mcap", tmp_path / "a/0.mcap")
@@ -303,8 +303,8 @@ def test_a_leg_is_forecast_with_what_others_measured(walk, update, tmp_path):
     ledger = LegDirectory(out, "old").ledger
     counted = lines(out, "old")["old/1.mcap"]["clearances"]["A"]["counted_m"]
     line = ["measure", "A", f"{1e3 * counted + 0.01:.4f}", "--sigma", "0.001", "--ledger", str(ledger)]
-    told = CliRunner().invoke(cli, line)
-    assert told.exit_code in (0, 1), told.output
+    result = CliRunner().invoke(cli, line)
+    assert result.exit_code in (0, 1), result.output
     walk(tmp_path / "new/1.mcap", seed=2)
     with path.open("a") as file:
         file.write('  - {id: new, recordings: "new/*", lot: "2026-03"}\n')

@@ -95,7 +95,7 @@ def test_what_ends_a_life_is_told(material, width, limited_by):
 def test_a_joint_beyond_a_limit_comes_first_and_one_that_is_not_known_last():
     """Nobody knows how soon a pin beyond its maker's limit ends; one that does not wear never does."""
 
-    def told(*present):
+    def ordered(*present):
         made = lw.Design(
             mechanism="", duty=read_duty("0:8"), hours=1.0, limit_m=6e-4, loads=STEADY, own=present,
             pairs=(), candidates=(), sensitivities=(),
@@ -112,14 +112,14 @@ def test_a_joint_beyond_a_limit_comes_first_and_one_that_is_not_known_last():
         joint("X", "iglidur-j-on-steel", 3e-4),
     )
     still = joint("N", material="", wear_coefficient=(0.0, 0.0))
-    order, first = told(unknown, sound, still, beyond)
+    order, first = ordered(unknown, sound, still, beyond)
     assert order == ["X", "S", "N", "U"]
     hours = f"{float(f'{sound.sure_h:.3g}'):.0f}"
     assert first.startswith("make X better first: outside the limits of iglidur-j-on-steel: p ")
     assert first.endswith(f"; then S, {hours} h")
-    assert told(unknown, sound)[1] == f"make S better first: nine of ten last {hours} h"
-    assert told(unknown)[1] == "no joint's life is known with its present bushing"
-    assert told(still, unknown)[1] == "no joint whose life is known wears with its present bushing"
+    assert ordered(unknown, sound)[1] == f"make S better first: nine of ten last {hours} h"
+    assert ordered(unknown)[1] == "no joint's life is known with its present bushing"
+    assert ordered(still, unknown)[1] == "no joint whose life is known wears with its present bushing"
     assert still.life_words == "does not wear: its wear coefficient is 0"
 
 

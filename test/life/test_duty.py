@@ -114,9 +114,9 @@ def test_the_table_has_hours_days_and_the_growth_under_each_load(leg):
     ],
 )
 def test_a_duty_that_cannot_be_is_refused(text, fault):
-    with pytest.raises(ConfigError) as told:
+    with pytest.raises(ConfigError) as error:
         lw.Duty.parse(text)
-    assert str(told.value).startswith(f"duty: {fault}")
+    assert str(error.value).startswith(f"duty: {fault}")
 
 
 @pytest.mark.plain

@@ -134,10 +134,10 @@ def test_jumps_meet_every_single_cycle(leg):
 )
 def test_a_limit_lies_between_the_new_clearance_and_the_bushing(lived, limit_m, meant):
     """Nothing else ends a life: below, the limit is behind from the start; above, no clearance gets there."""
-    with pytest.raises(ConfigError, match=r"^limit-m: .* is not between 0.0003 m, the new clearance") as told:
+    with pytest.raises(ConfigError, match=r"^limit-m: .* is not between 0.0003 m, the new clearance") as info:
         simulate_life(lived[0], limit_m=limit_m, horizon_cycles=1e9)
-    assert "0.01 m, the radius of its bushing" in str(told.value)
-    assert str(told.value).endswith(meant or "bushing")
+    assert "0.01 m, the radius of its bushing" in str(info.value)
+    assert str(info.value).endswith(meant or "bushing")
 
 
 def test_every_joint_has_a_limit_of_its_own(lived):

@@ -52,7 +52,7 @@ def same(mine, theirs):
 
 
 def expected_crank(message, crank):
-    """What a JointState means, told once more in plain words: fault, position, velocity, effort."""
+    """What a JointState means, given once more in plain words: fault, position, velocity, effort."""
     nothing = (math.nan, math.nan, math.nan)
     count = len(message.name)
     if not count or not len(message.position):
@@ -135,7 +135,7 @@ interface_values = st.one_of(
 
 
 def expected_interface(message):
-    """What a DynamicJointState means, told once more in plain words: fault, torque, temperature."""
+    """What a DynamicJointState means, given once more in plain words: fault, torque, temperature."""
     names, values = list(message.joint_names), list(message.interface_values)
     if not names or not values:
         return EMPTY, math.nan, math.nan

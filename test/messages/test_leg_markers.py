@@ -193,8 +193,8 @@ def test_markers_are_the_same_however_reports_are_cut(monitor, drawing, cuts):
         markers, rows = LegMarkers(monitor, drawing), []
         for begin, end in pairwise([0, *edges, len(at_s)]):
             fields = {one.name: getattr(whole, one.name)[begin:end] for one in attrs.fields(SampleReports)}
-            told = tuple(change for at, change in changes if begin <= at < end)
-            drawn = markers.of(reports(SampleReports(**fields), told))
+            known = tuple(change for at, change in changes if begin <= at < end)
+            drawn = markers.of(reports(SampleReports(**fields), known))
             rows += [one.messages[0].tobytes() for one in drawn if one.output in outputs]
         return rows
 

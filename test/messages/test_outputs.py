@@ -100,13 +100,13 @@ def sent(store, reports):
 
 def test_the_state_is_json_with_the_verdict_of_its_findings(sent):
     (message,) = sent[STATE.name]
-    told, expected = json.loads(message.data), made_up_state().to_dict()
-    assert (told["verdict"]["state"], told["clearances"]["A"]["status"]) == ("healthy", "healthy")
-    for one in (told, expected):
+    found, expected = json.loads(message.data), made_up_state().to_dict()
+    assert (found["verdict"]["state"], found["clearances"]["A"]["status"]) == ("healthy", "healthy")
+    for one in (found, expected):
         del one["verdict"]
         for joint in one["clearances"].values():
             del joint["status"]
-    assert told == expected
+    assert found == expected
 
 
 def test_forces_are_of_the_crank_samples_that_were_followed(sent):
@@ -200,12 +200,12 @@ def test_a_forecast_says_what_is_known(store, reports):
     raw = Messages(MonitorConfig(), CLEARANCE_JOINTS).forecast(
         attrs.evolve(cycle, joints=(*cycle.joints, third))
     )
-    *unknown, told = store.deserialize_cdr(raw, FORECAST.type).status
+    *unknown, leg = store.deserialize_cdr(raw, FORECAST.type).status
     values = {pair.key: pair.value for status in unknown for pair in status.values}
     assert [status.message for status in unknown] == 2 * ["not enough growth or data"]
     assert values == {"fault_code": "NONE"}
-    assert told.message == Answer.KNOWN.value
-    values = {pair.key: pair.value for pair in told.values}
+    assert leg.message == Answer.KNOWN.value
+    values = {pair.key: pair.value for pair in leg.values}
     assert [values[f"{fraction}_hours"] for fraction in ("p10", "p50", "p90")] == ["1", "2", "3"]
     assert (values["clearance_p90_m"], values["measurements"]) == ("3", "2")
 
@@ -221,17 +221,19 @@ def test_the_leg_s_forecast_is_a_status_after_those_of_the_joints(store, reports
         simulated_lives=9,
     )
     raw = Messages(MonitorConfig(), CLEARANCE_JOINTS).forecast(attrs.evolve(reports.cycles[0], forecast=leg))
-    *joints, told = store.deserialize_cdr(raw, FORECAST.type).status
+    *joints, of_leg = store.deserialize_cdr(raw, FORECAST.type).status
     assert [status.name.split(": ")[1] for status in joints] == ["forecast A", "forecast G"]
-    assert (told.name, told.message) == ("leg_wear_monitor: forecast leg", Answer.KNOWN.value)
-    values = {pair.key: pair.value for pair in told.values}
+    assert (of_leg.name, of_leg.message) == ("leg_wear_monitor: forecast leg", Answer.KNOWN.value)
+    values = {pair.key: pair.value for pair in of_leg.values}
     assert [values[f"{fraction}_cycles"] for fraction in ("p10", "p50", "p90")] == ["1", "2", "3"]
     assert (values["A_first_probability"], values["simulated_lives"]) == ("0.75", "9")
 
 
 def test_diagnostics_are_the_monitors_status(store):
-    told = (Status("input", Level.WARN, "see: input_gaps", {"crank_rate_hz": 199.5}, "INPUT_GAPS"),)
-    raw = Messages(MonitorConfig(hardware_id="left"), CLEARANCE_JOINTS, node="monitor").diagnostics(7, told)
+    statuses = (Status("input", Level.WARN, "see: input_gaps", {"crank_rate_hz": 199.5}, "INPUT_GAPS"),)
+    raw = Messages(MonitorConfig(hardware_id="left"), CLEARANCE_JOINTS, node="monitor").diagnostics(
+        7, statuses
+    )
     (status,) = store.deserialize_cdr(raw, DIAGNOSTICS.type).status
     assert (status.name, status.level, status.hardware_id) == ("monitor: input", 1, "left")
     values = [(pair.key, pair.value) for pair in status.values]
@@ -253,8 +255,8 @@ def test_topics_are_of_the_node(store):
 
 @pytest.mark.parametrize("cuts", [[], [3], [1, 2, 3, 4, 5, 6, 7]])
 def test_forecasts_are_due_by_stamps_however_reports_are_cut(reports, cuts):
-    """Seconds of gait cycles and of changes in order of arrival; some changes are told before their time."""
-    second, told = 10**9, []
+    """Seconds of gait cycles and of changes in order of arrival; some changes come before their time."""
+    second, due = 10**9, []
     arrivals = [("cycle", 1), ("change", 2.1), ("cycle", 2), ("cycle", 3), ("cycle", 4), ("change", 5),
                 ("cycle", 5), ("cycle", 70)]  # fmt: skip
     times = ForecastTimes()
@@ -267,8 +269,8 @@ def test_forecasts_are_due_by_stamps_however_reports_are_cut(reports, cuts):
         ]
         alarms = [AlarmList(round(at * second), ()) for what, at in part if what == "change"]
         now = attrs.evolve(reports, cycles=tuple(cycles), alarms=tuple(alarms))
-        told += [cycle.stamp_ns / second for cycle in times.due(now)]
-    assert told == [1, 3, 5, 70]
+        due += [cycle.stamp_ns / second for cycle in times.due(now)]
+    assert due == [1, 3, 5, 70]
 
 
 @pytest.mark.parametrize(

@@ -39,9 +39,9 @@ class Coverage:
             "sigma": self.within_sigma,
             "2 sigma": self.within_two_sigma,
         }
-        told = ", ".join(f"{name} {100.0 * part / self.measured:.1f} %" for name, part in parts.items())
+        words = ", ".join(f"{name} {100.0 * part / self.measured:.1f} %" for name, part in parts.items())
         return (
-            f"{self.measured} measured, {self.refused} refused, {self.findings} with findings; within {told}"
+            f"{self.measured} measured, {self.refused} refused, {self.findings} with findings; within {words}"
         )
 
 
@@ -101,8 +101,8 @@ if __name__ == "__main__":
     for signal in SIGNALS:
         for counts in (2.0, 8.0, 14.8):
             errors = np.abs(servo_errors(range(number), signal, counts=counts))
-            told = errors[np.isfinite(errors)]
+            known = errors[np.isfinite(errors)]
             print(
-                f"  {signal}, play {counts}: {np.median(told):.2f}, {told.max():.2f}; "
-                f"{np.count_nonzero(told <= 1.0)} of {number}; {number - len(told)}"
+                f"  {signal}, play {counts}: {np.median(known):.2f}, {known.max():.2f}; "
+                f"{np.count_nonzero(known <= 1.0)} of {number}; {number - len(known)}"
             )

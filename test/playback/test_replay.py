@@ -236,10 +236,10 @@ def test_what_two_recordings_have_in_common_is_counted_once_and_told(
     parts = [write_messages(tmp_path / "a.mcap", a), write_messages(tmp_path / "b.mcap", b)]
     one, other = (lw.replay(parts[i], lw.MonitorConfig(), ledger=tmp_path / "own.db") for i in order)
     assert not one.findings
-    (told,) = other.findings
-    assert str(told).startswith(f"{parts[order[1]]}: ")
-    assert str(told).endswith(" s of it are in the ledger already: not counted again")
-    common_s = float(told.text.split()[0])
+    (finding,) = other.findings
+    assert str(finding).startswith(f"{parts[order[1]]}: ")
+    assert str(finding).endswith(" s of it are in the ledger already: not counted again")
+    common_s = float(finding.text.split()[0])
     lag_s, lost_s = 0.3, 0.3  # what the tracker leaves at an end, and what it needs at a begin
     assert 2.0 - lag_s - lost_s <= common_s <= 2.0
     assert other.monitor.verdict.verdict.fault_code != "ALREADY_COUNTED"

@@ -54,10 +54,10 @@ def clearances(result: ReplayResult) -> np.ndarray:
 
 def test_the_summary_says_what_was_followed(sampled):
     summary = sampled.summary()
-    told = summary.sampling
-    assert told.fraction == SAMPLE
-    assert told.followed_cycles + told.estimated_cycles == pytest.approx(summary.cycles, abs=1.0)
-    assert 0.2 < told.followed_cycles / summary.cycles < 0.7
+    sampling = summary.sampling
+    assert sampling.fraction == SAMPLE
+    assert sampling.followed_cycles + sampling.estimated_cycles == pytest.approx(summary.cycles, abs=1.0)
+    assert 0.2 < sampling.followed_cycles / summary.cycles < 0.7
     assert "gait cycles were followed" in summary.verdict.why
     evidence = {each.name: each.value for each in summary.verdict.evidence}
     assert evidence["sampled fraction"] == SAMPLE
@@ -65,7 +65,7 @@ def test_the_summary_says_what_was_followed(sampled):
     status = next(each for each in summary.status if each.name == "sampling")
     assert status.values["A_sigma_m"] == summary.joints["A"].sampling_sigma_m
     known = np.isfinite(summary.history.peak_force_n["A"])
-    assert known.sum() == told.followed_cycles
+    assert known.sum() == sampling.followed_cycles
     assert summary.joints["A"].peak_force_n == summary.history.peak_force_n["A"][known].max()
 
 

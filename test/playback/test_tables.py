@@ -59,12 +59,12 @@ def test_a_csv_file_is_replayed_bit_for_bit_as_the_bag(
 ) -> None:
     table, config, (expected, place) = write_csv(tmp_path / "walk.csv", walked), config_from(NS), replayed
     found = lw.replay(table, config, out=tmp_path, ledger=tmp_path / "own.ledger")
-    told, of_bag = (json.loads(result.summary().to_json()) for result in (found, expected))
-    assert told["verdict"]["state"] == "healthy"
-    assert told["recording"].pop("files") == [str(table)]
+    of_table, of_bag = (json.loads(result.summary().to_json()) for result in (found, expected))
+    assert of_table["verdict"]["state"] == "healthy"
+    assert of_table["recording"].pop("files") == [str(table)]
     assert of_bag["recording"].pop("files") == [str(bag)]
-    told["monitor"].pop("ledger", None), of_bag["monitor"].pop("ledger", None)
-    assert told == of_bag
+    of_table["monitor"].pop("ledger", None), of_bag["monitor"].pop("ledger", None)
+    assert of_table == of_bag
     assert messages_of(tmp_path / REPORTS_FILE) == messages_of(place / REPORTS_FILE)
     assert found.monitor.wear_depth_m.tobytes() == expected.monitor.wear_depth_m.tobytes()
     again = lw.replay(bag, config, ledger=tmp_path / "own.ledger")

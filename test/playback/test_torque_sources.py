@@ -119,8 +119,8 @@ def test_efforts_that_are_not_one_a_joint_raise_alarms(
 def test_an_interface_that_is_not_there_is_told_with_those_that_are(write: Callable[..., Path]) -> None:
     result = replayed(write("interface"), "interface", interface="motor_current")
     assert {alarm.name for _, alarm in result.history.changes} >= {"input_rate torque"}
-    told = [finding.text for finding in result.findings if "dynamic_joint_states" in finding.text]
-    assert told == [
+    texts = [finding.text for finding in result.findings if "dynamic_joint_states" in finding.text]
+    assert texts == [
         f"{result.crank_samples} messages of dynamic_joint_states: crank has no interface 'motor_current', "
         "it has effort, position; set drive_torque.interface"
     ]

@@ -93,7 +93,7 @@ class Legs:
         before: Callable[[float], None] = lambda _: None,
         start_ns: int = START_NS,
     ) -> None:
-        """Publish a part of a walk, no faster than it is taken in; ``before`` is told when each block is."""
+        """Publish a part of a walk, no faster than it is taken in; ``before`` gets the time of each block."""
         if monitor:
             wait_for(lambda: self.listeners() > 0, "the monitor's subscriptions")
         part = [one for one in walk.readings if begin_s <= one.arrival_s < end_s]

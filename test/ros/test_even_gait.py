@@ -1,4 +1,4 @@
-"""An even gait over real DDS: followed, told, recorded, replayed; and all that a layout of a tool names."""
+"""An even gait over real DDS: followed, recorded, replayed; and all that a layout of a tool names."""
 
 import json
 from pathlib import Path
@@ -73,9 +73,9 @@ def followed(shared_stage, walk, tmp_path_factory: pytest.TempPathFactory) -> Fo
     graph = dict(shared_stage.node.get_topic_names_and_types())
     monitor.stop()
     replayed = lw.replay(recording, live.config, out=out).monitor
-    told = {topic: (graph[topic][0], list(messages)) for topic, messages in heard.items()}
+    received = {topic: (graph[topic][0], list(messages)) for topic, messages in heard.items()}
     reports = out / "reports.mcap"
-    return Followed(told, decoded(reports), recording, stops, reports, live, replayed)
+    return Followed(received, decoded(reports), recording, stops, reports, live, replayed)
 
 
 def decoded(path: Path) -> Run:

@@ -1,4 +1,4 @@
-"""The synthetic leg as a node: everything it walks is published, in order, and its truth is told."""
+"""The synthetic leg as a node: everything it walks is published, in order, with its truth."""
 
 import json
 import threading

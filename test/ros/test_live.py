@@ -97,11 +97,11 @@ def test_a_publisher_that_does_not_fit_is_told_of(stage, walk) -> None:
     heard = stage.listen("/diagnostics", DiagnosticArray)
     stage.legs(reliable=False)
 
-    def told() -> bool:
+    def is_named() -> bool:
         why = "/joint_states: /stage has a lower quality of service than this node requests (Best effort pub"
         return any(why in line.message for message in heard for line in message.status)
 
-    stage.wait_for(told, "a line about reliability")
+    stage.wait_for(is_named, "a line about reliability")
     assert levels(heard[-1])["topics"] == 2
     assert not any("/drive_torque: /stage has" in line.message for line in heard[-1].status)  # it fits
     assert monitor.received == 0

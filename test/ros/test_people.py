@@ -143,9 +143,9 @@ def test_another_wear_coefficient_than_that_of_the_ledger_is_logged(
     with made_node(wear_coefficients_per_pa=[1.0e-15], **given) as node:
         node.monitor._twin.set_depth(np.full((1, 2, 720), 3.0e-5))
     with made_node("--log-level", "warn", wear_coefficients_per_pa=[2.0e-15], **given):
-        told = capfd.readouterr().err
-        assert "wear coefficient of joint G: 4e-15 1/Pa (bushing and" in told
-        assert "usual are" not in told
+        err = capfd.readouterr().err
+        assert "wear coefficient of joint G: 4e-15 1/Pa (bushing and" in err
+        assert "usual are" not in err
     with made_node("--log-level", "warn", wear_coefficients_per_pa=[2.0e-7], clearance_joints=["G"]):
         assert "wear_coefficients_per_pa: 2e-07 1/Pa, usual are below" in capfd.readouterr().err
 

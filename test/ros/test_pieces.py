@@ -1,4 +1,4 @@
-"""Parts of the nodes by themselves: the inbox, the black box, how load is told, malformed messages."""
+"""Parts of the nodes by themselves: the inbox, the black box, how load is reported, malformed messages."""
 
 import os
 from pathlib import Path
@@ -121,15 +121,15 @@ def test_falling_behind_is_told_and_then_over() -> None:
     assert load_status(load, box).level is Level.OK
     assert load.note(1.0)
     load.note(0.0)
-    told = load_status(load, box)
-    assert (told.level, told.message.endswith("samples are not published")) == (Level.WARN, True)
+    status = load_status(load, box)
+    assert (status.level, status.message.endswith("samples are not published")) == (Level.WARN, True)
     load.worst_delay_s = 1.0
-    told = load_status(load, box, is_recorded=True)  # then they are
-    assert (told.level, told.message.endswith("samples are published late")) == (Level.WARN, True)
+    status = load_status(load, box, is_recorded=True)  # then they are
+    assert (status.level, status.message.endswith("samples are published late")) == (Level.WARN, True)
     for number in range(5):
         box.add(JOINT_STATE, b"", number)
-    told = load_status(load, box)
-    assert (told.level, told.values["shed_messages"]) == (Level.ERROR, 2.0)
+    status = load_status(load, box)
+    assert (status.level, status.values["shed_messages"]) == (Level.ERROR, 2.0)
     assert load_status(load, box).level is Level.OK
 
 
@@ -140,8 +140,12 @@ def test_what_is_lost_while_the_node_is_late_was_dropped_by_it() -> None:
     assert load_status(load, box).level is Level.OK
     assert load.late_ns(9 * second) == 4 * second
     load.note_lost(10, 9 * second)
-    told = load_status(load, box)
-    assert (told.level, told.values["shed_messages"], told.values["worst_delay_s"]) == (Level.ERROR, 7.0, 4.0)
+    status = load_status(load, box)
+    assert (status.level, status.values["shed_messages"], status.values["worst_delay_s"]) == (
+        Level.ERROR,
+        7.0,
+        4.0,
+    )
     assert load.is_late(17 * second)
     assert not load.is_late(18 * second)
     load.note_lost(20, 18 * second)
@@ -181,12 +185,12 @@ def test_what_is_said_of_a_topic(fields: dict, now_s: int, level: Level, message
     """The node began at 1 s, the last message was at 10 s."""
     known = {"publishers": Publishers(("/driver",)), "heard_ns": 10 * SECOND, "heard_wall_ns": START_NS}
     one = InputTopic("/left/joint_states", STREAMS[0], **(known | fields))
-    told = topics_status([one], now_s * SECOND, SECOND)
-    assert told.level is level
-    assert message in told.message
-    assert told.values["joint_states_publishers"] == len(one.publishers.fitting)
+    status = topics_status([one], now_s * SECOND, SECOND)
+    assert status.level is level
+    assert message in status.message
+    assert status.values["joint_states_publishers"] == len(one.publishers.fitting)
     if one.heard_ns:
-        assert told.values["joint_states_silent_s"] == now_s - 10.0
+        assert status.values["joint_states_silent_s"] == now_s - 10.0
 
 
 def test_an_inbox_holds_its_bytes_and_counts_what_it_sheds() -> None:

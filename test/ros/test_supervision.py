@@ -53,7 +53,7 @@ NOON_NS = 1_700_000_000 * SECOND
 
 
 class Lines:
-    """A logger that keeps what it is told."""
+    """A logger that keeps what it gets."""
 
     def __init__(self) -> None:
         self.lines: list[tuple[Level, str]] = []
@@ -89,16 +89,16 @@ def test_after_a_silence_every_status_says_since_when_it_has_no_data() -> None:
     one = silence()
     one.note(used(10, 10), 6 * SECOND, NOON_NS + SECOND)
     assert one.marked(STATUSES, 7 * SECOND) == STATUSES
-    told = one.marked(STATUSES, 9 * SECOND)
-    assert [status.name for status in told] == [status.name for status in STATUSES]
-    for status in told:
+    marked = one.marked(STATUSES, 9 * SECOND)
+    assert [status.name for status in marked] == [status.name for status in STATUSES]
+    for status in marked:
         assert status.level is Level.ERROR
         assert status.message.startswith("no current data since 2023-11-14T22:13:21.000Z")
         assert status.values["no_data_s"] == 3.0
         assert "in step" not in status.message
         assert "in order" not in status.message
         assert "as predicted" not in status.message
-    by_name = {status.name: status for status in told}
+    by_name = {status.name: status for status in marked}
     assert math.isnan(by_name["gait"].values["cadence_rpm"])
     assert by_name["gait"].values["cycles"] == 5.0
     assert by_name["input"].values["crank_rate_hz"] == 0.0
@@ -110,27 +110,27 @@ def test_messages_that_cannot_be_used_are_silence_until_the_next_sample_and_thei
     one.note(used(10, 10), 6 * SECOND, NOON_NS)
     one.note(used(10, 10), 8 * SECOND, NOON_NS)
     faulty = Status("input", Level.WARN, "9 of 9 samples have a zero stamp: set header.stamp", {})
-    (told,) = one.marked([faulty], 9 * SECOND)
-    assert told.message.endswith("; 9 of 9 samples have a zero stamp: set header.stamp")
-    assert told.message.startswith("no current data since")
+    (status,) = one.marked([faulty], 9 * SECOND)
+    assert status.message.endswith("; 9 of 9 samples have a zero stamp: set header.stamp")
+    assert status.message.startswith("no current data since")
     one.note(used(11, 11), 9 * SECOND, NOON_NS)
     assert one.marked(STATUSES, 9 * SECOND) == STATUSES
 
 
 @pytest.mark.parametrize(("after_s", "level"), [(0, Level.WARN), (9, Level.WARN), (10, Level.ERROR)])
 def test_no_data_from_the_start_is_an_error_after_ten_seconds(after_s: int, level: Level) -> None:
-    told = silence().marked(STATUSES, (5 + after_s) * SECOND)
-    assert {status.level for status in told} == {level}
-    assert all("since the start at 2023-11-14T22:13:20.000Z" in status.message for status in told)
+    marked = silence().marked(STATUSES, (5 + after_s) * SECOND)
+    assert {status.level for status in marked} == {level}
+    assert all("since the start at 2023-11-14T22:13:20.000Z" in status.message for status in marked)
 
 
 def test_a_silent_torque_concerns_the_torque() -> None:
     one = silence()
     one.note(used(10, 10), 6 * SECOND, NOON_NS)
     one.note(used(20, 10), 9 * SECOND, NOON_NS + 3 * SECOND)
-    told = {status.name: status for status in one.marked(STATUSES, 9 * SECOND)}
-    assert told["torque"].message == "no current data since 2023-11-14T22:13:20.000Z"
-    assert told["gait"].message == "in step"
+    by_name = {status.name: status for status in one.marked(STATUSES, 9 * SECOND)}
+    assert by_name["torque"].message == "no current data since 2023-11-14T22:13:20.000Z"
+    assert by_name["gait"].message == "in step"
 
 
 # --- alarms and log ---
@@ -153,10 +153,10 @@ def test_each_rise_and_fall_of_an_alarm_is_logged_once_with_value_limit_and_time
     latched = clearance(Level.OK, Level.ERROR)
     for alarm in (quiet, quiet, loud, loud, latched, latched):
         log.note(listed(alarm))
-    told = "0.000612 m, limit 0.0006 m, at 2023-11-14T22:13:20.000Z"
+    value = "0.000612 m, limit 0.0006 m, at 2023-11-14T22:13:20.000Z"
     assert lines.lines == [
-        (Level.ERROR, f"alarm clearance G rises from OK to ERROR: {told}"),
-        (Level.OK, f"alarm clearance G falls from ERROR to OK: {told}, shown until it is acknowledged"),
+        (Level.ERROR, f"alarm clearance G rises from OK to ERROR: {value}"),
+        (Level.OK, f"alarm clearance G falls from ERROR to OK: {value}, shown until it is acknowledged"),
     ]
 
 
@@ -225,8 +225,12 @@ def test_two_statuses_of_the_clock_are_one() -> None:
     counted = Status("clock", Level.OK, "continues", {"epochs_begun": 0.0})
     fine, stands = Status("clock", Level.OK, "goes on", {}), Status("clock", Level.ERROR, "stands still", {})
     assert both_clocks(counted, fine).message == "continues"
-    told = both_clocks(counted, stands)
-    assert (told.level, told.message, told.values) == (Level.ERROR, "stands still", {"epochs_begun": 0.0})
+    found = both_clocks(counted, stands)
+    assert (found.level, found.message, found.values) == (
+        Level.ERROR,
+        "stands still",
+        {"epochs_begun": 0.0},
+    )
 
 
 def noted(names: CrankNames, *messages: list[str]) -> str:
@@ -242,9 +246,9 @@ def noted(names: CrankNames, *messages: list[str]) -> str:
 
 def test_a_crank_that_no_message_names_is_told_with_the_names_that_are_there() -> None:
     names = CrankNames("crank")
-    told = noted(names, ["knee", "hip"])
-    assert told == "no joint is named 'crank'; there are hip, knee; set crank_joint to its name"
-    assert noted(names) == told
+    message = noted(names, ["knee", "hip"])
+    assert message == "no joint is named 'crank'; there are hip, knee; set crank_joint to its name"
+    assert noted(names) == message
     assert noted(names, ["knee"], ["hip", "crank"]) == ""
     assert noted(names, ["left", "right"], ["knee", "hip"], ["left", "right"]) == (
         "no joint is named 'crank'; there are hip, knee, left, right; set crank_joint to its name"
@@ -254,10 +258,10 @@ def test_a_crank_that_no_message_names_is_told_with_the_names_that_are_there() -
 
 
 def test_names_that_would_harm_a_terminal_or_fill_it_are_tamed() -> None:
-    told = noted(CrankNames("crank"), [f"joint{i:03d}" for i in range(300)] + ["a\x1b[2J", "b" * 200])
-    assert "\x1b" not in told
-    assert "and 290 more" in told
-    assert len(told) < 400
+    message = noted(CrankNames("crank"), [f"joint{i:03d}" for i in range(300)] + ["a\x1b[2J", "b" * 200])
+    assert "\x1b" not in message
+    assert "and 290 more" in message
+    assert len(message) < 400
 
 
 # --- over real DDS ---
@@ -396,14 +400,14 @@ def test_stamps_of_a_time_to_come_and_a_torque_about_another_axis_are_told(stage
     diagnostics = stage.listen("/diagnostics", DiagnosticArray)
     alarms = stage.listen(f"{ME}/alarms", DiagnosticArray, latched=True)
     verdicts = stage.listen(f"{ME}/verdict", DiagnosticArray, latched=True)
-    told: list[str] = []
+    texts: list[str] = []
 
     def listen(_: float) -> None:
-        told.append(words(diagnostics, "clock"))
+        texts.append(words(diagnostics, "clock"))
 
     # a mismatch is known after some gait cycles
     stage.legs().play(walk, monitor, before=listen, start_ns=time.time_ns() + 100 * SECOND)
-    assert any("are ahead of the node's clock: set the clocks" in text for text in told)
+    assert any("are ahead of the node's clock: set the clocks" in text for text in texts)
     axis = (
         "the torque about x does not change, the one about z does; if that is the drive's, set drive_torque"
     )
@@ -422,11 +426,11 @@ def test_the_names_that_are_there_are_told_where_the_crank_is_not(stage, walk) -
     diagnostics = stage.listen("/diagnostics", DiagnosticArray)
     stage.legs().play(walk, monitor, end_s=0.5)
 
-    def told() -> bool:
+    def is_named() -> bool:
         one = line(diagnostics, "topics")
         return one is not None and "no joint is named 'kurbel'; there are crank, hip, knee" in one.message
 
-    stage.wait_for(told, "the names")
+    stage.wait_for(is_named, "the names")
     assert "crank_joint" in words(diagnostics, "topics")
     assert line(diagnostics, "topics").level == b"\2"
     stage.wait_for(lambda: "do not name the crank 'kurbel'" in words(diagnostics, "input"), "the cause")

@@ -102,9 +102,9 @@ def test_points_that_are_not_what_was_computed_are_computed_again(study, sweep):
     whole = [path.read_bytes() for path in files(study)]
     swap(first, second)
     rewritten(third, grow)
-    with pytest.warns(ConfigWarning) as told:
+    with pytest.warns(ConfigWarning) as warned:
         assert run_study("size", sweep, study) == 3
-    assert [str(each.message).endswith("; it is computed again") for each in told] == [True] * 3
+    assert [str(each.message).endswith("; it is computed again") for each in warned] == [True] * 3
     assert [path.read_bytes() for path in files(study)] == whole
 
 

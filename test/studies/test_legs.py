@@ -254,8 +254,8 @@ def test_claims_are_json_and_have_a_state_for_every_leg(results):
 def test_the_claims_are_written_beside_the_page(directory, results, unpainted):
     assert write_study_page(directory) == 0
     assert json.loads((directory / "claims.json").read_text()) == results.claims().to_dict()
-    told = "Of 2 drawn legs 1 walk; rejected: no assembly near that of the file 1."
-    assert told in (directory / "report.html").read_text()
+    sentence = "Of 2 drawn legs 1 walk; rejected: no assembly near that of the file 1."
+    assert sentence in (directory / "report.html").read_text()
 
 
 def test_the_file_s_leg_wears_deeper_at_a_than_at_b(results):

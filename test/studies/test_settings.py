@@ -1,4 +1,4 @@
-"""Descriptions of studies: what comes with the package is whole, what cannot be is told in one line."""
+"""Descriptions of studies: what comes with the package is whole, what cannot be is refused in one line."""
 
 import attrs
 import numpy as np

@@ -39,7 +39,7 @@ def sent(traffic):
 
 
 def assert_sound(samples, recording, true):
-    """Nothing that was not sent, in its order; and all of it, unless a loss is told."""
+    """Nothing that was not sent, in its order; and all of it, unless a loss is reported."""
     if samples is None:
         return
     if not recording.is_partial:
@@ -77,7 +77,7 @@ def test_a_flipped_bit_is_seen_or_without_effect(
     for content in flipped(whole, seed=2):
         samples, recording = outcome(read, path, content)
         if samples is not None and recording.is_partial and options:
-            continue  # one checksum over everything: it is told, but not where
+            continue  # one checksum over everything: it is reported, but not where
         assert_sound(samples, recording, true)
 
 

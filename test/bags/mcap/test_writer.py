@@ -49,8 +49,8 @@ texts = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]
 statuses = st.tuples(texts, st.integers(0, 3), texts, texts, st.dictionaries(texts, texts, max_size=3))
 
 
-@given(stamp_ns=stamps, told=st.lists(statuses, max_size=3), frame=texts)
-def test_diagnostics_are_as_rosbags_writes_them(store, stamp_ns, told, frame):
+@given(stamp_ns=stamps, reported=st.lists(statuses, max_size=3), frame=texts)
+def test_diagnostics_are_as_rosbags_writes_them(store, stamp_ns, reported, frame):
     make = store.types
     pair = make["diagnostic_msgs/msg/KeyValue"]
     status = [
@@ -61,12 +61,12 @@ def test_diagnostics_are_as_rosbags_writes_them(store, stamp_ns, told, frame):
             hardware_id=hardware,
             values=[pair(*each) for each in values.items()],
         )
-        for name, level, message, hardware, values in told
+        for name, level, message, hardware, values in reported
     ]
     stamp = make["builtin_interfaces/msg/Time"](*divmod(stamp_ns, 10**9))
     array = make[encode.DIAGNOSTIC_ARRAY](make["std_msgs/msg/Header"](stamp, frame), status)
     expected = bytes(store.serialize_cdr(array, encode.DIAGNOSTIC_ARRAY))
-    assert encode.diagnostic_array(stamp_ns, told, frame) == expected
+    assert encode.diagnostic_array(stamp_ns, reported, frame) == expected
 
 
 @pytest.fixture

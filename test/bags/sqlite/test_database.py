@@ -212,7 +212,7 @@ def test_a_complaint_that_is_no_text_is_one(path, read):
     "query", ["SELECT name", "SELECT CASE", "SELECT id, timestamp", "SELECT data"], ids=lambda text: text[7:]
 )
 def test_what_the_system_cannot_read_is_no_damage(path, read, monkeypatch, query):
-    """As of other files: neither is the rest taken for the whole, nor is a fleet told that it is damaged."""
+    """As of other files: neither is the rest taken for the whole, nor does a fleet report it as damaged."""
 
     class OnBadDisk(sqlite3.Connection):
         def execute(self, text, *values):

@@ -169,9 +169,9 @@ def standing_first():
 def test_a_column_that_is_likely_in_another_unit_is_doubted(read, columns, parameters, doubt):
     config = config_from({f"input.{key}": value for key, value in parameters.items()})
     _, recording = read(columns, config=config)
-    told = losses(recording)
-    assert len(told) == bool(doubt)
-    assert not doubt or doubt in told[0]
+    found = losses(recording)
+    assert len(found) == bool(doubt)
+    assert not doubt or doubt in found[0]
 
 
 @pytest.mark.parametrize(

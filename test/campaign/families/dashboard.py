@@ -78,8 +78,8 @@ def _attacked(
             time.sleep(0.1)
     if not answer.startswith(b"HTTP/1.1 200"):
         return Outcome.SILENT, f"it answers {answer[:60]!r}"
-    told = (directory.parent / "stderr").read_text(errors="replace")
-    return (Outcome.SILENT, f"{len(told)} characters: {told[:200]}") if told else (Outcome.SOUND, "")
+    stderr = (directory.parent / "stderr").read_text(errors="replace")
+    return (Outcome.SILENT, f"{len(stderr)} characters: {stderr[:200]}") if stderr else (Outcome.SOUND, "")
 
 
 # --- attacks, in a process of their own ---

@@ -1,4 +1,4 @@
-"""Databases with hostile schemas, trees of pages and texts: refused, told of, or as if whole."""
+"""Databases with hostile schemas, trees of pages and texts: refused, reported, or as if whole."""
 
 import sqlite3
 from contextlib import closing

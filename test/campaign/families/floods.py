@@ -39,14 +39,14 @@ def _run(name: str, seed: int, _directory: Path) -> tuple[Outcome, str]:
     flood, sentence = _KINDS[name]
     stage = Stage()
     sent = flood(stage, np.random.default_rng(seed))
-    told, received = stage.told(), stage.monitor._inbox.received
+    reported, received = stage.reported(), stage.monitor._inbox.received
     unsaid = stage.unsaid()
     # the walk lies an hour later: whatever stamps were believed, it is a time of its own
     stage.send(stage.publisher(JointState, "joint_states", "after"), live.walk(3600.0, 3602.0))
     gait = next(one for one in stage.monitor.monitor.status() if one.name == "gait").message
     lost = [topic.lost for topic in stage.monitor._supervision.inputs]
-    counts = f"{sent} sent, {received} received, {lost} lost by DDS; then {gait}; {told}"
-    if unsaid or sentence not in told or gait != "in step":
+    counts = f"{sent} sent, {received} received, {lost} lost by DDS; then {gait}; {reported}"
+    if unsaid or sentence not in reported or gait != "in step":
         return Outcome.SILENT, f"{unsaid}; expected {sentence!r}; {counts}"
     return Outcome.REPORTED if sentence else Outcome.SOUND, counts
 
@@ -82,8 +82,8 @@ def _other_type(stage: Stage, rng: np.random.Generator) -> int:
     """Other types on both topics."""
     publish = stage.publisher(Float64, "drive_torque", matches=False)
     again = stage.publisher(WrenchStamped, "joint_states", matches=False)
-    # discovery is told by the graph
-    stage.serve(lambda: "publishes" in stage.told(), "publishers of another type")
+    # discovery is in the graph
+    stage.serve(lambda: "publishes" in stage.reported(), "publishers of another type")
     sent = stage.send(publish, (Float64(data=float(x)) for x in rng.random(_FEW)))
     return sent + stage.send(again, (WrenchStamped() for _ in range(_FEW)))
 

@@ -46,9 +46,9 @@ def _killed(path: Path, choose: random.Random) -> tuple[Outcome, str]:
             time.sleep(choose.uniform(0.0, 0.02))
             os.kill(pid, signal.SIGKILL)
             said += lines
-        told = [line.split() for line in said if line.endswith("\n")]
+        written = [line.split() for line in said if line.endswith("\n")]
         try:
-            lost_s.append(_lost_s(told, before, _kept(path)))
+            lost_s.append(_lost_s(written, before, _kept(path)))
         except AssertionError as error:
             return Outcome.SILENT, " ".join(str(error).split())
     new = [f"{lost:.3f}" for lost in lost_s if lost is not None]

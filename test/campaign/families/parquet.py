@@ -1,4 +1,4 @@
-"""Parquet files, damaged or with footers that lie: refused, told of, or as if whole."""
+"""Parquet files, damaged or with footers that lie: refused, reported, or as if whole."""
 
 import io
 from functools import cache, partial

@@ -1,12 +1,12 @@
-"""Recordings: damaged, hostile, of another robot. Refused, told of, or as if whole."""
+"""Recordings: damaged, hostile, of another robot. Refused, reported, or as if whole."""
 
 from collections.abc import Callable
 
 from campaign.case import Case
 from campaign.recordings_bombs import bomb
 from campaign.recordings_damaged import damaged
+from campaign.recordings_printed import printed, unlikely
 from campaign.recordings_stored import expected
-from campaign.recordings_told import told, unlikely
 from campaign.recordings_traps import trap
 from campaign.warm_twin import keep_twin
 
@@ -14,7 +14,7 @@ SHORT, LONG = 40, 2000
 
 # Of twenty cases: most compare every sample that comes out with those that went in.
 _KINDS: tuple[Callable[[int], Case], ...] = (
-    damaged, trap, damaged, bomb, damaged, trap, damaged, damaged, trap, told,
+    damaged, trap, damaged, bomb, damaged, trap, damaged, damaged, trap, printed,
     damaged, trap, damaged, unlikely, damaged, trap, damaged, damaged, bomb, damaged,
 )  # fmt: skip
 
@@ -23,7 +23,7 @@ def warm() -> None:
     """Compile what reads, and what replays; the tables of the leg are built once for all cases."""
     keep_twin()
     expected()
-    told(0)
+    printed(0)
 
 
 def case(seed: int) -> Case:

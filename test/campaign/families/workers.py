@@ -48,8 +48,8 @@ def case(seed: int) -> Case:
             jobs[-1] = Job(f"{_JOBS - 1}", _die_once, (str(directory / "died"), _JOBS - 1))
         found: dict[str, int] = {}
         run_in_processes(jobs, workers, lambda job, result: found.update({job.key: result}))
-        if (told := directory / "told").exists():
-            return Outcome.SILENT, f"imported {told.read_text()}"
+        if (imported := directory / "told").exists():
+            return Outcome.SILENT, f"imported {imported.read_text()}"
         is_all = found == {f"{k}": k + 1 for k in range(_JOBS)}
         return (Outcome.SOUND, "") if is_all else (Outcome.SILENT, f"results {found}")
 

@@ -155,8 +155,8 @@ def test_simulate_counts_the_turns_it_made(document):
 
 def test_the_clearance_model_says_what_it_needs(document):
     mechanism = parse_mechanism(_tracked(document, "four_bar", kp_nm_per_rad=1.0), "my_leg.yaml")
-    told = r"^my_leg.yaml: drive.track: the clearance model needs drive.speed; try --model full$"
-    with pytest.raises(ConfigError, match=told):
+    message = r"^my_leg.yaml: drive.track: the clearance model needs drive.speed; try --model full$"
+    with pytest.raises(ConfigError, match=message):
         simulate(mechanism, model="clearance")
 
 

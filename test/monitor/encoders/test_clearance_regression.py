@@ -84,7 +84,7 @@ def observations(found):
 
 
 def others(found):
-    """Joints that are told to be other than new."""
+    """Joints that are reported as other than new."""
     return [k for k, one in enumerate(clearance_estimates(found, FRESH)) if one.is_other]
 
 

@@ -181,7 +181,7 @@ def test_a_gear_that_is_not_set_is_named(monitor, gait):
 
 
 def test_why_samples_cannot_be_used_is_said_and_the_most_frequent_fault_is_not_taken_for_all(monitor, gait):
-    """The number of all stands before it, and is that of the alarm's fraction; told while it lasts."""
+    """The number of all stands before it, and is that of the alarm's fraction; reported while it lasts."""
     stream = gait(2.0)
     stream["fault"][100::4], stream["fault"][102::8] = ZERO_STAMP, EMPTY
     monitor.update(stream)

@@ -94,11 +94,11 @@ def test_a_row_of_the_table_has_what_the_json_of_the_joint_has(summary):
     def table(clearances, joints):
         return columns_of(JointClearance, list(clearances)) | columns_of(ReplayJoint, list(joints))
 
-    columns, told = table(summary.clearances.values(), summary.joints.values()), summary.to_dict()
+    columns, written = table(summary.clearances.values(), summary.joints.values()), summary.to_dict()
     assert {"forecast.hours.p50", "encoders.is_other", "believed_m"} <= set(columns)
     assert set(table((), ())) == set(columns)
     for joint, row in zip(summary.joints, zip(*columns.values(), strict=True), strict=True):
-        record = flat(told["clearances"][joint]) | flat(told["joints"][joint])
+        record = flat(written["clearances"][joint]) | flat(written["joints"][joint])
         record["seen_by"] = ", ".join(record["seen_by"])
         known = {name: value for name, value in zip(columns, row, strict=True) if value is not None}
         assert known == {name: value for name, value in record.items() if value is not None}

@@ -43,8 +43,8 @@ def test_the_counts_sum_up():
     assert found.pop(Standing.DEMONSTRATION) == 0
     assert all(number > 0 for number in found.values())  # otherwise this shows nothing
     text = words_of(read(page_html(fleet_page(fleet, DAY))))
-    told = re.search(r"(\d+) must stop, (\d+) to look at, (\d+) unmonitored, (\d+) well\.", text)
-    stop, look, blind, well = map(int, told.groups())
+    numbers = re.search(r"(\d+) must stop, (\d+) to look at, (\d+) unmonitored, (\d+) well\.", text)
+    stop, look, blind, well = map(int, numbers.groups())
     assert stop == found[Standing.STOP] == fleet.counts["stop"]
     assert look == fleet.counts["inspect"] + fleet.counts["watch"]
     assert well == found[Standing.HEALTHY] == fleet.counts["healthy"] - found[Standing.OUTDATED]

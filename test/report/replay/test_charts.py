@@ -56,8 +56,8 @@ def test_a_counted_clearance_that_is_not_believed_is_no_number():
     summary = summary_with(Figure.CLEARANCES, B=shown(ClearanceObservation.SEEN, 5e-5))
     ((table,),) = (section.parts for section in encoder_sections(summary))
     assert [row[1] for row in table.rows] == ["not valid"]
-    (told,) = clearance_section(summary).parts
-    assert (told.text, told.is_not_valid) == (
+    (text,) = clearance_section(summary).parts
+    assert (text.text, text.is_not_valid) == (
         "Counted clearances: not valid: leg differs from its model.",
         True,
     )

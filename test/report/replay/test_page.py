@@ -142,8 +142,8 @@ def test_the_last_estimate_of_a_clearance_is_not_called_the_worst(by):
     alarm = {"name": "clearance A", "level": Level.ERROR, "worst": 1.65e-3, "limit": 6e-4, "unit": "m"}
     now = (attrs.evolve(summary.alarms.now[0], **alarm),)
     alarms = attrs.evolve(summary.alarms, now=now)
-    told = raised_alarms(attrs.evolve(summary, clearances=clearances, alarms=alarms), otherwise="")
-    assert "last estimate 1.65 mm, limit 0.6 mm" in told and "worst" not in told
+    words = raised_alarms(attrs.evolve(summary, clearances=clearances, alarms=alarms), otherwise="")
+    assert "last estimate 1.65 mm, limit 0.6 mm" in words and "worst" not in words
 
 
 def test_what_the_verdict_gives_as_its_reason_is_not_hidden_beside_the_alarm():
@@ -165,13 +165,13 @@ def test_what_the_verdict_does_not_believe_is_greyed_and_no_number():
     clearances = {**summary.clearances, "A": seen}
     joints = {name: attrs.evolve(joint, encoders=None) for name, joint in summary.joints.items()}
     page = page_of(attrs.evolve(summary, clearances=clearances, joints=joints))
-    told = [data for data in greyed(page) if data.strip()]
-    assert len(told) >= 8
+    texts = [data for data in greyed(page) if data.strip()]
+    assert len(texts) >= 8
     assert all(
         text.strip().removeprefix("counted ").lower().startswith(("not valid", "counted clear"))
-        for text in told
+        for text in texts
     )
-    assert not any(character.isdigit() for text in told for character in text)
+    assert not any(character.isdigit() for text in texts for character in text)
     text = visible(page) + " ".join(page.inside(lambda tag, _: tag == "td"))
     assert "estimated 0.500 ± 0.010 mm by the drive torque" in text  # that does not rest on the counted one
     for number in ("0.400 mm", "9.00", "1e-", "pm/cycle"):

@@ -86,8 +86,8 @@ def test_wear_that_is_not_counted_is_not_told_as_none(study):
     results = study("multi")
     unworn = [(point, {**arrays, DEPTH: 0.0 * arrays[DEPTH]}) for point, arrays in results.of("response")]
     *alone, (_, whole) = unworn
-    told = "\n".join(findings.several_at_once(alone, whole))
-    assert told.count("greatest depth × –") == 3
+    text = "\n".join(findings.several_at_once(alone, whole))
+    assert text.count("greatest depth × –") == 3
     dry = findings.lubrication(unworn[:1])[0]
     assert dry == "G: wear of G is not counted, without a wear coefficient."
     one = {**whole, DEPTH: whole[DEPTH].copy()}

@@ -1,4 +1,4 @@
-"""Recordings through the command line: what a user is told of them, and the figures in the summary."""
+"""Recordings through the command line: what a user reads of them, and the figures in the summary."""
 
 import json
 from collections.abc import Callable
@@ -101,7 +101,7 @@ def unlikely(seed: int) -> Case:
         description=f"no gait: {what}",
         prepare=lambda directory: write(directory / "x.mcap", stamps, angle, torque),
         run=command_line("replay", "x.mcap"),
-        is_told=lambda ran: ran.code == 1 and bool(ran.complaints) and " pm/cycle" not in ran.stdout,
+        is_reported=lambda ran: ran.code == 1 and bool(ran.complaints) and " pm/cycle" not in ran.stdout,
         unsound=lambda ran: _impossible(ran) if what.startswith("stamps jump") else f"exit {ran.code}",
     )
 
@@ -141,8 +141,8 @@ def _differs(ran: Ran) -> str:
     return f"{', '.join(wrong)} differ" if wrong else ""
 
 
-def told(seed: int) -> Case:
-    """A damaged recording of a healthy leg through the command line; told of, or the undamaged summary."""
+def printed(seed: int) -> Case:
+    """A damaged recording of a healthy leg through the command line; reported, or the undamaged summary."""
     _summary()
     rng = np.random.default_rng(seed)
     content = bytearray(_true())

@@ -412,7 +412,7 @@ class Source:
     def _expanded(self, due: Due) -> Piece | None:
         """Load a piece and decompress those of its messages that are compressed one by one.
 
-        Metadata would tell, but they are written last, and a file may be given without them.
+        Metadata would show it, but they are written last, and a file may be given without them.
         """
         piece = due.load()
         if piece is None or not _has_compressed(piece):

@@ -407,7 +407,7 @@ def _is_stream(path: Path) -> bool:
 
 
 def _try(option: str, path: Path, directory: Path) -> None:
-    """Only writing tells: rights, a read-only file system, and an administrator whom rights do not stop."""
+    """Only writing shows it: rights, a read-only file system, an administrator whom rights do not stop."""
     with system_asked(option, "cannot be written", path), tempfile.TemporaryFile(dir=directory):
         return
 
@@ -457,7 +457,7 @@ def compilation(*kernels: str, how_long: str = "about half a minute") -> Iterato
         yield
         return
     what = f"compiling numerical kernels (once per installation, {how_long})"
-    with _shown(what) if sys.stderr.isatty() else _said_by_the_compiler(what):
+    with _shown(what) if sys.stderr.isatty() else _compilation_announced(what):
         yield
     mark_compiled(kernels)
 
@@ -471,21 +471,21 @@ def mark_compiled(kernels: Iterable[str]) -> None:
 
 
 @contextmanager
-def _said_by_the_compiler(what: str) -> Iterator[None]:
+def _compilation_announced(what: str) -> Iterator[None]:
     from leg_wear_monitor.compiled.kernel import at_compilation
 
-    said: list[str] = []
+    printed: list[str] = []
 
-    def say() -> None:
-        if not said:
-            said.append(what)
+    def announce() -> None:
+        if not printed:
+            printed.append(what)
             print(what, file=sys.stderr, flush=True)
 
-    at_compilation.append(say)
+    at_compilation.append(announce)
     try:
         yield
     finally:
-        at_compilation.remove(say)
+        at_compilation.remove(announce)
 
 
 @contextmanager

@@ -389,7 +389,7 @@ def _final(
     base: MonitorConfig,
     low_pass: LowPass | None = None,
 ) -> tuple[proposal.Found, Load | None]:
-    """The chosen fit again, with the terms that the recording can tell, and the lag that it is late by."""
+    """The chosen fit again, with the terms that the recording determines, and the lag that it is late by."""
     one, declared = choice.best.fit, drive_figures(base.drive)
     low_pass_s, low_pass_sigma_s = low_pass_time(low_pass, declared)
     terms = Terms(bias=one.pair.walks_both_ways, load_friction=True, lag=separates_lag(one.pair))

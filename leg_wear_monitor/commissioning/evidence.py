@@ -262,7 +262,7 @@ def scatter(one: Fit) -> float:
     return math.sqrt(max(energy, 0.0))
 
 
-# What speeds tell: a lag of the torque from an offset of the crank; and the cadence.
+# What speeds show: a lag of the torque from an offset of the crank; and the cadence.
 
 
 _SPEED_SPREAD = 0.15  # relative spread of the speed from which on a lag is separated from the offset

@@ -193,7 +193,7 @@ _TWO_CADENCES = "record two cadences in one recording, 40 rpm apart"
 
 
 def better(name: str, found: Found) -> str:
-    """What would tell a quantity better; empty where nothing has to."""
+    """What would determine a quantity better; empty where nothing has to."""
     return _WAYS[name](found) if name in _WAYS else ""
 
 

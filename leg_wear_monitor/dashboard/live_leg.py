@@ -208,7 +208,7 @@ class LiveLeg:
         self._leg_silent_s: float | None = None
         self._peaks_n: dict[str, float | None] = {}
         self._trends = Trends()
-        self._heard_s: float | None = None
+        self._arrived_s: float | None = None
         self._is_new = True
         self._drawn: tuple[float, str] = (-math.inf, "")
         self._moving = ""
@@ -235,31 +235,31 @@ class LiveLeg:
         if not own:
             return
         with self._lock:
-            self._hear()
+            self._note_arrival()
             verdict = own.pop("verdict", None)
             self._leg_silent_s = verdict.values.get(_NO_DATA) if verdict else None
             self._statuses = own
             self._trends.add(self._row(stamp_ns))
 
     def take_state(self, text: str) -> None:
-        """A message of ``~/state``; what is no state is left out, and said."""
+        """A message of ``~/state``; what is no state is left out, and reported."""
         try:
             state, fault = received_state(text, f"{self._node}/state"), ""
         except ConfigError as error:
             state, fault = NOTHING_KNOWN, f"The state of the leg cannot be read: {error}"
         with self._lock:
-            self._hear()
+            self._note_arrival()
             self._state, self._fault = state, fault
 
     def take_peaks(self, peaks_n: Mapping[str, float]) -> None:
         """A message of ``~/clearance_states``: the largest contact force of each joint in a gait cycle."""
         first = islice(peaks_n.items(), MOST)
         with self._lock:
-            self._hear()
+            self._note_arrival()
             self._peaks_n = {printable(joint): finite_or_none(peak_n) for joint, peak_n in first}
 
-    def _hear(self) -> None:
-        self._heard_s, self._is_new = self._clock(), True
+    def _note_arrival(self) -> None:
+        self._arrived_s, self._is_new = self._clock(), True
 
     def _row(self, stamp_ns: int) -> Row:
         leg: dict[str, float | None] = {}
@@ -297,15 +297,15 @@ class LiveLeg:
     def freshness(self) -> Freshness:
         """Since when nothing was heard of the monitor; or, if it speaks, since when it has no data."""
         with self._lock:
-            heard_s, leg_s = self._heard_s, self._leg_silent_s
-        if heard_s is None:
+            arrived_s, leg_s = self._arrived_s, self._leg_silent_s
+        if arrived_s is None:
             return Freshness(
                 None,
                 f"WAITING for the monitor {printable(self._node)}: no message yet on {self._waited_for}. "
                 "Is it running, with this name and this ROS_DOMAIN_ID?",
                 self._old_after_s,
             )
-        age_s = self._clock() - heard_s
+        age_s = self._clock() - arrived_s
         silence = "nothing is heard of the monitor; is it running?"
         if leg_s is not None and age_s < self._old_after_s:
             age_s += leg_s

@@ -16,7 +16,7 @@ from leg_wear_monitor.mechanism.arrays import Floats, Ints
 # on the counted clearance of one joint; two further tests are for a new part in a worn joint
 FACTORS = (1.08, 1.2, 1.35, 1.5, 2.0, 2.5, 3.3, 5.0, 8.0)
 
-_LEAST_INFORMATION = 1.0e-6  # of one gait cycle, by which a test can tell anything
+_LEAST_INFORMATION = 1.0e-6  # of one gait cycle, by which a test can show anything
 _SIGMAS = 4.0  # by which the baseline may be off
 # of the threshold: what one gait cycle counts at most, so that two alone raise nothing. One of 260 healthy
 # cycles on the ground looked like a wider joint: two in a row come each twenty hours by chance (2026-11-25)
@@ -112,8 +112,8 @@ class ChangeDetector:
         ratio = np.minimum(ratio, _MOST * self.threshold)
         since = np.where(state.since_ns == 0, begin_ns, state.since_ns)
         sums = state.sums + ratio
-        stays = sums > 0.0
-        return DetectorState(np.where(stays, sums, 0.0), np.where(stays, since, 0))
+        positive = sums > 0.0
+        return DetectorState(np.where(positive, sums, 0.0), np.where(positive, since, 0))
 
     def detected_ns(self, state: DetectorState) -> int:
         """Stamp since when there is a change; 0 where no test exceeds the threshold."""

@@ -108,7 +108,7 @@ def stance_phases(up: Floats, speed: float) -> tuple[float, float]:
     up : (n,) array
         At equal steps of the crank angle from 0.
     speed : float
-        Of the crank, whose sign tells which of the two ends of the force comes first.
+        Of the crank, whose sign shows which of the two ends of the force comes first.
 
     Returns
     -------

@@ -117,7 +117,7 @@ def blocks_of(pair: Pair, ratio: float) -> Blocks:
 # Regression of measured on predicted torque: its terms, its parameters under way, and its columns.
 
 
-PHASES = 128  # offsets tried where a start does not tell one
+PHASES = 128  # offsets tried where a start does not give one
 
 
 @attrs.frozen

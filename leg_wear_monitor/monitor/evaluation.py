@@ -360,7 +360,7 @@ class AlarmEvaluation:
         self.config = config
         self.board.configure(config)
 
-    def holds(self) -> bool:
+    def is_model_valid(self) -> bool:
         """Whether the model is valid for the present motion: cadence and torque are as expected."""
         return self.board.level(alarm_specs.CADENCE.name(), alarm_specs.MISMATCH.name()) is not Level.ERROR
 

@@ -66,7 +66,7 @@ def distance(settings, state, k, stamp, angle):
 
 @kernel
 def extend(state, k, stamp, angle):
-    """One more sample of series k; a late or repeated one tells nothing new."""
+    """One more sample of series k; a late or repeated one contains nothing new."""
     h = 1.0e-9 * (stamp - state.stamp[k])
     if h <= 0.0:
         return

@@ -76,7 +76,7 @@ def update_verdict(parts: Parts, situation: Situation | None = None) -> tuple[Ve
 def is_forecast_valid(parts: Parts, found: Sequence[Finding]) -> bool:
     """Whether the leg is in the range of the model, and is the counted one by some findings."""
     invalid = any(Figure.FORECAST in finding.not_valid for finding in found)
-    return parts.evaluation.holds() and not invalid
+    return parts.evaluation.is_model_valid() and not invalid
 
 
 def evaluate_clearances(parts: Parts, joints: Sequence[JointSituation]) -> tuple[AlarmList, ...]:

@@ -166,7 +166,7 @@ def drawing_html(drawing: Drawing, is_watched: bool = False) -> str:
 def _live(drawing: Drawing) -> Fragment:
     """The interactive picture."""
     reach, mechanism, text = drawing.reach, drawing.reach.mechanism, "To scale, all joints without clearance."
-    data = leg_data(reach) | {"first": drawing.shown, "runs": [], "said": _said(reach)}
+    data = leg_data(reach) | {"first": drawing.shown, "runs": [], "said": _dead_points(reach)}
     if mechanism.toe is not None and len(reach.q) > 1:
         text += " Dashed: path of the toe."
     if drawing.forces_n is not None:
@@ -180,8 +180,8 @@ def _live(drawing: Drawing) -> Fragment:
     return leg_slider(data, words, text)
 
 
-def _said(reach: Reach) -> dict[int, str]:
-    """What is said beside the picture at a position: which bodies are in line."""
+def _dead_points(reach: Reach) -> dict[int, str]:
+    """Sentence beside the picture at a position: which bodies are in line."""
     if reach.open_joint:
         return {}
     ends = ((0, reach.low), (len(reach.q) - 1, reach.high))

@@ -198,7 +198,7 @@ class GaitPublisher(ClosingNode):
 
     def _walk_on(self, wanted: Callable[[], bool]) -> None:
         blocks = self._blocks if self.config.precompute else self._computed_ahead()
-        while wanted() and not self._heard():
+        while wanted() and not self._has_subscribers():
             time.sleep(0.02)
         self._start_ns, began = self.get_clock().now().nanoseconds, time.monotonic()
         self.get_logger().info("walking")
@@ -229,7 +229,7 @@ class GaitPublisher(ClosingNode):
             kind, topic, qos, qos_overriding_options=QoSOverridingOptions.with_default_policies()
         )
 
-    def _heard(self) -> bool:
+    def _has_subscribers(self) -> bool:
         wanted = self.config.wait_for_subscribers
         return all(one.get_subscription_count() >= wanted for one in self._by_kind.values())
 

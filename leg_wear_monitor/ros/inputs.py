@@ -257,7 +257,7 @@ class Publishers:
 
 
 def publishers_of(node: Node, topic: str, expected: str, qos: QoSProfile) -> Publishers:
-    """Publishers of a topic, from the graph, which tells when one of them is gone; events do not.
+    """Publishers of a topic, from the graph, which shows when one of them is gone; events do not.
 
     Parameters
     ----------
@@ -420,7 +420,7 @@ class Inputs:
         Parameters
         ----------
         now_ns : int
-            Time of arrival where the middleware does not tell it [ns].
+            Time of arrival where the middleware does not give it [ns].
         """
         found = []
         for topic, subscription in zip(self.topics, self.subscriptions, strict=True):

@@ -108,9 +108,9 @@ class _Listener(Node):
             "leg_wear_dashboard", context=context, enable_rosout=False, start_parameter_services=False
         )
         self._monitor, self._leg = monitor, leg
-        self._hear(outputs.STATE, String, lambda m: leg.take_state(m.data))
-        self._hear(outputs.CLEARANCES, JointState, lambda m: leg.take_peaks(_peaks_n(m)))
-        self._hear(
+        self._subscribe(outputs.STATE, String, lambda m: leg.take_state(m.data))
+        self._subscribe(outputs.CLEARANCES, JointState, lambda m: leg.take_peaks(_peaks_n(m)))
+        self._subscribe(
             outputs.DIAGNOSTICS,
             DiagnosticArray,
             lambda m: leg.take_diagnostics(stamp_ns_of(m.header.stamp), _statuses(m)),
@@ -123,12 +123,12 @@ class _Listener(Node):
         """Subscribe to the moving leg while somebody looks: the monitor makes its frames only then."""
         is_wanted = self._leg.motion.viewers > 0
         if is_wanted and self._motion is None:
-            self._motion = self._hear(MOTION, String, lambda m: self._leg.take_motion(m.data))
+            self._motion = self._subscribe(MOTION, String, lambda m: self._leg.take_motion(m.data))
         elif not is_wanted and self._motion is not None:
             self.destroy_subscription(self._motion)
             self._motion = None
 
-    def _hear(self, output: Output, kind: type, take: Callable[[Any], None]) -> Any:
+    def _subscribe(self, output: Output, kind: type, take: Callable[[Any], None]) -> Any:
         return self.create_subscription(kind, topic_of(output, self._monitor), take, _profile(output.qos))
 
     def ask(self) -> None:
@@ -238,9 +238,9 @@ class DemoListener:
         self.acknowledged: list[str] = []
         self._asked: Future | None = None
         self._service = self._node.create_client(Trigger, f"{_MONITOR}/acknowledge_alarms")
-        self._node.create_subscription(JointState, f"{_MONITOR}/clearance_states", self._hear_cycle, 10)
+        self._node.create_subscription(JointState, f"{_MONITOR}/clearance_states", self._take_cycle, 10)
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self._node.create_subscription(DiagnosticArray, f"{_MONITOR}/alarms", self._hear_alarms, latched)
+        self._node.create_subscription(DiagnosticArray, f"{_MONITOR}/alarms", self._take_alarms, latched)
 
     def attend(self, going_on: Callable[[], bool]) -> None:
         """Process messages while `going_on` returns true."""
@@ -253,7 +253,7 @@ class DemoListener:
         self._node.destroy_node()
         try_shutdown(context=self._context)
 
-    def _hear_cycle(self, message: JointState) -> None:
+    def _take_cycle(self, message: JointState) -> None:
         self.stamp_ns = stamp_ns_of(message.header.stamp)
         names = [name.removesuffix("_clearance") for name in message.name]
         self.clearances_m = dict(zip(names, message.position, strict=True))
@@ -262,7 +262,7 @@ class DemoListener:
             self.stamp_ns, f"clearance [um]  {clearances}   hardest impact {max(message.effort):.0f} N"
         )
 
-    def _hear_alarms(self, message: DiagnosticArray) -> None:
+    def _take_alarms(self, message: DiagnosticArray) -> None:
         alarms = {status.name.split(": ", 1)[-1]: status for status in message.status}
         up = {name: status for name, status in alarms.items() if status.level != DiagnosticStatus.OK}
         for name, status in up.items():
@@ -271,9 +271,9 @@ class DemoListener:
                 self._report(stamp_ns_of(message.header.stamp), f"ALARM {name}: {_alarm_text(status)}")
         if up and all(status.message.startswith("latched") for status in up.values()) and not self._asked:
             self._asked = self._service.call_async(Trigger.Request())
-            self._asked.add_done_callback(lambda future: self._hear_answer(future, list(up)))
+            self._asked.add_done_callback(lambda future: self._take_answer(future, list(up)))
 
-    def _hear_answer(self, future: Future, names: list[str]) -> None:
+    def _take_answer(self, future: Future, names: list[str]) -> None:
         self._asked = None
         self.acknowledged += names
         self._report(self.stamp_ns, f"alarms acknowledged: {future.result().message}")

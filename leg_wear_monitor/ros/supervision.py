@@ -119,7 +119,7 @@ class StatusLog:
 # A killed publisher stays in the graph until its lease expires (20 s by default): two publishers of one name
 # may be one that was restarted.
 _SAME_NAME_S = 30.0
-# A node that has just come may still tell by its first message that it publishes other joints than the crank.
+# A node that has just come may still show by its first message that it publishes other joints than the crank.
 _NEW_S = 3.0
 _OTHERS_S = 60.0  # for which it is known, though it publishes seldom
 # rules of the verdict that a torque about another axis can be the cause of

@@ -140,7 +140,7 @@ def fitted_law(lives: Sequence[SimulatedLife], sigma: float) -> GrowthLaw:
     ----------
     lives : sequence of SimulatedLife
     sigma : float
-        Standard deviation of ln growth where there are too few lives to tell it.
+        Standard deviation of ln growth where there are too few lives to estimate it.
     """
     fresh = lives[0].clearance_m[0]
     coupling, _ = _coefficients(lives, fresh)

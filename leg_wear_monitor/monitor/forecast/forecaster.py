@@ -60,7 +60,7 @@ def law_of(mechanism: Mechanism, path: str, sigma: float) -> GrowthLaw:
         A file of its lives. If empty, the one that comes with the package for just this leg; if there is
         none, growth stays as it is.
     sigma : float
-        Standard deviation of what ln growth is off, where lives do not tell.
+        Standard deviation of what ln growth is off, where lives do not show it.
 
     Raises
     ------

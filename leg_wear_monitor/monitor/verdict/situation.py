@@ -323,7 +323,7 @@ def sampled_words(sampling: Sampling) -> str:
 def with_sampling(
     findings: Sequence[Finding], sampling: Sampling, joints: Sequence[str], sigma_m: Floats
 ) -> tuple[Finding, ...]:
-    """Findings that tell of a sampled replay.
+    """Findings on a sampled replay.
 
     Parameters
     ----------

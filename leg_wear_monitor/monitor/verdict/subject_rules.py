@@ -291,17 +291,17 @@ def all_counted(situation: Situation) -> Sequence[Hit]:
 
 def without_zero(situation: Situation) -> Sequence[Hit]:
     """The zero of the crank's encoder is not known."""
-    return _said(situation.without_zero)
+    return _with_cause(situation.without_zero)
 
 
 def unfollowed(situation: Situation) -> Sequence[Hit]:
     """The crank is not followed."""
-    return _said(situation.unfollowed)
+    return _with_cause(situation.unfollowed)
 
 
 def doubtful(situation: Situation) -> Sequence[Hit]:
     """The last gait cycle is unlikely to be one of this leg."""
-    return _said("; ".join(situation.doubts))
+    return _with_cause("; ".join(situation.doubts))
 
 
 def no_cycle(situation: Situation) -> Sequence[Hit]:
@@ -424,7 +424,7 @@ def _compared(found: Diagnosis) -> str:
     return "".join(f"; {each}" for each in (*shown, found.next_step) if each)
 
 
-def _said(cause: str) -> Sequence[Hit]:
+def _with_cause(cause: str) -> Sequence[Hit]:
     """A hit with a cause in words; none where there are no words."""
     return [Hit(words={"cause": cause})] if cause else []
 

@@ -134,7 +134,7 @@ def wear_section(summary: ReplaySummary) -> Section:
 
 
 def _deepest(summary: ReplaySummary) -> str:
-    """The deepest wear beside the clearance limit, which tells how much it is."""
+    """The deepest wear beside the clearance limit, which shows how much it is."""
     depths = {name: _greatest(worn) for name, worn in summary.wear_depth_m.items()}
     name = max(depths, key=lambda joint: depths[joint], default="")
     if not name or not depths[name]:

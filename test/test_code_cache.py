@@ -107,7 +107,7 @@ def test_a_link_is_judged_by_where_it_leads(shared):
 
 
 @pytest.mark.plain
-def test_a_file_in_the_way_is_told(tmp_path):
+def test_a_file_in_the_way_is_reported(tmp_path):
     (tmp_path / "file").write_text("")
     assert "Not a directory" in make_private(tmp_path / "file" / "a")
 
@@ -140,7 +140,7 @@ def test_a_directory_laid_in_advance_by_another_user_is_not_used(shared, tmp_pat
     assert not Path(place).exists()  # gone with the process
 
 
-def test_a_directory_that_was_asked_for_and_is_refused_is_told_once(shared, tmp_path):
+def test_a_directory_that_was_asked_for_and_is_refused_is_reported_once(shared, tmp_path):
     """Child processes go where their parent went and say nothing."""
     (shared / "asked" / "leg_wear_monitor").mkdir(parents=True)
     (shared / "asked" / "leg_wear_monitor").chmod(0o777)

@@ -33,7 +33,7 @@ def with_a_chunk(whole, data, compression, size, is_cut=False):
 @pytest.mark.parametrize("is_cut", [False, True])
 @pytest.mark.parametrize("claimed", [BOMB_BYTES, 1000])
 @pytest.mark.parametrize("compression", ["zstd", "lz4"])
-def test_a_chunk_that_grows_is_left_out_and_told(
+def test_a_chunk_that_grows_is_left_out_and_reported(
     tmp_path, sent, write_bag, expected, read, compression, claimed, is_cut
 ):
     index_types = pytest.importorskip("mcap.writer").IndexType
@@ -138,7 +138,7 @@ def test_a_device_is_refused(tmp_path, read):
         read(tmp_path / "x.mcap")
 
 
-def test_a_directory_that_is_called_like_a_file_is_told(tmp_path, sent, write_bag, expected, read):
+def test_a_directory_that_is_called_like_a_file_is_reported(tmp_path, sent, write_bag, expected, read):
     (tmp_path / "a.db3").mkdir()
     write_bag(tmp_path / "b.mcap", sent)
     samples, recording = read(tmp_path)

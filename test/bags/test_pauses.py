@@ -21,7 +21,7 @@ def gaps(result):
     return [alarm.name for _, alarm in result.history.changes if alarm.name == "input_gaps"]
 
 
-def test_a_pause_between_recordings_is_told_and_raises_no_alarm(record):
+def test_a_pause_between_recordings_is_reported_and_raises_no_alarm(record):
     paths = [record("a.mcap", 0.0), record("b.mcap", SECONDS + PAUSE_S)]
     config = lw.MonitorConfig()
     result = lw.replay(paths, config)

@@ -139,7 +139,7 @@ def test_a_log_time_heals_a_stamp_of_zero(tmp_path, write_bag, traffic, read):
     assert (read(path, time="log")[0]["fault"] == NO_FAULT).all()
 
 
-def test_clocks_that_run_apart_are_told(tmp_path, sent, write_bag, read):
+def test_clocks_that_run_apart_are_reported(tmp_path, sent, write_bag, read):
     slow = [attrs.evolve(each, log_time_ns=3 * each.log_time_ns) for each in sent]
     _, recording = read(write_bag(tmp_path / "a.mcap", slow))
     notes = [str(finding) for finding in recording.findings]
@@ -148,7 +148,7 @@ def test_clocks_that_run_apart_are_told(tmp_path, sent, write_bag, read):
     assert not recording.findings
 
 
-def test_a_torque_without_header_far_from_the_crank_is_told(tmp_path, sent, store, write_bag, read):
+def test_a_torque_without_header_far_from_the_crank_is_reported(tmp_path, sent, store, write_bag, read):
     number = bytes(store.serialize_cdr(store.types["std_msgs/msg/Float64"](2.5), "std_msgs/msg/Float64"))
     bare = [
         attrs.evolve(each, type="std_msgs/msg/Float64", raw=number, log_time_ns=each.log_time_ns)
@@ -264,7 +264,7 @@ def test_an_effort_is_the_torque_where_it_is_asked_for(tmp_path, sent, write_bag
     assert np.isfinite(samples["torque_nm"]).all()
 
 
-def test_a_damaged_metadata_file_is_told_and_done_without(tmp_path, sent, write_bag, expected, read):
+def test_a_damaged_metadata_file_is_reported_and_done_without(tmp_path, sent, write_bag, expected, read):
     write_bag(tmp_path / "a.mcap", sent)
     for text in (
         "rosbag2_bagfile_information: [",

@@ -13,7 +13,7 @@ def result(run):
     return run("design", "four_bar", "--duty", "0:8", *TRIED, "--hours", "10", "--out", "out")
 
 
-def test_each_joint_is_told_as_it_is_and_with_the_smallest_that_lasts(result, tmp_path):
+def test_each_joint_is_reported_as_it_is_and_with_the_smallest_that_lasts(result, tmp_path):
     assert result.exit_code == 0
     for joint in ("B", "C"):
         assert f"{joint} now: " in result.stdout

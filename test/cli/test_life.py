@@ -80,7 +80,7 @@ def test_life_tells_regime_limits_and_the_makers_own_life(run, refused, shipped,
     assert rating in result.stdout  # the formula knows nothing of a coefficient
 
 
-def test_a_factor_on_the_wear_is_told_beside_the_coefficient(run):
+def test_a_factor_on_the_wear_is_reported_beside_the_coefficient(run):
     result = run(*ONE, "--limit-m", "5.2e-4", "--wear-factor", "100")
     assert "wear coefficient 1e-15 1/Pa, times 100\n" in result.stdout
 

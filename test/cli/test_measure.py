@@ -32,7 +32,7 @@ def test_a_measurement_is_kept_and_explained(run, ledger):
     assert rows(ledger) == [("A", pytest.approx(4.2e-4), pytest.approx(6e-5), 4000, 1)]
 
 
-def test_another_wear_coefficient_than_that_of_the_counted_wear_is_told(run, ledger, tmp_path):
+def test_another_wear_coefficient_than_that_of_the_counted_wear_is_reported(run, ledger, tmp_path):
     config = tmp_path / "monitor.yaml"
     config.write_text("/**:\n  ros__parameters:\n    wear_coefficients_per_pa: [2.0e-15]\n")
     given = ("measure", "A", "0.42", "--sigma", "0.005", "--ledger", str(ledger))

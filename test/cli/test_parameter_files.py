@@ -26,7 +26,7 @@ def test_a_broken_parameter_file_is_one_line(refused, tmp_path, text, said):
 
 
 @pytest.mark.plain
-def test_a_parameter_file_in_order_is_told_in_one_line(run, tmp_path):
+def test_a_parameter_file_in_order_is_reported_in_one_line(run, tmp_path):
     (tmp_path / "mine.yaml").write_text(
         BEGIN + "{hardware_id: leg-7, clearance_joints: [G], cadence.commanded_rpm: -30.0}"
     )
@@ -56,7 +56,7 @@ def test_the_sections_of_all_monitors_of_a_file_are_checked(run, refused, tmp_pa
     assert "both.yaml: crank_joynt: unknown parameter" in refused("check", "both.yaml")
 
 
-def test_lives_that_end_before_the_limit_are_told_by_check_and_at_the_start_of_a_replay(run, tmp_path):
+def test_lives_that_end_before_the_limit_are_reported_by_check_and_at_the_start_of_a_replay(run, tmp_path):
     (tmp_path / "mine.yaml").write_text(BEGIN + "limits: {clearance_m: 0.0008}")
     for line in (("check", "mine.yaml"), ("replay", "none.mcap", "--config", "mine.yaml")):
         warning = run(*line).stderr.splitlines()[0]

@@ -99,7 +99,7 @@ def test_a_load_in_another_unit_is_warned_of(tmp_path: Path, peak: str, shown: s
     assert [str(each.message).split(": ", 1)[1] for each in found] == ([usual] if shown else [])
 
 
-def test_the_load_of_references_is_told(run, tmp_path: Path) -> None:
+def test_the_load_of_references_is_reported(run, tmp_path: Path) -> None:
     leg = load_mechanism("bionic_leg")
     (shipped,) = reference_file.shipped_references(leg)
     few = attrs.evolve(shipped, torque_nm=tuple(torque[:1] for torque in shipped.torque_nm))

@@ -102,7 +102,9 @@ def test_the_same_recording_again_keeps_the_report_and_exits_with_findings(
     assert json.loads((tmp_path / "again.json").read_text())["verdict"]["fault_code"] == "ALREADY_COUNTED"
 
 
-def test_another_wear_coefficient_than_that_of_the_ledger_is_told(run, bag, complaints, tmp_path, unpainted):
+def test_another_wear_coefficient_than_that_of_the_ledger_is_reported(
+    run, bag, complaints, tmp_path, unpainted
+):
     config = tmp_path / "monitor.yaml"
     config.write_text("/**:\n  ros__parameters:\n    wear_coefficients_per_pa: [2.0e-15]\n")
     first, again = (

@@ -63,7 +63,7 @@ def test_another_leg_is_an_option(run, tmp_path, unpainted):
     assert json.loads((tmp_path / "out" / "study.json").read_text())["settings"]["mechanism"] == "jansen_leg"
 
 
-def test_a_pair_without_wear_coefficient_is_told(run, shipped, tmp_path, unpainted, complaints):
+def test_a_pair_without_wear_coefficient_is_reported(run, shipped, tmp_path, unpainted, complaints):
     limits_only = shipped("four_bar").replace("wear_coefficient: 1.0e-15", "material: du-on-steel-dry")
     (tmp_path / "limits.yaml").write_text(limits_only)
     (tmp_path / "tiny.yaml").write_text(TINY.replace("[G]", "[B]").replace("0.0001, ", ""))
@@ -75,7 +75,7 @@ def test_a_pair_without_wear_coefficient_is_told(run, shipped, tmp_path, unpaint
     assert "Wear of B is not counted: the pair gives no wear coefficient." in page
 
 
-def test_points_that_are_missing_are_told_and_the_rest_is_shown(run, done, tmp_path):
+def test_points_that_are_missing_are_reported_and_the_rest_is_shown(run, done, tmp_path):
     first = json.loads((tmp_path / "out" / "study.json").read_text())["points"][0]["key"]
     (tmp_path / "out" / "points" / f"{first}.npz").unlink()
     result = run("report", "out")
@@ -103,7 +103,7 @@ def test_what_cannot_be_is_one_line(run, line, fault):
     assert len(result.stderr.splitlines()) == 1
 
 
-def test_a_scheduler_that_does_not_answer_is_told(run, tmp_path):
+def test_a_scheduler_that_does_not_answer_is_reported(run, tmp_path):
     pytest.importorskip("distributed", reason="the extra 'dask' is not installed")
     (tmp_path / "tiny.yaml").write_text(TINY)
     line = ("study", "size", "--config", "tiny.yaml", "--out", "o", "--scheduler", "frog://nowhere")

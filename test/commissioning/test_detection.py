@@ -153,7 +153,7 @@ def test_a_reference_that_is_asked_for_is_simulated_and_named(
     assert "reference: leg.npz" in result.to_yaml()
 
 
-def test_too_few_gait_cycles_are_told(walked: MakeWalk) -> None:
+def test_too_few_gait_cycles_are_reported(walked: MakeWalk) -> None:
     few = walked(cycles=LEAST_CYCLES - 1)
     assert "fewer than 8 gait cycles" in with_detections(RESULT, few, None).reference_used
     with pytest.raises(LegWearError, match="--reference: the recording has 7 gait cycles"):

@@ -147,7 +147,7 @@ def test_a_part_of_an_ideal_cycle_is_counted_as_such(leg, linkage_of):
     assert whole.drive_torque_nm.mean == pytest.approx(motion.drive_torque.mean(), abs=1.0e-9)
 
 
-def test_an_energy_that_does_not_close_is_told(leg):
+def test_an_energy_that_does_not_close_is_reported(leg):
     """With clearances of a third of the radius; not with one cycle, which has no standard error."""
     with pytest.warns(ConfigWarning, match=r"bionic_leg.yaml: the energy does not close, .*--model full"):
         simulate(leg, clearance_m=3.0e-3, cycles=6)

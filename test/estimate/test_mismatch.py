@@ -140,7 +140,7 @@ def test_what_is_wrong_is_named_with_its_value(leg, walked, wrong, causes) -> No
 
 @pytest.mark.parametrize(("bias", "word"), [(-5.0, "drives the crank"), (9.0, "largest friction")])
 @pytest.mark.parametrize("factor", [-1.0, 3.0])
-def test_a_bias_is_told_beside_a_wrong_factor(leg, walked, factor, bias, word) -> None:
+def test_a_bias_is_reported_beside_a_wrong_factor(leg, walked, factor, bias, word) -> None:
     found = explained(leg, walked(factor=factor, bias=factor * bias))
     assert found is not None
     assert found.bias.value == pytest.approx(bias if bias < 0.0 else bias - ALLOWED.friction_nm, abs=0.2)
@@ -207,7 +207,7 @@ def test_a_reversed_sign_on_a_leg_that_does_not_fit_is_named_with_what_remains(l
     assert "stays unexplained" in words(found)
 
 
-def test_two_causes_that_explain_alike_are_both_told_and_none_is_sure(leg, walked) -> None:
+def test_two_causes_that_explain_alike_are_both_reported_and_none_is_sure(leg, walked) -> None:
     found = explained(leg, walked(body="shank", more=0.5, noise=1.0))
     assert found is not None and len(found.alternatives) > 1 and not found.named and not found.is_input_fault
     text = words(found)

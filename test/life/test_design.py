@@ -83,7 +83,7 @@ def test_growing_work_shortens_a_life_by_its_integral():
         ("iglidur-j-on-steel", 6e-4, "impact"),
     ],
 )  # fmt: skip
-def test_what_ends_a_life_is_told(material, width, limited_by):
+def test_what_ends_a_life_is_reported(material, width, limited_by):
     one = next(tried(material, width).bushings(LEG.clearances["A"]))
     found = candidate(LEG, STEADY, 0, one, 6e-4)
     assert found.limited_by == limited_by

@@ -138,7 +138,7 @@ def test_without_complete_defaults_only_the_named_joints_have_settings(document)
     assert list(parse_mechanism(file, "leg.yaml").clearances) == ["B"]
 
 
-def test_a_fault_is_told_where_it_stands(document):
+def test_a_fault_is_named_where_it_stands(document):
     file = document("four_bar")
     file["clearances"]["joints"] = {"B": {"restitution": 2.0}}
     with pytest.raises(ConfigError) as own:

@@ -192,7 +192,7 @@ def test_words_on_missing_samples_say_what_acts(walk, model, is_sent, words):
     assert words in status_of(monitor, "foot_load").message
 
 
-def test_noise_without_a_load_does_not_wear_and_is_told(walk):
+def test_noise_without_a_load_does_not_wear_and_is_reported(walk):
     """The knee bears 73 N in the air; under this noise alone it was pressed as by a load."""
     monitor, new = as_new("measured", "wrench")
     monitor.restore(new)
@@ -209,7 +209,7 @@ def test_noise_without_a_load_does_not_wear_and_is_told(walk):
     assert np.mean([one.joints[2].mean_force_n for one in cycles[-2:]]) == pytest.approx(229.0, rel=0.2)
 
 
-def test_single_spikes_do_not_wear_and_are_told(walk):
+def test_single_spikes_do_not_wear_and_are_reported(walk):
     """One sample of 3 kN in every other swing was taken for a force: it doubled those of hip and knee."""
     monitor, new = as_new("measured", "wrench")
     forces_n = []

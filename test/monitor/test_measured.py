@@ -190,7 +190,7 @@ def test_a_joint_that_was_measured_since_a_correction_is_not_asked_for(
     assert asked() == ("A, B, I, J" if is_asked else "B, I, J")
 
 
-def test_a_measurement_and_a_torque_that_disagree_are_told_with_what_to_do(
+def test_a_measurement_and_a_torque_that_disagree_are_reported_with_what_to_do(
     monitor, gait, monkeypatch
 ) -> None:
     shown = Diagnosis(state=DiagnosisState.CHANGED, changes=(opened(2.0),))

@@ -80,7 +80,7 @@ def test_plays_that_do_not_fit_are_found() -> None:
     assert "of B would be -200 mm" in negative.findings[0]
 
 
-def test_a_joint_without_an_effect_is_not_told() -> None:
+def test_a_joint_without_an_effect_is_not_reported() -> None:
     found = solved("AB", np.array([[1.0, 0.0]]), np.array([1.0]), np.array([0.01]))
     assert found.joints[0].clearance_m == pytest.approx(1.0)
     assert found.joints[1].most_m is None

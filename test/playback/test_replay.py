@@ -229,7 +229,7 @@ def test_another_machine_is_not_counted(bag: Path, tmp_path: Path, leg: lw.Mecha
         pytest.param((1, 0), id="the later one first", marks=pytest.mark.slow),
     ],
 )
-def test_what_two_recordings_have_in_common_is_counted_once_and_told(
+def test_what_two_recordings_have_in_common_is_counted_once_and_reported(
     walk: list[Message], tmp_path: Path, leg: lw.Mechanism, order: tuple[int, int]
 ) -> None:
     a, b = walk[: 2 * 5 * RATE_HZ], walk[2 * 3 * RATE_HZ :]

@@ -116,7 +116,7 @@ def test_efforts_that_are_not_one_a_joint_raise_alarms(
     assert result.monitor.lost.faulty["wrong_length"] == len(walked[0])
 
 
-def test_an_interface_that_is_not_there_is_told_with_those_that_are(write: Callable[..., Path]) -> None:
+def test_an_interface_that_is_not_there_is_reported_with_those_that_are(write: Callable[..., Path]) -> None:
     result = replayed(write("interface"), "interface", interface="motor_current")
     assert {alarm.name for _, alarm in result.history.changes} >= {"input_rate torque"}
     texts = [finding.text for finding in result.findings if "dynamic_joint_states" in finding.text]

@@ -136,7 +136,7 @@ def test_markers_draw_the_leg(followed) -> None:
     assert max(z for _, z in positions[2:]) < -0.3
 
 
-def test_forces_torques_and_state_are_told(followed) -> None:
+def test_forces_torques_and_state_are_reported(followed) -> None:
     forces = followed.live[f"{ME}/impact_forces"][1][-1]
     assert list(forces.name) == [f"{joint}_impact" for joint in "ABGIJ"] and len(forces.effort) == 5
     torques = [message.wrench.torque.z for message in followed.live[f"{ME}/predicted_torque"][1]]

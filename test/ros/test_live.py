@@ -91,7 +91,7 @@ def test_reliable_and_best_effort_publishers_are_heard_whatever_time_ros_has(sta
     assert monitor.received == sum(one.arrival_s < 1.0 for one in walk.readings)
 
 
-def test_a_publisher_that_does_not_fit_is_told_of(stage, walk) -> None:
+def test_a_publisher_that_does_not_fit_is_reported(stage, walk) -> None:
     override = "qos_overrides./joint_states.subscription.reliability"
     monitor = stage.monitor(**{override: "reliable", "diagnostics.period_s": 0.1})
     heard = stage.listen("/diagnostics", DiagnosticArray)
@@ -163,7 +163,7 @@ def gait_of(monitor):
 
 
 @pytest.mark.parametrize("model", ["measured", "none"])
-def test_a_foot_load_is_taken_told_recorded_and_replayed(
+def test_a_foot_load_is_taken_reported_recorded_and_replayed(
     stage, tmp_path: Path, model: str, arrive_at
 ) -> None:
     """A wrench, which acts, or a contact switch, which has no stamp: it is of the time at which it comes.

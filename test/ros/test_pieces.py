@@ -115,7 +115,7 @@ def test_a_bounded_part_is_taken_oldest_first() -> None:
     assert box.delay_s(2_000_000_000) == 0.0
 
 
-def test_falling_behind_is_told_and_then_over() -> None:
+def test_falling_behind_is_reported_and_then_over() -> None:
     box, load = inbox(4), Load()
     assert not load.note(0.01)
     assert load_status(load, box).level is Level.OK
@@ -325,7 +325,7 @@ def test_a_clock_that_is_set_back_fills_no_memory(tmp_path: Path) -> None:
     assert len(box._stops._kept) == 31
 
 
-def test_stops_that_cannot_be_written_are_told_and_end_nothing(tmp_path: Path) -> None:
+def test_stops_that_cannot_be_written_are_reported_and_end_nothing(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(LegWearError, match=r"record\.stops: "):
         black_box(stops=tmp_path / "file" / "stops")

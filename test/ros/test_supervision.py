@@ -210,7 +210,7 @@ def test_samples_that_came_before_the_clock_was_set_back_are_not_ahead_of_it(
     assert lead_s == [0.0, 0.0, 9.0]
 
 
-def test_a_clock_that_stands_or_is_set_back_is_told() -> None:
+def test_a_clock_that_stands_or_is_set_back_is_reported() -> None:
     watch = ClockMonitor()
     assert watch.status(0, SECOND, True).message == "use_sim_time is set and nobody publishes /clock"
     assert watch.status(7, 2 * SECOND, True).level is Level.OK
@@ -244,7 +244,7 @@ def noted(names: CrankNames, *messages: list[str]) -> str:
     return names.report()
 
 
-def test_a_crank_that_no_message_names_is_told_with_the_names_that_are_there() -> None:
+def test_a_crank_that_no_message_names_is_reported_with_the_names_that_are_there() -> None:
     names = CrankNames("crank")
     message = noted(names, ["knee", "hip"])
     assert message == "no joint is named 'crank'; there are hip, knee; set crank_joint to its name"
@@ -395,7 +395,7 @@ def test_other_joints_on_the_topic_of_the_crank_are_no_fault(stage, walk) -> Non
     other.destroy_node()
 
 
-def test_stamps_of_a_time_to_come_and_a_torque_about_another_axis_are_told(stage, walk) -> None:
+def test_stamps_of_a_time_to_come_and_a_torque_about_another_axis_are_reported(stage, walk) -> None:
     monitor = stage.monitor(diagnostics__period_s=0.1, drive_torque__axis="x")
     diagnostics = stage.listen("/diagnostics", DiagnosticArray)
     alarms = stage.listen(f"{ME}/alarms", DiagnosticArray, latched=True)
@@ -421,7 +421,7 @@ def test_stamps_of_a_time_to_come_and_a_torque_about_another_axis_are_told(stage
     stage.wait_for(lambda: line(alarms, "stamps_ahead crank") is None, "the end of the alarm")
 
 
-def test_the_names_that_are_there_are_told_where_the_crank_is_not(stage, walk) -> None:
+def test_the_names_that_are_there_are_reported_where_the_crank_is_not(stage, walk) -> None:
     monitor = stage.monitor(diagnostics__period_s=0.1, crank_joint="kurbel")
     diagnostics = stage.listen("/diagnostics", DiagnosticArray)
     stage.legs().play(walk, monitor, end_s=0.5)

@@ -77,7 +77,7 @@ def test_a_result_says_what_it_came_from(uninterrupted):
 
 
 @pytest.mark.plain
-def test_a_directory_of_another_study_or_a_damaged_one_is_told(tiny, tmp_path):
+def test_a_directory_of_another_study_or_a_damaged_one_is_reported(tiny, tmp_path):
     StudyDirectory(tmp_path).open({"study": "speed", "settings": {}, "points": [], "versions": {}}, "")
     with pytest.raises(ConfigError, match="contains the study speed, expected size"):
         run_study("size", tiny("size", joints=["G"], clearances_m=[1.0e-4]), tmp_path)

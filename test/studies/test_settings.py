@@ -63,7 +63,7 @@ def test_every_study_that_comes_with_the_package_has_points_that_can_be(name):
         ("laws", {"joints": ["A"], "normal_laws": ["hooke"]}, "normal_laws: 'hooke' is not one of hertz,"),
     ],
 )
-def test_what_cannot_be_is_told_with_its_key(study, keys, fault):
+def test_what_cannot_be_is_reported_with_its_key(study, keys, fault):
     with pytest.raises(ConfigError) as error:
         parse_settings(study, keys, f"{study}.yaml")
     assert fault in str(error.value)
@@ -71,7 +71,7 @@ def test_what_cannot_be_is_told_with_its_key(study, keys, fault):
     assert "\n" not in str(error.value)
 
 
-def test_joints_that_the_leg_does_not_have_are_told_before_anything_runs(tiny):
+def test_joints_that_the_leg_does_not_have_are_reported_before_anything_runs(tiny):
     settings = tiny("size", joints=["Q"], clearances_m=[1.0e-4])
     with pytest.raises(ConfigError, match="'Q' has no clearance settings in bionic_leg"):
         check_points(load_mechanism(), [point.settings for point in settings.points()])

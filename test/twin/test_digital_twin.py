@@ -138,7 +138,7 @@ def test_parameters_that_change_underway_belong_to_a_snapshot(twin, gait, heavie
     assert_same(run(twin, [walk[300:]]), after)
 
 
-def test_what_happens_is_told(in_one_go):
+def test_what_happens_is_reported(in_one_go):
     what = TwinEventKind
     assert [event.what for event in in_one_go[0].events] == [
         what.ACQUIRED, what.STOPPED, what.MOVING, what.REVERSED, what.STOPPED,
@@ -375,7 +375,7 @@ def test_a_new_part_has_fresh_surfaces(twin, gait):
         twin.set_depth(-before)
 
 
-def test_a_leg_that_cannot_be_resolved_is_told_and_goes_on(leg, gait):
+def test_a_leg_that_cannot_be_resolved_is_reported_and_goes_on(leg, gait):
     """Bushings like jelly: journals go through them; the wear stays, the time counts as unmonitored."""
     soft = {name: attrs.evolve(c, stiffness=10.0) for name, c in leg.clearances.items()}
     twin = DigitalTwin(attrs.evolve(leg, clearances=soft), TwinSettings(clearance_joints=("A", "G")))

@@ -86,7 +86,7 @@ def test_a_name_is_a_name(path, sent, expected, read, name):
     assert sorted(file.name for file in path.parent.iterdir()) == sorted([name, "bag"])
 
 
-def test_messages_of_no_topic_are_told(path, read):
+def test_messages_of_no_topic_are_reported(path, read):
     with closing(sqlite3.connect(path)) as database, database:
         database.execute("UPDATE messages SET topic_id = 77 WHERE id % 2 = 0")
         (count,) = database.execute("SELECT COUNT(*) FROM messages WHERE topic_id = 77").fetchone()

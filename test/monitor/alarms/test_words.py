@@ -35,7 +35,7 @@ def test_a_latched_alarm_tells_its_worst_value_and_not_that_of_today() -> None:
     assert "worst 1.65 mm, limit 10 mm" in words(attrs.evolve(alarm, unit="m", worst=1.65e-3, limit=1e-2))
 
 
-def test_of_estimates_the_last_one_is_told_and_is_not_called_the_worst() -> None:
+def test_of_estimates_the_last_one_is_reported_and_is_not_called_the_worst() -> None:
     alarm = Alarm(kind="clearance", subject="G", unit="m")
     for value in (2.1e-3, 1.65e-3):
         alarm = evaluated(alarm, value, Limit(5e-4, 6e-4, 0.05), 10**9, 1, 4e-4, "torque")

@@ -197,7 +197,7 @@ def test_the_temperature_of_the_drive_is_that_now_and_that_of_the_baseline(new, 
 
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])
-def test_a_force_that_only_the_reference_knows_is_told(leg, reference, direction: float) -> None:
+def test_a_force_that_only_the_reference_knows_is_reported(leg, reference, direction: float) -> None:
     """As after a restart, or of a reference that was simulated under a known force."""
     turned = attrs.evolve(leg, drive=attrs.evolve(leg.drive, speed=direction * TURN))
     stance = nominal_stance(build_linkage(turned))
@@ -421,7 +421,7 @@ def pushed(leg, peak_n, cycles):
     return sizes[:, None] * torque
 
 
-def test_a_load_that_nobody_asked_for_is_told_and_not_taken_for_masses(leg, new, reference) -> None:
+def test_a_load_that_nobody_asked_for_is_reported_and_not_taken_for_masses(leg, new, reference) -> None:
     observer = new()
     cycles = COMMISSIONING_CYCLES + 12
     walk(observer, samples(reference, [0] * cycles, added=pushed(leg, 300.0, cycles)))
@@ -512,7 +512,7 @@ def on_ground(leg, reference, monkeypatch):
     return observer
 
 
-def test_a_joint_that_was_named_stays_told_while_the_load_at_the_foot_has_changed(
+def test_a_joint_that_was_named_stays_reported_while_the_load_at_the_foot_has_changed(
     on_ground, reference
 ) -> None:
     """Seen before: *inspect J*, then *watch* for 41 gait cycles at another load, then *stop*."""
@@ -532,7 +532,7 @@ def test_a_joint_that_was_named_stays_told_while_the_load_at_the_foot_has_change
 
 
 @pytest.mark.parametrize("is_named", [True, False])
-def test_a_joint_that_opens_as_the_load_changes_is_told_before_a_baseline_hides_it(
+def test_a_joint_that_opens_as_the_load_changes_is_reported_before_a_baseline_hides_it(
     on_ground, reference, monkeypatch, is_named: bool
 ) -> None:
     """Seen before: B at 0.50 mm was *G, 0.562 ± 0.059, sure*, and J at 0.60 became part of the baseline."""
@@ -572,7 +572,7 @@ def test_a_healthy_leg_is_commissioned_anew_under_the_new_load_without_a_word(on
 
 
 @pytest.mark.parametrize("is_other", [True, False])
-def test_an_unknown_change_is_not_told_while_the_foot_carries_another_load(
+def test_an_unknown_change_is_not_reported_while_the_foot_carries_another_load(
     commissioned, monkeypatch, is_other: bool
 ) -> None:
     """Seen before: a healthy leg that was lifted had *loose, bent or added parts* for two gait cycles."""
@@ -643,7 +643,9 @@ def test_a_mass_on_the_leg_is_no_joint(commissioned, beside_a_mass) -> None:
     assert found.state is DiagnosisState.CHANGED
 
 
-def test_a_joint_that_opens_in_a_leg_that_stays_changed_is_told_beside_that(commissioned, reference) -> None:
+def test_a_joint_that_opens_in_a_leg_that_stays_changed_is_reported_beside_that(
+    commissioned, reference
+) -> None:
     """Seen before: G that broke out after the torque had become late was that lag for good."""
     observer, late = commissioned(), [0] * (COMMISSIONING_CYCLES + 8)
     assert walk_on(observer, reference, late, delay_s=0.01) == []
@@ -662,7 +664,7 @@ def test_a_joint_that_opens_in_a_leg_that_stays_changed_is_told_beside_that(comm
     assert found.least_m[2] > MonitorConfig().limits.clearance_m
 
 
-def test_a_change_that_is_over_is_not_told_and_the_clearances_are_known_again(
+def test_a_change_that_is_over_is_not_reported_and_the_clearances_are_known_again(
     leg, commissioned, reference
 ) -> None:
     observer, heavy = commissioned(), int(reference.of_masses[list(leg.bodies).index("foot"), 1])
@@ -753,7 +755,7 @@ def test_whether_another_joint_opened_with_the_corrected_one_is_seen_by_a_refere
         assert shown.reason.endswith("measure them")
 
 
-def test_an_opening_beside_a_correction_that_a_measurement_contradicts_is_told_until_both_agree(
+def test_an_opening_beside_a_correction_that_a_measurement_contradicts_is_reported_until_both_agree(
     commissioned, reference, monkeypatch
 ) -> None:
     """Seen before: it was not reported, and all others stayed unknown for good."""
@@ -965,7 +967,7 @@ def test_each_cadence_has_its_own_baseline_and_reference(two_cadences, reference
     assert not observer.state.changes
 
 
-def test_a_told_change_stays_told_once_at_another_cadence(leg, two_cadences, reference) -> None:
+def test_a_reported_change_stays_reported_once_at_another_cadence(leg, two_cadences, reference) -> None:
     observer, block = two_cadences, samples(reference, [0] * 20)
     heavy = samples(reference, [int(reference.of_masses[list(leg.bodies).index("foot"), 1])] * 20)
     at = walk_at(observer, block, 10**9, START_NS)
@@ -1106,7 +1108,7 @@ def test_a_baseline_of_a_sensor_with_another_rate_is_not_used(leg, reference) ->
     assert observer.state.commissioned.signatures.shape[1] == 160
 
 
-def test_a_baseline_is_of_one_sensor_and_what_is_done_is_told(leg, commissioned, reference) -> None:
+def test_a_baseline_is_of_one_sensor_and_what_is_done_is_reported(leg, commissioned, reference) -> None:
     """With as many phases at 1 kHz, averaged, a healthy leg had changed, and a wide joint had no name."""
     known = commissioned().state.commissioned
     assert (known.period_s, known.together, known.is_instant) == (0.005, 1, False)

@@ -134,7 +134,7 @@ def test_a_ramp_is_recognised_and_a_start_raises_no_doubt() -> None:
     assert doubt(ramp, IDLE, models) == ""
 
 
-def test_a_torque_that_no_clearances_explain_is_told_with_what_to_do() -> None:
+def test_a_torque_that_no_clearances_explain_is_reported_with_what_to_do() -> None:
     """Twice the noise, half the scale or lost samples: nothing was observed, without a reason."""
     models = SimpleNamespace(is_sure=lambda _: True)
     fits = [ClearanceFit(NEW, np.eye(5), square, 0.0) for square in (1.0, 4.0)]

@@ -176,7 +176,7 @@ def test_a_restored_monitor_goes_on_bit_for_bit(new_watch, read):
 @pytest.mark.parametrize(
     "value, words", [(math.nan, "is not in joint_states with the crank"), (math.inf, "gives no angle")]
 )
-def test_an_encoder_that_says_nothing_is_told_and_the_others_go_on(new_watch, read, value, words):
+def test_an_encoder_that_says_nothing_is_reported_and_the_others_go_on(new_watch, read, value, words):
     monitor = new_watch()
     samples = read(3.5)
     samples["encoder_rad"][:, 1] = value
@@ -189,7 +189,7 @@ def test_an_encoder_that_says_nothing_is_told_and_the_others_go_on(new_watch, re
     assert len(monitor.status()[1].values) > 0 and monitor.lost.unmonitored_s < 0.2
 
 
-def test_a_leg_that_cannot_be_simulated_is_told_and_the_crank_goes_on(new_watch, read, monkeypatch):
+def test_a_leg_that_cannot_be_simulated_is_reported_and_the_crank_goes_on(new_watch, read, monkeypatch):
     monitor = new_watch()
     # whatever the stepper says, it failed
     monkeypatch.setattr("leg_wear_monitor.twin.reference.DONE", -1)
@@ -199,7 +199,7 @@ def test_a_leg_that_cannot_be_simulated_is_told_and_the_crank_goes_on(new_watch,
     assert len(reports.cycles) == 6
 
 
-def test_an_encoder_on_another_joint_than_said_is_told(new_watch, read):
+def test_an_encoder_on_another_joint_than_said_is_reported(new_watch, read):
     monitor = new_watch()
     samples = read(3.5)
     samples["encoder_rad"][:, 2] *= -1.0

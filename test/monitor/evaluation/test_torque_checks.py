@@ -100,7 +100,7 @@ def walked(lag_s, offset_rad, speeds):
     return record
 
 
-def test_a_crank_offset_at_one_speed_may_be_a_lag_and_is_told_as_either():
+def test_a_crank_offset_at_one_speed_may_be_a_lag_and_is_reported_as_either():
     said, record = report(lag=0.05 / (2.0 * math.pi)), walked(0.0, 0.05, [60.0] * 50)
     assert levels(said, record) == {LAG: Level.ERROR}
     cause = torque_causes({LAG}, said, record, BOUNDS)[LAG]

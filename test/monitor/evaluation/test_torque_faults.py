@@ -82,7 +82,7 @@ def test_what_is_of_single_samples_is_no_mismatch(leg, recorded, change, size):
         (1.5, 0.0, None, "measured as predicted"),
     ],
 )
-def test_it_is_told(monitor, healthy, bias_nm, offset_rad, alarm, cause):
+def test_it_is_reported(monitor, healthy, bias_nm, offset_rad, alarm, cause):
     samples = healthy.copy()
     samples["torque_nm"] += bias_nm
     samples["crank_angle_rad"] += offset_rad

@@ -177,7 +177,7 @@ def test_a_ledger_that_cannot_be_written_stops_nothing(begin, gait):
     np.testing.assert_array_equal(again._twin.depth, monitor._twin.depth)
 
 
-def test_a_last_entry_that_cannot_be_written_is_told(begin, gait):
+def test_a_last_entry_that_cannot_be_written_is_reported(begin, gait):
     monitor = begin()
     monitor.update(gait(2.5))
     path = monitor._accounting.ledger.path

@@ -387,7 +387,7 @@ def test_baselines_are_of_the_parts_since_the_last_reset_whatever_the_clocks_say
         found.close()
 
 
-def test_a_measurement_that_is_withdrawn_is_kept_and_told_as_withdrawn(open_ledger):
+def test_a_measurement_that_is_withdrawn_is_kept_and_reported_as_withdrawn(open_ledger):
     ledger = open_ledger()
     ledger.note(measured())
     ledger.record()

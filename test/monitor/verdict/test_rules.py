@@ -266,7 +266,7 @@ def test_a_leg_is_to_walk_on_only_where_that_shows_more(next_step: str) -> None:
     assert verdict.do == f"{walk_on}rock these joints by hand regularly"
 
 
-def test_a_mismatch_without_a_diagnosis_is_told_as_what_it_is() -> None:
+def test_a_mismatch_without_a_diagnosis_is_reported_as_what_it_is() -> None:
     verdict = judged(
         alarms=(alarm("torque_mismatch", value=0.35, limit=0.1),),
         torque_causes={"torque_bias": NamedCause(Cause.BIAS, -3.0, 0.1)},
@@ -359,7 +359,7 @@ TOLD = [
 
 
 @pytest.mark.parametrize(("found", "words"), TOLD, ids=[found.cause.name for found, _ in TOLD])
-def test_what_the_diagnosis_finds_is_told_with_its_value(found: Change, words: str) -> None:
+def test_what_the_diagnosis_finds_is_reported_with_its_value(found: Change, words: str) -> None:
     assert words in judged(diagnosis=diagnosis(found), cadence_rpm=60.0).why
 
 
@@ -393,14 +393,16 @@ def test_a_reason_to_stop_is_not_hidden_by_an_input_that_fails() -> None:
     [(Level.OK, 3.0, True), (Level.WARN, 0.9, True), (Level.ERROR, math.nan, False)],
     ids=["past", "warning", "of the ledger"],
 )
-def test_a_raised_alarm_is_told_with_its_worst_value_and_whether_it_is_past(present, value, is_past) -> None:
+def test_a_raised_alarm_is_reported_with_its_worst_value_and_whether_it_is_past(
+    present, value, is_past
+) -> None:
     verdict = judged(alarms=(alarm("impact_force A", present=present, value=value, worst=1234.5),))
     assert verdict.state is State.INSPECT
     assert "is 1234 N" in verdict.why and "again now" not in verdict.why
     assert ("(since 0.000 s; now within its limit)" in verdict.why) == is_past
 
 
-def test_an_alarm_is_told_in_words_with_the_label_of_its_joint() -> None:
+def test_an_alarm_is_reported_in_words_with_the_label_of_its_joint() -> None:
     labelled = tuple(attrs.evolve(each, label="knee" if each.joint == "G" else "") for each in NEW)
     impact = judged(alarms=(alarm("impact_force G"),), joints=labelled)
     assert impact.why == "the impact force in joint G (knee) is 2 N (limit 1 N)"
@@ -413,7 +415,7 @@ def test_an_alarm_is_told_in_words_with_the_label_of_its_joint() -> None:
     assert samples.why == "the fraction of unusable samples is 0.0972 (limit 0.05): x"
 
 
-def test_an_alarm_without_a_noun_is_told_by_its_name() -> None:
+def test_an_alarm_without_a_noun_is_called_by_its_name() -> None:
     own = attrs.evolve(alarm("torque_lag", Level.WARN), kind="input_silence", subject="torque")
     assert judged(alarms=(own,)).why == "alarm: the input silence torque is 2 s (limit 1 s)"
 
@@ -424,7 +426,7 @@ def test_no_sentence_of_a_verdict_has_a_code_name_of_an_alarm() -> None:
             assert name.partition(" ")[0] not in re.findall(r"\w+_\w+", judged(**raised(name, level)).why)
 
 
-def test_a_value_within_its_limit_by_less_than_the_deadband_is_told_beside_the_worst_one() -> None:
+def test_a_value_within_its_limit_by_less_than_the_deadband_is_reported_beside_the_worst_one() -> None:
     verdict = judged(alarms=(alarm("torque_mismatch", value=0.0896, worst=0.219, limit=0.1),))
     assert "0.219 of the predicted RMS is not explained (limit 0.1), 0.0896 now" in verdict.why
     slow = judged(alarms=(alarm("input_rate torque", value=41.0, worst=7.0, limit=40.0),))

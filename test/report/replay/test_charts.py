@@ -119,7 +119,7 @@ def test_each_joint_has_its_own_limit_where_they_differ():
     assert limits({"clearances": alike}) == {"limit": 0.6}
 
 
-def test_changes_of_alarms_that_are_not_drawn_are_told():
+def test_changes_of_alarms_that_are_not_drawn_are_reported():
     summary = made_up_summary()
     (first, *_) = summary.alarms.changes
     changes = [attrs.evolve(first, stamp_ns=summary.recording.begin_ns + i) for i in range(1005)]

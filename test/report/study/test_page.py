@@ -81,7 +81,7 @@ def test_a_superposition_is_called_one_only_where_it_is(study):
     assert findings.superposition(alone, halved).startswith("All at once is not the sum")
 
 
-def test_wear_that_is_not_counted_is_not_told_as_none(study):
+def test_wear_that_is_not_counted_is_not_reported_as_none(study):
     """Without wear coefficients depths are 0 while surfaces rub: a ratio of them is a dash."""
     results = study("multi")
     unworn = [(point, {**arrays, DEPTH: 0.0 * arrays[DEPTH]}) for point, arrays in results.of("response")]

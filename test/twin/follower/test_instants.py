@@ -70,7 +70,7 @@ def test_a_healthy_leg_is_as_predicted_if_its_sensor_is_known(leg, twin):
 
 @pytest.mark.slow
 @pytest.mark.chaotic
-def test_a_knock_is_still_told(leg, twin):
+def test_a_knock_is_still_reported(leg, twin):
     """A knee of 4 mm, by the mean of 29 cycles; of five it was 0.174 with 0.15 in the logarithm."""
     broken = attrs.evolve(leg.clearances["G"], radial_clearance=4.0e-3)
     other = attrs.evolve(leg, clearances={**leg.clearances, "G": broken})

@@ -156,7 +156,7 @@ def test_what_scatters_is_taken_off_and_what_repeats_stays():
 
 
 @pytest.mark.plain
-def test_before_enough_cycles_nothing_is_told():
+def test_before_enough_cycles_nothing_is_reported():
     found = instants(1.0, 0.0)
     found.cycles = found.cycles[1:]
     assert np.isnan(found.rms_nm()[0])

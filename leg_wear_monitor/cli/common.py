@@ -141,7 +141,17 @@ ledger_option: Option = file_option(
 )
 
 node_option: Option = option(
-    "--node", "NAME", "Full name of a running monitor to enter it into, such as /left/leg_wear_monitor."
+    "--node",
+    "NAME",
+    "Full name of a running monitor to enter it into, such as /left/leg_wear_monitor; with --config, of the "
+    "node whose parameters and ledger are used.",
+)
+
+section_option: Option = option(
+    "--node",
+    "NAME",
+    "Full name of the node whose parameters are read, such as /left/leg_wear_monitor.  "
+    "[default: the only one in the file]",
 )
 
 wait_option: Option = option(

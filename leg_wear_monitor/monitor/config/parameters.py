@@ -259,7 +259,10 @@ def parse_config(document: Any, source: str, node: str | None = None) -> Monitor
             values |= _flat(parameters, "", source)
     if not taken:
         found = ", ".join(name for name, _ in sections)
-        raise ConfigError(source, "", f"has nothing for the node {node}, its sections are for: {found}")
+        fault = f"has nothing for the node {node}, its sections are for: {found}"
+        if len(monitors_of(document)) > 1:
+            fault += "; choose one with --node, in a fleet file with node"
+        raise ConfigError(source, "", fault)
     return config_from({name: value for name, value in values.items() if not _OF_ROS.fullmatch(name)}, source)
 
 

@@ -127,7 +127,7 @@ def _run(
 @click.option(
     "--cadence",
     "cadences",
-    type=float,
+    type=common.Number("rpm"),
     multiple=True,
     callback=lambda ctx, param, values: tuple(common.bounded("rpm")(ctx, param, one) for one in values),
     metavar="RPM",
@@ -241,7 +241,7 @@ def reference(
     "DEG",
     "Crank angle of the mechanism in a recording; once for each, in their order.",
     "crank_angles",
-    type=float,
+    type=common.Number("degrees"),
     multiple=True,
 )
 @common.clearances_option("A,B")

@@ -54,9 +54,12 @@ class Number(click.types.FloatParamType):
             return float(value)
         except ValueError:
             pass
-        fault = f"{value!r} is not a number{self._of}, expected one with a decimal point"
+        fault = f"{value!r} is not a number{self._of}, expected one such as 0.5"
         with suppress(ValueError):
-            fault += f"; did you mean {float(value.replace(',', '.')):.12g}?"
+            meant = float(value.replace(",", "."))
+            fault = (
+                f"{value!r} is not a number{self._of}, expected a decimal point; did you mean {meant:.12g}?"
+            )
         return self.fail(fault, param, ctx)
 
 

@@ -36,6 +36,33 @@ WITH_FINDINGS = 1
 # A number on the command line: finite and within bounds, or refused with its unit.
 
 
+class Number(click.types.FloatParamType):
+    """Type of a number; one with a decimal comma is refused with the number that is probably meant.
+
+    Parameters
+    ----------
+    unit : str
+        ``""`` for a pure number.
+    """
+
+    def __init__(self, unit: str = "") -> None:
+        self._of = f" of {unit}" if unit else ""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Give the number, or fail with what is expected."""
+        try:
+            return float(value)
+        except ValueError:
+            pass
+        fault = f"{value!r} is not a number{self._of}, expected one such as 0.5"
+        with suppress(ValueError):
+            meant = float(value.replace(",", "."))
+            fault = (
+                f"{value!r} is not a number{self._of}, expected a decimal point; did you mean {meant:.12g}?"
+            )
+        return self.fail(fault, param, ctx)
+
+
 def bounded(
     unit: str = "", *, above: float | None = None, at_least: float | None = None
 ) -> Callable[[click.Context, click.Parameter, float | None], float | None]:
@@ -106,7 +133,7 @@ def number_option(
     """Option with a finite number within bounds; see `bounded`."""
     check = bounded(unit, above=above, at_least=at_least)
     given = {} if default is None else {"default": default}
-    return option(name, metavar, text, type=float, callback=check, **given)
+    return option(name, metavar, text, type=Number(unit), callback=check, **given)
 
 
 def path_option(name: str, metavar: str, text: str, *, required: bool = False, **of_path: bool) -> Option:
@@ -141,7 +168,17 @@ ledger_option: Option = file_option(
 )
 
 node_option: Option = option(
-    "--node", "NAME", "Full name of a running monitor to enter it into, such as /left/leg_wear_monitor."
+    "--node",
+    "NAME",
+    "Full name of a running monitor to enter it into, such as /left/leg_wear_monitor; with --config, of the "
+    "node whose parameters and ledger are used.",
+)
+
+section_option: Option = option(
+    "--node",
+    "NAME",
+    "Full name of the node whose parameters are read, such as /left/leg_wear_monitor.  "
+    "[default: the only one in the file]",
 )
 
 wait_option: Option = option(

@@ -166,6 +166,8 @@ def doubts(thing: Any, section: str = "") -> Iterator[Doubt]:
         if not (usual := field.metadata.get("usual")):
             continue
         value = getattr(thing, field.name)
+        if value == field.default:  # such as one that is not declared
+            continue
         numbers = [one for one in (value if isinstance(value, tuple) else (value,)) if one is not None]
         beyond = [one for one in numbers if not usual[0] <= abs(one) <= usual[1]]
         if beyond:

@@ -387,6 +387,8 @@ class Chain:
         Recordings that this update leaves out: another leg has them, or the system could not read them.
     is_renewed : bool
         Whether its forecast was made again, because something was measured.
+    has_new_settings : bool
+        Whether its settings are others than those of its last forecast.
     fault : str
         Why the leg could not go on; empty if it could.
     """
@@ -399,6 +401,7 @@ class Chain:
     copies: list[str] = attrs.Factory(list)
     refused: list[str] = attrs.Factory(list)
     is_renewed: bool = False
+    has_new_settings: bool = False
     fault: str = ""
     _settled: set[str] = attrs.Factory(set)
     _pending: str = ""
@@ -425,6 +428,8 @@ class Chain:
             if Outcome(line["outcome"]).is_final or line["settings"] == self.leg.settings:
                 self._settled.add(line["key"])
             self._last_ns = max(self._last_ns, line["end_ns"])
+            if line["outcome"] == Outcome.COUNTED.value:
+                self.has_new_settings = line["settings"] != self.leg.settings
         pending = self.directory.pending()
         if pending and pending["key"] in self._settled:
             self.directory.forget_pending()

@@ -330,6 +330,7 @@ def _renew(leg: FleetLeg, directory: LegDirectory) -> None:
     )
     write_whole(directory.summary, summary.to_json().encode())
     found = {"verdict": verdict, "clearances": clearances, "life": lives["life"], "knows": knows}
+    found |= {"settings": leg.settings}
     directory.renew({**line, **part_document(found)})
 
 

@@ -76,6 +76,16 @@ class FleetUpdate:
         return sum(chain.is_renewed and not chain.fault for chain in self.chains)
 
     @property
+    def with_new_settings(self) -> list[str]:
+        """Legs whose forecast was made with other settings than the one before, such as another duty."""
+        made = (
+            chain
+            for chain in self.chains
+            if (chain.is_renewed and not chain.fault) or any(one["outcome"] == "counted" for one in chain.new)
+        )
+        return [chain.leg.id for chain in made if chain.has_new_settings]
+
+    @property
     def findings(self) -> list[tuple[str, str]]:
         """Findings for operators: the leg, and a line about what is lost or was not done."""
         found = list(self.learned)

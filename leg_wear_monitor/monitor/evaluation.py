@@ -29,6 +29,7 @@ from leg_wear_monitor.monitor.inputs import (
     TorqueRange,
     causes,
     input_health,
+    with_not_finite,
     with_torques,
 )
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, JointReport
@@ -296,6 +297,8 @@ class AlarmEvaluationState:
         Samples skipped up to the last evaluation, and up to the one before.
     torque : TorqueRange
         Range of the torques since the last evaluation.
+    not_finite : mapping of str to int
+        Numbers of samples since then, by stream, that have a value that is NaN or infinite.
     evaluation_periods, cycles : int
         Evaluation periods and whole gait cycles since the last evaluation.
     health : InputHealth or None
@@ -312,6 +315,7 @@ class AlarmEvaluationState:
     skipped: int = 0
     skipped_before: int = 0
     torque: TorqueRange = TorqueRange()
+    not_finite: Mapping[str, int] = attrs.Factory(dict)
     evaluation_periods: int = 0
     cycles: int = 0
     health: InputHealth | None = None
@@ -368,6 +372,7 @@ class AlarmEvaluation:
         """Add received samples."""
         saturation_nm = self.config.drive_torque.saturation_nm
         self.state.torque = with_torques(self.state.torque, piece, saturation_nm)
+        self.state.not_finite = with_not_finite(self.state.not_finite, piece)
 
     @property
     def causes(self) -> tuple[str, ...]:
@@ -381,7 +386,8 @@ class AlarmEvaluation:
 
     def _causes(self) -> tuple[str, ...]:
         withheld = self._withheld - self.state.withheld
-        return tuple(causes(self.state.before, self._twin.intake, withheld, self.config))
+        state = self.state
+        return tuple(causes(state.before, self._twin.intake, withheld, self.config, state.not_finite))
 
     @property
     def torque_bounds(self) -> TorqueBounds:

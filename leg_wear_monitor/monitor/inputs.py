@@ -8,12 +8,13 @@ import numpy as np
 
 from leg_wear_monitor.compiled.kernel import Record, Records, entry, kernel, new_records, record_of
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.twin import CRANK, KINDS
+from leg_wear_monitor.twin import CRANK, KINDS, LOAD, TORQUE
 from leg_wear_monitor.twin.sample import (
     FAULTS,
     GAIT_SAMPLE,
     MISSING_JOINT,
     NO_FAULT,
+    NOT_FINITE,
     OUT_OF_RANGE,
     Samples,
     TrackerSettings,
@@ -433,7 +434,7 @@ _SENTENCES = {
     "missing_joint": "do not name the crank {crank!r}: set crank_joint to its name in joint_states",
     "empty": "have no name or no position",
     "wrong_length": "have another number of positions, velocities or efforts than of names",
-    "not_finite": "have a value that is NaN or infinite",
+    "not_finite": "have a value that is NaN or infinite ({where})",
     "undecodable": "cannot be decoded: another type or another encoding",
     "wrong_type": "are of a type that is not read",
     "out_of_range": "have an impossible value: angles are in radians, torques in N m",
@@ -445,7 +446,26 @@ _SENTENCES = {
 }
 
 
-def causes(before: Intake, after: Intake, withheld: int, config: MonitorConfig) -> list[str]:
+_STREAMS = {CRANK: "the crank", TORQUE: "drive_torque", LOAD: "foot_load"}
+
+
+def with_not_finite(before: Mapping[str, int], samples: Samples) -> Mapping[str, int]:
+    """Numbers of samples by stream that have a value that is NaN or infinite, with those of more samples."""
+    counts = dict(before)
+    for kind, name in _STREAMS.items():
+        own = samples[samples["kind"] == kind]
+        finite = np.isfinite(own[KINDS[kind].value])
+        odd = ~finite.all(axis=tuple(range(1, finite.ndim)))  # a force has two components
+        odd &= (own["fault"] == NO_FAULT) & (own["stamp_ns"] > 0)
+        number = int(np.count_nonzero(odd | (own["fault"] == NOT_FINITE)))
+        if number:
+            counts[name] = counts.get(name, 0) + number
+    return counts
+
+
+def causes(
+    before: Intake, after: Intake, withheld: int, config: MonitorConfig, not_finite: Mapping[str, int]
+) -> list[str]:
     """Sentences on the unused samples between two counts, the most frequent cause first.
 
     Parameters
@@ -455,13 +475,16 @@ def causes(before: Intake, after: Intake, withheld: int, config: MonitorConfig) 
         Number of out-of-range samples that another sentence reports.
     config : MonitorConfig
         Gives the name of the crank.
+    not_finite : mapping of str to int
+        Of `with_not_finite`, between the two counts.
     """
     others = of_other_joints(before, after)
     received = after.received - before.received - others
     lost = _unused(after, before, withheld, others)
     frequent = [name for name, count in lost.items() if count > _WORTH_TELLING * received]
+    where = ", ".join(f"{number} of {stream}" for stream, number in not_finite.items())
     sentences = [
-        f"{lost[name]} of {received} samples {_SENTENCES[name].format(crank=config.crank_joint)}"
+        f"{lost[name]} of {received} samples {_SENTENCES[name].format(crank=config.crank_joint, where=where)}"
         for name in sorted(frequent, key=lambda name: -lost[name])
     ]
     unused = sum(lost.values())

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from leg_wear_monitor.configuration import Doubt
-from leg_wear_monitor.errors import LegWearError, closed_on_interrupt
+from leg_wear_monitor.configuration.strict import shown
+from leg_wear_monitor.errors import ConfigError, LegWearError, closed_on_interrupt
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms import Alarm
@@ -121,7 +122,12 @@ class WearMonitor:
         ledger: Ledger | None = None,
         sampling: SamplingSettings | None = None,
     ) -> None:
-        self._parts = parts = Parts(mechanism, config or MonitorConfig(), ledger, sampling)
+        config = MonitorConfig() if config is None else config
+        for name, given, kind in (("mechanism", mechanism, Mechanism), ("config", config, MonitorConfig)):
+            if not isinstance(given, kind):
+                fault = f"{shown(given)} is not a {kind.__name__}, expected what load_{name} gives"
+                raise ConfigError(name, "", fault)
+        self._parts = parts = Parts(mechanism, config, ledger, sampling)
         self.mechanism, self.clearance_joints = parts.mechanism, parts.clearance_joints
         self._twin, self._accounting, self._board = parts.twin, parts.accounting, parts.evaluation.board
         self.reports_states = True

@@ -13,7 +13,7 @@ WRONG = [
     ("simulate --clearence A", ["--clearence", "--clearance"]),
     ("simulate bionic_leg", ["bionic_leg", "unexpected"]),
     ("simulate --json", ["--json", "argument"]),
-    ("simulate --cycles many", ["--cycles", "'many'", "float"]),
+    ("simulate --cycles many", ["--cycles", "'many'", "is not a number"]),
     ("simulate --cycles 0", ["--cycles", "0 is not above 0"]),
     ("simulate --duration -1", ["--duration", "-1", "above 0 s"]),
     ("simulate --duration inf", ["--duration", "inf", "finite number of s"]),

@@ -56,6 +56,16 @@ def test_a_file_that_is_there_may_be_better_than_what_is_not_certain(
     assert (tmp_path / "monitor.yaml").read_text() == "by hand"
 
 
+def test_the_section_of_a_file_for_two_legs_is_chosen_by_its_node(run, tmp_path: Path, monkeypatch) -> None:
+    given = []
+    found = CommissioningResult(items=(), not_told=(), findings=(), notes=(), config=None, turns=60.0)
+    monkeypatch.setattr(commission, "commission", lambda _, base, **__: given.append(base) or found)
+    text = "/{0}/leg_wear_monitor: {{ros__parameters: {{hardware_id: {0} leg}}}}\n"
+    (tmp_path / "two.yaml").write_text(text.format("left") + text.format("right"))
+    run("commission", str(HEALTHY), "--config", "two.yaml", "--node", "/right/leg_wear_monitor")
+    assert [base.hardware_id for base in given] == ["right leg"]
+
+
 def test_an_unknown_crank_is_named_with_the_joints_that_there_are(refused) -> None:
     assert "'knee' is not a joint of the recording, it has crank" in refused(
         "commission", str(HEALTHY), "--crank-joint", "knee"

@@ -7,6 +7,7 @@ from ledger_contents import rows_of
 
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.parameters import load_config
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.state import Level
 
 pytestmark = pytest.mark.plain
@@ -60,6 +61,9 @@ def test_a_contradiction_ends_with_findings_and_leaves_wear_as_it_is(run, ledger
         (("Z", "0.4", "--sigma", "0.01"), "'Z' is not a clearance joint, expected one of A, B, G, I, J"),
         (("A", "-1", "--sigma", "0.01"), "No such option"),
         (("A", "0.4", "--sigma", "0"), "0 is not above 0 mm"),
+        (("A", "0,4", "--sigma", "0.01"), "'0,4' is not a number of mm, expected a decimal point"),
+        (("A", "0.4", "--sigma", "0,01"), "'--sigma': '0,01' is not a number of mm"),
+        (("A", "0.4", "--sigma", "0,01"), "a decimal point; did you mean 0.01?"),
         (("a", "0.4", "--sigma", "0.01"), "expected one of A, B, G, I, J; did you mean A?"),
         (("A", "0.00042", "--sigma", "0.005"), "mm is not between 0.003 mm, 1 % of the new clearance"),
         (("A", "0.00042", "--sigma", "0.005"), "did you mean 0.42 mm?"),
@@ -241,6 +245,25 @@ def test_a_label_names_a_joint_in_all_that_is_done_with_its_measurements(run, le
 
 def test_a_ledger_has_to_be_named(refused):
     assert "no ledger given" in refused("measure", "A", "0.4", "--sigma", "0.01")
+
+
+def test_of_a_file_for_two_legs_a_section_is_chosen_by_its_node(run, refused, worn_ledger, tmp_path):
+    ledgers = {"left": tmp_path / "left.ledger", "right": worn_ledger(MonitorConfig(hardware_id="right"))}
+    sections = [
+        f"/{side}/leg_wear_monitor: {{ros__parameters: {{ledger.path: {path}}}}}\n"
+        for side, path in ledgers.items()
+    ]
+    (tmp_path / "two.yaml").write_text("".join(sections), encoding="utf-8")
+    verbs = ("measure", "A", "0.42", "--sigma", "0.005"), ("acknowledge",), ("reset", "A")
+    for verb in verbs:
+        told = refused(*verb, "--config", "two.yaml")
+        assert "for: /left/leg_wear_monitor, /right/leg_wear_monitor; choose one with --node" in told
+    chosen = ("--config", "two.yaml", "--node", "/right/leg_wear_monitor")
+    assert [run(*verb, *chosen).exit_code for verb in verbs] == [0, 0, 0]
+    assert [row[0] for row in rows(ledgers["right"])] == ["A"]
+    assert run("measure", "--list", *chosen).stdout.startswith("1: A 0.42 mm")
+    assert run("measure", "--withdraw", "last", *chosen).exit_code == 0
+    assert not ledgers["left"].exists()
 
 
 def test_a_leg_that_carries_a_person_is_the_one_of_its_ledger(run, worn_ledger, tmp_path):

@@ -174,7 +174,16 @@ def test_a_repair_in_the_ledger_of_a_fleet_shows_at_the_next_update(run, tmp_pat
     assert "ERROR clearance B" in page and "The verdict rests on what was entered" in page
     assert "everything is in the ledger already" in run(*update).stdout
     assert run("acknowledge", "--ledger", ledger).exit_code == 0
-    assert "forecasts: 1 renewed" in run(*update).stdout
+    told = run(*update).stdout
+    assert "forecasts: 1 renewed" in told and "settings changed" not in told
+    text = (BAGS / "knocking.yaml").read_text() + "    forecast.duty_hours_per_day: 2.0\n"
+    (tmp_path / "other.yaml").write_text(text)
+    (tmp_path / "fleet.yaml").write_text(
+        f"legs: [{leg.replace(str(BAGS / 'knocking.yaml'), 'other.yaml')}]\n"
+    )
+    for is_told in (True, False):  # once
+        assert run("reset", "B", "--ledger", ledger, "--config", str(tmp_path / "other.yaml")).exit_code == 0
+        assert ("lives follow the new ones: a\n" in run(*update).stdout) is is_told
 
 
 def test_acknowledged_alarms_are_kept_as_such_but_not_by_a_dry_run(run, ledger, tmp_path):

@@ -113,6 +113,14 @@ PARAMETERS = [
     ),
     ({"crank.offset_rad": 90.0}, "crank.offset_rad: 90 rad", "degrees for rad?"),
     ({"limits.clearance_m": 2e-4}, "limits.clearance_m: 0.0002 m is not above the new clearance", "A"),
+    (
+        {"drive.stiffness_nm_per_rad": 0.5},
+        "drive.stiffness_nm_per_rad: 0.5 N m/rad",
+        "usual are 5 to 1e7 N m/rad",
+    ),
+    ({"drive.bandwidth_hz": 0.066}, "drive.bandwidth_hz: 0.066 Hz, usual are 1 to 2e4 Hz", "kHz for Hz?"),
+    ({"drive.lag_s": 0.5}, "drive.lag_s: 0.5 s, usual are below 0.1 s", "ms for s?"),
+    ({"drive.coulomb_nm": 370.0}, "drive.coulomb_nm: 370 N m, usual are below 100 N m", "N mm for N m?"),
     ({"limits.impact_force_n": 1.5}, "limits.impact_force_n: 1.5 N", "kN for N?"),
     ({"limits.joint_impact_force_n": [1.5] + [1e4] * 4}, "limits.joint_impact_force_n: 1.5 N", "kN for N?"),
     (

@@ -17,6 +17,7 @@ from leg_wear_monitor.gait.sensors import readings
 from leg_wear_monitor.monitor.config.fitting import twin_settings
 from leg_wear_monitor.monitor.config.parameters import changed, config_from
 from leg_wear_monitor.monitor.forecast.forecast import Answer
+from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin import TORQUE
 from leg_wear_monitor.twin.sample import EMPTY, gait_samples
@@ -198,6 +199,13 @@ def test_statuses_keep_their_names_and_hold_plain_numbers(monitor, gait):
             assert all(type(value) is float for value in status.values.values()), status
             assert not any(letter.isdigit() for letter in status.name)
     assert len(set(names)) == len(names)
+
+
+@pytest.mark.parametrize("given", [("bionic_leg",), (None, "monitor.yaml")])
+def test_a_name_in_place_of_what_is_loaded_from_it_is_refused_in_one_line(given, leg):
+    mechanism, *config = given
+    with pytest.raises(ConfigError, match=r"^(mechanism|config): '.*' is not a M.*, expected what load_"):
+        WearMonitor(mechanism or leg, *config)
 
 
 def test_without_a_ledger_saving_is_refused(monitor):

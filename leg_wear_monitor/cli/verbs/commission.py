@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     "Parameter file that names the mechanism; parameters that are not measured are kept.  "
     "[default: the one that comes with the package]",
 )
+@common.section_option
 @common.file_option(
     "--out",
     "FILE",
@@ -51,6 +52,7 @@ if TYPE_CHECKING:
 def commission(
     recordings: tuple[Path, ...],
     config: Path | None,
+    node: str | None,
     out: Path | None,
     reference: Path | None,
     json_file: Path | None,
@@ -66,7 +68,7 @@ def commission(
     """
     for option, path in (("--out", out), ("--reference", reference), ("--json", json_file)):
         common.check_file(option, path)
-    result = _run(recordings, config, reference, topics)
+    result = _run(recordings, config, node, reference, topics)
     if json_file != common.STDOUT:
         from leg_wear_monitor.cli.pages import print_commissioning
 
@@ -98,12 +100,18 @@ def _write_reference(file: Path, config: "MonitorConfig", made: "TorqueReference
 
 
 def _run(
-    recordings: tuple[Path, ...], path: Path | None, reference: Path | None, topics: dict[str, str | None]
+    recordings: tuple[Path, ...],
+    path: Path | None,
+    node: str | None,
+    reference: Path | None,
+    topics: dict[str, str | None],
 ) -> "CommissioningResult":
     from leg_wear_monitor.commissioning.commission import commission as propose
+    from leg_wear_monitor.monitor.config.parameters import load_config
 
+    base = load_config(path, node)
     with common.compilation("commissioning", "monitor"), common.progress_bar("commissioning") as progress:
-        result = propose(recordings, path, **topics, reference=reference, progress=progress)
+        result = propose(recordings, base, **topics, reference=reference, progress=progress)
     for fault in result.faults:
         click.echo(f"warning: {fault}", err=True)
     return result
@@ -115,10 +123,11 @@ def _run(
 @click.command(short_help="Simulate a torque reference beforehand.")
 @click.argument("mechanism", required=False)
 @common.config_option
+@common.section_option
 @click.option(
     "--cadence",
     "cadences",
-    type=float,
+    type=common.Number("rpm"),
     multiple=True,
     callback=lambda ctx, param, values: tuple(common.bounded("rpm")(ctx, param, one) for one in values),
     metavar="RPM",
@@ -137,7 +146,12 @@ def _run(
     required=True,
 )
 def reference(
-    mechanism: str | None, config: Path | None, cadences: tuple[float, ...], load: Path | None, out: Path
+    mechanism: str | None,
+    config: Path | None,
+    node: str | None,
+    cadences: tuple[float, ...],
+    load: Path | None,
+    out: Path,
 ) -> None:
     """Simulate the torque reference of a leg, which the diagnosis compares with.
 
@@ -153,7 +167,7 @@ def reference(
     from leg_wear_monitor.monitor.config.parameters import config_from, load_config, values_of
     from leg_wear_monitor.monitor.diagnosis.reference_file import simulated_references, write_references
 
-    settings = load_config(config)
+    settings = load_config(config, node)
     if mechanism is not None:
         settings = attrs.evolve(settings, mechanism=mechanism)
     cadences = cadences or (settings.cadence.commanded_rpm,)
@@ -215,6 +229,7 @@ def reference(
     "Parameter file with the column of the time and the units of a table.  "
     "[default: the one that comes with the package]",
 )
+@common.section_option
 @common.option(
     "--mechanism",
     "FILE",
@@ -226,7 +241,7 @@ def reference(
     "DEG",
     "Crank angle of the mechanism in a recording; once for each, in their order.",
     "crank_angles",
-    type=float,
+    type=common.Number("degrees"),
     multiple=True,
 )
 @common.clearances_option("A,B")
@@ -285,6 +300,7 @@ def _plays(
 
 def _settings(
     config: Path | None,
+    node: str | None,
     counts_per_turn: float | None,
     time: str | None,
     time_unit: str | None,
@@ -296,7 +312,7 @@ def _settings(
     def given(**values: str | float | None) -> dict[str, Any]:
         return {key: value for key, value in values.items() if value is not None}
 
-    settings = load_config(config)
+    settings = load_config(config, node)
     table = settings.input
     if unit == COUNTS and not (counts_per_turn or table.counts_per_turn):
         raise ConfigError("--counts-per-turn", "", "is missing, expected it with --unit counts")

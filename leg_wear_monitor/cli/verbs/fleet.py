@@ -176,6 +176,10 @@ def _print_counts(done: "FleetUpdate", out: Path) -> None:
         click.echo(f"recordings: {done.counted} counted now")
         if done.renewed:
             click.echo(f"forecasts: {done.renewed} renewed after measurements or repairs")
+        if legs := done.with_new_settings:
+            click.echo(
+                f"settings changed since the last forecast, lives follow the new ones: {', '.join(legs)}"
+            )
     states = [f"{number} {state.replace('_', ' ')}" for state, number in overview.counts.items() if number]
     click.echo(f"legs: {', '.join(states)}")
     if demonstrations := [leg.id for leg in overview.legs if leg.is_accelerated]:

@@ -27,19 +27,23 @@ if TYPE_CHECKING:
 LAST = "last"
 
 
-def leg_of(config: Path | None, ledger: Path | None) -> tuple["MonitorConfig", "Mechanism"]:
-    """The parameters, with the ledger that is asked for, and the leg as they want it."""
+def leg_of(
+    config: Path | None, ledger: Path | None, node: str | None = None
+) -> tuple["MonitorConfig", "Mechanism"]:
+    """The parameters of a node, with the ledger that is asked for, and the leg as they want it."""
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.monitor.config.fitting import fitted
     from leg_wear_monitor.monitor.config.parameters import load_config
     from leg_wear_monitor.monitor.ledger.file import hardware_id_of
 
-    settings = load_config(config)
+    settings = load_config(config, node)
     if ledger is not None:
         # who names a ledger means its leg, unless the parameters name one
         hardware = settings.hardware_id or hardware_id_of(ledger)
         kept = attrs.evolve(settings.ledger, path=str(ledger))
         settings = attrs.evolve(settings, ledger=kept, hardware_id=hardware)
+    elif node is not None:
+        settings = settings.on_node(node)
     if not settings.ledger.path:
         raise ConfigError("--ledger", "", "no ledger given, neither by --ledger nor by ledger.path")
     return settings, fitted(load_mechanism(settings.mechanism), settings)
@@ -47,14 +51,18 @@ def leg_of(config: Path | None, ledger: Path | None) -> tuple["MonitorConfig", "
 
 @contextmanager
 def opened(
-    config: Path | None, ledger: Path | None, dry_run: bool, joint: str | None = None
+    config: Path | None,
+    ledger: Path | None,
+    dry_run: bool,
+    joint: str | None = None,
+    node: str | None = None,
 ) -> Iterator[tuple["Ledger", "Mechanism", "MonitorConfig"]]:
     """The ledger, the leg and its parameters; a copy of the ledger, if nothing shall be written."""
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.monitor.ledger.file import copy_of
     from leg_wear_monitor.monitor.ledger.ledger import open_ledger
 
-    settings, leg = leg_of(config, ledger)
+    settings, leg = leg_of(config, ledger, node)
     if joint is not None:
         leg.clearance_joint(joint)  # refuses another one before a ledger is made
     plain = load_mechanism(settings.mechanism)  # without its parameters, which a ledger applies itself
@@ -86,9 +94,9 @@ def check_limits(kept: "Ledger", leg: "Mechanism", settings: "MonitorConfig", co
         check_limit(kept, leg, settings, joint, config)
 
 
-def list_measurements(joint: str | None, config: Path | None, ledger: Path | None) -> None:
+def list_measurements(joint: str | None, config: Path | None, ledger: Path | None, node: str | None) -> None:
     """Print the measurements of a ledger, or of a joint, a line each; the ledger is left as it is."""
-    with opened(config, ledger, True, joint) as (kept, leg, _):
+    with opened(config, ledger, True, joint, node) as (kept, leg, _):
         own = _of_joint(kept, leg.clearance_joint(joint) if joint else None)
         for each in own:
             click.echo(_line(each))
@@ -102,12 +110,18 @@ def _of_joint(kept: "Ledger", joint: str | None) -> list["Measurement"]:
 
 
 def withdraw(
-    joint: str | None, which: str, who: str, config: Path | None, ledger: Path | None, dry_run: bool
+    joint: str | None,
+    which: str,
+    who: str,
+    config: Path | None,
+    ledger: Path | None,
+    dry_run: bool,
+    node: str | None,
 ) -> None:
     """Withdraw a measurement, by its number or the last one of a joint, and print what it is then."""
     from leg_wear_monitor.monitor.operators import withdraw_in
 
-    with opened(config, ledger, dry_run, joint) as (kept, leg, settings):
+    with opened(config, ledger, dry_run, joint, node) as (kept, leg, settings):
         number = _number(kept, leg.clearance_joint(joint) if joint else None, which)
         (own,) = (each.joint for each in kept.measurements if each.id == number)
         check_limit(kept, leg, settings, own, config)
@@ -168,12 +182,12 @@ def acknowledge(
     The service ~/acknowledge_alarms does the same. The others clear when their values return. A running
     monitor locks its ledger: name it with --node, or stop it first.
     """
-    if node is not None:
-        common.check_alone(config=config, ledger=ledger, dry_run=dry_run)
+    if node is not None and config is None:
+        common.check_alone(ledger=ledger, dry_run=dry_run)
         return _triggered(node, "acknowledge_alarms", wait_s)
     from leg_wear_monitor.monitor.operators import acknowledge_in
 
-    with opened(config, ledger, dry_run) as (kept, leg, settings):
+    with opened(config, ledger, dry_run, node=node) as (kept, leg, settings):
         check_limits(kept, leg, settings, config)
         click.echo(acknowledge_in(kept, leg, settings, time.time_ns()).words)
     if dry_run:
@@ -206,22 +220,24 @@ def reset(
     JOINT is a name or a label, such as knee; with --node, a name. The alarms that rested on the former part
     are acknowledged and clear. A running monitor locks its ledger: name it with --node, or stop it first.
     """
-    if node is not None:
-        common.check_alone(config=config, ledger=ledger, dry_run=dry_run)
+    if node is not None and config is None:
+        common.check_alone(ledger=ledger, dry_run=dry_run)
         service = f"{'undo_reset' if undo else 'reset_wear'}/{joint}"
         return _triggered(node, service, wait_s, times=1 if undo else 2)  # a reset is confirmed
-    _reset_in(joint, config, ledger, undo, dry_run)
+    _reset_in(joint, config, ledger, undo, dry_run, node)
     if dry_run:
         click.echo("dry run: nothing was written")
     return 0
 
 
-def _reset_in(joint: str, config: Path | None, ledger: Path | None, undo: bool, dry_run: bool) -> None:
+def _reset_in(
+    joint: str, config: Path | None, ledger: Path | None, undo: bool, dry_run: bool, node: str | None
+) -> None:
     """Enter it into a ledger, and print what came of it."""
     from leg_wear_monitor.monitor.operators import reset_in, undo_in, wear_words
 
     now_ns, who = time.time_ns(), getpass.getuser()
-    with opened(config, ledger, dry_run, joint) as (kept, leg, settings):
+    with opened(config, ledger, dry_run, joint, node) as (kept, leg, settings):
         check_limits(kept, leg, settings, config)
         joint = leg.clearance_joint(joint)
         if undo:
@@ -242,7 +258,7 @@ def _reset_in(joint: str, config: Path | None, ledger: Path | None, undo: bool, 
 
 @click.command(short_help="Enter a measured clearance, which updates the forecast.")
 @click.argument("joint", required=False)
-@click.argument("mm", type=float, required=False, callback=common.bounded("mm", above=0.0))
+@click.argument("mm", type=common.Number("mm"), required=False, callback=common.bounded("mm", above=0.0))
 @common.number_option("--sigma", "MM", "Standard deviation of the measurement.", "mm", above=0.0)
 @common.config_option
 @common.ledger_option
@@ -276,8 +292,9 @@ def measure(
     moved to and fro. A running monitor locks its ledger: name it with --node, or stop it first. The counted
     clearance stays as it is. Exit code 1 if the measurement contradicts the model or is at its limit.
     """
-    if node is not None:
-        alone = {name: options[name] for name in ("config", "ledger", "dry_run")}
+    is_live = node is not None and options["config"] is None
+    if is_live:
+        alone = {name: options[name] for name in ("ledger", "dry_run")}
         common.check_alone(**alone, list=listed, withdraw=withdrawn)
     if listed or withdrawn:
         is_new = mm is not None or sigma is not None or options.pop("accept")
@@ -286,17 +303,17 @@ def measure(
                 "--list and --withdraw cannot be combined, nor used with MM, --sigma or --accept"
             )
     if listed:
-        list_measurements(joint, options["config"], options["ledger"])
+        list_measurements(joint, options["config"], options["ledger"], node)
         return 0
     if withdrawn:
-        withdraw(joint, withdrawn, getpass.getuser(), **options)
+        withdraw(joint, withdrawn, getpass.getuser(), node=node, **options)
         return 0
     if joint is None or mm is None or sigma is None:
         raise click.UsageError("expected JOINT MM --sigma MM, or --list, or --withdraw")
     size = joint, 1.0e-3 * mm, 1.0e-3 * sigma
-    if node is not None:
+    if node is not None and is_live:
         return _on_node(node, *size, accept=options["accept"], wait_s=wait_s)
-    lines, has_findings = _measured(*size, **options)
+    lines, has_findings = _measured(*size, node=node, **options)
     for line in lines:
         click.echo(line)
     if options["dry_run"]:
@@ -323,6 +340,7 @@ def _measured(
     ledger: Path | None,
     accept: bool,
     dry_run: bool,
+    node: str | None,
 ) -> tuple[tuple[str, ...], bool]:
     """What came of a measurement, a line each, and whether the caller has to act."""
     from leg_wear_monitor.monitor.forecast.measurement import measure as evaluate
@@ -331,7 +349,7 @@ def _measured(
     from leg_wear_monitor.monitor.operators import measured_in, shown_in
     from leg_wear_monitor.monitor.verdict.situation import SOURCES
 
-    with opened(config, ledger, dry_run, joint) as (kept, leg, settings):
+    with opened(config, ledger, dry_run, joint, node) as (kept, leg, settings):
         joint = leg.clearance_joint(joint)
         limit_m = check_limit(kept, leg, settings, joint, config)
         parts = {wear.name: wear for wear in kept.entry.joints} if kept.entry else {}

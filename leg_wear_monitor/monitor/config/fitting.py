@@ -204,6 +204,7 @@ def parameter_doubts(config: MonitorConfig, leg: Mechanism) -> tuple[Doubt, ...]
         *doubts(config.crank, "crank."),
         *_limits(config, leg),
         *doubts(config.limits, "limits."),
+        *doubts(config.drive, "drive."),
         *_clearances(config, leg),
         *acceleration_doubts(config),
     )

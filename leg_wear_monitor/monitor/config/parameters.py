@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import attrs
 
 from leg_wear_monitor.configuration.strict import shown, structure, unknown_fault
-from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.errors import ConfigError, nearest, printable
 from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.mechanism.loader import read_yaml
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -238,8 +238,8 @@ def load_config(path: str | Path | None = None, node: str | None = None) -> Moni
 
 
 def is_parameter_file(document: Any) -> bool:
-    """Whether the content of a YAML file is ROS parameters."""
-    return any(isinstance(entry, dict) and MARK in entry for _, entry in _sections(document))
+    """Whether the content of a YAML file is ROS parameters, or those with a misspelt mark."""
+    return bool(_misspelt(document)) or any(_is_marked(entry) for _, entry in _sections(document))
 
 
 def parse_config(document: Any, source: str, node: str | None = None) -> MonitorConfig:
@@ -249,6 +249,8 @@ def parse_config(document: Any, source: str, node: str | None = None) -> Monitor
     """
     if not is_parameter_file(document):
         raise ConfigError(source, "", f"is not a ROS parameter file, expected '/**: {{{MARK}: ...}}'")
+    if misspelt := _misspelt(document):
+        raise ConfigError(source, misspelt, f"is not a key of ROS, expected {MARK} with two underscores")
     values: dict[str, Any] = {}
     sections = list(_sections(document))
     node, taken = node or _node_of([name for name, _ in sections]), False
@@ -259,7 +261,10 @@ def parse_config(document: Any, source: str, node: str | None = None) -> Monitor
             values |= _flat(parameters, "", source)
     if not taken:
         found = ", ".join(name for name, _ in sections)
-        raise ConfigError(source, "", f"has nothing for the node {node}, its sections are for: {found}")
+        fault = f"has nothing for the node {node}, its sections are for: {found}"
+        if len(monitors_of(document)) > 1:
+            fault += "; choose one with --node, in a fleet file with node"
+        raise ConfigError(source, "", fault)
     return config_from({name: value for name, value in values.items() if not _OF_ROS.fullmatch(name)}, source)
 
 
@@ -294,6 +299,20 @@ def sections_for_others(path: str | Path, node: str) -> tuple[str, ...]:
     """
     found = tuple(name for name, _ in _sections(read_yaml(Path(path), str(path))))
     return () if any(_is_for(each, node) for each in found) else found
+
+
+def _is_marked(entry: Any) -> bool:
+    return isinstance(entry, dict) and MARK in entry
+
+
+def _misspelt(document: Any) -> str:
+    """The first key that seems to be meant for the mark, behind its section; empty if there is none."""
+    for name, entry in _sections(document):
+        path = name.split("/")
+        for place, key in enumerate(path):
+            if key.startswith("ros") and not _is_marked(entry) and nearest(key, [MARK]):
+                return printable(f"{'/'.join(path[:place])}: {key}")
+    return ""
 
 
 def _sections(document: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:

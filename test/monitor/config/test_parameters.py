@@ -253,6 +253,17 @@ def test_a_file_of_one_node_is_read_for_that_node_and_one_of_two_needs_to_know_w
         parse_config({"/camera": {"ros__parameters": {}}}, "camera.yaml")
 
 
+@pytest.mark.parametrize("mark", ["ros_parameters", "ros__paramters", "ros__parameter"])
+def test_a_misspelt_mark_of_the_parameters_is_named(mark):
+    found = {"/**": {mark: {"limits": {"clearance_m": 5.0e-4}}}}
+    whole = {"/**": {"ros__parameters": {"hardware_id": "x"}}}
+    for document in (found, {"/left": {"leg_wear_monitor": found["/**"]}} | whole):
+        with pytest.raises(
+            ConfigError, match=rf"/(\*\*|left/leg_wear_monitor): {mark}: is not a key of ROS, exp"
+        ):
+            parse_config(document, "leg.yaml")
+
+
 @pytest.mark.parametrize("model", ["ground", "measured"])
 def test_a_load_needs_a_toe_to_push(model):
     with pytest.raises(

@@ -1,5 +1,7 @@
 """Bad input of every kind: no crash, no wear, each sample counted under a name."""
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -8,7 +10,7 @@ from reported import raised, status_of
 
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin import CRANK, TORQUE
-from leg_wear_monitor.twin.sample import ENCODERS, FAULTS, GAIT_SAMPLE, NO_FAULT
+from leg_wear_monitor.twin.sample import ENCODERS, FAULTS, GAIT_SAMPLE, NO_FAULT, NOT_FINITE
 
 SECOND = 10**9
 START_NS = 1_700_000_000_123_456_789
@@ -119,6 +121,22 @@ def test_a_stream_of_nothing_else_is_named_and_alarmed(new_monitor, gait, name, 
     assert status.values["received"] == len(stream)
     assert raised(monitor) & {"input_samples", "input_gaps"}, reports.lost
     assert status.level is Level.ERROR
+
+
+def test_the_stream_with_values_that_are_no_numbers_is_named_with_their_number(new_monitor, gait):
+    """Found by the twin in the crank's angle, and by the reader of messages in the torque."""
+    crank, torque = gait(4.0), gait(4.0)[::2].copy()
+    crank["crank_angle_rad"][::3] = np.inf
+    torque["kind"], torque["crank_angle_rad"], torque["torque_nm"] = TORQUE, np.nan, 1.0
+    torque["fault"][::4] = NOT_FINITE
+    stream = np.concatenate([crank, torque])
+    monitor = new_monitor()
+    monitor.update(stream[np.argsort(stream["stamp_ns"], kind="stable")])
+    pattern = r"(\d+) of \d+ samples have a value .* infinite \((\d+) of the crank, (\d+) of drive_torque\)"
+    found = re.search(pattern, status_of(monitor, "input").message)
+    every, of_crank, of_torque = map(int, found.groups())
+    assert every == of_crank + of_torque
+    assert of_crank / of_torque == pytest.approx(8 / 3, rel=0.1)  # a third of the samples, an eighth
 
 
 @pytest.mark.parametrize("spoil", [lambda s: spoiled(s, crank_angle_rad=1.0), lambda s: s[:1]])

@@ -33,66 +33,39 @@ if TYPE_CHECKING:
 WITH_FINDINGS = 1
 """Exit code of a verb that is done, with findings that the caller must see."""
 
-# A number on the command line: finite and within bounds, or refused with its unit.
-
 
 class Number(click.types.FloatParamType):
-    """Type of a number; one with a decimal comma is refused with the number that is probably meant.
+    """Type of a finite number within bounds; for files see `leg_wear_monitor.configuration`.
 
     Parameters
     ----------
     unit : str
         ``""`` for a pure number.
-    """
-
-    def __init__(self, unit: str = "") -> None:
-        self._of = f" of {unit}" if unit else ""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Give the number, or fail with what is expected."""
-        try:
-            return float(value)
-        except ValueError:
-            pass
-        fault = f"{value!r} is not a number{self._of}, expected one such as 0.5"
-        with suppress(ValueError):
-            meant = float(value.replace(",", "."))
-            fault = (
-                f"{value!r} is not a number{self._of}, expected a decimal point; did you mean {meant:.12g}?"
-            )
-        return self.fail(fault, param, ctx)
-
-
-def bounded(
-    unit: str = "", *, above: float | None = None, at_least: float | None = None
-) -> Callable[[click.Context, click.Parameter, float | None], float | None]:
-    """Callback of a click option of type float; for files see `leg_wear_monitor.configuration`.
-
-    Parameters
-    ----------
-    unit : str
-        SI unit, ``""`` for a pure number.
     above, at_least : float, optional
         Bounds.
     """
 
-    def check(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
-        fault = None
-        if value is None:
-            return None
-        if not math.isfinite(value):
-            fault = (
-                f"{value:g} is not a finite number of {unit}" if unit else f"{value:g} is not a finite number"
-            )
-        elif above is not None and not value > above:
-            fault = f"{value:g} is not above {above:g} {unit}".rstrip()
-        elif at_least is not None and not value >= at_least:
-            fault = f"{value:g} is not at least {at_least:g} {unit}".rstrip()
-        if fault:
-            raise click.BadParameter(fault, ctx, param)
-        return value
+    def __init__(self, unit: str = "", *, above: float | None = None, at_least: float | None = None) -> None:
+        self._unit, self._above, self._at_least = unit, above, at_least
 
-    return check
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Give the number, or fail with what is expected; of a decimal comma, with what is probably meant."""
+        of_unit = f" of {self._unit}" if self._unit else ""
+        try:
+            number = float(value)
+        except ValueError:
+            expected = "one such as 0.5"
+            with suppress(ValueError):
+                meant = float(value.replace(",", "."))
+                expected = f"a decimal point; did you mean {meant:.12g}?"
+            self.fail(f"{value!r} is not a number{of_unit}, expected {expected}", param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{number:g} is not a finite number{of_unit}", param, ctx)
+        if self._above is not None and not number > self._above:
+            self.fail(f"{number:g} is not above {self._above:g} {self._unit}".rstrip(), param, ctx)
+        if self._at_least is not None and not number >= self._at_least:
+            self.fail(f"{number:g} is not at least {self._at_least:g} {self._unit}".rstrip(), param, ctx)
+        return number
 
 
 @contextmanager
@@ -130,10 +103,10 @@ def number_option(
     at_least: float | None = None,
     default: float | None = None,
 ) -> Option:
-    """Option with a finite number within bounds; see `bounded`."""
-    check = bounded(unit, above=above, at_least=at_least)
+    """Option with a finite number within bounds."""
+    kind = Number(unit, above=above, at_least=at_least)
     given = {} if default is None else {"default": default}
-    return option(name, metavar, text, type=Number(unit), callback=check, **given)
+    return option(name, metavar, text, type=kind, **given)
 
 
 def path_option(name: str, metavar: str, text: str, *, required: bool = False, **of_path: bool) -> Option:

@@ -14,7 +14,8 @@ from leg_wear_monitor.monitor.alarm_specs import CLEARANCE
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import LedgerFile
 from leg_wear_monitor.monitor.gait_evidence import FRICTION_KEY, SIGMA_KEY
-from leg_wear_monitor.monitor.inputs import InputGuard, Pauses
+from leg_wear_monitor.monitor.input_health import Pauses
+from leg_wear_monitor.monitor.inputs import InputGuard
 from leg_wear_monitor.monitor.ledger.entry import (
     AlarmEvent,
     Audit,

@@ -28,7 +28,8 @@ from leg_wear_monitor.twin import LOAD
 if TYPE_CHECKING:
     from leg_wear_monitor.monitor.config.settings import Alarms, MonitorConfig
     from leg_wear_monitor.monitor.gait_evidence import TorqueBounds
-    from leg_wear_monitor.monitor.inputs import InputGuard, InputHealth
+    from leg_wear_monitor.monitor.input_health import InputHealth
+    from leg_wear_monitor.monitor.inputs import InputGuard
     from leg_wear_monitor.monitor.reports import JointReport
 
 

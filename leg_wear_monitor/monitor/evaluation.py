@@ -23,8 +23,7 @@ from leg_wear_monitor.monitor.gait_evidence import (
     torque_causes,
     torque_values,
 )
-from leg_wear_monitor.monitor.inputs import (
-    InputGuard,
+from leg_wear_monitor.monitor.input_health import (
     InputHealth,
     TorqueRange,
     causes,
@@ -32,6 +31,7 @@ from leg_wear_monitor.monitor.inputs import (
     with_not_finite,
     with_torques,
 )
+from leg_wear_monitor.monitor.inputs import InputGuard
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, JointReport
 from leg_wear_monitor.monitor.verdict.situation import is_observed
 from leg_wear_monitor.state import Level
@@ -385,8 +385,7 @@ class AlarmEvaluation:
         return self.guard.conflicting + self.guard.implausible
 
     def _causes(self) -> tuple[str, ...]:
-        withheld = self._withheld - self.state.withheld
-        state = self.state
+        state, withheld = self.state, self._withheld - self.state.withheld
         return tuple(causes(state.before, self._twin.intake, withheld, self.config, state.not_finite))
 
     @property

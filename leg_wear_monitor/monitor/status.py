@@ -29,7 +29,7 @@ from leg_wear_monitor.monitor.encoders import EncoderObserver, faults
 from leg_wear_monitor.monitor.evaluation import AlarmEvaluation
 from leg_wear_monitor.monitor.foot_load import FootLoadCheck
 from leg_wear_monitor.monitor.forecast.forecast import UNKNOWN, answer_words, lifetime_values
-from leg_wear_monitor.monitor.inputs import InputHealth
+from leg_wear_monitor.monitor.input_health import InputHealth
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.parts import Parts
 from leg_wear_monitor.monitor.reports import CycleReport, Status, VerdictReport

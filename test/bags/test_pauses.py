@@ -5,7 +5,7 @@ from short_walk import torque_of_a_cycle, write_walk
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.bags.findings import Severity
-from leg_wear_monitor.monitor.inputs import Pauses
+from leg_wear_monitor.monitor.input_health import Pauses
 
 SECONDS, PAUSE_S = 5, 3600.0
 

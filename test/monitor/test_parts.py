@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from leg_wear_monitor.monitor.accounting import NEIGHBOURS_NS, is_within, with_span
 from leg_wear_monitor.monitor.evaluation import IDLE_LIMIT, EvaluationPeriods
-from leg_wear_monitor.monitor.inputs import TorqueRange, with_torques
+from leg_wear_monitor.monitor.input_health import TorqueRange, with_torques
 from leg_wear_monitor.twin import TORQUE
 from leg_wear_monitor.twin.sample import EMPTY, GAIT_SAMPLE, gait_samples
 

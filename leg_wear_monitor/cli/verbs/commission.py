@@ -129,7 +129,6 @@ def _run(
     "cadences",
     type=common.Number("rpm"),
     multiple=True,
-    callback=lambda ctx, param, values: tuple(common.bounded("rpm")(ctx, param, one) for one in values),
     metavar="RPM",
     help="Cadence, negative for clockwise; may be given several times.  [default: the commanded one]",
 )

@@ -258,7 +258,7 @@ def _reset_in(
 
 @click.command(short_help="Enter a measured clearance, which updates the forecast.")
 @click.argument("joint", required=False)
-@click.argument("mm", type=common.Number("mm"), required=False, callback=common.bounded("mm", above=0.0))
+@click.argument("mm", type=common.Number("mm", above=0.0), required=False)
 @common.number_option("--sigma", "MM", "Standard deviation of the measurement.", "mm", above=0.0)
 @common.config_option
 @common.ledger_option

@@ -382,10 +382,8 @@ def _loads(summary: ReplaySummary) -> list[Part]:
         note="p: force over diameter times width. v: mean sliding speed under load. A dash: the material has "
         "no such limit. Beyond a limit, the wear coefficient does not hold.",
     )
-    sentences = [
-        f"{name}: {load.outside_limits}." for name, load in loads.items() if load and load.outside_limits
-    ]
-    return [table, *(Text(text, is_not_valid=True) for text in sentences)]
+    texts = (f"{name}: {one.outside_limits}." for name, one in loads.items() if one and one.outside_limits)
+    return [table, *(Text(text, is_not_valid=True) for text in texts)]
 
 
 def _load_cells(load: BushingLoad) -> tuple[str, ...]:

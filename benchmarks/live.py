@@ -2,6 +2,7 @@
 
 python benchmarks/live.py [--legs 1] [--rate-hz 1000] [--rpm 60] [--seconds 20] [--without-diagnosis]
                           [--foot-load-hz 0] [--ground-n 0] [--record DIRECTORY]
+                          [--topics predicted_torque,impact_forces] [--set publish_markers:=true ...]
 
 With --foot-load-hz, a sensor of the foot load sends too, and its load acts in the node.
 At 60 rpm the diagnosis uses the reference of the package: it is put in after five gait cycles, and reviewed
@@ -10,7 +11,8 @@ what it receives and publishes, keeps a ledger, and the recording is replayed: m
 have of references, are compared.
 
 Each leg is a monitor in a process and a namespace of its own; one more process sends the joint states and
-the torque of all legs, a recorded walk again and again; this one listens to the predicted torque.
+the torque of all legs, a recorded walk again and again; this one listens to --topics, to the clearances
+and to the diagnostics. --set gives each node a parameter, to see what an option costs.
 """
 
 import argparse
@@ -23,6 +25,7 @@ import threading
 import time
 from collections import defaultdict
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +38,8 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from visualization_msgs.msg import MarkerArray
 
 from leg_wear_monitor.gait.config import (
     EncoderConfig,
@@ -53,6 +58,19 @@ from leg_wear_monitor.twin.sample import TrackerSettings
 LOOP_CYCLES = 8  # that are sent again and again, with an angle that wraps
 STAMP = slice(4, 12)  # of a header in CDR
 SHOWN = ("received", "shed_messages")
+TYPES = {
+    "clearance_states": JointState,
+    "predicted_torque": WrenchStamped,
+    "measured_torque": WrenchStamped,
+    "impact_forces": JointState,
+    "linkage_states": JointState,
+    "markers": MarkerArray,
+    "motion": String,
+    "state": String,
+    "alarms": DiagnosticArray,
+    "verdict": DiagnosticArray,
+    "forecast": DiagnosticArray,
+}
 RECORDED = ("record", "mcap"), ("ledger", "ledger")
 TABLES = "torque_reference", "torque_commissioning", "body", "verdict"
 BEST_EFFORT = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -109,10 +127,14 @@ def publish(legs: int, rate_hz: float, rpm: float, seconds: float, load_hz: floa
     try_shutdown()
 
 
+def ignore(raw: bytes) -> None:
+    """What a subscriber does that only costs the node its sending."""
+
+
 class Listener(Node):
     """Delays of predicted torques and of gait cycles behind their stamps, and what the nodes report."""
 
-    def __init__(self, legs: int) -> None:
+    def __init__(self, legs: int, topics: list[str]) -> None:
         super().__init__("listener")
         self.delays_s: list[list[float]] = [[] for _ in range(legs)]
         self.stamps_s: list[list[float]] = [[] for _ in range(legs)]
@@ -122,21 +144,18 @@ class Listener(Node):
         self.hardware = {f"leg{leg}": leg for leg in range(legs)}
         deep = QoSProfile(depth=2000, reliability=ReliabilityPolicy.BEST_EFFORT)
         for leg in range(legs):
-            for kind, name, delays, stamps in (
-                (WrenchStamped, "predicted_torque", self.delays_s[leg], self.stamps_s[leg]),
-                (JointState, "clearance_states", self.cycle_delays_s[leg], []),
-            ):
+            kept = {
+                "clearance_states": (self.cycle_delays_s[leg], []),
+                "predicted_torque": (self.delays_s[leg], self.stamps_s[leg]),
+            }
+            for name in ("clearance_states", *topics):
+                heard = partial(self.hear, *kept[name]) if name in kept else ignore
                 topic = f"leg{leg}/leg_wear_monitor/{name}"
-                self.create_subscription(
-                    kind,
-                    topic,
-                    lambda raw, delays=delays, stamps=stamps: self.hear(raw, delays, stamps),
-                    deep,
-                    raw=True,
-                )
+                self.create_subscription(TYPES[name], topic, heard, deep, raw=True)
         self.create_subscription(DiagnosticArray, "/diagnostics", self.hear_diagnostics, 50)
 
-    def hear(self, raw: bytes, delays: list[float], stamps: list[float]) -> None:
+    @staticmethod
+    def hear(delays: list[float], stamps: list[float], raw: bytes) -> None:
         seconds, rest = struct.unpack("<iI", raw[STAMP])
         stamps.append(seconds % 100_000 + 1e-9 * rest)
         delays.append((time.time_ns() - seconds * 1_000_000_000 - rest) * 1e-9)
@@ -181,6 +200,7 @@ def monitors(args: argparse.Namespace) -> list["subprocess.Popen[bytes]"]:
         f"cadence.commanded_rpm:={args.rpm}",
         f"diagnosis.enabled:={str(not args.without_diagnosis).lower()}",
     ]
+    parameters += args.set
     if args.foot_load_hz:
         parameters += ["foot_load.source:=wrench", "load.model:=measured"]
     nodes = []
@@ -219,11 +239,13 @@ def main() -> None:
     parser.add_argument("--without-diagnosis", action="store_true")
     parser.add_argument("--joints", default="A,B,G,I,J")
     parser.add_argument("--record", type=Path)
+    parser.add_argument("--topics", default="predicted_torque", help=f"any of {', '.join(TYPES)}, or nothing")
+    parser.add_argument("--set", action="append", default=[], metavar="NAME:=VALUE")
     args = parser.parse_args()
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     os.environ["ROS_DOMAIN_ID"] = str(os.getpid() % 100)
-    rclpy.init()
-    listener = Listener(args.legs)
+    rclpy.init(args=[])  # which would take --set for its own
+    listener = Listener(args.legs, [name for name in args.topics.split(",") if name])
     hearing = threading.Thread(target=spin, args=(listener,))
     hearing.start()
     nodes = monitors(args)
@@ -231,7 +253,7 @@ def main() -> None:
     rest += [str(args.foot_load_hz), str(args.ground_n)]
     source = subprocess.Popen([sys.executable, __file__, "publish", *rest], stdout=subprocess.PIPE, text=True)
     try:
-        while not all(listener.delays_s):
+        while not all(listener.cycle_delays_s):
             time.sleep(0.1)
         seen = measure(nodes, source)
         sent = int(source.stdout.read())
@@ -295,15 +317,24 @@ def report(leg: int, sent: int, rows: list[tuple[float, ...]], listener: Listene
     counts, delays = listener.counts[leg], np.array(listener.delays_s[leg])
     clock, busy, memory = np.array(rows).T
     fraction = (busy[-2] - busy[0]) / (clock[-2] - clock[0])
-    median, p99 = 1e3 * np.percentile(delays, [50, 99])
     print(
         f"leg {leg}: sent {sent}, received {counts['received']:.0f}, shed {counts['shed_messages']:.0f}; "
-        f"{fraction:.1%} of a core; memory {memory[0]:.0f} to {memory[-1]:.0f} MB; "
-        f"stamp to report: median {median:.0f} ms, p99 {p99:.0f} ms, worst {1e3 * delays.max():.0f} ms "
-        f"of {len(delays)}"
+        f"{fraction:.1%} of a core; memory {memory[0]:.0f} to {memory[-1]:.0f} MB, "
+        f"median {np.median(memory):.0f}, at most {memory.max():.0f}"
     )
-    beyond = 1e3 * np.percentile(beyond_lag_s(np.array(listener.stamps_s[leg]), delays), [50, 99])
-    print(f"  beyond the tracker's lag, window and nodes: median {beyond[0]:.1f} ms, p99 {beyond[1]:.1f} ms")
+    parts = np.diff(busy) / np.diff(clock)
+    for at in range(0, len(parts), 12) if len(parts) > 24 else ():
+        minute = slice(at, at + 12)
+        fraction, most = parts[minute].mean(), memory[minute].max()
+        median = np.median(memory[minute])
+        print(f"  minute {at // 12 + 1}: {fraction:.1%} of a core; {median:.0f} MB, at most {most:.0f}")
+    if len(delays):
+        median, p99, worst = 1e3 * np.percentile(delays, [50, 99, 100])
+        print(f"  stamp to report: median {median:.0f} ms, p99 {p99:.0f}, worst {worst:.0f} of {len(delays)}")
+        beyond = 1e3 * np.percentile(beyond_lag_s(np.array(listener.stamps_s[leg]), delays), [50, 99])
+        print(
+            f"  beyond the tracker's lag, window and nodes: median {beyond[0]:.1f} ms, p99 {beyond[1]:.1f} ms"
+        )
     cycles = 1e3 * np.array(listener.cycle_delays_s[leg])
     median, p99 = np.percentile(cycles, [50, 99])
     late = ", ".join(f"{cycles[i]:.0f} ms ({i + 1})" for i in np.argsort(cycles)[:-6:-1])

@@ -105,10 +105,14 @@ class Change(NamedCause):
     is_corrected: bool = False
 
     @property
+    def is_named(self) -> bool:
+        """Whether no other explanation comes near."""
+        return self.runner_up_log_odds >= SURE_OF_NAME
+
+    @property
     def is_sure(self) -> bool:
         """Whether a clearance has changed, much more probably than anything else."""
-        is_alone = self.runner_up_log_odds >= SURE_OF_NAME
-        return self.cause is Cause.CLEARANCE and self.log_odds >= SURE_LOG_ODDS and is_alone
+        return self.cause is Cause.CLEARANCE and self.log_odds >= SURE_LOG_ODDS and self.is_named
 
     @property
     def is_wide(self) -> bool:

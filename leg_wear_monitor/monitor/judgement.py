@@ -100,7 +100,7 @@ def shown(parts: Parts, joint: JointSituation) -> KnownClearance | None:
 def situation_of(parts: Parts) -> Situation:
     """What the verdict depends on, at the end of an evaluation period."""
     evaluation, config, twin = parts.evaluation, parts.config, parts.twin
-    last, explained = parts.state.last, parts.state.mismatch.explanation
+    last, explained = parts.state.last, parts.explanation
     alarms, diagnosis = evaluation.board.alarms, parts.diagnosis
     return Situation(
         joints=_joint_situations(parts, diagnosis),
@@ -196,7 +196,7 @@ _TURN = 2.0 * math.pi
 def leg_state(parts: Parts, findings: Sequence[Finding], situation: Situation) -> LegState:
     """State of the leg now, with the verdict of some findings."""
     last, verdict, diagnosis = parts.state.last, verdict_of(findings), situation.diagnosis
-    explained, alarms = parts.state.mismatch.explanation, parts.evaluation.board.alarms
+    explained, alarms = parts.explanation, parts.evaluation.board.alarms
     return LegState(
         stamp_ns=parts.twin.intake.stamp_ns,
         life_cycles=parts.accounting.state.cycles,

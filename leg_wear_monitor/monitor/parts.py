@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.compiled.kernel import Records
-from leg_wear_monitor.estimate.cause import Cause, Change
+from leg_wear_monitor.estimate.cause import Cause, Change, TorqueExplanation
 from leg_wear_monitor.estimate.torque_model import torque_model
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials import bushing_of
@@ -287,6 +287,12 @@ class Parts:
             return ()
         factors = zip(self.mechanism.bodies, own.mass.tolist(), own.length.tolist(), strict=True)
         return tuple(Body(*one) for one in factors)
+
+    @property
+    def explanation(self) -> TorqueExplanation | None:
+        """What explains a mismatch of the torque; None where the diagnosis names another cause."""
+        explained = self.state.mismatch.explanation
+        return None if explained and self.diagnosis.contradicts(explained) else explained
 
     @property
     def is_torque_wrong(self) -> bool:

@@ -23,7 +23,7 @@ _CODES = {name.upper(): cause.fault_code for name, cause in CAUSES_OF_ALARMS.ite
 def torque_status(parts: Parts) -> Status:
     """Comparison of measured and predicted torque, and what explains a mismatch."""
     evaluation, last, record = parts.evaluation, parts.state.last, parts.state.torque
-    explained = parts.state.mismatch.explanation
+    explained = parts.explanation
     level = evaluation.board.level(*_TORQUE)
     code = worst_code(evaluation.board.alarms[name] for name in _TORQUE)
     code = _CODES.get(code, code)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate.cause import Change
+from leg_wear_monitor.estimate.cause import Cause, Change, TorqueExplanation
 from leg_wear_monitor.estimate.change_detector import DetectorState
 from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
 from leg_wear_monitor.estimate.drive import DIRECT, Channel
@@ -178,6 +178,19 @@ class Diagnosis(Shown):
         if not self.clearance_m or not math.isfinite(self.clearance_m[k]):
             return None
         return self.clearance_m[k], self.sigma_m[k]
+
+    def contradicts(self, explained: TorqueExplanation) -> bool:
+        """Whether it names another cause of a torque mismatch.
+
+        The explanation compares with the counted leg, and supposes faults of the inputs, a load or a mass.
+        The diagnosis compares with this leg as it was, and supposes more; but a torque that is wrong as
+        received is not used by it.
+        """
+        if explained.is_input_fault or self.state is not DiagnosisState.CHANGED:
+            return False
+        own = {each.cause for each in self.changes if each.is_named and not each.is_corrected}
+        codes = {cause.fault_code for cause in own - {Cause.NOISE, Cause.UNKNOWN}}
+        return bool(codes) and codes.isdisjoint(one.cause.fault_code for one in explained.named)
 
 
 WINDOW_CYCLES = 60  # that are kept at a cadence, and that clearances are estimated from

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 
 import attrs
 
-from leg_wear_monitor.estimate.cause import SURE_OF_NAME, Cause, Change, NamedCause
+from leg_wear_monitor.estimate.cause import Cause, Change, NamedCause
 from leg_wear_monitor.monitor.alarms import CAUSES_OF_ALARMS, Alarm, amount, time_words
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.verdict.situation import (
@@ -116,7 +116,7 @@ def words_of(change: Change, situation: Situation) -> str:
             words += ", less than before: if its part was replaced, reset the joint"
     else:
         words = words_for(situation).cause(_named_cause(change, situation))
-    if change.runner_up and change.runner_up_log_odds < SURE_OF_NAME:
+    if change.runner_up and not change.is_named:
         words += f" (or {change.runner_up})"
     return words
 

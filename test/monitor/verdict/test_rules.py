@@ -298,6 +298,28 @@ def test_a_cause_of_an_input_comes_before_what_the_torque_shows_of_the_leg() -> 
     assert judged(**both, explained=explained(Cause.LOAD)).fault_code == "CLEARANCE_CHANGED_G"
 
 
+@pytest.mark.parametrize(
+    ("causes", "after", "values", "is_other"),
+    [
+        ((Cause.MASS,), 0.03, {}, True),
+        ((Cause.LOAD, Cause.MASS), 0.9, {}, True),  # not named: what is left may be friction
+        ((Cause.SIGN, Cause.MASS), 0.03, {}, False),  # as received, no gait cycle of it is used
+        ((Cause.MASS,), 0.03, {"runner_up": "G", "runner_up_log_odds": 9.0}, False),
+        ((Cause.MASS,), 0.03, {"is_corrected": True}, False),
+        ((Cause.MASS,), 0.03, {"cause": Cause.MASS}, False),
+        ((Cause.MASS,), 0.03, {"cause": Cause.UNKNOWN}, False),
+    ],
+)
+def test_one_story_of_a_torque_that_is_not_as_predicted(
+    causes: tuple[Cause, ...], after: float, values: dict[str, Any], is_other: bool
+) -> None:
+    """Seen before: a dead zone of the torque sensor was friction by the diagnosis, and a mass beside it."""
+    found = diagnosis(change(**{"cause": Cause.FRICTION} | values))
+    assert found.contradicts(explained(*causes, after=after)) is is_other
+    past = attrs.evolve(found, state=DiagnosisState.AS_COUNTED)
+    assert not past.contradicts(explained(*causes, after=after))
+
+
 def test_a_diagnosis_names_the_joint_that_a_mismatch_does_not() -> None:
     found = change(Cause.CLEARANCE, "G", runner_up="B 0.5 mm", runner_up_log_odds=1.0)
     verdict = judged(**raised("torque_mismatch"), diagnosis=diagnosis(found))

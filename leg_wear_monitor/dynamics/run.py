@@ -11,6 +11,7 @@ from leg_wear_monitor.compiled.vectors import bits_of
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.errors import SimulationError
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
+from leg_wear_monitor.mechanism.materials import Bushing
 from leg_wear_monitor.mechanism.position import Linkage
 from leg_wear_monitor.wear import Surfaces
 
@@ -172,13 +173,16 @@ def percentile(seconds: Floats, fraction: float) -> float:
     float
         Exact to the width of a bin, at most 0.8 %; 0 for an empty histogram.
     """
-    reached = np.cumsum(seconds)
-    if not reached[-1] > 0.0:
+    bins = np.flatnonzero(seconds)  # a few hundred of thousands
+    if not len(bins):
         return 0.0
-    i = int(np.searchsorted(reached, fraction * reached[-1]))
-    if i == 0:
+    reached = np.cumsum(seconds[bins])
+    sought = fraction * reached[-1]
+    at = int(np.searchsorted(reached, sought))
+    if not (sought > 0.0 and bins[at] > 0):
         return 0.0
-    return bin_edge(i + (fraction * reached[-1] - reached[i - 1]) / seconds[i])
+    before = reached[at - 1] if at else 0.0
+    return bin_edge(float(bins[at] + (sought - before) / seconds[bins[at]]))
 
 
 def signed_percentile(seconds: Floats, fraction: float) -> float:
@@ -293,6 +297,8 @@ class Setup:
     contacts : ContactArrays
     films : (k, 2) array
         Viscosity [Pa s] and roughness [m] of the clearance joints' films; 0 for a dry joint.
+    bushings : tuple of Bushing
+        Those of the clearance joints.
     surfaces : Surfaces
         Worn surfaces; the run changes them.
     speed : float
@@ -303,6 +309,7 @@ class Setup:
     clearance_joints: tuple[str, ...]
     contacts: ContactArrays
     films: Floats
+    bushings: tuple[Bushing, ...]
     surfaces: Surfaces
     speed: float
 
@@ -377,19 +384,20 @@ class Tracer:
     """
 
     def __init__(self, run: Traceable, joints: int, begin: float, end: float, step: float) -> None:
-        self._run, self._joints, self._begin, self._step = run, joints, begin, step
+        self._run, self._begin, self._step = run, begin, step
         self._count = 0 if math.isinf(step) else max(1, math.ceil((end - begin) / step - _ROUNDING))
         self.samples: list[Sample] = []
+        self._unused = new_run_statistics(joints)  # those of the branches
 
     def look_ahead(self, t: float) -> None:
         """Take the samples up to a time [s], before the run is advanced to it."""
-        branch, statistics = None, new_run_statistics(self._joints)
+        branch = None
         while len(self.samples) < self._count:
             due = self._begin + len(self.samples) * self._step
             if due >= t - _ROUNDING * self._step:
                 break
             branch = branch or self._run.branch()
-            branch.advance(due, statistics)
+            branch.advance(due, self._unused)
             self.samples.append(branch.sample_at(due))
 
 

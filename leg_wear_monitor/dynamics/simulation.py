@@ -28,6 +28,7 @@ from leg_wear_monitor.dynamics.statistics import (
 from leg_wear_monitor.errors import AssemblyError, ConfigError, ConfigWarning, SimulationError, did_you_mean
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.loader import load_mechanism
+from leg_wear_monitor.mechanism.materials import bushing_of
 from leg_wear_monitor.mechanism.plausible import suspects
 from leg_wear_monitor.mechanism.position import (
     TURN,
@@ -241,6 +242,7 @@ def prepare(
         clearance_joints,
         contacts,
         compile_films(settings),
+        tuple(bushing_of(mechanism, joint) for joint in clearance_joints),
         fresh_surfaces(contacts, wear),
         _speed(mechanism, speed_rpm),
     )

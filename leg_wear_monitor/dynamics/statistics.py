@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from functools import cache
 from typing import Any
 
 import attrs
@@ -37,7 +38,7 @@ from leg_wear_monitor.dynamics.run import (
     signed_percentile,
 )
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.materials import bushing_of, regime_of
+from leg_wear_monitor.mechanism.materials import regime_of
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.wear import BUSHING, JOURNAL, wear_zone
 
@@ -135,7 +136,7 @@ class CycleScatter:
         parts = {
             "drive_torque_nm": drive_torque(cycle),
             "energy_j": energy_balance(cycle, before["stored"], stored),
-            "joints": joint_statistics(self._setup, cycle, worn, 1.0),
+            "joints": _mean_loads(self._setup, cycle, worn, 1.0),
         }
         values = {path: value for name, part in parts.items() for path, value in _numbers(name, part)}
         now = np.concatenate([list(values.values()), worn.ravel()])
@@ -178,70 +179,78 @@ def _numbers(path: str, part: Any) -> Iterator[tuple[str, float]]:
     """Numbers in a part of a result that add up over cycles, with their paths."""
     if isinstance(part, float):
         yield path, part
-    elif isinstance(part, dict) or attrs.has(type(part)):
-        fields = part if isinstance(part, dict) else attrs.asdict(part, recurse=False)
-        for name, value in fields.items():
-            if name not in _ONE_SAMPLE:
-                yield from _numbers(f"{path}.{name}", value)
+    elif isinstance(part, dict):
+        for name, value in part.items():
+            yield from _numbers(f"{path}.{name}", value)
+    else:
+        for name in _summed(part.__class__):
+            yield from _numbers(f"{path}.{name}", getattr(part, name))
+
+
+@cache
+def _summed(kind: type) -> tuple[str, ...]:
+    """Names of the fields of a part of a result that may add up over cycles; none of what has no fields."""
+    fields = attrs.fields(kind) if attrs.has(kind) else ()
+    return tuple(field.name for field in fields if field.name not in _ONE_SAMPLE)
 
 
 def joint_statistics(
     setup: Setup, statistics: RunStatistics, worn: Floats, cycles: float
 ) -> dict[str, JointResult]:
     """Results of all joints by name; ``worn`` (k, 2, N) [m] is the wear depth of the counted cycles."""
-    return {
-        name: _joint(setup, statistics, joint, worn, cycles)
-        for joint, name in enumerate(setup.linkage.mechanism.joints)
-    }
+    found = _mean_loads(setup, statistics, worn, cycles)
+    for k, name in enumerate(setup.clearance_joints):
+        psi, doubt = _contact(setup, k, found[name].p99_force_n)
+        found[name] = attrs.evolve(
+            found[name],
+            wear_zone_deg=wear_zone(worn[k, BUSHING]),
+            clearance_m=_clearance(setup, k),
+            holds_for=regime_of(setup.linkage.mechanism.clearances[name]),
+            contact_half_angle_deg=math.degrees(psi),
+            outside_contact_law=doubt,
+        )
+    return found
 
 
-def _joint(setup: Setup, statistics: RunStatistics, joint: int, worn: Floats, cycles: float) -> JointResult:
-    mean, square, contact = statistics.integral[joint, [FORCE, FORCE_SQUARED, CONTACT]] / statistics.time[0]
-    forces = JointResult(
-        mean_force_n=float(mean),
-        rms_force_n=float(np.sqrt(square)),
-        p99_force_n=percentile(statistics.force_time[joint], 0.99),
-        max_force_n=float(statistics.peak[joint]),
-    )
-    name = list(setup.linkage.mechanism.joints)[joint]
-    if name not in setup.clearance_joints:
-        return forces
-    k = setup.clearance_joints.index(name)
-    return attrs.evolve(
-        _loaded(forces, setup, k, float(statistics.integral[joint, ARCHARD] / statistics.time[0])),
-        contact_fraction=float(contact),
-        friction_work_j_per_cycle=float(statistics.integral[joint, FRICTION] / cycles),
-        archard_integral_j_per_cycle=float(statistics.integral[joint, ARCHARD] / cycles),
-        wear_depth_m_per_cycle=WearDepth(
-            bushing_max=float(worn[k, BUSHING].max() / cycles),
-            bushing_mean=float(worn[k, BUSHING].mean() / cycles),
-            journal_max=float(worn[k, JOURNAL].max() / cycles),
-            journal_mean=float(worn[k, JOURNAL].mean() / cycles),
-        ),
-        wear_zone_deg=wear_zone(worn[k, BUSHING]),
-        clearance_m=_clearance(setup, k),
-    )
+def _mean_loads(
+    setup: Setup, statistics: RunStatistics, worn: Floats, cycles: float
+) -> dict[str, JointResult]:
+    """Forces of all joints by name; of a clearance joint also contact, work, wear and pressure."""
+    found = {}
+    for joint, name in enumerate(setup.linkage.mechanism.joints):
+        integral = statistics.integral[joint]
+        mean, square, contact = integral[[FORCE, FORCE_SQUARED, CONTACT]] / statistics.time[0]
+        forces = JointResult(
+            mean_force_n=float(mean),
+            rms_force_n=float(np.sqrt(square)),
+            p99_force_n=percentile(statistics.force_time[joint], 0.99),
+            max_force_n=float(statistics.peak[joint]),
+        )
+        if name not in setup.clearance_joints:
+            found[name] = forces
+            continue
+        k, rubbing_w = setup.clearance_joints.index(name), float(integral[ARCHARD] / statistics.time[0])
+        load = setup.bushings[k].load(forces.mean_force_n, forces.p99_force_n, rubbing_w)
+        found[name] = attrs.evolve(
+            forces,
+            contact_fraction=float(contact),
+            friction_work_j_per_cycle=float(integral[FRICTION] / cycles),
+            archard_integral_j_per_cycle=float(integral[ARCHARD] / cycles),
+            wear_depth_m_per_cycle=WearDepth(
+                bushing_max=float(worn[k, BUSHING].max() / cycles),
+                bushing_mean=float(worn[k, BUSHING].mean() / cycles),
+                journal_max=float(worn[k, JOURNAL].max() / cycles),
+                journal_mean=float(worn[k, JOURNAL].mean() / cycles),
+            ),
+            **{name: getattr(load, name) for name in _OF_A_LOAD},
+        )
+    return found
 
 
 _OF_A_LOAD = (
     "mean_pressure_pa", "p99_pressure_pa", "mean_sliding_speed_mps", "mean_pressure_speed_pa_mps",
     "outside_limits",
 )  # fmt: skip
-
-
-def _loaded(forces: JointResult, setup: Setup, k: int, rubbing_w: float) -> JointResult:
-    """Pressure and sliding speed of clearance joint k; ``rubbing_w`` is the mean of F_N |v_t| [W]."""
-    load = bushing_of(setup.linkage.mechanism, setup.clearance_joints[k]).load(
-        forces.mean_force_n, forces.p99_force_n, rubbing_w
-    )
-    psi, doubt = _contact(setup, k, forces.p99_force_n)
-    return attrs.evolve(
-        forces,
-        **{name: getattr(load, name) for name in _OF_A_LOAD},
-        holds_for=regime_of(setup.linkage.mechanism.clearances[setup.clearance_joints[k]]),
-        contact_half_angle_deg=math.degrees(psi),
-        outside_contact_law=doubt,
-    )
 
 
 def _contact(setup: Setup, k: int, force_n: float) -> tuple[float, str | None]:

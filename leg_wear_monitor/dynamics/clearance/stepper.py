@@ -214,8 +214,7 @@ class ClearanceStepper:
 
     def observe(self) -> Moment:
         """The leg at that time; does not change the state."""
-        work, state = self.work, self.state
-        energy = observe(self.model, self._setup.surfaces.feeds_back, state, work)
+        work, state, energy = self.work, self.state, self.elastic_energy()
         x, now = work.x[:, : len(state.e)], work.now
         return Moment(
             deviation=_toe_deviations(now.toe, now.speed[0], x[E0], x[V0], x[A0]),
@@ -225,8 +224,12 @@ class ClearanceStepper:
             force=self._forces(),
             reaction=work.reaction.copy(),
             toe=work.toe.copy(),
-            elastic_energy=float(energy),
+            elastic_energy=energy,
         )
+
+    def elastic_energy(self) -> float:
+        """Elastic energy [J] of the contacts at that time."""
+        return float(observe(self.model, self._setup.surfaces.feeds_back, self.state, self.work))
 
     def advance(self, polynomial: Floats, t_end: float, statistics: RunStatistics) -> tuple[int, int]:
         """Advance by all whole intervals up to a time, and add to run statistics.
@@ -353,7 +356,7 @@ class ClearanceRun:
         moving = 0.5 * v @ at["a"] @ v + speed * v @ (at["b"] + at["b_e"] @ e)
         moving += 0.5 * speed**2 * (at["c"][0] + at["c_e"] @ e + 0.5 * e @ at["c_ee"] @ e)
         resting = at["potential"][0] - at["push"] @ e - 0.5 * e @ at["push_e"] @ e
-        return float(moving + resting) + self.stepper.observe().elastic_energy
+        return float(moving + resting) + self.stepper.elastic_energy()
 
     def advance(self, t_end: float, statistics: RunStatistics) -> None:
         """Advance to the last whole interval before a time [s] and add to run statistics.

@@ -18,7 +18,6 @@ from leg_wear_monitor.compiled.vectors import (
     every,
     number_of,
     part_at,
-    put_part,
     put_vector,
     vector_at,
     vector_sum,
@@ -128,7 +127,7 @@ def sudden_impulse(now, x, added):
 
 @kernel
 def reactions(tables, angle, now, x, sample, out_by, out_reaction):
-    """Drive torque [N m] and reactions of the ideal joints [N] (r,) at a crank angle, in the tables' order.
+    """Drive torque [N m] and reactions of the ideal joints [N], with room, at a crank angle, in the tables' order.
 
     ``out_by`` (4 + 3 d + k,) contains the factors of the table's columns.
     """
@@ -142,9 +141,9 @@ def reactions(tables, angle, now, x, sample, out_by, out_reaction):
     for r in range(0, out_reaction.shape[0], WIDTH):
         before, after = every(0.0), every(0.0)
         for c in range(out_by.shape[0]):
-            before += out_by[c] * part_at(table, (i, c, r))
-            after += out_by[c] * part_at(table, (i + 1, c, r))
-        put_part(out_reaction, r, (1.0 - w) * before + w * after)
+            before += out_by[c] * vector_at(table, (i, c, r))
+            after += out_by[c] * vector_at(table, (i + 1, c, r))
+        put_vector(out_reaction, r, (1.0 - w) * before + w * after)
     if now.spin.shape[0] > 0:
         points = blend(tables.spin_reaction.shape[0] - 1, angle)
         add_film_reactions(tables, points, now, sample, out_reaction)
@@ -170,7 +169,9 @@ def toe_deviation(now, x, out_response):
     """Update the toe's largest deviations from the ideal linkage: position, velocity, acceleration."""
     along = _along_toe(0, now, x), _along_toe(1, now, x)
     for i in range(3):
-        out_response[i] = max(out_response[i], math.sqrt(along[0][i] ** 2 + along[1][i] ** 2))
+        square = along[0][i] ** 2 + along[1][i] ** 2
+        if square > out_response[i] ** 2:
+            out_response[i] = math.sqrt(square)
 
 
 @kernel

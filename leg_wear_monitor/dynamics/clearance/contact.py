@@ -443,7 +443,7 @@ def add_film_reactions(tables, points, now, sample, out_reaction):
     table, (i, w) = tables.spin_reaction, points
     for m in range(now.spin.shape[0]):
         moment = sample[MOMENT_B + m % 2, m // 2]
-        for r in range(out_reaction.shape[0]):
+        for r in range(table.shape[2]):
             out_reaction[r] += moment * ((1.0 - w) * table[i, m, r] + w * table[i + 1, m, r])
 
 

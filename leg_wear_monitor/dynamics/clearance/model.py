@@ -280,7 +280,7 @@ def clearance_work(model: ClearanceModel, state: ClearanceState) -> ClearanceWor
         x=np.zeros((VECTORS, 2 * padded(clearance_joints))),
         weight=np.zeros(state.depth.shape[2]),
         by=np.zeros(model.tables.reaction.shape[1]),
-        reaction=np.zeros(len(model.tables.reaction_joint)),
+        reaction=np.zeros(model.tables.reaction.shape[2]),
         toe=np.zeros(2),
         added=np.zeros((ADDED, padded(clearance_joints))),
         sums=np.zeros((JOINT_RATES, padded(clearance_joints))),

@@ -222,7 +222,7 @@ class ClearanceStepper:
             e=self.eccentricity,
             rate=state.v.reshape(-1, 2).copy(),
             force=self._forces(),
-            reaction=work.reaction.copy(),
+            reaction=work.reaction[: len(self.model.tables.reaction_joint)].copy(),
             toe=work.toe.copy(),
             elastic_energy=energy,
         )

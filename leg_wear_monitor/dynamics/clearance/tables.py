@@ -175,7 +175,7 @@ def _with_levers(tables: ClearanceTables, linkage: Linkage, basis: Basis) -> Cle
         motion[:-1, first : first + columns.shape[1]] = columns
         motion[-1, first : first + columns.shape[1]] = columns[0]
     ideal, _ = _ideal_rows(linkage, basis)
-    reaction[:-1, -k:] = _friction_reactions(basis, ideal)
+    reaction[:-1, -k:, : len(ideal)] = _friction_reactions(basis, ideal)
     reaction[-1] = reaction[0]
     slopes, first = _lever_slopes(basis)[_coarse(len(basis.s))], start_of("lever_drive", changing_shapes(k))
     for i in range(k):
@@ -330,8 +330,11 @@ def _reaction(linkage: Linkage, _contacts: ContactArrays, basis: Basis) -> Float
     by += [basis.drag[:, :, -1:], mass * basis.s, 2.0 * mass * basis.s_t]
     by.append(basis.drag[:, :, :-1])
     others = project(np.concatenate(by, axis=2), basis.x[:, :, rows])
-    reaction = np.concatenate([others, _friction_reactions(basis, rows)], axis=1)
-    return np.concatenate([reaction, reaction[:1]])
+    columns = np.concatenate([others, _friction_reactions(basis, rows)], axis=1)
+    reaction = np.zeros((len(columns) + 1, columns.shape[1], padded(len(rows))))
+    reaction[:-1, :, : len(rows)] = columns
+    reaction[-1] = reaction[0]
+    return reaction
 
 
 def _spins(bodies: Ints, basis: Basis, rows: list[int]) -> dict[str, Singles]:

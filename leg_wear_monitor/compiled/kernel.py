@@ -296,6 +296,14 @@ _PLAIN = (int, float, complex, str, bytes, slice, np.generic, EllipsisType, type
 at_compilation: list[Callable[[], None]] = []  # called when an entry is compiled, and not loaded
 
 
+def uncompiled(function: Any) -> Any:
+    """The Python function of a kernel or an entry; other values as they are.
+
+    For a formula that Python needs once: a kernel that Python calls is compiled in each process anew.
+    """
+    return getattr(function, "py_func", function)
+
+
 def _description(value: object, digest: Any, known: set[object]) -> None:
     """Add to a digest what a value is for the compiler, with all that it depends on in its turn.
 
@@ -304,7 +312,7 @@ def _description(value: object, digest: Any, known: set[object]) -> None:
     TypeError
         For a kind of value of which it is not known what compiled code makes of it.
     """
-    function = getattr(value, "py_func", value)
+    function = uncompiled(value)
     if isinstance(function, FunctionType):
         if function not in known:
             known.add(function)

@@ -18,7 +18,12 @@ from leg_wear_monitor.estimate.cause import Cause
 from leg_wear_monitor.estimate.drive import DIRECT, UNDECLARED, Channel, DriveFigures
 from leg_wear_monitor.estimate.explanations import Nuisance
 from leg_wear_monitor.estimate.least_squares import Point, gauss_newton
-from leg_wear_monitor.estimate.signature import TorqueSensor, simulated_signatures, with_noise_of
+from leg_wear_monitor.estimate.signature import (
+    SimulatedSensor,
+    TorqueSensor,
+    simulated_signatures,
+    with_noise_of,
+)
 from leg_wear_monitor.estimate.torque_model import PHASE_ERROR_RAD
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
@@ -150,10 +155,13 @@ def channel_of(
     hz = figures.bandwidth_hz
     time_constants_s = _TIME_CONSTANTS_S if math.isnan(hz) else (1.0 / (TURN * hz),)
 
+    simulated = SimulatedSensor(reference, _CYCLES, sensor)
+    noise = sensor.noise_nm * simulated.noise(0)
+
     @functools.cache  # both hypotheses try the same channels
     def residual(channel: Channel) -> Floats:
-        behind = attrs.evolve(sensor, channel=channel)
-        return np.asarray(measured - simulated_signatures(reference, 0, behind, cycles=_CYCLES).mean(axis=0))
+        behind = simulated.behind(channel)
+        return np.asarray(measured - behind.signatures_of(behind.torque(0) + noise).mean(axis=0))
 
     @functools.cache
     def filtered(low_pass: Channel) -> Floats:  # clearance columns without a delay

@@ -4,6 +4,7 @@ Throughout, F is the length of a signature: mean and roughness in each phase.
 """
 
 import math
+from copy import copy
 
 import attrs
 import numpy as np
@@ -250,6 +251,12 @@ class SimulatedSensor:
         self._angle, shape, later = angle, (cycles, sensor.phases), which > 0
         self._phases = PhaseMeans(cycle, angle, shape), PhaseMeans(cycle[later], angle[later], shape)
         self._has_step = later
+
+    def behind(self, channel: Channel) -> "SimulatedSensor":
+        """The same sensor behind another channel; its samples fall at the same times."""
+        other = copy(self)
+        other._sensor = attrs.evolve(self._sensor, channel=channel)
+        return other
 
     def signatures(self, leg: int, scale: float = 1.0) -> Floats:
         """Signatures (cycles, F) of a leg, with the sensor's noise and a factor on the torque."""

@@ -140,8 +140,8 @@ class LifeRun:
         Factor on the wear coefficients of the clearance joints.
     depth : (k, 2, N) array, optional
         Initial wear [m]; none if not given.
-    workers : int
-        Number of threads.
+    workers : int, optional
+        Number of threads; default: the number of cores.
     duty : Duty, optional
         Loads under which the leg walks: the wear of a gait cycle is the mean over them by their hours. The
         mechanism's own loads if not given.
@@ -170,7 +170,7 @@ class LifeRun:
         speed_rpm: float | None = None,
         wear_factor: ArrayLike = 1.0,
         depth: Floats | None = None,
-        workers: int = 1,
+        workers: int | None = None,
         duty: Duty | None = None,
     ) -> None:
         self.settings = settings or LifeSettings()

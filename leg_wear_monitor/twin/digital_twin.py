@@ -21,6 +21,7 @@ import copy
 
 import numpy as np
 
+from leg_wear_monitor.compiled.kernel import uncompiled
 from leg_wear_monitor.dynamics.run import Setup, drive_at
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.errors import ConfigError, LegWearError
@@ -235,7 +236,7 @@ class SampledFollower(LegFollower):
         own, motion, polynomial = self._sampled, self.state.motion, self._leg.polynomial
         motion.base_ns = stamp - round(1.0e9 * self._stepper.time) - own.left_ns
         polynomial[0] = 1.0e-9 * (motion.piece_begin_ns - motion.base_ns)
-        drive_at(polynomial, self._stepper.time, self._stepper.state.drive)
+        uncompiled(drive_at)(polynomial, self._stepper.time, self._stepper.state.drive)
         self.records["torque"] = 0
         self.state.torque.mean_before, self.state.low_pass.stage = np.nan, 0
         self.estimate.wait(own.passed)

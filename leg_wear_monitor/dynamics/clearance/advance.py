@@ -127,9 +127,9 @@ def sudden_impulse(now, x, added):
 
 @kernel
 def reactions(tables, angle, now, x, sample, out_by, out_reaction):
-    """Drive torque [N m] and reactions of the ideal joints [N], with room, at a crank angle, in the tables' order.
+    """Drive torque [N m] and reactions of the ideal joints [N] at a crank angle, in the tables' order.
 
-    ``out_by`` (4 + 3 d + k,) contains the factors of the table's columns.
+    ``out_by`` (4 + 3 d + k,) contains the factors of the table's columns; out_reaction has room for vectors.
     """
     table, speed, d = tables.reaction, now.speed[0], now.torque_a.shape[0]
     out_by[0], out_by[1], out_by[2], out_by[3] = 1.0, now.speed[1], speed * speed, speed

@@ -458,14 +458,14 @@ def load_state(model, surfaces, state, angle, speed, acceleration, ahead, work):
 def sample_start(model, surfaces, state, turned, t, statistics, work):
     """Sample the joints at the start of a step at t [s]; begin contacts that rotating worn walls caused."""
     x, start, now, approach, contacts = work.x, work.start, work.now, state.approach, model.contacts
-    accelerate_clearances(model, surfaces, approach, now, turned, x, E0, V0, A0, start, True)
-    closed = False
-    for k in range(approach.shape[0]):
-        if approach[k] == 0.0 and start[DELTA, k] > 0.0 and start[DELTA_DOT, k] > 0.0:
-            begin_contact(
-                k, contacts.joint, contacts.speed_floor, t, start[DELTA_DOT, k],
-                approach, state.recent, statistics.impact, statistics.impacts,
-            )  # fmt: skip
-            closed = True
-    if closed:
+    closed = True
+    while closed:
         accelerate_clearances(model, surfaces, approach, now, turned, x, E0, V0, A0, start, True)
+        closed = False
+        for k in range(approach.shape[0]):
+            if approach[k] == 0.0 and start[DELTA, k] > 0.0 and start[DELTA_DOT, k] > 0.0:
+                begin_contact(
+                    k, contacts.joint, contacts.speed_floor, t, start[DELTA_DOT, k],
+                    approach, state.recent, statistics.impact, statistics.impacts,
+                )  # fmt: skip
+                closed = True

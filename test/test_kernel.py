@@ -1,5 +1,6 @@
 """The cache of compiled code: it works wherever the package lies, and is never stale."""
 
+import ast
 import math
 import os
 import shutil
@@ -204,6 +205,39 @@ def test_a_kernel_that_allocates_is_refused():
 
     with pytest.raises(NumbaError):
         greedy(3)
+
+
+def _python_calls(body, decorators=("kernel", "entry")):
+    """Names that code calls without being compiled itself."""
+    for node in ast.iter_child_nodes(body):
+        compiled = {one.id for one in getattr(node, "decorator_list", ()) if isinstance(one, ast.Name)}
+        if compiled.isdisjoint(decorators):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+                yield node.func.id
+            yield from _python_calls(node, decorators)
+
+
+def test_no_code_of_the_package_calls_a_kernel_from_python():
+    """It would be compiled anew in each process that comes there, for seconds."""
+    home = Path(leg_wear_monitor.__file__).parent
+    trees = {path: ast.parse(path.read_text()) for path in home.rglob("*.py")}
+    kernels = {
+        (".".join(("leg_wear_monitor", *path.relative_to(home).with_suffix("").parts)), node.name)
+        for path, tree in trees.items()
+        for node in tree.body
+        if isinstance(node, ast.FunctionDef) and "kernel" in map(ast.unparse, node.decorator_list)
+    }
+    assert len(kernels) > 100
+    for path, tree in trees.items():
+        imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+        known = {one.asname or one.name: (node.module, one.name) for node in imports for one in node.names}
+        known |= {name: (module, name) for module, name in kernels if path == _file_of(module, home)}
+        called = {name for name in _python_calls(tree) if known.get(name) in kernels}
+        assert not called, path
+
+
+def _file_of(module, home):
+    return home.joinpath(*module.split(".")[1:]).with_suffix(".py")
 
 
 def test_numba_has_the_switches_for_a_quick_start():

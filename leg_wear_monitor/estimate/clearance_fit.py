@@ -77,9 +77,8 @@ def fit_clearances(
     clearance: Floats = start_m
     for _ in range(_FIT_ROUNDS):  # what the model may be off depends on the clearances
         change = model.at(clearance)[0] - model.at(counted_m)[0]
-        scatter = model.scatter_at(clearance) + explainer.error(change[None])[0]
-        root = np.linalg.cholesky(explainer.covariance(cycles) + scatter * model.covariance)
-        whiten = np.linalg.inv(root)
+        scatter = model.scatter_at(clearance) + float(explainer.error(change[None])[0])
+        whiten, log_size = explainer.whitening(cycles, scatter)
 
         def at(x: Floats, whiten: Floats = whiten) -> Point:
             expected, slopes = model.at(np.exp(x))
@@ -94,8 +93,9 @@ def fit_clearances(
     # a baseline after a correction hides what that is off
     covariance = found.covariance * np.outer(clearance, clearance) + np.diag(uncertain**2 + known_sigma_m**2)
     square = float(np.square(found.point.rest[: len(mean)]).mean())
-    unlikely = found.point.square + 2.0 * float(np.log(np.diagonal(root)).sum())
-    fit = ClearanceFit(clearance, max(1.0, square) * covariance, square, unlikely)
+    fit = ClearanceFit(
+        clearance, max(1.0, square) * covariance, square, unlikely=found.point.square + log_size
+    )
     if fit.explains:
         return fit
     return attrs.evolve(fit, covariance=fit.covariance + np.diag(clearance**2))

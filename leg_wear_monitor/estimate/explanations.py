@@ -269,11 +269,17 @@ class Explainer:
         self.bodies = tuple(one.subject for one in nuisances if one.cause is Cause.MASS)
         self.channels, self.noises = tuple(channels), tuple(noises)
         self.fresh_m = model.joints.grid[:, 0] if fresh_m is None else fresh_m
-        self._root = np.linalg.cholesky(model.covariance)
         self._constant = baseline.covariance.copy()  # what does not become less over several cycles
         for one in nuisances:
             if one.spread:
                 self._constant += one.spread**2 * np.outer(one.column, one.column)
+        # combinations of a signature's entries that are independent under both covariances: variances of 1
+        # in a gait cycle, and these in what stays
+        root = np.linalg.cholesky(model.covariance)
+        apart = np.linalg.inv(root)
+        self._stays, axes = np.linalg.eigh(apart @ self._constant @ apart.T)
+        self._apart = axes.T @ apart
+        self._log_size = 2.0 * float(np.log(np.diagonal(root)).sum())
 
     def covariance(self, cycles: int) -> Floats:
         """Covariance (F, F) of the mean of some cycles' signatures in a leg as counted."""
@@ -281,8 +287,16 @@ class Explainer:
 
     def error(self, change: Floats) -> Floats:
         """Variance (n,) of what the model of changes (n, F) is off, as a part of that of a gait cycle."""
-        in_scatter = np.linalg.solve(self._root, change.T)
-        return np.asarray(MODEL_NOISE**2 * np.square(in_scatter).mean(axis=0))
+        return np.asarray(MODEL_NOISE**2 * np.square(self._apart @ change.T).mean(axis=0))
+
+    def whitening(self, cycles: int, scatter: float) -> tuple[Floats, float]:
+        """Matrix (F, F) that makes the mean of some cycles' signatures independent with variances of 1.
+
+        ``scatter``: further variance, as a part of that of a gait cycle. Also the logarithm of the
+        determinant of the covariance.
+        """
+        variance = np.maximum(self._stays, 0.0) + 1.0 / cycles + scatter
+        return self._apart / np.sqrt(variance)[:, None], self._log_size + float(np.log(variance).sum())
 
     def explanations(self, mean: Floats, cycles: int, counted_m: Floats) -> list[Explanation]:
         """Single causes of a change, the best first.

@@ -53,6 +53,17 @@ def measured(explainer, clearance, cycles: int, seed: int, extra=0.0):
     return explainer.model.at(np.asarray(clearance))[0] + explainer.baseline.offset + noise + extra
 
 
+@pytest.mark.parametrize(("cycles", "scatter"), [(1, 0.0), (10, 0.3), (1000, 0.01)])
+def test_whitened_signatures_are_independent(explainer, cycles: int, scatter: float) -> None:
+    turned = np.random.default_rng(5).standard_normal((F, F))
+    model = attrs.evolve(explainer.model, covariance=np.eye(F) + turned @ turned.T)
+    own = Explainer(model, JOINTS, explainer.baseline, explainer.nuisances)
+    covariance = own.covariance(cycles) + scatter * model.covariance
+    whiten, log_size = own.whitening(cycles, scatter)
+    np.testing.assert_allclose(whiten @ covariance @ whiten.T, np.eye(len(covariance)), atol=1e-9)
+    assert log_size == pytest.approx(np.linalg.slogdet(covariance)[1], rel=1e-9)
+
+
 def test_the_model_passes_through_its_grid(explainer) -> None:
     model = explainer.model
     for i, clearance in enumerate(GRID):

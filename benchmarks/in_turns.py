@@ -1,0 +1,94 @@
+"""Two versions of the clearance model in turns, some gait cycles each, hundreds of times.
+
+    python benchmarks/in_turns.py BEFORE NOW --joints A,B,G,I,J
+
+BEFORE and NOW are directories of two checkouts. Each version has a process of its own on one core, and they
+take turns within milliseconds: on a machine whose neighbours make it twice as slow for minutes, the median
+of the ratios is right to a percent, where runs one after another differ by a third.
+"""
+
+import argparse
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+WARM = 5  # turns that do not count
+
+
+def walk(joints: str, cycles: float, wear: bool) -> None:
+    """Advance by some gait cycles for each line of the standard input; print milliseconds of a gait cycle."""
+    from leg_wear_monitor import load_mechanism
+    from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
+    from leg_wear_monitor.dynamics.run import new_run_statistics, steady_drive
+    from leg_wear_monitor.dynamics.simulation import prepare
+
+    leg = load_mechanism("bionic_leg")
+    setup = prepare(leg, clearances=joints.split(","), wear=wear)
+    stepper, statistics = ClearanceStepper(setup), new_run_statistics(len(leg.joints))
+    polynomial, done = steady_drive(0.0, setup.speed), 0.0
+    for _ in sys.stdin:
+        done += cycles
+        began = time.process_time()
+        stepper.advance(polynomial, done, statistics)
+        print(1e3 * (time.process_time() - began) / cycles, flush=True)
+
+
+def take_turns(homes: list[Path], options: list[str], turns: int) -> np.ndarray:
+    """Milliseconds of a gait cycle (turns, versions)."""
+    walks = [
+        subprocess.Popen(
+            [sys.executable, __file__, "--walk", *options],
+            env=os.environ | {"PYTHONPATH": str(home)},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        for home in homes
+    ]
+    spent = np.zeros((turns + WARM, len(walks)))
+    for turn, row in enumerate(spent):
+        order = list(enumerate(walks))
+        for i, one in order if turn % 2 else reversed(order):
+            if one.stdin is None or one.stdout is None:
+                raise SystemExit("a version has no pipes")
+            one.stdin.write("\n")
+            one.stdin.flush()
+            row[i] = float(one.stdout.readline())
+    for one in walks:
+        one.kill()
+    return spent[WARM:]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("homes", nargs="*", type=Path, help="directories of two or more checkouts")
+    parser.add_argument("--joints", default="A,B,G,I,J", help="clearance joints")
+    parser.add_argument("--cycles", type=float, default=2.0, help="gait cycles in a turn")
+    parser.add_argument("--turns", type=int, default=300)
+    parser.add_argument("--wear", action="store_true", help="wear opens the clearances")
+    parser.add_argument("--walk", action="store_true", help=argparse.SUPPRESS)
+    args = parser.parse_args()
+    if args.walk:
+        walk(args.joints, args.cycles, args.wear)
+        return
+    os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+    options = ["--joints", args.joints, "--cycles", str(args.cycles), *(["--wear"] if args.wear else [])]
+    homes = [home.resolve() for home in args.homes]
+    spent = take_turns(homes, options, args.turns)
+    for home, own in zip(homes, spent.T, strict=True):
+        ratio = own / spent[:, 0]
+        error = 1.25 * ratio.std() / np.sqrt(len(ratio))
+        print(
+            f"{home.name:20} {np.median(own):7.2f} ms a gait cycle, at best {own.min():.2f}; "
+            f"of the first {np.median(ratio):.3f} ± {error:.3f}"
+        )
+
+
+if __name__ == "__main__":
+    main()

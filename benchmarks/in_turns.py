@@ -19,16 +19,25 @@ import numpy as np
 WARM = 5  # turns that do not count
 
 
-def walk(joints: str, cycles: float, wear: bool) -> None:
+def walk(joints: str, cycles: float, wear: bool, peak_n: float, stiffness: float) -> None:
     """Advance by some gait cycles for each line of the standard input; print milliseconds of a gait cycle."""
+    import attrs
+
     from leg_wear_monitor import load_mechanism
     from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
     from leg_wear_monitor.dynamics.run import new_run_statistics, steady_drive
     from leg_wear_monitor.dynamics.simulation import prepare
+    from leg_wear_monitor.life.result import Duty
+    from leg_wear_monitor.twin.reference import LegParameters, drive_coupling
 
     leg = load_mechanism("bionic_leg")
+    if peak_n:
+        (leg,) = Duty.parse(f"{peak_n}:1").mechanisms(leg)
     setup = prepare(leg, clearances=joints.split(","), wear=wear)
     stepper, statistics = ClearanceStepper(setup), new_run_statistics(len(leg.joints))
+    if stiffness:
+        parameters = attrs.evolve(LegParameters.none(leg), compliance=1.0 / stiffness)
+        stepper.model = stepper.model._replace(coupling=drive_coupling(setup, stepper.model, parameters))
     polynomial, done = steady_drive(0.0, setup.speed), 0.0
     for _ in sys.stdin:
         done += cycles
@@ -72,13 +81,17 @@ def main() -> None:
     parser.add_argument("--cycles", type=float, default=2.0, help="gait cycles in a turn")
     parser.add_argument("--turns", type=int, default=300)
     parser.add_argument("--wear", action="store_true", help="wear opens the clearances")
+    parser.add_argument("--peak-n", type=float, default=0.0, help="of the ground's force in stance [N]")
+    parser.add_argument("--stiffness", type=float, default=0.0, help="of the drive [N m/rad]; 0: rigid")
     parser.add_argument("--walk", action="store_true", help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.walk:
-        walk(args.joints, args.cycles, args.wear)
+        walk(args.joints, args.cycles, args.wear, args.peak_n, args.stiffness)
         return
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
-    options = ["--joints", args.joints, "--cycles", str(args.cycles), *(["--wear"] if args.wear else [])]
+    numbers = {"--cycles": args.cycles, "--peak-n": args.peak_n, "--stiffness": args.stiffness}
+    options = [f"{name}={value}" for name, value in numbers.items()]
+    options += ["--joints", args.joints, *(["--wear"] if args.wear else [])]
     homes = [home.resolve() for home in args.homes]
     spent = take_turns(homes, options, args.turns)
     for home, own in zip(homes, spent.T, strict=True):

@@ -160,8 +160,8 @@ def channel_of(
 
     @functools.cache  # both hypotheses try the same channels
     def residual(channel: Channel) -> Floats:
-        behind = simulated.behind(channel)
-        return np.asarray(measured - behind.signatures_of(behind.torque(0) + noise).mean(axis=0))
+        behind = simulated.torque(0, channel) + noise
+        return np.asarray(measured - simulated.signatures_of(behind).mean(axis=0))
 
     @functools.cache
     def filtered(low_pass: Channel) -> Floats:  # clearance columns without a delay

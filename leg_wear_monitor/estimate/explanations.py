@@ -269,17 +269,14 @@ class Explainer:
         self.bodies = tuple(one.subject for one in nuisances if one.cause is Cause.MASS)
         self.channels, self.noises = tuple(channels), tuple(noises)
         self.fresh_m = model.joints.grid[:, 0] if fresh_m is None else fresh_m
-        self._constant = baseline.covariance.copy()  # what does not become less over several cycles
-        for one in nuisances:
-            if one.spread:
-                self._constant += one.spread**2 * np.outer(one.column, one.column)
+        usual = (one.spread**2 * np.outer(one.column, one.column) for one in nuisances)
+        self._constant = sum(usual, baseline.covariance)  # what does not become less over several cycles
         # combinations of a signature's entries that are independent under both covariances: variances of 1
         # in a gait cycle, and these in what stays
-        root = np.linalg.cholesky(model.covariance)
-        apart = np.linalg.inv(root)
+        apart = np.linalg.inv(np.linalg.cholesky(model.covariance))
         self._stays, axes = np.linalg.eigh(apart @ self._constant @ apart.T)
         self._apart = axes.T @ apart
-        self._log_size = 2.0 * float(np.log(np.diagonal(root)).sum())
+        self._log_size = -2.0 * float(np.linalg.slogdet(apart)[1])
 
     def covariance(self, cycles: int) -> Floats:
         """Covariance (F, F) of the mean of some cycles' signatures in a leg as counted."""
@@ -434,9 +431,8 @@ class Explainer:
         # by Sherman and Morrison: without what the covariance contains of the nuisance itself
         sigmas = np.sqrt(1.0 / information - spread**2)
         more = np.sqrt(np.maximum(0.0, values**2 - sigmas**2 - spread**2))[:, None] * columns
-        rests = np.broadcast_to(rest, columns.shape)
         error = _diagonal(MODEL_ERROR * values[:, None] * columns)
-        misfits = Misfits(rests, covariance + error, more)
+        misfits = Misfits(np.broadcast_to(rest, columns.shape), covariance + error, more)
         found = []
         for i, one in enumerate(nuisances):
             counted = _COUNTED.get(one.cause, 0.0)

@@ -4,7 +4,6 @@ Throughout, F is the length of a signature: mean and roughness in each phase.
 """
 
 import math
-from copy import copy
 
 import attrs
 import numpy as np
@@ -252,12 +251,6 @@ class SimulatedSensor:
         self._phases = PhaseMeans(cycle, angle, shape), PhaseMeans(cycle[later], angle[later], shape)
         self._has_step = later
 
-    def behind(self, channel: Channel) -> "SimulatedSensor":
-        """The same sensor behind another channel; its samples fall at the same times."""
-        other = copy(self)
-        other._sensor = attrs.evolve(self._sensor, channel=channel)
-        return other
-
     def signatures(self, leg: int, scale: float = 1.0) -> Floats:
         """Signatures (cycles, F) of a leg, with the sensor's noise and a factor on the torque."""
         torque = scale * self.torque(leg)
@@ -274,11 +267,11 @@ class SimulatedSensor:
         step = np.diff(torque, prepend=0.0)[self._has_step]
         return signatures_by_phase(*self._phases, torque, step, self._sensor)
 
-    def torque(self, leg: int) -> Floats:
-        """Averaged samples (n,) of a leg [N m], without noise."""
+    def torque(self, leg: int, channel: Channel | None = None) -> Floats:
+        """Averaged samples (n,) of a leg [N m], without noise; behind the sensor's channel or another one."""
         simulated = self._reference.torque_nm[leg][: self._cycles].astype(float).ravel()
         direction = float(np.sign(self._reference.profile.speed))
-        torque = self._sensor.channel.received(simulated, self._step_s, direction)
+        torque = (channel or self._sensor.channel).received(simulated, self._step_s, direction)
         if self._sensor.is_instant:
             back = np.arange(self._sensor.together) * self._between
             at = np.maximum(self._ends[:, None] - back, 0.0).astype(np.int64)

@@ -191,7 +191,7 @@ class ClearanceWork(NamedTuple):
 
     ``now``: step tables; ``system``: contact system; ``start``, ``end`` (SAMPLE_ROWS, room): samples of the
     joints at a step's start and end; ``x`` (VECTORS, 2 room): vectors of a step; ``weight`` (N,): of the wear
-    on an arc; ``by`` (c,): factors of the reactions' table; ``reaction`` (r,), ``toe`` (2,): observed values;
+    on an arc; ``by`` (c,): factors of the reactions' table; ``reaction`` (room,), ``toe`` (2,): observed;
     ``added`` (ADDED, room): increments of the joints' integrals in a step, ``sums`` (JOINT_RATES, room): in
     an interval; ``drive_start``, ``drive_end`` (3,): of the drive at its ends; ``backup`` (s,): state to
     restore after a failed interval; ``pending`` (4, room): that of the state, within an interval; ``crank``

@@ -48,8 +48,8 @@ class ClearanceTables(NamedTuple):
 
     ``motion`` (N + 1, w): rows of `motion_shapes`, with zeros up to a whole number of vectors; ``reaction``
     (N + 1, 4 + 3 d + k, r): drive torque and reactions of the ideal joints, coefficients of (1, w', w^2, w,
-    e'', w e', e', F_t); ``reaction_joint`` (r,): joint of each, ``DRIVE`` first; ``stored`` (N + 1, u): parts
-    of the stored energy of `stored_shapes`;
+    e'', w e', e', F_t), with room likewise; ``reaction_joint`` (r,): joint of each, ``DRIVE`` first;
+    ``stored`` (N + 1, u): parts of the stored energy of `stored_shapes`;
     ``parts`` (N,): parts into which an interval of 1/2048 turn that starts there should be cut, as a float.
 
     ``by_e`` (M + 1, u / WIDTH, d, WIDTH): derivatives by e of the parts of `changing_shapes`, in blocks of

@@ -3,8 +3,9 @@
     python benchmarks/in_turns.py BEFORE NOW --joints A,B,G,I,J
 
 BEFORE and NOW are directories of two checkouts. Each version has a process of its own on one core, and they
-take turns within milliseconds: on a machine whose neighbours make it twice as slow for minutes, the median
-of the ratios is right to a percent, where runs one after another differ by a third.
+take turns within milliseconds, since neighbours can make a machine twice as slow for minutes. Where a process
+lies in memory makes it some percent slower or faster than the next one of the same version, so there are
+several pairs of processes; the range of their ratios says what a difference means.
 """
 
 import argparse
@@ -79,7 +80,8 @@ def main() -> None:
     parser.add_argument("homes", nargs="*", type=Path, help="directories of two or more checkouts")
     parser.add_argument("--joints", default="A,B,G,I,J", help="clearance joints")
     parser.add_argument("--cycles", type=float, default=2.0, help="gait cycles in a turn")
-    parser.add_argument("--turns", type=int, default=300)
+    parser.add_argument("--turns", type=int, default=60, help="of each pair of processes")
+    parser.add_argument("--pairs", type=int, default=7, help="of processes, one after another")
     parser.add_argument("--wear", action="store_true", help="wear opens the clearances")
     parser.add_argument("--peak-n", type=float, default=0.0, help="of the ground's force in stance [N]")
     parser.add_argument("--stiffness", type=float, default=0.0, help="of the drive [N m/rad]; 0: rigid")
@@ -93,13 +95,13 @@ def main() -> None:
     options = [f"{name}={value}" for name, value in numbers.items()]
     options += ["--joints", args.joints, *(["--wear"] if args.wear else [])]
     homes = [home.resolve() for home in args.homes]
-    spent = take_turns(homes, options, args.turns)
-    for home, own in zip(homes, spent.T, strict=True):
-        ratio = own / spent[:, 0]
-        error = 1.25 * ratio.std() / np.sqrt(len(ratio))
+    spent = np.array([take_turns(homes, options, args.turns) for _ in range(args.pairs)])
+    ratios = np.median(spent / spent[:, :, :1], axis=1)  # (pairs, versions)
+    for i, home in enumerate(homes):
+        own, ratio = spent[:, :, i], ratios[:, i]
         print(
             f"{home.name:20} {np.median(own):7.2f} ms a gait cycle, at best {own.min():.2f}; "
-            f"of the first {np.median(ratio):.3f} ± {error:.3f}"
+            f"of the first {np.median(ratio):.3f} ({ratio.min():.3f} to {ratio.max():.3f})"
         )
 
 

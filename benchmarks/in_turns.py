@@ -12,10 +12,13 @@ import argparse
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
+import one_core  # noqa: F401, before numpy
+
+# isort: split
 import numpy as np
+from watch import Watch
 
 WARM = 5  # turns that do not count
 
@@ -42,9 +45,9 @@ def walk(joints: str, cycles: float, wear: bool, peak_n: float, stiffness: float
     polynomial, done = steady_drive(0.0, setup.speed), 0.0
     for _ in sys.stdin:
         done += cycles
-        began = time.process_time()
+        watch = Watch()
         stepper.advance(polynomial, done, statistics)
-        print(1e3 * (time.process_time() - began) / cycles, flush=True)
+        print(1e3 * watch.processor / cycles, flush=True)
 
 
 def take_turns(homes: list[Path], options: list[str], turns: int) -> np.ndarray:
@@ -90,7 +93,8 @@ def main() -> None:
     if args.walk:
         walk(args.joints, args.cycles, args.wear, args.peak_n, args.stiffness)
         return
-    os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+    if len(args.homes) < 2:
+        parser.error("expected the directories of at least two checkouts")
     numbers = {"--cycles": args.cycles, "--peak-n": args.peak_n, "--stiffness": args.stiffness}
     options = [f"{name}={value}" for name, value in numbers.items()]
     options += ["--joints", args.joints, *(["--wear"] if args.wear else [])]

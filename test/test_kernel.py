@@ -207,37 +207,41 @@ def test_a_kernel_that_allocates_is_refused():
         greedy(3)
 
 
-def _python_calls(body, decorators=("kernel", "entry")):
+def _decorators(node):
+    """Names of the decorators of a function."""
+    return {one.id for one in getattr(node, "decorator_list", ()) if isinstance(one, ast.Name)}
+
+
+def _python_calls(body):
     """Names that code calls without being compiled itself."""
     for node in ast.iter_child_nodes(body):
-        compiled = {one.id for one in getattr(node, "decorator_list", ()) if isinstance(one, ast.Name)}
-        if compiled.isdisjoint(decorators):
+        if _decorators(node).isdisjoint({"kernel", "entry"}):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
                 yield node.func.id
-            yield from _python_calls(node, decorators)
+            yield from _python_calls(node)
 
 
 def test_no_code_of_the_package_calls_a_kernel_from_python():
     """It would be compiled anew in each process that comes there, for seconds."""
-    home = Path(leg_wear_monitor.__file__).parent
-    trees = {path: ast.parse(path.read_text()) for path in home.rglob("*.py")}
+    home = Path(leg_wear_monitor.__file__).parents[1]
+    paths = {
+        ".".join(path.relative_to(home).with_suffix("").parts): path
+        for path in (home / "leg_wear_monitor").rglob("*.py")
+    }
+    trees = {module: ast.parse(path.read_text()) for module, path in paths.items()}
     kernels = {
-        (".".join(("leg_wear_monitor", *path.relative_to(home).with_suffix("").parts)), node.name)
-        for path, tree in trees.items()
+        (module, node.name)
+        for module, tree in trees.items()
         for node in tree.body
-        if isinstance(node, ast.FunctionDef) and "kernel" in map(ast.unparse, node.decorator_list)
+        if "kernel" in _decorators(node)
     }
     assert len(kernels) > 100
-    for path, tree in trees.items():
+    for module, tree in trees.items():
         imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
         known = {one.asname or one.name: (node.module, one.name) for node in imports for one in node.names}
-        known |= {name: (module, name) for module, name in kernels if path == _file_of(module, home)}
+        known |= {name: (own, name) for own, name in kernels if own == module}
         called = {name for name in _python_calls(tree) if known.get(name) in kernels}
-        assert not called, path
-
-
-def _file_of(module, home):
-    return home.joinpath(*module.split(".")[1:]).with_suffix(".py")
+        assert not called, module
 
 
 def test_numba_has_the_switches_for_a_quick_start():

@@ -298,7 +298,7 @@ class Setup:
     films : (k, 2) array
         Viscosity [Pa s] and roughness [m] of the clearance joints' films; 0 for a dry joint.
     bushings : tuple of Bushing
-        Those of the clearance joints.
+        Of the clearance joints, in their order.
     surfaces : Surfaces
         Worn surfaces; the run changes them.
     speed : float
@@ -387,7 +387,7 @@ class Tracer:
         self._run, self._begin, self._step = run, begin, step
         self._count = 0 if math.isinf(step) else max(1, math.ceil((end - begin) / step - _ROUNDING))
         self.samples: list[Sample] = []
-        self._unused = new_run_statistics(joints)  # those of the branches
+        self._unused = new_run_statistics(joints)  # of the branches
 
     def look_ahead(self, t: float) -> None:
         """Take the samples up to a time [s], before the run is advanced to it."""

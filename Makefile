@@ -78,6 +78,7 @@ lint: .venv/installed
 	.venv/bin/ruff format --check
 	.venv/bin/mypy
 	.venv/bin/lint-imports --no-logo
+	.venv/bin/python benchmarks/structure.py --check
 
 kernels: .venv/installed
 	.venv/bin/leg-wear-monitor cache --fill

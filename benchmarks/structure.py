@@ -1,21 +1,26 @@
-"""The structure of the package in figures, by room: code, modules, records, imports, circles, repeats.
+"""The size and structure of the package: code lines, modules, records, imports, circles, repeats.
 
-``python benchmarks/structure.py [DIR]``: of the checkout in DIR, this one if not given.
+``python benchmarks/structure.py [DIR]`` prints the values of the checkout in DIR, this one by default.
+``--check`` compares the sizes with the budgets in ``pyproject.toml`` and names each one that is exceeded.
+``--lower`` lowers each budget to the present size, rounded up by at most 1 %; it never raises a budget.
 
-Code lines are those without imports, docstrings, comments and blank lines; test lines are all lines.
+Code lines exclude imports, docstrings, comments and blank lines. Test lines are all lines.
 """
 
+import argparse
 import ast
 import io
+import re
 import sys
 import tokenize
+import tomllib
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 PACKAGE = "leg_wear_monitor"
-LONG_FILE, LONG_FUNCTION = 300, 60  # lines of code
+LONG_FUNCTION = 60  # lines of code
 SMALLEST = 12  # nodes of a function's body that is looked for elsewhere
 
 _KINDS = "COMMENT", "NL", "NEWLINE", "INDENT", "DEDENT", "ENDMARKER"
@@ -31,7 +36,7 @@ class Module(NamedTuple):
     imports: set[int]
 
     @property
-    def room(self) -> str:
+    def package(self) -> str:
         """Folder or file at the top of the package."""
         return self.name.split(".")[0]
 
@@ -121,32 +126,73 @@ def repeats(modules: list[Module]) -> int:
     return sum(count for count in bodies.values() if count > 1)
 
 
+def sizes(root: Path, modules: list[Module]) -> dict[str, int]:
+    """Everything that has a budget: code lines per package, and of all; modules; test lines."""
+    found: Counter[str] = Counter()
+    for each in modules:
+        found[each.package] += len(each.code)
+    tests = [len(path.read_text(encoding="utf-8").splitlines()) for path in (root / "test").rglob("*.py")]
+    return {**found, "all": found.total(), "modules": len(modules), "test_lines": sum(tests)}
+
+
+def check(found: dict[str, int], settings: Path) -> None:
+    """End with one line per size over its budget; a package without an entry has a budget of 0."""
+    budgets = tomllib.loads(settings.read_text(encoding="utf-8"))["tool"]["leg_wear_monitor"]["budgets"]
+    over = [(name, size, budgets.get(name, 0)) for name, size in found.items() if size > budgets.get(name, 0)]
+    if over:
+        lines = [f"{settings.name}: budgets: {name}: {size} is over the budget of {limit}" for name, size, limit in over]
+        sys.exit("\n".join(lines))
+
+
+def lower(found: dict[str, int], settings: Path) -> None:
+    """Lower each budget to the present size; a package that has gone loses its entry."""
+
+    def entry(match: re.Match[str]) -> str:
+        size = found.get(match[1], 0)
+        return f"{match[1]} = {min(int(match[2]), size + size // 100)}\n" if size else ""
+
+    before, title, rest = settings.read_text(encoding="utf-8").partition("[tool.leg_wear_monitor.budgets]\n")
+    section, end, after = rest.partition("\n[")
+    section = re.sub(r"^(\w+) = (\d+)\n", entry, section, flags=re.MULTILINE)
+    settings.write_text(before + title + section + end + after, encoding="utf-8")
+
+
 def main() -> None:
-    """Print the figures of a checkout."""
-    root = Path(sys.argv[1] if len(sys.argv) > 1 else Path(__file__).parents[1])
+    """Print the values of a checkout, or compare them with the budgets."""
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    options.add_argument("root", nargs="?", type=Path, default=Path(__file__).parents[1], metavar="DIR")
+    options.add_argument("--check", action="store_true", help="compare the sizes with the budgets")
+    options.add_argument("--lower", action="store_true", help="lower the budgets to the present sizes")
+    given = options.parse_args()
+    root = given.root
     modules = [module(path, root / PACKAGE) for path in sorted((root / PACKAGE).rglob("*.py"))]
+    found = sizes(root, modules)
+    if given.lower:
+        lower(found, root / "pyproject.toml")
+    if given.check:
+        check(found, root / "pyproject.toml")
+    if given.check or given.lower:
+        return
+
     names = {each.name for each in modules}
     graph = {each.name: imported(each, names) for each in modules}
-    rooms = sorted({each.room for each in modules}, key=lambda room: room.strip("_"))
-
-    print(f"{'room':16}{'modules':>9}{'code':>8}{'records':>9}{'import lines':>14}")
-    for room in [*rooms, ""]:
-        inside = [each for each in modules if not room or each.room == room]
+    packages = sorted({each.package for each in modules}, key=lambda package: package.strip("_"))
+    print(f"{'package':16}{'modules':>9}{'code':>8}{'records':>9}{'import lines':>14}")
+    for package in [*packages, ""]:
+        inside = [each for each in modules if not package or each.package == package]
         sums = (sum(len(each.code) for each in inside), sum(map(records, inside)))
         imports = sum(len(each.imports) for each in inside)
-        print(f"{room or 'all':16}{len(inside):9}{sums[0]:8}{sums[1]:9}{imports:14}")
+        print(f"{package or 'all':16}{len(inside):9}{sums[0]:8}{sums[1]:9}{imports:14}")
 
-    crossed = {(each.room, there.split(".")[0]) for each in modules for there in graph[each.name]}
-    tests = [len(path.read_text(encoding="utf-8").splitlines()) for path in (root / "test").rglob("*.py")]
+    crossed = {(each.package, there.split(".")[0]) for each in modules for there in graph[each.name]}
     long = [length(each, function) for each in modules for function in functions(each)]
     for what, value in (
-        ("pairs of rooms with imports", sum(here != there for here, there in crossed)),
+        ("pairs of packages with imports", sum(here != there for here, there in crossed)),
         ("circles of files", len(circles(graph))),
         ("files in circles", sum(map(len, circles(graph)))),
         ("functions whose body occurs elsewhere", repeats(modules)),
-        (f"files over {LONG_FILE} lines of code", sum(len(each.code) > LONG_FILE for each in modules)),
         (f"functions over {LONG_FUNCTION} lines of code", sum(each > LONG_FUNCTION for each in long)),
-        ("test lines", sum(tests)),
+        ("test lines", found["test_lines"]),
     ):
         print(f"{what:40}{value:8}")
 

@@ -140,8 +140,11 @@ def check(found: dict[str, int], settings: Path) -> None:
     budgets = tomllib.loads(settings.read_text(encoding="utf-8"))["tool"]["leg_wear_monitor"]["budgets"]
     over = [(name, size, budgets.get(name, 0)) for name, size in found.items() if size > budgets.get(name, 0)]
     if over:
-        lines = [f"{settings.name}: budgets: {name}: {size} is over the budget of {limit}" for name, size, limit in over]
-        sys.exit("\n".join(lines))
+        sys.exit(
+            "\n".join(
+                f"{settings.name}: {name}: {size} is over the budget of {limit}" for name, size, limit in over
+            )
+        )
 
 
 def lower(found: dict[str, int], settings: Path) -> None:

@@ -21,7 +21,6 @@ import leg_wear_monitor as lw
 from leg_wear_monitor.commissioning.result import JointDetection
 from leg_wear_monitor.life.life import lives_document
 from leg_wear_monitor.life.result import Life
-from leg_wear_monitor.play.fit import Clearances, JointClearance, Play, PlayMeasurement
 from leg_wear_monitor.state import LegState
 
 ROOT = Path(__file__).parents[1]
@@ -112,19 +111,6 @@ def commissioning() -> Iterator[Row]:
     yield "reference_used", "text", "", texts["reference_used"]
 
 
-def play() -> Iterator[Row]:
-    texts = descriptions(PlayMeasurement)
-    yield VERSION
-    yield "is_sure", "true or false", "", PlayMeasurement.is_sure.__doc__ or ""
-    yield "plays[]", "object", "", texts["plays"]
-    yield from rows_of(Play, "plays[].")
-    yield "clearances", "object or null", "", texts["clearances"]
-    yield "clearances.joints[]", "object", "", descriptions(Clearances)["joints"]
-    yield from rows_of(JointClearance, "clearances.joints[].")
-    yield "clearances.findings[]", "text", "", descriptions(Clearances)["findings"]
-    yield "clearances.not_told_apart[]", "text", "", Clearances.not_told_apart.__doc__ or ""
-
-
 def fleet() -> Iterator[Row]:
     yield VERSION
     yield from rows_of(lw.FleetOverview)
@@ -136,7 +122,6 @@ DOCUMENTS = {
     "replay": replay,
     "life": life,
     "commissioning": commissioning,
-    "play": play,
     "fleet": fleet,
 }
 
@@ -166,11 +151,6 @@ def example(name: str) -> Any:
         return shipped | lives_document([(np.ones(1), run.life)] * 2, limit_m=6.0e-4)
     if name == "fleet":
         return filled_fleet().to_dict()
-    if name == "play":
-        numbers = ("play_rad", "sigma_rad", "count_rad", "noise_rad", "scatter_rad", "drift_rad")
-        one = Play(joint="knee", load="", plateaus=(10, 10), **dict.fromkeys(numbers, 0.001))
-        joints = (JointClearance(joint="G", rad_per_m=(5.0,), most_m=0.001),)
-        return json.loads(PlayMeasurement(plays=(one,), clearances=Clearances(joints=joints)).to_json())
     item = lw.CommissioningItem(name="crank.sign", value=1)
     reasons = {"not_told": ("lag",), "findings": ("load",), "notes": ("note",)}
     cycles = {"clearances_m": (6.0e-4,), "cycles": (2.0,), "named_cycles": (math.nan,)}

@@ -1,6 +1,6 @@
 """All joints and torques of recordings as time series.
 
-Which of the joints is the crank, and which torque drives it, `commissioning` and `play` then find out.
+Which of the joints is the crank, and which torque drives it, `commissioning` then finds out.
 """
 
 from collections import Counter

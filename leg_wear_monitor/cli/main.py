@@ -25,7 +25,7 @@ _VERBS = {
     "acknowledge": "upkeep", "cache": "check", "check": "check", "commission": "commission",
     "dashboard": "nodes", "demo": "nodes", "design": "life", "draw": "study", "drives": "check",
     "fleet": "fleet", "gait-publisher": "nodes", "life": "life", "materials": "check", "measure": "upkeep",
-    "monitor": "nodes", "play": "commission", "reference": "commission", "replay": "replay",
+    "monitor": "nodes", "reference": "commission", "replay": "replay",
     "report": "replay", "reset": "upkeep", "simulate": "study", "study": "study",
 }  # fmt: skip
 """Verbs, and the file in `verbs` of each."""

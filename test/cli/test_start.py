@@ -107,7 +107,7 @@ def test_without_the_libraries_of_an_extra_it_is_named_in_a_line(tmp_path):
     (tmp_path / "leg.mcap").touch()
     (tmp_path / "fleet.yaml").write_text("legs: [{id: left, recordings: '*.mcap'}]\n")
     lines = ["check fleet.yaml", "fleet update fleet.yaml", "demo",
-             "play leg.mcap --joint G", "replay leg.mcap", "commission leg.mcap"]  # fmt: skip
+             "replay leg.mcap", "commission leg.mcap"]  # fmt: skip
     code = (
         "import sys\n"
         "sys.modules.update(dict.fromkeys(('mcap', 'rosbags', 'zstandard', 'lz4')))\n"

@@ -69,7 +69,6 @@ def test_what_is_done_and_what_is_found(run, code: int, line: str) -> None:
         ("replay trash.mcap", "trash.mcap"),
         ("replay half.mcap --out trash.mcap", "--out: trash.mcap"),
         ("commission trash.mcap", "trash.mcap"),
-        ("play trash.mcap --joint knee", "trash.mcap"),
         ("reference --cadence 0 --out leg.npz", "--cadence"),
         ("life --limit-m -1", "--limit-m"),
         ("measure Q 0.4 --sigma 0.01 --config monitor.yaml", "'Q'"),

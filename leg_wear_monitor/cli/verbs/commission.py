@@ -1,23 +1,19 @@
-"""Verbs that learn from a recording: ``commission``, ``play``, ``reference``."""
+"""Verbs that learn from a recording: ``commission``, ``reference``."""
 
-import math
 import time
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import attrs
 import click
 
 from leg_wear_monitor.cli import common
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.monitor.config.tables import ANGLES, COUNTS, DATE, STAMPS
 
 if TYPE_CHECKING:
     from leg_wear_monitor.commissioning.result import CommissioningResult
-    from leg_wear_monitor.mechanism.spec import Mechanism
     from leg_wear_monitor.monitor.config.settings import MonitorConfig
-    from leg_wear_monitor.play.fit import Play, PlayMeasurement
     from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 
@@ -189,166 +185,3 @@ def reference(
     write_references(file, leg, made)
     common.write_file(out, file.getvalue())
     click.echo(f"written: {out}, after {time.perf_counter() - began:.3g} s")
-
-
-# ``leg-wear-monitor play``: the play of a joint from a recording in which it was rocked.
-
-
-@click.command(short_help="Measure the play of a joint that was rocked.")
-@common.recordings_argument
-@common.option("--joint", "NAME", "Joint in a bag, or column in a table, that has the angle.", required=True)
-@common.option(
-    "--load",
-    "SIGNAL",
-    "Signal with the direction of the push, in any unit: effort, effort:JOINT, TOPIC, TOPIC:AXIS "
-    "(torque of a wrench) or TOPIC:JOINT (position, such as a target) in a bag, a column in a table. Given "
-    "several times, the signals add up, such as the positions of two motors that pull to one side each.  "
-    "[default: none, the angle rests at two places]",
-    "loads",
-    multiple=True,
-)
-@common.option("--time", "COLUMN", "Column of the time in a table.  [default: that of --config]")
-@click.option(
-    "--time-unit", type=click.Choice([*STAMPS, DATE]), help="Its unit.  [default: that of --config]"
-)
-@click.option(
-    "--unit",
-    type=click.Choice([*ANGLES, COUNTS]),
-    help="Unit of the angle in a table; counts are those of --counts-per-turn.  [default: that of --config]",
-)
-@common.number_option(
-    "--counts-per-turn",
-    "N",
-    "Counts of the encoder per turn of the joint.  [default: found from the values]",
-    above=0.0,
-)
-@common.path_option(
-    "--config",
-    "FILE",
-    "Parameter file with the column of the time and the units of a table.  "
-    "[default: the one that comes with the package]",
-)
-@common.section_option
-@common.option(
-    "--mechanism",
-    "FILE",
-    "A mechanism, or the name of one that comes with the package: from which clearances the play comes.",
-)
-@common.option("--encoder", "JOINT", "Joint of the mechanism that has the encoder.  [default: --joint]")
-@common.option(
-    "--crank-angle",
-    "DEG",
-    "Crank angle of the mechanism in a recording; once for each, in their order.",
-    "crank_angles",
-    type=common.Number("degrees"),
-    multiple=True,
-)
-@common.clearances_option("A,B")
-@common.json_option("the result")
-def play(
-    recordings: tuple[Path, ...],
-    mechanism: str | None,
-    encoder: str | None,
-    crank_angles: tuple[float, ...],
-    clearances: str | None,
-    json_file: Path | None,
-    **options: Any,
-) -> int:
-    """Measure the play of a joint from a recording in which it was rocked.
-
-    Reads MCAP, .db3, CSV and Parquet files or bag directories, each with the leg in one posture. Hold the
-    drive, push the leg to and fro ten times, and hold each push for a second. With a mechanism and several
-    postures, the command tells which joints have the clearance. Exit code 1 if the result is doubtful, if
-    joints are not told apart, or if a part of a recording is lost.
-    """
-    from leg_wear_monitor.cli.pages import lines
-    from leg_wear_monitor.mechanism.loader import load_mechanism
-
-    common.check_file("--json", json_file)
-    if mechanism is None and (encoder or crank_angles or clearances):
-        raise click.UsageError("--encoder, --crank-angle and --clearances need --mechanism")
-    if mechanism is not None and len(crank_angles) != len(recordings):
-        fault = f"{len(crank_angles)} given for {len(recordings)} recordings, expected one for each"
-        raise ConfigError("--crank-angle", "", fault)
-    leg = None if mechanism is None else common.with_clearance_joints(load_mechanism(mechanism), clearances)
-    plays, is_lossy = _plays(recordings, crank_angles, **options)
-    encoder = encoder or options["joint"]
-    result = _measurement(plays, leg, encoder)
-    printed = lines(result, leg.name if leg else "", encoder)
-    common.say(json_file, printed, common.write_json(json_file, result.to_json()))
-    return common.WITH_FINDINGS if is_lossy or not result.is_sure else 0
-
-
-def _plays(
-    recordings: tuple[Path, ...],
-    crank_angles: tuple[float, ...],
-    joint: str,
-    loads: tuple[str, ...],
-    **of_table: Any,
-) -> tuple[list["Play"], bool]:
-    """The plays, and whether something of the recordings is lost."""
-    settings = _settings(**of_table)
-    plays, is_lossy = [], False
-    for number, recording in enumerate(recordings):
-        one, lossy = _play(recording, settings, joint, loads)
-        angle = math.radians(crank_angles[number]) if crank_angles else None
-        plays.append(attrs.evolve(one, recording=str(recording), crank_angle_rad=angle))
-        is_lossy |= lossy
-    return plays, is_lossy
-
-
-def _settings(
-    config: Path | None,
-    node: str | None,
-    counts_per_turn: float | None,
-    time: str | None,
-    time_unit: str | None,
-    unit: str | None,
-) -> "MonitorConfig":
-    """The parameters with the options for a table in their place."""
-    from leg_wear_monitor.monitor.config.parameters import load_config
-
-    def given(**values: str | float | None) -> dict[str, Any]:
-        return {key: value for key, value in values.items() if value is not None}
-
-    settings = load_config(config, node)
-    table = settings.input
-    if unit == COUNTS and not (counts_per_turn or table.counts_per_turn):
-        raise ConfigError("--counts-per-turn", "", "is missing, expected it with --unit counts")
-    table = attrs.evolve(
-        table,
-        columns=attrs.evolve(table.columns, **given(stamp=time)),
-        units=attrs.evolve(table.units, **given(stamp=time_unit, crank_angle=unit)),
-        **given(counts_per_turn=counts_per_turn),
-    )
-    return attrs.evolve(settings, input=table)
-
-
-def _play(
-    recording: Path, settings: "MonitorConfig", joint: str, loads: tuple[str, ...]
-) -> tuple["Play", bool]:
-    from leg_wear_monitor.bags.findings import Severity
-    from leg_wear_monitor.play.measurement import measure_play, read_rocked
-
-    with common.compilation("play"), common.progress_bar("reading") as progress:
-        read = read_rocked(recording, settings, joint, loads, progress)
-    for finding in read.findings:
-        click.echo(finding.line, err=True)
-    counts_per_turn = settings.input.counts_per_turn
-    count = 2.0 * math.pi / counts_per_turn if counts_per_turn else None
-    result = measure_play(
-        read.time_s, read.angle_rad, read.load, count_rad=count, joint=joint, load_name=" + ".join(loads)
-    )
-    return result, any(finding.severity is Severity.LOSS for finding in read.findings)
-
-
-def _measurement(plays: list["Play"], leg: "Mechanism | None", encoder: str) -> "PlayMeasurement":
-    """The plays, and with a mechanism the clearances that they show."""
-    from leg_wear_monitor.play.fit import PlayMeasurement, clearances_of
-
-    found = None
-    if leg is not None:
-        angles, sizes = [play.crank_angle_rad or 0.0 for play in plays], [play.play_rad for play in plays]
-        with common.compilation("mechanism"):
-            found = clearances_of(leg, encoder, angles, sizes, [play.sigma_rad for play in plays])
-    return PlayMeasurement(plays=tuple(plays), clearances=found)

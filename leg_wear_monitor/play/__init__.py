@@ -1,1 +1,0 @@
-"""Play of a joint, measured by rocking it: angles and the load that reverses in, play out."""

@@ -9,6 +9,7 @@ names of joints are sure, then on each opened one; a walk is repeated where it i
 
 import argparse
 import functools
+import os
 import pickle
 import time
 from collections.abc import Iterator, Sequence
@@ -16,7 +17,8 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import NamedTuple
 
-import one_core  # noqa: F401, before numpy: on a busy machine its threads take six times as long
+# numpy reads this once, when it is imported; on a busy machine its threads take six times as long
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # isort: split
 import attrs

@@ -1,11 +1,11 @@
 """Legs behind drives as they are sold: what the diagnosis says of healthy and of worn ones.
 
-The legs of `disturbed.py` in the air, in full coordinates, with masses 4 % off the file. Their torque passes
-a drive: friction that grows with the load, Coulomb and viscous friction, cogging, a low-pass of first or
-second order, a mean over some time, a lag, a torque constant and friction that change over twenty minutes,
-steps of the sensor, lost samples, a coupling between the measured angle and the crank. The first table is of
-healthy legs: gait cycles drawn in blocks of ten make up the given time. The second is of joints that open
-after 690 gait cycles, when a leg is identified and a drive that warms up is half warm; J on three walks. With
+The legs walk in the air, in full coordinates, with masses 4 % off the file. Their torque passes a drive:
+friction that grows with the load, Coulomb and viscous friction, cogging, a low-pass of first or second order,
+a mean over some time, a lag, a torque constant and friction that change over twenty minutes, steps of the
+sensor, lost samples, a coupling between the measured angle and the crank. The first table is of healthy legs:
+gait cycles drawn in blocks of ten make up the given time. The second is of joints that open after 690 gait
+cycles, when a leg is identified and a drive that warms up is half warm; J on three walks. With
 `--as-of-file` no leg is identified, and names count as if the leg were that of its file.
 `python benchmarks/drives.py --keep DIRECTORY [--hours 100]`.
 """
@@ -13,25 +13,39 @@ after 690 gait cycles, when a leg is identified and a drive that warms up is hal
 import argparse
 import functools
 from pathlib import Path
+from types import SimpleNamespace
+from unittest import mock
 
-import one_core  # noqa: F401
+from diagnosis import (  # first: it sets the threads of numpy
+    BODIES,
+    CLOCK,
+    NEW,
+    RATE,
+    UNWORN,
+    kept,
+    measured,
+    walked,
+)
 
 # isort: split
 import attrs
 import numpy as np
-from compliant import behind
-from diagnosis import NEW, RATE, kept
-from disturbed import COMMISSIONED, HEALTHY, MASSES, WORN, drawn, signed, walked, watched
 from scipy import signal
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.estimate import identification
-from leg_wear_monitor.estimate.signature import TorqueSensor
-from leg_wear_monitor.mechanism.position import TURN, build_linkage
-from leg_wear_monitor.monitor.diagnosis import references
+from leg_wear_monitor.estimate.signature import TorqueSensor, signatures
+from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
+from leg_wear_monitor.mechanism.spec import Mechanism, Track, TrackDrive
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.diagnosis import observer, references
+from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
+from leg_wear_monitor.monitor.diagnosis.state import SignedCycle
 from leg_wear_monitor.twin.load import torque_size
-from leg_wear_monitor.twin.reference import LegParameters
+from leg_wear_monitor.twin.reference import COUPLING_DAMPING, LegParameters
 
+MASSES = dict(zip(BODIES, (1.04, 0.96, 1.04, 0.96, 1.04, 0.96, 1.04), strict=True))
+NOISE_NM, BLOCK, COMMISSIONED, HEALTHY, WORN = 0.5, 10, 90, 260, 40
 OPENINGS = (  # and the walk, whose start is another one
     *((joint, 0.45, 0) for joint in "ABGI"), *(("J", 0.45, walk) for walk in range(3)),
     ("G", 0.6, 0), *(("J", 1.0, walk) for walk in range(3)),
@@ -121,6 +135,98 @@ DRIVES = {
 }
 
 
+def behind(leg: Mechanism, stiffness: float, damping_ratio: float = COUPLING_DAMPING) -> Mechanism:
+    """The leg behind a coupling: a controller that turns steadily, with its stiffness and damping."""
+    linkage = build_linkage(leg)
+    inertia = one_cycle(linkage, 240, 0.0, 1.0).drive_torque - one_cycle(linkage, 240, 0.0).drive_torque
+    damping = 2.0 * damping_ratio * float(np.sqrt(stiffness * inertia.mean()))
+    track = Track(speed_radps=TURN, kp_nm_per_rad=stiffness, kd_nm_s_per_rad=damping)
+    return attrs.evolve(leg, drive=TrackDrive(body=leg.drive.body, track=track))
+
+
+def signed(
+    walk: np.ndarray,
+    sensor: TorqueSensor,
+    seed: int,
+    loss: float = 0.0,
+    quantum_nm: float = 0.0,
+):
+    """Signatures (cycles, F) of a walk; with samples lost, and with the torque in steps."""
+    random = np.random.default_rng(seed)
+    if not (loss or quantum_nm):
+        return measured(walk, sensor, NOISE_NM, random)[1:]
+    between = sensor.period_s * CLOCK
+    time = np.arange(between, walk[-1, 0], between)
+    torque = np.diff(np.interp(time, walk[:, 0], walk[:, 2]), prepend=0.0) / between
+    torque += NOISE_NM * random.standard_normal(len(time))
+    if quantum_nm:
+        torque = quantum_nm * np.round(torque / quantum_nm)
+    angle = np.interp(time, walk[:, 0], walk[:, 1])
+    there = random.random(len(time)) >= loss
+    step = np.where(np.roll(there, 1), np.diff(torque, prepend=np.nan), np.nan)
+    angle, torque, step = angle[there], torque[there], step[there]
+    return signatures(np.floor(angle / TURN - 1e-9).astype(np.int64), angle, torque, step, sensor)[3:-1]
+
+
+def watched(
+    leg: Mechanism,
+    size_nm: float,
+    rows: list[np.ndarray],
+    one: observer.TorqueObserver | None = None,
+    first: int = 0,
+    config: MonitorConfig | None = None,
+    periods: int = 1,
+    counted_m: np.ndarray = NEW,
+) -> tuple[observer.TorqueObserver, list[str]]:
+    """The observer after gait cycles with given signatures; what it named, corrected or stopped, and when.
+
+    Goes on with an observer whose gait cycles end before the one with the number ``first``. Of the evaluation
+    periods of a gait cycle, all but one can be left out where no reference is made.
+    """
+    left, reference = iter(rows), shipped_references(leg)[0]
+    one = one or observer.TorqueObserver(leg, config or MonitorConfig(), size_nm, NEW)
+    counted, found = counted_m.copy(), []
+    joints, limit_m, second = leg.clearance_joints, MonitorConfig().limits.clearance_m, 10**9
+
+    def next_cycle(state, begin_ns, end_ns):
+        return SignedCycle(begin_ns, end_ns, next(left), reference.profile, 0.0)
+
+    def find(state, *_):
+        state.sensor = state.sensor or TorqueSensor(0.005, 1.0, size_nm)
+
+    with mock.patch.multiple(observer, signed_cycle=next_cycle, find_sensor=find):
+        for i in range(first, first + len(rows)):
+            begin, end = (i + 1) * second, (i + 2) * second
+            one.ended(SimpleNamespace(is_steady=True, cadence_rpm=60.0, begin_ns=begin, stamp_ns=end))
+            correction = one.end_period(counted, UNWORN)
+            for _ in range(periods - 1):
+                one.end_period(counted, UNWORN)
+            seen = one.diagnosis
+            texts = [
+                f"{change.cause.name} {change.subject}" for change in seen.changes if not change.is_corrected
+            ]
+            stops = zip(joints, seen.least_m, strict=False)
+            texts += [f"stop {joint}" for joint, least_m in stops if least_m >= limit_m]
+            if correction is not None:
+                texts.append(f"corrected {correction.subject} {1e3 * correction.value:.3f} mm")
+                counted = counted.copy()
+                counted[joints.index(correction.subject)] = correction.value
+                one.corrected(correction, counted)
+            found += [f"{i}: {text}" for text in texts]
+    return one, found
+
+
+def drawn(cycles: np.ndarray, number: int, seed: int = 1) -> list[np.ndarray]:
+    """Gait cycles drawn in blocks, after as many consecutive ones as commissioning takes."""
+    random = np.random.default_rng(seed)
+    begin, order = random.integers(len(cycles) - COMMISSIONED), []
+    order += range(begin, begin + COMMISSIONED)
+    while len(order) < number:
+        begin = random.integers(len(cycles) - BLOCK)
+        order += range(begin, begin + BLOCK)
+    return [cycles[i] for i in order[:number]]
+
+
 def cycles_of(walk: np.ndarray, drive: Drive, sensor: TorqueSensor, seed: int) -> np.ndarray:
     """Signatures (levels, cycles, F) of a walk, cold to warm; one level where nothing drifts."""
     levels = np.linspace(0.0, 1.0, LEVELS) if drive.drifts else np.zeros(1)
@@ -170,7 +276,7 @@ def main() -> None:
         name = " ".join(f"{one:g}" for one in (0, stiffness, number)[: 1 + 2 * bool(stiffness or number)])
         file = options.keep / f"{joint or 'new'} {size_mm:.2f} {name}.pkl" if options.keep else None
         driven, cycles = behind(real, stiffness) if stiffness else real, WORN if joint else HEALTHY
-        return kept(file, lambda: walked(driven, clearance, cycles + 3, 0.0, round(1000 * size_mm)))
+        return kept(file, lambda: walked(driven, clearance, cycles + 3, 0.0))
 
     names = options.drive or list(DRIVES)
     if not options.worn_only:

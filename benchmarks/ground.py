@@ -16,15 +16,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
-import one_core  # noqa: F401, before numpy
+from diagnosis import LEGS as DIAGNOSED  # first: it sets the threads of numpy
+from diagnosis import NEW, RATE, kept
 
 # isort: split
 import attrs
 import numpy as np
-from diagnosis import LEGS as DIAGNOSED
-from diagnosis import NEW, RATE, kept
-from disturbed import MASSES, drawn, watched
-from drives import Drive, cycles_of, summary, when
+from drives import MASSES, Drive, cycles_of, drawn, summary, watched, when
 
 from leg_wear_monitor import MonitorConfig, load_mechanism
 from leg_wear_monitor.dynamics.full_run import FullRun

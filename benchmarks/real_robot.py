@@ -21,12 +21,14 @@ default of the monitor, which asks for causes only after a test for a clearance.
 """
 
 import argparse
+import os
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-import one_core  # noqa: F401, before numpy
+# numpy reads this once, when it is imported; on a busy machine its threads take six times as long
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # isort: split
 import numpy as np

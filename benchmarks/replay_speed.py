@@ -6,6 +6,7 @@ The leg has clearances, and the same gait cycles of it are repeated: the diagnos
 import argparse
 import os
 import tempfile
+import time
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy, as the command line does
@@ -14,7 +15,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy, as the comma
 
 import attrs
 import numpy as np
-from watch import Watch
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.bags.mcap_writer import McapWriter
@@ -61,6 +61,17 @@ def write_walk(path: Path, seconds: int, rpm: float) -> None:
             rows = encode.joint_states(stamps, NAMES, position=position, velocity=velocity, effort=velocity)
             writer.write_many(joints, stamps, rows)
             writer.write_many(torque, stamps, encode.wrenches(stamps, torque=wrench, frame_id="pelvis"))
+
+
+class Watch:
+    """Seconds since it was made, by the wall clock and by processor time."""
+
+    def __init__(self) -> None:
+        self._wall, self._processor = time.perf_counter(), time.process_time()
+
+    def read(self) -> tuple[float, float]:
+        """Seconds by the wall clock and by processor time."""
+        return time.perf_counter() - self._wall, time.process_time() - self._processor
 
 
 def reading(path: Path) -> Watch:

@@ -114,7 +114,7 @@ def rms(values: Floats) -> float:
 
 
 LEAST_CYCLES = 20
-# error of the linear model and its reference against full coordinates (benchmarks/hidden.py)
+# error of the linear model and its reference against full coordinates
 MODEL_SIGMA_M = 2.0e-5
 
 _BATCH = 2  # cycles per batch: neighbouring cycles are correlated

@@ -469,7 +469,7 @@ class AlarmEvaluation:
         """Factor on the limits of impact forces, which are those of the commanded cadence, at another one.
 
         Forces grow with the square of the speed and more: peaks of a healthy leg are 4.1 kN at 60 and 6.9 kN
-        at 75 rpm (medians of joint A over an hour, benchmarks/cadences.py). A gait cycle that ends slower
+        at 75 rpm (medians of joint A over an hour). A gait cycle that ends slower
         than it began has the limits of the one before. Up to a tenth faster than commanded, as by a ripple,
         and slower, the limits stay.
         """

@@ -9,7 +9,7 @@ from recordings import losses
 
 from leg_wear_monitor.bags.findings import RecordingError
 
-# every one of these is a file of its own; benchmarks/damaged_bags.py does many more
+# every one of these is a file of its own
 TRUNCATIONS, FLIPS = 8, 40
 
 

@@ -113,12 +113,6 @@ def _warn_of_restitution(source: str, settings: dict[str, Clearance]) -> None:
         )
 
 
-def compile_films(settings: Sequence[Clearance]) -> Floats:
-    """Viscosity [Pa s] and roughness [m] of the joints' films (k, 2); 0 for a dry joint."""
-    films = [(c.film.viscosity_pa_s, c.film.roughness_m) if c.film else (0.0, 0.0) for c in settings]
-    return np.array(films).reshape(-1, 2)
-
-
 def compile_contacts(
     mechanism: Mechanism, joints: Sequence[str], settings: Sequence[Clearance]
 ) -> ContactArrays:

@@ -7,7 +7,6 @@ import numpy as np
 
 from leg_wear_monitor.compiled.kernel import entry, kernel
 from leg_wear_monitor.contact.arrays import ContactArrays
-from leg_wear_monitor.contact.film import film_force
 from leg_wear_monitor.dynamics.joint import (
     DELTA,
     DELTA_DOT,
@@ -48,30 +47,6 @@ from leg_wear_monitor.mechanism.constraints import (
     stored_energy,
 )
 from leg_wear_monitor.mechanism.position import TURN, Linkage, one_cycle, point_motion
-
-# Film of oil or grease of a clearance joint in full coordinates (physics.md section 4).
-
-
-@kernel
-def add_film(model, k, ex, ey, vx, vy, b, j, sbx, sby, cx, cy, delta, q, v, scratch, out_rate):
-    """Add the film's force in clearance joint k to the contact's, (cx, cy) [N]; change the joint's rates.
-
-    Arguments as in `add_contacts`. On worn surfaces the film is that of the local clearance.
-    """
-    contacts, speed_b, speed_j = model.contacts, v[b, 2], v[j, 2]
-    clearance = np.sqrt(ex * ex + ey * ey) - delta
-    fx, fy, moment_b, moment_j = film_force(
-        ex, ey, vx, vy, speed_b, speed_j, clearance, contacts.bushing_radius[k],
-        contacts.width[k], model.films[k, 0], model.films[k, 1],
-    )  # fmt: skip
-    add_force(b, sbx, sby, -fx, -fy, scratch.force)
-    add_force(j, q[b, 0] + sbx + ex - q[j, 0], q[b, 1] + sby + ey - q[j, 1], fx, fy, scratch.force)
-    scratch.force[b, 2] += moment_b
-    scratch.force[j, 2] += moment_j
-    out_rate[FORCE_SQUARED] = (cx + fx) ** 2 + (cy + fy) ** 2
-    out_rate[FORCE] = np.sqrt(out_rate[FORCE_SQUARED])
-    out_rate[DISSIPATION] -= fx * vx + fy * vy + moment_b * speed_b + moment_j * speed_j
-
 
 # Symmetric positive definite systems with a known envelope.
 
@@ -126,15 +101,13 @@ BAUMGARTE = 200.0  # alpha = beta [1/s]: drift decays within 5 ms, far slower th
 class FullModel(NamedTuple):
     """Constants of a run.
 
-    ``rows``: of the ideal joints and of a drive by speed; ``contacts``: the clearance joints; ``films``
-    (k, 2): their films' viscosity [Pa s] and roughness [m], 0 for a dry joint; ``baumgarte``: alpha
-    = beta [1/s].
+    ``rows``: of the ideal joints and of a drive by speed; ``contacts``: the clearance joints; ``baumgarte``:
+    alpha = beta [1/s].
     """
 
     arrays: MechanismArrays
     rows: Rows
     contacts: ContactArrays
-    films: Floats
     baumgarte: float
 
 
@@ -158,17 +131,10 @@ class FullScratch(NamedTuple):
     contact: Floats
 
 
-def full_model(
-    arrays: MechanismArrays,
-    contacts: ContactArrays,
-    driven: bool,
-    films: Floats | None = None,
-) -> FullModel:
+def full_model(arrays: MechanismArrays, contacts: ContactArrays, driven: bool) -> FullModel:
     """Model with the clearance joints of ``contacts`` and all other joints ideal."""
     ideal = [joint for joint in range(len(arrays.joint_kind)) if joint not in contacts.joint]
-    if films is None:
-        films = np.zeros((len(contacts.joint), 2))
-    return FullModel(arrays, select_rows(arrays, ideal, driven), contacts, films, BAUMGARTE)
+    return FullModel(arrays, select_rows(arrays, ideal, driven), contacts, BAUMGARTE)
 
 
 def full_scratch(model: FullModel) -> FullScratch:
@@ -234,9 +200,6 @@ def add_contacts(model, surfaces, approach, q, v, scratch, out_rate):
             rate[FRICTION] = -f_t * slip
             rate[ARCHARD] = f_n * abs(slip)
         rate[DISSIPATION] = (f_n - elastic) * delta_dot
-        if model.films[k, 0] > 0.0:
-            cx, cy = -f_n * nx - f_t * ny, -f_n * ny + f_t * nx
-            add_film(model, k, ex, ey, vx, vy, b, j, sbx, sby, cx, cy, delta, q, v, scratch, rate)
 
 
 @kernel

@@ -270,7 +270,7 @@ class FullRun:
         linkage = setup.linkage
         driven = isinstance(linkage.mechanism.drive, SpeedDrive)
         self._setup = setup
-        self.model = full_model(linkage.arrays, setup.contacts, driven, setup.films)
+        self.model = full_model(linkage.arrays, setup.contacts, driven)
         self.state = _start(setup)
         self.toe: Toe = ideal_toe(linkage, setup.speed) if driven else NO_TOE
         self.polynomial = steady_drive(0.0, setup.speed)

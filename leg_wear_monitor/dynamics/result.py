@@ -61,7 +61,7 @@ class EnergyBalance:
     friction_loss : float
         Energy lost in the tangential direction of the contacts.
     contact_loss : float
-        Energy lost in the normal direction of the contacts, and in films of oil or grease.
+        Energy lost in the normal direction of the contacts.
     wear_loss : float
         Elastic contact energy lost with removed material: negligible at real wear rates, a thousandth of the
         losses if clearances double within some thousand cycles.

@@ -295,8 +295,6 @@ class Setup:
     clearance_joints : tuple of str
         Names of the clearance joints, in the order of ``contacts``.
     contacts : ContactArrays
-    films : (k, 2) array
-        Viscosity [Pa s] and roughness [m] of the clearance joints' films; 0 for a dry joint.
     bushings : tuple of Bushing
         Of the clearance joints, in their order.
     surfaces : Surfaces
@@ -308,7 +306,6 @@ class Setup:
     linkage: Linkage
     clearance_joints: tuple[str, ...]
     contacts: ContactArrays
-    films: Floats
     bushings: tuple[Bushing, ...]
     surfaces: Surfaces
     speed: float

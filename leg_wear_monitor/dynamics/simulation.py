@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from leg_wear_monitor.configuration.strict import shown
-from leg_wear_monitor.contact.arrays import clearance_settings, compile_contacts, compile_films
+from leg_wear_monitor.contact.arrays import clearance_settings, compile_contacts
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceRun
 from leg_wear_monitor.dynamics.full_run import FullRun
 from leg_wear_monitor.dynamics.result import JointResult, SimulationResult, ToeResult, TorqueResult, Trace
@@ -241,7 +241,6 @@ def prepare(
         linkage,
         clearance_joints,
         contacts,
-        compile_films(settings),
         tuple(bushing_of(mechanism, joint) for joint in clearance_joints),
         fresh_surfaces(contacts, wear),
         _speed(mechanism, speed_rpm),

@@ -412,9 +412,6 @@ def design(
     joints = mechanism.clearance_joints
     if not joints:
         raise ConfigError(mechanism.source, "clearances.joints", "no joint has clearance, nothing can wear")
-    if filmed := [joint for joint in joints if mechanism.clearances[joint].film]:
-        fault = "what a film of another size carries is not known; remove it, or simulate lives with `life`"
-        raise ConfigError(mechanism.source, f"clearances ({', '.join(filmed)}): film", fault)
     own = [mechanism.clearances[joint] for joint in joints]
     # half the present clearances, too, for the sensitivities
     smallest = min(*choices.clearances_m, *(0.5 * one.radial_clearance for one in own))

@@ -37,19 +37,6 @@ class Friction:
     )
 
 
-FILM_WIDTHS = 0.125, 1.0  # width over the bushing's diameter for which the film's force is known
-
-
-@attrs.frozen(kw_only=True)
-class Film:
-    """Oil or grease between journal and bushing."""
-
-    viscosity_pa_s: float = quantity("Pa s", "dynamic viscosity", above=0.0)
-    roughness_m: float = quantity(
-        "m", "thickness below which the film resists no more than there; below the clearance", above=0.0
-    )
-
-
 def _length_slip(metres: float) -> str:
     return f"{USUAL}; {'mm' if metres > 1.0e-3 else 'km'} for m?"
 
@@ -84,7 +71,6 @@ class Clearance:
     # section 4)
     restitution: float = quantity("", "coefficient of restitution", within=(0.02, 1.0), default=0.9)
     friction: Friction = described("friction, a mapping of the keys below", default=Friction())
-    film: Film | None = described("oil or grease, a mapping of the keys below", default=None)
     wear_coefficient: Pair = quantity(
         "1/Pa",
         "K/H of Archard's law",
@@ -111,22 +97,6 @@ class Clearance:
             raise FieldError(
                 "radial_clearance",
                 f"{self.radial_clearance!r} is not below the bushing_radius of {self.bushing_radius!r} m",
-            )
-        if self.film is not None:
-            self._check_film(self.film)
-
-    def _check_film(self, film: Film) -> None:
-        if not self.radial_clearance > film.roughness_m:
-            raise FieldError(
-                "radial_clearance",
-                f"{self.radial_clearance!r} is not above the film's roughness_m of {film.roughness_m!r} m",
-            )
-        least, most = (2.0 * self.bushing_radius * ratio for ratio in FILM_WIDTHS)
-        if not least * (1.0 - 1.0e-9) <= self.width <= most * (1.0 + 1.0e-9):
-            raise FieldError(
-                "width",
-                f"{self.width!r} m with a film, whose force is known from {least:g} to {most:g} m, "
-                "an eighth of the bushing's diameter to the whole",
             )
 
     @property

@@ -233,35 +233,6 @@ class Location(OneClearance):
         return response(set_name(joints), self.run_of(joints), self.ensemble)
 
 
-# Study ``lubrication``: joints dry, and with oil or grease of several viscosities.
-
-
-@attrs.frozen(kw_only=True)
-class Lubrication(OneSet):
-    """The same joints dry and greased, with the same wear coefficient where surfaces touch."""
-
-    title = "Oil and grease"
-    question = (
-        "What does a film of oil or grease change in the forces, in the motion, in which joint wears first, "
-        "and in how long it lasts?"
-    )
-
-    viscosities_pa_s: tuple[float, ...] = quantity(
-        "Pa s", "viscosities, one per point beside the dry one", above=0.0, check=check_rising
-    )
-    roughness_m: float = quantity(
-        "m", "thickness below which a film resists no more than there", above=0.0, default=1.6e-6
-    )
-
-    def points(self) -> list[Point]:
-        """The dry joints, then each viscosity."""
-        points = [self.response("dry", film=None)]
-        for viscosity in self.viscosities_pa_s:
-            film = {"viscosity_pa_s": viscosity, "roughness_m": self.roughness_m}
-            points.append(self.response(f"{viscosity:g} Pa s", film=film))
-        return points
-
-
 # Study ``multi``: clearance in several places at once.
 
 
@@ -420,7 +391,6 @@ STUDIES: dict[str, type[Study]] = {
     "multi": Multi,
     "chaos": Chaos,
     "laws": Laws,
-    "lubrication": Lubrication,
     "load": Load,
     "legs": Legs,
 }

@@ -7,7 +7,6 @@ from typing import Any
 import attrs
 import numpy as np
 
-from leg_wear_monitor.configuration import FieldError
 from leg_wear_monitor.contact.arrays import clearance_settings
 from leg_wear_monitor.dynamics.batch import Leg, prepare_legs
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper, Moment, Snapshot
@@ -19,7 +18,7 @@ from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
 from leg_wear_monitor.mechanism.arrays import Flags, Floats
 from leg_wear_monitor.mechanism.person import on_the_ground
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.mechanism.spec import Film, Mechanism
+from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.studies.plan import Arrays, Estimate
 
 # Sampling grid of the studies.
@@ -86,26 +85,13 @@ class ObservedLeg:
 # Ensembles: legs with equal parameters that differ in the initial positions of crank and journals.
 
 
-def with_contact(mechanism: Mechanism, settings: dict[str, Any]) -> Mechanism:
-    """The mechanism with what a setting ``friction`` changes, and with its ``film`` or without.
-
-    A film of None removes it; without the setting, each joint keeps its own.
-
-    Raises
-    ------
-    ConfigError
-        If a joint cannot have this film.
-    """
-    clearances = {}
-    for name, own in mechanism.clearances.items():
-        try:
-            changed = attrs.evolve(own, friction=attrs.evolve(own.friction, **settings.get("friction", {})))
-            if "film" in settings:
-                changed = attrs.evolve(changed, film=settings["film"] and Film(**settings["film"]))
-            clearances[name] = changed
-        except FieldError as error:
-            where = f"clearances.joints.{name}.{error.key}"
-            raise ConfigError(mechanism.source, where, error.fault) from error
+def with_friction(mechanism: Mechanism, settings: dict[str, Any]) -> Mechanism:
+    """The mechanism with the values of a setting ``friction`` in all its clearance joints."""
+    changes = settings.get("friction", {})
+    clearances = {
+        name: attrs.evolve(own, friction=attrs.evolve(own.friction, **changes))
+        for name, own in mechanism.clearances.items()
+    }
     return attrs.evolve(mechanism, clearances=clearances)
 
 
@@ -137,15 +123,14 @@ def ensemble(mechanism: Mechanism, settings: dict[str, Any]) -> list[Leg]:
     mechanism : Mechanism
     settings : dict
         ``clearance_joints``, ``clearance_m`` [m], ``speed_rpm``, ``runs``, ``seed``, ``perturb_fraction`` (of
-        the smallest clearance); optional ``normal_law``, ``friction``, ``film`` (None for dry) and
-        ``ground_n`` [N].
+        the smallest clearance); optional ``normal_law``, ``friction`` and ``ground_n`` [N].
 
     Returns
     -------
     list of Leg
         One for each run.
     """
-    mechanism = loaded(with_contact(mechanism, settings), settings)
+    mechanism = loaded(with_friction(mechanism, settings), settings)
     clearance_joints, clearance_m = settings["clearance_joints"], settings["clearance_m"]
     smallest = min(c.radial_clearance for c in clearance_settings(mechanism, clearance_joints, clearance_m))
     return [

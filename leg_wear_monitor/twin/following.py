@@ -4,7 +4,7 @@ import math
 
 from leg_wear_monitor.compiled.kernel import entry, kernel
 from leg_wear_monitor.dynamics.clearance.advance import ADVANCE
-from leg_wear_monitor.dynamics.clearance.contact import joint_force
+from leg_wear_monitor.dynamics.clearance.contact import force_in_joint
 from leg_wear_monitor.dynamics.clearance.model import ANGLE, SPEED, blend, move_time_origin
 from leg_wear_monitor.dynamics.run import DONE, TORQUE, TORQUE_SQUARED
 from leg_wear_monitor.twin.follower_state import (
@@ -374,7 +374,7 @@ def follow(
                 squares = statistics.drive_integral[TORQUE_SQUARED] - squares
                 _add_torque(leg.torque, impulse, squares, statistics.time[0] - time)
                 for j in range(force.shape[0]):
-                    force[j] = joint_force(model.film.settings, j, work.start)
+                    force[j] = force_in_joint(j, work.start)
             if status != DONE:
                 motion.runs, motion.lost = 0, 1
                 motion.failures += 1

@@ -61,7 +61,7 @@ class SampleStatistics:
     predicted_torque_nm : (n,) array
         Mean of the predicted drive torque since the previous sample, with the friction of the drive.
     contact_force_n : (n, k) array
-        Forces in the clearance joints at the sample, of contact and film together.
+        Forces in the clearance joints at the sample.
     measured_torque_nm : (n,) array
         Drive torque of the sample, also while tracking is lost; NaN without one.
     eccentricity_m : (n, k, 2) array

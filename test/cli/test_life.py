@@ -37,20 +37,6 @@ def test_life_tells_when_each_joint_reaches_its_limit(run, tmp_path):
     assert len({round(fraction[0] / fraction[1], 2) for fraction in fractions}) == 3
 
 
-def test_a_life_with_grease_says_which_joints_do_not_wear(run, shipped, tmp_path):
-    """A thick film carries everything: nothing wears, and no life is made up of it."""
-    film = "wear_coefficient: 1.0e-15\n    film: {viscosity_pa_s: 50.0, roughness_m: 1.0e-6}"
-    (tmp_path / "greased.yaml").write_text(shipped("four_bar").replace("wear_coefficient: 1.0e-15", film))
-    result = run(
-        "life", "--mechanism", "greased.yaml", "--legs", "1", "--cycles", "2", "--horizon-cycles", "1e6"
-    )
-    assert result.exit_code == 0
-    for joint in ("B", "C"):
-        assert (
-            f"{joint} does not reach 600 µm: at its last rate, its clearance does not grow" in result.stdout
-        )
-
-
 def test_life_tells_regime_limits_and_the_makers_own_life(run, refused, shipped, tmp_path):
     """A pair with limits only is refused; with a coefficient beside it, the maker's life is printed, too."""
     pair = "material: skf-ptfe-composite-on-steel"

@@ -11,7 +11,6 @@ import leg_wear_monitor as lw
 from leg_wear_monitor.life.design import BushingChoices, Design, candidate
 from leg_wear_monitor.life.joint_loads import JointLoads, joint_loads, read_duty
 from leg_wear_monitor.mechanism.materials import load_material
-from leg_wear_monitor.mechanism.spec import Film
 
 LEG = lw.load_mechanism("bionic_leg")
 STEADY = JointLoads(
@@ -187,16 +186,6 @@ def test_a_limit_below_the_clearance_when_new_is_refused():
         lw.ConfigError, match=r"limit-m: 0\.0006 m is not above the largest clearance when new"
     ):
         lw.design(LEG, read_duty("0:8"), tried("pai-on-steel-dry", fresh_m=1e-3))
-
-
-@pytest.mark.plain
-def test_films_are_refused():
-    """They depend on the sizes that are tried; joints that they carry would have no work to divide by."""
-    film = Film(viscosity_pa_s=1.0, roughness_m=1e-6)
-    oiled = {joint: attrs.evolve(one, film=film) for joint, one in LEG.clearances.items() if joint in "AG"}
-    leg = attrs.evolve(LEG, clearances={**LEG.clearances, **oiled})
-    with pytest.raises(lw.ConfigError, match=r"clearances \(A, G\): film: .* or simulate lives with `life`"):
-        lw.design(leg, read_duty("0:8"), tried("pai-on-steel-dry"))
 
 
 @pytest.mark.plain

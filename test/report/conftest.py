@@ -23,7 +23,6 @@ TINY = {
         "joints": ["G"], "normal_laws": ["hertz", "flores"], "friction_laws": ["none"],
         "friction_coefficients": [0.1],
     },
-    "lubrication": {"joints": ["I", "J"], "viscosities_pa_s": [0.003, 1.0]},
     "load": {
         "joints": ["G"], "loads_n": [0, 300],
         "life": {"opens_m": 5.0e-6, "jump_m": 1.0e-5, "cycles": 2, "runs": 2},

@@ -11,7 +11,6 @@ from leg_wear_monitor.dynamics.run import TORQUE_ERROR, new_run_statistics, stea
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.person import on_the_ground
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.mechanism.spec import Film
 from leg_wear_monitor.studies.leg_tasks import run_ensemble
 from leg_wear_monitor.studies.life_tasks import SAMPLES, ensemble, observed_legs, start_angles
 from leg_wear_monitor.studies.plan import ERRORS, fraction_of_range
@@ -67,12 +66,9 @@ def test_a_crank_turns_as_in_its_file_and_curves_are_by_its_angle():
     assert off[0] < 0.1 * off[1]
 
 
-def test_a_point_in_the_air_or_dry_has_no_load_or_film_of_the_file(tiny):
-    """0 N and dry are settings, too: they take the place of what the mechanism has, which stays without."""
+def test_a_load_of_a_point_replaces_the_load_of_the_file(tiny):
+    """0 N is a load as well; a point without a load keeps the load of the file."""
     leg = on_the_ground(load_mechanism(), 600.0)
-    film = Film(viscosity_pa_s=0.1, roughness_m=1.6e-6)
-    films = {name: attrs.evolve(each, film=film) for name, each in leg.clearances.items()}
-    leg = attrs.evolve(leg, clearances=films)
 
     def peak_n(point):
         settings = point.settings | {"runs": 1}
@@ -80,14 +76,8 @@ def test_a_point_in_the_air_or_dry_has_no_load_or_film_of_the_file(tiny):
 
     in_the_air, _, _, loaded, *_ = tiny("load", joints=["G"], loads_n=[0, 300]).points()
     assert [peak_n(point) for point in (in_the_air, loaded)] == [0.0, pytest.approx(300.0, rel=1.0e-3)]
-    dry, oiled = tiny("lubrication", joints=["G"], viscosities_pa_s=[0.01]).points()
-    assert peak_n(dry) == pytest.approx(600.0, rel=1.0e-3)
     (own,) = tiny("size", joints=["G"], clearances_m=[3.0e-4]).points()
-    found = [
-        ensemble(leg, point.settings | {"runs": 1})[0].mechanism.clearances["G"].film
-        for point in (dry, oiled, own)
-    ]
-    assert found == [None, Film(viscosity_pa_s=0.01, roughness_m=1.6e-6), film]
+    assert peak_n(own) == pytest.approx(600.0, rel=1.0e-3)
 
 
 def test_curves_stay_within_the_largest_errors(response):

@@ -53,12 +53,6 @@ def test_every_study_that_comes_with_the_package_has_points_that_can_be(name):
             {"joints": ["A"], "exponent": {"renewals": 48}},
             "exponent.renewals: 48 does not divide 512",
         ),
-        (
-            "lubrication",
-            {"joints": ["A"], "viscosities_pa_s": [1.0, 0.1]},
-            "viscosities_pa_s: [1.0, 0.1] does",
-        ),
-        ("lubrication", {"joints": ["A"], "viscosities_pa_s": [0.0]}, "viscosities_pa_s: 0.0 is not above 0"),
         ("load", {"joints": ["A"], "loads_n": [300, 100]}, "loads_n: [300.0, 100.0] does not rise"),
         ("laws", {"joints": ["A"], "normal_laws": ["hooke"]}, "normal_laws: 'hooke' is not one of hertz,"),
     ],

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 import leg_wear_monitor as lw
 from leg_wear_monitor.errors import ConfigError, LegWearError
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.mechanism.spec import Film
 from leg_wear_monitor.twin import TORQUE
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.reference import LegParameters
@@ -267,16 +266,6 @@ def test_noise_of_the_encoder_is_no_wear(twin, gait, noise_rad, rate_hz):
         wear.append(np.mean([cycle.archard_j for cycle in update.cycles], axis=0))
     assert wear[1][0] == pytest.approx(wear[0][0], rel=0.03)
     assert wear[1][1:].sum() == pytest.approx(wear[0][1:].sum(), rel=0.13)
-
-
-def test_the_forces_of_a_lubricated_leg_are_those_of_contact_and_film(leg, gait):
-    """At the samples as over the gait cycle, where films carry the load of whole joints."""
-    film = Film(viscosity_pa_s=0.1, roughness_m=1.0e-6)
-    own = {name: attrs.evolve(c, film=film) for name, c in leg.clearances.items()}
-    update = DigitalTwin(attrs.evolve(leg, clearances=own)).update(gait(3.0, rate_hz=1000.0))
-    force, cycle = update.samples.contact_force_n, update.cycles[-1]
-    counted = force[(update.samples.stamp_ns > cycle.begin_ns) & (update.samples.stamp_ns <= cycle.stamp_ns)]
-    np.testing.assert_allclose(counted.mean(axis=0), cycle.mean_force_n, rtol=0.2)
 
 
 def test_a_slow_gait_is_no_standstill(leg, gait):

@@ -33,10 +33,7 @@ from leg_wear_monitor.dynamics.clearance.contact import (
     RUB,
     V0,
     accelerate_clearances,
-    add_film_reactions,
-    film_torque,
-    integrate_films,
-    joint_force,
+    force_in_joint,
 )
 from leg_wear_monitor.dynamics.clearance.model import (
     ACCELERATION,
@@ -105,8 +102,6 @@ def drive_torque(now, x, sample):
         abrupt += vector_at(sample, (F_N, k)) * vector_at(sample, (CAM, k))
         abrupt -= part_at(now.lever_drive, k) * vector_at(sample, (F_T, k))
     smooth = now.torque_0[0] + vector_sum(steady)
-    if now.spin.shape[0] > 0:
-        smooth += film_torque(now, sample)
     return smooth + vector_sum(abrupt), smooth
 
 
@@ -144,9 +139,6 @@ def reactions(tables, angle, now, x, sample, out_by, out_reaction):
             before += out_by[c] * vector_at(table, (i, c, r))
             after += out_by[c] * vector_at(table, (i + 1, c, r))
         put_vector(out_reaction, r, (1.0 - w) * before + w * after)
-    if now.spin.shape[0] > 0:
-        points = blend(tables.spin_reaction.shape[0] - 1, angle)
-        add_film_reactions(tables, points, now, sample, out_reaction)
 
 
 @kernel
@@ -369,7 +361,6 @@ def _accept(model, surfaces, state, t, h, turned, statistics, work):
     x, now, start, end, contacts = work.x, work.now, work.start, work.end, model.contacts
     statistics.steps[1] += 1
     integrate_joints(model, state.approach, h, start, end, work.added)
-    integrate_films(model.film.settings, contacts.joint, h, start, end, work.added, statistics.peak)
     gather_wear(work.added, start, end, work.pending)
     for k in range(0, work.added.shape[1], WIDTH):
         for r in range(JOINT_RATES):
@@ -419,7 +410,7 @@ def _finish(model, surfaces, state, statistics, work):
             statistics.worn_energy[0] += deposit_pending(
                 model.contacts, surfaces, k, sample, now, here, amid, work.pending, work.weight
             )
-        force = joint_force(model.film.settings, k, sample)
+        force = force_in_joint(k, sample)
         statistics.force_time[joint[k], bin_of(force)] += interval
     torque = work.drive_start[WHOLE]
     statistics.torque_time[1 if torque > 0.0 else 0, bin_of(abs(torque))] += interval

@@ -5,12 +5,10 @@ choice of two values, not a jump.
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
-from leg_wear_monitor.compiled.kernel import ByAddress, entry, kernel
+from leg_wear_monitor.compiled.kernel import entry, kernel
 from leg_wear_monitor.compiled.vectors import (
     LEAST_DIVISOR,
     WIDTH,
@@ -31,7 +29,6 @@ from leg_wear_monitor.compiled.vectors import (
     zip_last,
 )
 from leg_wear_monitor.contact.arrays import ContactArrays
-from leg_wear_monitor.contact.film import film_force
 from leg_wear_monitor.contact.friction import NONE, THRELFALL, against, ambrosio_ramp, friction_force
 from leg_wear_monitor.contact.geometry import journal_contact
 from leg_wear_monitor.contact.normal import (
@@ -55,7 +52,7 @@ from leg_wear_monitor.dynamics.joint import (
     soften,
     touch_walls,
 )
-from leg_wear_monitor.dynamics.run import DISSIPATION, FORCE, FORCE_SQUARED, JOINT_RATES
+from leg_wear_monitor.dynamics.run import JOINT_RATES
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.wear import BUSHING, JOURNAL, profiles_at
 
@@ -220,81 +217,13 @@ def _of_bodies(line, k):
     return evens(first, second), odds(first, second)
 
 
-# Films of oil or grease in clearance coordinates: forces and their effect on the leg (physics.md section 7).
-#
-# A film's force is conjugate to the eccentricity, as the contact's is. Its moments turn the bodies of bushing
-# and journal, whose rates depend on all eccentricities and on the crank. The kernels of a step call the entry
-# by its address, which only a leg with films has: a dry leg neither compiles nor runs it.
-
-
-# rows of a sample: force of the film on the journal [N], its moments on the bushing's and the journal's
-# body [N m], speeds of these bodies [rad/s]
-FILM_X, FILM_Y, MOMENT_B, MOMENT_J, SPEED_B, SPEED_J = range(SAMPLE, SAMPLE + 6)
-FILM_SAMPLE = SAMPLE + 6
-
-# settings of a film: radius of the bushing, width [m], viscosity [Pa s], 0 for a dry joint, roughness [m]
-RADIUS, FILM_WIDTH, VISCOSITY, ROUGHNESS = range(4)
-
-
-class FilmModel(NamedTuple):
-    """Films of the clearance joints.
-
-    ``settings`` (k, 4): columns above, no rows for a leg without films; ``force``, ``factorise`` and
-    ``solve``: addresses of `add_films`, `film_system.factorise_films` and `film_system.solve_films`, 0
-    without films.
-    """
-
-    settings: Floats
-    force: int
-    factorise: int
-    solve: int
-
-
-def film_settings(contacts: ContactArrays, films: Floats) -> Floats:
-    """Settings of the films, from viscosity and roughness (k, 2); none if all joints are dry."""
-    settings = np.column_stack([contacts.bushing_radius, contacts.width, films])
-    return settings if (films[:, 0] > 0.0).any() else settings[:0]
-
-
-@entry
-def add_films(settings, spin, spin_turn, response, inverse_mass, crank_speed, x, at_v, out_a, out_sample):
-    """Add the films' forces to the accelerations in row out_a of x (VECTORS, d) and to the samples.
-
-    ``spin`` (2 k, d), ``spin_turn`` (2 k,), ``response`` (2 k, d): of the step tables; rates of the
-    eccentricities [m/s] in row at_v. The film is that of the local clearance. Returns the number of joints.
-    """
-    d = inverse_mass.shape[0]
-    for k in range(settings.shape[0]):
-        if settings[k, VISCOSITY] > 0.0:
-            b, j = 2 * k, 2 * k + 1
-            speed_b, speed_j = spin_turn[b] * crank_speed, spin_turn[j] * crank_speed
-            for i in range(d):
-                speed_b += spin[b, i] * x[at_v, i]
-                speed_j += spin[j, i] * x[at_v, i]
-            ex, ey = out_sample[EX, k], out_sample[EY, k]
-            clearance = math.sqrt(ex * ex + ey * ey) - out_sample[DELTA, k]
-            fx, fy, moment_b, moment_j = film_force(
-                ex, ey, out_sample[VX, k], out_sample[VY, k], speed_b, speed_j, clearance,
-                settings[k, RADIUS], settings[k, FILM_WIDTH], settings[k, VISCOSITY], settings[k, ROUGHNESS],
-            )  # fmt: skip
-            for i in range(d):
-                x[out_a, i] += inverse_mass[b, i] * fx + inverse_mass[j, i] * fy
-                x[out_a, i] += response[b, i] * moment_b + response[j, i] * moment_j
-            out_sample[FILM_X, k], out_sample[FILM_Y, k] = fx, fy
-            out_sample[MOMENT_B, k], out_sample[MOMENT_J, k] = moment_b, moment_j
-            out_sample[SPEED_B, k], out_sample[SPEED_J, k] = speed_b, speed_j
-    return settings.shape[0]
-
-
-ADD_FILMS = ByAddress(add_films, types.int64)
-
-# further rows of a sample, after the film's: normal, friction force [N], slip speed [m/s], derivatives of
-# the normal force by the penetration [N/m] and by its rate [N s/m], its elastic part [N], derivative of the
-# penetration by the crank angle through the rotation of worn bodies [m/rad], the normal law's coefficient for
-# the local radii (unit of the law), and the local clearance [m]
-NX, NY, F_T, SLIP, STIFFNESS = range(FILM_SAMPLE, FILM_SAMPLE + 5)
-DAMPING, ELASTIC, CAM, COEFFICIENT, CLEARANCE = range(FILM_SAMPLE + 5, FILM_SAMPLE + 10)
-SAMPLE_ROWS = FILM_SAMPLE + 10
+# further rows of a sample: normal, friction force [N], slip speed [m/s], derivatives of the normal force by
+# the penetration [N/m] and by its rate [N s/m], its elastic part [N], derivative of the penetration by the
+# crank angle through the rotation of worn bodies [m/rad], the normal law's coefficient for the local radii
+# (unit of the law), and the local clearance [m]
+NX, NY, F_T, SLIP, STIFFNESS = range(SAMPLE, SAMPLE + 5)
+DAMPING, ELASTIC, CAM, COEFFICIENT, CLEARANCE = range(SAMPLE + 5, SAMPLE + 10)
+SAMPLE_ROWS = SAMPLE + 10
 
 # integrals of a joint in a step beyond those of the run statistics: friction force [N s]; moment about the
 # crank of the normal force on rotating worn walls [N m s]
@@ -306,8 +235,6 @@ ADDED = JOINT_RATES + 2
 # change of the rates in the last step; coefficients of the rates in the drive torque; forces of the contacts
 E0, V0, A0, EM, VM, E1, V1, A1, DRIFT, K1E, K1V, K2E, K2V, RE, RV, DV, BY_V, PUSH = range(18)
 VECTORS = 18
-
-_add_films = ADD_FILMS.call
 
 
 def fresh_sample(law: Floats) -> Floats:
@@ -329,13 +256,6 @@ def accelerate_clearances(model, surfaces, approach, now, turned, x, at_e, at_v,
     for k in range(0, out_sample.shape[1], WIDTH):
         _push_joints(model, surfaces, approach, now, turned, k, x, at_e, at_v, out_sample, whole)
     _accelerate(now.inverse_mass, now.moment, x, out_a, out_sample)
-    films = model.film.settings
-    if films.shape[0] > 0:
-        spin, turn, speed = now.spin, now.spin_turn, now.speed[0]
-        _add_films(
-            model.film.force,
-            (films, spin, turn, now.spin_response, now.inverse_mass, speed, x, at_v, out_a, out_sample),
-        )
 
 
 @kernel
@@ -364,7 +284,7 @@ def _push_joints(model, surfaces, approach, now, turned, k, x, at_e, at_v, out_s
     put_vector(x, (PUSH, 2 * k), zip_first(fx, fy))
     put_vector(x, (PUSH, 2 * k + WIDTH), zip_last(fx, fy))
     put_vector(out_sample, (F_T, k), f_t)
-    if not (whole or model.film.settings.shape[0] > 0):
+    if not whole:
         return
     put_vector(out_sample, (F_N, k), f_n)
     put_vector(out_sample, (STIFFNESS, k), stiffness)
@@ -405,84 +325,7 @@ def _accelerate(inverse_mass, moment, x, out_a, sample):
         put_vector(x, (out_a, i), total + other)
 
 
-# What films do beside their force: tables, drive torque, reactions, integrals (physics.md section 7).
-
-
 @kernel
-def load_spins(tables, points, e, v, ahead, now):
-    """Rates of the films' bodies, for the eccentricities ``ahead`` [s] later.
-
-    ``points`` (i, w): row of the table and fraction to the next. physics.md section 7.
-    """
-    spin, (i, w), d = tables.spin, points, e.shape[0]
-    for r in range(now.spin.shape[0]):
-        now.spin_turn[r] = now.turn_line[r]
-        for c in range(d):
-            here = (1.0 - w) * spin[i, 0, r, c] + w * spin[i + 1, 0, r, c]
-            slope = (1.0 - w) * spin[i, 1, r, c] + w * spin[i + 1, 1, r, c]
-            now.spin[r, c] = here
-            now.spin_turn[r] += slope * (e[c] + ahead * v[c])
-            now.spin_response[r, c] = 0.0
-        for c in range(d):
-            for a in range(d):
-                now.spin_response[r, a] += now.inverse_mass[c, a] * now.spin[r, c]
-
-
-@kernel
-def film_torque(now, sample):
-    """Drive torque [N m] that the films' moments need."""
-    torque = 0.0
-    for r in range(now.spin.shape[0]):
-        torque -= now.spin_turn[r] * sample[MOMENT_B + r % 2, r // 2]
-    return torque
-
-
-@kernel
-def add_film_reactions(tables, points, now, sample, out_reaction):
-    """Add what the films' moments make of drive torque and reactions (r,); ``points`` as in `load_spins`."""
-    table, (i, w) = tables.spin_reaction, points
-    for m in range(now.spin.shape[0]):
-        moment = sample[MOMENT_B + m % 2, m // 2]
-        for r in range(table.shape[2]):
-            out_reaction[r] += moment * ((1.0 - w) * table[i, m, r] + w * table[i + 1, m, r])
-
-
-@kernel
-def _power(k, sample):
-    """Power [W] that the film of joint k takes from the leg."""
-    power = sample[FILM_X, k] * sample[VX, k] + sample[FILM_Y, k] * sample[VY, k]
-    return -power - sample[MOMENT_B, k] * sample[SPEED_B, k] - sample[MOMENT_J, k] * sample[SPEED_J, k]
-
-
-@kernel
-def joint_force(films, k, sample):
-    """Force [N] of contact and film in clearance joint k; ``films``: settings of the leg's films."""
-    if films.shape[0] > 0:
-        return _total_force(k, sample)
+def force_in_joint(k, sample):
+    """Force [N] in clearance joint k."""
     return math.sqrt(sample[F_N, k] ** 2 + sample[F_T, k] ** 2)
-
-
-@kernel
-def _total_force(k, sample):
-    """As `joint_force`, with films."""
-    f_n, f_t = sample[F_N, k], sample[F_T, k]
-    fx = sample[FILM_X, k] - f_n * sample[NX, k] - f_t * sample[NY, k]
-    fy = sample[FILM_Y, k] - f_n * sample[NY, k] + f_t * sample[NX, k]
-    return math.sqrt(fx * fx + fy * fy)
-
-
-@kernel
-def integrate_films(settings, joint, h, start, end, out_added, out_peak):
-    """Add what films change in the integrals of a step of length h [s]; out_added (ADDED, room).
-
-    ``out_peak`` [N]: largest force of each joint of the mechanism.
-    """
-    for k in range(settings.shape[0]):
-        if settings[k, VISCOSITY] > 0.0:
-            for end_of_step in range(2):
-                sample = end if end_of_step else start
-                total, contact = _total_force(k, sample), sample[F_N, k] ** 2 + sample[F_T, k] ** 2
-                out_added[FORCE, k] += 0.5 * h * (total - math.sqrt(contact))
-                out_added[FORCE_SQUARED, k] += 0.5 * h * (total * total - contact)
-                out_added[DISSIPATION, k] += 0.5 * h * _power(k, sample)
-            out_peak[joint[k]] = max(out_peak[joint[k]], _total_force(k, end))

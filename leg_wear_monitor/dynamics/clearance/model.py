@@ -18,8 +18,8 @@ from leg_wear_monitor.compiled.vectors import (
 )
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.dynamics.clearance.basis import motion_shapes, start_of, views
-from leg_wear_monitor.dynamics.clearance.contact import ADDED, TO_ANGLE, VECTORS, FilmModel, fresh_sample
-from leg_wear_monitor.dynamics.clearance.film_system import ContactSystem, contact_system
+from leg_wear_monitor.dynamics.clearance.contact import ADDED, TO_ANGLE, VECTORS, fresh_sample
+from leg_wear_monitor.dynamics.clearance.contact_system import ContactSystem, contact_system
 from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables
 from leg_wear_monitor.dynamics.run import JOINT_RATES
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
@@ -94,9 +94,9 @@ class ClearanceModel(NamedTuple):
 
     ``interval`` [s]: time between the instants at which the state exists; ``tolerance`` (2,): reciprocals of
     the local error allowed in a step, of eccentricities [1/m] and of their rates [s/m]; ``law`` (LAW_ROWS,
-    room): of `contact_laws`, ``usual``: 1 if `have_usual_laws`, else 0; ``film``: films of the joints;
-    ``damped``: 1 with dampers, else 0; ``coupling``: between the drive and the crank; ``parts`` (N,): number
-    of parts of an interval that starts at each point of the tables.
+    room): of `contact_laws`, ``usual``: 1 if `have_usual_laws`, else 0; ``damped``: 1 with dampers, else 0;
+    ``coupling``: between the drive and the crank; ``parts`` (N,): number of parts of an interval that starts
+    at each point of the tables.
     """
 
     contacts: ContactArrays
@@ -105,7 +105,6 @@ class ClearanceModel(NamedTuple):
     tolerance: Floats
     law: Floats
     usual: int
-    film: FilmModel
     damped: int
     coupling: Coupling
     parts: Ints
@@ -146,8 +145,7 @@ class StepTables(NamedTuple):
     those of ``angle`` and ``turn``; ``moment`` (k, d): forces on e per friction force in each joint,
     ``lever`` transposed; drive torque: ``torque_0`` (1,) [N m] at rest, ``torque_by_v`` (d,) per e',
     ``torque_by_e`` (d,) per e. ``toward`` (3, k): reference directions of the eccentricities at the start of
-    the interval. For the moments of films, of both bodies of each joint: ``spin`` (d, d): their rates per e',
-    ``spin_turn`` (d,): per crank speed; ``spin_response`` (d, d): accelerations per moment.
+    the interval.
     """
 
     row: Floats
@@ -181,9 +179,6 @@ class StepTables(NamedTuple):
     load_power: Floats
     viscous: Floats
     damper: Floats
-    spin: Floats
-    spin_turn: Floats
-    spin_response: Floats
 
 
 class ClearanceWork(NamedTuple):
@@ -246,7 +241,6 @@ def clearance_state(depth: Floats, angle: float, speed: float) -> ClearanceState
 def clearance_work(model: ClearanceModel, state: ClearanceState) -> ClearanceWork:
     """Work arrays for a model and a state."""
     clearance_joints, d = len(state.approach), len(state.e)
-    films = 2 * len(model.film.settings)
     row = np.zeros(model.tables.motion.shape[1])
     shapes = motion_shapes(clearance_joints, model.damped > 0)
     parts, start = views(row, shapes), start_of("coriolis", shapes)
@@ -267,9 +261,6 @@ def clearance_work(model: ClearanceModel, state: ClearanceState) -> ClearanceWor
         toward=np.zeros((TO_ANGLE + 1, clearance_joints)),
         angle_line=parts["angle"].reshape(-1),
         turn_line=parts["turn"].reshape(-1),
-        spin=np.zeros((films, d)),
-        spin_turn=np.zeros(films),
-        spin_response=np.zeros((films, d)),
         **parts,
     )
     return ClearanceWork(

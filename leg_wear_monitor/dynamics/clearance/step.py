@@ -44,10 +44,9 @@ from leg_wear_monitor.dynamics.clearance.contact import (
     VM,
     accelerate_clearances,
     joint_forces,
-    load_spins,
     take_directions,
 )
-from leg_wear_monitor.dynamics.clearance.film_system import factorise_step, solve_step
+from leg_wear_monitor.dynamics.clearance.contact_system import factorise_contacts, solve_contacts
 from leg_wear_monitor.dynamics.clearance.model import (
     ACCELERATION,
     ANGLE,
@@ -101,9 +100,9 @@ def try_step(model, surfaces, approach, h, turned, now, system, x, start, end):
     error over the tolerance: the difference of the second-order step and the cubic through the accelerations
     at both ends, filtered like a stage so that stiff contacts do not exaggerate it (Shampine's filter).
     """
-    film, d, tolerance = model.film, now.bare.shape[0], model.tolerance
-    m = factorise_step(film, h, 1.0 / tolerance[1], now, start, system)
-    solve_step(film, h, now, system, m, 1.0, x, V0, A0, K1E, K1V)
+    d, tolerance = now.bare.shape[0], model.tolerance
+    m = factorise_contacts(h, now.inverse_mass, now.speed[0], start, system)
+    solve_contacts(h, system, m, 1.0, x, V0, A0, K1E, K1V)
     for i in range(0, d, WIDTH):
         put_vector(x, (EM, i), vector_at(x, (E0, i)) + h * vector_at(x, (K1E, i)))
         put_vector(x, (VM, i), vector_at(x, (V0, i)) + h * vector_at(x, (K1V, i)))
@@ -111,7 +110,7 @@ def try_step(model, surfaces, approach, h, turned, now, system, x, start, end):
     for i in range(0, d, WIDTH):
         put_vector(x, (RE, i), vector_at(x, (VM, i)) - 2.0 * vector_at(x, (K1E, i)))
         put_vector(x, (RV, i), vector_at(x, (RV, i)) - 2.0 * vector_at(x, (K1V, i)))
-    solve_step(film, h, now, system, m, -1.0, x, RE, RV, K2E, K2V)
+    solve_contacts(h, system, m, -1.0, x, RE, RV, K2E, K2V)
     first, second = 1.5 * h, 0.5 * h
     for i in range(0, d, WIDTH):
         moved = first * vector_at(x, (K1E, i)) + second * vector_at(x, (K2E, i))
@@ -126,7 +125,7 @@ def try_step(model, surfaces, approach, h, turned, now, system, x, start, end):
         put_vector(x, (RE, i), moved - third * before - sixth * after)
         gained = vector_at(x, (V1, i)) - vector_at(x, (V0, i))
         put_vector(x, (RV, i), gained - second * (before + after))
-    solve_step(film, h, now, system, m, 0.0, x, RE, RV, RE, RV)
+    solve_contacts(h, system, m, 0.0, x, RE, RV, RE, RV)
     worst, total = every(0.0), every(0.0)
     for i in range(0, d, WIDTH):
         off = abs(vector_at(x, (RE, i))) * tolerance[0]
@@ -375,7 +374,6 @@ def _let_yield(inertia, torque, now, x, v, by_v, along, by_speed):
         now.bare[i] += rest * x[along, i] / inertia
         for k in range(now.moment.shape[0]):
             now.moment[k, i] -= now.lever_drive[k] * by[i] / whole
-    _release_films(inertia, now, x, along)
     for j in range(min(d, now.viscous.shape[0])):
         by_rate = 0.0
         for i in range(d):
@@ -409,17 +407,6 @@ def _follow_speed(whole, now, x, v, by_v, by_speed):
 
 
 @kernel
-def _release_films(inertia, now, x, along):
-    """As `_let_yield`, of what the films' moments accelerate."""
-    for row in range(now.spin.shape[0]):
-        by_moment = -now.spin_turn[row]
-        for i in range(now.bare.shape[0]):
-            by_moment += now.torque_a[i] * now.spin_response[row, i]
-        for i in range(now.bare.shape[0]):
-            now.spin_response[row, i] += by_moment * x[along, i] / inertia
-
-
-@kernel
 def _turned(whole, steeper, length, needed, torque, now, e, v, x, e1, v1):
     """What a part of a length [s] adds to the crank's angle [rad] and speed [rad/s].
 
@@ -443,9 +430,6 @@ def load_state(model, surfaces, state, angle, speed, acceleration, ahead, work):
     x, now = work.x, work.now
     take_tables(model.tables, angle, speed, acceleration, now)
     hold_eccentricities(model.tables, angle, state.e, state.v, ahead, now)
-    if now.spin.shape[0] > 0:
-        points = blend(model.tables.spin.shape[0] - 1, angle)
-        load_spins(model.tables, points, state.e, state.v, ahead, now)
     for i in range(state.e.shape[0]):
         x[E0, i], x[V0, i] = state.e[i], state.v[i]
     fetch_tables(model.tables, angle, speed)

@@ -25,15 +25,12 @@ from leg_wear_monitor.dynamics.clearance.contact import (
     A0,
     E0,
     F_T,
-    FILM_X,
-    FILM_Y,
     NX,
     NY,
     V0,
     contact_laws,
     have_usual_laws,
 )
-from leg_wear_monitor.dynamics.clearance.film_system import film_model
 from leg_wear_monitor.dynamics.clearance.model import (
     ANGLE,
     SPEED,
@@ -144,7 +141,6 @@ class ClearanceStepper:
             tolerance=np.array([1.0, 1.0 / TOLERANCE_RATE]) / tolerance_m,
             law=contact_laws(setup.contacts),
             usual=int(have_usual_laws(setup.contacts)),
-            film=film_model(setup.contacts, setup.films),
             damped=int(is_damped(setup.linkage.arrays)),
             coupling=rigid_coupling(),
             parts=np.empty(len(tables.parts), np.int64),
@@ -180,19 +176,15 @@ class ClearanceStepper:
 
     @property
     def last_force(self) -> Floats:
-        """Magnitude (k,) of the forces [N] of contact and film at the last sample before that time."""
-        if not len(self.model.film.settings):
-            sample = self._sample()
-            return np.asarray(np.hypot(sample[F_N], sample[F_T]))
-        return np.asarray(np.linalg.norm(self._forces(), axis=1))
+        """Magnitude (k,) of the contact forces [N] at the last sample before that time."""
+        sample = self._sample()
+        return np.asarray(np.hypot(sample[F_N], sample[F_T]))
 
     def _forces(self) -> Floats:
-        """Forces (k, 2) [N] of contact and film on the journals at that sample."""
+        """Contact forces (k, 2) [N] on the journals at that sample."""
         sample = self._sample()
         nx, ny = sample[NX], sample[NY]
-        force = np.stack([-sample[F_N] * nx - sample[F_T] * ny, -sample[F_N] * ny + sample[F_T] * nx], axis=1)
-        films = sample[[FILM_X, FILM_Y]].T if len(self.model.film.settings) else 0.0
-        return np.asarray(force + films)
+        return np.stack([-sample[F_N] * nx - sample[F_T] * ny, -sample[F_N] * ny + sample[F_T] * nx], axis=1)
 
     def _sample(self) -> Floats:
         """The last sample before that time (SAMPLE_ROWS, k)."""
@@ -433,15 +425,12 @@ def _tables() -> ClearanceTables:
         parts=np.zeros(1),
         by_e=np.zeros((1, 1, 1, 1), np.float32),
         bend=np.zeros((1, 1, 1, 1), np.float32),
-        spin=np.zeros((1, 1, 1, 1), np.float32),
-        spin_reaction=np.zeros((1, 1, 1), np.float32),
     )
 
 
 def _leg() -> tuple[ClearanceModel, ClearanceState, ClearanceWork]:
     """A leg that has the types of all legs, and nothing else."""
     contacts, line = _contacts(), np.zeros(2)
-    film = film_model(contacts, np.zeros((1, 2)))
     model = ClearanceModel(
         contacts,
         _tables(),
@@ -449,7 +438,6 @@ def _leg() -> tuple[ClearanceModel, ClearanceState, ClearanceWork]:
         tolerance=line,
         law=contact_laws(contacts),
         usual=1,
-        film=film,
         damped=0,
         coupling=rigid_coupling(),
         parts=np.zeros(1, np.int64),

@@ -55,9 +55,7 @@ class ClearanceTables(NamedTuple):
     ``by_e`` (M + 1, u / WIDTH, d, WIDTH): derivatives by e of the parts of `changing_shapes`, in blocks of
     vectors; ``bend`` (M + 1, d d / WIDTH, d, WIDTH): accelerations A^-1 Gamma, bilinear in e'. Both are
     small, and therefore stored in single precision at every `COARSER`-th point, which reduces the memory
-    traffic of an interval. So are the tables for the moments of films, bushing's body before journal's:
-    ``spin`` (M + 1, 2, d, d): rates of the bodies per e', and their derivative by the crank angle;
-    ``spin_reaction`` (M + 1, d, r): drive torque and reactions per moment.
+    traffic of an interval.
     """
 
     motion: Floats
@@ -67,8 +65,6 @@ class ClearanceTables(NamedTuple):
     parts: Floats
     by_e: Singles
     bend: Singles
-    spin: Singles
-    spin_reaction: Singles
 
 
 def build_basis(
@@ -125,17 +121,14 @@ def build_tables(
     basis = basis.with_contacts(linkage, contacts) if basis else build_basis(linkage, contacts, points)
     if like is not None:
         return _with_levers(like, linkage, basis)
-    ideal, joints = _ideal_rows(linkage, basis)
-    bodies = linkage.arrays.joint_body[contacts.joint]
     return ClearanceTables(
         motion=_motion(linkage, contacts, basis),
         reaction=_reaction(linkage, contacts, basis),
-        reaction_joint=joints,
+        reaction_joint=_ideal_rows(linkage, basis)[1],
         stored=_stored(linkage, contacts, basis),
         by_e=_by_e(linkage, contacts, basis),
         parts=_parts(_accelerations(basis)["coriolis"]),
         bend=_in_blocks(_bend(basis).reshape(len(basis.gamma) + 1, 2 * len(contacts.joint), -1)),
-        **_spins(bodies, basis, ideal),
     )
 
 
@@ -335,21 +328,6 @@ def _reaction(linkage: Linkage, _contacts: ContactArrays, basis: Basis) -> Float
     reaction[:-1, :, : len(rows)] = columns
     reaction[-1] = reaction[0]
     return reaction
-
-
-def _spins(bodies: Ints, basis: Basis, rows: list[int]) -> dict[str, Singles]:
-    """Tables ``spin`` and ``spin_reaction`` for the bodies (k, 2) of bushing and journal."""
-    n, moments = len(basis.s), bodies.size
-    unit = np.zeros((3 + len(basis.mass), moments))
-    unit[3 * bodies.ravel() + 2, np.arange(moments)] = 1.0
-    moment = np.broadcast_to(unit[3:], (n, len(basis.mass), moments))  # on the ground it does nothing
-    spin = np.stack([project(moment, basis.s), project(moment, basis.s_t)], axis=1)
-    reaction = -project(moment, basis.x[:, :, rows])
-    coarse = _coarse(n)
-    return {
-        "spin": np.ascontiguousarray(spin[coarse], dtype=np.float32),
-        "spin_reaction": np.ascontiguousarray(reaction[coarse], dtype=np.float32),
-    }
 
 
 def _toe(linkage: Linkage, motion: IdealMotion, basis: Basis) -> Floats:

@@ -25,7 +25,6 @@ _CLASS_N = 100  # foot loads are told apart to this
 # (a person is in the masses of the bodies)
 _FREE = ("name", "source", "drive", "loads", "clearance_joints", "clearances", "person_kg")
 _FREE_OF_CLEARANCE = ("wear_coefficient", "material")  # what a pair gives is in the other settings
-_LATER = ("film",)  # settings of later versions: absent, they leave the hash of an older leg as it was
 _FREE_OF_JOINTS = ("label",)
 
 
@@ -40,9 +39,7 @@ def fingerprint(mechanism: Mechanism) -> str:
     for joint in mechanism.clearance_joints:
         settings = attrs.asdict(mechanism.clearances[joint])
         parts[f"clearance {joint}"] = {
-            name: _plain(value)
-            for name, value in settings.items()
-            if name not in _FREE_OF_CLEARANCE and not (name in _LATER and value is None)
+            name: _plain(value) for name, value in settings.items() if name not in _FREE_OF_CLEARANCE
         }
     text = json.dumps(parts, sort_keys=True, default=_plain)
     return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -45,7 +45,6 @@ _LARGEST_SUM_DEVIATION = 0.1
 # standard error of a power law's exponent above which the power law is not reported
 _LARGEST_EXPONENT_ERROR = 0.1
 _REPEATS = "repeats_contact_force"
-_OPENS_M = 1.0e-4  # depth of a bushing up to which lives are compared
 
 
 def disturbance(found: Found) -> list[str]:
@@ -280,55 +279,6 @@ def _law_sentence(what: str, group: Found) -> str:
         texts.append(f"{name} {percent(float(np.ptp(means) / means.mean()))}")
     names = joined([point.label.removeprefix("friction ") for point, _ in group])
     return f"{what} ({names}): largest minus smallest mean, relative to the mean: {', '.join(texts)}."
-
-
-def lubrication(found: Found) -> list[str]:
-    """Order of the joints by wear, life of the first, forces and contact, dry and with each viscosity."""
-    (_, dry), *greased = found
-    force = "force of contact and film, 99 % of the time below [N]"
-    return [
-        *(f"{point.label[:1].upper()}{point.label[1:]}: {_wear_and_life(arrays)}" for point, arrays in found),
-        *_of_each_joint(
-            found, force, lambda arrays, joint: with_spread(of_joint(arrays, "p99_force_n", joint))
-        ),
-        *(f"With {point.label} {_against_dry(arrays, dry)}." for point, arrays in greased),
-    ]
-
-
-def _wear_and_life(arrays: Arrays) -> str:
-    """The joints by wear of the bushing, the largest first, and the life of the first one."""
-    depths = {joint: of_joint(arrays, DEPTH, joint) for joint in _order(arrays, DEPTH)}
-    worn = [joint for joint in depths if depths[joint].mean > 0.0]
-    # surfaces that rub without wear have no coefficient; the others, a film carries
-    rubbing = [joint for joint in depths if joint not in worn and of_joint(arrays, ARCHARD, joint).mean > 0.0]
-    not_counted = f"wear of {joined(rubbing)} is not counted, without a wear coefficient" if rubbing else ""
-    if not worn:
-        return f"{not_counted}." if rubbing else "the films carry everything, and no joint wears."
-    texts = [f"{joint} {with_spread(depths[joint], PICO)}" for joint in worn]
-    first = depths[worn[0]]
-    cycles = _OPENS_M / first.mean
-    scatter = cycles * first.deviation / first.mean
-    rest = [joint for joint in clearance_joints_of(arrays) if joint not in [*worn, *rubbing]]
-    idle = f"; {joined(rest)} {'does' if len(rest) == 1 else 'do'} not wear" if rest else ""
-    idle += f"; {not_counted}" if rubbing else ""
-    return (
-        f"greatest depth of the bushings [pm a cycle]: {', '.join(texts)}{idle}. At this rate {worn[0]} is "
-        f"{1.0e3 * _OPENS_M:g} mm deep after {number(MILLIONTH * cycles)} ± {number(MILLIONTH * scatter)} "
-        "million cycles."
-    )
-
-
-def _against_dry(arrays: Arrays, dry: Arrays) -> str:
-    """Wear relative to that of the dry joints, and the fraction of time in contact."""
-    wear_texts, contact_texts = [], []
-    for joint in clearance_joints_of(dry):
-        before, after = (of_joint(each, ARCHARD, joint).mean for each in (dry, arrays))
-        wear_texts.append(f"{joint} {percent(after / before) if before > 0.0 else '–'}")
-        contact_texts.append(f"{joint} {percent(of_joint(arrays, 'contact_fraction', joint).mean)}")
-    return (
-        f"the wear, ∫ F |v| dt of the contact's share, is of the dry one: {', '.join(wear_texts)}; surfaces "
-        f"touch for: {', '.join(contact_texts)} of the time"
-    )
 
 
 def load(found: Found) -> list[str]:

@@ -273,7 +273,6 @@ _PAGES: dict[str, _OwnOf] = {
     "location": _by(findings.disturbance, findings.places),
     "multi": _multi,
     "laws": _by(findings.laws, head="law"),
-    "lubrication": _by(findings.lubrication, findings.disturbance, head="lubricant"),
     "load": _load,
     "wear": _wear,
     "chaos": _chaos,

@@ -1,6 +1,5 @@
 """What is compiled before a leg is there is what the leg calls."""
 
-import attrs
 import numba
 import pytest
 
@@ -9,7 +8,6 @@ from leg_wear_monitor.dynamics.clearance.advance import ADVANCE
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceRun, advance_arguments, observe_arguments
 from leg_wear_monitor.dynamics.run import new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.mechanism.spec import Film
 
 
 def types_of(arguments):
@@ -19,11 +17,8 @@ def types_of(arguments):
 @pytest.mark.plain
 @pytest.mark.parametrize("mechanism", ["bionic_leg", "four_bar"])
 @pytest.mark.parametrize("wear", [True, False])
-@pytest.mark.parametrize("film", [None, Film(viscosity_pa_s=0.1, roughness_m=1.0e-6)])
-def test_types_are_those_of_a_leg(mechanism, wear, film):
+def test_types_are_those_of_a_leg(mechanism, wear):
     leg = lw.load_mechanism(mechanism)
-    clearances = {name: attrs.evolve(c, film=film) for name, c in leg.clearances.items()}
-    leg = attrs.evolve(leg, clearances=clearances)
     setup = prepare(leg, wear=wear)
     run = ClearanceRun(setup)
     stepper, feeds_back = run.stepper, setup.surfaces.feeds_back

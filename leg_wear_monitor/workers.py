@@ -1,7 +1,4 @@
-"""Calls for other processes: here, on a Dask cluster, and compilation in a second process.
-
-A worker that dies loses only the jobs in progress there.
-"""
+"""Other processes: calls for workers, here or on a Dask cluster, and compilation in a second process."""
 
 import hashlib
 import os
@@ -10,22 +7,16 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, wait
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import cache
-from multiprocessing import get_context, parent_process
+from functools import cache, partial
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, NamedTuple
+from typing import IO, Any
 
 from leg_wear_monitor.compiled.kernel import cache_directory, is_stored
 from leg_wear_monitor.errors import ConfigError, ConfigWarning, LegWearError, closed_on_interrupt
-
-if TYPE_CHECKING:
-    from loky import ProcessPoolExecutor
-
 
 # The code that a worker runs: it has to be that of who asks.
 
@@ -42,107 +33,60 @@ def package_digest(*parts: str) -> str:
     return digest.hexdigest()[:20]
 
 
-# A call for a worker.
+# Calls for workers.
 
 
-class Job(NamedTuple):
-    """A call for a worker.
+Calls = Mapping[str, Callable[[], Any]]
+"""Calls by their names; workers need picklable ones, such as a `functools.partial`."""
 
-    Attributes
-    ----------
-    key : str
-        Name of the job, unique in a run.
-    call : callable
-        Function of a module, so that a worker can import it.
-    arguments : tuple
-        Picklable.
-    cost : float
-        Approximate cost; costly jobs begin first.
-    """
-
-    key: str
-    call: Callable[..., Any]
-    arguments: tuple[Any, ...]
-    cost: float = 1.0
-
-    def run(self) -> Any:
-        """Result of the call, computed in this process."""
-        return self.call(*self.arguments)
+TRIES = 3  # attempts at a call whose worker dies
+PATIENCE_S = 10.0  # time in which a scheduler has to answer
+WORKERS_S = 60.0  # time in which a scheduler has to have a worker
 
 
-Done = Callable[[Job, Any], Iterable[Job] | None]
-"""Called with each job and its result, in order of completion; gives jobs that can begin now."""
-
-
-def by_cost(jobs: Iterable[Job]) -> list[Job]:
-    """Jobs, the costliest first."""
-    return sorted(jobs, key=lambda job: -job.cost)
-
-
-def run_jobs(jobs: Sequence[Job], done: Done, workers: int, scheduler: str | None = None) -> None:
-    """Run jobs, and those that follow from them: on a cluster, in local processes, or in this process.
+def results(calls: Calls, workers: int = 1, scheduler: str | None = None) -> Iterator[tuple[str, Any]]:
+    """Names and results of calls, each as soon as it is there: the caller can store it at once.
 
     Parameters
     ----------
-    jobs : sequence of Job
-    done : callable
-        Called in this process with each job and its result, in order of completion.
+    calls : mapping of str to callable
+        Calls begin in this order.
     workers : int
-        Number of local processes; 1 and less uses this process only.
+        Number of local processes with one thread each; 1 and less uses this process only.
     scheduler : str, optional
-        Address of a Dask scheduler whose workers run the jobs instead.
-    """
-    if scheduler is not None:
-        run_on_cluster(jobs, scheduler, done)
-    elif workers > 1:
-        run_in_processes(jobs, workers, done)
-    else:
-        run_here(jobs, done)
-
-
-# Calls computed in local single-thread processes; if one dies, only jobs in progress are lost.
-
-
-TRIES = 3  # attempts per job if its worker dies
-
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
-
-# multiprocessing starts `python -c`, which would import from the current directory
-_OF_A_WORKER = {**dict.fromkeys(_THREADS, "1"), "PYTHONSAFEPATH": "1"}
-
-
-def run_here(jobs: Sequence[Job], done: Done) -> None:
-    """Run jobs one after the other in this process, those that follow from one right after it."""
-    waiting = list(reversed(jobs))
-    while waiting:
-        job = waiting.pop()
-        waiting.extend(reversed(list(done(job, job.run()) or ())))
-
-
-def run_in_processes(jobs: Sequence[Job], workers: int, done: Done) -> None:
-    """Run jobs in worker processes.
-
-    Parameters
-    ----------
-    jobs : sequence of Job
-    workers : int
-    done : callable
-        Called in this process with each job and its result, in order of completion.
+        Address of a Dask scheduler, such as ``tcp://127.0.0.1:8786``. Its workers run the calls instead.
 
     Raises
     ------
     ConfigError
-        If loky is not installed.
+        If dask.distributed is not installed, or the scheduler does not answer or has no worker.
     LegWearError
         If workers die repeatedly.
     """
-    open_jobs = {job.key: job for job in by_cost(jobs)}
+    if scheduler is not None:
+        yield from _from_cluster(calls, scheduler)
+    elif min(workers, len(calls)) > 1:
+        yield from _from_processes(calls, workers)
+    else:
+        yield from ((name, call()) for name, call in calls.items())
+
+
+def _from_processes(calls: Calls, workers: int) -> Iterator[tuple[str, Any]]:
+    try:
+        from joblib import parallel_config
+        from joblib.externals.loky.process_executor import TerminatedWorkerError
+    except ImportError as error:
+        fault = "needs joblib (pip install joblib), expected 1"
+        raise ConfigError("--workers", str(workers), fault) from error
+    waiting = {name: partial(_in_worker, os.getpid(), call) for name, call in calls.items()}
     for _ in range(TRIES):
         try:
-            with _pool(workers) as pool:
-                _work_off(open_jobs, pool, done)
+            with parallel_config("loky", inner_max_num_threads=1):
+                for name, result in _unordered(dict(waiting), workers):
+                    del waiting[name]
+                    yield name, result
             return
-        except BrokenProcessPool:
+        except TerminatedWorkerError:
             continue
     raise LegWearError(
         f"worker processes died {TRIES} times; finished results are kept; "
@@ -150,120 +94,83 @@ def run_in_processes(jobs: Sequence[Job], workers: int, done: Done) -> None:
     )
 
 
-def _work_off(open_jobs: dict[str, Job], pool: "ProcessPoolExecutor", done: Done) -> None:
-    """Run the open jobs and those that follow from them; what is finished is removed."""
-    futures = {pool.submit(job.run): job for job in open_jobs.values()}
-    while futures:
-        finished, _ = wait(futures, return_when=FIRST_COMPLETED)
-        for future in finished:
-            job = futures.pop(future)
-            more = done(job, future.result()) or ()
-            del open_jobs[job.key]
-            open_jobs |= {each.key: each for each in more}
-            futures |= {pool.submit(each.run): each for each in more}
-
-
-@contextmanager
-def _pool(workers: int) -> Iterator["ProcessPoolExecutor"]:
-    """A pool of single-thread workers, which is shut down at the end of the context.
-
-    The pool is that of loky. In the pool of Python 3.11, a worker that dies while jobs are being submitted
-    ends the thread that manages the workers, or raises OSError (both were observed).
-    """
+def _from_cluster(calls: Calls, address: str) -> Iterator[tuple[str, Any]]:
     try:
-        from loky import ProcessPoolExecutor
-    except ImportError as error:
-        raise ConfigError("--workers", str(workers), "needs loky (pip install loky), expected 1") from error
-    with _environment(_OF_A_WORKER), warnings.catch_warnings():
-        # A worker that has grown starts anew between two jobs, which loses nothing.
-        warnings.filterwarnings("ignore", "A worker was restarted", UserWarning)
-        pool = ProcessPoolExecutor(workers, context=get_context("spawn"), initializer=_begin_worker)
-        try:
-            yield pool
-        except BaseException:
-            pool.shutdown(kill_workers=True)
-            raise
-        pool.shutdown()
-
-
-@contextmanager
-def _environment(changes: dict[str, str]) -> Iterator[None]:
-    before = {name: os.environ.get(name) for name in changes}
-    os.environ.update(changes)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
-
-
-def _begin_worker() -> None:
-    """Set up a worker: it ignores interrupts, which the parent handles, and ends with its parent."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = parent_process()
-    if parent is not None:
-        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-
-
-def _end_with(parent: Any) -> None:
-    parent.join()
-    os._exit(1)
-
-
-# Calls computed on a Dask cluster. If a worker dies, only the jobs in progress there are lost.
-
-
-PATIENCE_S = 10.0  # timeout for the scheduler's answer
-
-
-def run_on_cluster(jobs: Sequence[Job], address: str, done: Done) -> None:
-    """Run jobs on the workers of a scheduler.
-
-    Parameters
-    ----------
-    jobs : sequence of Job
-    address : str
-        Address of the scheduler, such as ``tcp://127.0.0.1:8786``.
-    done : callable
-        Called in this process with each job and its result, in order of completion.
-
-    Raises
-    ------
-    ConfigError
-        If dask.distributed is not installed, or the scheduler does not answer.
-    LegWearError
-        If workers die repeatedly during one job.
-    """
-    try:
-        from distributed import Client, as_completed
+        from distributed import Client
         from distributed.scheduler import KilledWorker
+        from joblib import parallel_config
     except ImportError as error:
         raise ConfigError("--scheduler", address, "needs dask.distributed, the extra 'dask'") from error
     try:
         client = Client(address, timeout=PATIENCE_S, set_as_default=False)
     except (OSError, ValueError) as error:
         raise ConfigError("--scheduler", address, "no scheduler answers there") from error
-    with client, client.as_current():
-        futures = {}
+    try:
+        with client:
+            _wait_for_a_worker(client, address)
+            with parallel_config("dask", client=client):
+                yield from _unordered(calls, -1)
+    except KilledWorker as error:
+        raise LegWearError(
+            f"{address}: workers died repeatedly during one call; finished results are kept"
+        ) from error
 
-        def submit(job: Job) -> Any:
-            future = client.submit(job.call, *job.arguments, key=f"leg-wear-{job.key}", retries=TRIES)
-            futures[future] = job
-            return future
 
-        finished = as_completed([submit(job) for job in by_cost(jobs)])
-        for future in finished:
-            try:
-                result = future.result()
-            except KilledWorker as error:
-                raise LegWearError(
-                    f"{address}: workers died repeatedly during one job; finished results are kept"
-                ) from error
-            finished.update([submit(job) for job in done(futures.pop(future), result) or ()])
-            future.release()
+def _wait_for_a_worker(client: Any, address: str) -> None:
+    try:
+        client.wait_for_workers(1, timeout=WORKERS_S)
+    except TimeoutError as error:
+        fault = f"the scheduler has no worker after {WORKERS_S:g} s"
+        raise ConfigError("--scheduler", address, fault) from error
+
+
+def _unordered(calls: Calls, workers: int) -> Iterator[tuple[str, Any]]:
+    """Names and results from the workers that joblib is configured for."""
+    from joblib import Parallel, delayed
+
+    parallel = Parallel(workers, return_as="generator_unordered", batch_size=1, pre_dispatch="all")
+    with _no_imports_from_the_current_directory():
+        named = parallel(delayed(_named)(name, call) for name, call in calls.items())
+    yield from named
+
+
+def _named(name: str, call: Callable[[], Any]) -> tuple[str, Any]:
+    return name, call()
+
+
+@contextmanager
+def _no_imports_from_the_current_directory() -> Iterator[None]:
+    """Python processes that start inside do not import modules from it, as `python -m` does."""
+    before = os.environ.get("PYTHONSAFEPATH")
+    os.environ["PYTHONSAFEPATH"] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["PYTHONSAFEPATH"]
+        else:
+            os.environ["PYTHONSAFEPATH"] = before
+
+
+def _in_worker(parent: int, call: Callable[[], Any]) -> Any:
+    _begin_worker(parent)
+    return call()
+
+
+@cache
+def _begin_worker(parent: int) -> None:
+    """Set up a worker, once: it leaves interrupts to its parent, and ends with it.
+
+    Without its parent, a worker would go on to write where the next run writes.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+
+def _end_with(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(0.2)
+    os._exit(1)
 
 
 # Python processes that this one starts, and compilation in a second one.

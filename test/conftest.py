@@ -99,7 +99,7 @@ def traps(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPa
     """The current directory: its modules have the names of all that a new process imports, and tell of it."""
     home = tmp_path_factory.mktemp("traps")
     marks = home / "told"
-    for name in {*sys.stdlib_module_names, "leg_wear_monitor", "loky", "numba", "numpy", "sitecustomize"}:
+    for name in {*sys.stdlib_module_names, "leg_wear_monitor", "joblib", "numba", "numpy", "sitecustomize"}:
         trap = f"open({str(marks)!r}, 'a').write({name!r} + '\\n')\nraise SystemExit(66)\n"
         (home / f"{name}.py").write_text(trap)
     monkeypatch.chdir(home)

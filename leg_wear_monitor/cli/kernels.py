@@ -16,7 +16,7 @@ from leg_wear_monitor.messages.cdr import Decoder
 from leg_wear_monitor.messages.streams import STREAMS
 from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
 from leg_wear_monitor.twin.torque_reference import TorqueReferenceRun
-from leg_wear_monitor.workers import Job, run_jobs
+from leg_wear_monitor.workers import results
 
 SETS = ("clearance", "full", "gait", "monitor")
 """Sets of kernels that are then there, as commands name them."""
@@ -53,11 +53,11 @@ def _reading() -> None:
             next(recording.blocks())
 
 
-_JOBS = tuple(Job(job.__name__, job, ()) for job in (_simulation, _monitor, _reading))
+_CALLS: dict[str, Callable[[], None]] = {call.__name__: call for call in (_simulation, _monitor, _reading)}
 
 
 def compile_all(progress: AbstractContextManager[Callable[[float], None]]) -> None:
-    """Compile what simulations, monitor, synthetic leg and replays need: in two processes, if loky is there.
+    """Compile what simulations, monitor, synthetic leg and replays need: in two processes if joblib is there.
 
     Parameters
     ----------
@@ -65,10 +65,5 @@ def compile_all(progress: AbstractContextManager[Callable[[float], None]]) -> No
         Gives a function that takes the fraction done.
     """
     with progress as show:
-        finished: list[str] = []
-
-        def done(job: Job, _result: None) -> None:
-            finished.append(job.key)
-            show(len(finished) / len(_JOBS))
-
-        run_jobs(_JOBS, done, 2 if find_spec("loky") else 1)
+        for done, _ in enumerate(results(_CALLS, 2 if find_spec("joblib") else 1), start=1):
+            show(done / len(_CALLS))

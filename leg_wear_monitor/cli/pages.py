@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,7 +21,7 @@ from leg_wear_monitor.playback.result import summary_of
 from leg_wear_monitor.report.fleet_page import fleet_page
 from leg_wear_monitor.report.fleet_standing import Day
 from leg_wear_monitor.report.page import page_html
-from leg_wear_monitor.workers import Job, run_jobs
+from leg_wear_monitor.workers import results
 
 if TYPE_CHECKING:
     from leg_wear_monitor.commissioning.result import CommissioningItem, CommissioningResult
@@ -167,16 +168,13 @@ def _is_due(home: Path) -> bool:
 
 def _write_legs(homes: Sequence[Path], workers: int) -> list[str]:
     """Write the pages of legs; why some cannot be made."""
-    done: list[str] = []
+    calls = {home.name: partial(write_leg, home) for home in homes}
+    faults: list[str] = []
     with progress_bar("writing the pages") as progress:
-
-        def take(_job: Job, fault: str) -> None:
-            done.append(fault)
-            progress(len(done) / len(homes))
-
-        jobs = [Job(home.name, write_leg, (home,)) for home in homes]
-        run_jobs(jobs, take, workers if len(jobs) >= _WORTH_WORKERS else 1)
-    return sorted(filter(None, done))
+        for _, fault in results(calls, workers if len(calls) >= _WORTH_WORKERS else 1):
+            faults.append(fault)
+            progress(len(faults) / len(calls))
+    return sorted(filter(None, faults))
 
 
 def write_leg(home: Path) -> str:

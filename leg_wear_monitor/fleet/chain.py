@@ -2,9 +2,9 @@
 
 import hashlib
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import attrs
 
@@ -25,7 +25,7 @@ from leg_wear_monitor.fleet.directory import (
 )
 from leg_wear_monitor.playback.replay import replay
 from leg_wear_monitor.playback.summary import ReplayResult
-from leg_wear_monitor.workers import Job, package_digest
+from leg_wear_monitor.workers import package_digest
 
 # What is kept of one recording of a leg.
 
@@ -97,6 +97,19 @@ def line_of(result: ReplayResult, about: Line, is_late: bool) -> Line:
         "lost": monitor.lost,
     }
     return dict(part_document(_UNREAD | about | read | counted))
+
+
+class Job(NamedTuple):
+    """A call for a worker, by a name; costly ones begin first."""
+
+    key: str
+    call: Callable[..., Any]
+    arguments: tuple[Any, ...]
+    cost: float = 1.0
+
+    def run(self) -> Any:
+        """Result of the call."""
+        return self.call(*self.arguments)
 
 
 # Finds the recordings of a leg: what they contain tells them apart, not their names.

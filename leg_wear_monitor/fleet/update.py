@@ -16,7 +16,7 @@ from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.bags.mcap_layout import MAGIC
 from leg_wear_monitor.bags.table_file import PARQUET
 from leg_wear_monitor.files import data_frame
-from leg_wear_monitor.fleet.chain import Chain, begin_of, state_of, words_of
+from leg_wear_monitor.fleet.chain import Chain, Job, begin_of, state_of, words_of
 from leg_wear_monitor.fleet.description import FleetDescription, FleetLeg, fleet_directory
 from leg_wear_monitor.fleet.directory import (
     LegDirectory,
@@ -28,7 +28,7 @@ from leg_wear_monitor.fleet.directory import (
 )
 from leg_wear_monitor.fleet.overview import FleetOverview, load_overview, write_overview
 from leg_wear_monitor.fleet.renew import is_renewal_due, learn_fleet, learned_from, measured_in, renew
-from leg_wear_monitor.workers import Job, run_jobs
+from leg_wear_monitor.workers import results
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -148,8 +148,11 @@ def update_fleet(
         if begin and (scans or work.is_due):
             begin(work.chains)
         # further jobs follow from the results of the first ones, in `done`
-        if jobs := scans or work.first_jobs():
-            run_jobs(jobs, work.done, workers, scheduler)
+        jobs = scans or work.first_jobs()
+        while jobs:
+            by_key = {job.key: job for job in sorted(jobs, key=lambda job: -job.cost)}
+            done = results({key: job.run for key, job in by_key.items()}, workers, scheduler)
+            jobs = [following for key, result in done for following in work.done(by_key[key], result)]
         faults = {one.leg.id: next(filter(None, [one.fault, *one.refused]), "") for one in work.chains}
         write_overview(fleet, out, faults)
     return FleetUpdate(tuple(work.chains), work.learned)

@@ -8,6 +8,7 @@ import warnings
 import zipfile
 import zlib
 from collections.abc import Callable
+from functools import partial
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from leg_wear_monitor.studies.kinds import STUDIES
 from leg_wear_monitor.studies.leg_tasks import TASKS, compute
 from leg_wear_monitor.studies.life_tasks import check_points
 from leg_wear_monitor.studies.plan import Arrays, Point, Study, code_digest
-from leg_wear_monitor.workers import Job, run_jobs
+from leg_wear_monitor.workers import results
 
 # Settings of studies from YAML files.
 
@@ -333,23 +334,20 @@ def run_study(
     directory = StudyDirectory(out)
     directory.open(_manifest(name, settings, points, keys, about), _mechanism_text(settings.mechanism))
     wanted = dict(zip(keys, points, strict=True))
-    missing = [
-        Job(key, compute, (point.task, mechanism, point.settings, code_digest()), point.cost)
-        for key, point in wanted.items()
-        if not _is_kept(directory, key, point)
-    ]
+    missing = {key: point for key, point in wanted.items() if not _is_kept(directory, key, point)}
+    costly_first = sorted(missing.items(), key=lambda item: -item[1].cost)
+    calls = {
+        key: partial(compute, point.task, mechanism, point.settings, code_digest())
+        for key, point in costly_first
+    }
     report, total = progress or (lambda _fraction: None), sum(point.cost for point in wanted.values())
-    spent = total - sum(job.cost for job in missing)
-
-    def done(job: Job, arrays: Arrays) -> None:
-        nonlocal spent
-        point = wanted[job.key]
-        directory.write(job.key, arrays, {"task": point.task, "settings": point.settings, "versions": about})
-        spent += job.cost
-        report(spent / total)
-
+    spent = total - sum(point.cost for point in missing.values())
     report(spent / total)
-    run_jobs(missing, done, min(workers, len(missing)), scheduler)
+    for key, arrays in results(calls, workers, scheduler):
+        point = wanted[key]
+        directory.write(key, arrays, {"task": point.task, "settings": point.settings, "versions": about})
+        spent += point.cost
+        report(spent / total)
     return len(missing)
 
 

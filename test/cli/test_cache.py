@@ -9,13 +9,8 @@ import pytest
 from leg_wear_monitor.cli import kernels
 from leg_wear_monitor.cli.common import compilation, is_compiled
 from leg_wear_monitor.compiled import kernel
-from leg_wear_monitor.workers import run_here
 
 pytestmark = pytest.mark.plain
-
-
-def nothing() -> None:
-    """A job that is done at once."""
 
 
 def test_it_prints_where_and_how_much(run, place):
@@ -48,8 +43,7 @@ def test_nothing_is_removed_where_no_place_is_safe(run, monkeypatch):
 
 
 def test_what_was_filled_is_not_compiled_again(run, place, monkeypatch):
-    monkeypatch.setattr(kernels, "_JOBS", tuple(kernels.Job(name, nothing, ()) for name in "ab"))
-    monkeypatch.setattr(kernels, "run_jobs", lambda jobs, done, _: run_here(jobs, done))
+    monkeypatch.setattr(kernels, "_CALLS", {"nothing": int})
     result = run("cache", "--fill")
     assert result.exit_code == 0
     assert result.stdout.startswith(f"place: {place}\ntotal: ")
@@ -60,7 +54,7 @@ def test_what_was_filled_is_not_compiled_again(run, place, monkeypatch):
 @pytest.mark.slow
 def test_after_a_fill_nothing_is_compiled(run, place):
     assert run("cache", "--fill").exit_code == 0
-    line = "import leg_wear_monitor.cli.kernels as kernels; [job.run() for job in kernels._JOBS]"
+    line = "import leg_wear_monitor.cli.kernels as kernels; [call() for call in kernels._CALLS.values()]"
     before = sorted(file for file in place.rglob("*.nbc"))
     subprocess.run([sys.executable, "-c", line], check=True, cwd=Path(__file__).parents[2])
     assert before and sorted(file for file in place.rglob("*.nbc")) == before

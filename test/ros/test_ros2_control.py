@@ -218,7 +218,7 @@ def test_the_stand_ins_interfaces_are_read_by_the_library(stand_ins: Any) -> Non
 
 def test_a_node_needs_no_library_that_no_ros_package_has() -> None:
     """Without a recording: Ubuntu has packages for all others."""
-    only_of_recordings = ("apsw", "loky", "lz4", "mcap", "rosbags", "zstandard")
+    only_of_recordings = ("apsw", "joblib", "lz4", "mcap", "rosbags", "zstandard")
     text = (
         f"import sys; sys.modules.update(dict.fromkeys({only_of_recordings}))\n"
         "import leg_wear_monitor.ros.gait_publisher, leg_wear_monitor.ros.monitor_node"

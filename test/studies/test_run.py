@@ -1,24 +1,16 @@
 """A study's points are computed once, kept whole, and the same however and wherever they are computed."""
 
 import json
-import os
-import signal
-import sys
-import time
-from concurrent.futures.process import BrokenProcessPool
 
 import attrs
-import loky
 import numpy as np
 import pytest
 
-from leg_wear_monitor import workers
-from leg_wear_monitor.errors import ConfigError, LegWearError
+from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.studies import execution
 from leg_wear_monitor.studies import leg_tasks as tasks
 from leg_wear_monitor.studies.execution import StudyDirectory, run_study
 from leg_wear_monitor.studies.results import load_results
-from leg_wear_monitor.workers import Job
 
 
 def files(directory):
@@ -118,54 +110,3 @@ def test_a_point_that_is_asked_for_twice_is_computed_once(tiny, tmp_path):
     """A single place is also all places at once."""
     assert run_study("multi", tiny("multi", sets=[["G"]]), tmp_path) == 1
     assert [point.label for point, _ in load_results(tmp_path).of("response")] == ["G", "G"]
-
-
-@pytest.mark.skipif("MOVED_STARTS" in os.environ, reason="the starts of other processes are not moved")
-@pytest.mark.usefixtures("traps")
-def test_processes_give_the_same_results_to_the_bit_though_one_dies(
-    sweep, uninterrupted, tmp_path, monkeypatch
-):
-    """The pool is broken once, as by a lack of memory; what was done by then stays done."""
-    began = []
-
-    class Breaking(loky.ProcessPoolExecutor):
-        def submit(self, *arguments):
-            future = super().submit(*arguments)
-            if not began:
-                began.append(True)
-                while not self._processes:
-                    time.sleep(0.01)
-                os.kill(next(iter(self._processes)), signal.SIGKILL)
-            return future
-
-    monkeypatch.setattr(loky, "ProcessPoolExecutor", Breaking)
-    fractions = []
-    assert run_study("size", sweep, tmp_path, workers=2, progress=fractions.append) == 3
-    assert files(tmp_path) == files(uninterrupted)
-    assert fractions == sorted(fractions)
-    assert (fractions[0], fractions[-1]) == (0.0, pytest.approx(1.0))
-
-
-@pytest.mark.plain
-def test_where_there_is_no_pool_a_study_says_what_to_install(monkeypatch):
-    monkeypatch.setitem(sys.modules, "loky", None)
-    with pytest.raises(ConfigError, match=r"--workers: 2: needs loky \(pip install loky\), expected 1"):
-        workers.run_in_processes([], 2, lambda *_: None)
-
-
-@pytest.mark.plain
-def test_workers_that_keep_dying_end_the_study(monkeypatch):
-    class Broken:
-        def __init__(self, *_, **__):
-            pass
-
-        def submit(self, *_):
-            raise BrokenProcessPool
-
-        def shutdown(self, **_):
-            pass
-
-    monkeypatch.setattr(loky, "ProcessPoolExecutor", Broken)
-    job = Job("k", print, ())
-    with pytest.raises(LegWearError, match="worker processes died 3 times; finished results are kept"):
-        workers.run_in_processes([job], 2, lambda *_: None)

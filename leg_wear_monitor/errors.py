@@ -103,7 +103,7 @@ def system_asked(
 # Optional modules.
 
 
-_EXTRAS = {"lz4": "bags", "mcap": "bags", "rosbags": "bags", "tornado": "dashboard", "zstandard": "bags"}
+_EXTRAS = dict.fromkeys(("lz4", "mcap", "pyarrow", "rosbags", "zstandard"), "bags") | {"tornado": "dashboard"}
 """Optional modules, and the extra of this package that installs each."""
 
 

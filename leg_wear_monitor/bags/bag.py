@@ -26,9 +26,10 @@ from leg_wear_monitor.bags.findings import (
     irregular_kind,
     open_regular,
 )
-from leg_wear_monitor.bags.mcap_file import Due, McapFile, Piece
-from leg_wear_monitor.bags.mcap_layout import ZSTD_MAGIC, Channel, expand_message, expanded
-from leg_wear_monitor.bags.table_file import CSV, PARQUET, TableFile
+from leg_wear_monitor.bags.mcap_file import McapFile
+from leg_wear_monitor.bags.mcap_layout import ZSTD_MAGIC, expand_message, expanded
+from leg_wear_monitor.bags.piece import Channel, Due, Piece
+from leg_wear_monitor.bags.table_layout import CSV, PARQUET
 from leg_wear_monitor.configuration.strict import events_with_depth
 from leg_wear_monitor.errors import printable, system_asked
 from leg_wear_monitor.messages.streams import Stream, streams_of
@@ -497,12 +498,13 @@ def assign(
 def _open(bag_file: BagFile, config: MonitorConfig, budget: Budget, stack: ExitStack) -> OpenFile:
     path = bag_file.path
     try:
-        if bag_file.storage == IN_MEMORY:
-            return TableFile(path, bag_file.table, bag_file.storage, config, budget)
         if bag_file.compressed:
             path = _expanded_file(bag_file, budget, stack)
         if bag_file.storage in TABLES:
-            content = stack.enter_context(open_regular(path))
+            from leg_wear_monitor.bags.table_file import TableFile  # pyarrow takes a quarter of a second
+
+            is_file = bag_file.storage != IN_MEMORY
+            content = stack.enter_context(open_regular(path)) if is_file else bag_file.table
             return TableFile(bag_file.path, content, bag_file.storage, config, budget)
         if bag_file.storage == MCAP:
             return McapFile(bag_file.path, stack.enter_context(open_regular(path)), budget)

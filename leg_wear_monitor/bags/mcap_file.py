@@ -1,7 +1,7 @@
 """Reading of MCAP files: by their index, or by a sequential scan if the index is missing or damaged."""
 
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import IO, Any
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from leg_wear_monitor.bags import mcap_layout
 from leg_wear_monitor.bags.budget import Budget
 from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError, Severity
+from leg_wear_monitor.bags.piece import Channel, Due, Piece
 from leg_wear_monitor.messages.cdr import MESSAGE
 
 # The scan of a file without a usable index, from the first to the last readable record. Its result is a
@@ -161,42 +162,6 @@ _BYTES_PER_MESSAGE = 400  # memory overhead of decoding one message into a sampl
 _MOST_FINDINGS = 1000  # of a file, so that damage everywhere does not fill the memory
 
 
-@attrs.frozen(eq=False)
-class Piece:
-    """Messages that are read in one step.
-
-    Attributes
-    ----------
-    start_ns : int
-        Lower bound of the log times in this piece and all later pieces of the file [ns].
-    data : (bytes,) array of uint8
-    messages : (n,) array of MESSAGE
-    stored : int
-        Bytes that the piece occupies in the file.
-    """
-
-    start_ns: int
-    data: NDArray[np.uint8]
-    messages: NDArray[np.void]
-    stored: int
-
-
-@attrs.frozen(eq=False)
-class Due:
-    """A piece that is not loaded yet, so that a merge of many files has few pieces in memory.
-
-    Attributes
-    ----------
-    start_ns : int
-        `Piece.start_ns` of the piece [ns].
-    load : callable
-        Returns the piece, or None if it is damaged. Call it before requesting the next piece.
-    """
-
-    start_ns: int
-    load: Callable[[], Piece | None]
-
-
 class McapFile:
     """An open MCAP file; its faults are listed in `findings`.
 
@@ -230,7 +195,7 @@ class McapFile:
         self._check_data()
 
     @property
-    def channels(self) -> dict[int, mcap_layout.Channel]:
+    def channels(self) -> dict[int, Channel]:
         """Channels of the file by channel number."""
         return self.layout.channels
 

@@ -18,6 +18,7 @@ from mcap.stream_reader import StreamReader
 
 from leg_wear_monitor.bags.budget import Budget
 from leg_wear_monitor.bags.findings import DamageError
+from leg_wear_monitor.bags.piece import Channel
 from leg_wear_monitor.compiled.kernel import entry, kernel
 
 # Decompression of untrusted data: declared lengths and checksums are verified, sizes are bounded.
@@ -191,17 +192,6 @@ _OF_USE = (ChannelRecord, ChunkIndex, Schema, Statistics)
 _CHUNK_HEAD = struct.Struct("<QQQI")
 _FOOTER = struct.Struct("<BQQQI")
 _DATA_END = struct.Struct("<BQI")
-
-
-@attrs.frozen
-class Channel:
-    """Topic, type and schema of a channel in one file; unknown texts are empty."""
-
-    topic: str
-    type: str
-    encoding: str
-    definition: str
-    definition_encoding: str
 
 
 @attrs.frozen

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from itertools import repeat
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
@@ -14,8 +15,7 @@ from numpy.typing import NDArray
 from leg_wear_monitor.bags import bag
 from leg_wear_monitor.bags.budget import DEFAULT_MB, Budget
 from leg_wear_monitor.bags.findings import Clocks, Finding, RecordingError, Severity, reading
-from leg_wear_monitor.bags.mcap_file import Piece
-from leg_wear_monitor.bags.table_file import TableFile
+from leg_wear_monitor.bags.piece import Piece
 from leg_wear_monitor.bags.table_layout import (
     CRANK_SPEED,
     DRIVE_TORQUE,
@@ -34,6 +34,9 @@ from leg_wear_monitor.messages.streams import INTERFACES, JOINT_STATE
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, MISSING_JOINT, NO_FAULT, NOT_FINITE, ZERO_STAMP, Samples
+
+if TYPE_CHECKING:
+    from leg_wear_monitor.bags.table_file import TableFile
 
 # Check that several files record one leg: same topics, and equal crank angles at equal times.
 
@@ -505,6 +508,8 @@ def understood(path: Path, config: MonitorConfig) -> tuple[list[str], list[Findi
     RecordingError
         If the table cannot be read.
     """
+    from leg_wear_monitor.bags.table_file import TableFile
+
     files, findings = bag.find_files([path])
     with ExitStack() as stack:
         (source,), _ = bag.open_sources(files, config, Budget(), stack)
@@ -518,7 +523,7 @@ def understood(path: Path, config: MonitorConfig) -> tuple[list[str], list[Findi
         return [*lines, *_others(table, columns)], findings + table.findings
 
 
-def _time(table: TableFile, columns: tuple[Column, ...]) -> str:
+def _time(table: "TableFile", columns: tuple[Column, ...]) -> str:
     counts = table.counts
     seconds = ((counts.last_ns or 0) - (counts.first_ns or 0)) * 1.0e-9
     rate = f", {(counts.rows - 1) / seconds:.4g} rows a second" if seconds > 0.0 else ""
@@ -526,7 +531,7 @@ def _time(table: TableFile, columns: tuple[Column, ...]) -> str:
     return f"table of {counts.rows} rows over {seconds:.6g} s{rate}; {of}"
 
 
-def _column(table: TableFile, column: Column) -> str:
+def _column(table: "TableFile", column: Column) -> str:
     counts, unit = table.counts, _SI.get(column.key, "rad")
     number = counts.measured.get(column.key, 0)
     found = f"{number} values"
@@ -537,7 +542,7 @@ def _column(table: TableFile, column: Column) -> str:
     return f"{column.key} {_named(column)}: {found}"
 
 
-def _others(table: TableFile, columns: tuple[Column, ...]) -> list[str]:
+def _others(table: "TableFile", columns: tuple[Column, ...]) -> list[str]:
     read = {column.name for column in columns}
     others = [printable(name, 100) for name in table.names if name not in read]
     return [f"not read: {', '.join(others)}"] if others else []

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from leg_wear_monitor.bags.bag import Recordable, Source, check_channel, find_files, open_sources
 from leg_wear_monitor.bags.budget import Budget
 from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
-from leg_wear_monitor.bags.mcap_layout import Channel
+from leg_wear_monitor.bags.piece import Channel
 from leg_wear_monitor.estimate.joint_motion import Series, series
 from leg_wear_monitor.messages import outputs
 from leg_wear_monitor.messages.cdr import Decoder

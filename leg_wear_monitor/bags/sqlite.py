@@ -15,8 +15,7 @@ import numpy as np
 
 from leg_wear_monitor.bags.budget import Budget
 from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError, Severity, open_regular
-from leg_wear_monitor.bags.mcap_file import Due, Piece
-from leg_wear_monitor.bags.mcap_layout import Channel
+from leg_wear_monitor.bags.piece import Channel, Due, Piece
 from leg_wear_monitor.messages.cdr import MESSAGE
 
 # Opening of an untrusted database: nothing is written to the file, no code in it (views, triggers, virtual

@@ -1,8 +1,9 @@
 """Tables as recordings: their rows, counted, as messages of the streams."""
 
 from collections.abc import Iterator, Sequence
+from itertools import chain
 from pathlib import Path
-from typing import IO, Any, Protocol
+from typing import IO, Any
 
 import attrs
 import numpy as np
@@ -10,8 +11,7 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.bags.budget import Budget
 from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
-from leg_wear_monitor.bags.mcap_file import Due, Piece
-from leg_wear_monitor.bags.mcap_layout import Channel
+from leg_wear_monitor.bags.piece import Channel, Due, Piece
 from leg_wear_monitor.bags.table_layout import (
     CRANK_ANGLE,
     CRANK_SPEED,
@@ -21,7 +21,7 @@ from leg_wear_monitor.bags.table_layout import (
     Rows,
     unit_doubts,
 )
-from leg_wear_monitor.bags.table_rows import CsvFile
+from leg_wear_monitor.bags.table_rows import TableRows, open_table
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.messages import encode
 from leg_wear_monitor.messages.cdr import MESSAGE
@@ -289,19 +289,6 @@ def _piece(
 # One table (CSV, Parquet, data frame) as a file of a recording; its faults are listed in `findings`.
 
 
-CSV, PARQUET = ".csv", ".parquet"
-
-
-class Table(Protocol):
-    """Common interface of the kinds of tables."""
-
-    size: int
-    names: list[str]
-
-    def parts(self) -> Iterator[Rows]:
-        """All sound rows, block by block, from the first one."""
-
-
 class TableFile:
     """An open table.
 
@@ -326,41 +313,39 @@ class TableFile:
         self, path: Path, content: IO[bytes] | Any, storage: str, config: MonitorConfig, budget: Budget
     ) -> None:
         self.path, self._config, self._encoder = path, config, Encoder(config)
-        self._open = lambda findings: _opened(path, content, storage, config, budget, findings)
-        self._start_ns = self._check_start()
         self.findings: list[Finding] = []
-        self._table = self._open(self.findings)
-        self.size = self._table.size
-        self.counts = Counts(config, self._encoder.is_effort, "line" if storage == CSV else "row")
+        source = open_table(path, content, storage, budget)
+        self.size, self.names = source.size, source.names
+        self.counts = Counts(config, self._encoder.is_effort, source.word)
+        parts = TableRows(path, source, config, self.findings).parts()
+        first = next((rows for rows in parts if len(rows.line)), None)
+        if first is None:
+            why = next((f"; {finding.text}" for finding in self.findings), "")
+            raise RecordingError(str(path), "", f"has no row that can be read{why}")
+        self.findings += [Finding(path, text) for text in unit_doubts(first, config)]
+        self._parts, self._start_ns = chain([first], parts), int(first.stamp_ns[0])
 
     @property
     def channels(self) -> dict[int, Channel]:
         """Channels by channel number."""
         return self._encoder.channels
 
-    @property
-    def names(self) -> list[str]:
-        """Names of all columns."""
-        return self._table.names
-
     def pieces(self, types: dict[int, int]) -> Iterator[Due]:
-        """Pieces of the requested channels; lines that cannot be read are skipped and become findings.
+        """Pieces of the requested channels, once; lines that cannot be read become findings.
 
         Parameters
         ----------
         types : dict
             Stream code by channel number.
         """
-        path, parts, last_ns, is_over = self.path, self._table.parts(), self._start_ns, False
+        last_ns, is_over = self._start_ns, False
 
         def load() -> Piece | None:
             nonlocal last_ns, is_over
-            rows = next(parts, None)
+            rows = next(self._parts, None)
             if rows is None:
                 is_over = True
                 return None
-            if self.counts.rows == 0:
-                self.findings += [Finding(path, text) for text in unit_doubts(rows, self._config)]
             log_time_ns = _order(rows.stamp_ns, last_ns, self.counts.last_ns)
             self.counts.add(rows)
             last_ns = int(log_time_ns[-1]) if len(log_time_ns) else last_ns
@@ -368,31 +353,7 @@ class TableFile:
 
         while not is_over:
             yield Due(last_ns, load)
-        self.findings += [Finding(path, text, severity) for text, severity in self.counts.findings()]
-
-    def _check_start(self) -> int:
-        """Stamp of the first sound row [ns]; the first part decides whether anything can be read."""
-        found: list[Finding] = []
-        table = self._open(found)
-        rows = next(table.parts(), None)
-        if rows is not None and len(rows.stamp_ns):
-            return int(rows.stamp_ns[0])
-        why = next((f"; {finding.text}" for finding in found), "")
-        raise RecordingError(str(self.path), "", f"has no row that can be read{why}")
-
-
-def _opened(
-    path: Path, content: Any, storage: str, config: MonitorConfig, budget: Budget, findings: list[Finding]
-) -> Table:
-    if storage == CSV:
-        return CsvFile(path, content, config, budget, findings)
-    if storage == PARQUET:
-        from leg_wear_monitor.bags.parquet import ParquetFile
-
-        return ParquetFile(path, content, config, budget, findings)
-    from leg_wear_monitor.bags.table_rows import Frame
-
-    return Frame(path, content, config, findings)
+        self.findings += [Finding(self.path, text, severity) for text, severity in self.counts.findings()]
 
 
 def _order(stamp_ns: NDArray[np.int64], last_ns: int, last_stamp_ns: int | None) -> NDArray[np.int64]:

@@ -1,15 +1,13 @@
-"""Layout of tables: columns, rows, stamps, units that are plausible, damage."""
+"""Layout of tables: columns, rows, dates, and hints at columns that are likely in a different unit."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from decimal import Decimal
-from pathlib import Path
+from collections.abc import Iterator, Sequence
 
 import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.bags.findings import Finding, RecordingError
+from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
@@ -20,6 +18,7 @@ from leg_wear_monitor.twin.sample import CONTACT, NO_LOAD, WRENCH
 # Which columns of a table are read, in which units, and which of them it has.
 
 
+CSV, PARQUET = ".csv", ".parquet"
 STAMP, CRANK_ANGLE, CRANK_SPEED, DRIVE_TORQUE = "stamp", "crank_angle", "crank_speed", "drive_torque"
 FOOT_LOAD, FOOT_LOAD_ALONG = "foot_load", "foot_load_along"
 _MAY_BE_NONE = (CRANK_SPEED, DRIVE_TORQUE, FOOT_LOAD, FOOT_LOAD_ALONG)
@@ -139,103 +138,11 @@ def _listed(names: Sequence[str]) -> str:
     return ", ".join(printable(name, 100) for name in names[:_MOST_LISTED]) + more
 
 
-# Lines or rows of a table that cannot be read: the first ones are reported, the rest is counted.
-
-
-_MOST = 5
-
-
-@attrs.define
-class LostLines:
-    """Findings about lost lines of a file.
-
-    Attributes
-    ----------
-    path : pathlib.Path
-    findings : list of Finding
-        Where the findings go.
-    word : str
-        What a line is called: ``line`` or ``row``.
-    """
-
-    path: Path
-    findings: list[Finding]
-    word: str = "line"
-    count: int = attrs.field(init=False, default=0)
-
-    def add(self, line: NDArray[np.int64], lost: NDArray[np.int64], fault: Callable[[int], str]) -> None:
-        """Report what is wrong with the lost ones among some lines, by their indices, and count them."""
-        for k in lost[: max(0, _MOST - self.count)].tolist():
-            self.findings.append(Finding(self.path, f"{self.word} {line[k]} is lost: {fault(k)}"))
-        self.count += len(lost)
-
-    def close(self) -> None:
-        """Report how many more there are; after the last line."""
-        if self.count > _MOST:
-            self.findings.append(Finding(self.path, f"{self.count - _MOST} more {self.word}s are lost"))
-
-
-# Times of the rows of a table as stamps, exact to the nanosecond where the table is.
+# Dates and times as stamps, exact to the nanosecond.
 
 
 MOST_NS = (2**31 - 1) * 1_000_000_000  # the seconds of a ROS stamp are an int32: until 2038
-_EXACT_NS = 1.0e15  # below, a double of the time has the nanosecond
 _UTC = ("Z", "+00:00", "+0000")
-
-
-@attrs.frozen
-class Clock:
-    """From the times of a table to stamps.
-
-    Parameters
-    ----------
-    unit : str
-        A key of `STAMPS`, or `DATE`.
-    start_ns : int
-        Stamp of time 0 [ns]; not for dates.
-    """
-
-    unit: str
-    start_ns: int
-
-    @classmethod
-    def of(cls, table: tables.TableInput) -> "Clock":
-        """The clock that the parameters declare."""
-        unit = table.units.stamp
-        return cls(unit, 0 if unit == tables.DATE else table.start_ns)
-
-    def of_numbers(self, times: NDArray[np.number]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Stamps [ns] of times in the clock's unit, and whether each is within what a stamp can be."""
-        if times.dtype.kind in "iu":
-            scale = 10 ** tables.STAMPS[self.unit]
-            within = (times <= MOST_NS // scale) & (times >= -(MOST_NS // scale))
-            stamps = np.where(within, times, 0).astype(np.int64) * scale
-            return self._started(stamps, np.asarray(within))
-        values = np.asarray(times, float)
-        with np.errstate(invalid="ignore"):
-            within = np.abs(values) <= MOST_NS / 10.0 ** tables.STAMPS[self.unit]
-        whole = np.floor(np.where(within, values, 0.0))
-        rest = np.where(within, values, 0.0) - whole
-        scale = 10 ** tables.STAMPS[self.unit]
-        stamps = whole.astype(np.int64) * scale + np.rint(rest * scale).astype(np.int64)
-        return self._started(stamps, within)
-
-    def of_texts(self, texts: Sequence[str], times: Floats) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Stamps [ns] of times that are also there as texts, and whether each is within its range."""
-        stamps, within = self.of_numbers(times)
-        power = tables.STAMPS[self.unit]
-        if np.abs(times[within]).max(initial=0.0) * 10.0**power >= _EXACT_NS:
-            # below 1 a double has the nanosecond, and the text may have an exponent that no Decimal takes
-            for k in np.flatnonzero(within & (np.abs(times) >= 1.0)).tolist():
-                exact = int(Decimal(texts[k].strip().replace("_", "")).scaleb(power).to_integral_value())
-                stamps[k] = exact + self.start_ns
-        return stamps, within
-
-    def _started(
-        self, stamps: NDArray[np.int64], within: NDArray[np.bool_]
-    ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        stamps = stamps + self.start_ns
-        return stamps, within & (np.abs(stamps) <= MOST_NS)
 
 
 def dates(texts: Sequence[str]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:

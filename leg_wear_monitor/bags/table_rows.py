@@ -1,425 +1,527 @@
-"""Rows of tables: lines of CSV, arrays, data frames."""
+"""Rows of tables: CSV, Parquet, arrays and data frames, read by pyarrow, as numbers in SI units."""
 
 import csv
+import io
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from decimal import Decimal
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, Protocol
 
+import attrs
 import numpy as np
+import pyarrow as pa
+import pyarrow.compute
+import pyarrow.csv
+import pyarrow.parquet
 from numpy.typing import NDArray
 
-from leg_wear_monitor.bags import table_layout
 from leg_wear_monitor.bags.budget import Budget
-from leg_wear_monitor.bags.findings import Finding, RecordingError
+from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError
+from leg_wear_monitor.bags.table_layout import (
+    CSV,
+    MOST_NS,
+    PARQUET,
+    STAMP,
+    Column,
+    Rows,
+    columns_of,
+    dates,
+    places,
+)
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.config.tables import DATE, TableInput
+from leg_wear_monitor.monitor.config.tables import DATE, STAMPS
 
-# Lines of a CSV file in blocks, in bounded memory, whatever the file contains.
-
-
-_UTF8_MARK = b"\xef\xbb\xbf"
-_UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
-_SEPARATORS = ",;\t"
+_ROWS = 65536
+_Bools = NDArray[np.bool_]
+_Stamps = NDArray[np.int64]
 
 
-def blocks(
-    path: Path, file: IO[bytes], size: int, findings: list[Finding]
-) -> Iterator[tuple[list[str], int, int]]:
-    """Complete lines, about `size` bytes at a time; what is not a complete line becomes a finding.
+@attrs.frozen(eq=False)
+class Part:
+    """Some rows as the table has them.
 
-    Yields
-    ------
-    texts : list of str
-        Lines without line breaks.
-    first : int
-        Number of the first one, from 1.
+    Attributes
+    ----------
+    line : (n,) array of int
+        Line or row in the table, from 1.
+    columns : list of pyarrow.Array
+        Texts, numbers or dates (n,) of each column that is read. A null was not measured.
     stored : int
-        Their bytes in the file.
+        Bytes that the rows occupy in the file.
     """
-    file.seek(0)
-    number, rest, at = 1, b"", 0
-    while part := file.read(size):
-        text, found, rest = (rest + part).rpartition(b"\n")
-        if found:
-            if not at:
-                text = text.removeprefix(_UTF8_MARK)
-            texts = text.decode("utf-8", "surrogateescape").split("\n")
-            yield texts, number, len(text) + 1
-            number += len(texts)
-        elif len(rest) >= size:
-            findings.append(
-                Finding(path, f"line {number} has no end within {size} bytes: all from it on is lost")
-            )
-            return
-        at += len(part)
-    if rest.strip():
-        fault = "it has no line break at its end, so it may be cut short"
-        findings.append(Finding(path, f"line {number} is lost: {fault}"))
+
+    line: NDArray[np.int64]
+    columns: list[Any]
+    stored: int
 
 
-def separator_of(path: Path, header: str) -> str:
-    """The separator of the cells: the most frequent of comma, semicolon and tab, else the space.
+class Source(Protocol):
+    """A table of any kind.
 
-    Raises
-    ------
-    RecordingError
-        If the file is not a text in UTF-8.
+    Attributes
+    ----------
+    names : list of str
+        Names of all columns.
+    size : int
+        Bytes of the table.
+    word : str
+        Name of a row in messages: ``line`` or ``row``.
+    header : int
+        Lines before the first row.
     """
-    if header.encode("utf-8", "surrogateescape").startswith(_UTF16_MARKS) or "\0" in header:
-        raise RecordingError(str(path), "", "is not a text in UTF-8, expected a CSV file in UTF-8")
-    best = max(_SEPARATORS, key=header.count)
-    return best if best in header else " "
+
+    names: list[str]
+    size: int
+    word: str
+    header: int
+
+    def parts(self, columns: list[int], lost: "Lost") -> Iterator[Part]:
+        """Rows of the columns with these indices, part by part."""
 
 
-def is_number(text: str) -> bool:
-    """Whether a cell is a number."""
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+class Lost:
+    """Findings about rows that cannot be read: the first five are listed, the others counted."""
+
+    MOST = 5
+
+    def __init__(self, path: Path, word: str, findings: list[Finding]) -> None:
+        self._path, self._word, self._findings, self._count = path, word, findings, 0
+
+    def add(self, lines: Sequence[int], fault: Callable[[int], str]) -> None:
+        """Report rows, and what is wrong with each by its index."""
+        for k, line in enumerate(lines):
+            if self._count + k >= self.MOST:
+                break
+            self.tell(f"{self._word} {line} is lost: {fault(k)}")
+        self._count += len(lines)
+
+    def tell(self, text: str) -> None:
+        """Report a loss of any kind."""
+        self._findings.append(Finding(self._path, text))
+
+    def close(self) -> None:
+        """Report how many rows are not listed."""
+        if self._count > self.MOST:
+            self.tell(f"{self._count - self.MOST} more {self._word}s are lost")
 
 
-# CSV files: rows by the standard library's reader, numbers correctly rounded, faults by line.
-
-
-_BLOCK = 2**21
-_OF_A_BYTE = 32  # memory of cells, rows and samples per byte of text
-_Row = list[str]
-
-
-class CsvFile:
-    """An open CSV file.
+def open_table(path: Path, content: IO[bytes] | Any, storage: str, budget: Budget) -> Source:
+    """Open a table.
 
     Parameters
     ----------
     path : pathlib.Path
-        Name of the file in findings and errors.
-    file : binary file
-        Seekable.
-    config : MonitorConfig
+        Name of the table in errors.
+    content : binary file, mapping of arrays or data frame
+        A file is seekable.
+    storage : str
+        `CSV`, `PARQUET`, or empty for columns in memory.
     budget : Budget
+
+    Raises
+    ------
+    RecordingError
+        If it is no such table.
+    """
+    if storage == CSV:
+        return _Csv(path, content, budget)
+    return _Parquet(path, content, budget) if storage == PARQUET else _Frame(path, content)
+
+
+# Rows in SI units, from texts, numbers or dates.
+
+
+class TableRows:
+    """The columns of a table that the configuration names.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+    source : Source
+    config : MonitorConfig
     findings : list of Finding
         Where the findings go.
 
     Raises
     ------
     RecordingError
-        If the file is empty, is no text, or lacks a column.
+        If a column is missing.
     """
 
-    def __init__(
-        self, path: Path, file: IO[bytes], config: MonitorConfig, budget: Budget, findings: list[Finding]
-    ) -> None:
-        self._path, self._file, self._findings = path, file, findings
-        self.size = file.seek(0, 2)
-        self._block = min(_BLOCK, budget.part_limit // _OF_A_BYTE)
-        self._config, self._clock = config.input, table_layout.Clock.of(config.input)
-        self._lost = table_layout.LostLines(path, findings)
-        if not self.size:
-            raise RecordingError(str(path), "", "is empty, expected a line with the names of the columns")
-        first = next(blocks(path, file, self._block, []), None)
-        if first is None:
-            raise RecordingError(str(path), "", "has no complete line, expected the names of the columns")
-        self._separator = separator_of(path, first[0][0])
-        names = self._names(first[0][0])
-        self._has_header = not all(map(is_number, names))
-        self.names = names if self._has_header else [str(k + 1) for k in range(len(names))]
-        self._columns = table_layout.columns_of(config)
-        self._places = table_layout.places(str(path), self.names, self._columns)
+    def __init__(self, path: Path, source: Source, config: MonitorConfig, findings: list[Finding]) -> None:
+        self._path, self._source, self._table = path, source, config.input
+        self._columns = columns_of(config)
+        self._places = places(str(path), source.names, self._columns)
+        self._lost = Lost(path, source.word, findings)
 
-    def parts(self) -> Iterator[table_layout.Rows]:
-        """All sound rows, block by block."""
-        for texts, first, stored in blocks(self._path, self._file, self._block, self._findings):
-            rows, line = self._rows(texts), first + np.arange(len(texts))
-            skipped = 1 if first == 1 and self._has_header else 0
-            yield self._converted(rows[skipped:], line[skipped:], stored)
+    def parts(self) -> Iterator[Rows]:
+        """All sound rows, part by part.
+
+        Raises
+        ------
+        RecordingError
+            If a column has neither numbers nor texts, or the time does not fit its unit.
+        """
+        for part in self._source.parts(self._places, self._lost):
+            yield self._rows(part)
         self._lost.close()
 
-    def _names(self, header: str) -> list[str]:
-        """Names of the columns; numpy.savetxt writes them behind a number sign."""
-        cells = next(self._reader([header.removeprefix("#").strip()]), [])
-        return [cell.strip() for cell in cells]
-
-    def _reader(self, texts: Sequence[str]) -> "Iterator[_Row]":
-        return csv.reader(texts, delimiter=self._separator, skipinitialspace=self._separator == " ")
-
-    def _rows(self, texts: list[str]) -> list[_Row]:
-        """Cells of lines."""
-        try:
-            rows = list(self._reader(texts))
-        except csv.Error:
-            rows = []
-        # otherwise, a cell in quotes contains a line break
-        return rows if len(rows) == len(texts) else [self._one(text) for text in texts]
-
-    def _one(self, text: str) -> _Row:
-        try:
-            return next(self._reader([text]), [])
-        except csv.Error:
-            return [text]
-
-    def _converted(self, rows: list[_Row], line: NDArray[np.int64], stored: int) -> table_layout.Rows:
-        """Rows in SI units; those that cannot be read are reported."""
-        rows, line = self._complete(rows, line)
-        sound = np.ones(len(rows), bool)
+    def _rows(self, part: Part) -> Rows:
+        sound = np.ones(len(part.line), bool)
         values, measured = {}, {}
-        stamps = self._regular(line)
-        for column, place in zip(self._columns, self._places, strict=True):
-            texts = [row[place] for row in rows]
-            if column.key == table_layout.STAMP:
-                stamps = self._stamps(column, texts, line, sound)
-                continue
-            found, is_there, bad = _numbers(texts)
-            self._report(column, texts, line, bad & sound)
-            sound &= ~bad
-            values[column.key], measured[column.key] = column.to_si(found), is_there
-        every = table_layout.Rows(line, stamps, values, measured, stored)
-        return every if sound.all() else every.part(sound)
+        stamps = self._regular(part.line)
+        for column, array in zip(self._columns, part.columns, strict=True):
+            if column.key == STAMP:
+                stamps, good = self._stamps(column, array)
+            else:
+                found, there, good = self._numbers(column, array)
+                values[column.key], measured[column.key] = column.to_si(found), there
+            self._report(column, array, part.line, np.flatnonzero(sound & ~good))
+            sound &= good
+        rows = Rows(part.line, stamps, values, measured, part.stored)
+        return rows if sound.all() else rows.part(sound)
 
-    def _complete(self, rows: list[_Row], line: NDArray[np.int64]) -> tuple[list[_Row], NDArray[np.int64]]:
-        """Rows with as many cells as there are columns."""
-        expected = len(self.names)
-        if all(len(row) == expected for row in rows):
-            return rows, line
-        complete = np.array([len(row) == expected for row in rows], bool)
-        is_blank = np.array([not any(cell.strip() for cell in row) for row in rows], bool)
-
+    def _report(self, column: Column, array: Any, line: NDArray[np.int64], bad: NDArray[np.int64]) -> None:
         def fault(k: int) -> str:
-            hint = "; decimal commas?" if self._separator == "," and len(rows[k]) > expected else ""
-            return f"{len(rows[k])} cells, expected {expected}{hint}"
+            cell = array.slice(bad[k], 1)
+            text = _text((cell if _is_text(array.type) else cell.cast(pa.string()))[0].as_py())
+            return f"column {column.name!r}: {_fault(column, text)}"
 
-        self._lost.add(line, np.flatnonzero(~complete & ~is_blank), fault)
-        return [row for row in rows if len(row) == expected], line[complete]
+        self._lost.add(line[bad].tolist(), fault)
 
-    def _regular(self, line: NDArray[np.int64]) -> NDArray[np.int64]:
+    def _regular(self, line: NDArray[np.int64]) -> _Stamps:
         """Stamps of rows without a column of the time."""
-        if not self._config.rate_hz:
+        if not self._table.rate_hz:
             return line
-        row = line - 1 - self._has_header
-        passed = np.rint(row * (1.0e9 / self._config.rate_hz)).astype(np.int64)
-        return np.asarray(passed + self._config.start_ns)
+        row = line - 1 - self._source.header
+        passed = np.rint(row * (1.0e9 / self._table.rate_hz)).astype(np.int64)
+        return np.asarray(passed + self._table.start_ns)
 
-    def _stamps(
-        self, column: table_layout.Column, texts: list[str], line: NDArray[np.int64], sound: NDArray[np.bool_]
-    ) -> NDArray[np.int64]:
-        """Stamps of rows; a row without a time is not sound."""
-        if self._config.units.stamp == DATE:
-            stamps, good = table_layout.dates(texts)
-        else:
-            times, is_there, _ = _numbers(texts)
-            stamps, good = self._clock.of_texts(texts, times)
-            good &= is_there
-        self._report(column, texts, line, ~good & sound)
-        sound &= good
-        return stamps
+    def _numbers(self, column: Column, array: Any) -> tuple[Floats, _Bools, _Bools]:
+        """Numbers of cells, whether each cell has something, and whether that is a number or nothing."""
+        array = array.cast(pa.float64()) if pa.types.is_null(array.type) else array
+        kind = array.type
+        if _is_text(kind):
+            return numbers(array)
+        if not (pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind)):
+            fault = f"column {column.name!r} is of type {kind}, expected numbers"
+            raise RecordingError(str(self._path), column.parameter, fault)
+        there = np.asarray(array.is_valid())
+        return _numpy(array.cast(pa.float64(), safe=False), np.nan), there, np.ones(len(array), bool)
 
-    def _report(
-        self, column: table_layout.Column, texts: list[str], line: NDArray[np.int64], bad: NDArray[np.bool_]
-    ) -> None:
-        self._lost.add(
-            line, np.flatnonzero(bad), lambda k: f"column {column.name!r}: {_fault(column, texts[k])}"
-        )
+    def _stamps(self, column: Column, array: Any) -> tuple[_Stamps, _Bools]:
+        """Stamps [ns] of times, and whether each is one."""
+        array = array.cast(pa.float64()) if pa.types.is_null(array.type) else array
+        kind, unit = array.type, self._table.units.stamp
+        if _is_text(kind):
+            texts = [_text(text) for text in array.to_pylist()] if unit == DATE else []
+            return dates(texts) if unit == DATE else self._of_texts(array, 10 ** STAMPS[unit])
+        is_date = pa.types.is_timestamp(kind) or pa.types.is_date(kind)
+        if not (is_date or pa.types.is_integer(kind) or pa.types.is_floating(kind)):
+            fault = f"column {column.name!r} is of type {kind}, expected numbers or dates"
+            raise RecordingError(str(self._path), column.parameter, fault)
+        if is_date != (unit == DATE):
+            found = "dates" if is_date else "numbers"
+            fault = f"{unit!r} does not fit column {column.name!r}, which has {found}"
+            raise RecordingError(str(self._path), "input.units.stamp", fault)
+        if is_date:
+            return _of_dates(array)
+        wide = array if kind == pa.uint64() else array.cast(_WIDE[pa.types.is_integer(kind)])
+        stamps, within = self._of_numbers(_numpy(wide, 0), 10 ** STAMPS[unit])
+        return stamps, within & np.asarray(array.is_valid())
+
+    def _of_numbers(self, times: NDArray[Any], scale: int) -> tuple[_Stamps, _Bools]:
+        """Stamps of times in a unit of `scale` nanoseconds, exact to what a double has."""
+        with np.errstate(invalid="ignore"):
+            within = np.asarray((times <= MOST_NS // scale) & (times >= -(MOST_NS // scale)))
+        times = np.where(within, times, 0)
+        whole = times.astype(np.int64)
+        # of integers there is no rest, and a double could not hold them
+        rest = np.rint((times - whole) * scale).astype(np.int64) if times.dtype.kind == "f" else 0
+        stamps = whole * scale + rest + self._table.start_ns
+        return stamps, within & (np.abs(stamps) <= MOST_NS)
+
+    def _of_texts(self, texts: Any, scale: int) -> tuple[_Stamps, _Bools]:
+        """Stamps of times as texts: exact to the nanosecond where a double is not."""
+        times, there, _ = numbers(texts)
+        stamps, within = self._of_numbers(times, scale)
+        within &= there
+        if np.abs(times[within]).max(initial=0.0) * scale >= _EXACT_NS:
+            # below 1 a double has the nanosecond, and the text may have an exponent that no Decimal takes
+            for k in np.flatnonzero(within & (np.abs(times) >= 1.0)).tolist():
+                exact = (Decimal(_text(texts[k].as_py()).strip()) * scale).to_integral_value()
+                stamps[k] = int(exact) + self._table.start_ns
+        return stamps, within
 
 
-def _numbers(texts: list[str]) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
-    """Numbers of cells, whether anything is in the cell, and whether that is not a number."""
-    is_there, bad = np.ones(len(texts), bool), np.zeros(len(texts), bool)
+_WIDE = {True: pa.int64(), False: pa.float64()}
+_EXACT_NS = 1.0e15  # below, a double of the time has the nanosecond
+
+
+def numbers(texts: Any) -> tuple[Floats, _Bools, _Bools]:
+    """Numbers of cells of text.
+
+    Parameters
+    ----------
+    texts : (n,) pyarrow.Array of binary or string
+
+    Returns
+    -------
+    values : (n,) array
+        Correctly rounded; NaN without a number.
+    there : (n,) array of bool
+        Whether the cell is not empty.
+    good : (n,) array of bool
+        Whether it is empty or has a number.
+    """
+    there = np.ones(len(texts), bool)
     try:
-        return np.array(list(map(float, texts)), float), is_there, bad
+        return _numpy(texts.cast(pa.float64()), np.nan), there & texts.is_valid().to_numpy(False), there
+    except pa.ArrowInvalid:
+        values, good = np.full(len(texts), np.nan), there.copy()
+    for k, cell in enumerate(texts.to_pylist()):
+        text = _text(cell).strip()
+        there[k] = bool(text)
+        good[k] = not text or _is_number(text)
+        values[k] = float(text) if text and good[k] else np.nan
+    return values, there, good
+
+
+def _of_dates(array: Any) -> tuple[_Stamps, _Bools]:
+    """Stamps [ns] of dates, and whether each is within the range of a stamp."""
+    of = np.datetime64(0, "s")
+    dated = array.cast(pa.timestamp(array.type.unit if pa.types.is_timestamp(array.type) else "s"))
+    times = dated.to_numpy(zero_copy_only=False)
+    seconds = (times.astype("datetime64[s]") - of).astype(np.int64)  # nanoseconds of any year would overflow
+    good = ~np.isnat(times) & (np.abs(seconds) <= MOST_NS // 10**9)
+    return np.where(good, times, of).astype("datetime64[ns]").astype(np.int64), np.asarray(good)
+
+
+def _numpy(array: Any, nothing: float) -> NDArray[Any]:
+    """Values of numbers, `nothing` where one is null."""
+    return np.asarray(array.fill_null(nothing).to_numpy(zero_copy_only=False))
+
+
+def _is_text(kind: Any) -> bool:
+    return bool(pa.types.is_binary(kind) or pa.types.is_string(kind) or pa.types.is_large_string(kind))
+
+
+def _text(cell: Any) -> str:
+    """A cell as text; empty without a value."""
+    if isinstance(cell, bytes):
+        return cell.decode("utf-8", "replace")
+    return "" if cell is None else str(cell)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
     except ValueError:
-        found = np.full(len(texts), np.nan)
-    for k, text in enumerate(texts):
-        is_there[k] = bool(text.strip())
-        bad[k] = is_there[k] and not is_number(text)
-        if is_there[k] and not bad[k]:
-            found[k] = float(text)
-    return found, is_there, bad
+        return False
+    return "_" not in text
 
 
-def _fault(column: table_layout.Column, text: str) -> str:
+def _fault(column: Column, text: str) -> str:
     """What is wrong with a cell."""
     shown, unit = printable(text.strip(), 60), column.unit
-    if column.key == table_layout.STAMP and unit == DATE:
-        return f"{shown!r} is no date and time in UTC, expected one such as 2026-03-01 09:00:00.001"
-    if not shown:
+    if column.key == STAMP and (not shown or shown == "nan"):
         return f"empty, expected a time in {unit}"
-    if is_number(text) and not math.isfinite(float(text)):
+    if column.key == STAMP and unit == DATE:
+        return f"{shown!r} is no date and time in UTC, expected one such as 2026-03-01 09:00:00.001"
+    if _is_number(text) and not math.isfinite(float(text)):
         return f"{shown} is no time, expected one in {unit}"
-    if is_number(text):
+    if _is_number(text):
         return f"{shown} {unit} is no time from 1902 to 2038; another unit (input.units.stamp)?"
-    hint = "; a decimal comma?" if is_number(text.replace(",", ".", 1)) else ""
-    if column.key == table_layout.STAMP and table_layout.dates([text])[1][0]:
+    hint = "; a decimal comma?" if _is_number(text.replace(",", ".", 1)) else ""
+    if column.key == STAMP and dates([text])[1][0]:
         hint = f"; a date ({column.parameter.replace('columns', 'units')}: {DATE})?"
     return f"{shown!r} is not a number, expected one in {unit}{hint}"
 
 
-# Columns that are arrays already (Parquet, data frames) as rows in SI units.
+# CSV files, by pyarrow: the cells stay texts, so that each fault has its line.
 
 
-NUMBERS, TIMES = "iuf", "iufM"
+_BLOCK = 2**21
+_OF_A_BYTE = 32  # memory of cells, rows and samples per byte of text
+_UTF8_MARK, _UTF16_MARKS = b"\xef\xbb\xbf", (b"\xff\xfe", b"\xfe\xff")
+_SEPARATORS = ",;\t"
 
 
-def check_kind(source: str, column: table_layout.Column, kind: str, shown: str, table: TableInput) -> None:
-    """Check that a column has numbers, or the time dates.
+class _Lines(io.RawIOBase):
+    """The complete lines of a file: a last line without a line break may be cut in a number."""
 
-    Parameters
-    ----------
-    source : str
-        File name in errors.
-    column : Column
-    kind : str
-        Its kind as numpy names it, such as ``f``.
-    shown : str
-        Its type, for the message.
-    table : TableInput
+    def __init__(self, file: IO[bytes], end: int) -> None:
+        self._file, self._end = file, end
+        file.seek(0)
 
-    Raises
-    ------
-    RecordingError
-    """
-    expected = "numbers or dates" if column.key == table_layout.STAMP else "numbers"
-    if kind not in (TIMES if column.key == table_layout.STAMP else NUMBERS):
-        fault = f"column {column.name!r} is of type {shown}, expected {expected}"
-        raise RecordingError(source, column.parameter, fault)
-    if column.key == table_layout.STAMP and (table.units.stamp == DATE) != (kind == "M"):
-        found = "dates" if kind == "M" else "numbers"
-        fault = f"{table.units.stamp!r} does not fit column {column.name!r}, which has {found}"
-        raise RecordingError(source, "input.units.stamp", fault)
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        data = self._file.read(min(len(buffer), self._end - self._file.tell()))
+        buffer[: len(data)] = data
+        return len(data)
 
 
-def rows_of(
-    columns: Sequence[table_layout.Column],
-    arrays: Mapping[str, NDArray[np.generic]],
-    measured: Mapping[str, NDArray[np.bool_]],
-    first: int,
-    stored: int,
-    table: TableInput,
-    lost: table_layout.LostLines,
-) -> table_layout.Rows:
-    """Rows in SI units; a row without a time is reported.
-
-    Parameters
-    ----------
-    columns : sequence of Column
-    arrays, measured : mapping
-        Values (n,) and whether there is a value (n,), by the column's key.
-    first : int
-        Rows before these.
-    stored : int
-        Their bytes.
-    table : TableInput
-    lost : LostLines
-    """
-    row = first + np.arange(len(next(iter(arrays.values()))), dtype=np.int64)
-    if table_layout.STAMP in arrays:
-        stamps, good = _stamps(arrays[table_layout.STAMP], table)
-        good &= measured[table_layout.STAMP]
-    else:
-        stamps = table.start_ns + np.rint(row * (1.0e9 / table.rate_hz)).astype(np.int64)
-        good = np.ones(len(row), bool)
-    values = {
-        one.key: one.to_si(arrays[one.key].astype(float)) for one in columns if one.key != table_layout.STAMP
-    }
-    there = {one.key: measured[one.key] for one in columns if one.key != table_layout.STAMP}
-    rows = table_layout.Rows(row + 1, stamps, values, there, stored)
-    if good.all():
-        return rows
-
-    def fault(k: int) -> str:
-        time = arrays[table_layout.STAMP][k]
-        is_there = measured[table_layout.STAMP][k] and not (isinstance(time, np.floating) and np.isnan(time))
-        return f"{time} {table.units.stamp} is no time from 1902 to 2038" if is_there else "has no time"
-
-    lost.add(row + 1, np.flatnonzero(~good), fault)
-    return rows.part(good)
+def _end_of_lines(file: IO[bytes], size: int, block: int) -> int:
+    """Offset behind the last line break of a file."""
+    at = size
+    while at:
+        begin = max(0, at - block)
+        file.seek(begin)
+        if found := file.read(at - begin).rfind(b"\n") + 1:
+            return begin + found
+        at = begin
+    return 0
 
 
-def _stamps(times: NDArray[np.generic], table: TableInput) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Stamps [ns] of times, and whether each can be one."""
-    if times.dtype.kind != "M":
-        return table_layout.Clock.of(table).of_numbers(times)  # type: ignore[arg-type]
-    seconds = times.astype("datetime64[s]").astype(np.int64)  # of any year: nanoseconds would overflow
-    good = np.abs(seconds) <= table_layout.MOST_NS // 10**9
-    stamps = np.where(good, times, np.datetime64(0, "ns")).astype("datetime64[ns]").astype(np.int64)
-    return stamps, np.asarray(good & ~np.isnat(times))
+class _Csv:
+    word = "line"
+
+    def __init__(self, path: Path, file: IO[bytes], budget: Budget) -> None:
+        self._file, self.size = file, file.seek(0, 2)
+        self._block = min(_BLOCK, budget.part_limit // _OF_A_BYTE)
+        self._end = _end_of_lines(file, self.size, self._block)
+        file.seek(0)
+        first = file.readline(self._block)
+        if not self.size:
+            raise RecordingError(str(path), "", "is empty, expected a line with the names of the columns")
+        if first.startswith(_UTF16_MARKS) or b"\0" in first:
+            raise RecordingError(str(path), "", "is not a text in UTF-8, expected a CSV file in UTF-8")
+        if not first.endswith(b"\n"):
+            raise RecordingError(str(path), "", "has no complete line, expected the names of the columns")
+        # numpy.savetxt writes the names behind a number sign
+        header = first.removeprefix(_UTF8_MARK).decode("utf-8", "replace").removeprefix("#").strip()
+        separator = max(_SEPARATORS, key=header.count)
+        self._separator = separator if separator in header else " "
+        names = [cell.strip() for cell in next(csv.reader([header], delimiter=self._separator), [])]
+        self.header = int(not all(map(_is_number, names)))
+        self.names = names if self.header else [str(k + 1) for k in range(len(names))]
+
+    def parts(self, columns: list[int], lost: Lost) -> Iterator[Part]:
+        """Rows of some columns, as texts."""
+        skipped: list[int] = []
+        names = [str(k) for k in range(len(self.names))]
+        wanted = [names[k] for k in columns]
+
+        def skip(row: Any) -> str:
+            skipped.append(row.number)
+            if row.text.strip():
+                more = row.actual_columns > row.expected_columns and self._separator == ","
+                hint = "; decimal commas?" if more else ""
+                if lines := row.text.count("\n"):
+                    hint = f"; a quote has no end on its line, and takes {lines} lines with it"
+                fault = f"{row.actual_columns} cells, expected {row.expected_columns}{hint}"
+                lost.add([row.number], lambda _: fault)
+            return "skip"
+
+        reader = self._reader(names, wanted, skip)
+        line, at = 1 + self.header, 0
+        try:
+            for batch in reader:
+                texts = [batch.column(name) for name in wanted]
+                lines = line + np.arange(batch.num_rows + len(skipped))
+                lines = np.setdiff1d(lines, skipped)[: batch.num_rows]
+                line = int(lines[-1]) + 1 if len(lines) else line
+                filled = np.any([np.asarray(pa.compute.binary_length(each)) > 0 for each in texts], axis=0)
+                at, stored = self._file.tell(), self._file.tell() - at
+                chosen = pa.array(filled)
+                yield Part(lines[filled], [each.filter(chosen) for each in texts], stored)
+        except pa.ArrowInvalid as error:
+            lost.tell(f"all from line {line} on is lost: {one_line(error)}")
+        if self._end < self.size:
+            last = max([line, *(number + 1 for number in skipped)])
+            lost.tell(f"line {last} is lost: it has no line break at its end, so it may be cut short")
+
+    def _reader(self, names: list[str], wanted: list[str], skip: Any) -> Any:
+        read = pyarrow.csv.ReadOptions(
+            use_threads=False, block_size=self._block, skip_rows=self.header, column_names=names
+        )
+        parse = pyarrow.csv.ParseOptions(
+            delimiter=self._separator, ignore_empty_lines=False, invalid_row_handler=skip
+        )
+        convert = pyarrow.csv.ConvertOptions(
+            include_columns=wanted, column_types=dict.fromkeys(wanted, pa.binary())
+        )
+        return pyarrow.csv.open_csv(_Lines(self._file, self._end), read, parse, convert)
+
+
+# Parquet files, by pyarrow: one group of rows at a time.
+
+
+class _Parquet:
+    word, header = "row", 0
+
+    def __init__(self, path: Path, file: IO[bytes], budget: Budget) -> None:
+        self._budget, self.size = budget, file.seek(0, 2)
+        try:
+            self._file = pyarrow.parquet.ParquetFile(file, page_checksum_verification=True)
+            self.names = list(self._file.schema_arrow.names)
+        except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
+            fault = f"is not a readable Parquet file: {one_line(error)}"
+            raise RecordingError(str(path), "", fault) from error
+
+    def parts(self, columns: list[int], lost: Lost) -> Iterator[Part]:
+        """Rows of some columns; what a damaged group still had is lost."""
+        head, first = self._file.metadata, 0
+        names = [self.names[k] for k in columns]
+        for group in range(head.num_row_groups):
+            end = first + head.row_group(group).num_rows
+            at = first
+            try:
+                self._budget.check(2 * _expanded_size(head.row_group(group), set(names)))
+                for batch in self._file.iter_batches(_ROWS, row_groups=[group], columns=names):
+                    row = at + 1 + np.arange(batch.num_rows)
+                    stored = self.size * batch.num_rows // max(1, head.num_rows)
+                    yield Part(row, [batch.column(name) for name in names], stored)
+                    at += batch.num_rows
+            except (DamageError, pa.ArrowException, OSError) as error:
+                lost.tell(f"rows {at + 1} to {end} cannot be read: {one_line(error)}: they are lost")
+            first = end
+
+
+def _expanded_size(group: Any, names: set[str]) -> int:
+    """Bytes of some columns in a group of rows."""
+    columns = (group.column(k) for k in range(group.num_columns))
+    return sum(one.total_uncompressed_size for one in columns if one.path_in_schema in names)
 
 
 # Columns in memory: a mapping of arrays, or a data frame.
 
 
-_ROWS = 65536
+class _Frame:
+    word, header = "row", 0
 
+    def __init__(self, path: Path, table: Any) -> None:
+        self._path, self._table = path, table if isinstance(table, Mapping) else _named(table)
+        self.names = [str(name) for name in self._table]
+        self.size = len(next(iter(self._table.values()), ()))  # rows, of which each counts the same
 
-class Frame:
-    """Columns in memory, read like a file.
-
-    Parameters
-    ----------
-    path : pathlib.Path
-        Name of the table in findings and errors.
-    table : mapping of str to array, or data frame
-        The index of a frame counts as a column if it has a name. NaN: not measured.
-    config : MonitorConfig
-    findings : list of Finding
-        Where the findings go.
-
-    Raises
-    ------
-    RecordingError
-        If a column is missing, is no array of numbers, or has another length.
-    """
-
-    def __init__(self, path: Path, table: Any, config: MonitorConfig, findings: list[Finding]) -> None:
-        self._config, self._lost = config.input, table_layout.LostLines(path, findings, "row")
-        self._columns = table_layout.columns_of(config)
-        content = table if isinstance(table, Mapping) else _named(table)
-        self.names = [str(name) for name in content]
-        table_layout.places(str(path), self.names, self._columns)
-        self._arrays = {one.key: self._array(path, one, content[one.name]) for one in self._columns}
-        lengths = {one.name: len(self._arrays[one.key]) for one in self._columns}
-        self._rows = next(iter(lengths.values()))
+    def parts(self, columns: list[int], lost: Lost) -> Iterator[Part]:
+        """Rows of some columns; NaN is null."""
+        content = list(self._table.values())
+        arrays = [self._array(self.names[k], content[k]) for k in columns]
+        lengths = {self.names[k]: len(array) for k, array in zip(columns, arrays, strict=True)}
         if len(set(lengths.values())) > 1:
             words = ", ".join(f"{name} {length}" for name, length in lengths.items())
-            raise RecordingError(str(path), "", f"has columns of different lengths: {words}")
-        self.size = sum(array.nbytes for array in self._arrays.values())
+            raise RecordingError(str(self._path), "", f"has columns of different lengths: {words}")
+        for begin in range(0, len(arrays[0]), _ROWS):
+            chosen = [array[begin : begin + _ROWS] for array in arrays]
+            yield Part(begin + 1 + np.arange(len(chosen[0])), chosen, len(chosen[0]))
 
-    def parts(self) -> Iterator[table_layout.Rows]:
-        """All sound rows, block by block."""
-        for begin in range(0, self._rows, _ROWS):
-            chosen = {key: array[begin : begin + _ROWS] for key, array in self._arrays.items()}
-            # neither NaN nor NaT equals itself
-            there = {key: np.asarray(array == array) for key, array in chosen.items()}
-            stored = self.size * min(_ROWS, self._rows - begin) // self._rows
-            yield rows_of(self._columns, chosen, there, begin, stored, self._config, self._lost)
-        self._lost.close()
-
-    def _array(self, path: Path, column: table_layout.Column, values: Any) -> NDArray[np.generic]:
-        """A column as an array of numbers or dates."""
-        array = np.asarray(values.to_numpy() if hasattr(values, "to_numpy") else values)
-        if array.dtype.kind == "O":  # what pandas has beside missing values, and dates of a time zone
-            array = _plain(values, array)
-        if array.ndim != 1:
-            fault = f"column {column.name!r} has the shape {array.shape}, expected one number a row"
-            raise RecordingError(str(path), column.parameter, fault)
-        check_kind(str(path), column, array.dtype.kind, str(array.dtype), self._config)
-        return array
-
-
-def _plain(values: Any, array: NDArray[Any]) -> NDArray[Any]:
-    """Objects as numbers or dates, if they are some; else the objects."""
-    kind = str(getattr(values, "dtype", ""))
-    try:
-        if kind.startswith("datetime64"):
-            return np.asarray(values, "datetime64[ns]")
-        if kind[:1] in "IUF" and hasattr(values, "to_numpy"):
-            return np.asarray(values.to_numpy(dtype=float, na_value=np.nan))
-    except (TypeError, ValueError):
-        pass
-    return array
+    def _array(self, name: str, values: Any) -> Any:
+        shape = np.shape(values)
+        if len(shape) != 1:
+            fault = f"column {name!r} has the shape {shape}, expected one number a row"
+            raise RecordingError(str(self._path), "", fault)
+        try:
+            return pa.array(values, from_pandas=True)
+        except (pa.ArrowException, TypeError) as error:
+            fault = f"column {name!r} has neither numbers nor dates: {one_line(error)}"
+            raise RecordingError(str(self._path), "", fault) from error
 
 
 def _named(frame: Any) -> dict[str, Any]:
@@ -429,3 +531,8 @@ def _named(frame: Any) -> dict[str, Any]:
     if getattr(index, "name", None) is not None:
         columns.setdefault(str(index.name), index)
     return columns
+
+
+def one_line(error: BaseException) -> str:
+    """Text of an error on one line."""
+    return " ".join(str(error).split())[:200] or type(error).__name__

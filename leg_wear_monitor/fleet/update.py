@@ -14,7 +14,7 @@ from leg_wear_monitor.bags.bag import METADATA, find_files
 from leg_wear_monitor.bags.budget import DEFAULT_MB
 from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.bags.mcap_layout import MAGIC
-from leg_wear_monitor.bags.table_file import PARQUET
+from leg_wear_monitor.bags.table_layout import PARQUET
 from leg_wear_monitor.files import data_frame
 from leg_wear_monitor.fleet.chain import Chain, Job, begin_of, state_of, words_of
 from leg_wear_monitor.fleet.description import FleetDescription, FleetLeg, fleet_directory

@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     )
     from leg_wear_monitor.dynamics.simulation import simulate
     from leg_wear_monitor.files import share_directory
-    from leg_wear_monitor.fleet.overview import FleetOverview, LegOverview
-    from leg_wear_monitor.fleet.update import Fleet
+    from leg_wear_monitor.fleet.overview import Fleet, FleetOverview, LegOverview
     from leg_wear_monitor.life.design import BushingChoices, Design, design
     from leg_wear_monitor.life.joint_loads import DutyPart, read_duty
     from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
@@ -55,7 +54,7 @@ _HOME = {
     "Duty": "life.result",
     "DutyPart": "life.joint_loads",
     "EnergyBalance": "dynamics.result",
-    "Fleet": "fleet.update",
+    "Fleet": "fleet.overview",
     "FleetOverview": "fleet.overview",
     "Impact": "dynamics.result",
     "JointDetection": "commissioning.result",

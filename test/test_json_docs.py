@@ -13,12 +13,12 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))  # as a script
 
-from filled_fleet import filled_fleet
 from json_fields import Row, descriptions, is_of, leaves, rows_of, unit_of
 from made_up_summary import made_up_state, made_up_summary
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.commissioning.result import JointDetection
+from leg_wear_monitor.fleet.overview import LegOverview, overview_of
 from leg_wear_monitor.life.life import lives_document
 from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.state import LegState
@@ -150,7 +150,10 @@ def example(name: str) -> Any:
         run = lw.LifeRun(lw.load_mechanism(), few, clearances=["A"], duty=lw.Duty({0.0: 1.0, 300.0: 1.0}))
         return shipped | lives_document([(np.ones(1), run.life)] * 2, limit_m=6.0e-4)
     if name == "fleet":
-        return filled_fleet().to_dict()
+        leg = LegOverview(
+            id="a", state=made_up_state(), last_recording="a.mcap", faults=("b.mcap: unreadable",)
+        )
+        return overview_of([leg]).to_dict()
     item = lw.CommissioningItem(name="crank.sign", value=1)
     reasons = {"not_told": ("lag",), "findings": ("load",), "notes": ("note",)}
     cycles = {"clearances_m": (6.0e-4,), "cycles": (2.0,), "named_cycles": (math.nan,)}

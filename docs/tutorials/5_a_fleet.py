@@ -3,13 +3,13 @@ A fleet on one page
 ===================
 
 You describe two legs in a file, count their recordings with one command, and read which leg needs a person, and why.
-Then somebody measures a joint, and the next update knows it.
+Then you enter a measured clearance, and the next update shows it.
 
-You need the first lesson, and the tables of the extra ``fleet``:
+You need the first lesson, and pandas:
 
 .. code-block:: console
 
-   $ pip install '.[bags,fleet]' pandas
+   $ pip install '.[bags]' pandas
 """
 
 # %%
@@ -17,7 +17,7 @@ You need the first lesson, and the tables of the extra ``fleet``:
 # -----------------
 #
 # Work in a directory of your own.
-# The description names each leg, its recordings and its parameters; ``lot`` says that their bushings come from one delivery:
+# The description names each leg, its recordings and its parameters:
 
 import subprocess
 import tempfile
@@ -35,11 +35,9 @@ legs:
   - id: left-07
     recordings: "{checkout}/bags/healthy.mcap"
     config: "{checkout}/bags/healthy.yaml"
-    lot: "2026-03"
   - id: right-07
     recordings: "{checkout}/bags/knocking.mcap"
     config: "{checkout}/bags/knocking.yaml"
-    lot: "2026-03"
 """)
 
 
@@ -68,18 +66,15 @@ terminal("leg-wear-monitor fleet update fleet.yaml")
 # Ask your own questions
 # ----------------------
 #
-# The tables are pandas frames:
+# The table is a pandas frame with one row per leg, the worst leg first.
+# Where the verdict does not believe the forecast, the remaining life is empty:
 
-fleet = lw.Fleet(home / "fleet")
-verdicts = fleet.verdicts()
-print(verdicts[["leg", "lot", "state", "joints", "fault_code"]].to_string(index=False))
-
-# %%
-# ``lives()`` has a row for each joint: the clearance that is counted, the one that the torque shows, and the remaining life.
-# Where the verdict does not believe the forecast, it is empty.
-
-lives = fleet.lives()
-print(lives[["leg", "joint", "seen_m", "limit_m", "p10_h", "p50_h"]].to_string(index=False))
+legs = lw.Fleet(home / "fleet").to_pandas()
+print(
+    legs[["leg", "state", "fault_code", "worst_joint", "clearance_m", "limit_m", "life_p10_h"]].to_string(
+        index=False
+    )
+)
 
 # %%
 # Enter a measurement
@@ -92,26 +87,26 @@ terminal(f"leg-wear-monitor measure A 0.31 --sigma 0.01 {parameters} --ledger fl
 
 # %%
 # The measurement is in the ledger of this leg.
-# Bushings of one delivery are alike, so the next update of the fleet lets the other legs of the lot learn from it, too:
-# `Learning across legs <../explanation/learning.html>`_ explains how.
-#
+# The next update shows the clearance that the ledger now has:
+
+terminal("leg-wear-monitor fleet update fleet.yaml")
+measured = lw.Fleet(home / "fleet").overview.leg("left-07")
+print(measured.state.clearances["A"])
+
+# %%
 # See it
 # ------
 #
-# ``leg-wear-monitor fleet report fleet.yaml`` writes one page for all legs, and a page for each.
-# Here you draw the part that matters yourself: the clearance of each joint compared with its limit.
-
-joints = lives[lives.joint != "leg"].pivot(index="leg", columns="joint", values="seen_m")
-limit_mm = 1e3 * float(lives.limit_m.max())
+# The update has written one page for all legs, ``fleet/report.html``, and a page for each leg.
+# Here you draw the part that matters yourself: the clearance of the worst joint of each leg, compared with its limit.
 
 figure, axes = plt.subplots(figsize=(7, 3.4), layout="constrained")
-for leg, row in joints.iterrows():
-    axes.plot(row.index, 1e3 * row, "o", label=leg)
-axes.axhline(limit_mm, color="gray", linestyle="--", label="limit")
-axes.set(xlabel="joint", ylabel="radial clearance by the torque [mm]", ylim=(0, None))
+axes.bar(legs.leg + ", joint " + legs.worst_joint, 1e3 * legs.clearance_m, width=0.5)
+axes.axhline(1e3 * legs.limit_m.max(), color="gray", linestyle="--", label="limit")
+axes.set(ylabel="radial clearance [mm]")
 axes.legend()
 plt.show()
 
 # %%
-# One point is above the limit: joint G of *right-07*, as the verdict says.
-# `Monitor many legs <../howto/fleet.html>`_ has the rest: months of recordings, several computers, and what happens if a file is damaged.
+# One bar is above the limit: joint G of *right-07*, as the verdict says.
+# `Monitor many legs <../howto/fleet.html>`_ has the rest: months of recordings, several computers, and damaged files.

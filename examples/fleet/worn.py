@@ -4,9 +4,5 @@ import sys
 
 import leg_wear_monitor as lw
 
-fleet = lw.Fleet(sys.argv[1])
-lives = fleet.lives()
-for leg in fleet.verdicts().itertuples():
-    joints = lives[(lives.leg == leg.leg) & (lives.joint != "leg")].set_index("joint")
-    most = joints.seen_m.idxmax()
-    print(f"{leg.leg}: {leg.state} {leg.fault_code}; {most} {1e3 * joints.seen_m[most]:.2f} mm by the torque")
+for leg in lw.Fleet(sys.argv[1]).to_pandas().itertuples():
+    print(f"{leg.leg}: {leg.state} {leg.fault_code}; {leg.worst_joint} {1e3 * leg.clearance_m:.2f} mm")

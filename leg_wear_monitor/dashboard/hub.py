@@ -108,11 +108,6 @@ class Hub:
             raise RuntimeError("a source without content")
         return self._content
 
-    async def leg_page(self, name: str) -> str | None:
-        """The page of a leg of a fleet; None if there is none."""
-        page: str | None = await self._work(partial(self._source.leg_page, name))
-        return page
-
     async def document(self, path: Path) -> tuple[str, str]:
         """A document as a page, and its policy."""
         page: tuple[str, str] = await self._work(partial(document_page, path))

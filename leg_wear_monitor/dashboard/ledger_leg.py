@@ -6,7 +6,6 @@ from pathlib import Path
 from leg_wear_monitor.dashboard import source as region
 from leg_wear_monitor.dashboard.live_leg import Row, Trends
 from leg_wear_monitor.dashboard.source import (
-    NO_VERDICT,
     Content,
     Freshness,
     leg_content,
@@ -18,23 +17,13 @@ from leg_wear_monitor.dashboard.source import (
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.files import stamp_of
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.alarm_specs import with_its_unit
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.forecast.measurement import last_measured
-from leg_wear_monitor.monitor.judgement import joint_clearance, leg_alarm, with_measured
-from leg_wear_monitor.monitor.ledger.entry import (
-    ClearancePoint,
-    JointWear,
-    binding_of,
-    clearance_limit_key,
-    walked_words,
-)
+from leg_wear_monitor.monitor.ledger.entry import ClearancePoint, walked_words
 from leg_wear_monitor.monitor.ledger.file import LedgerError
-from leg_wear_monitor.monitor.ledger.ledger import LedgerContent, read_ledger
-from leg_wear_monitor.monitor.verdict.situation import JointSituation
+from leg_wear_monitor.monitor.ledger.ledger import LedgerContent
+from leg_wear_monitor.monitor.ledger_state import content_of, state_in_ledger
 from leg_wear_monitor.playback.result import ReplaySummary
 from leg_wear_monitor.report.replay.page import raised_alarms
-from leg_wear_monitor.state import Figure, JointClearance, LegAlarms, LegState, LifeHours, Verdict
 
 OLD_AFTER_S = 60.0  # a monitor of a walking leg writes more often
 
@@ -68,7 +57,8 @@ class LedgerLeg:
         self, path: Path, config: MonitorConfig, mechanism: Mechanism, clock: Callable[[], float]
     ) -> None:
         self._path, self._clock = path, clock
-        self._setup, self._binding = leg_setup(config, mechanism), binding_of(mechanism, config)
+        self._config, self._mechanism = config, mechanism
+        self._setup = leg_setup(config, mechanism)
         self._read_stamp = 0, 0, 0
         self._failures = 0
         self._fault = ""
@@ -85,7 +75,7 @@ class LedgerLeg:
     def _read(self) -> bool:
         stamp = stamp_of(self._path)
         try:
-            self._content = read_ledger(self._path, self._binding)
+            self._content = content_of(self._path, self._mechanism, self._config)
         except LedgerError as error:
             self._failures += 1
             self._fault = str(error)
@@ -113,59 +103,18 @@ class LedgerLeg:
         words = words_of(view, name, f"Joint wear of {name}", summary)
         return leg_content(regions, words, self.freshness(), "Written ")
 
-    def leg_page(self, name: str) -> None:
-        """None: that is for a fleet, and this is one leg."""
-
     def _view(self) -> ReplaySummary:
         found = self._content
         if found is None:
             raise LedgerError(self._fault)
-        parts = {part.name: part for part in found.entry.joints} if found.entry else {}
-        joints = {joint: parts[joint] for joint in self._setup.joints if joint in parts}
-        verdict = found.verdict or NO_VERDICT
-        is_doubted = Figure.FORECAST in verdict.not_valid
-        alarms = found.entry.alarms if found.entry else ()
-        state = LegState(
-            verdict=verdict,
-            clearances={
-                joint: self._clearance(found, part, self._setup.new_m[joint] + part.mean_m, verdict)
-                for joint, part in joints.items()
-            },
-            life={joint: None if is_doubted else _life(found, part) for joint, part in joints.items()},
-            alarms=LegAlarms(now=tuple(leg_alarm(with_its_unit(each)) for each in alarms)),
-            life_cycles=int(found.entry.totals.get("cycles", 0.0)) if found.entry else 0,
-        )
+        state = state_in_ledger(found, self._mechanism, self._config)
         history = _trends(found.clearances).history(self._setup.joints)
         return view_of(self._setup, state, history, measurements=found.measurements, walked=found.loads)
-
-    def _clearance(
-        self, found: LedgerContent, part: JointWear, counted_m: float, verdict: Verdict
-    ) -> JointClearance:
-        joint, totals = part.name, found.entry.totals if found.entry else {}
-        limit_m = totals.get(clearance_limit_key(joint), self._setup.limits_m[joint])
-        last = last_measured(found.measurements, joint, part.replaced_ns)
-        known = with_measured(JointSituation(joint=joint, counted_m=counted_m, limit_m=limit_m), last)
-        alarms = found.entry.alarms if found.entry else ()
-        own = next((each for each in alarms if (each.kind, each.subject) == ("clearance", joint)), None)
-        return joint_clearance(known, own, [verdict], self._setup.new_m[joint])
 
 
 def _heading(view: ReplaySummary) -> str:
     words = walked_words(view.walked)
     return f"As the ledger has it: {words}." if words else "As the ledger has it."
-
-
-def _life(found: LedgerContent, part: JointWear) -> LifeHours | None:
-    """Hours of walking from the last forecast on, with the part's own mean duration of a gait cycle."""
-    point = found.forecasts.get(part.name)
-    if point is None or not part.cycles or point.stamp_ns < part.replaced_ns or found.entry is None:
-        return None
-    since = max(0.0, found.entry.totals.get("cycles", 0.0) - point.cycle)
-    hours = part.moving_s / part.cycles / 3600.0
-    p10, p50, p90 = (
-        hours * max(0.0, cycles - since) for cycles in (point.p10_cycles, point.p50_cycles, point.p90_cycles)
-    )
-    return LifeHours(p10_h=p10, p50_h=p50, p90_h=p90)
 
 
 def _trends(points: Iterable[ClearancePoint]) -> Trends:

@@ -312,9 +312,6 @@ class LiveLeg:
             silence = "the monitor runs, but receives nothing from the leg; see its status below"
         return Freshness(age_s, silence, self._old_after_s)
 
-    def leg_page(self, name: str) -> None:
-        """None: that is for a fleet, and this is one leg."""
-
     def _words(self, view: ReplaySummary) -> Words:
         node, leg = printable(self._node), printable(view.monitor.hardware_id) or "a leg"
         which = ", ".join(filter(None, [view.monitor.mechanism, f"live from {node}"]))

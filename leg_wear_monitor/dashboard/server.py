@@ -151,7 +151,6 @@ def application(hub: Hub, host: str) -> Application:
             (r"/events", _Events, common),
             (r"/motion", _Motion, common),
             (r"/docs/([A-Za-z0-9_/]+\.md)", _Document, common),
-            (r"/legs/([^/]+)/report\.html", _Leg, common),
         ],
         default_handler_class=_Nothing,
         default_handler_args=common,
@@ -225,16 +224,6 @@ class _Document(_Reading):
             raise HTTPError(HTTPStatus.NOT_FOUND)
         html, policy = await self._hub.document(path)
         await self.show(html, f"{policy}; base-uri 'none'; form-action 'none'")
-
-    head = get
-
-
-class _Leg(_Reading):
-    async def get(self, name: str) -> None:
-        page = await self._hub.leg_page(name)
-        if page is None:
-            raise HTTPError(HTTPStatus.NOT_FOUND)
-        await self.show(page, "base-uri 'none'; form-action 'none'")  # the page itself says what may run
 
     head = get
 

@@ -16,8 +16,9 @@ from leg_wear_monitor.monitor.alarms import ADVICE, amount
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.ledger.entry import Measurement, WalkedLoad
+from leg_wear_monitor.monitor.ledger_state import NO_VERDICT
 from leg_wear_monitor.monitor.reports import Lost
-from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, guide_to
+from leg_wear_monitor.monitor.verdict.verdict import guide_to
 from leg_wear_monitor.playback.result import (
     ReplayGait,
     ReplayHistory,
@@ -40,7 +41,7 @@ from leg_wear_monitor.report.page import (
 )
 from leg_wear_monitor.report.replay.charts import health_chart, joint_trends
 from leg_wear_monitor.report.replay.joints import joints_and_leg
-from leg_wear_monitor.state import Evidence, LegState, State, Verdict
+from leg_wear_monitor.state import Evidence, LegState
 
 # What is known of a leg at one instant, in the shape of a replay's summary: so the page has its words.
 
@@ -55,17 +56,6 @@ _NOTHING_LOST = Lost(
     unmonitored_s=0.0, already_counted=0, faulty={}, conflicting=0, implausible=0, duplicates=0, late=0,
     stray_stamps=0, outliers=0, gaps_bridged=0, gaps_lost=0, backward_jumps=0, failures=0,
 )  # fmt: skip
-
-NO_VERDICT = Verdict(
-    state=State.NOT_MONITORED,
-    joints=(),
-    why="there is no verdict on the leg yet",
-    since_ns=0,
-    do="let the leg walk with the monitor running",
-    evidence=(),
-    not_valid=(),
-    fault_code=NO_GAIT_CYCLE,
-)
 
 
 @attrs.frozen(eq=False)
@@ -338,9 +328,6 @@ class Source(Protocol):
 
     def freshness(self) -> Freshness:
         """How old the data are now."""
-
-    def leg_page(self, name: str) -> str | None:
-        """The page of a leg of a fleet; None if there is none."""
 
     @property
     def motion(self) -> MotionFeed | None:

@@ -1,114 +1,39 @@
-"""The fleet at a glance: as classes, made from records, written and read."""
+"""The fleet at a glance: one entry per leg, the worst leg first; its files, and tables for Python."""
 
+import csv
+import io
 import json
 import math
-from collections.abc import Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 
 from leg_wear_monitor.configuration import part_document
-from leg_wear_monitor.configuration.strict import structure, structure_of_version
-from leg_wear_monitor.errors import ConfigError, printable
-from leg_wear_monitor.files import json_text, write_whole
-from leg_wear_monitor.fleet.description import FleetDescription, FleetLeg
-from leg_wear_monitor.fleet.directory import LegDirectory, Line, Outcome, used_of
-from leg_wear_monitor.monitor.alarms import ADVICE
-from leg_wear_monitor.shown import Shown
-from leg_wear_monitor.state import JointClearance, LifeHours, State, Verdict
+from leg_wear_monitor.configuration.strict import structure_of_version
+from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.files import data_frame, json_text, write_whole
+from leg_wear_monitor.fleet.description import fleet_directory
+from leg_wear_monitor.fleet.recordings import read_lines
+from leg_wear_monitor.monitor.alarms import ADVICE, time_words
+from leg_wear_monitor.monitor.verdict.decision import decision_of
+from leg_wear_monitor.state import JointClearance, LegState, LifeHours, State
 
-# The fleet at a glance, as classes; SI units, None for what is not known.
+if TYPE_CHECKING:
+    import pandas as pd
 
-
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 """Of the JSON; counts up when a field is renamed, removed or means something else."""
 
-
-@attrs.frozen(kw_only=True)
-class BadRecording:
-    """A recording that is not sound.
-
-    Attributes
-    ----------
-    file : str
-        Its name when it was counted.
-    outcome : str
-        What became of it: ``counted`` in part, ``already_counted``, ``no_gait`` or ``unreadable``.
-    why : str
-        What was found in it first.
-    """
-
-    file: str
-    outcome: str
-    why: str = ""
+FILE, TABLE = "fleet.json", "fleet.csv"
+UNKNOWN = "unknown"
+"""State of a leg without a counted recording."""
 
 
-@attrs.frozen(kw_only=True)
-class RecordingHealth:
-    """The recordings of a leg.
-
-    Attributes
-    ----------
-    found : int
-        Recordings that the description names now, copies included.
-    counted : int
-        Recordings whose wear is in the ledger.
-    already_counted : int
-        Recordings whose time was in the ledger from others.
-    no_gait : int
-        Recordings without a gait cycle that fits the leg.
-    unreadable : int
-        Recordings of which nothing can be read.
-    partial : int
-        Counted recordings of which parts are lost.
-    begin_ns, end_ns : int
-        First and last stamp of what is counted [ns]; 0 if nothing is.
-    counted_h : float
-        Duration of the counted recordings; time that they have in common is in it once [h].
-    cycles : int
-        Gait cycles in them.
-    unmonitored_s : float
-        Time in them during which the leg was not followed [s].
-    bad : tuple of BadRecording
-        The last ten that are not sound, the newest first.
-    """
-
-    found: int = 0
-    counted: int = 0
-    already_counted: int = 0
-    no_gait: int = 0
-    unreadable: int = 0
-    partial: int = 0
-    begin_ns: int = 0
-    end_ns: int = 0
-    counted_h: float = 0.0
-    cycles: int = 0
-    unmonitored_s: float = 0.0
-    bad: tuple[BadRecording, ...] = ()
-
-
-@attrs.frozen(kw_only=True)
-class LegChange:
-    """What is new since the update before the last that counted something for the leg.
-
-    Attributes
-    ----------
-    recordings : int
-        Recordings that were counted since.
-    state : str
-        State of the verdict before; empty if there was none.
-    fault_code : str
-        Reason of the verdict before.
-    used_fraction : dict of str to float
-        Growth of the fraction of each joint's clearance that is used up.
-    """
-
-    recordings: int = 0
-    state: str = ""
-    fault_code: str = ""
-    used_fraction: dict[str, float] = attrs.Factory(dict)
+def leg_directory(out: Path, leg: str) -> Path:
+    """Directory of the files of one leg."""
+    return out / "legs" / leg
 
 
 @attrs.frozen(kw_only=True)
@@ -119,70 +44,114 @@ class LegOverview:
     ----------
     id : str
         Name of the leg.
-    lot : str
-        Production lot; empty if it is not known.
-    verdict : Verdict or None
-        At the end of the recording that was counted last; None before the first.
-    clearances : dict of str to JointClearance
-        Clearance of each joint then.
-    used_fraction : dict of str to float
-        Fraction of the clearance from new to limit that is used up, by joint.
-    life : dict of str to LifeHours or None
-        Remaining life of each joint, and of the ``leg``; None where it is not known or not valid.
-    change : LegChange
-        What is new.
-    recordings : RecordingHealth
-        The recordings of the leg.
-    fault : str
-        Why the last update could not count all of its recordings; empty if it could.
-    wear_acceleration : float
-        Factor on all of its wear; other than 1 in demonstrations, which are not ranked.
+    state : LegState or None
+        State at the end of the last recording, or after a later entry of an operator; None before the first.
+    recordings : int
+        Recordings that the description names now.
+    counted : int
+        Recordings of these whose wear is in the ledger.
+    last_recording : str
+        Recording that ends last.
+    last_ns : int
+        Its last stamp [ns]; 0 without a recording.
+    faults : tuple of str
+        Why the leg could not be updated, and recordings that were not counted as a whole; the first ten.
     """
 
     id: str
-    lot: str = ""
-    verdict: Verdict | None = None
-    clearances: dict[str, JointClearance] = attrs.Factory(dict)
-    used_fraction: dict[str, float] = attrs.Factory(dict)
-    life: dict[str, LifeHours | None] = attrs.Factory(dict)
-    change: LegChange = attrs.Factory(LegChange)
-    recordings: RecordingHealth = attrs.Factory(RecordingHealth)
-    fault: str = ""
-    wear_acceleration: float = 1.0
+    state: LegState | None = None
+    recordings: int = 0
+    counted: int = 0
+    last_recording: str = ""
+    last_ns: int = 0
+    faults: tuple[str, ...] = ()
 
     @property
-    def is_accelerated(self) -> bool:
-        """Whether its wear is that of a demonstration, which is compared with no leg."""
-        return self.wear_acceleration != 1.0
+    def word(self) -> str:
+        """State of the verdict; ``unknown`` before the first recording."""
+        return self.state.verdict.state.value if self.state else UNKNOWN
 
     @property
-    def state(self) -> str:
-        """State of the verdict; ``unknown`` before the first."""
-        return self.verdict.state.value if self.verdict else UNKNOWN
+    def how_soon(self) -> str:
+        """The deadline of the leg's verdict, as on the page of the leg itself."""
+        if self.state is None:
+            return "record its gait, then update the fleet"
+        return decision_of(self.state, str).urgency
 
+    @property
+    def used_fraction(self) -> dict[str, float]:
+        """Fraction of each joint's clearance, from new to limit, that is used up; joints with a value."""
+        clearances = self.state.clearances if self.state else {}
+        return {
+            joint: (one.believed_m - one.new_m) / (one.limit_m - one.new_m)
+            for joint, one in clearances.items()
+            if one.believed_m is not None
+        }
 
-UNKNOWN = "unknown"
-"""State of a leg without a counted recording."""
+    @property
+    def worst_joint(self) -> str:
+        """The joint whose clearance is used up most; empty if none is known."""
+        used = self.used_fraction
+        return max(used, key=lambda joint: used[joint], default="")
+
+    @property
+    def life(self) -> LifeHours | None:
+        """Remaining life of the leg; where the ledger alone is known, of the joint that lasts shortest."""
+        lives = self.state.life if self.state else {}
+        known = [life for life in lives.values() if life]
+        return lives.get("leg") or min(known, key=lambda life: life.p10_h, default=None)
+
+    @property
+    def urgency(self) -> tuple[float, float, float, str]:
+        """Key that sorts legs, the worst first: by state, remaining life, and clearance."""
+        state = self.state.verdict.state if self.state else State.NOT_MONITORED
+        life, used = self.life, self.used_fraction.values()
+        return -state.severity, life.p10_h if life else math.inf, -max(used, default=0.0), self.id
+
+    @property
+    def row(self) -> dict[str, Any]:
+        """The leg as a row of a table; None for what is not known."""
+        verdict = self.state.verdict if self.state else None
+        joint = self.worst_joint
+        clearance: JointClearance | None = self.state.clearances[joint] if self.state and joint else None
+        life = self.life
+        return {
+            "leg": self.id,
+            "state": self.word,
+            "joints": " ".join(verdict.joints) if verdict else "",
+            "fault_code": verdict.fault_code if verdict else "",
+            "why": verdict.why if verdict else "",
+            "do": verdict.do if verdict else "",
+            "how_soon": self.how_soon,
+            "worst_joint": joint,
+            "clearance_m": clearance.believed_m if clearance else None,
+            "limit_m": clearance.limit_m if clearance else None,
+            "life_p10_h": life.p10_h if life else None,
+            "life_p50_h": life.p50_h if life else None,
+            "life_p90_h": life.p90_h if life else None,
+            "last_recording": self.last_recording,
+            "last_time": time_words(self.last_ns) if self.last_ns else "",
+            "recordings": self.recordings,
+            "counted": self.counted,
+            "faults": "; ".join(self.faults),
+        }
 
 
 @attrs.frozen(kw_only=True)
-class FleetOverview(Shown):
+class FleetOverview:
     """The fleet; its page contains nothing else.
 
     Attributes
     ----------
     counts : dict of str to int
         Number of legs in each state, from the mildest to the most severe, and of those that are ``unknown``.
-    first : tuple of str
-        Ids of the up to ten legs that need a person first, the most urgent one first.
     legs : tuple of LegOverview
-        In the order of the description.
+        The worst leg first.
     advice : str
         Limits of the results.
     """
 
     counts: dict[str, int]
-    first: tuple[str, ...]
     legs: tuple[LegOverview, ...]
     advice: str
 
@@ -191,119 +160,60 @@ class FleetOverview(Shown):
         return {leg.id: leg for leg in self.legs}[name]
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain object: what ``fleet.json`` contains; null for what is not known."""
-        return {"schema_version": SCHEMA_VERSION, **part_document(self)}
+        """Plain object: the content of ``fleet.json``; null for what is not known."""
+        legs = [
+            {**part_document(attrs.evolve(leg, state=None)), "state": _without_version(leg.state)}
+            for leg in self.legs
+        ]
+        return {"schema_version": SCHEMA_VERSION, **part_document(attrs.evolve(self, legs=())), "legs": legs}
 
     def to_json(self) -> str:
         """Text of ``fleet.json``."""
         return json_text(self.to_dict())
 
+    def to_csv(self) -> str:
+        """Text of ``fleet.csv``: one row per leg, the worst leg first."""
+        text = io.StringIO()
+        rows = [leg.row for leg in self.legs]
+        writer = csv.DictWriter(text, fieldnames=list(LegOverview(id="").row), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+        return text.getvalue()
 
-# One leg at a glance, from the records of its recordings.
-
-
-_MOST_BAD = 10
-
-
-def leg_overview(
-    leg: FleetLeg, directory: LegDirectory, before: LegOverview | None, fault: str
-) -> LegOverview:
-    """A leg at a glance.
-
-    Parameters
-    ----------
-    leg : FleetLeg
-    directory : LegDirectory
-    before : LegOverview or None
-        The leg after an earlier update.
-    fault : str
-        Why this update could not count all of its recordings.
-    """
-    lines = directory.last_lines()
-    counted = [line for line in lines if line["outcome"] == Outcome.COUNTED.value]
-    health = _health(lines, counted, len(leg.recordings))
-    factor = leg.config.wear_acceleration
-    now = LegOverview(id=leg.id, lot=leg.lot, recordings=health, fault=fault, wear_acceleration=factor)
-    if counted:
-        source = str(directory.records)
-        joints = structure(counted[-1]["clearances"], dict[str, JointClearance], source, "clearances")
-        now = attrs.evolve(
-            now,
-            verdict=structure(counted[-1]["verdict"], Verdict, source, "verdict"),
-            clearances=joints,
-            used_fraction={name: used_of(joint) for name, joint in counted[-1]["clearances"].items()},
-            life=structure(counted[-1]["life"], dict[str, LifeHours | None], source, "life"),
-        )
-    return attrs.evolve(now, change=_change(now, before))
+    def to_pandas(self) -> "pd.DataFrame":
+        """The same rows as a data frame; requires pandas."""
+        return _frame([leg.row for leg in self.legs], list(LegOverview(id="").row))
 
 
-def _health(lines: list[Line], counted: list[Line], found: int) -> RecordingHealth:
-    outcomes = [line["outcome"] for line in lines]
-    bad = [
-        BadRecording(file=line["file"], outcome=line["outcome"], why=next(iter(line["findings"]), ""))
-        for line in lines
-        if line["is_partial"] or line["outcome"] == Outcome.NO_GAIT.value
-    ]
-    return RecordingHealth(
-        found=found,
-        **{outcome.value: outcomes.count(outcome.value) for outcome in Outcome},
-        partial=sum(line["is_partial"] for line in counted),
-        begin_ns=min((line["begin_ns"] for line in counted), default=0),
-        end_ns=max((line["end_ns"] for line in counted), default=0),
-        counted_h=_covered_ns(counted) / 3600.0e9,
-        cycles=sum(line["cycles"] for line in counted),
-        unmonitored_s=sum(line["lost"]["unmonitored_s"] for line in counted),
-        bad=tuple(reversed(bad[-_MOST_BAD:])),
-    )
+def _without_version(state: LegState | None) -> dict[str, Any] | None:
+    if state is None:
+        return None
+    return {name: value for name, value in state.to_dict().items() if name != "schema_version"}
 
 
-def _covered_ns(lines: Iterable[Line]) -> int:
-    """Time that recordings cover together; a recording that has grown since is there twice."""
-    total, until = 0, 0
-    for line in sorted(lines, key=lambda line: line["begin_ns"]):
-        total += max(0, line["end_ns"] - max(line["begin_ns"], until))
-        until = max(until, line["end_ns"])
-    return total
+def overview_of(legs: Iterable[LegOverview]) -> FleetOverview:
+    """The fleet of some legs."""
+    ordered = tuple(sorted(legs, key=lambda leg: leg.urgency))
+    words = [leg.word for leg in ordered]
+    counts = {word: words.count(word) for word in (*(each.value for each in State), UNKNOWN)}
+    return FleetOverview(counts=counts, legs=ordered, advice=ADVICE)
 
 
-def _change(now: LegOverview, before: LegOverview | None) -> LegChange:
-    """What is new; that of the update before if nothing was counted since."""
-    if before is None:
-        return LegChange(recordings=now.recordings.counted)
-    if before.recordings.counted == now.recordings.counted:
-        return before.change
-    return LegChange(
-        recordings=now.recordings.counted - before.recordings.counted,
-        state=before.state if before.verdict else "",
-        fault_code=before.verdict.fault_code if before.verdict else "",
-        used_fraction={
-            joint: used - before.used_fraction[joint]
-            for joint, used in now.used_fraction.items()
-            if joint in before.used_fraction
-        },
-    )
+def write_overview(out: Path, overview: FleetOverview) -> None:
+    """Write ``fleet.json`` and ``fleet.csv``, each whole or not at all."""
+    write_whole(out / FILE, overview.to_json().encode())
+    write_whole(out / TABLE, overview.to_csv().encode())
 
 
-# Reads fleet.json.
-
-
-FILE = "fleet.json"
-
-
-def load_overview(path: str | Path) -> FleetOverview:
-    """Read the overview of a fleet.
-
-    Parameters
-    ----------
-    path : str or pathlib.Path
-        ``fleet.json``, or the directory of the fleet.
+def load_overview(path: Path) -> FleetOverview:
+    """Read the overview in the directory of a fleet.
 
     Raises
     ------
     ConfigError
         If there is none, or it has another version; it names the key at fault.
     """
-    place = Path(path) / FILE if Path(path).is_dir() else Path(path)
+    place = path / FILE
     try:
         record = json.loads(place.read_bytes())
     except OSError as error:
@@ -313,67 +223,53 @@ def load_overview(path: str | Path) -> FleetOverview:
     return structure_of_version(record, FleetOverview, SCHEMA_VERSION, str(place), "run fleet update again")
 
 
-# Makes the overview of a fleet from the records of its legs.
-
-
-_FIRST = 10
-
-
-def write_overview(fleet: FleetDescription, out: Path, faults: Mapping[str, str]) -> FleetOverview:
-    """Write the overview of a fleet, with what is new since the one that is there.
+class Fleet:
+    """Results of a fleet that ``leg-wear-monitor fleet update`` maintains; its tables require pandas.
 
     Parameters
     ----------
-    fleet : FleetDescription
-    out : pathlib.Path
+    path : str or pathlib.Path
+        Directory of the fleet, or its description ``fleet.yaml``.
+
+    Attributes
+    ----------
+    path : pathlib.Path
         Directory of the fleet.
-    faults : mapping of str to str
-        Why recordings of a leg could not be counted, by its id.
+    overview : FleetOverview
+        The fleet at a glance, as in ``fleet.json``.
+
+    Raises
+    ------
+    ConfigError
+        If the directory contains no fleet.
+
+    Examples
+    --------
+    >>> import leg_wear_monitor as lw
+    >>> fleet = lw.Fleet("fleet/")  # doctest: +SKIP
+    >>> fleet.overview.counts["stop"]  # doctest: +SKIP
+    1
+    >>> fleet.to_pandas()[["leg", "state", "worst_joint", "clearance_m"]]  # doctest: +SKIP
     """
-    before: dict[str, LegOverview] = {}
-    with suppress(ConfigError):  # none is there, or one of another version
-        before = {leg.id: leg for leg in load_overview(out / FILE).legs}
-    legs = [
-        leg_overview(leg, LegDirectory(out, leg.id), before.get(leg.id), printable(faults.get(leg.id, "")))
-        for leg in fleet.legs
-    ]
-    overview = FleetOverview(counts=counts_of(legs), first=first_of(legs), legs=tuple(legs), advice=ADVICE)
-    write_whole(out / FILE, overview.to_json().encode())
-    return overview
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = fleet_directory(path)
+        self.overview: FleetOverview = load_overview(self.path)
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """Table with one row per leg, the worst leg first, as in ``fleet.csv``."""
+        return self.overview.to_pandas()
+
+    def recordings(self) -> "pd.DataFrame":
+        """Table with one row per recording: whether it was counted, and if not, why."""
+        rows = [
+            {"leg": leg.id, **attrs.asdict(one), "findings": "; ".join(one.findings)}
+            for leg in self.overview.legs
+            for one in read_lines(leg_directory(self.path, leg.id)).values()
+        ]
+        return _frame(rows, ["leg"])
 
 
-def counts_of(legs: Iterable[LegOverview]) -> dict[str, int]:
-    """Number of legs in each state, zeros included."""
-    states = [leg.state for leg in legs]
-    return {state: states.count(state) for state in (*(each.value for each in State), UNKNOWN)}
-
-
-def first_of(legs: Iterable[LegOverview]) -> tuple[str, ...]:
-    """Legs that need a person first: by state, then by what is left of their life, then by clearance.
-
-    Legs with accelerated wear are left out.
-    """
-    asking = [
-        leg
-        for leg in legs
-        if leg.verdict and leg.verdict.state is not State.HEALTHY and not leg.is_accelerated
-    ]
-    return tuple(leg.id for leg in sorted(asking, key=urgency)[:_FIRST])
-
-
-def urgency(leg: LegOverview) -> tuple[float, float, float, str]:
-    """Key that sorts legs by who needs a person first."""
-    severity = leg.verdict.state.severity if leg.verdict else 0
-    life = leg.life.get("leg")
-    used = max(leg.used_fraction.values(), default=0.0)
-    return -severity, life.p10_h if life else math.inf, -used, leg.id
-
-
-# The overview for the legs of a description, which may have changed since the last update.
-
-
-def described(overview: FleetOverview, fleet: FleetDescription) -> FleetOverview:
-    """The overview with exactly the legs of a description: new ones are unknown, others are left out."""
-    known = {leg.id: leg for leg in overview.legs}
-    legs = tuple(attrs.evolve(known.get(leg.id, LegOverview(id=leg.id)), lot=leg.lot) for leg in fleet.legs)
-    return attrs.evolve(overview, legs=legs, counts=counts_of(legs), first=first_of(legs))
+def _frame(rows: list[dict[str, Any]], columns: list[str]) -> "pd.DataFrame":
+    names = list(rows[0]) if rows else columns
+    return data_frame({name: [row[name] for row in rows] for name in names})

@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 
 from leg_wear_monitor.dynamics.result import SimulationResult
 from leg_wear_monitor.estimate.cause import SURE_SIGMAS, Change
-from leg_wear_monitor.fleet.overview import FleetOverview, LegOverview
 from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.materials import Material
 from leg_wear_monitor.mechanism.position import TURN
@@ -42,7 +41,7 @@ from leg_wear_monitor.report.figure import (
 )
 from leg_wear_monitor.report.leg_picture import PATH_POINTS
 from leg_wear_monitor.report.page import NOT_VALID, Picture, Table, render
-from leg_wear_monitor.state import Figure, LegState, State, Verdict
+from leg_wear_monitor.state import Figure, LegState, Verdict
 
 _COLOURS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, INK)
 
@@ -169,7 +168,7 @@ def _shown(result: Any) -> _Shown:
 
 
 def notebook_html(result: Any) -> str:
-    """HTML of a result, a verdict, a fleet, a mechanism or a material; names are escaped."""
+    """HTML of a result, a verdict, a mechanism or a material; names are escaped."""
     return render("notebook.html", shown=_shown(result))
 
 
@@ -305,48 +304,6 @@ def _torque_picture(torque: ExplainedTorque) -> Picture:
     counted, estimated = (f"{np.sqrt(np.mean(rest**2)):.3g} N m RMS" for rest in rests)
     alt = f"Drive torque: {counted} off the counted clearances, {estimated} off the estimated ones"
     return Picture(image=svg(figure), alt=alt)
-
-
-@_shown.register
-def _fleet_html(fleet: FleetOverview) -> _Shown:
-    """Legs by the state of their verdict, those that need a person first, and how far all are worn."""
-    counts = ", ".join(
-        f"{number} {state.replace('_', ' ')}" for state, number in fleet.counts.items() if number
-    )
-    head = ["leg", "verdict", "joints", "most used [%]", "remaining life, p10 [h]"]
-    rows = [_leg_row(fleet.leg(name)) for name in fleet.first]
-    table = Table(caption="Legs that need a person first", head=head, rows=rows) if rows else None
-    return _Shown(f"Fleet: {len(fleet.legs)} legs", (counts, fleet.advice), table, _fleet_picture(fleet))
-
-
-def _leg_row(leg: LegOverview) -> tuple[str, ...]:
-    verdict, life = leg.verdict, leg.life.get("leg")
-    used = 100.0 * max(leg.used_fraction.values()) if leg.used_fraction else None
-    return (
-        leg.id,
-        verdict.state.words if verdict else leg.state,
-        ", ".join(verdict.joints) if verdict else "",
-        _number(used),
-        _number(life.p10_h if life else None),
-    )
-
-
-def _fleet_picture(fleet: FleetOverview) -> Picture | None:
-    """Fraction of the clearance used up in the most worn joint of each leg, the most worn first."""
-    known = [one for one in fleet.legs if one.used_fraction and not one.is_accelerated]
-    if not known:
-        return None
-    worst = sorted(known, key=lambda one: -max(one.used_fraction.values()))
-    figure = new_figure(5.0, 2.4)
-    axes = figure.subplots()
-    used = [100.0 * max(one.used_fraction.values()) for one in worst]
-    severe = [one.state in (State.STOP.value, State.INSPECT.value) for one in worst]
-    axes.bar(range(len(used)), used, 0.9, color=[VERMILION if one else BLUE for one in severe])
-    axes.axhline(100.0, color=INK, linewidth=0.8, linestyle="--")
-    axes.set_xlim(-0.6, len(used) - 0.4)
-    finish(axes, x="legs, the most worn first; red: inspect or stop", y="most worn joint [% of limit]")
-    extremes = f"{used[0]:.3g} % in {worst[0].id}, {used[-1]:.3g} % in {worst[-1].id}"
-    return Picture(image=svg(figure), alt=f"Most worn joint of {len(used)} legs: {extremes}")
 
 
 @_shown.register

@@ -12,7 +12,7 @@ NAMES = sorted(path.stem for path in (ROOM / "families").glob("[a-z]*.py"))
 
 
 # So many of the first seeds in `make test`. Other families are left to `make test-slow` and `make campaign`;
-# their laws are held in less time by test/bags/, test/fleet/, test/dashboard/test_server.py, by
+# their laws are held in less time by test/bags/, test/dashboard/test_server.py, by
 # test/test_beside.py and test/doors/test_kills.py.
 QUICK = {"configurations": 16, "ledgers": 13}
 

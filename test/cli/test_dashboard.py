@@ -30,20 +30,17 @@ def ledger(tmp_path):
 
 
 WRONG = [
-    ("--node /a --ledger wear.db", ["--node, --ledger and --fleet cannot be combined"]),
+    ("--node /a --ledger wear.db", ["--node and --ledger cannot be combined"]),
     ("--ledger none.db", ["--ledger", "none.db", "does not exist"]),
-    ("--fleet none.yaml", ["--fleet", "none.yaml", "does not exist"]),
-    ("--fleet wear.db --config wear.db", ["--config cannot be combined with --fleet"]),
-    ("--fleet wear.db", ["wear.db"]),
     ("--ledger wear.db --port 70000", ["--port", "70000"]),
     ("--ledger wear.db --port 0 --host no.such.host.invalid", ["--host", "no.such.host.invalid"]),
-    ("--ledger fleet.yaml", ["fleet.yaml", "not a ledger"]),
+    ("--ledger leg.yaml", ["leg.yaml", "not a ledger"]),
 ]
 
 
 @pytest.mark.parametrize(("line", "said"), WRONG, ids=[line for line, _ in WRONG])
 def test_a_wrong_command_line_is_one_line(run, complaints, ledger, tmp_path, line, said):
-    (tmp_path / "fleet.yaml").write_text("legs: []\n" * 100)
+    (tmp_path / "leg.yaml").write_text("legs: []\n" * 100)
     result = run("dashboard", *line.split())
     assert (result.exit_code, result.stdout) == (2, "")
     (complaint,) = complaints(result)

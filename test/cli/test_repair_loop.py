@@ -8,7 +8,6 @@ import pytest
 from ledger_contents import rows_of
 
 from leg_wear_monitor.files import share_directory
-from leg_wear_monitor.fleet.overview import load_overview
 from leg_wear_monitor.state import Level
 
 BAGS = share_directory() / "bags"
@@ -77,13 +76,6 @@ def _alarms(ledger):
     return {name.strip(): (Level(level).name, bool(seen)) for name, level, seen in rows}
 
 
-def _alarms_in(home):
-    """The same of the summary that a leg of the fleet has."""
-    now = json.loads((home / "fleet/legs/a/summary.json").read_text())["alarms"]["now"]
-    raised = [each for each in now if each["level"] != "OK"]
-    return {each["name"]: (each["level"], "acknowledged" in each["state"]) for each in raised}
-
-
 def _ends(column):
     return column, column[::-1]
 
@@ -104,7 +96,6 @@ def test_the_page_of_the_stop_shows_the_estimates_and_links_the_guide(knocked):
 GUIDES = (
     "howto/repair.md",
     "howto/verdict/joint_at_limit.md",
-    "howto/fleet.md",
     "explanation/diagnosis.md",
 )
 
@@ -136,54 +127,6 @@ def test_after_the_repair_a_healthy_recording_is_not_to_be_inspected(run, ledger
     assert found["verdict"]["state"] in ("watch", "healthy")
     assert found["verdict"]["not_valid"] == []
     assert not any(alarm["level"] != "OK" for alarm in found["alarms"]["now"])
-
-
-def test_a_repair_in_the_ledger_of_a_fleet_shows_at_the_next_update(run, tmp_path):
-    pytest.importorskip("pyarrow", reason="the extra 'fleet' is not installed")
-    leg = f"{{id: a, recordings: {BAGS / 'knocking.mcap'}, config: {BAGS / 'knocking.yaml'}}}"
-    (tmp_path / "fleet.yaml").write_text(f"legs: [{leg}]\n")
-    update = ["fleet", "update", str(tmp_path / "fleet.yaml"), "--workers", "1"]
-    ledger, config = str(tmp_path / "fleet/legs/a/ledger"), ("--config", str(BAGS / "knocking.yaml"))
-    assert "legs: 1 stop" in run(*update).stdout
-    assert "everything is in the ledger already" in run(*update).stdout
-    before = load_overview(tmp_path / "fleet").leg("a")
-    assert _alarms(ledger) == _alarms_in(tmp_path) != {}
-    assert run("reset", "knee", "--ledger", ledger).exit_code == 0
-    assert "forecasts: 1 renewed" in run(*update).stdout
-    after = load_overview(tmp_path / "fleet").leg("a")
-    knee = after.clearances["G"]
-    assert (after.state, knee.status.value) == ("watch", "watch")  # a new part
-    assert after.verdict.why == last_reason(ledger)
-    assert (knee.counted_m, knee.seen_m) == (knee.new_m, None)
-    assert knee.believed_m == pytest.approx(knee.new_m, rel=0.1)
-    assert after.clearances["A"].counted_m == before.clearances["A"].counted_m
-    assert _alarms(ledger) == _alarms_in(tmp_path) == {}  # those of the old part stayed on the page
-    found = json.loads((tmp_path / "fleet/legs/a/summary.json").read_text())
-    lines = {line["name"]: line for line in found["status"]}
-    assert lines["verdict"]["message"].startswith("watch joint G") and "input" in lines
-    assert not {"joint G", "alarms", "torque", "diagnosis"} & lines.keys()
-    assert (found["diagnosis"]["state"], found["joints"]["G"]["growth_mps"]) == ("waiting", None)
-    assert run("measure", "B", "0.63", "--sigma", "0.006", "--ledger", ledger, *config).exit_code == 1
-    assert "forecasts: 1 renewed" in run(*update).stdout
-    assert _alarms(ledger) == _alarms_in(tmp_path) == {"clearance B": ("ERROR", False)}
-    found = json.loads((tmp_path / "fleet/legs/a/summary.json").read_text())
-    assert found["verdict"]["fault_code"] == "CLEARANCE_B" and set(found["life"].values()) == {None}
-    assert found["status"][0]["level"] == "ERROR"
-    assert run("fleet", "report", str(tmp_path / "fleet.yaml")).exit_code == 0
-    page = (tmp_path / "fleet/legs/a/report.html").read_text()
-    assert "ERROR clearance B" in page and "The verdict rests on what was entered" in page
-    assert "everything is in the ledger already" in run(*update).stdout
-    assert run("acknowledge", "--ledger", ledger).exit_code == 0
-    told = run(*update).stdout
-    assert "forecasts: 1 renewed" in told and "settings changed" not in told
-    text = (BAGS / "knocking.yaml").read_text() + "    forecast.duty_hours_per_day: 2.0\n"
-    (tmp_path / "other.yaml").write_text(text)
-    (tmp_path / "fleet.yaml").write_text(
-        f"legs: [{leg.replace(str(BAGS / 'knocking.yaml'), 'other.yaml')}]\n"
-    )
-    for is_told in (True, False):  # once
-        assert run("reset", "B", "--ledger", ledger, "--config", str(tmp_path / "other.yaml")).exit_code == 0
-        assert ("lives follow the new ones: a\n" in run(*update).stdout) is is_told
 
 
 def test_acknowledged_alarms_are_kept_as_such_but_not_by_a_dry_run(run, ledger, tmp_path):

@@ -77,7 +77,7 @@ def test_what_is_done_and_what_is_found(run, code: int, line: str) -> None:
         ("study size --config study.yaml --out study", "study.yaml: runs"),
         ("report .", "."),
         ("fleet update fleet.yaml", "fleet.yaml: legs.a.colour"),
-        ("fleet export nowhere", "nowhere"),
+        ("fleet report nowhere", "nowhere"),
         ("dashboard --port 99999999", "--port"),
     ],
 )

@@ -5,7 +5,6 @@ import math
 import attrs
 import numpy as np
 import pytest
-from made_up_fleet import made_up_fleet, random_fleet
 from made_up_summary import made_up_summary
 
 import leg_wear_monitor as lw
@@ -98,19 +97,6 @@ def test_large_numbers_have_no_exponent():
 def test_what_is_no_result_is_named():
     with pytest.raises(TypeError, match="dict has no HTML"):
         notebook_html({})
-
-
-def test_a_fleet_is_a_picture_of_its_wear_and_a_table_of_the_legs_that_come_first():
-    fleet = random_fleet(40)
-    html = attrs.evolve(fleet, advice=EVIL)._repr_html_()
-    assert "Fleet: 40 legs" in html and 'src="data:image/svg+xml;base64,' in html and "<script" not in html
-    for name in fleet.first:
-        assert f'<th scope="row">{name}</th>' in html
-    assert (
-        sum(f"{number} {state.replace('_', ' ')}" in html for state, number in fleet.counts.items() if number)
-        >= 4
-    )
-    assert "Fleet: 0 legs" in made_up_fleet([])._repr_html_()
 
 
 def test_a_diagnosis_is_its_torque_with_estimates_and_odds():

@@ -149,18 +149,13 @@ def _file(name: str) -> str:
 
 
 def _fleet(path: str) -> str:
-    """Read the description of a fleet and the begins of its recordings, and say what was understood."""
-    from leg_wear_monitor.fleet.description import load_fleet
-    from leg_wear_monitor.fleet.update import understood
+    """Read the description of a fleet, and say what was understood."""
+    from leg_wear_monitor.fleet.description import load_fleet, understood
 
     fleet = load_fleet(path)
     for file in dict.fromkeys(leg.config_file for leg in fleet.legs if leg.config_file):
         click.echo(f"{file.name:<13} {_parameters(str(file))}")
-    with common.progress_bar("looking at the recordings") as progress:
-        pairs = list(understood(fleet, progress))
-    for fault in (fault for _, fault in pairs if fault):
-        warnings.warn(f"{path}: {fault}", ConfigWarning, stacklevel=2)
-    return f"\n{'':13} ".join(line for line, _ in pairs if line)
+    return f"\n{'':13} ".join(understood(fleet))
 
 
 def _parameters(path: str, node: str | None = None) -> str:

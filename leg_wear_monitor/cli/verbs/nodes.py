@@ -18,7 +18,7 @@ import click
 from leg_wear_monitor.cli import common
 from leg_wear_monitor.cli.start import main as program
 from leg_wear_monitor.errors import LegWearError, closed_on_interrupt
-from leg_wear_monitor.files import package_version, share_directory
+from leg_wear_monitor.files import share_directory
 
 if TYPE_CHECKING:
     from leg_wear_monitor.dashboard.server import Place
@@ -241,7 +241,7 @@ def _compare_with_truth(out: Path, demo_listener: "DemoListener") -> None:
 _NODE = "/leg_wear_monitor"
 
 
-@click.command(short_help="Show a leg or a fleet live in a browser, for reading only.")
+@click.command(short_help="Show a leg live in a browser, for reading only.")
 @common.option(
     "--node",
     "[NAME]",
@@ -252,9 +252,6 @@ _NODE = "/leg_wear_monitor"
 @common.file_option(
     "--ledger", "FILE", "A ledger instead, which a monitor may be writing meanwhile.", exists=True
 )
-@common.file_option(
-    "--fleet", "FLEET.yaml", "A fleet instead, as the last fleet update left it.", exists=True
-)
 @common.config_option
 @common.option(
     "--host", "HOST", "Address to listen on; 0.0.0.0 for all of this machine.", default="127.0.0.1"
@@ -262,40 +259,30 @@ _NODE = "/leg_wear_monitor"
 @common.option(
     "--port", "PORT", "Port to listen on; 0 for any free one.", type=click.IntRange(0, 65535), default=8350
 )
-def dashboard(
-    node: str | None, ledger: Path | None, fleet: Path | None, config: Path | None, host: str, port: int
-) -> int:
+def dashboard(node: str | None, ledger: Path | None, config: Path | None, host: str, port: int) -> int:
     """Serve a page with the verdict, the leg and the trends, renewed while you look, until Ctrl-C.
 
     The page cannot change anything. It is served to this machine only, unless --host says otherwise: it has
     no password. --config is needed for a leg with a mechanism file of its own.
     """
-    if sum(each is not None for each in (node, ledger, fleet)) > 1:
-        raise click.UsageError("--node, --ledger and --fleet cannot be combined")
-    if fleet and config:
-        raise click.UsageError("--config cannot be combined with --fleet")
+    if node and ledger:
+        raise click.UsageError("--node and --ledger cannot be combined")
     import_module("tornado")
     from leg_wear_monitor.dashboard.server import listen
 
-    with _source(node, ledger, fleet, config) as source:
+    with _source(node, ledger, config) as source:
         _serve(source, listen(host, port))
     return 0
 
 
 @contextmanager
-def _source(
-    node: str | None, ledger: Path | None, fleet: Path | None, config: Path | None
-) -> Iterator["Source"]:
+def _source(node: str | None, ledger: Path | None, config: Path | None) -> Iterator["Source"]:
     if ledger:
         from leg_wear_monitor.cli.verbs.upkeep import leg_of
         from leg_wear_monitor.dashboard.ledger_leg import LedgerLeg
 
         settings, leg = leg_of(config, ledger)
         yield LedgerLeg(ledger, settings, leg, time.time)
-    elif fleet:
-        from leg_wear_monitor.dashboard.fleet_source import FleetSource
-
-        yield FleetSource(fleet, time.time, {"leg_wear_monitor": package_version()})
     else:
         with _live(node or _NODE, config) as source:
             yield source

@@ -14,6 +14,7 @@ from typing import TypeVar
 
 import attrs
 
+from leg_wear_monitor.mechanism.arrays import Ints
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -387,6 +388,8 @@ class LedgerContent:
     measurements : tuple of Measurement
     loads : tuple of WalkedLoad
         Foot loads of all runs.
+    counted_ns : (n, 2) array
+        Begin and end [ns] of the time spans whose wear is in the ledger.
     """
 
     entry: Entry | None
@@ -395,6 +398,12 @@ class LedgerContent:
     forecasts: dict[str, ForecastPoint]
     measurements: tuple[Measurement, ...]
     loads: tuple[WalkedLoad, ...]
+    counted_ns: Ints
+
+    @property
+    def cycles(self) -> int:
+        """Gait cycles over the leg's whole life."""
+        return int(self.entry.totals.get("cycles", 0.0)) if self.entry else 0
 
 
 def read_ledger(path: Path, binding: Binding) -> LedgerContent:
@@ -417,6 +426,7 @@ def read_ledger(path: Path, binding: Binding) -> LedgerContent:
                 forecasts={point.joint: point for point in rows.read_rows(db, ForecastPoint, last)},
                 measurements=rows.read_measurements(db),
                 loads=rows.read_loads(db),
+                counted_ns=rows.read_spans(db),
             )
 
 

@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from ledger_contents import measured
 
 from leg_wear_monitor.estimate.cause import Cause, Change
-from leg_wear_monitor.fleet.learning import parts_of
 from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.cycle_report import correct
 from leg_wear_monitor.monitor.forecast.forecast import JointCondition, forecast, no_law
@@ -91,17 +89,6 @@ def test_two_corrections_each_count_from_themselves():
     assert precision == pytest.approx(sum(each[1] for each in alone))
     assert factor == pytest.approx(sum(math.prod(each) for each in alone) / precision)
     assert believed(again.wear_m, [EARLY, between], [CORRECTED, again])[1] == pytest.approx(2e-3, rel=1e-3)
-
-
-@pytest.mark.plain
-def test_a_fleet_learns_from_a_corrected_part_what_a_part_that_wore_alike_teaches(leg):
-    one = measured(clearance_m=OPENED + 1.8e-5, wear_m=CORRECTED.wear_m + 1e-5)
-    given = leg, SETTINGS, [one], {}
-    blind, aware = (
-        next(p for p in parts_of("left", *given, corrections=each) if p.joint == "A")
-        for each in ((), [CORRECTED])
-    )
-    assert aware.precision < 0.01 * blind.precision  # a hundredth of a millimetre of wear teaches little
 
 
 @pytest.mark.plain

@@ -8,13 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from ledger_contents import measured
 
-from leg_wear_monitor.fleet.learning import parts_of
-from leg_wear_monitor.fleet.renew import _with_parts
-from leg_wear_monitor.mechanism.spec import Clearance
 from leg_wear_monitor.monitor.config.sections import Forecasting
-from leg_wear_monitor.monitor.forecast.forecast import ForecastBasis, JointCondition, forecast, no_law
+from leg_wear_monitor.monitor.forecast.forecast import JointCondition, forecast, no_law
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     ClearanceAtWear,
     CoefficientPrior,
@@ -24,7 +20,6 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
 )
 from leg_wear_monitor.monitor.ledger.entry import (
     CorrectedClearance,
-    Entry,
     JointWear,
     coefficient_spans,
 )
@@ -159,33 +154,6 @@ def test_a_line_names_the_joints_and_both_coefficients(leg):
     assert str(second) == (
         f"wear coefficient of joint I: 0 1/Pa {stays}; that wear stays as counted, and no more is counted"
     )
-
-
-@pytest.mark.plain
-def test_a_fleet_learns_the_same_coefficient_whatever_is_nominal(leg):
-    own = Clearance(**{**attrs.asdict(leg.clearances["A"], recurse=False), "wear_coefficient": (WAS, WAS)})
-    given = (
-        attrs.evolve(leg, clearances=leg.clearances | {"A": own}),
-        SETTINGS,
-        [measured(clearance_m=MEASURED.clearance_m, wear_m=WEAR)],
-        {},
-    )
-    spans = coefficient_spans([part(WEAR)], {"A": 2.0 * WAS})
-    (one,) = (each for each in parts_of("left", *given, corrections=spans) if each.joint == "A")
-    assert one.factor * one.nominal_per_pa == pytest.approx(1.8 * WAS, rel=0.01)
-
-
-@pytest.mark.plain
-def test_a_growth_that_was_recorded_before_is_taken_with_the_present_coefficient(leg):
-    """A fleet's forecast is renewed after a measurement, with the growth of the last recording."""
-    now = JointCondition(
-        joint="A", fresh_m=FRESH, wear_m=WEAR, limit_m=6e-4, growth_m=1e-12, growth_error_m=1e-13
-    )
-    basis = ForecastBasis(conditions=(now,), observed=(None,), cycle_s=1.0, is_valid=True)
-    own = attrs.evolve(leg.clearances["A"], wear_coefficient=(WAS, WAS))
-    mechanism = attrs.evolve(leg, clearances=leg.clearances | {"A": own})
-    found, _ = _with_parts(Entry(1, (part(WEAR),), {}), mechanism, basis, {})
-    assert found.conditions == (attrs.evolve(now, growth_m=2e-12, growth_error_m=2e-13),)
 
 
 @pytest.fixture

@@ -163,14 +163,6 @@ wait_option: Option = option(
     default=10.0,
 )
 
-sample_option: Option = option(
-    "--sample",
-    "FRACTION",
-    "Follow this fraction of the gait cycles, track and check the others, and estimate their wear; for "
-    "long recordings, where no impact needs to be seen.  [default: all]",
-    type=click.FloatRange(0.0, 1.0, min_open=True),
-)
-
 memory_option: Option = option(
     "--memory-mb",
     "MB",

@@ -247,9 +247,6 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
                 if one.believed_by not in (None, COUNTED):
                     console.print(f"joint {joint}: {believed_words(one)}")
         console.print(f"torque {_by_torque(result)}", soft_wrap=True)
-        errors = [f"{joint.joint} {figure(1.0e9 * joint.sampling_sigma_m)} nm" for joint in last.joints]
-        if any(joint.sampling_sigma_m for joint in last.joints):
-            console.print(f"standard errors of the clearances by sampling: {', '.join(errors)}")
         if words := walked_words(monitor.walked):
             console.print(words, soft_wrap=True)
         console.print()

@@ -69,22 +69,16 @@ POINT_FRACTION = 0.005
 
 _DUE_KEY = "history_due_s"  # moving_s at which the history takes its next point; of totals
 
-ESTIMATED_KEY = "estimated_cycles"  # of `cycles`, in sampled replays; of totals
-
 _SUMS = ("moving_s", "standing_s", "bridged_s", "unmonitored_s")
 
 
 @attrs.frozen
 class PartLife:
-    """When a joint's part was new: gait cycles and time in motion of the leg then, and the stamp.
-
-    ``sampling_m2``: variance of its clearance by sampled replays, less that of this run [m^2].
-    """
+    """When a joint's part was new: gait cycles and time in motion of the leg then, and the stamp."""
 
     cycles: int = 0
     moving_s: float = 0.0
     replaced_ns: int = 0
-    sampling_m2: float = 0.0
 
 
 @attrs.define
@@ -116,8 +110,6 @@ class AccountingState:
         What the ledger keeps of this leg's torque, by names that end in their unit.
     loads : tuple of WalkedLoad
         Foot loads that acted in this run.
-    load_n : float
-        That of the last gait cycle that was followed; NaN before.
     """
 
     cycles: int
@@ -134,7 +126,6 @@ class AccountingState:
     without_zero_s: float = 0.0
     commissioned: dict[str, float] = attrs.field(factory=dict)
     loads: tuple[WalkedLoad, ...] = ()
-    load_n: float = math.nan
 
 
 def next_point_s(moving_s: float) -> float:
@@ -193,7 +184,6 @@ class Accounting:
             self.state.cycles - wear.cycles,
             self.totals["moving_s"] - wear.moving_s,
             wear.replaced_ns,
-            wear.sampling_m2 - float(self._run_sampling_m2[k]),
         )
 
     @property
@@ -288,32 +278,8 @@ class Accounting:
             self.state.cycles - part.cycles,
             totals["moving_s"] - part.moving_s,
             part.replaced_ns,
-            float(self._sampling_m2[k]),
             float(self._twin.wear_coefficient_per_pa[k]),
         )
-
-    @property
-    def sampling_sigma_m(self) -> Floats:
-        """Standard deviation of each mean clearance, because not all gait cycles were followed (k,)."""
-        return np.asarray(np.sqrt(self._sampling_m2))
-
-    @property
-    def _sampling_m2(self) -> Floats:
-        """Variance of each clearance by sampled replays since its part was new (k,) [m^2]."""
-        before = np.array([part.sampling_m2 for part in self.state.parts])
-        return np.maximum(0.0, before + self._run_sampling_m2)
-
-    @property
-    def _run_sampling_m2(self) -> Floats:
-        sampling = self._twin.sampling
-        return sampling.variance_m2 if sampling else np.zeros(len(self.state.parts))
-
-    @property
-    def _sampling_totals(self) -> dict[str, float]:
-        """What the ledger keeps of sampled replays; empty if there was none."""
-        sampling, before = self._twin.sampling, self._before.get(ESTIMATED_KEY, 0.0)
-        estimated = before + (sampling.estimated_cycles if sampling else 0.0)
-        return {ESTIMATED_KEY: estimated} if estimated else {}
 
     def wear_of(self, joint: str) -> JointWear:
         """Present wear of a joint; raises LegWearError for a joint without clearance."""
@@ -331,8 +297,7 @@ class Accounting:
         k = self._index(joint)
         was = self.joint_wear(k, self._twin.depth)
         self._twin.reset_wear(joint)
-        run_m2 = float(self._run_sampling_m2[k])
-        self._set_part(k, PartLife(self.state.cycles, self.totals["moving_s"], stamp_ns, -run_m2))
+        self._set_part(k, PartLife(self.state.cycles, self.totals["moving_s"], stamp_ns))
         return was
 
     def correct(self, joint: str, clearance_m: float) -> JointWear:
@@ -342,9 +307,6 @@ class Accounting:
         was = self.joint_wear(k, depth.copy())
         depth[k, BUSHING] += max(clearance_m - float(self._twin.clearance_mean_m[k]), 0.0)
         self._twin.set_depth(depth)
-        # what was not followed before does not matter for a clearance that is known otherwise
-        run_m2 = float(self._run_sampling_m2[k])
-        self._set_part(k, attrs.evolve(self.state.parts[k], sampling_m2=-run_m2))
         return was
 
     def put_back(self, joint: str, before: JointWear) -> JointWear:
@@ -361,14 +323,10 @@ class Accounting:
         self.state.parts = (*self.state.parts[:k], part, *self.state.parts[k + 1 :])
 
     def ended(self, statistics: CycleStatistics) -> None:
-        """Count a gait cycle, and the load under which it was; one that was not followed was as the last."""
-        state = self.state
-        state.cycles += 1
-        if statistics.is_followed:
-            state.load_n = statistics.load_peak_n
-        if not math.isnan(state.load_n):
-            one = WalkedLoad.of_cycle(state.load_n, statistics.moving_s)
-            state.loads = together((*state.loads, one))
+        """Count a gait cycle, and the load that acted in it."""
+        self.state.cycles += 1
+        load = WalkedLoad.of_cycle(statistics.load_peak_n, statistics.moving_s)
+        self.state.loads = together((*self.state.loads, load))
 
     @property
     def loads(self) -> tuple[WalkedLoad, ...]:
@@ -441,7 +399,6 @@ class Accounting:
             joints=tuple(self.joint_wear(k, depth) for k in range(len(self._twin.clearance_joints))),
             totals=self.totals
             | self.state.commissioned
-            | self._sampling_totals
             | {_DUE_KEY: self.state.point_due_s}
             | {
                 clearance_limit_key(alarm.subject): alarm.limit

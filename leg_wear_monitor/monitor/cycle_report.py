@@ -29,7 +29,7 @@ def cycle_report(
     forecast: Forecast,
     seen: Sequence[ClearanceEstimate] | None,
 ) -> CycleReport:
-    """Report of a gait cycle that is counted.
+    """Report of a gait cycle.
 
     Parameters
     ----------
@@ -73,7 +73,6 @@ def _joint_report(
     joint, rate = parts.clearance_joints[k], growth_rate(parts.state.growth[k])
     mean_n, p99_n = float(statistics.mean_force_n[k]), float(statistics.p99_force_n[k])
     rubbing_w = float(statistics.archard_j[k] / statistics.moving_s)
-    load = parts.bushings[joint].load(mean_n, p99_n, rubbing_w) if statistics.is_followed else None
     error_m = rate.error_m(parts.model_error.relative(k, rate.per_cycle_m)) if rate else None
     return JointReport(
         joint=joint,
@@ -88,9 +87,8 @@ def _joint_report(
         peak_force_n=float(statistics.peak_force_n[k]),
         p99_force_n=p99_n,
         mean_force_n=mean_n,
-        impacts=int(statistics.impacts[k]) if statistics.is_followed else None,
-        load=load,
-        sampling_sigma_m=float(parts.accounting.sampling_sigma_m[k]),
+        impacts=int(statistics.impacts[k]),
+        load=parts.bushings[joint].load(mean_n, p99_n, rubbing_w),
         shown=shown_by_torque(k, diagnosis),
     )
 
@@ -160,7 +158,6 @@ def observe_torque(parts: Parts) -> None:
     if correction is not None and not is_wrong:
         correct(parts, correction)
         torque.corrected(correction, twin.clearance_mean_m)
-        twin.pull_block()
     _note_torque(parts, torque, before)
     if correction is not None and not is_wrong:
         parts.keep()
@@ -193,7 +190,6 @@ def _take_parameters(parts: Parts, found: LegParameters | None) -> None:
     if found is None or found == parts.twin.parameters or not parts.config.diagnosis.correct:
         return
     parts.twin.set_parameters(found)
-    parts.twin.pull_block()
     stamp_ns = parts.twin.intake.followed_stamp_ns
     parts.accounting.note(IdentifiedLeg(stamp_ns, tuple(parts.mechanism.bodies), found))
     parts.grows_anew(parts.clearance_joints)

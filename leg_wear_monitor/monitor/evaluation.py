@@ -334,8 +334,6 @@ class AlarmEvaluation:
     cycle_ns : int
         Duration of a commanded gait cycle.
     guard : InputGuard
-    periods : int
-        Evaluation periods in that duration.
 
     Attributes
     ----------
@@ -349,9 +347,8 @@ class AlarmEvaluation:
         config: MonitorConfig,
         cycle_ns: int,
         guard: InputGuard,
-        periods: int = A_CYCLE,
     ) -> None:
-        self._twin, self._periods = twin, periods
+        self._twin = twin
         self.guard = guard
         self._cycle_ns = cycle_ns
         self.config = config
@@ -432,20 +429,15 @@ class AlarmEvaluation:
             if foot_load is None
             else {spec.name(): spec.value(foot_load) for spec in alarm_specs.FOOT_LOAD}
         )
-        factor = 1.0
-        if report.is_followed:
-            values = self._of_cycle(report, record)
-            factor = self._impact_factor(report.cadence_rpm)
-            self.state.cadence_rpm = report.cadence_rpm
-        else:
-            values = self._of_tracked(report)
-        values |= sensor
+        values = self._of_cycle(report, record) | sensor
+        factor = self._impact_factor(report.cadence_rpm)
+        self.state.cadence_rpm = report.cadence_rpm
         for name in self.board.observed:  # it is evaluated with all that is known, at the period's end
             values.pop(name, None)
         return self.board.evaluate(values, report.stamp_ns, impact_factor=factor)
 
     def _of_cycle(self, report: CycleReport, record: TorqueRecord) -> dict[str, float]:
-        """Values of a gait cycle that was followed, by the names of their alarms."""
+        """Values of a gait cycle, by the names of their alarms."""
         cycle = {
             **torque_values(report, record, self.torque_bounds),
             alarm_specs.MISMATCH.kind: report.torque_mismatch,
@@ -457,13 +449,6 @@ class AlarmEvaluation:
         for joint in report.joints:
             values |= {spec.name(joint.joint): spec.value(joint) for spec in joint_specs(self.config)}
         return values
-
-    def _of_tracked(self, report: CycleReport) -> dict[str, float]:
-        """Those of one that was tracked only: it has neither forces nor a predicted torque."""
-        clearance = alarm_specs.CLEARANCE
-        departure = abs(report.cadence_rpm - self.config.cadence.commanded_rpm)
-        clearances = {clearance.name(joint.joint): clearance.value(joint) for joint in report.joints}
-        return {alarm_specs.CADENCE.name(): departure, **clearances}
 
     def _impact_factor(self, rpm: float) -> float:
         """Factor on the limits of impact forces, which are those of the commanded cadence, at another one.
@@ -495,7 +480,7 @@ class AlarmEvaluation:
         sources = {alarm_specs.SOURCES.name(): alarm_specs.SOURCES.value(self.guard)}
         early += self.board.evaluate(sources, self.guard.stamp_ns)
         self.state.evaluation_periods += 1
-        if self.state.evaluation_periods < self._periods:
+        if self.state.evaluation_periods < A_CYCLE:
             return early
         return early + self._evaluate_input(skipped)
 

@@ -27,7 +27,6 @@ from leg_wear_monitor.monitor.verdict.situation import (
     believed,
     joint_status,
     surest,
-    with_sampling,
 )
 from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, Finding, dated, has_changed, verdict_of
 from leg_wear_monitor.state import (
@@ -48,10 +47,8 @@ from leg_wear_monitor.twin.statistics import Tracking
 
 def verdict_report(parts: Parts, situation: Situation | None = None) -> VerdictReport:
     """The verdict now; the situation is made if it is not given."""
-    stamp_ns, sampling = parts.twin.intake.stamp_ns, parts.twin.sampling
+    stamp_ns = parts.twin.intake.stamp_ns
     found = findings(situation or situation_of(parts))
-    if sampling:
-        found = with_sampling(found, sampling, parts.clearance_joints, parts.accounting.sampling_sigma_m)
     return VerdictReport(stamp_ns, dated(found, parts.state.findings, stamp_ns))
 
 

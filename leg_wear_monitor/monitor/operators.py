@@ -200,15 +200,13 @@ def renew_forecast(parts: Parts) -> CycleReport | None:
     last = parts.state.last
     if last is None:
         return None
-    sigma_m = parts.accounting.sampling_sigma_m
     forecast = parts.forecaster.renewed(
         parts.worn_m(parts.twin.clearance_mean_m),
         parts.evaluation.board.clearance_limits_m,
         is_forecast_valid(parts, verdict_report(parts).findings),
-        sigma_m,
         parts.model_error,
     )
-    parts.state.last = with_forecast(last, forecast, parts.measured, sigma_m.tolist())
+    parts.state.last = with_forecast(last, forecast, parts.measured)
     return parts.state.last
 
 

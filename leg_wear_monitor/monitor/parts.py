@@ -44,7 +44,7 @@ from leg_wear_monitor.monitor.reports import AlarmList, CycleReport
 from leg_wear_monitor.monitor.verdict.verdict import Finding, estimate
 from leg_wear_monitor.twin.digital_twin import DigitalTwin, TwinSnapshot
 from leg_wear_monitor.twin.reference import LegParameters
-from leg_wear_monitor.twin.sample import GROUND, NO_LOAD, SamplingSettings
+from leg_wear_monitor.twin.sample import GROUND, NO_LOAD
 from leg_wear_monitor.twin.statistics import Event
 from leg_wear_monitor.twin.torque_reference import TorqueReference
 
@@ -102,8 +102,6 @@ class Parts:
     mechanism : Mechanism
     config : MonitorConfig
     ledger : Ledger or None
-    sampling : SamplingSettings, optional
-        Follow blocks of gait cycles only.
 
     Attributes
     ----------
@@ -114,17 +112,11 @@ class Parts:
     state : MonitorState
     """
 
-    def __init__(
-        self,
-        mechanism: Mechanism,
-        config: MonitorConfig,
-        ledger: Ledger | None,
-        sampling: SamplingSettings | None = None,
-    ) -> None:
+    def __init__(self, mechanism: Mechanism, config: MonitorConfig, ledger: Ledger | None) -> None:
         self.config = config
         self.mechanism = fitted(mechanism, config)
         self.clearance_joints = self.mechanism.clearance_joints
-        self.twin = DigitalTwin(self.mechanism, twin_settings(self.config), sampling)
+        self.twin = DigitalTwin(self.mechanism, twin_settings(self.config))
         self.guard = InputGuard(self.twin.settings.tracker)
         self.foot_load = (
             FootLoadCheck(self.mechanism, self.config) if self.config.foot_load.source != NO_LOAD else None
@@ -136,9 +128,7 @@ class Parts:
         )
         self.accounting = Accounting(self.twin, ledger, self.config.ledger)
         cycle_ns = round(60.0e9 / abs(self.config.cadence.commanded_rpm))
-        # shorter than a gait cycle for early alarms of impacts, which a sampled replay does not promise
-        periods = 1 if sampling else A_CYCLE
-        self.evaluation = AlarmEvaluation(self.twin, self.config, cycle_ns, self.guard, periods)
+        self.evaluation = AlarmEvaluation(self.twin, self.config, cycle_ns, self.guard)
         self.bushings = {joint: bushing_of(self.mechanism, joint) for joint in self.clearance_joints}
         self.forecaster = Forecaster(
             self.mechanism,
@@ -166,7 +156,7 @@ class Parts:
             board.restore(ledger.entry.alarms)
             self.accounting.note_alarms(AlarmList(stamp_ns, tuple(board.alarms.values())))
         self._of_leg = self.twin.parameters, self._model_error()
-        self.evaluation_periods = EvaluationPeriods(cycle_ns // periods)
+        self.evaluation_periods = EvaluationPeriods(cycle_ns // A_CYCLE)
         self._fresh_m = [self.mechanism.clearances[joint].radial_clearance for joint in self.clearance_joints]
         kept = TorqueRecord.of(self.accounting.state.commissioned)
         self.state = MonitorState(tuple(GrowthWindow() for _ in self.clearance_joints), kept)

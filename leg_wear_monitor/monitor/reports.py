@@ -37,8 +37,7 @@ class JointReport:
         Standard deviation of what it may be off: cycles scatter, and masses are not those on paper.
     peak_force_n, p99_force_n, mean_force_n : float
         Of the contact force in this cycle; the peak is a sample of a heavy tail.
-    impacts : int or None
-        None if the gait cycle was tracked only; forces are NaN then.
+    impacts : int
     forecast : JointForecast or None
         Renewed once a minute, and when more is known.
     seen : ClearanceEstimate or None
@@ -47,8 +46,6 @@ class JointReport:
         The last clearance of this part that somebody measured.
     load : BushingLoad or None
         Pressure and sliding speed in this cycle, against the limits of the joint's material.
-    sampling_sigma_m : float
-        Standard deviation of the mean clearance, because sampled replays did not follow all gait cycles.
     shown : KnownClearance or None
         The clearance that the drive torque shows; None if it shows none.
     """
@@ -62,12 +59,11 @@ class JointReport:
     peak_force_n: float
     p99_force_n: float
     mean_force_n: float
-    impacts: int | None
+    impacts: int
     forecast: JointForecast | None = None
     seen: ClearanceEstimate | None = None
     measured: Measurement | None = None
     load: BushingLoad | None = None
-    sampling_sigma_m: float = 0.0
     shown: KnownClearance | None = None
 
     @property
@@ -133,9 +129,6 @@ class CycleReport:
         Standard deviations of these three.
     forecast : LegForecast or None
         Renewed once a minute.
-    is_followed : bool
-        Whether the leg was followed. Otherwise, in a sampled replay, the cycle was tracked only: forces and
-        torques are NaN, and clearances are estimates from other cycles.
     """
 
     cycle: int
@@ -160,7 +153,6 @@ class CycleReport:
     torque_lag_sigma_s: float = math.nan
     load_friction_sigma: float = math.nan
     forecast: LegForecast | None = None
-    is_followed: bool = True
 
 
 @attrs.frozen
@@ -313,34 +305,15 @@ class Status:
     fault_code: str = NO_FAULT
 
 
-# A gait cycle after another one, and with a newer forecast.
-
-
-def latest(report: CycleReport, followed: CycleReport | None) -> CycleReport:
-    """A gait cycle; one that was tracked only, with forces and torques of the last one that was followed."""
-    if report.is_followed or followed is None:
-        return report
-    own = ("cycle", "begin_ns", "stamp_ns", "cadence_rpm", "moving_s", "bridged_s", "forecast")
-    forces = ("peak_force_n", "p99_force_n", "mean_force_n", "impacts", "load")
-    joints = tuple(
-        attrs.evolve(new, **{name: getattr(old, name) for name in forces})
-        for new, old in zip(report.joints, followed.joints, strict=True)
-    )
-    return attrs.evolve(followed, joints=joints, **{name: getattr(report, name) for name in own})
+# A gait cycle with a newer forecast.
 
 
 def with_forecast(
-    report: CycleReport,
-    forecast: Forecast,
-    measured: Sequence[Measurement | None],
-    sampling_sigma_m: Sequence[float],
+    report: CycleReport, forecast: Forecast, measured: Sequence[Measurement | None]
 ) -> CycleReport:
-    """The same gait cycle with a newer forecast, its measurements, and newer errors by sampling."""
-    joints = zip(report.joints, forecast.joints, measured, sampling_sigma_m, strict=True)
-    renewed = tuple(
-        attrs.evolve(joint, forecast=new, measured=by, sampling_sigma_m=sigma_m)
-        for joint, new, by, sigma_m in joints
-    )
+    """The same gait cycle with a newer forecast, and its measurements."""
+    joints = zip(report.joints, forecast.joints, measured, strict=True)
+    renewed = tuple(attrs.evolve(joint, forecast=new, measured=by) for joint, new, by in joints)
     return attrs.evolve(report, joints=renewed, forecast=forecast.leg)
 
 

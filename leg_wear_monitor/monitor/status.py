@@ -34,7 +34,7 @@ from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.parts import Parts
 from leg_wear_monitor.monitor.reports import CycleReport, Status, VerdictReport
 from leg_wear_monitor.monitor.torque_status import diagnosis_status, torque_status
-from leg_wear_monitor.monitor.verdict.situation import believed_words, sampled_words
+from leg_wear_monitor.monitor.verdict.situation import believed_words
 from leg_wear_monitor.monitor.verdict.verdict import (
     Finding,
     estimate,
@@ -44,7 +44,7 @@ from leg_wear_monitor.monitor.verdict.verdict import (
 )
 from leg_wear_monitor.state import JointClearance, Level, State, Verdict
 from leg_wear_monitor.twin import KINDS, LOAD
-from leg_wear_monitor.twin.statistics import Sampling, Tracking
+from leg_wear_monitor.twin.statistics import Tracking
 
 # Status of the crank's zero.
 
@@ -74,7 +74,7 @@ _INPUT = tuple(spec.name() for spec in alarm_specs.OF_INPUT)
 
 
 def statuses(parts: Parts, report: VerdictReport) -> tuple[Status, ...]:
-    """All statuses, verdict first, then gait, inputs, joints, alarms and ledger; last, a sampled replay.
+    """All statuses, verdict first, then gait, inputs, joints, alarms and ledger.
 
     Parameters
     ----------
@@ -99,21 +99,7 @@ def statuses(parts: Parts, report: VerdictReport) -> tuple[Status, ...]:
         *((_encoders(parts.encoders, parts),) if parts.encoders else ()),
         alarms_status(parts.evaluation.board.alarms.values()),
         _ledger(parts.accounting),
-        *((_sampling(parts.twin.sampling, parts),) if parts.twin.sampling else ()),
     )
-
-
-def _sampling(sampling: Sampling, parts: Parts) -> Status:
-    """A sampled replay: what was followed, and the standard errors of the counted clearances."""
-    values = {
-        "fraction": sampling.fraction,
-        "followed_cycles": float(sampling.followed_cycles),
-        "estimated_cycles": sampling.estimated_cycles,
-        "blocks": float(sampling.blocks),
-    }
-    sigmas = zip(parts.clearance_joints, parts.accounting.sampling_sigma_m.tolist(), strict=True)
-    values |= {f"{joint}_sigma_m": sigma for joint, sigma in sigmas}
-    return Status("sampling", Level.OK, sampled_words(sampling), values)
 
 
 def verdict_status(verdict: Verdict) -> Status:
@@ -204,7 +190,7 @@ def _joint(parts: Parts, k: int, name: str) -> Status:
         "peak_force_n": report.peak_force_n,
         "p99_force_n": report.p99_force_n,
         "mean_force_n": report.mean_force_n,
-        "impacts": float(or_nan(report.impacts)),
+        "impacts": float(report.impacts),
         **(_load_values(report.load) if report.load else {}),
     }
     if report.forecast is None:

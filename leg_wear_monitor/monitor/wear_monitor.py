@@ -61,14 +61,13 @@ from leg_wear_monitor.monitor.reports import (
     SampleReports,
     Status,
     VerdictReport,
-    latest,
 )
 from leg_wear_monitor.monitor.status import statuses
 from leg_wear_monitor.monitor.verdict.situation import SEEN, Situation, is_observed
 from leg_wear_monitor.monitor.verdict.verdict import Finding
 from leg_wear_monitor.state import LegState
-from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples, SamplingSettings
-from leg_wear_monitor.twin.statistics import CycleStatistics, Sampling, joined
+from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples
+from leg_wear_monitor.twin.statistics import CycleStatistics, joined
 
 
 class WearMonitor:
@@ -83,8 +82,6 @@ class WearMonitor:
     config : MonitorConfig, optional
     ledger : Ledger, optional
         See `open_ledger`; its wear is continued. Without one, wear begins at 0 and is lost at the end.
-    sampling : SamplingSettings, optional
-        For long recordings: follow blocks of gait cycles only. By default, all are followed.
 
     Attributes
     ----------
@@ -94,8 +91,7 @@ class WearMonitor:
     clearance_joints : tuple of str
         The clearance joints, in the order of all values.
     reports_states : bool
-        Whether `update` reports the state of the leg. To make one takes 0.3 ms, which counts where gait
-        cycles are only tracked.
+        Whether `update` reports the state of the leg, which takes 0.3 ms per report.
 
     Raises
     ------
@@ -120,14 +116,13 @@ class WearMonitor:
         mechanism: Mechanism,
         config: MonitorConfig | None = None,
         ledger: Ledger | None = None,
-        sampling: SamplingSettings | None = None,
     ) -> None:
         config = MonitorConfig() if config is None else config
         for name, given, kind in (("mechanism", mechanism, Mechanism), ("config", config, MonitorConfig)):
             if not isinstance(given, kind):
                 fault = f"{shown(given)} is not a {kind.__name__}, expected what load_{name} gives"
                 raise ConfigError(name, "", fault)
-        self._parts = parts = Parts(mechanism, config, ledger, sampling)
+        self._parts = parts = Parts(mechanism, config, ledger)
         self.mechanism, self.clearance_joints = parts.mechanism, parts.clearance_joints
         self._twin, self._accounting, self._board = parts.twin, parts.accounting, parts.evaluation.board
         self.reports_states = True
@@ -232,30 +227,26 @@ class WearMonitor:
             known = self._twin.freeze_load(*parts.foot_load.freezes(sensor))
             parts.foot_load.state.has_mean = known
         self._take_changes(parts.evaluation.end_cycle(report, parts.state.torque, sensor), changes)
-        if statistics.is_followed:
-            explain_mismatch(parts, statistics)
-            self._keep_torque(statistics, report)
+        explain_mismatch(parts, statistics)
+        self._keep_torque(statistics, report)
         return report
 
     def _report(self, statistics: CycleStatistics) -> CycleReport:
         """Report of a gait cycle, with growth, estimates and forecast."""
         parts, state = self._parts, self._parts.state
         self._accounting.ended(statistics)
-        if statistics.is_followed:
-            state.growth = all_extended(state.growth, statistics, self.config.growth.window_cycles)
+        state.growth = all_extended(state.growth, statistics, self.config.growth.window_cycles)
         estimates = clearance_estimates(parts, statistics)
         forecast = parts.forecaster.after(
             statistics,
             parts.worn_m(statistics.clearance_mean_m),  # the twin itself may be ahead
             self.clearance_limits_m,
             lambda: is_forecast_valid(parts, state.findings),
-            self._accounting.sampling_sigma_m,
             parts.model_error,
         )
-        report = cycle_report(parts, statistics, forecast, estimates)
-        state.last = latest(report, state.last)
-        self._accounting.note_clearances(report)
-        return report
+        state.last = cycle_report(parts, statistics, forecast, estimates)
+        self._accounting.note_clearances(state.last)
+        return state.last
 
     def _keep_torque(self, statistics: CycleStatistics, report: CycleReport) -> None:
         """Record the torque of a gait cycle if it is as predicted."""
@@ -278,9 +269,8 @@ class WearMonitor:
         return attrs.evolve(situation, alarms=tuple(self._board.alarms.values()))
 
     def _take_changes(self, changed: tuple[AlarmList, ...], changes: list[AlarmList]) -> None:
-        """Add changes of alarms to the reports and to the ledger; a sampled replay follows what comes."""
+        """Add changes of alarms to the reports and to the ledger."""
         for change in changed:
-            self._twin.pull_block()
             changes.append(change)
             self._accounting.note_alarms(change)
 
@@ -351,11 +341,6 @@ class WearMonitor:
     def lost(self) -> Lost:
         """Samples and time that were not integrated so far."""
         return self._accounting.lost(self._parts.guard)
-
-    @property
-    def sampling(self) -> Sampling | None:
-        """State of a sampled replay; None where all gait cycles are followed."""
-        return self._twin.sampling
 
     @property
     def used(self) -> dict[str, int]:
@@ -509,10 +494,6 @@ class WearMonitor:
         """
         return measure(self._parts, joint, float(clearance_m), float(sigma_m), int(stamp_ns), who, accept)
 
-    def end_recording(self) -> None:
-        """Count the wear up to the last sample, which a sampled replay does at the end of a gait cycle."""
-        self._twin.end_recording()
-
     @property
     def forecast_basis(self) -> ForecastBasis | None:
         """What the last forecast rests on; None before the first."""
@@ -602,12 +583,7 @@ class WearMonitor:
 # A monitor with the ledger that its parameters name, from the one to the other without a gap.
 
 
-def open_monitor(
-    mechanism: Mechanism,
-    config: MonitorConfig,
-    at_end: bool = False,
-    sampling: SamplingSettings | None = None,
-) -> WearMonitor:
+def open_monitor(mechanism: Mechanism, config: MonitorConfig, at_end: bool = False) -> WearMonitor:
     """Open the ledger and build the monitor that continues it.
 
     Building takes seconds, and a minute where kernels are compiled: if it is cut short, the ledger must not
@@ -619,8 +595,6 @@ def open_monitor(
     config : MonitorConfig
     at_end : bool
         Whether the ledger is written at the end of the run alone, see `open_ledger`.
-    sampling : SamplingSettings, optional
-        Follow blocks of gait cycles only.
 
     Raises
     ------
@@ -629,10 +603,10 @@ def open_monitor(
     """
     ledger = open_ledger(mechanism, config, at_end)
     if ledger is None:
-        return WearMonitor(mechanism, config, sampling=sampling)
+        return WearMonitor(mechanism, config)
     with closed_on_interrupt(ledger.abandon):
         try:
-            return WearMonitor(mechanism, config, ledger, sampling)
+            return WearMonitor(mechanism, config, ledger)
         except BaseException:
             ledger.abandon()
             raise

@@ -20,7 +20,7 @@ from leg_wear_monitor.monitor.gait_evidence import GaitEvidence
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor, open_monitor
 from leg_wear_monitor.playback.history import History, Sink
 from leg_wear_monitor.playback.summary import ReplayResult
-from leg_wear_monitor.twin.sample import Samples, SamplingSettings
+from leg_wear_monitor.twin.sample import Samples
 
 REPORTS_FILE = "reports.mcap"
 
@@ -37,7 +37,6 @@ def replay(
     foot_load: str | None = None,
     node: str | None = None,
     memory_mb: float = DEFAULT_MB,
-    sample: float | None = None,
     ready: Callable[[WearMonitor], None] | None = None,
     progress: Callable[[float], None] | None = None,
     finish: Callable[[ReplayResult], None] | None = None,
@@ -71,9 +70,6 @@ def replay(
         namespace of the crank topic, such as ``/left/leg_wear_monitor`` for ``/left/joint_states``.
     memory_mb : float
         Memory limit for reading the recording, including temporary files [10⁶ bytes].
-    sample : float, optional
-        Fraction of the gait cycles that is followed, for long recordings: the others are tracked and checked,
-        and their wear is estimated; by default, all are followed. See ``docs/explanation/sampling.md``.
     ready : callable, optional
         Called with the monitor before the first sample.
     progress : callable, optional
@@ -91,8 +87,6 @@ def replay(
         If the recording contains nothing usable, or the reports cannot be written.
     ConfigError, LedgerError
         If the parameters or the ledger are unusable.
-    LegWearError
-        If ``sample`` is no fraction.
 
     Examples
     --------
@@ -116,7 +110,6 @@ def replay(
     >>> summary.cycles, summary.recording.torque_samples
     (10, 2400)
     """
-    sampling = _sampling(sample)
     config = config if isinstance(config, MonitorConfig) else load_config(config, node)
     kept = attrs.evolve(config.ledger, path="" if ledger is None else str(ledger))
     config = attrs.evolve(config, ledger=kept)
@@ -129,7 +122,7 @@ def replay(
         node = node or node_beside(printable(recording.topics["joint_states"]))
         config = config.on_node(node)
         mechanism = load_mechanism(config.mechanism)
-        monitor = open_monitor(mechanism, config, at_end=True, sampling=sampling)
+        monitor = open_monitor(mechanism, config, at_end=True)
         stack.callback(monitor.abandon)
         monitor.reports_states = out is not None  # otherwise the last one is enough
         history, evidence = History(monitor.clearance_joints), GaitEvidence(config)
@@ -153,12 +146,6 @@ def replay(
     return result
 
 
-def _sampling(fraction: float | None) -> SamplingSettings | None:
-    """Settings of a sampled replay; None where all gait cycles are followed."""
-    settings = None if fraction is None else SamplingSettings(fraction=fraction)
-    return settings if settings and settings.fraction < 1.0 else None
-
-
 def _run(
     result: ReplayResult,
     recording: Recording,
@@ -173,13 +160,11 @@ def _run(
         result.logged_s = max(result.logged_s, (int(block.log_time_ns[-1]) - first_ns) / 1e9)
         if block.pause_ns:
             monitor.pause(_stamps_apart_s(result, block))
-        whole = sink is None and monitor.sampling is not None  # diagnostics are due in reports only
-        for samples in [block.samples] if whole else _evaluation_periods(block, monitor.config):
+        for samples in _evaluation_periods(block, monitor.config):
             result.count(samples)
             _take(result, samples, sink)
         if progress:
             progress(block.fraction)
-    monitor.end_recording()
     result.history.last = monitor.renew_forecast()
 
 
@@ -207,12 +192,10 @@ def _about_the_ledger(result: ReplayResult) -> list[Finding]:
 def _take(result: ReplayResult, samples: Samples, sink: Sink | None) -> None:
     """Process samples with the monitor, and store the reports."""
     reports = result.monitor.update(samples)
-    if result.monitor.sampling is None:
-        result.history.add_samples(reports.samples)
+    result.history.add_samples(reports.samples)
     for cycle in reports.cycles:
         result.history.add_cycle(cycle)
-        if cycle.is_followed:
-            result.evidence.add(cycle)
+        result.evidence.add(cycle)
     for alarms in reports.alarms:
         result.history.add_alarms(alarms)
     if sink:

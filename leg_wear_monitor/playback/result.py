@@ -139,12 +139,10 @@ class ReplayJoint:
     encoders : EncoderEvidence or None
         What further encoders show of the clearance; None without such encoders.
     impacts : int
-        Number of impacts, in the gait cycles that were followed.
+        Number of impacts.
     load : BushingLoad or None
         Pressure and sliding speed in the last gait cycle, and the limits of the joint's material; None if
         they are not known.
-    sampling_sigma_m : float
-        Standard deviation of the counted clearance, because sampled replays did not follow all gait cycles.
     """
 
     opened_m: float | None = _perhaps()
@@ -157,7 +155,6 @@ class ReplayJoint:
     encoders: EncoderEvidence | None = None
     impacts: int
     load: BushingLoad | None = None
-    sampling_sigma_m: float = 0.0
 
 
 @attrs.frozen(kw_only=True)
@@ -298,28 +295,6 @@ class ReplayMonitor:
 
 
 @attrs.frozen(kw_only=True)
-class ReplaySampling:
-    """How much of the gait was followed in a sampled replay.
-
-    Attributes
-    ----------
-    fraction : float
-        Fraction of the gait cycles that was asked for.
-    followed_cycles : int
-        Gait cycles that were followed and counted.
-    estimated_cycles : float
-        Gait cycles that were tracked only: their wear is estimated, their forces are not known.
-    blocks : int
-        Blocks of followed gait cycles with one cadence and load.
-    """
-
-    fraction: float
-    followed_cycles: int
-    estimated_cycles: float
-    blocks: int
-
-
-@attrs.frozen(kw_only=True)
 class ReplayGait:
     """Whether the motion was a gait of this leg.
 
@@ -348,8 +323,7 @@ class ReplayGait:
 class ReplayHistory:
     """Columns over n groups of gait cycles: last value of each; maximum of peaks, sum of impacts.
 
-    NaN where a value is not known, such as forces and torques of gait cycles that were tracked only. What a
-    joint has is an array a joint, by its name.
+    NaN where a value is not known. What a joint has is an array a joint, by its name.
 
     Attributes
     ----------
@@ -507,15 +481,13 @@ class ReplaySummary(LegState, Drawable):
         verdict's, and those of the recording that still hold.
     lost : Lost
         Samples and time that were not used.
-    sampling : ReplaySampling or None
-        How much of the gait was followed; None if all of it was.
     history : ReplayHistory
         The gait cycles over time.
     wear_depth_m : dict of str to WornDepth
         Wear around the surfaces of each joint since the start of the ledger, or of the replay without one.
     motion : tuple of CycleMotion
         The first gait cycle with a settled torque, and the last one; one where the two are the same, none
-        where no whole one was followed, or the replay was sampled.
+        where no whole one was followed.
     advice : str
         Limits of the results: the absence of an alarm does not mean the joints are healthy.
     made_with : dict of str to str
@@ -535,7 +507,6 @@ class ReplaySummary(LegState, Drawable):
     walked: tuple[WalkedLoad, ...] = ()
     status: tuple[ReplayStatus, ...]
     lost: Lost
-    sampling: ReplaySampling | None = None
     history: ReplayHistory
     wear_depth_m: dict[str, WornDepth]
     motion: tuple[CycleMotion, ...] = ()

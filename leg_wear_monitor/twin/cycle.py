@@ -166,10 +166,6 @@ class LoadEstimate:
         self.values[LOAD], self.state[REGRESSORS + LOAD] = load_n, _UNKNOWN[LOAD] ** 2
         self.state[-1] = load_n if acts else 0.0
 
-    def wait(self, cycles: int) -> None:
-        """Let so many cycles pass without an estimate."""
-        self.state[REGRESSORS:-1] += cycles * _DRIFT**2
-
     def take(self, found: CycleEstimate, acts: bool) -> None:
         """Update by a cycle's estimate; ``acts``: whether a significant load acts on the leg."""
         values, variance = self.values, self.state[REGRESSORS:-1]
@@ -272,52 +268,28 @@ def cycle_statistics(
 ) -> CycleStatistics:  # fmt: skip
     """Statistics of a cycle at its end from a `LEG_STATE`; ``before`` (2, k) [m]: initial clearances."""
     joint, moving = contacts.joint, float(statistics.time[0])
-    tracked = tracked_cycle(leg, stamp, contacts, depth, moving)
-    return attrs.evolve(
-        tracked,
+    motion, now = leg.motion, clearances(contacts, depth)
+    return CycleStatistics(
+        cycle=int(motion.cycles),
+        begin_ns=int(motion.cycle_begin_ns),
+        stamp_ns=stamp,
+        direction=1 if motion.cut_rises else -1,
+        moving_s=moving,
+        bridged_s=float(motion.cycle_bridged_ns) * 1.0e-9,
         peak_force_n=statistics.peak[joint],
         p99_force_n=np.array([percentile(statistics.force_time[j], 0.99) for j in joint]),
         mean_force_n=statistics.integral[joint, FORCE] / moving,
         impacts=statistics.impacts[joint],
         contact_fraction=statistics.integral[joint, CONTACT] / moving,
         archard_j=statistics.integral[joint, ARCHARD],
-        growth_mean_m=tracked.clearance_mean_m - before[0],
+        clearance_mean_m=now[0],
+        clearance_max_m=now[1],
+        growth_mean_m=now[0] - before[0],
         torque=torque,
         torque_profile=profile,
         not_compared=not_compared,
-        is_followed=True,
-        load_peak_n=load_peak_n,
-    )
-
-
-def tracked_cycle(
-    leg: Record, stamp: int, contacts: ContactArrays, depth: Floats, moving_s: float
-) -> CycleStatistics:
-    """Statistics of a cycle that was tracked, but does not count by itself; depth (k, 2, N) is estimated."""
-    motion, now = leg.motion, clearances(contacts, depth)
-    unknown = np.full(len(contacts.joint), np.nan)
-    values = [field.name for field in attrs.fields(TorqueStatistics) if field.name != "samples"]
-    return CycleStatistics(
-        cycle=int(motion.cycles),
-        begin_ns=int(motion.cycle_begin_ns),
-        stamp_ns=stamp,
-        direction=1 if motion.cut_rises else -1,
-        moving_s=moving_s,
-        bridged_s=float(motion.cycle_bridged_ns) * 1.0e-9,
-        peak_force_n=unknown,
-        p99_force_n=unknown,
-        mean_force_n=unknown,
-        impacts=np.zeros(len(unknown), np.int64),
-        contact_fraction=unknown,
-        archard_j=unknown,
-        clearance_mean_m=now[0],
-        clearance_max_m=now[1],
-        growth_mean_m=unknown,
-        torque=TorqueStatistics(samples=0, **dict.fromkeys(values, np.nan)),
-        torque_profile=torque_profile(leg.sums, 0.0),
-        is_followed=False,
         load=load_profile(leg),
-        load_peak_n=np.nan,
+        load_peak_n=load_peak_n,
     )
 
 

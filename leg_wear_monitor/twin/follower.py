@@ -21,7 +21,6 @@ from leg_wear_monitor.twin.following import CYCLE, LEFT, NEEDS_START, REPORTED, 
 from leg_wear_monitor.twin.load import FootLoad, force_of, set_force, shape_torque, torque_size
 from leg_wear_monitor.twin.reference import LegParameters, drive_coupling
 from leg_wear_monitor.twin.sample import FOOT_FRAME, GROUND, INSTANT, MEASURED, STANCE, TwinSettings
-from leg_wear_monitor.twin.sampling import SampledState
 from leg_wear_monitor.twin.statistics import (
     CycleStatistics,
     Event,
@@ -67,7 +66,6 @@ class FollowerSnapshot(NamedTuple):
     repeating: tuple[Floats, ...]
     load: tuple[Floats, ...]
     load_shape: str
-    sampled: SampledState | None = None
 
 
 class LegFollower:
@@ -202,7 +200,6 @@ class LegFollower:
                 if reason == LEFT:
                     self.state.motion.runs, self.state.motion.lost = 0, 0
                 events.append(Event(int(steps["begin_ns"][i]), _EVENT_KINDS[int(steps["detail"][i])]))
-                self._happened(events[-1].what)
                 i += 1
             elif reason != run.DONE:
                 joint = self._setup.clearance_joints[k] if k >= 0 else None
@@ -244,9 +241,6 @@ class LegFollower:
         self._leg.polynomial[:] = 0.0, angle, speed, 0.0, 0.0, 0.0, 0.0
         cycle.clear_run_statistics(self.statistics)
         return Event(stamp, TwinEventKind.ACQUIRED)
-
-    def _happened(self, what: TwinEventKind) -> None:
-        """Hook for an event of the tracker, in the order of stamps."""
 
     def _run_in(self, angle: float, speed: float) -> int:
         """Run the leg in up to a crank angle [rad] and speed [rad/s], without wear.

@@ -14,10 +14,6 @@ from leg_wear_monitor.mechanism.arrays import Floats
 PHASES = 32  # crank phases per turn, for the residual that repeats over gait cycles
 FINE_PHASES = 128  # of the torque profile of a gait cycle
 
-# what the present gait cycle is in a sampled replay: followed and counted; followed, but not settled after a
-# jump; tracked, with the leg left where it was
-COUNTED, SETTLING, TRACKED = 0, 1, 2
-
 # number and indices of the regressors of a torque residual
 REGRESSORS = 4
 LOAD, FRICTION, LAG, LOAD_FRICTION = range(REGRESSORS)
@@ -27,7 +23,6 @@ LEG_MOTION = np.dtype(
         ("base_ns", "i8"),  # stamp of the stepper's time 0
         ("runs", "i8"),  # 1 where the leg runs
         ("lost", "i8"),  # 1 after a failure, until the next start
-        ("counts", "i8"),  # of `COUNTED` and so on: 0, except in a sampled replay
         # the present piece of the crank's motion
         ("piece_begin_ns", "i8"),  # stamp
         ("piece_end_ns", "i8"),  # stamp

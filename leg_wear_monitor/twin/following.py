@@ -8,14 +8,12 @@ from leg_wear_monitor.dynamics.clearance.contact import force_in_joint
 from leg_wear_monitor.dynamics.clearance.model import ANGLE, SPEED, blend, move_time_origin
 from leg_wear_monitor.dynamics.run import DONE, TORQUE, TORQUE_SQUARED
 from leg_wear_monitor.twin.follower_state import (
-    COUNTED,
     FRICTION,
     LAG,
     LOAD,
     LOAD_FRICTION,
     PHASES,
     REGRESSORS,
-    TRACKED,
     in_turn,
     pass_low,
     phase_of,
@@ -242,41 +240,17 @@ def _load_piece(model, stepper, leg, polynomial, step):
 def _evaluate(sensor, signature, leg, polynomial, stepper, step, out):
     """Evaluate the running leg at a sample, into the record ``out`` of `EVALUATED`."""
     motion, torque = leg.motion, leg.torque
-    if motion.counts == TRACKED:
-        out.angle = _add_measured(signature, leg, polynomial, step)
-        return
     if torque.time > 0.0:
         torque.mean_before = torque.impulse / torque.time
         torque.impulse, torque.time = 0.0, 0.0
     at = min(max(step.end_ns, motion.piece_begin_ns), motion.piece_end_ns)
     angle = _angle_at(polynomial, 1.0e-9 * (at - motion.piece_begin_ns))
     out.angle = angle - _TURN * math.floor(angle / _TURN)
-    if motion.counts == COUNTED:
-        direction = 1.0 if stepper.drive[SPEED] > 0.0 else -1.0
-        rubbing = sensor.friction + sensor.load_friction * abs(torque.mean_before)
-        out.torque = torque.mean_before + direction * rubbing
+    direction = 1.0 if stepper.drive[SPEED] > 0.0 else -1.0
+    rubbing = sensor.friction + sensor.load_friction * abs(torque.mean_before)
+    out.torque = torque.mean_before + direction * rubbing
     if motion.piece_begin_ns <= step.end_ns <= motion.piece_end_ns and math.isfinite(step.torque):
         compare(sensor, signature, leg, stepper, step.torque)
-
-
-@kernel
-def _add_measured(signature, leg, polynomial, step):
-    """Add a sample's torque, if it has one, to the profile of a gait cycle that is only tracked.
-
-    Returns
-    -------
-    float
-        The crank angle at the sample [rad].
-    """
-    motion = leg.motion
-    at = min(max(step.end_ns, motion.piece_begin_ns), motion.piece_end_ns)
-    angle = _angle_at(polynomial, 1.0e-9 * (at - motion.piece_begin_ns))
-    if motion.piece_begin_ns <= step.end_ns <= motion.piece_end_ns and math.isfinite(step.torque):
-        i, w = blend(signature.shape[0] - 1, angle)
-        lever = signature[i] + w * (signature[i + 1] - signature[i])
-        before, leg.torque.last_lever = leg.torque.last_lever, lever  # the torque is a mean since then
-        add_to_profile(leg.sums.profile, angle, step.torque, math.nan, 0.5 * (before + lever), 1.0)
-    return angle - _TURN * math.floor(angle / _TURN)
 
 
 @kernel
@@ -340,7 +314,7 @@ def follow(
 
     ``sensors`` (1,) contains the torque sensor, ``load`` the `LoadRows`. Values at samples are written to
     ``evaluated`` (n,) from index m on, joint forces [N] to ``forces`` (n, k) and eccentricities [m] to
-    ``eccentricities`` (n, 2 k), NaN while the leg does not run or does not count.
+    ``eccentricities`` (n, 2 k), NaN while the leg does not run.
 
     Returns
     -------
@@ -364,11 +338,9 @@ def follow(
             impulse, squares = statistics.drive_integral[TORQUE], statistics.drive_integral[TORQUE_SQUARED]
             time, before = statistics.time[0], stepper.intervals[0]
             t_end = 1.0e-9 * (until - motion.base_ns)
-            status, k = DONE, -1
-            if motion.counts != TRACKED:
-                status, k = _advance(
-                    advance_address, (model, feeds_back, stepper, polynomial, t_end, statistics, work)
-                )
+            status, k = _advance(
+                advance_address, (model, feeds_back, stepper, polynomial, t_end, statistics, work)
+            )
             if stepper.intervals[0] > before:
                 impulse = statistics.drive_integral[TORQUE] - impulse
                 squares = statistics.drive_integral[TORQUE_SQUARED] - squares
@@ -397,11 +369,10 @@ def follow(
             out.measured = step.torque
             if motion.runs != 0:
                 _evaluate(sensor, signature, leg, polynomial, stepper, step, out)
-            is_counted = motion.runs != 0 and motion.counts == COUNTED
             for j in range(force.shape[0]):
-                forces[m, j] = force[j] if is_counted else math.nan
+                forces[m, j] = force[j] if motion.runs != 0 else math.nan
             for j in range(stepper.e.shape[0]):
-                eccentricities[m, j] = stepper.e[j] if is_counted else math.nan
+                eccentricities[m, j] = stepper.e[j] if motion.runs != 0 else math.nan
             m += 1
         elif code == PUSH:
             if motion.runs != 0:

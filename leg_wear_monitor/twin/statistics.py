@@ -212,15 +212,12 @@ class CycleStatistics:
         Change of the first over the cycle.
     torque : TorqueStatistics
     torque_profile : TorqueProfile
-    is_followed : bool
-        Whether the leg was followed. Otherwise, in a sampled replay, the cycle was tracked only: its forces,
-        growth and torques are NaN, it has no impacts, and its clearances are estimates.
     not_compared : NotCompared or None
         Why its torque is not among those of the mismatch; None if it is.
     load : LoadProfile or None
         None without a sample of the foot load.
     load_peak_n : float
-        Largest vertical foot load that acted on the leg; NaN if it was not followed.
+        Largest vertical foot load that acted on the leg.
     """
 
     cycle: int
@@ -240,7 +237,6 @@ class CycleStatistics:
     growth_mean_m: Floats
     torque: TorqueStatistics
     torque_profile: TorqueProfile
-    is_followed: bool = True
     not_compared: NotCompared | None = None
     load: LoadProfile | None = None
     load_peak_n: float = 0.0
@@ -268,31 +264,6 @@ class TwinUpdate:
     samples: SampleStatistics
     cycles: tuple[CycleStatistics, ...]
     events: tuple[Event, ...]
-
-
-@attrs.frozen(eq=False)
-class Sampling:
-    """State of a sampled replay.
-
-    Attributes
-    ----------
-    fraction : float
-        Fraction of the gait cycles that was asked for.
-    followed_cycles : int
-        Gait cycles that were followed and counted.
-    estimated_cycles : float
-        Gait cycles whose wear is that of others; a part of a cycle counts as such.
-    blocks : int
-        Blocks of followed cycles of one condition.
-    variance_m2 : (k,) array
-        Variance of the mean clearances because of this, since the twin was created.
-    """
-
-    fraction: float
-    followed_cycles: int
-    estimated_cycles: float
-    blocks: int
-    variance_m2: Floats
 
 
 @attrs.frozen

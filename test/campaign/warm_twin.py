@@ -15,9 +15,9 @@ def keep_twin() -> None:
     twin.warm_up()
     new, settings = twin.snapshot(), twin_settings(config)
 
-    def again(mechanism: Any, wanted: Any = None, sampling: Any = None) -> Any:
-        if mechanism.name != "bionic_leg" or wanted != settings or sampling is not None:
-            return made(mechanism, wanted, sampling)
+    def again(mechanism: Any, wanted: Any = None) -> Any:
+        if mechanism.name != "bionic_leg" or wanted != settings:
+            return made(mechanism, wanted)
         twin.restore(new)
         return twin
 

@@ -78,7 +78,7 @@ def worn_ledger(tmp_path: Path) -> Callable[..., Path]:
         kept = open_ledger(leg, attrs.evolve(config, ledger=attrs.evolve(config.ledger, path=str(path))))
         worn = np.full((2, 720), 3.0e-5)
         nominal = {name: sum(leg.clearances[name].wear_coefficient) for name in leg.clearance_joints}
-        joints = tuple(JointWear(name, worn, 4000, 4000.0, 0, 4.0e-12, k) for name, k in nominal.items())
+        joints = tuple(JointWear(name, worn, 4000, 4000.0, 0, k) for name, k in nominal.items())
         totals = {"cycles": 5e3, "moving_s": 5e3}
         entry = Entry(stamp_ns=10**9, joints=joints, totals=totals, alarms=alarms, spans=((0, 10**9, 0),))
         for alarm in alarms:

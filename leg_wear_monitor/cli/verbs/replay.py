@@ -51,7 +51,6 @@ TIMES = ("header", "log", "publish")
 )
 @common.option("--crank-joint", "NAME", "The crank's name.  [default: crank_joint of the parameters]")
 @common.memory_option
-@common.sample_option
 @common.file_option(
     "--ledger", "FILE", "Ledger to continue or to begin; the one in the parameters is never touched."
 )

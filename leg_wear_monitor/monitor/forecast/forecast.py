@@ -354,8 +354,6 @@ class JointCondition:
     joint : str
     fresh_m, wear_m, limit_m : float
         Clearance when new, wear since, and limit of the mean clearance.
-    wear_sigma_m : float
-        Standard deviation of `wear_m` where not all gait cycles were followed.
     growth_m : float or None
         Of the mean clearance in a gait cycle; None while there is not enough data.
     growth_error_m : float
@@ -373,7 +371,6 @@ class JointCondition:
     growth_m: float | None
     growth_error_m: float
     has_coefficient: bool = True
-    wear_sigma_m: float = 0.0
 
     def answer(self, clearance_m: float, valid: bool) -> Answer:
         """What can be said of it, supposing its clearance."""
@@ -480,9 +477,8 @@ def _legs(
     log_factor = np.array([one.log_factors(row) for one, row in zip(estimates, fractions, strict=False)])
     excess = np.array(
         [
-            np.interp(own, one.log_factor, one.excess_m)
-            + np.hypot(one.excess_sigma_m, np.exp(own) * each.wear_sigma_m) * row
-            for own, one, row, each in zip(log_factor, estimates, normals[k:], now, strict=False)
+            np.interp(own, one.log_factor, one.excess_m) + one.excess_sigma_m * row
+            for own, one, row in zip(log_factor, estimates, normals[k:], strict=False)
         ]
     )
     fresh, wear, growth, error, limit = (

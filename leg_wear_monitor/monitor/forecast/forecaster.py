@@ -273,7 +273,6 @@ class Forecaster:
         wear_m: Floats,
         limits_m: Sequence[float],
         is_valid: Callable[[], bool],
-        sampling_sigma_m: Floats,
         model: ModelError,
     ) -> Forecast:
         """Forecast after a gait cycle: a new one if it is due, else the last.
@@ -287,21 +286,16 @@ class Forecaster:
             Of the mean clearances.
         is_valid : callable
             Whether the leg is in the range of the model.
-        sampling_sigma_m : (k,) array
-            Standard deviation of the wear, because not all gait cycles were followed [m].
         model : ModelError
             What the growth may be off by the load.
         """
         state = self.state
-        if statistics.is_followed:
-            state.growth = all_extended(state.growth, statistics, self._settings.window_cycles)
+        state.growth = all_extended(state.growth, statistics, self._settings.window_cycles)
         is_recent = 0 <= statistics.stamp_ns - state.stamp_ns < RENEWED_NS
-        if state.last is not None and is_recent and not statistics.is_followed:
-            return state.last
         rates = [growth_rate(window) for window in state.growth]
         if state.last is None or not is_recent or _known(rates) > state.known:
             state.stamp_ns = statistics.stamp_ns
-            return self.renewed(wear_m, limits_m, is_valid(), sampling_sigma_m, model)
+            return self.renewed(wear_m, limits_m, is_valid(), model)
         return state.last
 
     def renewed(
@@ -309,7 +303,6 @@ class Forecaster:
         wear_m: Floats,
         limits_m: Sequence[float],
         is_valid: bool,
-        sampling_sigma_m: Floats,
         model: ModelError,
     ) -> Forecast:
         """A new forecast from the present state; parameters as in `after`."""
@@ -321,7 +314,6 @@ class Forecaster:
                 joint=joint,
                 fresh_m=self._fresh_m[k],
                 wear_m=float(wear_m[k]),
-                wear_sigma_m=float(sampling_sigma_m[k]),
                 limit_m=limits_m[k],
                 growth_m=rate.per_cycle_m if rate else None,
                 growth_error_m=rate.error_m(model.by_load(k, rate.per_cycle_m)) if rate else 0.0,

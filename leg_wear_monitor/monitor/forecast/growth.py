@@ -74,7 +74,7 @@ def extended(window: GrowthWindow, growth_m: float, moving_s: float, cycles: int
 def all_extended(
     windows: Sequence[GrowthWindow], statistics: CycleStatistics, cycles: int
 ) -> tuple[GrowthWindow, ...]:
-    """Windows of all joints, with a gait cycle that was followed."""
+    """Windows of all joints, with one more gait cycle."""
     each = zip(windows, statistics.growth_mean_m.tolist(), strict=True)
     return tuple(extended(window, growth_m, statistics.moving_s, cycles) for window, growth_m in each)
 

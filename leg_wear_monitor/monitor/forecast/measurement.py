@@ -183,7 +183,7 @@ def observations_of(
 ) -> list[ClearanceAtWear]:
     """Measurements of a joint's present part that count."""
     return [
-        ClearanceAtWear(m.clearance_m, math.hypot(m.sigma_m, m.wear_sigma_m), m.wear_m)
+        ClearanceAtWear(m.clearance_m, m.sigma_m, m.wear_m)
         for m in measurements
         if m.joint == joint and m.replaced_ns == replaced_ns and m.counts and not m.is_withdrawn
     ]
@@ -259,8 +259,7 @@ def measure(
         if fault:
             raise ConfigError(name, "", fault)
     observations = observations_of(earlier, wear.name, wear.replaced_ns)
-    wear_sigma_m = math.sqrt(wear.sampling_m2)
-    observation = ClearanceAtWear(clearance_m, math.hypot(sigma_m, wear_sigma_m), wear.mean_m)
+    observation = ClearanceAtWear(clearance_m, sigma_m, wear.mean_m)
     corrected = corrections_of(corrections, wear.name, wear.replaced_ns)
     before = estimate_coefficient(settings, fresh_m, observations, prior, corrected)
     below = before.probability_below(observation)
@@ -279,7 +278,6 @@ def measure(
         replaced_ns=wear.replaced_ns,
         expected_below=below,
         counts=counts,
-        wear_sigma_m=wear_sigma_m,
     )
     words, per_pa = _clock(stamp_ns, kept_ns), max(clearance.wear_coefficient) if contradicts else 0.0
     if contradicts:

@@ -192,8 +192,6 @@ class JointWear:
     moving_s : float
     replaced_ns : int
         When the part was replaced, 0 if it never was.
-    sampling_m2 : float
-        Variance of the mean depth because sampled replays did not follow all gait cycles.
     wear_coefficient_per_pa : float
         Of bushing and journal together, with which the last of it was counted; 0 if it is not known.
     """
@@ -203,7 +201,6 @@ class JointWear:
     cycles: int = 0
     moving_s: float = 0.0
     replaced_ns: int = 0
-    sampling_m2: float = 0.0
     wear_coefficient_per_pa: float = 0.0
 
     @property
@@ -231,7 +228,6 @@ def one_part(before: JointWear, since: JointWear) -> JointWear:
         before.cycles + since.cycles,
         before.moving_s + since.moving_s,
         before.replaced_ns,
-        before.sampling_m2 + since.sampling_m2,
         since.wear_coefficient_per_pa or before.wear_coefficient_per_pa,
     )
 
@@ -354,8 +350,6 @@ class Measurement:
         When it was withdrawn; 0 if it was not.
     withdrawn_by : str
         By whom it was withdrawn; empty if it was not.
-    wear_sigma_m : float
-        Standard deviation of `wear_m` because sampled replays did not follow all gait cycles.
     id : int
         Number of its row in the ledger, 0 before it is written.
     """
@@ -372,7 +366,6 @@ class Measurement:
     counts: bool
     withdrawn_ns: int = 0
     withdrawn_by: str = ""
-    wear_sigma_m: float = 0.0
     id: int = attrs.field(default=0, eq=False)
 
     @property

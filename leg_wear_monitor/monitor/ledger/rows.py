@@ -107,7 +107,7 @@ def read_entry(db: sqlite3.Connection) -> Entry | None:
     )
     return Entry(
         stamp_ns=stamp_ns,
-        joints=tuple(_risen(_joint(*row[:7]), row[7:]) for row in joints),
+        joints=tuple(_risen(_joint(*row[:6]), row[6:]) for row in joints),
         totals=_totals(db),
         alarms=tuple(_alarm_of(*row) for row in db.execute("SELECT * FROM alarm ORDER BY kind, subject")),
         spans=tuple(spans),
@@ -119,7 +119,7 @@ def _totals(db: sqlite3.Connection) -> dict[str, float]:
     return dict(db.execute("SELECT name, value FROM total"))
 
 
-_PART = "depth, cycles, moving_s, replaced_ns, sampling_m2, wear_coefficient_per_pa"
+_PART = "depth, cycles, moving_s, replaced_ns, wear_coefficient_per_pa"
 
 
 def _joint(name: str, depth: bytes, *rest: Any) -> JointWear:

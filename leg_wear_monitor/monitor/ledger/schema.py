@@ -33,13 +33,11 @@ CREATE TABLE entry (
     id INTEGER PRIMARY KEY CHECK (id = 1), run INTEGER NOT NULL, stamp_ns INTEGER NOT NULL
 ) STRICT;
 
--- mean wear depths of the surfaces; the rest since the part was new; sampling_m2 is the variance of the mean
--- depth because sampled replays did not follow all gait cycles; wear_coefficient_per_pa, of bushing and
+-- mean wear depths of the surfaces; the rest since the part was new; wear_coefficient_per_pa, of bushing and
 -- journal together, is that with which the last of it was counted, 0 if it is not known
 CREATE TABLE joint (
     name TEXT PRIMARY KEY, bushing_m REAL NOT NULL, journal_m REAL NOT NULL, cycles INTEGER NOT NULL,
-    moving_s REAL NOT NULL, replaced_ns INTEGER NOT NULL, sampling_m2 REAL NOT NULL,
-    wear_coefficient_per_pa REAL NOT NULL
+    moving_s REAL NOT NULL, replaced_ns INTEGER NOT NULL, wear_coefficient_per_pa REAL NOT NULL
 ) STRICT, WITHOUT ROWID;
 
 -- wear depths around the surfaces as they were last written, at most a minute of motion before the entry:
@@ -80,8 +78,8 @@ CREATE TABLE alarm_history (
 -- who did what to the wear; the joint is as it was before, undoes is the row that was undone
 CREATE TABLE audit (
     id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, who TEXT NOT NULL, what TEXT NOT NULL, joint TEXT,
-    depth BLOB, cycles INTEGER, moving_s REAL, replaced_ns INTEGER, sampling_m2 REAL,
-    wear_coefficient_per_pa REAL, undoes INTEGER
+    depth BLOB, cycles INTEGER, moving_s REAL, replaced_ns INTEGER, wear_coefficient_per_pa REAL,
+    undoes INTEGER
 ) STRICT;
 
 -- clearances now and then
@@ -104,14 +102,14 @@ CREATE TABLE verdict (
     evidence TEXT NOT NULL, not_valid TEXT NOT NULL
 ) STRICT;
 
--- clearances measured by hand: of which part (replaced_ns as in joint), what the twin had counted for it and
--- the standard deviation of that by sampled replays, with what probability a smaller one was expected,
--- whether the forecast believes it, and when and by whom it was withdrawn, 0 and '' if it was not
+-- clearances measured by hand: of which part (replaced_ns as in joint), what the twin had counted for it,
+-- with what probability a smaller one was expected, whether the forecast believes it, and when and by whom it
+-- was withdrawn, 0 and '' if it was not
 CREATE TABLE measurement (
     id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, joint TEXT NOT NULL, who TEXT NOT NULL,
     clearance_m REAL NOT NULL, sigma_m REAL NOT NULL, wear_m REAL NOT NULL, cycles INTEGER NOT NULL,
     replaced_ns INTEGER NOT NULL, expected_below REAL NOT NULL, counts INTEGER NOT NULL,
-    withdrawn_ns INTEGER NOT NULL, withdrawn_by TEXT NOT NULL, wear_sigma_m REAL NOT NULL
+    withdrawn_ns INTEGER NOT NULL, withdrawn_by TEXT NOT NULL
 ) STRICT;
 
 -- counted clearances that were replaced by what the drive torque shows: of which part (replaced_ns as in

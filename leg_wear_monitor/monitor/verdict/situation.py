@@ -7,14 +7,12 @@ import attrs
 
 from leg_wear_monitor.estimate.cause import SURE_SIGMAS, NamedCause, TorqueExplanation
 from leg_wear_monitor.files import or_nan
-from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials import BushingLoad
 from leg_wear_monitor.monitor.alarms import Alarm, amount, joint_of, time_words
 from leg_wear_monitor.monitor.config.inputs import Crank, DriveTorque
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
 from leg_wear_monitor.monitor.verdict.verdict import Finding, estimate
 from leg_wear_monitor.state import Evidence, Figure, JointClearance, Level, State, Verdict
-from leg_wear_monitor.twin.statistics import Sampling
 
 # What a verdict depends on, and nothing else; the defaults are those of a leg without a fault.
 
@@ -306,43 +304,6 @@ def _takes_back(shown: KnownClearance, limit_m: float) -> bool:
 def is_observed(alarm: Alarm, by: Sequence[str] = (MEASURED, BOTH, *SEEN)) -> bool:
     """Whether an alarm of the clearance is present because of what some sources say, not counting alone."""
     return alarm.present is not Level.OK and alarm.cause in by
-
-
-# What a sampled replay adds to a verdict: how much of the gait was followed, and the standard errors.
-
-
-def sampled_words(sampling: Sampling) -> str:
-    """Words on a sampled replay."""
-    cycles = sampling.followed_cycles + sampling.estimated_cycles
-    return (
-        f"sampled: {sampling.followed_cycles} of {cycles:.0f} gait cycles were followed, "
-        "wear of the others is estimated, their impacts are not seen"
-    )
-
-
-def with_sampling(
-    findings: Sequence[Finding], sampling: Sampling, joints: Sequence[str], sigma_m: Floats
-) -> tuple[Finding, ...]:
-    """Findings on a sampled replay.
-
-    Parameters
-    ----------
-    findings : sequence of Finding
-    sampling : Sampling
-    joints : sequence of str
-        The clearance joints.
-    sigma_m : (k,) array
-        Standard errors of their clearances.
-    """
-    evidence = [Evidence("sampled fraction", sampling.fraction, None, "")]
-    evidence += [
-        Evidence(f"standard error {joint}", sigma, None, "m")
-        for joint, sigma in zip(joints, sigma_m.tolist(), strict=True)
-    ]
-    words = sampled_words(sampling)
-    return tuple(
-        attrs.evolve(one, why=f"{one.why}; {words}", evidence=(*one.evidence, *evidence)) for one in findings
-    )
 
 
 # A rule of the verdict: condition, state and texts in one entry.

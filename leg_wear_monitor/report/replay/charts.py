@@ -282,14 +282,9 @@ def clearance_section(summary: ReplaySummary) -> Section:
 def _table(summary: ReplaySummary) -> Table:
     has_growth = Figure.GROWTH not in summary.verdict.not_valid
     head = ["joint", "counted clearance [mm]", "opened [nm]"]
-    is_sampled = any(joint.sampling_sigma_m for joint in summary.joints.values())
-    if is_sampled:
-        head.append("standard error of sampling [nm]")
     rows = []
     for name, joint in summary.joints.items():
         row = [summary.leg.joint_words(name), counted_mm(summary, name), value(1.0e9, joint.opened_m)]
-        if is_sampled:
-            row.append(value(1.0e9, joint.sampling_sigma_m))
         for growth in (joint.growth_m_per_cycle, joint.growth_error_m_per_cycle):
             row.append(value(1.0e12, growth) if has_growth else NOT_VALID)
         rows.append(tuple(row))

@@ -132,8 +132,6 @@ def _row(summary: ReplaySummary, change: AlarmChange) -> tuple[str, ...]:
 def health_section(summary: ReplaySummary) -> Section:
     """Chart and tables."""
     parts: list[Part] = [health_chart(summary)] if summary.cycles else []
-    if summary.sampling:
-        parts.append(_numbers("Sampled replay", attrs.asdict(summary.sampling)))
     if any(load.about_n for load in summary.walked):
         walked = [
             (f"{load.mean_n:.0f} ± {load.sigma_n:.0f}", f"{load.cycles}", duration(load.moving_s))

@@ -98,7 +98,7 @@ def test_the_forecast_says_what_its_prior_rests_on(learned):
     forecaster.state.growth = tuple(
         attrs.evolve(each, growth_m=np.zeros(1), moving_s=np.ones(1)) for each in forecaster.state.growth
     )
-    forecast = forecaster.renewed(np.zeros(5), [6e-4] * 5, True, np.zeros(5), ModelError(*np.zeros((3, 5))))
+    forecast = forecaster.renewed(np.zeros(5), [6e-4] * 5, True, ModelError(*np.zeros((3, 5))))
     assert [each.prior.basis for each in forecast.joints] == [BASIS, *[BASIS_CONFIGURED] * 4]
     forecaster.replaced("A", 9)
     assert forecaster.state.coefficient_estimates[0].prior.basis == "19 parts of 1 other lot"

@@ -15,21 +15,21 @@ from leg_wear_monitor.twin.statistics import CycleStatistics
 
 SECOND = 10**9
 LIMITS = [6e-4] * 5
-SURE = np.zeros(5), ModelError(*np.zeros((3, 5)))  # wear that was followed, of a leg that is known
+SURE = ModelError(*np.zeros((3, 5)))  # of a leg that is known
 
 
 def cycle(second, growth=2e-11):
     """A gait cycle's figures that end at a second, as far as the forecast looks at them."""
     zeros = {field.name: 0 for field in attrs.fields(CycleStatistics)}
     wobble = growth * (1.0 + 0.1 * np.sin(1.7 * second + np.arange(5.0)))
-    own = {"stamp_ns": second * SECOND, "moving_s": 1.0, "growth_mean_m": wobble, "is_followed": True}
+    own = {"stamp_ns": second * SECOND, "moving_s": 1.0, "growth_mean_m": wobble}
     return CycleStatistics(**(zeros | own))
 
 
 def walked(forecaster, seconds, worn=0.0, valid=True):
     """Forecasts after each second."""
     wear = np.full(5, worn)
-    return [forecaster.after(cycle(s), wear, LIMITS, lambda: valid, *SURE) for s in seconds]
+    return [forecaster.after(cycle(s), wear, LIMITS, lambda: valid, SURE) for s in seconds]
 
 
 @pytest.fixture
@@ -58,8 +58,8 @@ def test_a_load_that_is_not_sure_widens_growth_and_life(leg):
         forecaster = Forecaster(leg, settings, (), [0] * 5)
         model = ModelError(*np.zeros((2, 5)), np.full(5, sigma))
         for second in range(1, 60):
-            forecaster.after(cycle(second), np.zeros(5), LIMITS, lambda: True, *SURE)
-        found = forecaster.renewed(np.zeros(5), LIMITS, True, np.zeros(5), model)
+            forecaster.after(cycle(second), np.zeros(5), LIMITS, lambda: True, SURE)
+        found = forecaster.renewed(np.zeros(5), LIMITS, True, model)
         growth = [(one.growth_m, one.growth_error_m) for one in forecaster.state.basis.conditions]
         return np.array(growth), np.log([one.cycles.p90 / one.cycles.p10 for one in found.joints])
 

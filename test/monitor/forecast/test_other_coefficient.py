@@ -31,7 +31,7 @@ MEASURED = ClearanceAtWear(FRESH + 1.8 * WEAR, 2.0e-6, WEAR)  # 1.8 times the no
 
 def part(wear_m, per_pa=WAS, replaced_ns=0, joint="A"):
     """A joint with so much wear, the last of it counted with a coefficient."""
-    return JointWear(joint, np.full((2, 720), 0.5 * wear_m), 4000, 4000.0, replaced_ns, 0.0, per_pa)
+    return JointWear(joint, np.full((2, 720), 0.5 * wear_m), 4000, 4000.0, replaced_ns, per_pa)
 
 
 def joint_forecast(now_per_pa, observations=(), prior=None):

@@ -173,16 +173,3 @@ def test_a_clock_that_has_jumped_is_said_and_changes_nothing():
     early, right = found(worn(6e-5), 0.42, stamp_ns=HOUR, kept_ns=3 * HOUR), found(worn(6e-5), 0.42)
     assert "the clock is 2 h before the ledger's last entry" in early.words[0]
     np.testing.assert_array_equal(early.after.weight, right.after.weight)
-
-
-def test_wear_that_was_counted_by_samples_teaches_as_much_less_as_it_is_uncertain():
-    """Like a measurement with the errors of both, now and from the ledger."""
-    sampled = attrs.evolve(worn(6e-5), sampling_m2=12e-6**2)
-    now = found(sampled, 0.36)
-    exact = found(worn(6e-5), 0.36, sigma_m=math.hypot(5e-6, 12e-6))
-    assert now.measurement.sigma_m == 5e-6
-    assert now.measurement.wear_sigma_m == pytest.approx(12e-6)
-    assert now.after.sigma == pytest.approx(exact.after.sigma)
-    again = [found(worn(7e-5), 0.37, [each.measurement]).before.sigma for each in (now, exact)]
-    assert again[0] == pytest.approx(again[1])
-    assert now.after.sigma > 1.2 * found(worn(6e-5), 0.36).after.sigma

@@ -66,7 +66,7 @@ def test_after_a_kill_all_that_is_counted_is_exact_to_the_last_entry(open_ledger
     last, first = walk[-1], walk[0]
     for joints in zip(found.entry.joints, last.joints, first.joints, strict=True):
         got, given, seen = (joint.depth for joint in joints)
-        lives = [(j.name, j.cycles, j.moving_s, j.replaced_ns, j.sampling_m2) for j in joints[:2]]
+        lives = [(j.name, j.cycles, j.moving_s, j.replaced_ns) for j in joints[:2]]
         assert lives[0] == lives[1]
         np.testing.assert_allclose(joints[0].surface_means_m, joints[1].surface_means_m, rtol=8 * MACHINE)
         risen = got / seen  # each surface as it was seen, higher

@@ -22,7 +22,6 @@ from leg_wear_monitor.messages.cdr import MESSAGE, Decoder
 from leg_wear_monitor.messages.names import is_without, names_in, without_interface
 from leg_wear_monitor.messages.streams import INTERFACES, JOINT_STATE, WRENCH_STAMPED, Stream, streams_of
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.ros.generated_type import generated_class
 from leg_wear_monitor.twin import LOAD
 from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, Samples
 
@@ -224,12 +223,19 @@ class InterfaceNames:
 
 
 def message_class(name: str) -> Any:
-    """Class of a message type such as ``sensor_msgs/msg/JointState``; generated if it is not installed."""
+    """Class of a message type such as ``sensor_msgs/msg/JointState``.
+
+    Raises
+    ------
+    ConfigError
+        If its package is not installed. Only that of the interfaces of ros2_control may be missing.
+    """
     package, _, message = name.split("/")
     try:
         found = import_module(f"{package}.msg")
-    except ModuleNotFoundError:
-        return generated_class(name)
+    except ModuleNotFoundError as error:
+        fault = f"'interface' needs {package}, which is not installed. Install ros-jazzy-control-msgs"
+        raise ConfigError("drive_torque.source", "", fault) from error
     return getattr(found, message)
 
 

@@ -1,9 +1,8 @@
-"""The monitor reads a robot on ros2_control, as examples/ros2_control has it; types that no package has."""
+"""The monitor reads a robot on ros2_control, as examples/ros2_control has it."""
 
-import hashlib
 import itertools
-import json
 import math
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -15,18 +14,16 @@ import pytest
 pytest.importorskip("rclpy")
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.qos import QoSProfile
-from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
+from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.gait.config import GaitConfig, KnockConfig
 from leg_wear_monitor.messages import encode
 from leg_wear_monitor.messages.cdr import Decoder
 from leg_wear_monitor.messages.names import wanted_interfaces
-from leg_wear_monitor.messages.streams import definition, types
+from leg_wear_monitor.messages.streams import types
 from leg_wear_monitor.monitor.config.parameters import load_config
 from leg_wear_monitor.ros import inputs
-from leg_wear_monitor.ros.generated_type import generated_class, type_description
 from leg_wear_monitor.state import State
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "ros2_control"
@@ -56,6 +53,7 @@ class Walking:
     """
 
     def __init__(self, stage: Any, stand_ins: Any, leg: Any = None) -> None:
+        pytest.importorskip("control_msgs")
         given = load_config(EXAMPLE / "monitor.yaml")
         torque, load = given.drive_torque, given.foot_load
         # before the monitor, which would call it silent while its kernels are compiled
@@ -138,6 +136,7 @@ def test_an_opened_knee_is_shown_by_the_current_in_the_air(stage: Any, stand_ins
 
 def test_joint_states_are_those_of_joint_state_broadcaster(stage: Any, stand_ins: Any) -> None:
     """As its tests have it: all three fields of each joint of the URDF, NaN for what is not measured."""
+    pytest.importorskip("control_msgs")
     heard = stage.listen("joint_states", JointState, matched=False)
     joints = stand_ins.JointStateBroadcaster(context=stage.node.context)
     states = {"leg_crank": {"position": 1.0, "motor_current": 2.0}, "hip_yaw": {"position": 3.0}}
@@ -182,27 +181,16 @@ def test_an_interface_that_is_not_there_is_reported_with_those_that_are() -> Non
         assert names.report() == report
 
 
-@pytest.mark.parametrize("name", ["control_msgs/msg/DynamicJointState", "sensor_msgs/msg/JointState"])
-def test_the_description_of_a_type_has_its_hash(name: str) -> None:
-    text = json.dumps(type_description(name))
-    assert definition(name).digest == f"RIHS01_{hashlib.sha256(text.encode()).hexdigest()}"
-
-
-def test_a_generated_type_is_the_type_of_its_package(stage: Any) -> None:
-    """In both directions between a generated type and the package's own, with the same hash in the graph."""
-    name, topic = encode.JOINT_STATE, "generated"
-    generated, message = generated_class(name), JointState(name=["crank"], position=[1.5])
-    raw: list[bytes] = []
-    stage.node.create_subscription(generated, topic, raw.append, QoSProfile(depth=10), raw=True)
-    whole = stage.listen(topic, JointState, matched=False)
-    sender, package = (stage.node.create_publisher(kind, topic, 10) for kind in (generated, JointState))
-    stage.wait_for(lambda: package.get_subscription_count() == sender.get_subscription_count() == 2, "both")
-    sender.publish(serialize_message(message))
-    package.publish(message)
-    stage.wait_for(lambda: len(whole) == len(raw) == 2, "both messages on both subscriptions")
-    assert [deserialize_message(one, JointState) for one in raw] == [message, message] == whole
-    found = stage.node.get_publishers_info_by_topic(topic)
-    assert {(one.topic_type, str(one.topic_type_hash)) for one in found} == {(name, definition(name).digest)}
+def test_without_control_msgs_a_line_names_the_parameter_and_the_package(
+    stage: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "control_msgs", None)
+    line = (
+        "drive_torque.source: 'interface' needs control_msgs, which is not installed. "
+        "Install ros-jazzy-control-msgs"
+    )
+    with pytest.raises(ConfigError, match=f"^{re.escape(line)}$"):
+        stage.monitor(drive_torque__source="interface")
 
 
 def test_the_stand_ins_interfaces_are_read_by_the_library(stand_ins: Any) -> None:

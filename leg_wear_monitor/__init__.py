@@ -6,7 +6,6 @@ Names are imported when they are first used, so that the command line can answer
 from importlib import import_module
 
 from leg_wear_monitor.errors import AssemblyError, ConfigError, LegWearError, SimulationError, extras_hinted
-from leg_wear_monitor.shown import VIEWS
 
 TYPE_CHECKING = False  # as typing has it, without the time to import that
 if TYPE_CHECKING:
@@ -146,9 +145,6 @@ __all__ = [
     "simulate_life",
     "with_person",
 ]
-
-VIEWS["html"] = lambda thing: import_module(f"{__name__}.report.plot").notebook_html(thing)
-VIEWS["plot"] = lambda thing, axes: import_module(f"{__name__}.report.plot").plot(thing, axes)
 
 
 def __getattr__(name: str) -> "Any":

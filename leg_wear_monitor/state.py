@@ -4,14 +4,15 @@ The monitor makes it, and all else that is shown of a leg is a view of it. SI un
 known.
 """
 
+import re
 from enum import Enum, IntEnum
+from html import escape
 from typing import Any
 
 import attrs
 
 from leg_wear_monitor.configuration import part_document
 from leg_wear_monitor.files import finite_or_none, json_text
-from leg_wear_monitor.shown import Shown
 
 SCHEMA_VERSION = 3
 """Of the JSON; counts up when a field is renamed, removed or means something else."""
@@ -95,7 +96,7 @@ class Evidence:
 
 
 @attrs.frozen(kw_only=True)
-class Verdict(Shown):
+class Verdict:
     """Conclusion of the monitor on the leg.
 
     Attributes
@@ -132,6 +133,16 @@ class Verdict(Shown):
         """State, joints, reason and action in one line."""
         whose = f" joint {', '.join(self.joints)}" if self.joints else ""
         return as_plain(f"{self.state.words}{whose}: {self.why}. To do: {self.do}")
+
+    def _repr_html_(self) -> str:
+        """HTML for a notebook, without scripts."""
+        whose = f" (joint {', '.join(self.joints)})" if self.joints else ""
+        lines = [f"{self.why} [{self.fault_code}]", f"to do: {self.do}"]
+        if self.not_valid:
+            lines.append(f"not valid: {', '.join(figure.words for figure in self.not_valid)}")
+        paragraphs = (re.sub(r"`(.+?)`", r"<code>\1</code>", escape(line)) for line in lines)
+        heading = f"<p><strong>Verdict: {escape(self.state.words + whose)}</strong></p>"
+        return f"<div>{heading}{''.join(f'<p>{line}</p>' for line in paragraphs)}</div>"
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data as in summary.json; an unknown value is None."""
@@ -386,7 +397,7 @@ class LegAlarms:
 
 
 @attrs.frozen(kw_only=True)
-class LegState(Shown):
+class LegState:
     """All that is known of a leg at one instant.
 
     Attributes

@@ -127,7 +127,7 @@ crank_of_500_mm = FOUR_BAR.replace("B: [0.050, 0.000]}}", "B: [0.500, 0.000]}}")
 written = (folder / "long.yaml").write_text(crank_of_500_mm)
 terminal("leg-wear-monitor draw long.yaml")
 
-lw.load_mechanism(folder / "long.yaml").plot()
+lw.plot(lw.load_mechanism(folder / "long.yaml"))
 plt.show()
 
 # %%

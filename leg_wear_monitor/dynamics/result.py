@@ -7,7 +7,6 @@ import attrs
 
 from leg_wear_monitor.files import data_frame, json_text
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.shown import Drawable
 from leg_wear_monitor.wear import Surfaces
 
 if TYPE_CHECKING:
@@ -344,7 +343,7 @@ SCHEMA_VERSION = 1
 
 
 @attrs.frozen(eq=False)
-class SimulationResult(Drawable):
+class SimulationResult:
     """Result of `simulate` over the counted cycles.
 
     Attributes

@@ -21,7 +21,6 @@ from leg_wear_monitor.mechanism.materials import (
 )
 from leg_wear_monitor.mechanism.person import on_the_ground
 from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
-from leg_wear_monitor.shown import Drawable
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -165,7 +164,7 @@ class LifePoint:
 
 
 @attrs.frozen(eq=False)
-class Life(Drawable):
+class Life:
     """A life as arrays over p points and k clearance joints.
 
     Attributes

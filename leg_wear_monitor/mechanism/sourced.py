@@ -10,7 +10,6 @@ import attrs
 
 from leg_wear_monitor.configuration import FieldError, choice, described
 from leg_wear_monitor.configuration.strict import Library
-from leg_wear_monitor.shown import Shown
 
 # Units of the files of materials and drives, by what they measure, and their factors to SI.
 #
@@ -182,7 +181,7 @@ def sourced(dimension: str, doc: str) -> Any:
 SHAFTS = OUTPUT, MOTOR = ("output", "motor")
 
 
-class SourcedFile(Shown):
+class SourcedFile:
     """Content of a file of figures with their sources."""
 
     def values(self) -> Iterator[tuple[str, SourcedValue]]:

@@ -8,7 +8,6 @@ import attrs
 from leg_wear_monitor.configuration import USUAL, FieldError, choice, described, quantity
 from leg_wear_monitor.errors import ConfigError, did_you_mean
 from leg_wear_monitor.mechanism import FRICTION_LAWS, NORMAL_LAWS
-from leg_wear_monitor.shown import Drawable
 
 # Settings of a revolute clearance joint: geometry, material, contact laws and wear.
 
@@ -319,7 +318,7 @@ class Assembly:
 
 
 @attrs.frozen(kw_only=True)
-class Mechanism(Drawable):
+class Mechanism:
     """A planar linkage with one drive; the fields with a description are the keys of the file.
 
     Attributes

@@ -333,9 +333,7 @@ class WearMonitor:
     @property
     def diagnosis(self) -> Diagnosis:
         """Clearances that the drive torque shows; empty while the received torque is wrong."""
-        found, torque = self._parts.diagnosis, self._parts.torque
-        explained = torque.models.explained(torque.state) if torque and found.clearance_m else None
-        return attrs.evolve(found, joints=tuple(self.clearance_joints), torque=explained)
+        return self._parts.diagnosis
 
     @property
     def lost(self) -> Lost:

@@ -17,7 +17,6 @@ from leg_wear_monitor.monitor.config.settings import Limits
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
 from leg_wear_monitor.monitor.ledger.entry import Measurement, WalkedLoad
 from leg_wear_monitor.monitor.reports import Lost
-from leg_wear_monitor.shown import Drawable
 from leg_wear_monitor.state import SCHEMA_VERSION, JointClearance, LegState, Level
 
 if TYPE_CHECKING:
@@ -449,7 +448,7 @@ def _value(part: Any, path: _Path) -> Any:
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class ReplaySummary(LegState, Drawable):
+class ReplaySummary(LegState):
     """The state of the leg at the end of a replay, and what else was found; its page contains nothing else.
 
     Attributes

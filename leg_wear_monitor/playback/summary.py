@@ -42,7 +42,6 @@ from leg_wear_monitor.playback.result import (
     ReplaySummary,
     WornDepth,
 )
-from leg_wear_monitor.shown import Drawable
 from leg_wear_monitor.state import AlarmChange, Figure, Verdict
 from leg_wear_monitor.twin import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import Samples, has_value_of
@@ -84,7 +83,7 @@ _LONGER, _LONGER_S = 1.05, 1.0  # stamps may span this factor times, plus these 
 
 
 @attrs.define(eq=False)
-class ReplayResult(Drawable):
+class ReplayResult:
     """Result of a replay.
 
     Attributes

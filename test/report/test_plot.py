@@ -8,6 +8,7 @@ from matplotlib import pyplot
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.life.result import Life
+from leg_wear_monitor.mechanism.loader import parse_mechanism
 from leg_wear_monitor.report import figure
 from leg_wear_monitor.state import Figure
 
@@ -101,3 +102,18 @@ def test_openings_that_are_not_valid_are_dotted_and_named():
         axes = lw.plot(attrs.evolve(summary, verdict=verdict))
         assert {line.get_linestyle() for line in axes.get_lines()} == {style}
         assert ("not valid: counted clearances" in axes.get_title()) is bool(not_valid)
+
+
+def test_a_mechanism_that_does_not_close_is_drawn(document):
+    long = document("four_bar")
+    long["bodies"]["coupler"]["points"]["C"] = [0.5, 0.0]
+    axes = lw.plot(parse_mechanism(long, "long.yaml"))
+    assert any(text.get_text() == "200 mm" for text in axes.texts)
+    assert "does not close" in axes.get_title()
+
+
+def test_a_notebook_shows_a_verdict_with_its_names_as_text():
+    why = "<script>alert(1)</script> in `joint A`"
+    html = attrs.evolve(made_up_summary().verdict, why=why, not_valid=(Figure.CLEARANCES,))._repr_html_()
+    assert "<script" not in html and "<code>joint A</code>" in html
+    assert "not valid: counted clearances" in html

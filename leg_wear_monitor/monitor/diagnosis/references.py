@@ -26,7 +26,7 @@ from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
-from leg_wear_monitor.monitor.diagnosis.state import FIRST_CYCLES, ExplainedTorque, TorqueState
+from leg_wear_monitor.monitor.diagnosis.state import FIRST_CYCLES, TorqueState
 from leg_wear_monitor.twin.reference import CrankProfile, LegParameters, mean_profile
 from leg_wear_monitor.twin.torque_reference import (
     LEAST_CLEARANCE_M,
@@ -110,15 +110,6 @@ class LegModels:
         if state.sensor is None or _is_far(reference, state.counted_m) or not before.is_of(state.sensor):
             return None
         return explainer_of(self._mechanism, reference, state.sensor, before, state.counted_m)
-
-    def explained(self, state: TorqueState) -> ExplainedTorque | None:
-        """What the estimate rests on; None without one."""
-        if state.fit is None or not state.cycles:
-            return None
-        explainer = self.explainer(state, is_commissioned=True)
-        measured = state.signatures[-max(state.fit_cycles, 1) :].mean(axis=0) - explainer.baseline.offset
-        expected = (explainer.model.at(each)[0] for each in (state.counted_m, state.fit.clearance_m))
-        return ExplainedTorque(*(each[: len(each) // 2] for each in (measured, *expected)))
 
     def detector(self, state: TorqueState, config: MonitorConfig) -> ChangeDetector:
         """Tests for a change of the counted clearances."""

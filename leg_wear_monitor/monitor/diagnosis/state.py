@@ -16,7 +16,6 @@ from leg_wear_monitor.estimate.ground_load import GroundLoad
 from leg_wear_monitor.estimate.signature import CommissionedTorque, TorqueSensor
 from leg_wear_monitor.files import finite_or_none
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.shown import Shown
 from leg_wear_monitor.state import FootLoad
 from leg_wear_monitor.twin import TORQUE
 from leg_wear_monitor.twin.reference import (
@@ -95,21 +94,8 @@ class Body:
     length: float
 
 
-@attrs.frozen(eq=False)
-class ExplainedTorque:
-    """Mean drive torque (p,) [N m] in equal parts of a turn, of the gait cycles in an estimate.
-
-    As measured, less what the commissioned leg showed beside its model; as the counted clearances give it;
-    and as the estimated ones do.
-    """
-
-    measured_nm: Floats
-    counted_nm: Floats
-    estimated_nm: Floats
-
-
 @attrs.frozen(kw_only=True)
-class Diagnosis(Shown):
+class Diagnosis:
     """Clearances estimated from the drive torque, and what has changed.
 
     Attributes
@@ -148,10 +134,6 @@ class Diagnosis(Shown):
     temperature_c, commissioned_c : float or None
         Temperature of the drive in the last gait cycles, and in those of the baseline [°C]; None where it was
         not measured.
-    joints : tuple of str
-        The clearance joints; empty but in `WearMonitor.diagnosis`.
-    torque : ExplainedTorque or None
-        What the estimate rests on; None but in `WearMonitor.diagnosis`, and without an estimate.
     """
 
     state: DiagnosisState = DiagnosisState.OFF
@@ -170,8 +152,6 @@ class Diagnosis(Shown):
     compliance: float = 0.0
     temperature_c: float | None = attrs.field(default=None, converter=finite_or_none)
     commissioned_c: float | None = attrs.field(default=None, converter=finite_or_none)
-    joints: tuple[str, ...] = ()
-    torque: ExplainedTorque | None = attrs.field(default=None, eq=False)
 
     def of_joint(self, k: int) -> tuple[float, float] | None:
         """Clearance of joint k, and its standard deviation; None where it is not observable."""

@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     from leg_wear_monitor.dynamics.simulation import simulate
     from leg_wear_monitor.files import share_directory
     from leg_wear_monitor.fleet.overview import Fleet, FleetOverview, LegOverview
-    from leg_wear_monitor.life.design import BushingChoices, Design, design
-    from leg_wear_monitor.life.joint_loads import DutyPart, read_duty
+    from leg_wear_monitor.life.design import BushingLife, design
     from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
     from leg_wear_monitor.life.result import Duty, Life
     from leg_wear_monitor.mechanism.loader import load_mechanism
@@ -45,13 +44,11 @@ if TYPE_CHECKING:
     from leg_wear_monitor.twin.sample import gait_samples
 
 _HOME = {
-    "BushingChoices": "life.design",
+    "BushingLife": "life.design",
     "CommissioningItem": "commissioning.result",
     "CommissioningResult": "commissioning.result",
-    "Design": "life.design",
     "Drive": "mechanism.sourced",
     "Duty": "life.result",
-    "DutyPart": "life.joint_loads",
     "EnergyBalance": "dynamics.result",
     "Fleet": "fleet.overview",
     "FleetOverview": "fleet.overview",
@@ -85,7 +82,6 @@ _HOME = {
     "on_the_ground": "mechanism.person",
     "open_ledger": "monitor.ledger.ledger",
     "plot": "report.plot",
-    "read_duty": "life.joint_loads",
     "replay": "playback.replay",
     "share_directory": "files",
     "simulate": "dynamics.simulation",
@@ -95,14 +91,12 @@ _HOME = {
 
 __all__ = [
     "AssemblyError",
-    "BushingChoices",
+    "BushingLife",
     "CommissioningItem",
     "CommissioningResult",
     "ConfigError",
-    "Design",
     "Drive",
     "Duty",
-    "DutyPart",
     "EnergyBalance",
     "Fleet",
     "FleetOverview",
@@ -138,7 +132,6 @@ __all__ = [
     "on_the_ground",
     "open_ledger",
     "plot",
-    "read_duty",
     "replay",
     "share_directory",
     "simulate",

@@ -1,7 +1,5 @@
 """Verbs on lives: ``life``, ``design``."""
 
-import csv
-import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,7 +11,7 @@ from leg_wear_monitor.cli import common
 from leg_wear_monitor.files import json_text
 
 if TYPE_CHECKING:
-    from leg_wear_monitor.life.design import BushingChoices, Design
+    from leg_wear_monitor.life.design import BushingLife
     from leg_wear_monitor.life.result import Life
     from leg_wear_monitor.mechanism.arrays import Floats
     from leg_wear_monitor.mechanism.materials import RatingLife
@@ -235,9 +233,8 @@ def _numbers(ctx: click.Context, param: click.Parameter, value: str) -> tuple[fl
 @common.clearances_option("A,B")
 @common.option(
     "--duty",
-    "N:H,...|FILE",
-    "Hours a day at each peak of the ground's vertical force on the toe [N], such as 0:2,300:5; or a "
-    "YAML file with duty: [{load_n, hours_per_day, speed_rpm}, ...].",
+    "N:H,...",
+    "Hours a day at each peak of the ground's vertical force on the toe [N], such as 0:2,300:5.",
     default="0:8",
 )
 @common.number_option(
@@ -254,82 +251,74 @@ def _numbers(ctx: click.Context, param: click.Parameter, value: str) -> tuple[fl
 @common.option(
     "--clearances-um", "UM,...", "Radial clearances when new to try.", default="25,50,100", callback=_numbers
 )
-@common.json_option("the design")
-@common.out_option("Write design.html, design.json and design.csv with all candidates.")
+@common.json_option("the table of all bushings tried")
 def design(
     mechanism: str,
     clearances: str | None,
     duty: str,
-    hours: float,
-    limit_m: float,
     materials: str | None,
-    diameters_mm: tuple[float, ...],
-    widths_mm: tuple[float, ...],
-    clearances_um: tuple[float, ...],
     json_file: Path | None,
-    out: Path | None,
+    **options: Any,
 ) -> None:
     """Find bushings with which each joint of a leg lasts the hours wanted.
 
-    The leg is simulated once with several clearances under the duty; from its forces and sliding follow the
+    One life of the leg under the duty gives forces and sliding over the clearance. From these follow the
     lives of all pairs and sizes, by wear or by the maker's formula, and which of the maker's limits are
     exceeded. Check a choice with the verb life.
     """
-    from leg_wear_monitor.life.design import BushingChoices
+    import attrs
+
     from leg_wear_monitor.life.design import design as of_leg
-    from leg_wear_monitor.life.joint_loads import read_duty
+    from leg_wear_monitor.life.result import Duty
     from leg_wear_monitor.mechanism.loader import load_mechanism
-    from leg_wear_monitor.mechanism.materials import materials as shipped
 
     leg = common.with_clearance_joints(load_mechanism(mechanism), clearances)
-    names = tuple(shipped()) if materials is None else tuple(one.strip() for one in materials.split(","))
-    choices = BushingChoices(
-        materials=names,
-        diameters_m=tuple(1.0e-3 * one for one in diameters_mm),
-        widths_m=tuple(1.0e-3 * one for one in widths_mm),
-        clearances_m=tuple(1.0e-6 * one for one in clearances_um),
-    )
-    common.check_outputs(json_file, out)
+    common.check_outputs(json_file, None)
     with common.options_named(), common.compilation("clearance"), common.progress_bar("design") as progress:
-        result = of_leg(leg, read_duty(duty), choices, hours=hours, limit_m=limit_m, progress=progress)
-    written = common.write_json(json_file, result.to_json())
-    if out is not None:
-        from leg_wear_monitor.report.design_page import design_page
-        from leg_wear_monitor.report.page import page_html
-
-        page = page_html(design_page(leg, result, choices)).encode()
-        files = {"design.html": page, "design.json": result.to_json().encode(), "design.csv": _csv(result)}
-        written += common.write_directory(out, files)
-    common.say(json_file, design_lines(result, choices), written)
-
-
-def design_lines(result: "Design", choices: "BushingChoices") -> list[str]:
-    """The design as a table: each joint as it is, and the smallest bushing that lasts."""
-    lines = [f"{result.mechanism}: {result.asked}"]
-    for now in result.order:
-        lines.append(f"{now.joint} now: {now.words}: {now.life_words}")
-        lasting = result.of(now.joint)
-        if lasting:
-            lines.append(f"  smallest that lasts: {lasting[0].words}: {lasting[0].life_words}")
-        else:
-            lines.append(
-                f"  none of {len(choices.materials)} pairs in the sizes tried lasts {result.hours:g} h"
-            )
-    in_the_air = "" if any(part.load_n for part in result.duty) else "in the air"
-    lines += [
-        f"life of {one.joint} now: {in_the_air or f'10 % more load {one.load:+.0f} %'}, "
-        f"10 % more cadence {one.cadence:+.0f} %, half the clearance when new {one.clearance:+.0f} %, "
-        f"10 % wider {one.width:+.0f} %"
-        for one in result.sensitivities
-    ]
-    return [*lines, result.first]
+        table = of_leg(
+            leg,
+            Duty.parse(duty),
+            hours=options["hours"],
+            limit_m=options["limit_m"],
+            pairs=[name.strip() for name in materials.split(",")] if materials else None,
+            diameters_m=[1.0e-3 * each for each in options["diameters_mm"]],
+            widths_m=[1.0e-3 * each for each in options["widths_mm"]],
+            clearances_m=[1.0e-6 * each for each in options["clearances_um"]],
+            progress=progress,
+        )
+    written = common.write_json(json_file, json_text({"bushings": [attrs.asdict(row) for row in table]}))
+    common.say(json_file, design_lines(table, options["hours"]), written)
 
 
-def _csv(result: "Design") -> bytes:
-    """All candidates, a row each."""
-    rows = [one.row() for one in result.candidates]
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return text.getvalue().encode()
+_PAIRS = 5  # of each joint in the printed table
+
+
+def design_lines(table: "Sequence[BushingLife]", hours: float) -> list[str]:
+    """The present bushing of each joint, and the smallest bushings that last, one per pair."""
+    head = "life in hours of walking (10 to 90 %)"
+    lines = [f"{'joint':8}{'pair':32}{'pin mm':>8}{'width mm':>10}{'clearance µm':>14}  {head}"]
+    for joint in dict.fromkeys(row.joint for row in table):
+        now, *others = (row for row in table if row.joint == joint)
+        smallest: dict[str, BushingLife] = {}
+        for row in others:
+            if row.lasts:
+                smallest.setdefault(row.material, row)
+        lines.append(_design_line(f"{joint} now", now))
+        lines += [_design_line(joint, row) for row in list(smallest.values())[:_PAIRS]]
+        if not smallest:
+            lines.append(f"{joint:8}none of the bushings tried lasts {hours:g} h")
+    return lines
+
+
+_LIVES = {"nothing": "does not wear", "unknown": "not known: the pair has no wear coefficient and no formula"}
+
+
+def _design_line(joint: str, row: "BushingLife") -> str:
+    life = _LIVES.get(row.limited_by, f"not valid: {row.limited_by} exceeds the maker's limit")
+    if row.limited_by == "wear" and row.wear_h:
+        p10, p50, p90 = (f"{float(f'{each:.3g}'):g}" for each in row.wear_h)
+        life = f"{p50} ({p10} to {p90})"
+    elif row.limited_by == "rating life":
+        life = f"{float(f'{row.rating_h:.3g}'):g} by the maker's formula"
+    sizes = f"{1e3 * row.diameter_m:8g}{1e3 * row.width_m:10g}{1e6 * row.clearance_m:14g}"
+    return f"{joint:8}{row.material or 'no pair named':32}{sizes}  {life}"

@@ -22,7 +22,6 @@ from leg_wear_monitor.monitor.cycle_report import (
 )
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
 from leg_wear_monitor.monitor.evaluation import EvaluationPeriods
-from leg_wear_monitor.monitor.forecast.forecast import ForecastBasis
 from leg_wear_monitor.monitor.forecast.growth import all_extended
 from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult
 from leg_wear_monitor.monitor.forecast.wear_coefficients import coefficient_doubts
@@ -491,11 +490,6 @@ class WearMonitor:
             For a joint without clearance, or impossible values.
         """
         return measure(self._parts, joint, float(clearance_m), float(sigma_m), int(stamp_ns), who, accept)
-
-    @property
-    def forecast_basis(self) -> ForecastBasis | None:
-        """What the last forecast rests on; None before the first."""
-        return self._parts.forecaster.state.basis
 
     def renew_forecast(self) -> CycleReport | None:
         """Renew the forecast now; otherwise it may be a minute old.

@@ -344,7 +344,7 @@ def _measured(
 ) -> tuple[tuple[str, ...], bool]:
     """What came of a measurement, a line each, and whether the caller has to act."""
     from leg_wear_monitor.monitor.forecast.measurement import measure as evaluate
-    from leg_wear_monitor.monitor.forecast.wear_coefficients import coefficient_doubts, prior_source
+    from leg_wear_monitor.monitor.forecast.wear_coefficients import coefficient_doubts, usual_prior
     from leg_wear_monitor.monitor.ledger.entry import new_part
     from leg_wear_monitor.monitor.operators import measured_in, shown_in
     from leg_wear_monitor.monitor.verdict.situation import SOURCES
@@ -366,7 +366,7 @@ def _measured(
             who=getpass.getuser(),
             kept_ns=kept.kept_ns,
             accept=accept,
-            prior=prior_source(leg, settings.forecast).prior(joint, part.replaced_ns),
+            prior=usual_prior(settings.forecast, leg.clearances[joint]),
             corrections=kept.corrections,
         )
         shown = shown_in(kept, joint)

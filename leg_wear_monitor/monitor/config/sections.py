@@ -186,8 +186,3 @@ class Forecasting:
         "clearances open; empty: the one that comes with the package for just this leg, if there is one",
         default="",
     )
-    priors: str = described(
-        "file of priors that a fleet has learned for this leg's wear coefficients; empty: "
-        "the spread of wear_coefficient_sigma about the given ones",
-        default="",
-    )

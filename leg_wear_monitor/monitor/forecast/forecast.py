@@ -17,7 +17,6 @@ import numpy as np
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
-    ClearanceAtWear,
     CoefficientEstimate,
     CoefficientPrior,
 )
@@ -383,28 +382,6 @@ class JointCondition:
         if self.growth_m is None:
             return Answer.NOT_ENOUGH_DATA
         return Answer.KNOWN if self.growth_m > 0.0 else Answer.NO_GROWTH
-
-
-@attrs.frozen(kw_only=True)
-class ForecastBasis:
-    """What a forecast rests on, besides wear coefficients and their measurements: it can be made again.
-
-    Attributes
-    ----------
-    conditions : tuple of JointCondition
-        In the order of the clearance joints.
-    observed : tuple of ClearanceAtWear or None
-        What encoders showed of each joint, as far as the forecast uses it.
-    cycle_s : float
-        Time of a gait cycle.
-    is_valid : bool
-        Whether the model holds for what the leg does.
-    """
-
-    conditions: tuple[JointCondition, ...]
-    observed: tuple[ClearanceAtWear | None, ...]
-    cycle_s: float
-    is_valid: bool
 
 
 def forecast(

@@ -18,7 +18,6 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast import measurement
 from leg_wear_monitor.monitor.forecast.forecast import (
     Forecast,
-    ForecastBasis,
     GrowthLaw,
     JointCondition,
     SimulatedLife,
@@ -33,7 +32,7 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     CoefficientEstimate,
     corrections_of,
     estimate_coefficient,
-    prior_source,
+    usual_prior,
 )
 from leg_wear_monitor.monitor.ledger.entry import (
     CorrectedClearance,
@@ -203,10 +202,6 @@ class ForecastState:
         Of the last.
     known : int
         Joints whose growth was known then.
-    observed : tuple of ClearanceAtWear or None
-        What encoders show of each joint, where the estimate uses it.
-    basis : ForecastBasis or None
-        Of the last forecast that was made.
     measurements, corrections : tuples of Measurement, of CorrectedClearance and CoefficientSpan
         Of the ledger, and since.
     """
@@ -216,8 +211,6 @@ class ForecastState:
     last: Forecast | None = None
     stamp_ns: int = 0
     known: int = 0
-    observed: tuple[ClearanceAtWear | None, ...] = ()
-    basis: ForecastBasis | None = None
     measurements: tuple[Measurement, ...] = ()
     corrections: tuple[Recount, ...] = ()
 
@@ -240,7 +233,7 @@ class Forecaster:
     Raises
     ------
     ConfigError
-        For a file of lives or of priors that cannot be used.
+        For a file of lives that cannot be used.
     """
 
     def __init__(
@@ -255,11 +248,9 @@ class Forecaster:
         self._clearances = [mechanism.clearances[joint] for joint in mechanism.clearance_joints]
         self._fresh_m = [clearance.radial_clearance for clearance in self._clearances]
         self._law = law_of(mechanism, settings.life, settings.model_sigma)
-        self._priors = prior_source(mechanism, settings)
         self.state = ForecastState(
             growth=tuple(GrowthWindow() for _ in self._clearance_joints),
             coefficient_estimates=(),
-            observed=(None,) * len(self._clearance_joints),
             measurements=tuple(measurements),
             corrections=tuple(corrections),
         )
@@ -323,10 +314,14 @@ class Forecaster:
         ]
         # a new part's window is shorter than the others'
         walked = max((window.moving_s for window in state.growth), key=len)
-        state.basis = ForecastBasis(
-            conditions=tuple(now), observed=state.observed, cycle_s=float(np.mean(walked)), is_valid=is_valid
+        state.last = forecast(
+            now,
+            state.coefficient_estimates,
+            self._settings,
+            self._law,
+            cycle_s=float(np.mean(walked)),
+            valid=is_valid,
         )
-        state.last = self._of(state.basis)
         return state.last
 
     def expire(self) -> None:
@@ -348,7 +343,6 @@ class Forecaster:
         k, state = self._clearance_joints.index(joint), self.state
         state.growth = _with(state.growth, k, GrowthWindow())
         self._update_coefficients(k, self._estimate(k, replaced_ns))
-        self._observe(k, None)
 
     def corrected(self, correction: CorrectedClearance) -> None:
         """Count the wear of a joint from a corrected clearance on."""
@@ -379,7 +373,7 @@ class Forecaster:
             who=who,
             kept_ns=kept_ns,
             accept=accept,
-            prior=self._priors.prior(wear.name, wear.replaced_ns),
+            prior=usual_prior(self._settings, self._clearances[k]),
             corrections=self.state.corrections,
         )
         self.state.measurements += (found.measurement,)
@@ -409,22 +403,7 @@ class Forecaster:
         self._update_coefficients(
             k, self._estimate(k, replaced_ns, observation) if is_plausible else estimate
         )
-        self._observe(k, observation if is_plausible else None)
         return is_plausible
-
-    def again(self, basis: ForecastBasis, replaced_ns: Sequence[int]) -> Forecast:
-        """A former forecast with the wear coefficients as they are known now.
-
-        Parameters
-        ----------
-        basis : ForecastBasis
-        replaced_ns : sequence of int
-            As for the forecaster.
-        """
-        for k, observation in enumerate(basis.observed):
-            if observation is not None:
-                self.use_estimate(k, observation, replaced_ns[k])
-        return self._of(basis)
 
     def _estimate(self, k: int, replaced_ns: int, *further: ClearanceAtWear) -> CoefficientEstimate:
         """Estimate for a part, from its prior, the measurements that count, and further ones."""
@@ -434,27 +413,14 @@ class Forecaster:
             self._settings,
             self._fresh_m[k],
             [*observations, *further],
-            self._priors.prior(joint, replaced_ns),
+            usual_prior(self._settings, self._clearances[k]),
             corrections_of(self.state.corrections, joint, replaced_ns),
         )
-
-    def _observe(self, k: int, observation: ClearanceAtWear | None) -> None:
-        self.state.observed = _with(self.state.observed, k, observation)
 
     def _update_coefficients(self, k: int, coefficient_estimate: CoefficientEstimate) -> None:
         state = self.state
         state.coefficient_estimates = _with(state.coefficient_estimates, k, coefficient_estimate)
         state.last = None
-
-    def _of(self, basis: ForecastBasis) -> Forecast:
-        return forecast(
-            basis.conditions,
-            self.state.coefficient_estimates,
-            self._settings,
-            self._law,
-            cycle_s=basis.cycle_s,
-            valid=basis.is_valid,
-        )
 
 
 def _known(rates: Sequence[GrowthRate | None]) -> int:

@@ -17,7 +17,7 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     CoefficientPrior,
     corrections_of,
     estimate_coefficient,
-    prior_source,
+    usual_prior,
 )
 from leg_wear_monitor.monitor.ledger.entry import JointWear, Measurement, Recount
 
@@ -201,7 +201,8 @@ def believed_clearance_m(
     used = observations_of(measurements, *key)
     if not used:
         return math.nan
-    fresh_m, prior = leg.clearances[part.name].radial_clearance, prior_source(leg, settings).prior(*key)
+    clearance = leg.clearances[part.name]
+    fresh_m, prior = clearance.radial_clearance, usual_prior(settings, clearance)
     corrected = corrections_of(corrections, *key)
     return estimate_coefficient(settings, fresh_m, used, prior, corrected).clearance_m(part.mean_m)
 

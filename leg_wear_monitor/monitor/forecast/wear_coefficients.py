@@ -14,17 +14,14 @@ learned; until then wear is taken as it was counted.
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from statistics import NormalDist
 
 import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from leg_wear_monitor.configuration import Doubt, described, quantity
-from leg_wear_monitor.configuration.strict import structure
-from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.files import read_json
+from leg_wear_monitor.configuration import Doubt
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials import USUAL_SPREAD, regime_of, spread_of
 from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
@@ -36,15 +33,6 @@ from leg_wear_monitor.monitor.ledger.entry import (
     Recount,
 )
 
-# Prior of each joint's wear coefficient: the spread of its material pair, or what a fleet has learned.
-#
-# A file of priors belongs to one leg. For each joint it has the prior of the present part, from the measured
-# clearances of all other parts, and the prior of the next part, whose lot is not known yet. Wear coefficients
-# are absolute, so the file stays right if the nominal coefficient of the leg changes.
-
-
-SCHEMA_VERSION = 1
-
 
 @attrs.frozen(kw_only=True)
 class CoefficientPrior:
@@ -52,81 +40,17 @@ class CoefficientPrior:
 
     Attributes
     ----------
-    mean : float
-        Mean of the logarithm of the factor.
     sigma : float
-        Standard deviation of this logarithm.
+        Standard deviation of this logarithm; its mean is 0.
     basis : str
-        What it rests on, such as ``19 parts of lot 2026-03`` or ``spread of steel-on-steel-greased-mild``.
+        Source of the standard deviation, such as ``spread of steel-on-steel-greased-mild``.
     holds_for : str
         Material pair and regime that the wear coefficient holds for.
     """
 
-    mean: float = 0.0
     sigma: float
     basis: str = ""
     holds_for: str = ""
-
-
-@attrs.frozen(kw_only=True)
-class LearnedCoefficient:
-    """Lognormal distribution of a part's wear coefficient, as in a file of priors."""
-
-    wear_coefficient_per_pa: float = quantity(
-        "1/Pa", "median of the wear coefficients of bushing and journal together", above=0.0
-    )
-    sigma: float = quantity("", "standard deviation of its logarithm", within=(1.0e-6, 10.0))
-    basis: str = described("what was measured for it")
-
-
-@attrs.frozen(kw_only=True)
-class LearnedJoint:
-    """Priors of a joint's present and next part, as in a file of priors."""
-
-    replaced_ns: int = quantity("ns", "when the present part was mounted, 0 for the first", at_least=0)
-    present: LearnedCoefficient = described("of the present part, without its own measurements")
-    next: LearnedCoefficient = described("of a part of a new lot")
-
-
-@attrs.frozen(kw_only=True)
-class LearnedPriors:
-    """Content of a file of priors."""
-
-    schema_version: int = described("version of the file's fields")
-    leg: str = described("leg of the fleet")
-    joints: dict[str, LearnedJoint] = described("priors by joint; a joint without one has that of its pair")
-
-
-@attrs.frozen
-class PriorSource:
-    """Where the forecast takes the prior of a part from.
-
-    Attributes
-    ----------
-    usual : dict of str to CoefficientPrior
-        Prior of each joint that nothing was learned of.
-    learned : dict of str to LearnedJoint
-        Joints of the file of priors.
-    nominal_per_pa : dict of str to float
-        Nominal wear coefficients of bushing and journal together.
-    """
-
-    usual: Mapping[str, CoefficientPrior]
-    learned: Mapping[str, LearnedJoint]
-    nominal_per_pa: Mapping[str, float]
-
-    def prior(self, joint: str, replaced_ns: int) -> CoefficientPrior:
-        """Prior of the part that a joint has had since a stamp, 0 for its first part."""
-        learned, nominal = self.learned.get(joint), self.nominal_per_pa.get(joint, 0.0)
-        if learned is None or not nominal > 0.0:
-            return self.usual[joint]
-        found = learned.present if learned.replaced_ns == replaced_ns else learned.next
-        return attrs.evolve(
-            self.usual[joint],
-            mean=math.log(found.wear_coefficient_per_pa / nominal),
-            sigma=found.sigma,
-            basis=found.basis,
-        )
 
 
 def nominal_per_pa(clearance: Clearance) -> float:
@@ -161,28 +85,8 @@ def _further(was_per_pa: float, now_per_pa: float) -> str:
     )
 
 
-def prior_source(mechanism: Mechanism, settings: Forecasting) -> PriorSource:
-    """Priors of a leg, from the file that ``forecast.priors`` names if it names one.
-
-    Parameters
-    ----------
-    mechanism : Mechanism
-        As the configuration wants it.
-    settings : Forecasting
-
-    Raises
-    ------
-    ConfigError
-        For a file that cannot be used.
-    """
-    learned = read_priors(settings.priors).joints if settings.priors else {}
-    nominal = {name: nominal_per_pa(clearance) for name, clearance in mechanism.clearances.items()}
-    usual = {name: usual_prior(settings, clearance) for name, clearance in mechanism.clearances.items()}
-    return PriorSource(usual, learned, nominal)
-
-
 def usual_prior(settings: Forecasting, clearance: Clearance | None = None) -> CoefficientPrior:
-    """Prior of a joint that nothing was learned of (docs/decisions/0012-wear-prior.md).
+    """Prior of a joint before any measurement (docs/decisions/0012-wear-prior.md).
 
     Parameters
     ----------
@@ -200,21 +104,6 @@ def usual_prior(settings: Forecasting, clearance: Clearance | None = None) -> Co
         basis = "usual scatter of wear coefficients"
         return CoefficientPrior(sigma=USUAL_SPREAD, basis=basis, holds_for=regime)
     return CoefficientPrior(sigma=of_pair, basis=f"spread of {clearance.material}", holds_for=regime)
-
-
-def read_priors(path: str) -> LearnedPriors:
-    """Content of a file of priors.
-
-    Raises
-    ------
-    ConfigError
-        If it cannot be read.
-    """
-    priors: LearnedPriors = structure(read_json(path), LearnedPriors, path, "")
-    if priors.schema_version != SCHEMA_VERSION:
-        fault = f"{priors.schema_version} is not {SCHEMA_VERSION}, the version that this program reads"
-        raise ConfigError(path, "schema_version", f"{fault}; update the fleet again")
-    return priors
 
 
 # Clearances that do not rest on counted wear: that of a new part, and what the drive torque showed later.
@@ -363,7 +252,7 @@ def estimate_coefficient(
     """
     prior = prior or usual_prior(settings)
     mean, precision = measured_factor(settings, fresh_m, observations, corrections)
-    if prior.mean == 0.0 and math.sqrt(precision) * mean * prior.sigma < 1.0:
+    if math.sqrt(precision) * mean * prior.sigma < 1.0:
         # nothing is known better than the nominal coefficient: another one says nothing of the wear before it
         corrections = [one for one in corrections if not isinstance(one, CoefficientSpan)]
         mean, precision = measured_factor(settings, fresh_m, observations, corrections)
@@ -459,14 +348,7 @@ def posterior_grid(prior: CoefficientPrior, mean: float, precision: float) -> tu
     mean, precision : float
         Of the factor, from `measured_factor`.
     """
-    # relative to the median of the prior, the factor is normal as well
-    median = math.exp(prior.mean)
-    grid, density = _centred_grid(prior.sigma, mean / median, precision * median**2)
-    return grid + prior.mean, density
-
-
-def _centred_grid(sigma: float, mean: float, precision: float) -> tuple[Floats, Floats]:
-    """Grid and density for a prior with mean 0."""
+    sigma = prior.sigma
     low, high = -_WIDTH * sigma, _WIDTH * sigma
     if precision > 0.0:
         own = precision**-0.5

@@ -137,32 +137,6 @@ def hardware_id_of(path: Path) -> str:
     return str(row[0]) if row else ""
 
 
-def measurements_of(path: Path) -> str:
-    """The measured clearances of a ledger as a text, in which any change shows; empty without any.
-
-    It is read without a lock. If it cannot be read (damaged, of another format, just being written), the text
-    says so, and nothing is raised: `connect` decides whether the ledger can be used.
-    """
-    return _rows_as_text(path, "SELECT * FROM measurement ORDER BY rowid")
-
-
-def last_changes_of(path: Path) -> str:
-    """Row ids of the last changes of parts, alarms and verdict as a text, read as by `measurements_of`."""
-    last = (f"(SELECT max(id) FROM {table})" for table in ("audit", "alarm_history", "verdict"))
-    return _rows_as_text(path, f"SELECT {', '.join(last)}")
-
-
-def _rows_as_text(path: Path, query: str) -> str:
-    """Rows that a query selects, a line each; empty without a ledger."""
-    if not path.is_file():
-        return ""
-    try:
-        with closing(_connect(path, "ro")) as db:
-            return "\n".join(map(repr, db.execute(query)))
-    except sqlite3.Error as error:
-        return f"not readable: {error}"
-
-
 @contextmanager
 def copy_of(path: str | Path) -> Iterator[Path]:
     """Copy a ledger into a temporary directory, to try a change, or to read it while a monitor has it locked.

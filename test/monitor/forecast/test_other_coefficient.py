@@ -13,7 +13,6 @@ from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.forecast.forecast import JointCondition, forecast, no_law
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     ClearanceAtWear,
-    CoefficientPrior,
     coefficient_doubts,
     estimate_coefficient,
     measured_factor,
@@ -60,17 +59,6 @@ def test_without_a_measurement_of_wear_the_life_follows_and_the_counted_wear_sta
     before, after = (joint_forecast(each, observations) for each in (WAS, 2.0 * WAS))
     assert after.clearance_m == before.clearance_m
     assert after.cycles.p50 == pytest.approx(0.5 * before.cycles.p50)
-
-
-@pytest.mark.plain
-def test_what_a_fleet_has_learned_of_a_coefficient_holds_for_the_wear_before():
-    """Its prior is absolute: 3e-15 1/Pa, whatever is nominal."""
-    before, after = (
-        joint_forecast(each, prior=CoefficientPrior(mean=math.log(3.0e-15 / each), sigma=0.3))
-        for each in (WAS, 4.0 * WAS)
-    )
-    assert attrs.astuple(after.clearance_m) == pytest.approx(attrs.astuple(before.clearance_m), rel=1e-6)
-    assert attrs.astuple(after.cycles) == pytest.approx(attrs.astuple(before.cycles), rel=1e-6)
 
 
 PIECES = st.lists(st.tuples(st.floats(1e-16, 1e-14), st.floats(1e9, 1e10)), min_size=1, max_size=4)

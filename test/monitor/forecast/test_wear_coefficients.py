@@ -173,3 +173,19 @@ def test_a_clock_that_has_jumped_is_said_and_changes_nothing():
     early, right = found(worn(6e-5), 0.42, stamp_ns=HOUR, kept_ns=3 * HOUR), found(worn(6e-5), 0.42)
     assert "the clock is 2 h before the ledger's last entry" in early.words[0]
     np.testing.assert_array_equal(early.after.weight, right.after.weight)
+
+
+@pytest.mark.plain
+@given(st.floats(0.02, 3.0), st.floats(-1.0, 60.0), st.floats(0.1, 10.0))
+def test_the_estimate_is_its_prior_times_the_likelihood(sigma, factor, own):
+    """Against a sum over a wide and fine grid."""
+    exact = Forecasting(wear_coefficient_sigma=sigma, clearance_sigma_m=1e-9)
+    observation = ClearanceAtWear(3.0e-4 + factor * 1e-5, own * 1e-5, 1e-5)
+    found = estimate_coefficient(exact, 3.0e-4, [observation])
+    u = np.linspace(-12.0 * sigma - 5.0, 12.0 * sigma + 5.0, 200_001)
+    density = -0.5 * (u / sigma) ** 2 - 0.5 * ((np.exp(u) - factor) / own) ** 2
+    weight = np.exp(density - density.max())
+    weight /= weight.sum()
+    assert found.mean == pytest.approx(weight @ u, abs=0.01 * found.sigma + 2e-4)
+    assert found.sigma == pytest.approx(np.sqrt(weight @ (u - weight @ u) ** 2), rel=0.02)
+    assert found.weight[[0, -1]].max() < 1e-6

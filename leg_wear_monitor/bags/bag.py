@@ -27,9 +27,9 @@ from leg_wear_monitor.bags.findings import (
     open_regular,
 )
 from leg_wear_monitor.bags.mcap_file import McapFile
-from leg_wear_monitor.bags.mcap_layout import ZSTD_MAGIC, expand_message, expanded
 from leg_wear_monitor.bags.piece import Channel, Due, Piece
 from leg_wear_monitor.bags.table_layout import CSV, PARQUET
+from leg_wear_monitor.bags.zstd import ZSTD_MAGIC, expand_message, expanded
 from leg_wear_monitor.configuration.strict import events_with_depth
 from leg_wear_monitor.errors import printable, system_asked
 from leg_wear_monitor.messages.streams import Stream, streams_of
@@ -508,9 +508,9 @@ def _open(bag_file: BagFile, config: MonitorConfig, budget: Budget, stack: ExitS
             return TableFile(bag_file.path, content, bag_file.storage, config, budget)
         if bag_file.storage == MCAP:
             return McapFile(bag_file.path, stack.enter_context(open_regular(path)), budget)
-        from leg_wear_monitor.bags.sqlite import SqliteFile
+        from leg_wear_monitor.bags.database import DatabaseFile
 
-        return SqliteFile(bag_file.path, path, budget, stack)
+        return DatabaseFile(bag_file.path, path, budget, stack)
     except DamageError as error:
         raise RecordingError(str(bag_file.path), "", str(error)) from error
     except OSError as error:

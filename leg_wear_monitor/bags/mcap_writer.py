@@ -15,7 +15,7 @@ from mcap.records import Channel, ChunkIndex, DataEnd, Footer, Header, Schema, S
 from numpy.typing import ArrayLike, NDArray
 
 from leg_wear_monitor.bags.findings import RecordingError
-from leg_wear_monitor.bags.mcap_layout import HEAD, MAGIC
+from leg_wear_monitor.bags.mcap_file import MAGIC
 from leg_wear_monitor.errors import system_asked
 from leg_wear_monitor.messages.qos import RELIABLE, Qos
 from leg_wear_monitor.messages.streams import definition
@@ -23,6 +23,7 @@ from leg_wear_monitor.messages.streams import definition
 # An MCAP chunk under construction, and its serialization as records.
 
 
+HEAD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<BQHIQQ")
 _MESSAGE_TYPE = np.dtype(
     [

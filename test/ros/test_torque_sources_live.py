@@ -13,7 +13,6 @@ from leg_wear_monitor.bags.reader import Recording
 from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.gait.config import EFFORT, FLOAT64, TORQUE_SOURCES, TorqueSensorConfig
 from leg_wear_monitor.gait.sensors import Reading
-from leg_wear_monitor.monitor.config.inputs import INTERFACE
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.ros.gait_publisher import PublisherConfig
 from leg_wear_monitor.twin import CRANK, TORQUE
@@ -51,8 +50,6 @@ def walk_with(readings, source):
 @pytest.mark.parametrize("source", TORQUE_SOURCES)
 def test_a_healthy_leg_raises_no_alarm(stage, healthy, source, arrive_at) -> None:
     """A Float64 has no stamp: it is of the time at which it comes, here that of the walk."""
-    if source == INTERFACE:
-        pytest.importorskip("control_msgs")
     monitor = stage.monitor(drive_torque__source=source)
     alarms = stage.listen(f"{ME}/alarms", DiagnosticArray, latched=True)
     block_s = 1.0e-4 if source == FLOAT64 else 0.015

@@ -262,8 +262,8 @@ def test_a_recording_is_never_overwritten(tmp_path: Path) -> None:
 
 def test_a_full_disk_ends_the_recording_and_not_the_node(tmp_path: Path) -> None:
     box = black_box(tmp_path / "run.mcap")
-    box._writer._file.close()
-    box._writer._file = open("/dev/full", "wb", buffering=0)  # noqa: SIM115
+    box._writer._disk.file.close()
+    box._writer._disk.file = open("/dev/full", "wb", buffering=0)  # noqa: SIM115
     box.write("/a", 1, b"one")
     box.flush()
     assert recording_status(box).level is Level.ERROR

@@ -1,14 +1,6 @@
 # `make test` and `make demo` do all the set-up themselves, once: Python 3.11 to 3.13 with venv and a C compiler are enough.
-.PHONY: test test-slow test-slow-in-turn test-machines test-machine-in-turn test-without-ros lint kernels test-oldest test-oldest-quick package colcon docs tables docs-check demo campaign lock sbom release clean
+.PHONY: test test-slow test-slow-in-turn test-without-ros test-oldest lint kernels package colcon docs docs-tests tables docs-check demo lock sbom release clean
 .DELETE_ON_ERROR:
-
-# Percent of lines and branches that the two runs of the tests reach together.
-COVERAGE_MIN ?= 90
-
-# Measuring them slows Python by a fifth and more, and takes a run of kernels uncompiled, since the tracer cannot see into
-# compiled ones: it is done by `make test COVERAGE=1`, and by CI for one commit of four.
-MEASURED := $(COVERAGE)
-STEPS := $(if $(MEASURED),3,2)
 
 # Of these, the first that there is makes the environments; the oldest libraries have no wheels for the newest one.
 PYTHONS ?= python3.13 python3.12 python3.11 python3
@@ -18,9 +10,6 @@ TWO := --numprocesses 2 --dist loadfile
 
 # As they stand: a long file that has few tests would otherwise come last and leave a process idle.
 IN_ORDER := --no-loadscope-reorder
-
-# Tests of the folders that hold kernels.
-WITH_KERNELS := $(addprefix test/,bags/mcap contact dynamics mechanism messages monitor twin wear)
 
 # ROS finds packages below the environment's root; its log and matplotlib's font cache stay in the checkout.
 export AMENT_PREFIX_PATH := $(CURDIR)/.venv
@@ -38,40 +27,22 @@ unexport PYTHONPATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 # Images for containers often set it: each process that a test starts would compile numpy and all others anew, for seconds.
 unexport PYTHONDONTWRITEBYTECODE
 
+# Laws through the public names, the command line and the nodes, and the formulas of the kernels.
 test: .venv/installed
-	@echo "== 1 of $(STEPS): style, types, layers; kernels are compiled"
+	@echo "== 1 of 2: style, types, layers; kernels are compiled"
 	@$(MAKE) --no-print-directory --jobs 2 --output-sync=target lint kernels
-	@echo "== 2 of $(STEPS): all tests, with compiled kernels"
-	@TRACED_LATER="$(if $(MEASURED),$(WITH_KERNELS))" .venv/bin/python -m pytest $(TWO) $(IN_ORDER) \
-		-m "not slow and not uncompiled" --verbose $(if $(MEASURED),--cov --cov-report=)
-ifneq ($(MEASURED),)
-	@echo "== 3 of 3: tests of kernels, uncompiled; coverage of 2 and 3"
-	@NUMBA_DISABLE_JIT=1 .venv/bin/python -m pytest $(TWO) $(IN_ORDER) -m "plain and not slow" $(WITH_KERNELS) \
-		--verbose --cov --cov-append --cov-fail-under=$(COVERAGE_MIN)
-endif
+	@echo "== 2 of 2: tests"
+	@.venv/bin/python -m pytest $(TWO) $(IN_ORDER) -m "not slow" --ignore test/docs --durations 10 --durations-min 1
 
-# What `make test` leaves out: more of the same laws, at a length that finds what a short run does not (marker `slow`),
-# and kernels compiled by themselves (marker `uncompiled`).
+# More of the same laws, at a length that finds what a short run does not (marker `slow`); SLOW_PART=3/8 runs one part of eight.
 test-slow: kernels
-	.venv/bin/python -m pytest $(TWO) $(IN_ORDER) -m "slow or uncompiled"
+	.venv/bin/python -m pytest $(TWO) $(IN_ORDER) -m slow --ignore test/docs
 
-# What CI has time for: one of SLOW_PARTS even parts, at one commit of four.
-SLOW_PARTS := 16
-TURN = $$(( $$(git rev-list --count HEAD) / 4 ))
+# Of the slow tests, what CI has time for: one of SLOW_PARTS even parts, commit by commit.
+SLOW_PARTS := 8
 test-slow-in-turn: kernels
-	SLOW_PART=$$(( $(TURN) % $(SLOW_PARTS) ))/$(SLOW_PARTS) \
-		.venv/bin/python -m pytest $(TWO) $(IN_ORDER) -m "slow or uncompiled"
-
-# The tests as other machines would run them (test/machines.py), one machine after the other, each as long as the second
-# step of `make test`; MACHINE=haswell runs one of them. A red one does not end it: how each did stands at the end.
-# Another Python is tried where it is installed, in an environment of its own.
-MACHINE ?= all
-test-machines: .venv/installed
-	.venv/bin/python test/machines.py --machine $(MACHINE) $(TWO) $(IN_ORDER)
-
-# What CI has time for: the tests of chaotic motion, on one machine in turn, at one commit of four.
-test-machine-in-turn: .venv/installed
-	.venv/bin/python test/machines.py --turn $(TURN) --select "chaotic and not slow" $(TWO) $(IN_ORDER)
+	SLOW_PART=$$(( $$(git rev-list --count HEAD) % $(SLOW_PARTS) ))/$(SLOW_PARTS) \
+		.venv/bin/python -m pytest $(TWO) $(IN_ORDER) -m slow --ignore test/docs
 
 lint: .venv/installed
 	.venv/bin/ruff check
@@ -86,17 +57,13 @@ kernels: .venv/installed
 demo: .venv/installed
 	.venv/bin/leg-wear-monitor demo --out build/demo
 
-# Hostile users by the hundred, minutes to an hour (docs/appendix/campaign.md); the tests run a few of each family.
-campaign: .venv/installed
-	PYTHONPATH=test .venv/bin/python -m campaign
-
 # With the libraries of `make test`, but without ROS, whose wheels are for x86-64 only.
 test-without-ros: .venv-without-ros/installed
-	.venv-without-ros/bin/python -m pytest $(TWO) $(IN_ORDER) -m "not slow and not uncompiled"
+	.venv-without-ros/bin/python -m pytest $(TWO) $(IN_ORDER) -m "not slow" --ignore test/docs
 
 # The oldest libraries we support, without ROS; their deprecations are not ours to mend.
 test-oldest: .venv-oldest/installed
-	.venv-oldest/bin/python -m pytest $(TWO) -W default
+	.venv-oldest/bin/python -m pytest $(TWO) -W default -m "not slow" --ignore test/docs
 
 # A wheel in an empty environment, without ROS and away from the checkout. What setuptools built before may be out of date.
 package: .venv/installed
@@ -116,44 +83,36 @@ colcon: .venv/installed .venv-tools/installed
 	rm -rf build/colcon
 	$(COLCON) build $(COLCON_BASES) --install-base build/colcon/install
 	$(COLCON) test $(COLCON_BASES) --install-base build/colcon/install \
-		--pytest-args test/test_packaging.py test/monitor/alarms/test_words.py --no-cov
+		--pytest-args test/test_packaging.py test/doors/test_public_names.py --no-cov
 	$(COLCON) test-result --test-result-base build/colcon/build --verbose
 
 # The documentation site, without network: build/docs/index.html, and a browser on it where there is a screen.
-docs: .venv/installed .venv-docs/installed
+docs: .venv/installed .venv-docs/installed docs-tests
 	PYTHONPATH=$$(echo .venv-docs/lib/python3*/site-packages) .venv/bin/python -m sphinx \
 		-q -n -W --keep-going -d build/doctrees docs build/docs
 	@echo "build/docs/index.html"
 	@test -n "$$CI" || test -z "$$DISPLAY$$WAYLAND_DISPLAY" || .venv/bin/python -m webbrowser build/docs/index.html
 
+# Links, generated pages, tutorials, examples, the texts of README: what documents say is there, and is true.
+docs-tests: kernels
+	.venv/bin/python -m pytest $(TWO) $(IN_ORDER) test/docs
+
 # The tables of documents that follow from the source; a test beside each fails while a table is out of date.
 tables: .venv/installed
-	.venv/bin/python test/test_json_docs.py
-	.venv/bin/python test/test_generated_pages.py
+	.venv/bin/python test/docs/test_json_docs.py
+	.venv/bin/python test/docs/test_generated_pages.py
 
 # Spelling, and links from one document to another.
 docs-check: .venv/installed .venv-tools/installed
 	.venv-tools/bin/codespell *.md *.rst Makefile docs benchmarks config launch security leg_wear_monitor test
-	.venv/bin/python -m pytest --quiet test/test_docs_links.py
-
-# The part of it that CI has time for: uncompiled, where it is quick.
-test-oldest-quick: .venv-oldest/installed
-	NUMBA_DISABLE_JIT=1 .venv-oldest/bin/python -m pytest $(TWO) -W default -m "plain and not slow" \
-		test/contact test/estimate test/messages test/monitor
+	.venv/bin/python -m pytest --quiet test/docs/test_docs_links.py
 
 clean:
-	rm -rf .venv .venv-python* .venv-oldest .venv-without-ros .venv-tools .venv-docs build dist docs/lessons *.egg-info .coverage .hypothesis .import_linter_cache .*_cache
+	rm -rf .venv .venv-oldest .venv-without-ros .venv-tools .venv-docs build dist docs/lessons *.egg-info .coverage .hypothesis .import_linter_cache .*_cache
 
 # What the packages are built with comes first: without build isolation, which would fetch a setuptools that nothing pins.
 .venv/installed: setup.cfg setup.py package.xml requirements-build.lock requirements.lock
 	$(call environment,$(PYTHONS))
-	$(call locked,requirements-build.lock)
-	$(call locked,requirements.lock)
-	$(@D)/bin/python -m pip install $(QUICKLY) --no-deps --no-build-isolation --editable .
-	@touch $@
-
-.venv-python3.%/installed: .venv/installed
-	$(call environment,python3.$*)
 	$(call locked,requirements-build.lock)
 	$(call locked,requirements.lock)
 	$(@D)/bin/python -m pip install $(QUICKLY) --no-deps --no-build-isolation --editable .

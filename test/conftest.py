@@ -3,7 +3,7 @@
 import os
 import sys
 from collections.abc import Callable, Iterator
-from functools import cache, wraps
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -11,9 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import settings
-from matplotlib.figure import Figure
 from ruamel.yaml import YAML
-from ruamel.yaml.parser import Parser
 
 from leg_wear_monitor import Mechanism, load_mechanism
 from leg_wear_monitor.compiled import cache as code_cache
@@ -51,47 +49,13 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     forget()
 
 
-def untraced(call: Callable[..., Any]) -> Callable[..., Any]:
-    """A function of a library, run without the tracer: coverage slows what it does not measure, too."""
-
-    @wraps(call)
-    def without(*arguments: Any, **options: Any) -> Any:
-        tracer = sys.gettrace()
-        sys.settrace(None)
-        try:
-            return call(*arguments, **options)
-        finally:
-            sys.settrace(tracer)
-
-    return without
-
-
-# Pictures and YAML are pure Python, which takes two to three times as long when traced.
-if sys.gettrace() is not None:
-    for owner, name in ((Figure, "savefig"), (YAML, "load"), (Parser, "check_event")):
-        setattr(owner, name, untraced(getattr(owner, name)))
-
-
 @pytest.hookimpl(trylast=True)  # after `-m` has made its choice
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave the tracing of tests that run again, uncompiled, to that run: it sees all of what they reach.
-
-    Of what ``-m`` has chosen, take one of so many even parts if ``SLOW_PART`` says so: ``3/16``, from zero.
-    """
-    below = tuple(os.environ.get("TRACED_LATER", "").split())
-    for item in items:
-        if item.nodeid.startswith(below) and item.get_closest_marker("plain"):
-            item.add_marker("no_cover")
+    """Take one of several even parts of the chosen tests if ``SLOW_PART`` says so: ``3/8``, from zero."""
     if os.environ.get("SLOW_PART"):
         part, parts = map(int, os.environ["SLOW_PART"].split("/"))
         config.hook.pytest_deselected(items=[item for i, item in enumerate(items) if i % parts != part])
         items[:] = items[part::parts]
-
-
-@pytest.fixture
-def unpainted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pictures are made but not painted: that takes most of a page's time and changes none of its text."""
-    monkeypatch.setattr(Figure, "savefig", lambda *_, **__: None)
 
 
 @pytest.fixture

@@ -45,7 +45,6 @@ def shared(tmp_path):
     return tmp_path / "tmp"
 
 
-@pytest.mark.plain
 def test_what_is_made_is_private_whatever_the_umask(tmp_path):
     before = os.umask(0)
     try:
@@ -55,14 +54,12 @@ def test_what_is_made_is_private_whatever_the_umask(tmp_path):
     assert [mode(tmp_path / "a"), mode(tmp_path / "a" / "b")] == [0o700, 0o700]
 
 
-@pytest.mark.plain
 def test_a_directory_of_ours_that_others_can_read_becomes_private(tmp_path):
     (tmp_path / "a").mkdir(mode=0o755)
     assert make_private(tmp_path / "a") is None
     assert mode(tmp_path / "a") == 0o700
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("bits", [0o777, 0o775, 0o757, 0o1777])
 def test_a_directory_that_others_can_write_to_is_refused(shared, bits):
     (shared / "a").mkdir()
@@ -72,7 +69,6 @@ def test_a_directory_that_others_can_write_to_is_refused(shared, bits):
     assert mode(shared / "a") == bits
 
 
-@pytest.mark.plain
 def test_on_the_way_the_sticky_bit_makes_the_difference(shared):
     (shared / "a").mkdir()
     assert fault_of(shared / "a" / "b") is None
@@ -80,7 +76,6 @@ def test_on_the_way_the_sticky_bit_makes_the_difference(shared):
     assert "can be written to by others" in fault_of(shared / "a" / "b")
 
 
-@pytest.mark.plain
 def test_below_a_directory_that_nobody_else_enters_modes_do_not_matter(shared):
     (shared / "mine" / "open").mkdir(parents=True)
     (shared / "mine" / "open").chmod(0o777)
@@ -90,7 +85,6 @@ def test_below_a_directory_that_nobody_else_enters_modes_do_not_matter(shared):
     assert make_private(shared / "mine" / "open" / "leaf") is not None
 
 
-@pytest.mark.plain
 def test_a_link_is_judged_by_where_it_leads(shared):
     (shared / "open").mkdir()
     (shared / "open").chmod(0o777)
@@ -106,14 +100,12 @@ def test_a_link_is_judged_by_where_it_leads(shared):
     assert "loop" in fault_of(shared / "mine" / "loop")
 
 
-@pytest.mark.plain
 def test_a_file_in_the_way_is_reported(tmp_path):
     (tmp_path / "file").write_text("")
     assert "Not a directory" in make_private(tmp_path / "file" / "a")
 
 
 @as_root
-@pytest.mark.plain
 def test_what_another_user_owns_is_refused(shared):
     for name in ("theirs", "link"):
         (shared / name).mkdir() if name == "theirs" else (shared / name).symlink_to("/root")
@@ -167,14 +159,12 @@ def test_where_no_place_is_safe_nothing_is_kept(shared):
     assert "can be written to by others" in output
 
 
-@pytest.mark.plain
 def test_the_usual_place_is_taken_without_a_word(place):
     with warnings.catch_warnings():
         warnings.simplefilter("error", ConfigWarning)
         assert code_directory("a leaf of this test") == place / "a leaf of this test"
 
 
-@pytest.mark.plain
 def test_of_old_versions_the_two_used_last_are_kept(tmp_path, place):
     """Others go once they have not been used for a day; so do those that versions before named otherwise."""
     now = tmp_path.stat().st_mtime
@@ -190,7 +180,6 @@ def test_of_old_versions_the_two_used_last_are_kept(tmp_path, place):
     assert left == {"a.b-new", "a.b-2", "a.c-1", "a-1", "fedcba9876543210"}
 
 
-@pytest.mark.plain
 def test_what_was_used_within_a_day_stays(place):
     for k in range(5):
         (place / f"a.b-{k}").mkdir(parents=True, mode=0o700)

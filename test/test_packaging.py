@@ -12,8 +12,6 @@ import setuptools
 ROOT = Path(__file__).parents[1]
 EXTRAS = ("ros", "bags", "test", "lint", "dask", "studies", "dashboard")  # that `make` installs
 
-pytestmark = pytest.mark.plain
-
 
 def normal(name):
     return re.sub(r"[-_.]+", "-", name).lower()

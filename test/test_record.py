@@ -5,8 +5,6 @@ import pytest
 
 from leg_wear_monitor.compiled.kernel import entry, new_records, record_of, values_of
 
-pytestmark = pytest.mark.plain
-
 INNER = np.dtype([("angle", "f8")])
 DTYPE = np.dtype([("count", "i8"), ("speed", "f8", (2,)), ("inner", INNER)])
 

@@ -11,8 +11,6 @@ import pytest
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.files import unfinished, write_whole
 
-pytestmark = pytest.mark.plain
-
 KILLED = """
 import os, signal, sys
 from pathlib import Path

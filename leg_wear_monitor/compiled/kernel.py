@@ -209,7 +209,11 @@ def store(entry: Any, directory: Path) -> None:
 
             def load_overload(self, signature: Any, context: Any) -> Any:
                 with self._guard_against_spurious_io_errors():
-                    return self._load_overload(signature, context)
+                    try:
+                        return self._load_overload(signature, context)
+                    except AttributeError:  # the index names a type of arguments that this version lacks
+                        self.flush()
+                        return None
 
         entry._cache = Cache(entry.py_func)
     except (AttributeError, ImportError):  # then by path and time

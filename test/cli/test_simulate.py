@@ -37,7 +37,6 @@ def test_json_on_stdout_tells_contact_and_wear_of_the_clearance_joints_only(run)
     assert record["trace"]["crank_angle_rad"][0] == 0.0
 
 
-@pytest.mark.plain
 def test_an_ideal_run_has_no_contact_figures_and_no_picture_of_wear(run, tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "wear.png").write_bytes(b"of an earlier run")
@@ -71,7 +70,6 @@ def test_the_table_has_every_joint_and_fits_80_columns(run):
     assert "\x1b" not in result.stdout
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize(
     ("line", "joint", "advice"),
     [
@@ -88,7 +86,6 @@ def test_a_run_that_diverges_says_where_and_leaves_nothing(refused, shipped, tmp
     assert [path.name for path in tmp_path.iterdir()] == ["soft.yaml"]
 
 
-@pytest.mark.plain
 def test_an_interrupted_run_leaves_nothing(run, complaints, tmp_path, never):
     never(KeyboardInterrupt())
     result = run("simulate", "--json", "result.json", "--out", "out")
@@ -97,7 +94,6 @@ def test_an_interrupted_run_leaves_nothing(run, complaints, tmp_path, never):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.plain
 def test_a_file_is_replaced_whole_or_stays(run, complaints, tmp_path, monkeypatch):
     def full(*_arguments):
         raise OSError(28, "No space left on device")
@@ -110,7 +106,6 @@ def test_a_file_is_replaced_whole_or_stays(run, complaints, tmp_path, monkeypatc
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("result.json", "as it was")]
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize(
     ("option", "value"),
     [
@@ -126,14 +121,12 @@ def test_the_ideal_leg_takes_no_option_of_clearance_joints(refused, option, valu
     assert line == f"error: {option}: is for clearance joints, and no joint has clearance"
 
 
-@pytest.mark.plain
 def test_a_bug_keeps_its_traceback(run, never):
     never(ZeroDivisionError("a bug"))
     with pytest.raises(ZeroDivisionError, match="a bug"):
         run("simulate")
 
 
-@pytest.mark.plain
 def test_a_clearance_that_is_doubtful_in_a_file_is_so_as_an_option(run, complaints):
     result = run("simulate", "--clearance-m", "0.0079", *SHORT[1:])
     assert result.exit_code == 0
@@ -142,7 +135,6 @@ def test_a_clearance_that_is_doubtful_in_a_file_is_so_as_an_option(run, complain
     assert "% of the bushing's radius" in line
 
 
-@pytest.mark.plain
 def test_a_restitution_that_the_law_does_not_give_is_warned_of_once(run, complaints, shipped, tmp_path):
     (tmp_path / "soft.yaml").write_text(shipped("four_bar").replace("restitution: 0.9", "restitution: 0.5"))
     result = run("simulate", "--mechanism", "soft.yaml", "--duration", "0.001")

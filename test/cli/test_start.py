@@ -13,7 +13,6 @@ from leg_wear_monitor.dynamics.simulation import MODELS, default_model
 HEAVY = {"numba", "numpy", "matplotlib", "rich", "cattrs", "ruamel.yaml"}
 
 
-@pytest.mark.plain
 def test_help_loads_nothing_heavy():
     lines = [["--version"], *([*verb, "--help"] for verb in ((), ("simulate",), ("study",), ("replay",)))]
     code = (
@@ -30,7 +29,6 @@ def test_help_loads_nothing_heavy():
     assert done.stdout.count("Usage: ") == len(lines) - 1
 
 
-@pytest.mark.plain
 def test_module_and_script_are_the_same(run):
     done = subprocess.run(
         [sys.executable, "-m", "leg_wear_monitor", "--version"], capture_output=True, text=True, check=True
@@ -39,7 +37,6 @@ def test_module_and_script_are_the_same(run):
     assert done.stdout.startswith("leg-wear-monitor ")
 
 
-@pytest.mark.plain
 def test_an_error_leaves_one_line_on_the_real_stderr():
     line = [sys.executable, "-m", "leg_wear_monitor", "check", "no_such_leg.yaml"]
     done = subprocess.run(line, capture_output=True, text=True, check=False)
@@ -47,14 +44,12 @@ def test_an_error_leaves_one_line_on_the_real_stderr():
     assert done.stderr == "error: no_such_leg.yaml: cannot be read: No such file or directory\n"
 
 
-@pytest.mark.plain
 def test_names_that_help_shows_are_the_library_s():
     assert set(MODELS) <= set(verb.MODELS)
     assert default_model(load_mechanism("bionic_leg")) == verb.DEFAULT_MODEL
     assert default_model(load_mechanism("andrews")) == "full"
 
 
-@pytest.mark.plain
 def test_help_lists_the_verbs_that_are_there(run):
     listed = run("--help").stdout.split("Commands:\n")[1]
     verbs = [line.split()[0] for line in listed.splitlines()]
@@ -70,14 +65,12 @@ def test_check_finds_this_installation_in_order(run, complaints):
     assert "turns through" in found["bionic_leg"]
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("verb", ["monitor", "gait-publisher", "demo"])
 def test_without_ros_a_node_says_so_in_a_line(refused, monkeypatch, verb):
     monkeypatch.setitem(sys.modules, "rclpy", None)
     assert "leg_wear_monitor[ros]" in refused(verb)
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("node", ["monitor", "gait_publisher"])
 def test_the_help_of_a_node_shows_the_line_that_starts_it(node):
     """It said `monitor monitor`."""
@@ -86,7 +79,6 @@ def test_the_help_of_a_node_shows_the_line_that_starts_it(node):
     assert done.stdout.splitlines()[0] == f"Usage: ros2 run leg_wear_monitor {node} [--ros-args ...]"
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize(("given", "threads"), [({}, "1"), ({"OMP_NUM_THREADS": "3"}, "3")])
 def test_linear_algebra_takes_one_thread_if_nothing_else_is_asked_for(given, threads):
     code = (
@@ -101,7 +93,6 @@ def test_linear_algebra_takes_one_thread_if_nothing_else_is_asked_for(given, thr
     assert done.stdout.splitlines()[-1] == threads
 
 
-@pytest.mark.plain
 def test_without_the_libraries_of_an_extra_it_is_named_in_a_line(tmp_path):
     """Only in ``replay`` and ``commission`` before; a live dashboard ended in a traceback, too."""
     (tmp_path / "leg.mcap").touch()
@@ -132,7 +123,6 @@ def test_without_the_libraries_of_an_extra_it_is_named_in_a_line(tmp_path):
         )
 
 
-@pytest.mark.plain
 def test_without_an_extra_the_library_names_it_and_the_other_files_are_checked(tmp_path):
     (tmp_path / "fleet.yaml").write_text("legs: [{id: left, recordings: '*.mcap'}]\n")
     code = (

@@ -8,8 +8,6 @@ from leg_wear_monitor import ConfigError, load_config, load_mechanism
 from leg_wear_monitor.configuration import strict
 from leg_wear_monitor.configuration.strict import MOST_BYTES
 
-pytestmark = pytest.mark.plain
-
 LAUGHS = "a0: &a0 {x: 1, y: 2}\n" + "".join(
     f"a{i + 1}: &a{i + 1} {{x: *a{i}, y: *a{i}, z: *a{i}}}\n" for i in range(40)
 )

@@ -17,8 +17,6 @@ from leg_wear_monitor.contact.conformity import (
 )
 from leg_wear_monitor.mechanism.position import build_linkage, one_cycle
 
-pytestmark = pytest.mark.plain
-
 LEG = lw.load_mechanism("bionic_leg")
 STEEL = LEG.clearances["A"]
 

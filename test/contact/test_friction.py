@@ -17,8 +17,6 @@ from leg_wear_monitor.contact.friction import (
 )
 from leg_wear_monitor.mechanism import FRICTION_LAWS
 
-pytestmark = pytest.mark.plain
-
 V0, V1 = 1.0e-3, 1.0e-2
 
 laws = st.sampled_from([NONE, AMBROSIO, THRELFALL])

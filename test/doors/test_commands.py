@@ -9,8 +9,6 @@ import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import pytest
-
 KEPT = Path(__file__).parent / "kept" / "commands.txt"
 
 
@@ -37,7 +35,6 @@ def commands(help_of: Callable[..., str], *verb: str) -> Iterator[str]:
         yield from commands(help_of, *verb, entry.split()[0])
 
 
-@pytest.mark.plain
 def test_commands_and_options_are_those_that_are_kept(run) -> None:
     found = list(commands(lambda *verb: run(*verb, "--help").out))
     assert found == KEPT.read_text().splitlines(), "if it is meant: python test/doors/test_commands.py"

@@ -24,7 +24,6 @@ def fields() -> Iterator[str]:
             yield f"{document[1]}: {path.strip(' `')}: {kind.strip()} {unit.strip()}".rstrip()
 
 
-@pytest.mark.plain
 def test_fields_their_types_and_units_are_those_that_are_kept() -> None:
     assert list(fields()) == KEPT.read_text().splitlines(), "if it is meant: python test/doors/test_fields.py"
 

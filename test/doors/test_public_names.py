@@ -9,11 +9,8 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import attrs
-import pytest
 
 import leg_wear_monitor as lw
-
-pytestmark = pytest.mark.plain
 
 PACKAGE = Path(__file__).parents[2] / "package.xml"
 KEPT = Path(__file__).parent / "kept" / "names.txt"

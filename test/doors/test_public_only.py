@@ -4,10 +4,6 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
-
-pytestmark = pytest.mark.plain
-
 ROOM = Path(__file__).parent
 PACKAGE = "leg_wear_monitor"
 

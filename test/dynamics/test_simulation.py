@@ -218,7 +218,6 @@ def test_a_mechanism_can_be_given_by_name_and_by_path(leg, tmp_path):
         assert simulate(given, clearances=(), cycles=1).to_dict() == wanted
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize(
     ("given", "said"),
     [

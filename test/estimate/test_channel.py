@@ -70,7 +70,6 @@ def test_a_mean_over_some_time_is_found(known):
     assert found.lateness_s == pytest.approx(drive.lateness_s, abs=0.0005)
 
 
-@pytest.mark.plain
 def test_a_mean_is_that_of_the_time_before():
     """In closed form, of a cosine."""
     channel, omega = Channel(mean_s=0.02), 15.0 * TURN
@@ -80,7 +79,6 @@ def test_a_mean_is_that_of_the_time_before():
     assert abs(channel.response(np.array([TURN * channel.bandwidth_hz])))[0] == pytest.approx(math.sqrt(0.5))
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize(("second_order", "order"), [(0.0, 1), (0.5, 2)])
 def test_low_passes_are_those_of_butterworth(second_order, order):
     time_constant_s = math.sqrt(order) / (TURN * 20.0)
@@ -140,7 +138,6 @@ def test_declared_figures_are_used(known):
     assert figures.lateness_s == pytest.approx(DRIVE.time_constant_s)
 
 
-@pytest.mark.plain
 def test_a_drive_that_rubs_takes_power_whichever_way_the_power_flows():
     """The motor drives with more than the leg takes, and is driven by less than the leg gives."""
     torque = np.array([10.0, -10.0, 0.0])

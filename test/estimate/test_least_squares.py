@@ -8,8 +8,6 @@ import pytest
 from leg_wear_monitor.estimate.least_squares import Point, gauss_newton, jackknife, solved
 from leg_wear_monitor.mechanism.arrays import Floats
 
-pytestmark = pytest.mark.plain
-
 
 def rosenbrock(x: Floats) -> Point:
     rest = np.array([10.0 * (x[1] - x[0] ** 2), 1.0 - x[0]])

@@ -30,7 +30,6 @@ def starts_and_ends(force: Floats) -> tuple[float, float]:
     return in_stance[0] / POINTS, in_stance[-1] / POINTS
 
 
-@pytest.mark.plain
 def test_without_scatter_it_is_the_template_between_nominal_ends() -> None:
     force, stance = ground(**EVEN).step(SPEED), nominal_stance(build_linkage(LEG))
     assert force == pytest.approx(300.0 * stance.force(FORE_AFT, POINTS), abs=1e-9)
@@ -38,14 +37,12 @@ def test_without_scatter_it_is_the_template_between_nominal_ends() -> None:
     assert np.abs(force[:, 0]).max() == pytest.approx(300.0 * FORE_AFT, rel=1e-3)
 
 
-@pytest.mark.plain
 def test_stance_begins_and_ends_later_as_asked_for() -> None:
     nominal = starts_and_ends(ground(**EVEN).step(SPEED))
     moved = starts_and_ends(ground(heel_strike_shift=0.05, toe_off_shift=-0.03, **EVEN).step(SPEED))
     assert np.subtract(moved, nominal) == pytest.approx([0.05, -0.03], abs=2.0 / POINTS)
 
 
-@pytest.mark.plain
 def test_steps_scatter_in_size_and_time() -> None:
     """2000 steps: sample deviations are within 8 % of the true ones, five times their standard error."""
     drawn = ground()
@@ -57,14 +54,12 @@ def test_steps_scatter_in_size_and_time() -> None:
     assert begins.std() == pytest.approx(0.02, rel=0.08)
 
 
-@pytest.mark.plain
 def test_equal_seeds_give_equal_steps() -> None:
     one, same = ground(), ground()
     assert np.array_equal(one.step(SPEED), same.step(SPEED))
     assert not np.array_equal(one.step(SPEED), one.step(SPEED))
 
 
-@pytest.mark.plain
 def test_a_leg_that_walks_backwards_stands_in_the_same_turn_in_reverse() -> None:
     """Its heel strikes where the toe was off."""
     forth, back = ground(**EVEN).step(SPEED), ground(-60.0, **EVEN).step(-SPEED)
@@ -72,7 +67,6 @@ def test_a_leg_that_walks_backwards_stands_in_the_same_turn_in_reverse() -> None
     assert not np.allclose(back, forth)
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize(
     ("load", "at_s", "vertical_n", "back_n"),
     [
@@ -91,7 +85,6 @@ def test_other_shapes(load: dict[str, Any], at_s: float, vertical_n: float, back
     assert np.array(there) @ stance.back == pytest.approx(back_n, abs=2.0)
 
 
-@pytest.mark.plain
 def test_the_treadmill_is_not_the_template() -> None:
     """Vertically by 7 % of the peak, fore-aft by 4 % of it, RMS over stance."""
     difference = ground(shape="treadmill", **EVEN).step(SPEED) - ground(**EVEN).step(SPEED)
@@ -138,7 +131,6 @@ def test_energy_is_balanced_while_steps_differ() -> None:
     assert gained == pytest.approx(lost, rel=2.0e-3)
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize(
     ("mechanism", "load", "line"),
     [

@@ -12,8 +12,6 @@ from leg_wear_monitor.dynamics.run import CrankMotion, quintic
 from leg_wear_monitor.gait.config import PaceConfig
 from leg_wear_monitor.gait.leg import Pace
 
-pytestmark = pytest.mark.plain
-
 SPEEDS = st.lists(st.floats(-120.0, 120.0), min_size=1, max_size=4)
 NUMBERS = st.floats(-10.0, 10.0)
 

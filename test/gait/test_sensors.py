@@ -17,8 +17,6 @@ from leg_wear_monitor.gait.sensors import Reading, readings
 from leg_wear_monitor.twin import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import NO_FAULT
 
-pytestmark = pytest.mark.plain
-
 CLEAN = GaitConfig(
     duration_s=2.0,
     encoder=EncoderConfig(noise_rad=0.0, velocity_noise_radps=0.0, counts_per_turn=0.0),

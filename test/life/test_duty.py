@@ -97,7 +97,6 @@ def test_the_table_has_hours_days_and_the_growth_under_each_load(leg):
     assert "hours" not in begun(leg, clearances=("A",)).columns()
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
@@ -119,13 +118,11 @@ def test_a_duty_that_cannot_be_is_refused(text, fault):
     assert str(error.value).startswith(f"duty: {fault}")
 
 
-@pytest.mark.plain
 def test_a_duty_has_a_load():
     with pytest.raises(ConfigError, match=r"^duty: has no load, expected such as 0:2,300:5,600:1"):
         lw.Duty({})
 
 
-@pytest.mark.plain
 def test_a_leg_without_a_toe_has_no_duty():
     with pytest.raises(ConfigError, match="has no point called toe for the ground to push"):
         lw.Duty({300.0: 1.0}).mechanisms(lw.load_mechanism("slider_crank"))

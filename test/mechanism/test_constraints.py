@@ -11,8 +11,6 @@ from hypothesis.extra.numpy import arrays
 from leg_wear_monitor.mechanism.loader import parse_mechanism
 from leg_wear_monitor.mechanism.position import Linkage, build_linkage, evaluate
 
-pytestmark = pytest.mark.plain
-
 STEP = 1.0e-5
 
 # the crank's pin drives a block along a swinging arm: a prismatic joint whose guide moves

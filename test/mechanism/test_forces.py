@@ -16,8 +16,6 @@ from leg_wear_monitor.mechanism.constraints import (
 )
 from leg_wear_monitor.mechanism.loader import parse_mechanism
 
-pytestmark = pytest.mark.plain
-
 TURN = 2.0 * np.pi
 PHASES = [0.05, 0.2, 0.6, 0.85]
 FORCES = [[0.0, 100.0], [-30.0, 800.0], [60.0, 750.0], [0.0, 0.0]]

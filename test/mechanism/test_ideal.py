@@ -8,8 +8,6 @@ import pytest
 
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, ideal_motion, one_cycle, point_motion
 
-pytestmark = pytest.mark.plain
-
 SPEED = TURN  # 60 rpm
 
 # foot of Jansen's linkage at crank angles 0, 45, ... 315 deg, in his units, from his published lengths

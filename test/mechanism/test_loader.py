@@ -18,8 +18,6 @@ from leg_wear_monitor.mechanism.spec import (
     TorqueDrive,
 )
 
-pytestmark = pytest.mark.plain
-
 SCALARS = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5)
 JUNK = st.recursive(
     SCALARS,

@@ -7,8 +7,6 @@ from leg_wear_monitor import ConfigError, load_mechanism
 from leg_wear_monitor.mechanism.person import heavier_person, with_person
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
 
-pytestmark = pytest.mark.plain
-
 LEG = load_mechanism("bionic_leg")
 
 

@@ -9,8 +9,6 @@ from leg_wear_monitor.errors import AssemblyError
 from leg_wear_monitor.mechanism.loader import parse_mechanism
 from leg_wear_monitor.mechanism.position import TURN, assemble, build_linkage, check_cycle, one_cycle
 
-pytestmark = pytest.mark.plain
-
 POINTS = 24
 
 

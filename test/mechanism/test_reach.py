@@ -11,8 +11,6 @@ from leg_wear_monitor.mechanism.loader import load_mechanism, parse_mechanism, s
 from leg_wear_monitor.mechanism.position import TURN, point_path
 from leg_wear_monitor.mechanism.reach import findings, headline, loop_of, reach_of
 
-pytestmark = pytest.mark.plain
-
 CRANK, COUPLER, ROCKER, BASE = 0.1, 0.2, 0.15, 0.3
 
 

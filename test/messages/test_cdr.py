@@ -34,8 +34,6 @@ from leg_wear_monitor.twin.sample import (
     ZERO_STAMP,
 )
 
-pytestmark = pytest.mark.plain
-
 NAME = {stream.code: stream.type for stream in STREAMS}
 CRANK_NAME = "ζ_crank"
 BY_EFFORT = MonitorConfig(crank_joint=CRANK_NAME, drive_torque=DriveTorque(source="effort"))

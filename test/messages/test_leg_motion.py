@@ -10,8 +10,6 @@ from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.messages.leg_motion import PERIOD_NS, PHASES, LegMotion, received_frame, whole_cycles
 from leg_wear_monitor.twin.statistics import SampleStatistics
 
-pytestmark = pytest.mark.plain
-
 MS = 1_000_000
 RATE_HZ = 1000
 

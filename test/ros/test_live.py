@@ -107,7 +107,6 @@ def test_a_publisher_that_does_not_fit_is_reported(stage, walk) -> None:
     assert monitor.received == 0
 
 
-@pytest.mark.no_cover
 def test_several_legs_in_namespaces_do_not_hear_each_other(stage, walk) -> None:
     slow = stage.walk(PublisherConfig(duration_s=3.0, pace=PaceConfig(speeds_rpm=(50.0,))))
     left, right = stage.monitor("left"), stage.monitor("right", cadence__commanded_rpm=50.0)

@@ -8,8 +8,6 @@ from hypothesis import strategies as st
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.studies.life_tasks import exponent, lyapunov_exponent, stretches
 
-PLAIN = pytest.mark.plain
-
 
 def measured(advance, starts, steps, step_time=1.0, skip=50, comparable=None, distance=1.0e-9):
     """Exponent of a system from several starts."""
@@ -25,7 +23,6 @@ def agrees(estimate, value, within=0.0):
     return abs(estimate.value - value) < 4.0 * estimate.error + within
 
 
-@PLAIN
 def test_lorenz_s_flow():
     """0.9056, e.g. Sprott, Chaos and Time-Series Analysis, 2003; Runge and Kutta's fourth order."""
 
@@ -46,7 +43,6 @@ def test_lorenz_s_flow():
     assert agrees(estimate, 0.9056, 0.01)
 
 
-@PLAIN
 def test_a_ball_that_bounces_on_a_shaking_table():
     """Motion that jumps: high bounces without loss are the standard map (Chirikov, Physics Reports 52, 1979).
 
@@ -66,7 +62,6 @@ def test_a_ball_that_bounces_on_a_shaking_table():
     assert agrees(estimate, np.log(kick / 2.0), 0.02)
 
 
-@PLAIN
 @given(rate=st.floats(-3.0, 3.0), distance=st.floats(1.0e-9, 1.0e-3), scale=st.floats(1.0e-6, 1.0e6))
 def test_a_linear_map_has_the_logarithm_of_its_larger_factor(rate, distance, scale):
     factors = np.exp([rate, rate - 1.0])
@@ -75,7 +70,6 @@ def test_a_linear_map_has_the_logarithm_of_its_larger_factor(rate, distance, sca
     assert logs[40:].mean() == pytest.approx(rate, abs=1.0e-6)
 
 
-@PLAIN
 def test_a_coordinate_without_a_scale_is_the_first_one_s():
     seen = []
 
@@ -87,7 +81,6 @@ def test_a_coordinate_without_a_scale_is_the_first_one_s():
     assert [x[1] for x in seen] == [5.0, 5.0, 6.0, 6.0, 7.0, 7.0]
 
 
-@PLAIN
 def test_neighbours_that_meet_do_not_end_the_count():
     logs = stretches(lambda x: 0.0 * x, np.ones(1), np.ones(1), np.ones(1), 1.0e-6, 5)
     assert np.isfinite(logs).all()

@@ -45,7 +45,6 @@ def test_a_bouncing_joint_has_no_period():
         assert period_of(arrays["section_rate_mps"][:, k], 4, 1.0e-6) is None
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize(("r", "period"), [(2.9, 1), (3.2, 2), (3.5, 4), (3.83, 3), (3.9, None)])
 def test_periods_of_the_logistic_map(r, period):
     """Feigenbaum's cascade, and the window of period three."""
@@ -57,7 +56,6 @@ def test_periods_of_the_logistic_map(r, period):
     assert period_of(np.array(points), 16, 1.0e-6) == period
 
 
-@pytest.mark.plain
 @given(period=st.integers(1, 6), turns=st.integers(3, 5), seed=st.integers(0, 1000))
 def test_the_shortest_period_is_found(period, turns, seed):
     once = np.random.default_rng(seed).random((period, 2))

@@ -7,8 +7,6 @@ from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.studies.plan import Point
 from leg_wear_monitor.studies.results import StudyResults, joint_columns, point_columns
 
-pytestmark = pytest.mark.plain
-
 ERRORS = ("toe_position_m", "toe_velocity_mps", "toe_acceleration_mps2", "drive_torque_nm")
 
 OF_CONTACT = (

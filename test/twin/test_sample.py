@@ -36,7 +36,6 @@ def test_unknown_codes_are_refused(name: str, code: int) -> None:
         gait_samples([1], **{name: code})
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize(
     ("kind", "name", "value", "more"),
     [

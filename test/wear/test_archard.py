@@ -12,8 +12,6 @@ from scipy.optimize import brentq
 
 from leg_wear_monitor.wear import BUSHING, JOURNAL, SECTORS, deposit_wear, fresh_surfaces, profile_at
 
-pytestmark = pytest.mark.plain
-
 RADIUS, CLEARANCE, WIDTH = 0.010, 3.0e-4, 0.015
 FORCE, WEAR = 100.0, 1.0e-13
 PRESSED = 1.0e-7  # penetration of the journal, small beside every depth [m]

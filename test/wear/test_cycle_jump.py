@@ -15,8 +15,6 @@ from leg_wear_monitor.life.jumps import (
     wear_rate,
 )
 
-pytestmark = pytest.mark.plain
-
 SECTORS = 90
 
 

@@ -19,8 +19,6 @@ from leg_wear_monitor.wear import (
     worn_volume,
 )
 
-pytestmark = pytest.mark.plain
-
 TURN = 2.0 * math.pi
 RADIUS, CLEARANCE = 0.010, 3.0e-4
 WEAR = (2.0e-13, 0.5e-13)  # 1/Pa, bushing and journal

@@ -8,8 +8,6 @@ from hypothesis.extra.numpy import arrays
 
 from leg_wear_monitor.wear import wear_zone
 
-pytestmark = pytest.mark.plain
-
 N = 72
 
 profiles = arrays(float, N, elements=st.floats(0.0, 1.0).map(lambda x: round(x, 3))).filter(np.any)

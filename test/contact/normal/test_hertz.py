@@ -17,8 +17,6 @@ from leg_wear_monitor.contact.normal import (
     softening,
 )
 
-pytestmark = pytest.mark.plain
-
 K = 6.6102e10
 NUMBER = LAWS["hertz"].number
 

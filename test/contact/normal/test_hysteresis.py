@@ -15,8 +15,6 @@ from scipy.integrate import solve_ivp
 from leg_wear_monitor.contact.geometry import contact_modulus
 from leg_wear_monitor.contact.normal import LAWS, delivered_restitution, law_coefficient, normal_force
 
-pytestmark = pytest.mark.plain
-
 ASKED = np.arange(0.05, 0.951, 0.05)
 HERTZ = LAWS["hertz"].number
 

@@ -11,8 +11,6 @@ from leg_wear_monitor.contact.geometry import contact_modulus
 from leg_wear_monitor.contact.normal import LAWS, elastic_energy, law_coefficient, normal_force, softening
 from leg_wear_monitor.mechanism import NORMAL_LAWS
 
-pytestmark = pytest.mark.plain
-
 MODULUS, WIDTH = contact_modulus(2.07e11, 0.29, 2.07e11, 0.29), 0.02
 BUSHING, CLEARANCE = 0.01, 3.0e-4
 

@@ -70,7 +70,6 @@ def plane_elasticity(psi, terms=12, orders=2400):
     return math.pi * float(pressure[1] @ found[:-1])
 
 
-@pytest.mark.plain
 @given(psi=st.floats(0.02, 1.4))
 def test_force_is_the_integral_of_the_pressure(psi):
     """And the pressure is that of a foundation as deep as the contact is wide, with Johnson's 1.18."""
@@ -85,14 +84,12 @@ def test_force_is_the_integral_of_the_pressure(psi):
     assert force_at(psi) == pytest.approx(wanted, rel=1.0e-8)
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("degrees", OFF)
 def test_persson_s_closed_form_is_plane_elasticity(degrees):
     psi = math.radians(degrees)
     assert plane_elasticity(psi) == pytest.approx(persson(psi), rel=2.0e-4)
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("degrees, off", OFF.items())
 def test_force_by_half_angle_against_persson(degrees, off):
     psi = math.radians(degrees)
@@ -100,7 +97,6 @@ def test_force_by_half_angle_against_persson(degrees, off):
     assert force_at(psi) / exact - 1.0 == pytest.approx(off, abs=5.0e-5)
 
 
-@pytest.mark.plain
 @given(psi=st.floats(1.0e-5, 0.02))
 def test_a_narrow_contact_is_hertz_s_line(psi):
     """Half width a = R psi, a^2 = 4 F R_eq / (pi E* w), R_eq = R^2 / c; Persson's form has the same limit."""
@@ -109,13 +105,11 @@ def test_a_narrow_contact_is_hertz_s_line(psi):
     assert 2.0 * persson(psi) * E_STAR * WIDTH * CLEARANCE == pytest.approx(line, rel=1.2 * psi**2)
 
 
-@pytest.mark.plain
 @given(psi=st.floats(0.02, 1.4))
 def test_the_half_angle_under_a_load_is_the_one_at_which_the_force_is_it(psi):
     assert half_angle_under_load(force_at(psi), MODULUS, WIDTH, CLEARANCE) == pytest.approx(psi, rel=1.0e-8)
 
 
-@pytest.mark.plain
 @given(x=st.floats(1.0e-6, 2.9))
 def test_energy_is_the_integral_of_the_force(x):
     def force(delta):

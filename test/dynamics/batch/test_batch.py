@@ -51,14 +51,12 @@ def by_one_worker(various):
     return figures(simulate_batch(various, workers=1, **SHORT))
 
 
-@pytest.mark.no_cover
 @pytest.mark.parametrize("workers", [pytest.param(2, marks=pytest.mark.slow), 5])
 def test_results_do_not_depend_on_the_number_of_workers(various, by_one_worker, workers):
     """Bit for bit."""
     assert figures(simulate_batch(various, workers=workers, **SHORT)) == by_one_worker
 
 
-@pytest.mark.no_cover
 def test_results_do_not_depend_on_the_others(various, by_one_worker):
     """Nor on the order, with as many workers as there are processors."""
     backwards = figures(simulate_batch(various[::-1], **SHORT))
@@ -92,7 +90,6 @@ def test_the_error_of_a_leg_stands_in_its_place(leg, document, various, by_one_w
     assert figures([first, second]) == by_one_worker[:2]
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize(
     ("options", "how", "fault"),
     [
@@ -157,7 +154,6 @@ def new_stepper(leg):
     return lambda: ClearanceStepper(prepare(leg, clearances=("A", "G")), tables=tables)
 
 
-@pytest.mark.no_cover
 @settings(max_examples=25)
 @given(perturb_m=st.floats(0.0, 3.0e-4), seed=st.integers(0, 2**32), angle=st.floats(-10.0, 10.0))
 def test_a_start_is_inside_the_clearance_and_repeats_itself(leg, new_stepper, perturb_m, seed, angle):
@@ -201,7 +197,6 @@ def test_the_starting_phase_is_forgotten(leg):
     np.testing.assert_allclose(forces, np.tile(forces.mean(axis=0), (4, 1)), rtol=0.03)
 
 
-@pytest.mark.plain
 def test_legs_that_differ_in_their_material_alone_keep_it(leg):
     """The text of a mechanism, by which legs are prepared once, leaves it out."""
     pairs = ("ds-on-steel-greased", "graphite-bronze-oil-on-steel")
@@ -209,7 +204,6 @@ def test_legs_that_differ_in_their_material_alone_keep_it(leg):
     assert [setup.linkage.mechanism.clearances["A"].material for setup in setups] == list(pairs)
 
 
-@pytest.mark.plain
 def test_advancing_a_batch_is_advancing_each(new_stepper):
     """Each to its own time; a drive that makes no sense stops its own leg only."""
     alone, together = ([new_stepper() for _ in range(3)] for _ in range(2))
@@ -232,7 +226,6 @@ def test_advancing_a_batch_is_advancing_each(new_stepper):
         np.testing.assert_array_equal(statistics.integral, wanted.integral)
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("shared", ["tally", "stepper", "setup", "length"])
 def test_what_two_threads_would_write_is_refused(leg, new_stepper, shared):
     steppers, statistics_of_all = (

@@ -6,8 +6,6 @@ from hypothesis import strategies as st
 
 from leg_wear_monitor.dynamics.clearance.advance import inverse_cube_root
 
-pytestmark = pytest.mark.plain
-
 
 @given(st.floats(-300.0, 300.0).map(lambda power: 10.0**power))
 def test_the_inverse_cube_root(x):

@@ -13,8 +13,6 @@ from leg_wear_monitor.mechanism.loader import load_mechanism, parse_mechanism
 from leg_wear_monitor.mechanism.position import TURN, Linkage, evaluate, ideal_motion
 from leg_wear_monitor.mechanism.spec import ConstantLoad
 
-pytestmark = pytest.mark.plain
-
 POINTS = 256  # of a turn: enough for smooth tables
 LEGS = ("bionic_leg", "jansen_leg", "four_bar")
 

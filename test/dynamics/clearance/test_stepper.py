@@ -192,7 +192,6 @@ def test_a_senseless_drive_is_refused_and_forgotten(new_stepper, in_one_go, i, v
     assert_same_statistics(statistics, in_one_go[1])
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("t_end", [np.nan, -1.0, -np.inf])
 def test_an_end_that_is_not_ahead_changes_nothing(new_stepper, t_end):
     stepper, statistics = new_stepper(), new_run_statistics(10)
@@ -240,7 +239,6 @@ def test_at_rest_the_contacts_carry_the_weight(leg, tables):
     np.testing.assert_allclose(statistics.integral[:, FORCE] / statistics.time[0], wanted, rtol=0.01)
 
 
-@pytest.mark.plain
 def test_a_mirrored_leg_moves_and_wears_mirrored(worn_leg, mirrored):
     """With the crank turning backwards; until rounding, multiplied by impacts, shows."""
     steppers = []

@@ -21,7 +21,7 @@ from leg_wear_monitor.mechanism.constraints import closures, rotations
 from leg_wear_monitor.mechanism.position import TURN, dense_jacobian, one_cycle
 from leg_wear_monitor.wear import SECTORS, Surfaces
 
-pytestmark = [pytest.mark.plain, pytest.mark.uncompiled]
+pytestmark = pytest.mark.slow  # kernels that only tests call are compiled for it
 
 CLEARANCE_JOINTS = ("A", "B", "G", "I", "J")
 APPROACH = np.full(len(CLEARANCE_JOINTS), 0.2)

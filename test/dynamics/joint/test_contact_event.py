@@ -10,8 +10,6 @@ from hypothesis import strategies as st
 from leg_wear_monitor.contact.geometry import journal_contact
 from leg_wear_monitor.dynamics.joint import DELTA, DELTA_DOT, NEVER, SAMPLE, first_contact_event
 
-pytestmark = pytest.mark.plain
-
 CLEARANCE = 3.0e-4
 
 

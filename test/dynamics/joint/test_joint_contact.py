@@ -12,8 +12,6 @@ from leg_wear_monitor.contact.normal import LAWS
 from leg_wear_monitor.dynamics.joint import contact_energy, joint_force, penetration
 from leg_wear_monitor.wear import SECTORS, Surfaces, local_surfaces
 
-pytestmark = pytest.mark.plain
-
 TURN = 2.0 * math.pi
 angles = st.floats(-3.0, 3.0)
 

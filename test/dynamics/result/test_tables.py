@@ -14,8 +14,6 @@ from leg_wear_monitor.dynamics.result import (
     trace_columns,
 )
 
-pytestmark = pytest.mark.plain
-
 
 @pytest.fixture
 def result():

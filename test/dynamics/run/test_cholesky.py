@@ -1,13 +1,10 @@
 """Cholesky inside an envelope gives what dense algebra gives."""
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor.dynamics.full_model import factorise, substitute
-
-pytestmark = pytest.mark.plain
 
 
 @st.composite

@@ -14,8 +14,6 @@ from leg_wear_monitor.dynamics.run import (
     stage_state,
 )
 
-pytestmark = pytest.mark.plain
-
 coefficients = arrays(float, 4, elements=st.floats(-10.0, 10.0))
 
 

@@ -1,14 +1,11 @@
 """The crank's polynomial and its derivatives."""
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from leg_wear_monitor.dynamics.run import DEGREE, drive_at
-
-pytestmark = pytest.mark.plain
 
 
 @given(

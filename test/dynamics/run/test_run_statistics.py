@@ -22,8 +22,6 @@ from leg_wear_monitor.dynamics.run import (
     signed_percentile,
 )
 
-pytestmark = pytest.mark.plain
-
 BIN = 1.0085  # ratio of two bins' magnitudes
 
 magnitudes = arrays(float, st.integers(1, 200), elements=st.floats(1.0e-3, 1.0e5))

@@ -8,8 +8,6 @@ import pytest
 from leg_wear_monitor.dynamics.full_model import NO_TOE, ideal_toe, interpolate
 from leg_wear_monitor.mechanism.position import TURN, ideal_motion, point_motion
 
-pytestmark = pytest.mark.plain
-
 
 @pytest.fixture(scope="module")
 def toe(linkage_of):

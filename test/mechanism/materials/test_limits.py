@@ -6,8 +6,6 @@ import pytest
 import leg_wear_monitor as lw
 from leg_wear_monitor.mechanism.materials import Bushing, BushingLoad
 
-pytestmark = pytest.mark.plain
-
 SETTINGS = attrs.evolve(lw.load_mechanism().clearances["G"], material="du-on-steel-dry")
 
 

@@ -11,8 +11,6 @@ import leg_wear_monitor as lw
 from leg_wear_monitor.mechanism.materials import Material
 from leg_wear_monitor.mechanism.sourced import UNITS, SourcedValue, WearCoefficient
 
-pytestmark = pytest.mark.plain
-
 
 def wear(value: float, unit: str, hardness: SourcedValue | None = None) -> float:
     return WearCoefficient(value=value, unit=unit, source="a", conditions="b", hardness=hardness).si

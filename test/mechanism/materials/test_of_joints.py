@@ -14,8 +14,6 @@ from leg_wear_monitor.mechanism.materials import bushing_of, regimes
 from leg_wear_monitor.mechanism.plausible import doubts
 from leg_wear_monitor.monitor.ledger.entry import fingerprint
 
-pytestmark = pytest.mark.plain
-
 DOCUMENT = YAML(typ="safe").load(shipped_mechanisms()["bionic_leg"])
 
 

@@ -7,8 +7,6 @@ import pytest
 import leg_wear_monitor as lw
 from leg_wear_monitor.mechanism.materials import rating_life_hours
 
-pytestmark = pytest.mark.plain
-
 
 def test_the_published_example() -> None:
     """The door of a tramway: published 1.64 N/mm^2, 0.01 m/s and 22 500 h; 22 464 h by the formula."""

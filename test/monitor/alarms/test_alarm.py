@@ -10,8 +10,6 @@ from hypothesis import strategies as st
 from leg_wear_monitor.monitor.alarms import Alarm, Limit, acknowledged, evaluated, has_changed
 from leg_wear_monitor.state import Level
 
-pytestmark = pytest.mark.plain
-
 OK, WARN, ERROR = Level
 LIMIT = Limit(warn=8.0, error=10.0, deadband=0.1)
 ALARM = Alarm(kind="clearance", subject="A", unit="m")

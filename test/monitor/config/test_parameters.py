@@ -19,8 +19,6 @@ from leg_wear_monitor.monitor.config.parameters import (
 from leg_wear_monitor.monitor.config.sections import NOT_DECLARED
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 
-pytestmark = pytest.mark.plain
-
 WRONG = [
     ("limits.clearance_m", -1.0, ["-1.0", "above 0 m", "at most 0.1"]),
     ("limits.clearance_m", 1, ["1 is a whole number", "expected 1.0 [m]"]),

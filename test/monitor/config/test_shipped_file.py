@@ -2,14 +2,12 @@
 
 from typing import Any
 
-import pytest
 from ruamel.yaml import YAML
 
 from leg_wear_monitor.monitor.config.parameters import PARAMETERS, load_config, shipped_config
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 
 
-@pytest.mark.plain
 def test_the_shipped_file_holds_every_parameter_but_empty_lists_at_its_default():
     assert load_config() == MonitorConfig()
     document = YAML(typ="safe", pure=True).load(shipped_config().read_text(encoding="utf-8"))

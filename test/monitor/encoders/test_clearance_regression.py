@@ -91,7 +91,6 @@ def others(found):
 WORN = [3e-4, 3.3e-4, 4.5e-4, 3e-4, 3.1e-4]
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("noise", [0.0, 1e-4, 1e-3])
 def test_clearances_and_the_encoders_errors_are_found_at_once(model, shape, reference, noise):
     found = watched(model, shape, reference, prior_with(UNKNOWN, FRESH, 3e-4), WORN, noise=noise).fused()
@@ -100,7 +99,6 @@ def test_clearances_and_the_encoders_errors_are_found_at_once(model, shape, refe
     assert (found.sigma_m < 3e-5 + 0.02 * noise).all()
 
 
-@pytest.mark.plain
 def test_outliers_do_no_harm(model, shape, reference):
     hidden = ClearanceRegression(model, reference, prior_with(UNKNOWN, FRESH, 3e-4))
     for seed in range(30):
@@ -110,7 +108,6 @@ def test_outliers_do_no_harm(model, shape, reference):
     np.testing.assert_allclose(hidden.fused().clearance_m, WORN, atol=2e-5)
 
 
-@pytest.mark.plain
 def test_more_cycles_make_it_surer(model, shape, reference):
     before = prior_with(UNKNOWN, FRESH, 3e-4)
     few, many = (
@@ -120,12 +117,10 @@ def test_more_cycles_make_it_surer(model, shape, reference):
     assert (many < 0.9 * few).all()
 
 
-@pytest.mark.plain
 def test_too_few_cycles_say_nothing(model, shape, reference):
     assert watched(model, shape, reference, prior_with(UNKNOWN, FRESH, 3e-4), WORN, cycles=5).fused() is None
 
 
-@pytest.mark.plain
 def test_the_hip_alone_says_nothing_of_the_ankle(model, shape, reference):
     """What was known before stays, mean and deviation."""
 
@@ -144,7 +139,6 @@ def test_the_hip_alone_says_nothing_of_the_ankle(model, shape, reference):
     np.testing.assert_allclose(found.sigma_m[3:], 2e-5, rtol=1e-3)
 
 
-@pytest.mark.plain
 def test_a_sensor_that_is_added_later_is_commissioned_by_what_is_known_then(model, shape, reference):
     hidden = ClearanceRegression(model, reference, prior_with(UNKNOWN, FRESH, 2e-4))
     for seed in range(30):
@@ -158,7 +152,6 @@ def test_a_sensor_that_is_added_later_is_commissioned_by_what_is_known_then(mode
     assert later.mean[8] == pytest.approx(ERRORS[3], abs=1e-3)
 
 
-@pytest.mark.plain
 def test_a_worn_joint_is_named_and_a_sound_leg_is_left_alone(model, shape, reference):
     new = watched(model, shape, reference, prior_with(UNKNOWN, FRESH, 5e-6), FRESH, noise=1e-4).fused()
     before = prior_with(commissioned(UNKNOWN, new, (True,) * 3), FRESH, 1e-4)
@@ -168,7 +161,6 @@ def test_a_worn_joint_is_named_and_a_sound_leg_is_left_alone(model, shape, refer
     assert others(watched(model, shape, reference, before, FRESH, noise=1e-4).fused()) == []
 
 
-@pytest.mark.plain
 def test_fusion_weighs_by_covariance(model, shape, reference):
     """A sure prediction moves little, an unsure one takes over what is seen."""
     sure = watched(model, shape, reference, prior_with(UNKNOWN, FRESH, 1e-7), WORN, scatter=0.2).fused()
@@ -219,7 +211,6 @@ def test_an_encoder_that_is_absent_is_as_one_that_was_never_there(leg, model, si
     np.testing.assert_allclose(found.sigma_m, expected.sigma_m, rtol=1e-2)
 
 
-@pytest.mark.plain
 def test_a_worn_joint_is_worn_more_where_it_is_worn():
     depth = np.zeros((2, 2, 720))
     depth[0, 0, :180] = 8e-5  # 20 um in the mean
@@ -230,7 +221,6 @@ def test_a_worn_joint_is_worn_more_where_it_is_worn():
     np.testing.assert_allclose(profile[0, 0, :180], 2e-4)
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("target", [3e-4, 2.9e-4])
 def test_a_joint_that_is_to_be_new_has_no_wear(target: float):
     """Worn by more than its clearance when new, it had a negative one, and a torque of 1e143 N m."""
@@ -239,13 +229,11 @@ def test_a_joint_that_is_to_be_new_has_no_wear(target: float):
     assert not profile.any()
 
 
-@pytest.mark.plain
 def test_a_sensor_has_to_sit_on_a_revolute_joint(leg):
     with pytest.raises(ConfigError, match="'Z' is not a revolute joint"):
         angle_model(leg, ("Z",))
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_phases_are_where_they_are_however_the_crank_turns(sign) -> None:
     """A crank with ripple passes each phase at another time, but at the same angle."""

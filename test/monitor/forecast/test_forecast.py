@@ -14,8 +14,6 @@ from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.forecast.forecast import Answer, GrowthLaw, JointCondition, forecast, no_law
 from leg_wear_monitor.monitor.forecast.wear_coefficients import ClearanceAtWear, estimate_coefficient
 
-pytestmark = pytest.mark.plain
-
 SETTINGS = Forecasting(model_sigma=0.05)
 SURE = Forecasting(load_sigma=0.0, model_sigma=0.0, clearance_sigma_m=1e-9, duty_sigma=0.0)
 NOW = JointCondition(joint="A", fresh_m=3e-4, wear_m=0.0, limit_m=6e-4, growth_m=1.5e-11, growth_error_m=0.0)

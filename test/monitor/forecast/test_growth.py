@@ -15,8 +15,6 @@ from leg_wear_monitor.monitor.forecast.growth import (
     growth_rate,
 )
 
-pytestmark = pytest.mark.plain
-
 P90 = NormalDist().inv_cdf(0.9)
 
 

@@ -8,8 +8,6 @@ from hypothesis import strategies as st
 
 from leg_wear_monitor.monitor.forecast.forecast import GrowthLaw, SimulatedLife, cycles_to, fitted_law, no_law
 
-pytestmark = pytest.mark.plain
-
 FRESH = np.array([3e-4, 2e-4, 3e-4])
 LIMIT = np.array([6e-4, 3e-4, 5e-4])
 COUPLING = np.array([[0.3, -0.4, 0.2], [0.5, 0.1, 0.0], [-0.2, 0.6, 0.4]])

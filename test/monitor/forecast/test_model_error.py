@@ -9,8 +9,6 @@ from leg_wear_monitor.mechanism.person import PERSON_TOLERANCE, on_the_ground, w
 from leg_wear_monitor.monitor.forecast.model_error import ModelError, model_error
 from leg_wear_monitor.twin.reference import MASS_TOLERANCE
 
-pytestmark = pytest.mark.plain
-
 
 def scaled(mechanism, factors):
     """Mechanism with other masses and inertias."""

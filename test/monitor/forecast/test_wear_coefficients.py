@@ -15,8 +15,6 @@ from leg_wear_monitor.monitor.forecast.measurement import measure
 from leg_wear_monitor.monitor.forecast.wear_coefficients import ClearanceAtWear, estimate_coefficient
 from leg_wear_monitor.monitor.ledger.entry import JointWear
 
-pytestmark = pytest.mark.plain
-
 FRESH, PRIOR = 3.0e-4, Forecasting(wear_coefficient_sigma=0.7)
 CLEARANCE = load_mechanism("bionic_leg").clearances["A"]
 HOUR = 3_600_000_000_000
@@ -175,7 +173,6 @@ def test_a_clock_that_has_jumped_is_said_and_changes_nothing():
     np.testing.assert_array_equal(early.after.weight, right.after.weight)
 
 
-@pytest.mark.plain
 @given(st.floats(0.02, 3.0), st.floats(-1.0, 60.0), st.floats(0.1, 10.0))
 def test_the_estimate_is_its_prior_times_the_likelihood(sigma, factor, own):
     """Against a sum over a wide and fine grid."""

@@ -29,8 +29,6 @@ from leg_wear_monitor.state import Level, State, Verdict
 from leg_wear_monitor.twin.reference import POINTS, CrankProfile, LegParameters
 from leg_wear_monitor.twin.torque_reference import TorqueReference
 
-pytestmark = pytest.mark.plain
-
 LEG = LegParameters(np.ones(1), np.ones(1))
 TABLES = [name for kind, name, *_ in expected_definitions() if kind == "table"]
 

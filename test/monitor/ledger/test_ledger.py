@@ -31,8 +31,6 @@ from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.reference import POINTS, CrankProfile, LegParameters
 from leg_wear_monitor.twin.torque_reference import CYCLES, TorqueReference
 
-pytestmark = pytest.mark.plain
-
 SECOND = 10**9
 
 

@@ -47,7 +47,6 @@ def test_load_friction_and_lag_are_told_apart(load, friction, lag, phase):
     assert found.left < 1.0e-4
 
 
-@pytest.mark.plain
 @given(
     load=st.floats(-500.0, 500.0), friction=st.floats(-5.0, 5.0), load_friction=st.floats(0.0, 0.4),
     phase=st.floats(0.0, TURN),
@@ -66,7 +65,6 @@ def test_friction_that_grows_with_the_torque_is_told_from_a_constant_one(
         assert found.left < 1.0e-3
 
 
-@pytest.mark.plain
 def test_a_drive_does_not_gain_from_its_load():
     """Friction below 0 or above what gears have is not explained; the constant one beside it still is."""
     angle = np.linspace(0.0, TURN, 200, endpoint=False)
@@ -118,7 +116,6 @@ def test_a_sudden_load_is_believed_soon_and_a_doubtful_one_not():
     assert estimate.acting == 0.0
 
 
-@pytest.mark.plain
 def test_a_foot_that_pulls_is_not_explained_by_a_load():
     """What a load below 0 would explain is left in the mismatch; the friction beside it is still found."""
     sums = sums_of(COLUMNS, COLUMNS @ [-50.0, 1.5, 0.001, 0.0])
@@ -146,7 +143,6 @@ def instants(repeats: float, scatter: float, seed: int = 0):
     return found
 
 
-@pytest.mark.plain
 def test_what_scatters_is_taken_off_and_what_repeats_stays():
     quiet = [instants(0.0, 2.0, seed).rms_nm()[0] for seed in range(20)]
     assert np.sqrt(np.mean(np.square(quiet))) < 0.35  # of 2 N m, 0.7 in a mean of eight cycles
@@ -155,7 +151,6 @@ def test_what_scatters_is_taken_off_and_what_repeats_stays():
     assert instants(3.0, 0.0).rms_nm()[0] == pytest.approx(3.0, rel=1e-6)
 
 
-@pytest.mark.plain
 def test_before_enough_cycles_nothing_is_reported():
     found = instants(1.0, 0.0)
     found.cycles = found.cycles[1:]

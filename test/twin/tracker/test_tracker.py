@@ -99,7 +99,6 @@ def test_any_split_into_blocks_gives_the_same(gait, cuts):
     assert_same(track(cut(samples, cuts)), track([samples]))
 
 
-@pytest.mark.plain
 def test_blocks_of_one_give_the_same(gait):
     samples = with_torque(gait(3.0))
     assert_same(track(cut(samples, range(len(samples)))), track([samples]))
@@ -242,7 +241,6 @@ def test_speed_ripple_is_followed(gait, times):
     assert np.abs(off[steady]).std() < 0.1 * ripple * w
 
 
-@pytest.mark.plain
 def test_a_crank_at_rest_stays_put(gait):
     """It rests from its stop to its next start, and no noise moves it meanwhile."""
     tracker = CrankTracker(TrackerSettings())
@@ -307,7 +305,6 @@ def test_longer_gaps_are_not_made_up(gait):
     assert unmonitored == pytest.approx(2.3 * S, abs=0.1 * S)
 
 
-@pytest.mark.plain
 def test_a_gap_of_the_crank_alone_is_one_too(gait):
     """Torque samples go on meanwhile: they are looked at without a leg."""
     samples = with_torque(gait(6.0))
@@ -320,7 +317,6 @@ def test_a_gap_of_the_crank_alone_is_one_too(gait):
     assert ((looked["begin_ns"] > START_NS + 2.6 * S) & (looked["begin_ns"] < START_NS + 3.9 * S)).sum() > 200
 
 
-@pytest.mark.plain
 def test_stamps_that_jump_back_start_a_new_time_base(gait):
     tracker = CrankTracker(TrackerSettings())
     steps = track([gait(3.0), gait(3.0, start_ns=START_NS - 1000 * S)], tracker)
@@ -344,7 +340,6 @@ def test_single_stray_stamps_change_nothing(gait, where, stamp):
     assert tracker.state.counts.stray_stamps + tracker.state.counts.duplicates == len(where)
 
 
-@pytest.mark.plain
 def test_outliers_change_little_and_a_crank_that_is_elsewhere_is_found_again(gait):
     samples = gait(6.0)
     jumped = samples.copy()

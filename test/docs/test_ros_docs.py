@@ -1,0 +1,117 @@
+"""Launch files and shipped parameter files fit the nodes."""
+
+from configparser import ConfigParser
+from typing import Any
+from xml.etree import ElementTree
+
+from ruamel.yaml import YAML
+
+from leg_wear_monitor.files import share_directory
+from leg_wear_monitor.messages.streams import STREAMS
+from leg_wear_monitor.monitor.config.parameters import parse_config, structured
+from leg_wear_monitor.monitor.config.tables import FORCES
+from leg_wear_monitor.ros import monitor_node
+from leg_wear_monitor.ros.gait_publisher import PublisherConfig
+from leg_wear_monitor.ros.inputs import DEPTH
+
+TAKE_S = monitor_node._TAKE_S  # the nodes of these tests take their messages sooner
+
+
+def flat(mapping: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    values: dict[str, Any] = {}
+    for key, value in mapping.items():
+        values |= flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {prefix + key: value}
+    return values
+
+
+def test_the_demo_s_parameters_fit_both_nodes() -> None:
+    path = share_directory() / "config" / "demo.yaml"
+    document = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
+    monitor = parse_config(document, path.name, "/demo/leg_wear_monitor")
+    leg = structured(PublisherConfig, flat(document["/**/gait_publisher"]["ros__parameters"]), path.name)
+    assert monitor.wear_acceleration == leg.wear_acceleration == 1.0e3
+    # faster than commanded: within a tolerance of more than a tenth, limits of impact forces would grow
+    own = monitor.cadence
+    fastest = max(abs(speed) for speed in leg.pace.speeds_rpm)
+    assert fastest > own.commanded_rpm + own.tolerance_rpm
+    assert own.tolerance_rpm <= 0.1 * own.commanded_rpm
+    assert min(abs(speed) for speed in leg.pace.speeds_rpm) == own.commanded_rpm
+
+
+def test_launch_files_start_what_is_installed() -> None:
+    package = share_directory()
+    setup = ConfigParser()
+    setup.read(package / "setup.cfg")
+    scripts = setup["options.entry_points"]["console_scripts"].split("\n")
+    installed = {line.split("=")[0].strip() for line in scripts if line}
+    nodes = [node for path in package.glob("launch/*.xml") for node in ElementTree.parse(path).iter("node")]
+    shown, nodes = (
+        [node for node in nodes if (node.get("pkg") == "rviz2") is is_rviz] for is_rviz in (True, False)
+    )
+    assert len(nodes) == 4
+    assert {node.get("pkg") for node in nodes} == {"leg_wear_monitor"}
+    assert {node.get("exec") for node in nodes} <= installed
+    assert len(shown) == 2
+    for path in package.glob("launch/*.xml"):
+        for group in ElementTree.parse(path).iterfind("group"):
+            # a package that is missing aborts a launch, also that of the monitor
+            assert group.get("if") == "$(var rviz)"
+            (has,) = (one for one in group.iterfind("let") if one.get("name") == "has_rviz2")
+            assert '"rviz2" in ament_index_python.get_packages_with_prefixes()' in has.get("value")
+            (said,) = group.iterfind("log")
+            assert said.get("unless") == "$(var has_rviz2)"
+            assert "rviz2 is not installed" in said.get("message")
+    for node in shown:
+        assert node.get("if") == "$(var has_rviz2)"
+        layout = node.get("args").removeprefix("-d $(find-pkg-share leg_wear_monitor)/")
+        assert (package / layout).is_file()
+
+
+def test_every_input_can_be_remapped_by_the_launch_files() -> None:
+    """A robot with one broadcaster for both legs, or on ros2_control, could not."""
+    topics = {stream.topic for stream in STREAMS}
+    one, two = (
+        ElementTree.parse(share_directory() / "launch" / f"{name}.launch.xml").getroot()
+        for name in ("monitor", "two_legs")
+    )
+    for node in one.iterfind("node"):
+        assert {(each.get("from"), each.get("to")) for each in node.iterfind("remap")} == {
+            (topic, f"$(var {topic})") for topic in topics
+        }
+    for launch, included in ((one, ()), (two, two.findall("include"))):
+        declared = {arg.get("name"): arg.get("default") for arg in launch.iterfind("arg")}
+        for include in included:
+            passed = {arg.get("name"): arg.get("value") for arg in include.iterfind("arg")}
+            assert topics < set(passed) < {arg.get("name") for arg in one.iterfind("arg")}
+            assert {declared[passed[topic][6:-1]] for topic in topics} == topics
+
+
+def test_the_parameters_for_tools_prevail_where_rviz_is_asked_for() -> None:
+    package = share_directory()
+    document = YAML(typ="safe", pure=True).load(
+        (package / "config" / "tools.yaml").read_text(encoding="utf-8")
+    )
+    config = parse_config(document, "tools.yaml", "/left/leg_wear_monitor")
+    assert config.publish_scalars and config.publish_markers
+    for name in ("monitor", "demo"):
+        launch = ElementTree.parse(package / "launch" / f"{name}.launch.xml").getroot()
+        values = {next(iter(one.items())): one.get("value") for one in launch.iterfind("let")}
+        assert values == {
+            ("if", "$(var rviz)"): "$(find-pkg-share leg_wear_monitor)/config/tools.yaml",
+            ("unless", "$(var rviz)"): "$(var params_file)",
+        }
+        for node in launch.iter("node"):
+            if node.get("exec") == "monitor":
+                files = [one.get("from") for one in node.iter("param") if one.get("from")]
+                assert files == ["$(var params_file)", "$(var shown)"]
+
+
+def test_the_pages_have_the_numbers_and_units_of_the_code() -> None:
+    docs = share_directory() / "docs"
+    reference = (docs / "reference" / "ros.md").read_text(encoding="utf-8")
+    tables = (docs / "howto" / "csv.md").read_text(encoding="utf-8")
+    numbers = {"depth": DEPTH, "at most": monitor_node._AT_ONCE, "At": monitor_node._HELD}
+    for words, number in numbers.items():
+        assert f"{words} {number:,}".replace(",", " ") in reference
+    assert f"{1.0 / TAKE_S:g} times a second the node takes" in reference
+    assert f"`input.units.foot_load` is {' or '.join(f'`{unit}`' for unit in FORCES)}" in tables

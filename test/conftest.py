@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import settings
+from matplotlib.figure import Figure
 from ruamel.yaml import YAML
 
 from leg_wear_monitor import Mechanism, load_mechanism
@@ -56,6 +57,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         part, parts = map(int, os.environ["SLOW_PART"].split("/"))
         config.hook.pytest_deselected(items=[item for i, item in enumerate(items) if i % parts != part])
         items[:] = items[part::parts]
+
+
+@pytest.fixture
+def unpainted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures are made but not painted: that takes most of a page's time and changes none of its text."""
+    monkeypatch.setattr(Figure, "savefig", lambda *_, **__: None)
 
 
 @pytest.fixture

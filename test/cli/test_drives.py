@@ -1,0 +1,78 @@
+"""``leg-wear-monitor drives`` and ``materials``, and what ``check`` prints of a drive."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+import leg_wear_monitor as lw
+
+EACH = pytest.mark.parametrize(
+    ("verb", "names", "known", "one", "of_it"),
+    [
+        ("drives", lw.drives(), "viscous 1.403 N m s/rad",
+         lw.load_drive("pulse115-60"), "those of the output shaft"),
+        ("materials", lw.materials(), "p v up to 1.8 N/mm^2 m/s",
+         lw.load_material("steel-on-steel-dry-severe"), "1.98e-12"),
+    ],
+    ids=["drives", "materials"],
+)  # fmt: skip
+
+
+@EACH
+def test_the_list_has_every_name(run, verb, names, known, one, of_it):
+    result = run(verb)
+    assert result.exit_code == 0
+    assert [line for line in result.stdout.splitlines() if not line.startswith(" ")] == list(names)
+    assert known in result.stdout
+    assert [each["name"] for each in json.loads(run(verb, "--json", "-").stdout)[verb]] == list(names)
+
+
+@EACH
+def test_one_in_full_has_every_source(run, verb, names, known, one, of_it):
+    text = run(verb, one.name).stdout
+    assert of_it in text
+    for key, value in one.values():
+        assert f"{key}: {value.central:g}" in text
+        assert value.source in text
+
+
+def test_json_has_the_numbers_of_the_files(run):
+    (drive,) = json.loads(run("drives", "pulse115-60", "--json", "-").stdout)["drives"]
+    assert drive["bandwidth"]["value"] == drive["bandwidth"]["si"] == 66.3
+    (pair,) = json.loads(run("materials", "du-on-steel-dry", "--json", "-").stdout)["materials"]
+    assert (pair["limits"]["pressure_speed"]["value"], pair["limits"]["pressure_speed"]["si"]) == (1.8, 1.8e6)
+    assert pair["friction"]["range"] == [0.02, 0.25]
+
+
+@pytest.mark.parametrize(
+    ("verb", "name", "near"),
+    [
+        ("drives", "erob8050", "erob80-50"),
+        ("materials", "steel-on-stel-dry-mild", "steel-on-steel-dry-mild"),
+    ],
+)
+def test_an_unknown_name_is_one_line(refused, verb, name, near):
+    assert f"did you mean {near}?" in refused(verb, name)
+
+
+def test_check_prints_what_is_declared_of_the_drive(run, tmp_path: Path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    drive = "{type: erob80-50, gear_ratio: 2.0, lag_s: 0.004, stiffness_nm_per_rad: 800.0}"
+    Path("monitor.yaml").write_text(f"/**: {{ros__parameters: {{drive: {drive}}}}}", encoding="utf-8")
+    result = run("check", "monitor.yaml")
+    assert result.exit_code == 0
+    line = next(line for line in result.stdout.splitlines() if "at the crank" in line)
+    assert line.strip() == (
+        "drive erob80-50, at the crank: lag 0.004 s, load friction 0.036, "
+        "Coulomb friction 6.52 N m, viscous friction 5.612 N m s/rad, stiffness 800 N m/rad; "
+        "the rest is estimated"
+    )
+
+
+def test_check_names_the_nearest_drive(refused, tmp_path: Path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("monitor.yaml").write_text("/**: {ros__parameters: {drive: {type: ak80}}}", encoding="utf-8")
+    line = refused("check", "monitor.yaml")
+    assert "monitor.yaml: drive.type: 'ak80': no drive of this name" in line
+    assert "did you mean ak80-9?" in line

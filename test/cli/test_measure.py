@@ -1,0 +1,291 @@
+"""`measure`: a clearance into the ledger, and the reply."""
+
+import json
+
+import pytest
+from ledger_contents import rows_of
+
+from leg_wear_monitor.monitor.alarms import Alarm
+from leg_wear_monitor.monitor.config.parameters import load_config
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.state import Level
+
+
+@pytest.fixture
+def ledger(worn_ledger):
+    return worn_ledger()
+
+
+def rows(path):
+    return rows_of(path, "SELECT joint, clearance_m, wear_m, cycles, counts FROM measurement")
+
+
+def test_a_measurement_is_kept_and_explained(run, ledger):
+    result = run("measure", "A", "0.42", "--sigma", "0.005", "--ledger", str(ledger))
+    assert (result.exit_code, result.stderr) == (0, "")
+    first, second, third, fourth = result.stdout.splitlines()
+    assert first == "A: 0.42 mm ± 0.005 mm, 4000 gait cycles after the part was new"
+    assert second == "0.36 mm is counted (limit 0.6 mm); that stays as it is"
+    assert third.startswith("the wear coefficient is 1.9")
+    assert fourth.startswith("1 of 1 measured clearances were between expected p10 and p90")
+    assert rows(ledger) == [("A", pytest.approx(4.2e-4), pytest.approx(6e-5), 4000, 1)]
+
+
+def test_another_wear_coefficient_than_that_of_the_counted_wear_is_reported(run, ledger, tmp_path):
+    config = tmp_path / "monitor.yaml"
+    config.write_text("/**:\n  ros__parameters:\n    wear_coefficients_per_pa: [2.0e-15]\n")
+    given = ("measure", "A", "0.42", "--sigma", "0.005", "--ledger", str(ledger))
+    assert run(*given).stderr == ""
+    (line,) = run(*given, "--config", str(config)).stderr.splitlines()
+    assert line.startswith(
+        f"warning: {config}: wear coefficient of joint A: 4e-15 1/Pa (bushing and journal together), and the "
+        "wear in the ledger was counted with 2e-15 1/Pa; that wear stays as counted"
+    )
+
+
+def test_a_contradiction_ends_with_findings_and_leaves_wear_as_it_is(run, ledger):
+    result = run("measure", "G", "3.0", "--sigma", "0.005", "--ledger", str(ledger))
+    assert result.exit_code == 1
+    assert "contradicts the model" in result.stdout
+    assert "the measured clearance is at its limit: stop the leg when it is safe" in result.stdout
+    assert [row[-1] for row in rows(ledger)] == [0]
+    assert run("measure", "G", "3.0", "--sigma", "0.005", "--ledger", str(ledger), "--accept").exit_code == 1
+    assert [row[-1] for row in rows(ledger)] == [0, 1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "fault"),
+    [
+        (("Z", "0.4", "--sigma", "0.01"), "'Z' is not a clearance joint, expected one of A, B, G, I, J"),
+        (("A", "-1", "--sigma", "0.01"), "No such option"),
+        (("A", "0.4", "--sigma", "0"), "0 is not above 0 mm"),
+        (("A", "0,4", "--sigma", "0.01"), "'0,4' is not a number of mm, expected a decimal point"),
+        (("A", "0.4", "--sigma", "0,01"), "'--sigma': '0,01' is not a number of mm"),
+        (("A", "0.4", "--sigma", "0,01"), "a decimal point; did you mean 0.01?"),
+        (("a", "0.4", "--sigma", "0.01"), "expected one of A, B, G, I, J; did you mean A?"),
+        (("A", "0.00042", "--sigma", "0.005"), "mm is not between 0.003 mm, 1 % of the new clearance"),
+        (("A", "0.00042", "--sigma", "0.005"), "did you mean 0.42 mm?"),
+        (("A", "420", "--sigma", "0.005"), "and 10 mm, the radius of its bushing; did you mean 0.42 mm?"),
+        (("A", "0.0025", "--sigma", "0.005"), "did you mean 2.5 mm?"),
+        (("A", "10.1", "--sigma", "0.01"), "10.1 mm is not between"),
+        (("A", "0.42", "--sigma", "5e-6"), "5e-06 mm is not a standard deviation from 0.0001 mm to 0.42 mm"),
+        (("A", "0.42", "--sigma", "10"), "the measured clearance; did you mean 0.01 mm?"),
+        (("A", "0.42", "--sigma", "1e-5"), "the measured clearance; did you mean 0.01 mm?"),
+        (("A", "0.42", "--sigma", "50"), "50 mm is not a standard deviation"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(refused, ledger, arguments, fault):
+    assert fault in refused("measure", *arguments, "--ledger", str(ledger))
+    assert rows(ledger) == []
+
+
+def test_what_is_near_the_limit_or_at_it_is_said_and_at_it_the_caller_has_to_act(run, ledger, tmp_path):
+    (tmp_path / "mine.yaml").write_text("/**: {ros__parameters: {limits.clearance_m: 0.00045}}")
+    arguments = ("--sigma", "0.005", "--ledger", str(ledger), "--config", "mine.yaml")
+    near = run("measure", "A", "0.42", *arguments)
+    assert near.exit_code == 0
+    assert "above 80 % of its limit: the alarm clearance A is raised" in near.stdout
+    at = run("measure", "B", "0.451", *arguments)
+    assert "contradicts" not in at.stdout
+    assert (at.exit_code, "at its limit" in at.stdout) == (1, True)
+
+
+def alarms(path):
+    now = rows_of(path, "SELECT subject, level, acknowledged, worst, cause FROM alarm")
+    return now, rows_of(path, "SELECT subject, level FROM alarm_history")
+
+
+def verdict(path):
+    ((*row, evidence),) = rows_of(
+        path, "SELECT state, fault_code, evidence FROM verdict ORDER BY id DESC LIMIT 1"
+    )
+    return *row, json.loads(evidence)
+
+
+@pytest.mark.parametrize(
+    ("mm", "level", "state", "code"),
+    [("0.7", 2, "stop", "CLEARANCE_G"), ("0.5", 1, "watch", "CLEARANCE_NEAR_G")],
+)
+def test_a_measurement_at_the_limit_or_near_it_raises_alarm_and_verdict(run, ledger, mm, level, state, code):
+    run("measure", "G", mm, "--sigma", "0.02", "--ledger", str(ledger))
+    value = pytest.approx(1e-3 * float(mm))
+    assert alarms(ledger) == ([("G", level, 0, value, "measured")], [("G", level)])
+    now = verdict(ledger)
+    assert (now[0], code in {now[1], "CLEARANCE_NEAR_G"}) == (state, True)
+    # the alarm has the unit of the measurement beside it
+    own = {each["name"]: (each["value"], each["unit"]) for each in now[2]}
+    assert own["clearance G"] == own["measured clearance G"] == (value, "m")
+
+
+def test_a_harmless_measurement_leaves_alarms_and_verdict_as_they_are(run, ledger):
+    before = verdict(ledger)
+    run("measure", "G", "0.4", "--sigma", "0.02", "--ledger", str(ledger))
+    assert (alarms(ledger), verdict(ledger)) == (([], []), before)
+
+
+@pytest.mark.parametrize("present", [Level.OK, Level.ERROR])
+def test_a_withdrawn_measurement_does_not_end_a_stop(run, worn_ledger, present):
+    stop = {"level": Level.ERROR, "worst": 1.7e-3, "limit": 6e-4, "raised_ns": 5, "cause": "torque"}
+    path = worn_ledger(alarms=(Alarm(kind="clearance", subject="G", present=present, sigma=4e-4, **stop),))
+    before = verdict(path)[:2]
+    assert before == ("stop", "CLEARANCE_SEEN_G")
+    for mm in ("0.36", "0.37"):
+        run("measure", "knee", mm, "--sigma", "0.01", "--ledger", str(path))
+        assert verdict(path)[0] != "stop"
+    run("measure", "--withdraw", "1", "--ledger", str(path))
+    assert verdict(path)[0] != "stop"  # the other one says so, too
+    run("measure", "--withdraw", "2", "--ledger", str(path))
+    assert verdict(path)[:2] == before
+    assert alarms(path)[0] == [("G", 2, 0, 1.7e-3, "torque")]
+
+
+def test_a_stop_by_a_limit_of_the_leg_is_not_judged_by_another_one(run, refused, worn_ledger, tmp_path):
+    (tmp_path / "mine.yaml").write_text("/**: {ros__parameters: {limits.clearance_m: 0.00045}}")
+    stop = {"level": Level.ERROR, "worst": 5.2e-4, "limit": 4.5e-4, "raised_ns": 5, "cause": "torque"}
+    path = worn_ledger(
+        alarms=(Alarm(kind="clearance", subject="G", present=Level.ERROR, sigma=1e-5, **stop),)
+    )
+    arguments = ("measure", "G", "0.5", "--sigma", "0.01", "--ledger", str(path))
+    fault = "the limit of joint G is 0.45 mm in the ledger and 0.6 mm without parameters"
+    assert fault in refused(*arguments)
+    assert (rows(path), verdict(path)[0]) == ([], "stop")
+    assert "at its limit" in run(*arguments, "--config", "mine.yaml").stdout
+    assert verdict(path)[0] == "stop"
+    assert fault in refused("measure", "--withdraw", "last", "--ledger", str(path))
+    assert run("measure", "--withdraw", "last", "--ledger", str(path), "--config", "mine.yaml").exit_code == 0
+    for verb in (("acknowledge",), ("reset", "A"), ("reset", "A", "--undo")):
+        assert fault in refused(*verb, "--ledger", str(path))
+    assert verdict(path)[0] == "stop"
+
+
+def test_an_alarm_by_a_measurement_that_was_wrong_clears_once_it_is_withdrawn_and_acknowledged(run, ledger):
+    kept = ("--ledger", str(ledger))
+    run("measure", "G", "0.7", "--sigma", "0.02", *kept)
+    run("measure", "G", "--withdraw", "last", *kept)
+    assert verdict(ledger)[0] == "stop"  # until somebody has seen to it
+    assert run("acknowledge", *kept).stdout == "cleared: clearance G; still present: none\n"
+    assert verdict(ledger)[0] != "stop"
+
+
+def test_a_dry_run_says_the_same_and_leaves_the_ledger_as_it_is(run, ledger):
+    before = {path.name: path.read_bytes() for path in ledger.parent.iterdir()}
+    arguments = ("measure", "A", "0.42", "--sigma", "0.005", "--ledger", str(ledger))
+    dry = run(*arguments, "--dry-run")
+    assert {path.name: path.read_bytes() for path in ledger.parent.iterdir()} == before
+    assert (dry.exit_code, dry.stderr) == (0, "")
+    assert dry.stdout.splitlines()[-1] == "dry run: nothing was written"
+    assert dry.stdout.splitlines()[:-1] == run(*arguments).stdout.splitlines()
+
+
+def test_a_dry_run_creates_no_ledger_and_names_the_one_that_is_damaged_and_not_its_copy(
+    run, refused, tmp_path
+):
+    (tmp_path / "mine.yaml").write_text("/**: {ros__parameters: {ledger.path: new.ledger}}")
+    arguments = ("measure", "A", "0.3", "--sigma", "0.005", "--dry-run")
+    assert run(*arguments, "--config", "mine.yaml").exit_code == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.yaml"]
+    (tmp_path / "new.ledger").write_bytes(b"no ledger" * 100)
+    assert refused(*arguments, "--config", "mine.yaml").startswith("error: new.ledger: ")
+    assert {path.name for path in tmp_path.iterdir()} == {"mine.yaml", "new.ledger"}
+
+
+def test_a_withdrawn_measurement_is_kept_and_teaches_nothing(run, ledger):
+    kept = ("--ledger", str(ledger))
+    first = run("measure", "A", "0.42", "--sigma", "0.005", *kept)
+    run("measure", "B", "0.31", "--sigma", "0.005", *kept)
+    assert "withdrawn" in run("measure", "--withdraw", "1", "--dry-run", *kept).stdout
+    assert "withdrawn" not in run("measure", "--list", *kept).stdout
+    shown = run("measure", "A", "--withdraw", "last", *kept)
+    assert (shown.exit_code, shown.stderr) == (0, "")
+    assert shown.stdout.startswith("1: A 0.42 mm ± 0.005 mm, 20")
+    assert ", withdrawn 20" in shown.stdout
+    assert len(rows(ledger)) == 2
+    listed = run("measure", "--list", *kept).stdout.splitlines()
+    assert [line.split(":")[0] for line in listed] == ["1", "2"]
+    assert "withdrawn" in listed[0]
+    assert listed[1].endswith(", counts")
+    # the next one is judged as the first was
+    again = run("measure", "A", "0.42", "--sigma", "0.005", *kept)
+    assert again.stdout.splitlines()[:3] == first.stdout.splitlines()[:3]
+    assert again.stdout.splitlines()[3].startswith("1 of 2 measured clearances")
+    assert run("measure", "--withdraw", "3", *kept).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "fault"),
+    [
+        (("--withdraw", "last"), "no measurement can be withdrawn"),
+        (("A", "--withdraw", "last"), "no measurement of joint A can be withdrawn"),
+        (("--withdraw", "7"), "'7' is not last, nor a measurement (none)"),
+        (("--withdraw", "first"), "'first' is not last, nor a measurement (none)"),
+        (("--withdraw", "1", "--list"), "cannot be combined"),
+        (("A", "0.4", "--withdraw", "1"), "cannot be combined"),
+        (("A", "--withdraw", "1", "--accept"), "nor used with MM, --sigma or --accept"),
+        (("--list", "--accept"), "nor used with MM, --sigma or --accept"),
+        (("knee", "--withdraw", "last"), "no measurement of joint G can be withdrawn"),
+        (("neck", "--list"), "'neck' is not a clearance joint"),
+        (("A", "0.4"), "expected JOINT MM --sigma MM, or --list, or --withdraw"),
+        ((), "expected JOINT MM --sigma MM, or --list, or --withdraw"),
+        (("A", "0.4", "--sigma", "0.01", "--node", "/leg_wear_monitor"), "--node cannot be combined with"),
+    ],
+)
+def test_what_cannot_be_withdrawn_is_one_line(refused, ledger, arguments, fault):
+    assert fault in refused("measure", *arguments, "--ledger", str(ledger))
+
+
+def test_a_label_names_a_joint_in_all_that_is_done_with_its_measurements(run, ledger):
+    kept = ("--ledger", str(ledger))
+    run("measure", "knee", "0.37", "--sigma", "0.01", *kept)
+    assert run("measure", "A", "--list", *kept).stdout == "no clearance was measured yet\n"
+    assert run("measure", "knee", "--list", *kept).stdout.startswith("1: G 0.37 mm")
+    assert run("measure", "knee", "--withdraw", "last", *kept).stdout.startswith("1: G 0.37 mm")
+
+
+def test_a_ledger_has_to_be_named(refused):
+    assert "no ledger given" in refused("measure", "A", "0.4", "--sigma", "0.01")
+
+
+def test_of_a_file_for_two_legs_a_section_is_chosen_by_its_node(run, refused, worn_ledger, tmp_path):
+    ledgers = {"left": tmp_path / "left.ledger", "right": worn_ledger(MonitorConfig(hardware_id="right"))}
+    sections = [
+        f"/{side}/leg_wear_monitor: {{ros__parameters: {{ledger.path: {path}}}}}\n"
+        for side, path in ledgers.items()
+    ]
+    (tmp_path / "two.yaml").write_text("".join(sections), encoding="utf-8")
+    verbs = ("measure", "A", "0.42", "--sigma", "0.005"), ("acknowledge",), ("reset", "A")
+    for verb in verbs:
+        told = refused(*verb, "--config", "two.yaml")
+        assert "for: /left/leg_wear_monitor, /right/leg_wear_monitor; choose one with --node" in told
+    chosen = ("--config", "two.yaml", "--node", "/right/leg_wear_monitor")
+    assert [run(*verb, *chosen).exit_code for verb in verbs] == [0, 0, 0]
+    assert [row[0] for row in rows(ledgers["right"])] == ["A"]
+    assert run("measure", "--list", *chosen).stdout.startswith("1: A 0.42 mm")
+    assert run("measure", "--withdraw", "last", *chosen).exit_code == 0
+    assert not ledgers["left"].exists()
+
+
+def test_a_leg_that_carries_a_person_is_the_one_of_its_ledger(run, worn_ledger, tmp_path):
+    config = tmp_path / "carries.yaml"
+    config.write_text("/**: {ros__parameters: {load.person_kg: 80.0}}\n", encoding="utf-8")
+    ledger = worn_ledger(load_config(config))
+    result = run("measure", "A", "0.42", "--sigma", "0.005", "--ledger", str(ledger), "--config", str(config))
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert rows(ledger)[0][0] == "A"
+
+
+def test_what_does_not_count_does_not_end_a_stop_by_a_measurement_that_counts(run, ledger):
+    kept = ("--sigma", "0.006", "--ledger", str(ledger))
+    run("measure", "A", "0.63", *kept, "--accept")
+    second = run("measure", "A", "0.31", *kept)
+    assert "does not count" in second.stdout and "raised" not in second.stdout
+    ((joint, level, is_acknowledged, *_),) = alarms(ledger)[0]
+    assert (joint, level, is_acknowledged) == ("A", 2, 0)
+    assert verdict(ledger)[:2] == ("stop", "CLEARANCE_A")
+
+
+def test_a_measurement_that_ends_the_stop_of_an_earlier_one_says_so(run, ledger):
+    kept = ("--sigma", "0.006", "--ledger", str(ledger))
+    run("measure", "A", "3.0", *kept)
+    second = run("measure", "A", "0.36", *kept)
+    assert "the alarm clearance A that an earlier measurement raised ends" in second.stdout
+    assert alarms(ledger)[0] == []

@@ -1,0 +1,605 @@
+"""The verdict as a pure function: a list of cases, and laws over all alarms."""
+
+import math
+import re
+from typing import Any
+
+import attrs
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from leg_wear_monitor.dashboard.source import evidence_words
+from leg_wear_monitor.estimate.cause import Cause, Change, NamedCause, TorqueExplanation
+from leg_wear_monitor.monitor import alarm_specs
+from leg_wear_monitor.monitor.alarms import (
+    ADVICE,
+    EXCHANGED,
+    SCALE,
+    SIGN,
+    STUCK,
+    ZERO,
+    Alarm,
+    guide_of,
+    joint_of,
+)
+from leg_wear_monitor.monitor.config.inputs import Crank, DriveTorque
+from leg_wear_monitor.monitor.config.parameters import config_from
+from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
+from leg_wear_monitor.monitor.evaluation import AlarmBoard
+from leg_wear_monitor.monitor.verdict.rules import RULES, findings
+from leg_wear_monitor.monitor.verdict.situation import (
+    OF_THE_GAIT,
+    OF_THE_MODEL,
+    JointSituation,
+    KnownClearance,
+    Situation,
+)
+from leg_wear_monitor.monitor.verdict.verdict import (
+    CauseWords,
+    Finding,
+    dated,
+    guide_to,
+    has_changed,
+    verdict_of,
+)
+from leg_wear_monitor.state import Figure, Level, State, Verdict
+
+JOINTS = ("A", "G")
+NEW = tuple(JointSituation(joint=joint, counted_m=3.0e-4, limit_m=6.0e-4) for joint in JOINTS)
+HEALTHY = Situation(joints=NEW, quantities=alarm_specs.QUANTITIES, mismatch=0.031, mismatch_limit=0.1)
+BOARD = AlarmBoard(
+    config_from({"encoders.names": ["knee"], "encoders.joints": ["G"], "foot_load.source": "wrench"}),
+    JOINTS,
+)
+
+
+def judged(**changed: Any) -> Verdict:
+    return verdict_of(findings(attrs.evolve(HEALTHY, **changed)))
+
+
+def alarm(name: str, level: Level = Level.ERROR, present: Level | None = None, **values: float) -> Alarm:
+    one = BOARD.alarms[name]
+    values = {"value": 2.0, "limit": 1.0, "worst": 2.0, "raised_ns": 77} | values
+    return attrs.evolve(one, level=level, present=level if present is None else present, **values)
+
+
+def change(cause: Cause, subject: str = "", **values: Any) -> Change:
+    values = {"value": 6.2e-4, "sigma": 3.0e-5, "counted": 3.0e-4, "since_ns": 55, "log_odds": 30.0} | values
+    return Change(cause=cause, subject=subject, **values)
+
+
+def diagnosis(*changes: Change) -> Diagnosis:
+    return Diagnosis(state=DiagnosisState.CHANGED, changes=changes)
+
+
+def raised(name: str, level: Level = Level.ERROR, present: Level | None = None) -> dict[str, Any]:
+    """What is changed of a healthy leg by an alarm."""
+    return {"alarms": (alarm(name, level, present),)}
+
+
+def shown(cause: Cause, subject: str = "") -> dict[str, Any]:
+    """What is changed of a healthy leg by a cause that the diagnosis finds."""
+    return {"diagnosis": diagnosis(change(cause, subject))}
+
+
+def explained(*causes: Cause, **values: Any) -> TorqueExplanation:
+    """One explanation, with made-up values."""
+    named = tuple(NamedCause(cause, -0.5, 0.01, "foot" if cause.name == "MASS" else "") for cause in causes)
+    given = {"before": 2.0, "after": 0.03, "after_sigma": 0.01, "limit": 0.08, "speed_radps": 6.3} | values
+    return TorqueExplanation(alternatives=(named,), **given)
+
+
+def seen_as_new(by: str) -> tuple[JointSituation, ...]:
+    return tuple(attrs.evolve(each, seen=(KnownClearance(by, 3.0e-4, 1.0e-5),)) for each in NEW)
+
+
+def seen(by: str, clearance_m: float, sigma_m: float, **more: Any) -> tuple[JointSituation, ...]:
+    return (NEW[0], attrs.evolve(NEW[1], seen=(KnownClearance(by, clearance_m, sigma_m),), **more))
+
+
+def at_limit(**more: Any) -> tuple[JointSituation, ...]:
+    return (NEW[0], attrs.evolve(NEW[1], counted_m=6.1e-4, **more))
+
+
+ALL, OF_THE_WALK = tuple(Figure), (Figure.GROWTH, Figure.IMPACT_FORCES)
+CASES = [
+    ({}, State.HEALTHY, "NONE", ()),
+    (raised("clearance G") | {"joints": at_limit()}, State.STOP, "CLEARANCE_G", ()),
+    *(  # what stops the leg is not in the forecast
+        (raised("clearance G") | {"joints": joints}, State.STOP, "CLEARANCE_G", (Figure.FORECAST,))
+        for joints in (NEW, at_limit(is_measurement_used=True, believed_m=5.0e-4))
+    ),
+    (raised("clearance G", Level.WARN), State.WATCH, "CLEARANCE_NEAR_G", ()),
+    (raised("growth G", Level.WARN), State.WATCH, "ALARM_G", ()),
+    (
+        {"alarms": (alarm("clearance A"), alarm("clearance G"))},
+        State.STOP,
+        "CLEARANCE_A_G",
+        (Figure.FORECAST,),
+    ),
+    ({"joints": seen("torque", 6.7e-4, 3.0e-5)}, State.STOP, "CLEARANCE_SEEN_G", ALL),
+    ({"joints": (attrs.evolve(NEW[0], replaced_ns=1, part_cycles=19),)}, State.WATCH, "PART_REPLACED_A", ()),
+    ({"joints": (attrs.evolve(NEW[0], replaced_ns=1, part_cycles=20),)}, State.HEALTHY, "NONE", ()),
+    ({"joints": seen("encoders", 6.2e-4, 3.0e-5)}, State.HEALTHY, "NONE", ()),  # not surely
+    ({"joints": (NEW[0], attrs.evolve(NEW[1], believed_m=6.1e-4))}, State.STOP, "CLEARANCE_BELIEVED_G", ()),
+    (shown(Cause.CLEARANCE, "G"), State.INSPECT, "CLEARANCE_CHANGED_G", ALL),
+    (
+        {"diagnosis": Diagnosis(changes=(change(Cause.CLEARANCE, "G", is_corrected=True),))},
+        State.INSPECT,
+        "CLEARANCE_CORRECTED_G",
+        (),
+    ),
+    (shown(Cause.UNKNOWN), State.INSPECT, "MECHANISM_CHANGED", ALL),
+    (shown(Cause.LENGTH, "foot"), State.INSPECT, "MECHANISM_CHANGED", ALL),
+    (shown(Cause.MASS, "foot"), State.INSPECT, "TORQUE_MASS", ALL),
+    (shown(Cause.SCALE), State.INSPECT, "TORQUE_SCALE", ()),
+    (shown(Cause.LAG), State.INSPECT, "TORQUE_TIMING", ()),
+    (shown(Cause.TIMING), State.INSPECT, "TORQUE_TIMING", ()),
+    (shown(Cause.NOISE), State.WATCH, "TORQUE_NOISE", ()),
+    (shown(Cause.LOAD), State.WATCH, "TORQUE_LOAD", (Figure.GROWTH, Figure.IMPACT_FORCES, Figure.FORECAST)),
+    (shown(Cause.FRICTION), State.WATCH, "FRICTION_CHANGED", ()),
+    (shown(Cause.JOINT_FRICTION), State.WATCH, "FRICTION_CHANGED", ()),
+    ({"diagnosis": Diagnosis(state=DiagnosisState.AS_COUNTED)}, State.WATCH, "NOT_OBSERVED", ()),
+    (raised("clearance_departure G", Level.WARN), State.WATCH, "ALARM_G", ()),
+    (raised("clearance_departure G"), State.INSPECT, "CLEARANCE_DEPARTURE_G", ALL),
+    (
+        {"alarms": (alarm("clearance_departure G"),), "joints": seen("encoders", 4.5e-4, 1e-5, is_used=True)},
+        State.INSPECT,
+        "CLEARANCE_DEPARTURE_G",
+        (Figure.CLEARANCES, Figure.GROWTH, Figure.IMPACT_FORCES),
+    ),
+    (raised("torque_mismatch", Level.WARN), State.WATCH, "ALARM", ()),  # healthy legs have it
+    (raised("torque_mismatch"), State.INSPECT, "TORQUE_MISMATCH", ALL),
+    (raised("torque_mismatch", present=Level.OK), State.INSPECT, "TORQUE_MISMATCH", ALL),
+    *(
+        (raised("torque_mismatch") | {"explained": explained(cause)}, State.INSPECT, cause.fault_code, ALL)
+        for cause in (Cause.SIGN, Cause.SCALE, Cause.TIMING, Cause.LOAD, Cause.MASS)
+    ),
+    (
+        raised("torque_mismatch") | {"explained": explained(Cause.LOAD, after=0.9)},
+        State.INSPECT,
+        "TORQUE_MISMATCH",
+        ALL,
+    ),
+    (raised("torque_bias"), State.INSPECT, "TORQUE_BIAS", ()),
+    (raised("torque_drift"), State.INSPECT, "FRICTION_CHANGED", ()),
+    (raised("torque_lag"), State.INSPECT, "TORQUE_TIMING", ()),
+    (raised("torque_lag", present=Level.OK), State.INSPECT, "TORQUE_TIMING", ()),  # latched
+    (raised("torque_lag", Level.WARN), State.WATCH, "ALARM", ()),
+    (raised("impact_force A"), State.INSPECT, "IMPACT_FORCE_A", ()),
+    (raised("growth A"), State.INSPECT, "GROWTH_A", ()),
+    (raised("remaining_life A"), State.INSPECT, "REMAINING_LIFE_A", ()),
+    (
+        {"is_all_counted": True, "has_cycle": False, "unfollowed": "not followed for 8 s"},
+        State.NOT_MONITORED,
+        "ALREADY_COUNTED",
+        OF_THE_WALK,
+    ),
+    *(
+        (raised(kind), State.INSPECT, kind.upper(), OF_THE_MODEL)
+        for kind in (STUCK, ZERO, SCALE, EXCHANGED, SIGN)
+    ),
+    (raised("input_rate foot_load"), State.WATCH, "FOOT_LOAD_MISSING", OF_THE_GAIT),
+    (raised("input_gaps foot_load"), State.WATCH, "FOOT_LOAD_MISSING", OF_THE_GAIT),
+    (raised("material_limit A"), State.WATCH, "MATERIAL_LIMIT_A", (Figure.GROWTH, Figure.FORECAST)),
+    (raised("material_limit A", Level.WARN), State.WATCH, "ALARM_A", ()),
+    ({"unfollowed": "two series of crank angles"}, State.NOT_MONITORED, "NOT_FOLLOWED", OF_THE_WALK),
+    (raised("input_samples"), State.NOT_MONITORED, "BAD_INPUT", OF_THE_WALK),
+    (raised("input_samples", present=Level.OK), State.WATCH, "ALARM", ()),
+    (raised("input_rate torque"), State.WATCH, "ALARM", ()),
+    (
+        {"without_zero": "the crank's zero is being found: 2 of 3 turns"},
+        State.NOT_MONITORED,
+        "CRANK_ZERO",
+        OF_THE_WALK,
+    ),
+    ({"doubts": ("the crank turns at 240 rpm",)}, State.NOT_MONITORED, "NOT_THIS_LEG", ALL),
+    ({"has_cycle": False, "has_torque": False}, State.NOT_MONITORED, "NO_GAIT_CYCLE", ()),
+    ({"has_torque": False}, State.WATCH, "NO_DRIVE_TORQUE", ()),
+    (raised("input_torque"), State.WATCH, "NO_DRIVE_TORQUE", ()),
+    ({"mismatch": math.nan}, State.WATCH, "TORQUE_NOT_COMPARED", ()),
+    # beyond its limit, and not yet for long enough
+    (
+        {"alarms": (alarm("torque_mismatch", Level.OK, beyond=(2, 1)),)},
+        State.WATCH,
+        "TORQUE_NOT_COMPARED",
+        (),
+    ),
+    ({"alarms": (alarm("torque_mismatch", Level.OK, beyond=(2, 0)),)}, State.HEALTHY, "NONE", ()),
+    (
+        {"diagnosis": Diagnosis(state=DiagnosisState.WAITING, reason="gait cycles: 2 of 5")},
+        State.WATCH,
+        "NOT_OBSERVED",
+        (),
+    ),
+    ({"diagnosis": Diagnosis(reason="diagnosis.enabled is false")}, State.HEALTHY, "NONE", ()),
+    (
+        {
+            "diagnosis": Diagnosis(state=DiagnosisState.AS_COUNTED, clearance_m=(3e-4, math.nan)),
+            "joints": (seen_as_new("torque")[0], NEW[1]),
+        },
+        State.WATCH,
+        "NOT_OBSERVED",
+        (),
+    ),
+    (
+        {
+            "diagnosis": Diagnosis(state=DiagnosisState.AS_COUNTED, clearance_m=(3e-4, 3e-4)),
+            "joints": seen_as_new("torque"),
+        },
+        State.HEALTHY,
+        "NONE",
+        (),
+    ),
+    ({"is_out_of_step": True, "cadence_rpm": 70.0}, State.WATCH, "CADENCE", (Figure.FORECAST,)),
+    (raised("cadence"), State.WATCH, "CADENCE", (Figure.FORECAST,)),
+    ({"encoder_faults": ("knee gives no angle",)}, State.WATCH, "ENCODER", ()),
+]
+
+
+@pytest.mark.parametrize(
+    ("changed", "state", "code", "not_valid"), CASES, ids=[f"{i}-{c[2]}" for i, c in enumerate(CASES)]
+)
+def test_each_case_has_its_verdict(changed, state, code, not_valid) -> None:
+    verdict = judged(**changed)
+    assert (verdict.state, verdict.fault_code, verdict.not_valid) == (state, code, not_valid)
+    assert verdict.why and verdict.do and "{" not in verdict.words
+    assert verdict.joints == tuple(part for part in code.split("_") if part in JOINTS)
+    assert guide_to(verdict) == guide_of(re.sub("(_[AG])+$", "", code))
+
+
+def test_every_rule_is_the_verdict_of_some_case() -> None:
+    reached = {re.sub("(_[AG])+$", "", code) for _, _, code, _ in CASES}
+    assert {rule.code for rule in RULES} == reached
+
+
+@pytest.mark.parametrize("next_step", ["", "clearances are compared in 3 gait cycles (3 s)"])
+def test_a_leg_is_to_walk_on_only_where_that_shows_more(next_step: str) -> None:
+    """J on the ground does not show, however long the leg walks."""
+    shown = Diagnosis(state=DiagnosisState.AS_COUNTED, clearance_m=(3e-4, math.nan), next_step=next_step)
+    verdict = judged(diagnosis=shown, joints=(seen_as_new("torque")[0], NEW[1]))
+    walk_on = f"let the leg walk on at a steady cadence: {next_step}; until then, " if next_step else ""
+    assert verdict.why.endswith(f"of joints G{' yet' if next_step else ''}")
+    assert verdict.do == f"{walk_on}rock these joints by hand regularly"
+
+
+def test_a_mismatch_without_a_diagnosis_is_reported_as_what_it_is() -> None:
+    verdict = judged(
+        alarms=(alarm("torque_mismatch", value=0.35, limit=0.1),),
+        torque_causes={"torque_bias": NamedCause(Cause.BIAS, -3.0, 0.1)},
+    )
+    assert "the drive torque does not fit the counted leg, so the forecast is not valid" in verdict.why
+    assert "0.35 of the predicted RMS is not explained (limit 0.1)" in verdict.why
+    assert verdict.why.endswith(
+        "possible cause: a constant torque of 3 N m ± 0.1 N m drives the crank; friction cannot drive"
+    )
+    assert "rock each joint" in verdict.do and "leg-wear-monitor measure JOINT MM" in verdict.do
+    (evidence,) = (each for each in verdict.evidence if each.name == "torque_mismatch")
+    assert (evidence.value, evidence.limit, verdict.since_ns) == (0.35, 0.1, 77)
+
+
+def test_a_mismatch_that_is_explained_says_by_what_and_by_how_much() -> None:
+    found = explained(Cause.SIGN, Cause.TIMING)
+    verdict = judged(alarms=(alarm("torque_mismatch"),), explained=found)
+    assert (verdict.fault_code, verdict.since_ns) == ("TORQUE_SIGN", 77)
+    assert "it is -0.5 ± 0.01 times the predicted one and the crank is 500 mrad ± 10 mrad" in verdict.why
+    assert verdict.do.startswith("set drive_torque.sign to -1 and turn the crank to a known angle")
+    assert verdict.evidence[0].name == "torque_factor" and verdict.evidence[1].unit == "rad"
+    partly = judged(alarms=(alarm("torque_mismatch"),), explained=attrs.evolve(found, after=0.2))
+    assert partly.fault_code == "TORQUE_SIGN" and "0.2 ± 0.01 of the predicted RMS stays" in partly.why
+
+
+def test_a_cause_of_an_input_comes_before_what_the_torque_shows_of_the_leg() -> None:
+    both = raised("torque_mismatch") | shown(Cause.CLEARANCE, "G")
+    assert judged(**both, explained=explained(Cause.SCALE)).fault_code == "TORQUE_SCALE"
+    assert judged(**both, explained=explained(Cause.LOAD)).fault_code == "CLEARANCE_CHANGED_G"
+
+
+@pytest.mark.parametrize(
+    ("causes", "after", "values", "is_other"),
+    [
+        ((Cause.MASS,), 0.03, {}, True),
+        ((Cause.LOAD, Cause.MASS), 0.9, {}, True),  # not named: what is left may be friction
+        ((Cause.SIGN, Cause.MASS), 0.03, {}, False),  # as received, no gait cycle of it is used
+        ((Cause.MASS,), 0.03, {"runner_up": "G", "runner_up_log_odds": 9.0}, False),
+        ((Cause.MASS,), 0.03, {"is_corrected": True}, False),
+        ((Cause.MASS,), 0.03, {"cause": Cause.MASS}, False),
+        ((Cause.MASS,), 0.03, {"cause": Cause.UNKNOWN}, False),
+    ],
+)
+def test_one_story_of_a_torque_that_is_not_as_predicted(
+    causes: tuple[Cause, ...], after: float, values: dict[str, Any], is_other: bool
+) -> None:
+    """Seen before: a dead zone of the torque sensor was friction by the diagnosis, and a mass beside it."""
+    found = diagnosis(change(**{"cause": Cause.FRICTION} | values))
+    assert found.contradicts(explained(*causes, after=after)) is is_other
+    past = attrs.evolve(found, state=DiagnosisState.AS_COUNTED)
+    assert not past.contradicts(explained(*causes, after=after))
+
+
+def test_a_diagnosis_names_the_joint_that_a_mismatch_does_not() -> None:
+    found = change(Cause.CLEARANCE, "G", runner_up="B 0.5 mm", runner_up_log_odds=1.0)
+    verdict = judged(**raised("torque_mismatch"), diagnosis=diagnosis(found))
+    assert (verdict.fault_code, verdict.joints, verdict.since_ns) == ("CLEARANCE_CHANGED_G", ("G",), 55)
+    assert (
+        "shows a clearance of 0.62 mm ± 0.03 mm in joint G (0.3 mm is counted) (or B 0.5 mm)" in verdict.why
+    )
+    assert "rock joint G" in verdict.do and "leg-wear-monitor measure G MM --sigma MM" in verdict.do
+
+
+SAME = [
+    (Cause.SCALE, {"value": 1.2}, None),
+    (Cause.TIMING, {"value": -0.05}, "torque_lag"),
+    (Cause.LOAD, {"value": -40.0}, None),
+    (Cause.MASS, {"value": 0.5, "subject": "shank"}, None),
+    (Cause.FRICTION, {"value": 2.0}, "torque_drift"),
+]
+
+
+@pytest.mark.parametrize(("cause", "values", "kind"), SAME, ids=[each[0].name for each in SAME])
+def test_a_cause_has_one_code_and_one_sentence_whoever_finds_it(cause, values, kind) -> None:
+    one = NamedCause(cause, sigma=0.01, **values)
+    walking: dict[str, Any] = {"cadence_rpm": 60.0}
+    by_diagnosis = judged(diagnosis=diagnosis(change(cause, sigma=0.01, counted=0.0, **values)), **walking)
+    if kind is None:
+        found = attrs.evolve(explained(), alternatives=((one,),), speed_radps=2.0 * math.pi)
+        other = judged(alarms=(alarm("torque_mismatch"),), explained=found, **walking)
+    else:
+        other = judged(alarms=(alarm(kind),), torque_causes={kind: one}, **walking)
+    assert by_diagnosis.fault_code == other.fault_code == cause.fault_code
+    sentence = CauseWords(Crank(), DriveTorque(), 2.0 * math.pi).cause(one)
+    assert by_diagnosis.why.endswith(sentence) and other.why.endswith(sentence)
+    assert by_diagnosis.do == other.do
+    assert other.state is State.INSPECT  # its alarm is raised
+
+
+@pytest.mark.parametrize("cause", [*Cause][1:], ids=lambda one: one.name)
+def test_every_cause_of_the_diagnosis_has_a_rule_and_words(cause: Cause) -> None:
+    verdict = judged(diagnosis=diagnosis(change(cause, "foot", value=0.5, sigma=0.1)), cadence_rpm=60.0)
+    assert verdict.fault_code == cause.fault_code and verdict.evidence
+    assert ("no single cause" in verdict.why) == (cause is Cause.UNKNOWN)
+
+
+TOLD = [
+    (change(Cause.MASS, "shank", value=-0.2, sigma=0.03, counted=0.0), "body shank is 20 % ± 3 % lighter"),
+    (
+        change(Cause.LENGTH, "thigh", value=-0.012, sigma=0.002, counted=0.0),
+        "body thigh is 1.2 % ± 0.2 % shorter",
+    ),
+    (
+        change(Cause.CLEARANCE, "G", is_corrected=True),
+        "in joint G (0.3 mm was counted); the counted clearance is corrected",
+    ),
+    (  # at one cadence it may be an offset
+        change(Cause.LAG, value=0.01, sigma=0.001, counted=0.0),
+        "the crank is 62.8 mrad ± 6.28 mrad behind its measured angle, or the torque is 10 ms",
+    ),
+]
+
+
+@pytest.mark.parametrize(("found", "words"), TOLD, ids=[found.cause.name for found, _ in TOLD])
+def test_what_the_diagnosis_finds_is_reported_with_its_value(found: Change, words: str) -> None:
+    assert words in judged(diagnosis=diagnosis(found), cadence_rpm=60.0).why
+
+
+def test_an_alarm_of_the_lag_that_is_past_gives_no_value_to_set() -> None:
+    verdict = judged(alarms=(alarm("torque_lag", present=Level.OK),), cadence_rpm=60.0)
+    assert verdict.why.endswith("is 2 s (limit 1 s) (since 0.000 s; now within its limit)")
+    assert "correct crank.offset_rad if its angle is wrong" in verdict.do
+
+
+def test_the_commanded_cadence_is_no_limit() -> None:
+    """A leg at 59.9 rpm was shown with a limit of 60 rpm."""
+    departs = alarm("cadence", value=20.0, worst=20.0, limit=6.0)
+    verdict = judged(alarms=(departs,), cadence_rpm=59.9, commanded_rpm=60.0, tolerance_rpm=6.0)
+    assert list(map(evidence_words, verdict.evidence)) == [
+        "cadence 59.9 rpm",
+        "commanded cadence 60 rpm",
+        "departure from the commanded cadence 20 rpm (limit 6 rpm)",
+    ]
+
+
+def test_a_reason_to_stop_is_not_hidden_by_an_input_that_fails() -> None:
+    fault = "the crank has not been followed for 4 s"
+    verdict = judged(joints=at_limit(), alarms=(alarm("clearance G"),), unfollowed=fault)
+    assert verdict.state is State.STOP
+    assert verdict.why.endswith("the leg is not monitored now: the crank has not been followed for 4 s")
+    assert verdict.not_valid == (Figure.GROWTH, Figure.IMPACT_FORCES)
+
+
+@pytest.mark.parametrize(
+    ("present", "value", "is_past"),
+    [(Level.OK, 3.0, True), (Level.WARN, 0.9, True), (Level.ERROR, math.nan, False)],
+    ids=["past", "warning", "of the ledger"],
+)
+def test_a_raised_alarm_is_reported_with_its_worst_value_and_whether_it_is_past(
+    present, value, is_past
+) -> None:
+    verdict = judged(alarms=(alarm("impact_force A", present=present, value=value, worst=1234.5),))
+    assert verdict.state is State.INSPECT
+    assert "is 1234 N" in verdict.why and "again now" not in verdict.why
+    assert ("(since 0.000 s; now within its limit)" in verdict.why) == is_past
+
+
+def test_an_alarm_is_reported_in_words_with_the_label_of_its_joint() -> None:
+    labelled = tuple(attrs.evolve(each, label="knee" if each.joint == "G" else "") for each in NEW)
+    impact = judged(alarms=(alarm("impact_force G"),), joints=labelled)
+    assert impact.why == "the impact force in joint G (knee) is 2 N (limit 1 N)"
+    assert "rock joint G (knee); " in impact.do and "leg-wear-monitor measure G MM" in impact.do
+    warning = judged(
+        alarms=(alarm("clearance G", Level.WARN, value=5e-4, worst=5e-4, limit=6e-4),), joints=labelled
+    )
+    assert warning.why == "the counted clearance of joint G (knee) is 0.5 mm, near its limit of 0.6 mm"
+    samples = judged(alarms=(alarm("input_samples", value=0.0972, limit=0.05),), input_causes=("x",))
+    assert samples.why == "the fraction of unusable samples is 0.0972 (limit 0.05): x"
+
+
+def test_an_alarm_without_a_noun_is_called_by_its_name() -> None:
+    own = attrs.evolve(alarm("torque_lag", Level.WARN), kind="input_silence", subject="torque")
+    assert judged(alarms=(own,)).why == "alarm: the input silence torque is 2 s (limit 1 s)"
+
+
+def test_no_sentence_of_a_verdict_has_a_code_name_of_an_alarm() -> None:
+    for name in BOARD.alarms:
+        for level in (Level.WARN, Level.ERROR):
+            assert name.partition(" ")[0] not in re.findall(r"\w+_\w+", judged(**raised(name, level)).why)
+
+
+def test_a_value_within_its_limit_by_less_than_the_deadband_is_reported_beside_the_worst_one() -> None:
+    verdict = judged(alarms=(alarm("torque_mismatch", value=0.0896, worst=0.219, limit=0.1),))
+    assert "0.219 of the predicted RMS is not explained (limit 0.1), 0.0896 now" in verdict.why
+    slow = judged(alarms=(alarm("input_rate torque", value=41.0, worst=7.0, limit=40.0),))
+    assert "is 7 Hz (limit 40 Hz)" in slow.why and ", 41 Hz now" in slow.why
+
+
+def test_a_healthy_leg_is_told_that_no_alarm_is_no_proof() -> None:
+    off = judged(diagnosis=Diagnosis(reason="diagnosis.enabled is false"))
+    assert off.why.endswith("the torque is not compared with wider joints: diagnosis.enabled is false")
+    verdict = judged()
+    assert ADVICE in verdict.do
+    assert "3.1 % of its RMS is not explained (limit 10 %)" in verdict.why
+
+
+WAITING = Diagnosis(state=DiagnosisState.WAITING, reason="gait cycles: 2 of 5")
+
+
+@pytest.mark.parametrize(
+    ("missing", "seen_by", "why"),
+    [
+        ({"has_torque": False}, "the encoders show", "joints G cannot be observed: there is no drive torque"),
+        (
+            {"has_torque": False, "drive_torque": DriveTorque(source="effort")},
+            "the encoders show",
+            "there is no drive torque: the effort of the crank is empty or NaN",
+        ),
+        ({"diagnosis": WAITING}, "the drive torque agrees", "of joints G yet: gait cycles: 2 of 5"),
+    ],
+    ids=["torque", "effort", "diagnosis"],
+)
+def test_joints_that_encoders_show_need_no_torque_and_no_diagnosis(missing, seen_by, why) -> None:
+    eyes = seen_as_new("encoders")
+    every, some = judged(**missing, joints=eyes), judged(**missing, joints=(eyes[0], NEW[1]))
+    assert (every.state, some.state) == (State.HEALTHY, State.WATCH)
+    assert every.why.startswith(f"no alarm is raised, and {seen_by}")
+    assert some.why.endswith(why)
+
+
+def test_every_alarm_of_a_board_has_a_verdict_and_its_kind_is_known() -> None:
+    for name, one in BOARD.alarms.items():
+        verdict = judged(alarms=(alarm(name, Level.WARN),))
+        assert verdict.state is not State.HEALTHY, name
+        assert {one.subject} & set(JOINTS) == set(verdict.joints) == {joint_of(name)} - {""}, name
+    for level in (Level.WARN, Level.ERROR):
+        assert "NONE" not in {judged(**raised(name, level)).fault_code for name in BOARD.alarms}
+
+
+levels = st.sampled_from(Level)
+raised_alarms = st.lists(
+    st.builds(
+        lambda name, level, present: alarm(name, level, min(level, present)),
+        st.sampled_from(sorted(BOARD.alarms)),
+        levels,
+        levels,
+    ),
+    max_size=6,
+    unique_by=lambda one: one.name,
+)
+situations = st.sampled_from([case[0] for case in CASES if "alarms" not in case[0]])
+
+
+@given(situations, raised_alarms)
+def test_a_further_alarm_never_makes_the_verdict_better(changed, alarms) -> None:
+    severity, not_valid = -1, set()
+    for count in range(len(alarms) + 1):
+        verdict = judged(**changed, alarms=tuple(alarms[:count]))
+        assert verdict.state.severity >= severity
+        assert set(verdict.not_valid) >= not_valid
+        severity, not_valid = verdict.state.severity, set(verdict.not_valid)
+
+
+@given(situations, raised_alarms)
+def test_the_verdict_is_the_worst_of_its_findings_and_holds_all_evidence(changed, alarms) -> None:
+    found = findings(attrs.evolve(HEALTHY, **changed, alarms=tuple(alarms)))
+    verdict = verdict_of(found)
+    assert verdict.state.severity == max(finding.state.severity for finding in found)
+    assert set(verdict.not_valid) == {figure for finding in found for figure in finding.not_valid}
+    names = [each.name for each in verdict.evidence]
+    assert len(set(names)) == len(names)
+    assert set(names) == {each.name for finding in found for each in finding.evidence}
+    assert {each.name for each in alarms if each.level} <= set(names)
+    assert verdict_of(found[::-1]).state is verdict.state
+
+
+def test_a_finding_keeps_the_stamp_since_which_it_holds() -> None:
+    found = findings(attrs.evolve(HEALTHY, has_torque=False))
+    first = dated(found, (), 10)
+    assert [finding.since_ns for finding in first] == [10] * len(found)
+    assert dated(found, first, 20) == first
+    assert verdict_of(dated(findings(HEALTHY), first, 30)).since_ns == 30
+    own = dated([Finding(code="X", state=State.STOP, why="w", do="d", since_ns=3)], first, 30)
+    assert own[0].since_ns == 3
+
+
+def test_values_alone_are_no_change() -> None:
+    before = judged(alarms=(alarm("impact_force A"),))
+    assert not has_changed(before, judged(alarms=(alarm("impact_force A", value=9.0),)))
+    assert has_changed(before, judged(alarms=(alarm("impact_force G"),)))
+    assert has_changed(before, judged(alarms=(alarm("impact_force A"), alarm("cadence"))))  # no forecast
+    assert has_changed(None, before)
+
+
+def test_a_verdict_is_plain_data() -> None:
+    record = judged(diagnosis=diagnosis(change(Cause.CLEARANCE, "G"))).to_dict()
+    assert record["state"] == "inspect" and record["joints"] == ["G"]
+    evidence = {"name": "clearance G by torque", "value": 6.2e-4, "limit": None, "unit": "m"}
+    assert record["evidence"][0] == evidence
+    assert record["not_valid"] == ["clearances", "growth", "impact_forces", "forecast"]
+
+
+def test_a_name_that_is_not_sure_is_said_to_be_so() -> None:
+    reason = "the leg is not that of its mechanism file"
+    unsure = attrs.evolve(diagnosis(change(Cause.CLEARANCE, "G")), reason=reason)
+    assert f"(0.3 mm is counted); {reason}" in judged(diagnosis=unsure).why
+    at_limit = judged(diagnosis=unsure, joints=seen("torque", 6.7e-4, 3.0e-5))
+    assert f"(limit 0.6 mm); {reason}" in at_limit.why
+    assert reason not in judged(diagnosis=unsure, joints=seen("encoders", 6.7e-4, 3.0e-5)).why
+
+
+@pytest.mark.parametrize(
+    ("cause", "values", "words", "remedy"),
+    [
+        (
+            Cause.JOINT_FRICTION,
+            (-0.5, 0.1, 0.0),
+            "the friction in the joints has fallen by 50 %",
+            "lubrication",
+        ),
+        (Cause.LOAD, (290.0, 5.0, 0.0), "a load of 290 N ± 5 N lifts the foot", "set load.model to ground"),
+        (Cause.LOAD, (-290.0, 5.0, 290.0), "the load at the foot has fallen by 290 N", "check the load"),
+    ],
+)
+def test_a_cause_is_said_with_its_size_and_what_to_do(cause, values, words, remedy) -> None:
+    value, sigma, counted = values
+    found = attrs.evolve(change(cause, value=value, sigma=sigma), counted=counted)
+    verdict = judged(diagnosis=diagnosis(found))
+    assert words in verdict.why and remedy in verdict.do
+
+
+@pytest.mark.parametrize("now, then", [(-5.0, 41.4), (-5.0, math.nan), (math.nan, 41.4)])
+def test_a_friction_that_comes_with_another_temperature_says_both(now: float, then: float) -> None:
+    """Whoever finds it; and no other cause does."""
+    known = attrs.evolve(diagnosis(change(Cause.FRICTION, value=2.0)), temperature_c=now, commissioned_c=then)
+    alarmed = judged(
+        alarms=(alarm("torque_drift"),),
+        torque_causes={"torque_drift": NamedCause(Cause.FRICTION, 2.0, 0.1)},
+        diagnosis=attrs.evolve(known, changes=(), state=DiagnosisState.AS_COUNTED),
+        cadence_rpm=60.0,
+    )
+    words = " (the drive is at -5 °C, and was at 41 °C then)"
+    for verdict in (judged(diagnosis=known, cadence_rpm=60.0), alarmed):
+        assert verdict.fault_code == "FRICTION_CHANGED"
+        assert (words in verdict.why) == (not math.isnan(now + then))
+        assert ("°C" in verdict.why) == (words in verdict.why)
+    lag = attrs.evolve(known, changes=(change(Cause.LAG, value=0.01, sigma=0.001),))
+    assert "°C" not in judged(diagnosis=lag, cadence_rpm=60.0).why

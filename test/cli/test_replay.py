@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from spoilt_json import spoilt
 
+from leg_wear_monitor.cli import replays
 from leg_wear_monitor.cli.verbs import replay as verb
 from leg_wear_monitor.state import Level, State
 
@@ -175,14 +176,14 @@ def test_an_alarm_asked_for_fails(run, bag, tmp_path):
 )
 def test_what_counts_as_an_alarm_asked_for(name, level, asked, raised):
     result = SimpleNamespace(history=SimpleNamespace(worst={name: level}))
-    assert verb.is_raised(result, asked) == raised
+    assert replays.is_raised(result, asked) == raised
 
 
 @pytest.mark.parametrize("state", list(State))
 def test_a_verdict_that_asks_to_act_fails_where_it_is_asked_for(state):
     report = SimpleNamespace(verdict=SimpleNamespace(state=state))
     result = SimpleNamespace(monitor=SimpleNamespace(verdict=report))
-    assert verb.asks_to_act(result) == (state.value in ("not_monitored", "inspect", "stop"))
+    assert replays.asks_to_act(result) == (state.value in ("not_monitored", "inspect", "stop"))
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """``leg-wear-monitor replay`` and ``report``."""
 
 import json
+import os
 import time
 import warnings
 from collections.abc import Iterator
@@ -11,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from leg_wear_monitor.cli import common
+from leg_wear_monitor.cli.replays import is_failed, write_replay
 from leg_wear_monitor.errors import ConfigError, closed_on_interrupt
-from leg_wear_monitor.files import package_version
-from leg_wear_monitor.monitor.alarm_specs import INPUT_KINDS, KINDS
+from leg_wear_monitor.monitor.alarm_specs import KINDS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -64,6 +65,18 @@ TIMES = ("header", "log", "publish")
     type=click.Choice(("verdict", "alarm", "warning", "input", *KINDS)),
     multiple=True,
 )
+@click.option(
+    "--separately",
+    is_flag=True,
+    help="Replay each recording with a monitor of its own, several at a time: reports in DIR/NAME of --out, "
+    "one row per recording in DIR/recordings.csv.",
+)
+@common.option(
+    "--workers",
+    "N",
+    "Number of local processes of --separately.  [default: cores]",
+    type=click.IntRange(min=1),
+)
 @common.json_option("the summary")
 def replay(
     bags: tuple[Path, ...],
@@ -71,18 +84,27 @@ def replay(
     json_file: Path | None,
     allow_partial: bool,
     fail_on: tuple[str, ...],
+    separately: bool,
+    workers: int | None,
     **options: Any,
 ) -> int:
     """Replay recordings through the monitor: MCAP, .db3, CSV and Parquet files or bag directories.
 
-    Several paths are one recording. Exits with 1 if parts of it were lost, if no gait cycle in it fits this
-    leg, if all of it is in the ledger already, or if the verdict is or an alarm was one of --fail-on.
+    Several paths are one recording, unless --separately is given. Exits with 1 if parts of it were lost, if
+    no gait cycle in it fits this leg, if all of it is in the ledger already, or if the verdict is or an alarm
+    was one of --fail-on.
     """
     common.check_outputs(json_file, out)
+    if separately:
+        return _separately(
+            bags, out, json_file, workers or os.cpu_count() or 1, allow_partial, fail_on, **options
+        )
+    if workers is not None:
+        raise click.UsageError("--workers needs --separately")
     written: list[Path] = []
 
     def write(result: "ReplayResult", wall_s: float) -> None:
-        written.extend(_write(result, wall_s, out, json_file))
+        written.extend(write_replay(result, wall_s, out, json_file))
 
     is_report_there = out is not None and (out / common.SUMMARY).exists()
     result, wall_s = _run(bags, out, write, **options)
@@ -97,10 +119,45 @@ def replay(
     common.say(json_file, (), written)
     if is_report_there and result.monitor.is_all_counted:
         click.echo(f"warning: {out}: nothing was counted, so the earlier report stays as it is", err=True)
-    failed = (result.is_partial and not allow_partial) or is_raised(result, fail_on)
-    failed = failed or result.is_unusable or result.monitor.is_all_counted
-    failed = failed or ("verdict" in fail_on and asks_to_act(result))
-    return common.WITH_FINDINGS if failed else 0
+    return common.WITH_FINDINGS if is_failed(result, allow_partial, fail_on) else 0
+
+
+def _separately(
+    bags: tuple[Path, ...],
+    out: Path | None,
+    json_file: Path | None,
+    workers: int,
+    allow_partial: bool,
+    fail_on: tuple[str, ...],
+    config: Path | None,
+    time_source: str,
+    crank_joint: str | None,
+    node: str | None,
+    ledger: Path | None,
+    **options: Any,
+) -> int:
+    if out is None:
+        raise click.UsageError("--separately needs --out DIR")
+    if json_file is not None:
+        raise click.UsageError(
+            "--separately and --json cannot be combined: DIR/NAME/summary.json has the summary"
+        )
+    if ledger is not None:
+        fault = "a ledger counts recordings in their order. Expected no --ledger with --separately"
+        raise ConfigError("--ledger", str(ledger), fault)
+    from leg_wear_monitor.cli.separately import replay_separately
+
+    return replay_separately(
+        bags,
+        _config(config, crank_joint, node),
+        out,
+        workers,
+        allow_partial=allow_partial,
+        fail_on=fail_on,
+        time=time_source,
+        node=node,
+        **options,
+    )
 
 
 def _run(
@@ -159,40 +216,6 @@ def _config(path: Path | None, crank_joint: str | None, node: str | None) -> "Mo
     common.warn_of(leg.source, doubts(mechanism))
     common.warn_of(source, (*parameter_doubts(config, leg), *life_doubts(config, leg)))
     return config if crank_joint is None else attrs.evolve(config, crank_joint=crank_joint)
-
-
-def asks_to_act(result: "ReplayResult") -> bool:
-    """Whether the verdict at the end asks a person to do something, or cannot be given."""
-    from leg_wear_monitor.state import State
-
-    return result.monitor.verdict.verdict.state in (State.NOT_MONITORED, State.INSPECT, State.STOP)
-
-
-def is_raised(result: "ReplayResult", fail_on: tuple[str, ...]) -> bool:
-    """Whether an alarm asked for was raised at any time."""
-    from leg_wear_monitor.state import Level
-
-    worst = result.history.worst
-    highest = max(worst.values(), default=Level.OK)
-    if ("alarm" in fail_on and highest is Level.ERROR) or ("warning" in fail_on and highest > Level.OK):
-        return True
-    asked = {*fail_on, *(INPUT_KINDS if "input" in fail_on else ())}
-    return any(level is Level.ERROR and kind in asked for kind, level in worst.items())
-
-
-def _write(result: "ReplayResult", wall_s: float, out: Path | None, json_file: Path | None) -> list[Path]:
-    """Write what was asked for, and give the files."""
-    if out is None and json_file is None:
-        return []
-    from leg_wear_monitor.playback.replay import REPORTS_FILE
-
-    summary = result.summary(wall_s, made_with={"leg_wear_monitor": package_version()})
-    text = summary.to_json()
-    written: list[Path] = []
-    if out is not None and not (result.monitor.is_all_counted and (out / common.SUMMARY).exists()):
-        files = {common.SUMMARY: text.encode(), common.PAGE: common.page_of(summary)}
-        written = [out / REPORTS_FILE, *common.write_directory(out, files)]
-    return written + common.write_json(json_file, text)
 
 
 # ``leg-wear-monitor report``: the page of a run again, from its data.

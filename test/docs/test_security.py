@@ -4,6 +4,7 @@ import re
 import time
 from collections.abc import Callable
 from fnmatch import fnmatchcase
+from importlib.util import find_spec
 from typing import Any
 from xml.etree import ElementTree
 
@@ -37,10 +38,11 @@ def allowed(node: str, kind: str, right: str, policy: ElementTree.Element = POLI
     ("make", "own", "idle"),
     [
         (MonitorNode, {"publish_scalars": True, "foot_load__source": "wrench"}, "dynamic_joint_states"),
-        (
+        pytest.param(
             MonitorNode,
-            {"publish_scalars": True, "foot_load__source": "wrench", "drive_torque__source": "float64"},
+            {"publish_scalars": True, "foot_load__source": "wrench", "drive_torque__source": "interface"},
             "drive_torque",
+            marks=pytest.mark.skipif(not find_spec("control_msgs"), reason="control_msgs is not installed"),
         ),
         (GaitPublisher, {"foot_load_sensor__source": "wrench"}, ""),
     ],

@@ -1,5 +1,5 @@
 # `make test` and `make demo` do all the set-up themselves, once: Python 3.11 to 3.13 with venv and a C compiler are enough.
-.PHONY: test test-slow test-slow-in-turn test-without-ros test-oldest lint kernels package colcon docs docs-tests tables docs-check demo lock sbom release clean
+.PHONY: test test-slow test-slow-in-turn mutations test-without-ros test-oldest lint kernels package colcon docs docs-tests tables docs-check demo lock sbom release clean
 .DELETE_ON_ERROR:
 
 # Of these, the first that there is makes the environments; the oldest libraries have no wheels for the newest one.
@@ -43,6 +43,10 @@ SLOW_PARTS := 8
 test-slow-in-turn: kernels
 	SLOW_PART=$$(( $$(git rev-list --count HEAD) % $(SLOW_PARTS) ))/$(SLOW_PARTS) \
 		.venv/bin/python -m pytest $(TWO) $(IN_ORDER) -m slow --ignore test/docs
+
+# How many of 40 small faults in the package the tests find: takes hours, and goes on where it was stopped.
+mutations: kernels
+	.venv/bin/python test/mutations.py
 
 lint: .venv/installed
 	.venv/bin/ruff check

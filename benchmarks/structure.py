@@ -2,6 +2,7 @@
 
 ``python benchmarks/structure.py [DIR]`` prints the values of the checkout in DIR, this one by default.
 ``--check`` compares the sizes with the budgets in ``pyproject.toml`` and names each one that is exceeded.
+It also names each inner module that a test in ``test/doors`` uses.
 ``--lower`` lowers each budget to the present size, rounded up by at most 1 %; it never raises a budget.
 
 Code lines exclude imports, docstrings, comments and blank lines. Test lines are all lines.
@@ -72,6 +73,33 @@ def records(of: Module) -> int:
         or any(ast.unparse(base) in ("NamedTuple", "TypedDict") for base in one.bases)
         for one in classes
     )
+
+
+def inner_names(path: Path, tests: Path, packages: set[str], seen: set[Path]) -> Iterator[str]:
+    """Inner modules that a test file, or a helper in ``tests`` that it imports, names in imports or texts."""
+    seen.add(path)
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        found: list[str] = []
+        if isinstance(node, ast.Import):
+            found = [each.name for each in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            found = [node.module or "", *(f"{node.module}.{each.name}" for each in node.names)]
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            found = [node.value]  # as monkeypatch takes it
+        for each in found:
+            if each.startswith(f"{PACKAGE}.") and each.split(".")[1] in packages:
+                yield f"{path.relative_to(tests)}: {each}"
+            helper = tests / f"{each}.py"
+            if not isinstance(node, ast.Constant) and helper.exists() and helper not in seen:
+                yield from inner_names(helper, tests, packages, seen)
+
+
+def is_public(path: Path, tests: Path, packages: set[str]) -> bool:
+    """Whether a test file, its helpers and the conftests of its folder use public names only."""
+    seen = set[Path]()
+    around = [each / "conftest.py" for each in path.parents if tests in each.parents]
+    files = [path, *(each for each in around if each.exists())]
+    return not any(found for each in files for found in inner_names(each, tests, packages, seen))
 
 
 def functions(of: Module) -> Iterator[ast.FunctionDef]:
@@ -172,21 +200,31 @@ def main() -> None:
     found = sizes(root, modules)
     if given.lower:
         lower(found, root / "pyproject.toml")
+    packages = {each.package for each in modules}
+    tests, doors = root / "test", root / "test" / "doors"
     if given.check:
         check(found, root / "pyproject.toml")
+        seen = set[Path]()
+        inner = [
+            name for path in sorted(doors.glob("*.py")) for name in inner_names(path, tests, packages, seen)
+        ]
+        if inner:
+            sys.exit(
+                "\n".join(f"{name}: is not public. Expected public names in test/doors." for name in inner)
+            )
     if given.check or given.lower:
         return
 
     names = {each.name for each in modules}
     graph = {each.name: imported(each, names) for each in modules}
-    packages = sorted({each.package for each in modules}, key=lambda package: package.strip("_"))
     print(f"{'package':16}{'modules':>9}{'code':>8}{'records':>9}{'import lines':>14}")
-    for package in [*packages, ""]:
+    for package in [*sorted(packages, key=lambda name: name.strip("_")), ""]:
         inside = [each for each in modules if not package or each.package == package]
         sums = (sum(len(each.code) for each in inside), sum(map(records, inside)))
         imports = sum(len(each.imports) for each in inside)
         print(f"{package or 'all':16}{len(inside):9}{sums[0]:8}{sums[1]:9}{imports:14}")
 
+    files = sorted(tests.rglob("test_*.py"))
     crossed = {(each.package, there.split(".")[0]) for each in modules for there in graph[each.name]}
     long = [length(each, function) for each in modules for function in functions(each)]
     for what, value in (
@@ -196,6 +234,8 @@ def main() -> None:
         ("functions whose body occurs elsewhere", repeats(modules)),
         (f"functions over {LONG_FUNCTION} lines of code", sum(each > LONG_FUNCTION for each in long)),
         ("test lines", found["test_lines"]),
+        ("test files", len(files)),
+        ("test files that use public names only", sum(is_public(path, tests, packages) for path in files)),
     ):
         print(f"{what:40}{value:8}")
 

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import attrs
-import zstandard
 from mcap.reader import make_reader
 
 import leg_wear_monitor as lw
@@ -85,7 +84,7 @@ def keep_joint_states(path: Path) -> None:
     """Leave all other topics out of a recording."""
     with path.open("rb") as file:
         kept = [each[2] for each in make_reader(file).iter_messages(topics=[JOINT_STATES])]
-    with McapWriter(path, level=zstandard.MAX_COMPRESSION_LEVEL) as writer:
+    with McapWriter(path) as writer:
         channel = writer.channel(JOINT_STATES, "sensor_msgs/msg/JointState")
         for message in kept:
             writer.write(channel, message.log_time, message.data)

@@ -24,7 +24,7 @@ _OWN_HEADING = 2  # level of a page's sections: headings of a document inside it
 
 
 def document_path(name: str) -> Path | None:
-    """A document by its name below `FOLDER`, such as ``howto/repair.md``; None for anything else."""
+    """A document by its name below `FOLDER`, such as ``howto/csv.md``; None for anything else."""
     folder = (share_directory() / FOLDER).resolve()
     path = (folder / name).resolve()
     if path.suffix != ".md" or not path.is_relative_to(folder) or not path.is_file():

@@ -94,7 +94,7 @@ def test_the_page_of_the_stop_shows_the_estimates_and_links_the_guide(knocked):
 
 
 GUIDES = (
-    "howto/repair.md",
+    "howto/verdict/index.md",
     "howto/verdict/joint_at_limit.md",
     "explanation/diagnosis.md",
 )

@@ -27,7 +27,7 @@ ROOT = Path(__file__).parents[1]
 LOG = ROOT / "build" / "mutations.jsonl"
 NEVER = "test/docs"  # `make docs` runs these
 LONGEST_S = 3600.0
-_FOUND = re.compile(r"^(?:FAILED|ERROR) (\S+?)(?: - .*)?$", re.MULTILINE)
+_FOUND = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", re.MULTILINE)  # a case may have spaces
 
 Fault = dict[str, str]
 

@@ -5,7 +5,6 @@
 
 import re
 import sqlite3
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from pathlib import Path
@@ -17,7 +16,7 @@ import pytest
 from leg_wear_monitor.fleet import description
 from leg_wear_monitor.mechanism import materials, sourced, spec
 from leg_wear_monitor.monitor import alarm_specs
-from leg_wear_monitor.monitor.alarms import FAULT_CODES, FOLDER, guide_of
+from leg_wear_monitor.monitor.alarms import FAULT_CODES, guide_of
 from leg_wear_monitor.monitor.config.parameters import PARAMETERS, parameters_of
 from leg_wear_monitor.monitor.ledger.schema import FORMAT, TABLES, create_tables
 from leg_wear_monitor.monitor.verdict.decision import measured_figures
@@ -337,18 +336,6 @@ def classes_in(kind: Any) -> set[str]:
 )
 def test_no_part_of_a_page_is_missing(name: str, parts: set[str]) -> None:
     assert {found[2] for found in PART.finditer(written(f"reference/{name}.md"))} == parts
-
-
-def test_every_code_has_one_guide_that_names_it_and_every_guide_a_code() -> None:
-    linked = [
-        (f"{FOLDER}/{page.name}", code.upper())
-        for page in (ROOT / FOLDER).glob("*.md")
-        for code in re.findall(r"\]\(../../reference/codes\.md#(\w+)\)", page.read_text(encoding="utf-8"))
-    ]
-    assert Counter(code for _, code in linked) == Counter({code for code, _ in meanings()})
-    assert all(guide_of(code) == page for page, code in linked)
-    assert {page for page, _ in linked} == {f"{FOLDER}/{page.name}" for page in (ROOT / FOLDER).glob("*.md")}
-    assert guide_of("UNHEARD_OF") == f"{FOLDER}/index.md"
 
 
 if __name__ == "__main__":

@@ -123,6 +123,13 @@ def test_the_verdict_is_the_one_that_is_written_beside(bag: Replayed) -> None:
         assert 0.99 * joint["new_m"] < joint["counted_m"] < joint["limit_m"]
 
 
+def test_the_terminal_names_the_guide_of_the_code(bag: Replayed) -> None:
+    ((code, guide),) = re.findall(r"^code +(\w+), see (\S+)$", bag.printed, re.MULTILINE)
+    assert code == bag.found["verdict"]["fault_code"]
+    stem = re.sub("(_[A-Z])*$", "", code).lower()  # without the joints
+    assert f"](../../reference/codes.md#{stem})" in Path(guide).read_text()
+
+
 def test_the_terminal_gives_no_number_that_the_verdict_does_not_believe(bag: Replayed) -> None:
     not_valid = bag.found["verdict"]["not_valid"]
     (row,) = (line for line in bag.printed.splitlines() if line.startswith("A (hip, drive side)  "))

@@ -164,6 +164,9 @@ def test_a_worn_joint_is_new_after_a_reset_and_the_others_stay(monitor_of) -> No
     now = monitor.wear_depth_m
     assert not now[k].any()
     assert np.delete(now, k, axis=0).tobytes() == np.delete(worn, k, axis=0).tobytes()
+    parts = {joint: monitor.wear_of(joint) for joint in monitor.clearance_joints}
+    assert all(part.name == joint for joint, part in parts.items())
+    assert [joint for joint, part in parts.items() if part.moving_s == 0.0] == ["G"]
     with pytest.raises(lw.LegWearError, match="Q"):
         monitor.reset_wear("Q", START_NS, "ann")
 
@@ -202,6 +205,41 @@ def test_a_present_alarm_is_acknowledged_and_stays(monitor_of) -> None:
     assert "impact_force A" in {each.name for each in kept} - {each.name for each in cleared}
     alarm = next(each for each in monitor.alarms.alarms if each.name == "impact_force A")
     assert (alarm.level, alarm.acknowledged) == (2, True)
+
+
+@pytest.mark.chaotic
+def test_an_alarm_outlives_a_restart(leg, parameters, tmp_path) -> None:
+    file = parameters(limits__impact_force_n=50.0, ledger__path=str(tmp_path / "wear.ledger"))
+    config = lw.load_config(file)
+    monitor = lw.WearMonitor(leg, config, lw.open_ledger(leg, config))
+    monitor.update(walk(4.0))
+    levels = {alarm.name: alarm.level for alarm in monitor.alarms.alarms}
+    assert levels["impact_force A"] == 2
+    monitor.close()
+    again = lw.WearMonitor(leg, config, lw.open_ledger(leg, config))
+    assert {alarm.name: alarm.level for alarm in again.alarms.alarms} == levels
+    again.close()
+
+
+@pytest.mark.chaotic
+def test_a_measured_clearance_beyond_its_limit_keeps_its_alarm_while_the_leg_walks(monitor_of) -> None:
+    """Also a measurement that contradicts the model, and so does not count for the forecast."""
+    monitor = monitor_of()
+    monitor.update(walk(3.0))
+    assert not monitor.measure("G", 3.0e-3, 5.0e-6, START_NS + 3 * SECOND, "ann").measurement.counts
+    assert monitor.update(walk(3.0, begin_s=3.0)).cycles
+    alarm = next(each for each in monitor.alarms.alarms if each.name == "clearance G")
+    assert (alarm.present, alarm.value) == (2, 3.0e-3)
+
+
+def test_counts_of_an_encoder_are_read_as_its_angle(parameters) -> None:
+    counts, per_turn = np.arange(600) * 4096 // RATE_HZ, 4096
+    columns = {"time": np.arange(600) / RATE_HZ, "drive_torque": np.zeros(600)}
+    inputs = {"input__units__crank_angle": "counts", "input__counts_per_turn": float(per_turn)}
+    counted = lw.replay({**columns, "crank_angle": counts % per_turn}, parameters(**inputs)).summary()
+    angles = 2.0 * np.pi * (counts % per_turn) / per_turn
+    of_angles = lw.replay({**columns, "crank_angle": angles}).summary()
+    assert counted.cycles == of_angles.cycles >= 1
 
 
 @pytest.mark.chaotic

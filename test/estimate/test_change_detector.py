@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.estimate.change_detector import FACTORS, ChangeDetector, excess, threshold
+from leg_wear_monitor.estimate.clearance_fit import fit_clearances
 from leg_wear_monitor.estimate.explanations import Baseline, Explainer
 from leg_wear_monitor.estimate.leg_model import commissioned_baseline, parts_left_out, with_scatter_of
 from leg_wear_monitor.estimate.signature import Changes, CommissionedTorque, SignatureModel, TorqueSensor
@@ -119,6 +120,14 @@ def test_since_is_the_begin_of_the_change() -> None:
         if found:
             break
     assert 1028 <= found <= 1030
+
+
+def test_the_offset_of_a_commissioned_leg_is_not_taken_for_a_clearance() -> None:
+    own, offset = model(), 5.0 * np.random.default_rng(3).standard_normal(F)
+    explainer = Explainer(own, ("A", "B"), Baseline(offset, np.zeros((F, F))), ())
+    wide = np.array([6.0e-4, 3.0e-4])
+    found = fit_clearances(explainer, own.at(wide)[0] + offset, 100, NEW, NEW)
+    assert found.clearance_m == pytest.approx(wide, rel=0.02)
 
 
 def test_later_cycles_scatter_as_the_tests_expect() -> None:

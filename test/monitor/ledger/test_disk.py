@@ -17,7 +17,8 @@ STORY = """
 import subprocess, sys
 from pathlib import Path
 import numpy as np
-from leg_wear_monitor.monitor.ledger.entry import Binding
+from leg_wear_monitor.monitor.alarms import Alarm
+from leg_wear_monitor.monitor.ledger.entry import AlarmEvent, Binding
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.ledger.entry import Entry, JointWear
 
@@ -35,6 +36,7 @@ try:
         pass
 except OSError:
     ballast.close()
+ledger.note(AlarmEvent(5, Alarm(kind="clearance", subject="A")))
 failed = [n for n in range(2, 100) if not ledger.keep(entry(n))]
 assert failed, "the disk was never full"
 print("full:", ledger.fault)
@@ -45,6 +47,7 @@ assert not ledger.keep(entry(100))
 print("read-only:", ledger.fault)
 mount("remount,rw")
 assert ledger.keep(entry(101)), ledger.fault
+assert [event.stamp_ns for event in ledger.alarm_history] == [5]
 ledger.keep(entry(102), closed=True)
 ledger.close()
 

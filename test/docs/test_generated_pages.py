@@ -206,18 +206,17 @@ def of_drives(name: str) -> str:
 def ledger_tables(_name: str) -> str:
     comments = re.findall(r"((?:^-- .*\n)+)CREATE TABLE (\w+)", TABLES, re.MULTILINE)
     remarks = {name: " ".join(line[3:] for line in text.splitlines()) for text, name in comments}
-    units = {"ns": "ns", "s": "s", "m": "m", "pa": "1/Pa", "cycles": "gait cycles"}
     lines = [f"The format is {FORMAT} (`PRAGMA user_version`)."]
     with closing(sqlite3.connect(":memory:", isolation_level=None)) as db:
         create_tables(db)
         names = [name for (name,) in db.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
         for one in sorted(names):
-            rows = []
+            columns = []
             for _, name, kind, not_null, _, key in db.execute(f"PRAGMA table_info({one})"):
-                remark = "key" if key else "" if not_null else "may be null"
-                rows.append((f"`{name}`", kind, units.get(name.split("_")[-1], ""), remark))
+                remark = " (key)" if key else "" if not_null else " (may be null)"
+                columns.append(f"`{name}` {kind}{remark}")
             words = remarks[one][0].upper() + remarks[one][1:]
-            lines += ["", f"## {one}", "", f"{words}.", "", table("column | type | unit |", rows).rstrip()]
+            lines += ["", f"## {one}", "", f"{words}.", "", f"Columns: {', '.join(columns)}."]
     return "\n".join([*lines, ""])
 
 
@@ -237,13 +236,10 @@ def of_monitor(name: str) -> str:
         rows = ((f"`{name}`", spec.meaning, spec.limit_words) for name, spec in names)
         return table("alarm | value | limit", rows)
     rows = (
-        (
-            f"`{rule.code}`", rule.state.value, in_words(rule.why),
-            ", ".join(figure.value for figure in rule.not_valid),
-        )
+        (f"`{rule.code}`", rule.state.value, ", ".join(figure.value for figure in rule.not_valid))
         for rule in RULES
-    )  # fmt: skip
-    return table("`fault_code` | state | reason | values that are not valid", rows)
+    )
+    return table("`fault_code` | state | values that are not valid", rows)
 
 
 def certainty(_name: str) -> str:

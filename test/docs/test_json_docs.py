@@ -133,13 +133,14 @@ def renewed(page: str) -> str:
     state_rows = set(state())
 
     def table(name: str) -> str:
-        lines = ["| field | type | unit | what it is |", "|---|---|---|---|"]
+        lines = ["| field | type, unit | meaning |", "|---|---|---|"]
         prefix = STATE_IN.get(name)
         for path, kind, unit, text in DOCUMENTS[name]():
             if prefix is not None and (path.removeprefix(prefix), kind, unit, text) in state_rows:
                 continue  # the page lists the state of a leg once
             words = re.sub(r"\bNone\b", "null", text.replace("``", "`")).replace("|", r"\|")
-            lines.append(f"| `{path}` | {kind} | {unit} | {words} |")
+            quantity = f"{kind}, {unit}" if unit else kind
+            lines.append(f"| `{path}` | {quantity} | {words} |")
         return "\n".join([*lines, ""])
 
     return TABLE.sub(lambda found: found[1] + table(found[2]) + found[3], page)

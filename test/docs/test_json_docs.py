@@ -131,13 +131,34 @@ STATE_IN = {"replay": "", "fleet": "legs[].state."}  # documents that contain th
 
 def renewed(page: str) -> str:
     state_rows = set(state())
+    listed: dict[tuple[Row, ...], str] = {}  # parts whose fields the page has, by these fields
+
+    def rows(name: str) -> Iterator[Row]:
+        """Rows of a document without the fields that the page lists before."""
+        prefix = STATE_IN.get(name)
+        documented = list(DOCUMENTS[name]())
+        left_out = ""
+        for path, kind, unit, text in documented:
+            if prefix is not None and (path.removeprefix(prefix), kind, unit, text) in state_rows:
+                continue
+            if left_out and path.startswith(left_out):
+                continue
+            below = f"{path}."
+            parts = tuple(
+                (row[0].removeprefix(below), row[1], "", row[3])
+                for row in documented
+                if row[0].startswith(below)
+            )
+            first = listed.setdefault(parts, path)
+            if len(parts) > 1 and first != path:
+                left_out = below
+                yield path, kind, unit, f"{text.removesuffix('.')}; fields as in `{first}`."
+            else:
+                yield path, kind, unit, text
 
     def table(name: str) -> str:
         lines = ["| field | type, unit | meaning |", "|---|---|---|"]
-        prefix = STATE_IN.get(name)
-        for path, kind, unit, text in DOCUMENTS[name]():
-            if prefix is not None and (path.removeprefix(prefix), kind, unit, text) in state_rows:
-                continue  # the page lists the state of a leg once
+        for path, kind, unit, text in rows(name):
             words = re.sub(r"\bNone\b", "null", text.replace("``", "`")).replace("|", r"\|")
             quantity = f"{kind}, {unit}" if unit else kind
             lines.append(f"| `{path}` | {quantity} | {words} |")

@@ -1,27 +1,29 @@
-"""Fields of the JSON documents: those that are kept; this file as a script renews them from the page.
+"""Fields of the JSON documents: those that are kept; this file as a script renews them.
 
 python test/doors/test_fields.py
 """
 
 import json
-import re
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+sys.path.insert(0, str(Path(__file__).parents[1]))  # as a script
+
+from json_documents import DOCUMENTS
+
 import leg_wear_monitor as lw
 
-PAGE = Path(__file__).parents[2] / "docs" / "reference" / "json.md"
 KEPT = Path(__file__).parent / "kept" / "fields.txt"
 
 
 def fields() -> Iterator[str]:
-    """A line a field of the page: document, path, type, unit."""
-    for document in re.finditer(r"<!-- fields of (\w+) -->\n(.*?)<!-- end -->", PAGE.read_text(), re.DOTALL):
-        for row in document[2].splitlines()[2:]:
-            path, kind, unit, _ = re.split(r"(?<!\\)\|", row.strip("|"), maxsplit=3)
-            yield f"{document[1]}: {path.strip(' `')}: {kind.strip()} {unit.strip()}".rstrip()
+    """A line a field: document, path, type, unit."""
+    for name, rows in DOCUMENTS.items():
+        for path, kind, unit, _ in rows():
+            yield f"{name}: {path}: {kind} {unit}".rstrip()
 
 
 def test_fields_their_types_and_units_are_those_that_are_kept() -> None:

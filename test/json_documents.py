@@ -1,13 +1,13 @@
 """The JSON documents and the fields that each declares."""
 
 from collections.abc import Iterator
+from typing import get_args, get_type_hints
 
 from json_fields import Row, descriptions, rows_of, unit_of
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.commissioning.result import JointDetection
-from leg_wear_monitor.life.result import Life
-from leg_wear_monitor.state import LegState
+
+LegState = get_args(get_type_hints(lw.LegOverview)["state"])[0]
 
 VERSION = ("schema_version", "whole number", "", "Version of these fields; see above.")
 
@@ -36,7 +36,7 @@ _LOAD = "number", "Pa m/s", "Mean of pressure times sliding speed when new."
 
 
 def life() -> Iterator[Row]:
-    texts = descriptions(Life)
+    texts = descriptions(lw.Life)
     yield "mechanism", "text", "", "Name of the mechanism."
     yield "fingerprint", "text", "", "Checksum of the mechanism; a forecast refuses the lives of another leg."
     yield "validity.<joint>.holds_for", "text", "", "Material pair and regime that its life holds for."
@@ -89,7 +89,7 @@ def commissioning() -> Iterator[Row]:
     yield "findings[]", "text", "", texts["findings"]
     yield "notes[]", "text", "", texts["notes"]
     yield "joints[]", "object", "", texts["joints"]
-    yield from rows_of(JointDetection, "joints[].")
+    yield from rows_of(lw.JointDetection, "joints[].")
     yield "judgement", "text", "", lw.CommissioningResult.judgement.__doc__ or ""
     yield "reference_used", "text", "", texts["reference_used"]
 

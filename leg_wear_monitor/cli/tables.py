@@ -254,14 +254,13 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
             console.print(f"lasts  {NOT_VALID}: {as_plain(verdict.why)}\n", soft_wrap=True)
         else:
             _print_lifetimes(console, last, monitor.config.forecast.duty_hours_per_day)
-    from leg_wear_monitor.monitor.alarms import raised_words, state_of
+    from leg_wear_monitor.monitor.alarms import raised_values, state_of, time_words
 
     raised = [alarm for alarm in monitor.alarms.alarms if alarm.level]
     for alarm in raised:
-        words = raised_words(
-            state_of(alarm), alarm.worst, alarm.limit, alarm.unit, alarm.raised_ns, alarm.cause
-        )
-        console.print(f"{alarm.level.name:<6} {alarm.name}: {words}", soft_wrap=True)
+        words = raised_values(state_of(alarm), alarm.worst, alarm.limit, alarm.unit, alarm.cause)
+        since = time_words(alarm.raised_ns)
+        console.print(f"{alarm.level.name:<6} {alarm.name}: {words}, since {since}", soft_wrap=True)
     if not raised:
         console.print("no alarm is raised at the end")
     if result.is_believable:

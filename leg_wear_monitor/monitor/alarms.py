@@ -369,10 +369,10 @@ def state_of(alarm: Alarm) -> str:
 _LAST = {"torque": "last estimate", "encoders": "last estimate", "measured": "last measured"}
 
 
-def raised_words(
-    state: str, worst: float | None, limit: float | None, unit: str, raised_ns: int, by: str | None = None
+def raised_values(
+    state: str, worst: float | None, limit: float | None, unit: str, by: str | None = None
 ) -> str:
-    """Description of a raised alarm, such as ``latched, worst 0.42, limit 0.05, since ...``.
+    """State and values of a raised alarm, such as ``latched, worst 0.42, limit 0.05``.
 
     Parameters
     ----------
@@ -381,8 +381,6 @@ def raised_words(
     worst, limit : float or None
         None or NaN if unknown, as for an alarm from an older ledger.
     unit : str
-    raised_ns : int
-        Stamp at which it was raised.
     by : str, optional
         Source of a clearance: of estimates and measurements, the last one is kept, not the worst.
     """
@@ -390,7 +388,7 @@ def raised_words(
     for name, value in ((_LAST.get(by or "", "worst"), worst), ("limit", limit)):
         if value is not None and not math.isnan(value):
             words.append(f"{name} {amount(value, unit)}")
-    return ", ".join([*words, f"since {time_words(raised_ns)}"])
+    return ", ".join(words)
 
 
 def time_words(stamp_ns: int) -> str:

@@ -37,7 +37,7 @@ class Series:
     colour : str
         CSS variable of the page.
     style : str
-        ``line``, ``dashed``, ``points``, ``steps``, or ``edge`` of a band, which has no line.
+        ``line``, ``dashed``, ``points``, or ``edge`` of a band, which has no line.
     width : float
         Of a line [CSS pixels].
     """
@@ -69,8 +69,6 @@ class Panel:
         [CSS pixels].
     bands : sequence of pair of int
         Numbers of the series above and below an area that is filled in the colour of the first.
-    lanes : sequence of str
-        Words for the values 0, 1, … of each series, which is then drawn in a lane of its own.
     """
 
     title: str
@@ -79,7 +77,6 @@ class Panel:
     high: float | None = None
     height: int = 170
     bands: Sequence[tuple[int, int]] = ()
-    lanes: Sequence[str] = ()
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -424,7 +421,6 @@ def template_text(name: str) -> str:
 
 
 NOT_VALID = "not valid"
-_SEE_VERDICT = "see the verdict"
 
 
 def not_valid(verdict: Verdict, *figures: Figure) -> str:
@@ -438,7 +434,7 @@ def reason(verdict: Verdict) -> str:
     """Why the values of a verdict's list are not valid, in general words."""
     if Figure.CLEARANCES in verdict.not_valid:
         return "leg differs from its model"
-    return "leg not monitored" if verdict.state is State.NOT_MONITORED else _SEE_VERDICT
+    return "leg not monitored" if verdict.state is State.NOT_MONITORED else "see the verdict"
 
 
 def since_words(summary: ReplaySummary, stamp_ns: int) -> str:
@@ -498,8 +494,7 @@ def verdict_banner(summary: ReplaySummary, guide: str, certainty: str) -> Banner
         notes.append(("Since", since_words(summary, verdict.since_ns)))
     if verdict.not_valid:
         figures = ", ".join(figure.words for figure in verdict.not_valid)
-        why = reason(verdict)
-        notes.append(("Not valid", figures if why == _SEE_VERDICT else f"{figures}: {why}"))
+        notes.append(("Not valid", f"{figures}: {reason(verdict)}"))
     links = {"Do": ("step by step", guide)}
     if figures_of(summary):
         links[HOW_SURE] = ("measured on what", certainty)

@@ -38,8 +38,8 @@ NUMBERS = {
 SECTIONS = [
     "Joints", "Are these values valid?", "Alarms", "A gait cycle to play", "Guide", "Guide",
     "How sure is the verdict?",
-    "Clearance over time", "Forecast", "Impact forces",
-    "Wear around each bushing", "Changes of alarms", "Input health", "The recording", "Made with",
+    "Joints over time", "Forecast", "Wear around each bushing",
+    "Changes of alarms", "Input health", "The recording", "Made with",
 ]  # fmt: skip
 
 

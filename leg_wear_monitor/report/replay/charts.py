@@ -1,6 +1,6 @@
-"""Charts of a replay over time: clearances, forces, input, alarms, a single joint."""
+"""Charts over time: clearance and contact force of each joint, and the input."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import attrs
 import numpy as np
@@ -9,7 +9,7 @@ from leg_wear_monitor.estimate.cause import SURE_SIGMAS
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.materials import BushingLoad
 from leg_wear_monitor.playback.result import ReplaySummary
-from leg_wear_monitor.report.figure import opened, time_of
+from leg_wear_monitor.report.figure import time_of
 from leg_wear_monitor.report.page import (
     NOT_VALID,
     Chart,
@@ -23,12 +23,9 @@ from leg_wear_monitor.report.page import (
     value,
 )
 from leg_wear_monitor.report.replay.joints import counted_mm
-from leg_wear_monitor.state import AlarmChange, Figure
+from leg_wear_monitor.state import Figure
 
-_COLOURS = 7  # of the style sheet, templates/replay/replay.css
-_MOST_CHANGES = 1000  # of alarms that are drawn
 _STEADY = 0.1  # of the commanded cadence to either side, less does not fill the picture
-_NEAR = 3.0  # a limit beyond so many times the largest value would only flatten the curve
 
 
 def _over_time(
@@ -37,10 +34,9 @@ def _over_time(
     words: str,
     caption: str,
     panels: Sequence[Panel],
-    stamps_ns: Ints | None = None,
 ) -> Chart:
-    """A chart from begin to end of the recording; over the gait cycles if no other stamps are given."""
-    time, unit = time_of(summary, summary.history.stamp_ns if stamps_ns is None else stamps_ns)
+    """A chart over the gait cycles, from start to end of the recording."""
+    time, unit = time_of(summary, summary.history.stamp_ns)
     ends = np.array([summary.recording.begin_ns, summary.recording.end_ns], np.int64)
     begin, end = time_of(summary, ends)[0].tolist()
     return Chart(
@@ -52,61 +48,6 @@ def _over_time(
         panels=panels,
         group="time",
     )
-
-
-def _openings_chart(summary: ReplaySummary) -> Chart:
-    """How much each clearance has opened since the first gait cycle."""
-    columns, unit = opened(summary)
-    series = [
-        Series(f"opened by {joint}", unit, values, _colour(k))
-        for k, (joint, values) in enumerate(columns.items())
-    ]
-    caption = "Mean radial clearance of each joint, minus its value after the first gait cycle."
-    panels = [Panel("Opening of the clearances", series, height=260)]
-    return _over_time(summary, "clearances", "Opening of each joint's clearance", caption, panels)
-
-
-def _estimates_chart(summary: ReplaySummary) -> Chart:
-    """Clearances that encoders or the drive torque show, with their limit."""
-    seen_m = summary.history.seen_m
-    series = [
-        Series(f"clearance {joint}", "mm", 1.0e3 * values, _colour(k))
-        for k, (joint, values) in enumerate(seen_m.items())
-    ]
-    limits = {joint: 1.0e3 * each.limit_m for joint, each in summary.clearances.items() if joint in seen_m}
-    is_common = len(set(limits.values())) == 1
-    for joint, limit in list(limits.items())[: 1 if is_common else None]:
-        series.append(_limit("limit" if is_common else f"limit {joint}", "mm", limit, series[0].values))
-    caption = (
-        "Mean radial clearance of each joint as encoders or the drive torque show it, whatever is "
-        "counted; nothing is drawn while they show none."
-    )
-    panels = [Panel("Clearances by estimate", series, low=0.0, height=260)]
-    words = "Clearances that encoders or the drive torque show,"
-    return _over_time(summary, "estimates", words, caption, panels)
-
-
-def _force_chart(summary: ReplaySummary) -> Chart:
-    """Peak and mean contact force of each joint in each gait cycle, a panel a joint, all on the same axis."""
-    history, limits = summary.history, summary.monitor.limits
-    own = limits.joint_impact_force_n or [limits.impact_force_n] * len(history.peak_force_n)
-    greatest = _greatest(*history.peak_force_n.values())
-    shown = [limit for limit in own if limit < _NEAR * greatest]
-    panels = []
-    for limit, (joint, peak) in zip(own, history.peak_force_n.items(), strict=False):
-        series = [
-            Series(f"peak force {joint}", "N", peak),
-            Series(f"mean force {joint}", "N", history.mean_force_n[joint], "--ink"),
-        ]
-        if limit in shown:
-            series.append(_limit(f"limit {joint}", "N", limit, peak))
-        title, high = summary.leg.joint_words(joint), 1.05 * max([greatest, *shown])
-        panels.append(Panel(title, series, low=0.0, high=high or 1.0, height=150))
-    caption = (
-        "Contact force in each gait cycle, on the same axis for all joints. Peaks are of a heavy "
-        "tail; their scatter does not mean that the joint changes."
-    )
-    return _over_time(summary, "forces", "Peak and mean contact force of each joint", caption, panels)
 
 
 def health_chart(summary: ReplaySummary) -> Chart:
@@ -131,7 +72,7 @@ def health_chart(summary: ReplaySummary) -> Chart:
     cadence, mismatch = known("cadence", "rpm", "cadence_rpm"), known("mismatch", "", "torque_mismatch")
     mismatches = [each.values for each in mismatch]
     torque = known("measured", "N m", "measured_torque_rms_nm")
-    torque += known("predicted", "N m", "predicted_torque_rms_nm", _colour(1))
+    torque += known("predicted", "N m", "predicted_torque_rms_nm", "--series-1")
     commanded = attrs.evolve(_limit("commanded", "rpm", rpm, history.cadence_rpm), colour="--ink")
     panels = [
         Panel(
@@ -159,36 +100,8 @@ def health_chart(summary: ReplaySummary) -> Chart:
     return _over_time(summary, "input", words, caption, shown)
 
 
-def alarm_chart(summary: ReplaySummary, changes: Sequence[AlarmChange]) -> Chart:
-    """Level of each alarm that was ever raised: OK at first, and each change holds until the next one."""
-    begin, end, left = summary.recording.begin_ns, summary.recording.end_ns, len(changes) - _MOST_CHANGES
-    if left > 0:
-        changes, end = changes[:_MOST_CHANGES], changes[_MOST_CHANGES].stamp_ns
-    stamps = sorted({begin, end, *(change.stamp_ns for change in changes)})
-    names = dict.fromkeys(change.alarm.name for change in changes)
-    series = [Series(name, "", _levels(stamps, changes, name), "--careful", "steps") for name in names]
-    height, lanes = 80 + 34 * len(series), ("OK", "WARN", "ERROR")
-    panels = [Panel("Alarms", series, height=height, lanes=lanes)]
-    cut = f" The first {_MOST_CHANGES} changes; {left} later ones are not drawn." if left > 0 else ""
-    caption = f"Level of each alarm over time: 0 is OK, 1 WARN, 2 ERROR.{cut}"
-    return _over_time(summary, "alarms", "Levels of alarms", caption, panels, np.array(stamps, np.int64))
-
-
-def _levels(stamps: Iterable[int], changes: Sequence[AlarmChange], name: str) -> Floats:
-    own = {change.stamp_ns: float(change.alarm.level) for change in changes if change.alarm.name == name}
-    level, levels = 0.0, []
-    for stamp in stamps:
-        level = own.get(stamp, level)
-        levels.append(level)
-    return np.array(levels)
-
-
 def _limit(name: str, unit: str, limit: float, beside: Floats | Ints) -> Series:
     return Series(name, unit, np.full(len(beside), limit), "--bad", "dashed")
-
-
-def _colour(k: int) -> str:
-    return f"--series-{k % _COLOURS}"
 
 
 def _is_known(values: Floats) -> bool:
@@ -262,21 +175,18 @@ def _force_panel(summary: ReplaySummary, joint: str) -> Panel:
     return Panel("Contact force", series if is_valid else [], low=0.0, height=150)
 
 
-# Clearances over time and at the end, as counted and as further encoders show them.
+# The clearance joints over time and at the end.
 
 
-_TITLE = "Clearance over time"
-
-
-def clearance_section(summary: ReplaySummary) -> Section:
-    """Clearances by estimate, and the counted ones where they are valid."""
-    doubt = not_valid(summary.verdict, Figure.CLEARANCES)
-    is_seen = any(map(_is_known, summary.history.seen_m.values()))
-    seen = [_estimates_chart(summary)] if is_seen else []
-    if doubt:
-        text = Text(f"Counted clearances: {doubt}.", is_not_valid=True)
-        return Section(_TITLE, [*seen, text], is_folded=True)
-    return Section(_TITLE, [_openings_chart(summary), *seen, _table(summary)], is_folded=True)
+def joint_section(summary: ReplaySummary) -> Section:
+    """A chart per joint, and tables of the clearances, forces and loads at the end."""
+    invalid = summary.verdict.not_valid
+    parts = [part for joint in summary.joints for part in joint_trends(summary, joint)]
+    if Figure.CLEARANCES not in invalid:
+        parts.append(_table(summary))
+    if Figure.IMPACT_FORCES not in invalid:
+        parts += [_forces(summary), *_loads(summary)]
+    return Section("Joints over time", parts, is_folded=True)
 
 
 def _table(summary: ReplaySummary) -> Table:
@@ -298,59 +208,7 @@ def _table(summary: ReplaySummary) -> Table:
     )
 
 
-def clearance_sentences(summary: ReplaySummary) -> list[str]:
-    """Joints that surely are not as counted, a sentence each."""
-    sentences = []
-    for name, joint in summary.joints.items():
-        off = joint.encoders.departure_m if joint.encoders and joint.encoders.is_other else None
-        if off is not None:
-            sentences.append(
-                f"Encoders show that {summary.leg.joint_words(name)} is {1.0e6 * abs(off):.0f} µm "
-                f"{'wider' if off > 0.0 else 'narrower'} than counted."
-            )
-    return sentences
-
-
-def encoder_sections(summary: ReplaySummary) -> list[Section]:
-    """Clearances as further encoders show them, if there are such."""
-    is_counted_leg = Figure.CLEARANCES not in summary.verdict.not_valid
-    rows = []
-    for name, joint in summary.joints.items():
-        if shown := joint.encoders:
-            counted_m = summary.clearances[name].counted_m
-            estimated = None if shown.departure_m is None else counted_m + shown.departure_m
-            rows.append((
-                summary.leg.joint_words(name),
-                _millimetres(counted_m) if is_counted_leg else NOT_VALID,
-                _millimetres(estimated),
-                _millimetres(shown.sigma_m),
-                "other than counted" if shown.is_other else shown.observation.value,
-            ))  # fmt: skip
-    if not rows:
-        return []
-    title = "Clearances estimated from encoders"
-    table = Table(
-        caption=title,
-        head=("joint", "counted [mm]", "estimated [mm]", "± [mm]", ""),
-        rows=rows,
-        note="Counted: by the law of wear with the nominal coefficient. Estimated: from the angles of "
-        "further encoders over the last gait cycles; the standard deviation includes the model error.",
-    )
-    return [Section(title, [table], is_folded=True)]
-
-
-def _millimetres(metres: float | None) -> str:
-    return "-" if metres is None else f"{1.0e3 * metres:.4f}"
-
-
-# Contact forces of each joint over time.
-
-
-def force_section(summary: ReplaySummary) -> Section:
-    """Chart and table."""
-    doubt = not_valid(summary.verdict, Figure.IMPACT_FORCES)
-    if doubt:
-        return Section("Impact forces", [Text(doubt, is_not_valid=True)], is_folded=True)
+def _forces(summary: ReplaySummary) -> Table:
     rows = [
         (
             summary.leg.joint_words(name),
@@ -360,8 +218,7 @@ def force_section(summary: ReplaySummary) -> Section:
         )
         for name, joint in summary.joints.items()
     ]
-    table = Table(caption="Contact forces", head=("joint", "peak [N]", "mean [N]", "impacts"), rows=rows)
-    return Section("Impact forces", [_force_chart(summary), table, *_loads(summary)], is_folded=True)
+    return Table(caption="Contact forces", head=("joint", "peak [N]", "mean [N]", "impacts"), rows=rows)
 
 
 def _loads(summary: ReplaySummary) -> list[Part]:

@@ -11,7 +11,7 @@ from leg_wear_monitor.monitor.alarms import joint_of
 from leg_wear_monitor.monitor.forecast.forecast import clearance_mm, three_digits
 from leg_wear_monitor.monitor.verdict.situation import MEASURED, SEEN, SOURCES
 from leg_wear_monitor.playback.result import Place, ReplaySummary
-from leg_wear_monitor.report.page import LEVEL_LOOKS, STATE_LOOKS, not_valid, render
+from leg_wear_monitor.report.page import LEVEL_LOOKS, NOT_VALID, STATE_LOOKS, not_valid, render
 from leg_wear_monitor.state import Figure, JointClearance, LegAlarm, Level, LifeHours, State
 
 # A clearance joint as the first screen shows it: only values that are valid.
@@ -373,7 +373,7 @@ def _is_near(one: Place, other: Place) -> bool:
 def _words(view: JointView) -> str:
     known = view.clearance
     if known is None or known.believed_m is None:
-        return "not valid" if view.doubt.startswith("not valid") else "not known"
+        return NOT_VALID if known else "not known"
     if view.used is None:
         return "not monitored"
     if view.used >= 1.0:

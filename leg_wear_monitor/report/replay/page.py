@@ -6,7 +6,7 @@ import attrs
 
 from leg_wear_monitor.files import or_nan, share_directory
 from leg_wear_monitor.monitor.alarm_specs import KINDS
-from leg_wear_monitor.monitor.alarms import amount, joint_of, raised_words, time_words
+from leg_wear_monitor.monitor.alarms import amount, joint_of, raised_values, time_words
 from leg_wear_monitor.monitor.verdict.decision import decision_of, figures_of
 from leg_wear_monitor.monitor.verdict.situation import COUNTED
 from leg_wear_monitor.monitor.verdict.verdict import guide_to
@@ -37,12 +37,8 @@ from leg_wear_monitor.report.page import (
     verdict_banner,
 )
 from leg_wear_monitor.report.replay.charts import (
-    alarm_chart,
-    clearance_section,
-    clearance_sentences,
-    encoder_sections,
-    force_section,
     health_chart,
+    joint_section,
 )
 from leg_wear_monitor.report.replay.forecast_section import forecast_section, wear_section
 from leg_wear_monitor.report.replay.joints import joints_and_leg
@@ -67,13 +63,13 @@ def _raised(summary: ReplaySummary, alarm: LegAlarm) -> dict[str, str]:
     joint = joint_of(alarm.name)
     name = f"{alarm.name.removesuffix(joint)}{summary.leg.joint_words(joint)}" if joint else alarm.name
     by = _source(summary.clearances.get(joint), alarm.worst) if alarm.name == f"clearance {joint}" else None
-    words = raised_words(alarm.state, alarm.worst, alarm.limit, alarm.unit, alarm.raised_ns, by)
+    values = raised_values(alarm.state, alarm.worst, alarm.limit, alarm.unit, by)
     doubt = _alarm_doubt(summary, alarm)
     return {
         "symbol": symbol,
         "look": look,
         "title": f"{alarm.level.name} {name}",
-        "words": alarm.state if doubt else words.rpartition(", since ")[0],
+        "words": alarm.state if doubt else values,
         "doubt": doubt,
         "since": f"since {since_words(summary, alarm.raised_ns)}",
     }
@@ -99,7 +95,7 @@ def _alarm_doubt(summary: ReplaySummary, alarm: LegAlarm) -> str:
 
 
 def change_section(summary: ReplaySummary) -> Section:
-    """Chart and table of the changes."""
+    """Table of the changes."""
     title, changes = "Changes of alarms", summary.alarms.changes
     if not changes:
         return Section(title, [Text("No alarm was raised in the recording.")], is_folded=True)
@@ -110,7 +106,7 @@ def change_section(summary: ReplaySummary) -> Section:
         rows=[_row(summary, change) for change in changes[:MOST_ROWS]],
         note=f"{more} more are in summary.json." if more > 0 else "",
     )
-    return Section(title, [alarm_chart(summary, changes), table], is_folded=True)
+    return Section(title, [table], is_folded=True)
 
 
 def _row(summary: ReplaySummary, change: AlarmChange) -> tuple[str, ...]:
@@ -209,7 +205,6 @@ def certainty_section(summary: ReplaySummary) -> Section:
 
 
 _ANSWERS = {Level.OK: "yes", Level.WARN: "in part", Level.ERROR: "no"}
-_MOST_SENTENCES = 3
 _LEAST_REST = 0.01  # of the torque, as the verdict of a healthy leg says it
 
 _Card = tuple[str, Level, list[str]]
@@ -239,11 +234,7 @@ def _input(summary: ReplaySummary) -> _Card:
     status, level, why = _status(summary, "input"), Level.OK, []
     if status:
         level = status.level
-        parts = status.message.split("; ")
-        sentences = [part for part in parts if not part.startswith("see: ")] or parts
-        why += sentences[:_MOST_SENTENCES]
-        if len(sentences) > _MOST_SENTENCES:
-            why.append(f"{len(sentences) - _MOST_SENTENCES} more below")
+        why.append(status.message)
     if summary.recording.is_partial:
         level = max(level, Level.WARN)
         why.append("the recording is damaged or incomplete: only its readable part is used")
@@ -258,7 +249,7 @@ def _torque(summary: ReplaySummary) -> _Card:
     if status is None:
         return "Torque", Level.ERROR, [summary.diagnosis.reason or "unknown"]
     is_compared = status.values.get("mismatch") is not None
-    return "Torque", status.level if is_compared else Level.ERROR, status.message.split("; ")
+    return "Torque", status.level if is_compared else Level.ERROR, [status.message]
 
 
 def _cadence(summary: ReplaySummary) -> _Card:
@@ -338,8 +329,7 @@ def replay_page(summary: ReplaySummary) -> Page:
     sections += [Section("Alarms", [Fragment(raised)]), *motion_section(summary)]
     shown = len(sections)
     if summary.gait.believable_cycles:
-        sections += [clearance_section(summary), *encoder_sections(summary), forecast_section(summary)]
-        sections += [force_section(summary), wear_section(summary)]
+        sections += [joint_section(summary), forecast_section(summary), wear_section(summary)]
     sections += [change_section(summary), health_section(summary), recording_section(recording)]
     guides, sure = guide_sections(summary), certainty_section(summary)
     return Page(
@@ -358,7 +348,7 @@ def replay_page(summary: ReplaySummary) -> Page:
 def _joints(summary: ReplaySummary) -> Section:
     """The leg's picture beside a row a joint, and what follows for the leg."""
     parts: list[Part] = [Fragment(joints_and_leg(summary))]
-    sentences = [*_gait_sentences(summary.gait), *clearance_sentences(summary)]
+    sentences = _gait_sentences(summary.gait)
     if sentences:
         parts.append(Sentences(sentences))
     return Section("Joints", parts)

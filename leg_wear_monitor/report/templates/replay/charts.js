@@ -21,21 +21,14 @@
 
   function seriesOf(panel) {
     return panel.series.map((series, k) => {
-      const points = series.style === "points", steps = series.style === "steps";
+      const points = series.style === "points";
       const isEdge = series.style === "edge";
       const drawn = { label: series.name, stroke: () => colour(series.colour), width: points || isEdge ? 0 : series.width };
       if (series.style === "dashed") drawn.dash = [6, 4];
       if (points) drawn.paths = () => null;
       drawn.points = { show: points ? true : isEdge ? false : undefined, size: points ? 9 : 5 };
-      if (steps) {
-        drawn.paths = uPlot.paths.stepped({ align: 1 });
-        drawn.points.show = false;
-        drawn.fill = () => colour(series.colour) + "55";
-        drawn.fillTo = () => k;
-      }
       drawn.value = (_, value) => {
         if (value === null || value === undefined) return "–";
-        if (panel.lanes.length) return panel.lanes[Math.round((value - k) / 0.4)];
         return short(value) + (series.unit ? " " + series.unit : "");
       };
       return drawn;
@@ -47,23 +40,10 @@
     axis.size = narrow ? 52 : 64;
     axis.values = (_, values, k, space, step) =>
       values.map((value) => (value === null ? "" : step < 1e-6 ? short(value) : value.toFixed(decimals(step))));
-    if (panel.lanes.length) axis.values = (_, values) => values.map(() => "");
     return axis;
   }
 
-  function nameLanes(plot, panel) {
-    const context = plot.ctx, ratio = devicePixelRatio;
-    context.save();
-    context.fillStyle = colour("--ink");
-    context.textAlign = "left";
-    context.font = 12 * ratio + "px sans-serif";
-    panel.series.forEach((series, k) =>
-      context.fillText(series.name, plot.bbox.left + 6 * ratio, plot.valToPos(k + 0.12, "y", true)));
-    context.restore();
-  }
-
   function rangeOf(panel) {
-    if (panel.lanes.length) return [-0.1, panel.series.length];
     return (_, low, high) => {
       const own = uPlot.rangeNum(low === null ? 0 : low, high === null ? 1 : high, 0.1, true);
       return [panel.low === null ? own[0] : panel.low, panel.high === null ? own[1] : panel.high];
@@ -94,7 +74,6 @@
         yAxis(panel, width < NARROW)
       ],
       hooks: {
-        draw: panel.lanes.length ? [(plot) => nameLanes(plot, panel)] : [],
         setScale: [(plot, key) => { if (key === "x" && plot.status) share(plot, chart.group); }]
       }
     };
@@ -143,8 +122,7 @@
     let first = 1;
     const plots = chart.panels.map((panel) => {
       const own = columns.slice(first, (first += panel.series.length));
-      const lanes = (column, k) => column.map((value) => (value === null ? null : k + 0.4 * value));
-      const data = [columns[0]].concat(panel.lanes.length ? own.map(lanes) : own);
+      const data = [columns[0]].concat(own);
       const plot = new uPlot(settingsOf(chart, panel, box.clientWidth), data, box);
       plot.ends = chart.ends;
       reset(plot);

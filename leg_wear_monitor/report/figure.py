@@ -17,7 +17,7 @@ from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.playback.result import ReplaySummary
-from leg_wear_monitor.wear import BUSHING, JOURNAL, Surfaces, wear_zone
+from leg_wear_monitor.wear import BUSHING, JOURNAL, wear_zone
 
 # Style of the figures: matplotlib without pyplot, in colours that colour-blind readers can distinguish.
 
@@ -225,20 +225,18 @@ _DEEPEST = 0.5  # drawn depth of the greatest wear depth, as a multiple of the b
 _SUPERSCRIPT = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def worn_bushings(
-    surfaces: Surfaces, names: tuple[str, ...], radius_m: tuple[float, ...], cycles: float
-) -> Figure:
+def worn_bushings(depth: Floats, names: Sequence[str], radius_m: Sequence[float], title: str) -> Figure:
     """Figure of each joint's worn surfaces: a section with exaggerated depth, and the depth over the angle.
 
     Parameters
     ----------
-    surfaces : Surfaces
-    names : tuple of str
-        The joints, in the order of the surfaces.
-    radius_m : tuple of float
+    depth : (k, 2, N) array
+        Wear depth of bushing and journal [m].
+    names : sequence of str
+        The joints, in the order of the depths.
+    radius_m : sequence of float
         Radii of their bushings [m]; the exaggeration factor refers to them.
-    cycles : float
-        Number of gait cycles of the run, for the title.
+    title : str
 
     Returns
     -------
@@ -246,20 +244,19 @@ def worn_bushings(
     """
     figure = new_figure(max(2, len(names)) * _COLUMN_IN, 4.9)
     grid = figure.add_gridspec(3, len(names), height_ratios=(3.0, 2.0, 0.3))
-    scale, unit = length_unit(float(surfaces.depth.max()))
+    scale, unit = length_unit(float(depth.max()))
     for k, name in enumerate(names):
-        depth, zone = surfaces.depth[k], wear_zone(surfaces.depth[k, BUSHING])
+        zone = wear_zone(depth[k, BUSHING])
         section = figure.add_subplot(grid[0, k], projection="polar")
-        exaggerated = draw_section(section, depth, zone, radius_m[k])
+        exaggerated = draw_section(section, depth[k], zone, radius_m[k])
         section.set_title(f"{name}\n{exaggerated}", fontsize=USUAL, color=INK)
         unrolled = figure.add_subplot(grid[1, k])
-        draw_depth(unrolled, scale * depth[None], zone)
+        draw_depth(unrolled, scale * depth[k], zone)
         unrolled.set_xticks((0.0, 90.0, 180.0, 270.0, 360.0))
         unrolled.set_xlabel("angle in its own body [°]", fontsize=SMALL)
         if k == 0:
             unrolled.set_ylabel(f"depth [{unit}]", fontsize=SMALL)
     _draw_key(figure.add_subplot(grid[2, :]))
-    title = f"Wear after {cycles:.4g} gait cycles"
     figure.suptitle(title, fontsize=USUAL, fontweight="bold", color=INK)
     return figure
 
@@ -307,21 +304,14 @@ def _factor(value: float) -> str:
 
 
 def draw_depth(axes: Axes, depth: Floats, zone: tuple[float, float] | None) -> None:
-    """Draw the depth (r, 2, N) of bushing and journal in r runs over the angle [deg], and shade the zone.
-
-    Over three turns, so that a zone across 0 is not cut. Of several runs, the least and the greatest are the
-    ends of a band around the mean.
-    """
-    n = depth.shape[2]
-    angle = (np.arange(-n, 2 * n) + 0.5) * (360.0 / n)
+    """Draw the depth (2, N) of bushing and journal over the angle [deg], and shade the zone."""
+    angle = (np.arange(depth.shape[1]) + 0.5) * (360.0 / depth.shape[1])
     if zone is not None:
-        for turn in (0.0, -360.0):
+        for turn in (0.0, -360.0):  # a zone may cross 360 degrees
             axes.axvspan(zone[0] + turn, zone[1] + turn, color=PALE, alpha=0.6, linewidth=0.0)
     for surface, colour in ((BUSHING, BLUE), (JOURNAL, VERMILION)):
-        runs = np.tile(depth[:, surface], 3)
-        low = runs.min(axis=0) if len(runs) > 1 else 0.0
-        axes.fill_between(angle, low, runs.max(axis=0), color=colour, alpha=0.25, linewidth=0.0)
-        axes.plot(angle, runs.mean(axis=0), color=colour, linewidth=1.0)
+        axes.fill_between(angle, 0.0, depth[surface], color=colour, alpha=0.25, linewidth=0.0)
+        axes.plot(angle, depth[surface], color=colour, linewidth=1.0)
     tidy(axes)
     axes.set_xlim(0.0, 360.0)
     axes.set_ylim(0.0, 1.05 * float(depth.max()) or 1.0)

@@ -329,5 +329,6 @@ def pictures(mechanism: Mechanism, result: SimulationResult) -> dict[str, bytes 
     if result.surfaces is not None and joints:
         radii = tuple(mechanism.clearances[name].bushing_radius for name in joints)
         cycles = abs(result.speed_rpm) / 60.0 * result.simulated_s
-        files["wear.png"] = png(worn_bushings(result.surfaces, joints, radii, cycles))
+        title = f"Wear after {cycles:.4g} gait cycles"
+        files["wear.png"] = png(worn_bushings(result.surfaces.depth, joints, radii, title))
     return files

@@ -96,7 +96,7 @@ def write_study_page(path: Path) -> int:
     """Draw the page of a study from the data in its directory; 1 if something is missing there."""
     from leg_wear_monitor.files import json_text
     from leg_wear_monitor.report.page import page_html
-    from leg_wear_monitor.report.study.page import study_page
+    from leg_wear_monitor.report.study_page import study_page
     from leg_wear_monitor.studies.results import load_results
 
     results = load_results(path)

@@ -1,0 +1,576 @@
+"""HTML page of a study: its question, tables and pictures, from the results in its directory."""
+
+import io
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+from ruamel.yaml import YAML
+
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.materials import lacks_wear
+from leg_wear_monitor.mechanism.position import build_linkage, one_cycle
+from leg_wear_monitor.mechanism.reach import Reach
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.report.figure import (
+    BLUE,
+    BODY_COLOURS,
+    INK,
+    LEAST_N,
+    SKY,
+    SMALL,
+    draw_clearances,
+    finish,
+    new_figure,
+    png,
+    worn_bushings,
+)
+from leg_wear_monitor.report.leg_picture import leg_picture
+from leg_wear_monitor.report.leg_slider import leg_data, leg_slider, run_data
+from leg_wear_monitor.report.page import Fragment, Gallery, Page, Part, Picture, Section, Table, Text
+from leg_wear_monitor.studies.kinds import STUDIES
+from leg_wear_monitor.studies.life_tasks import exponent, period_of
+from leg_wear_monitor.studies.plan import (
+    ARCHARD,
+    DEPTH,
+    ERRORS,
+    TITLES,
+    Arrays,
+    Found,
+    Spread,
+    clearance_joints_of,
+    fraction_of_range,
+    largest_error,
+    of_joint,
+    power_law,
+    spread,
+    worst_zone,
+)
+from leg_wear_monitor.studies.results import CONFIDENCE, FAILS, HOLDS, UNDECIDED, StudyResults
+
+_UNITS = (("mm", 1.0e3), ("m/s", 1.0), ("m/s²", 1.0), ("N m", 1.0))
+_QUANTITIES = tuple((name, title, *unit) for name, title, unit in zip(ERRORS, TITLES, _UNITS, strict=True))
+# settings that may vary from point to point: label of the axis, factor from SI
+_AXES = {
+    "clearance_m": ("radial clearance [mm]", 1.0e3),
+    "speed_rpm": ("crank speed [rpm]", 1.0),
+    "ground_n": ("vertical force of the ground, peak [N]", 1.0),
+}
+_FORCES = {
+    "peak_force_n": ("largest force in a cycle [N]", 1.0),
+    "p99_force_n": ("force, 99 % of the time below [N]", 1.0),
+    "mean_force_n": ("mean force [N]", 1.0),
+    "impacts": ("impacts per cycle", 1.0),
+    "impact_speed_mps": ("mean approach speed [mm/s]", 1.0e3),
+    "contact_fraction": ("time in contact [%]", 100.0),
+    "repeats_contact_force": ("variance of the force that repeats [%]", 100.0),
+}
+_WEAR = {
+    DEPTH: ("greatest wear depth [pm/cycle]", 1.0e12),
+    ARCHARD: ("∫ F |v| dt [J/cycle]", 1.0),
+}
+_CHARTS = ("peak_force_n", "p99_force_n", "mean_force_n", DEPTH, ARCHARD)
+_MOST_SHOWN = 6  # points with curves and surfaces; of more points, the first, the middle and the last
+_CLEARANCE_FRACTION = 0.3  # drawn clearance, as a fraction of the bushing's radius
+_FORGET = 3  # first cycles of an exponent, in which the neighbours turn into the fastest growing direction
+_LONGEST, _SAME = 16, 1.0e-3  # longest period searched [cycles]; tolerance for equal points [clearances]
+_KEY = "Shaded: the middle 90 % of all cycles. Blue: one cycle of one run, as an example. Dashed: ideal leg."
+
+
+def study_page(results: StudyResults) -> Page:
+    """The page of a study; a study without any result has a page that lists the missing points."""
+    found, lives, exponents = (results.of(task) for task in ("response", "life", "exponent"))
+    lines = [f"{label}: {fault}." for label, fault in results.faults]
+    lines += [f"Not computed yet: {', '.join(results.missing)}."] if results.missing else []
+    parts: dict[str, Sequence[Part]] = {"Missing points": [Text(line) for line in lines]}
+    parts["Question"] = _question(results)
+    if results.of("leg"):
+        parts["Claims of the paper"] = _claims(results)
+    if found:
+        shown = found if len(found) <= _MOST_SHOWN else [found[0], found[len(found) // 2], found[-1]]
+        parts["Results"] = [_error_table(found), *_sum_table(found), _force_table(found), _wear_table(found)]
+        parts["Comparison"] = [_comparison(found)] if len(found) > 1 else []
+        parts["One gait cycle"] = [_slider(results.mechanism, shown)]
+        parts["Curves of a cycle"] = _curves(shown)
+        parts["Wear of a million cycles"] = [
+            _worn(results.mechanism, point.label, arrays, 1.0e6 * arrays[DEPTH].mean(axis=0))
+            for point, arrays in shown
+        ]
+    if lives:
+        worn = [
+            _worn(
+                results.mechanism,
+                f"{point.label}, end of life",
+                arrays,
+                arrays["depth_m"][:, -1].mean(axis=0),
+            )
+            for point, arrays in lives
+        ]
+        parts["Life with wear"] = [_life_table(lives), _life_gallery(lives), *worn]
+    if exponents:
+        parts["Lyapunov exponents"] = [_exponent_table(exponents)]
+    parts |= _sections_of_cycles(results)
+    buffer = io.StringIO()
+    YAML().dump(attrs.asdict(results.settings), buffer)
+    return Page(
+        title=f"{STUDIES[results.study].title}: {results.mechanism.name}",
+        summary=STUDIES[results.study].question,
+        sections=[Section(title, each) for title, each in parts.items() if each],
+        configuration=buffer.getvalue(),
+        versions={**results.versions, "seed": str(results.settings.ensemble.seed)},
+    )
+
+
+def _question(results: StudyResults) -> list[Part]:
+    """The ensemble in words, and the leg."""
+    ensemble = results.settings.ensemble
+    text = (
+        f"Each value is a mean over {ensemble.runs} runs with different initial crank angles and journal "
+        f"positions. Each run counts {ensemble.cycles} gait cycles after {ensemble.skip_cycles} cycles that "
+        "it does not count. Motion with clearance is chaotic, so a single run is only an example."
+    )
+    joints = list(dict.fromkeys(name for point in results.points for name in point.clearance_joints))
+    lacking = [joint for joint in joints if lacks_wear(results.mechanism.clearances[joint])]
+    if lacking:
+        text += f" The material pair of {', '.join(lacking)} has no wear coefficient, so its wear is unknown."
+    caption = f"The leg to scale. Clearance joints of this study: {', '.join(joints)}."
+    return [
+        Text(text),
+        Picture(image=png(leg_picture(results.mechanism, joints)), alt=caption, caption=caption, wide=True),
+    ]
+
+
+# Numbers as text, and tables.
+
+
+def number(value: float) -> str:
+    """A number with three significant digits; with an exponent below 0.001 and from a million on."""
+    if not math.isfinite(value):
+        return "–"
+    if value == 0.0:
+        return "0"
+    if not 1.0e-3 <= abs(value) < 1.0e6:
+        return f"{value:.2e}"
+    return f"{value:.{max(0, 2 - math.floor(math.log10(abs(value))))}f}"
+
+
+def with_spread(value: Spread, factor: float = 1.0) -> str:
+    """Mean and standard deviation, with two digits of the deviation and at most four of the mean."""
+    mean, deviation = factor * value.mean, factor * value.deviation
+    if not deviation > 0.0 or mean == 0.0:
+        return number(mean)
+    most = max(0, 3 - math.floor(math.log10(abs(mean))))
+    digits = max(0, min(most, 1 - math.floor(math.log10(deviation))))
+    least = 10.0**-digits
+    return f"{mean:.{digits}f} ± " + (
+        f"{deviation:.{digits}f}" if deviation >= 0.5 * least else f"<{least:.{digits}f}"
+    )
+
+
+def _zone_text(zone: tuple[float, float] | None) -> str:
+    return (
+        "–"
+        if zone is None
+        else f"{zone[0] % 360.0:.0f}° to {zone[1] % 360.0:.0f}° ({zone[1] - zone[0]:.0f}°)"
+    )
+
+
+def _known(found: Found) -> list[tuple[str, str, str, float]]:
+    """Quantities whose ideal curve all results contain; a leg without a toe has the drive torque only."""
+    return [each for each in _QUANTITIES if all(f"ideal_{each[0]}" in arrays for _, arrays in found)]
+
+
+def _error_table(found: Found) -> Table:
+    known, axis = _known(found), _axis(found)
+    rows = [
+        [point.label]
+        + [with_spread(largest_error(arrays, name), factor) for name, _, _, factor in known]
+        + [f"{number(100.0 * fraction_of_range(arrays, name))} %" for name, *_ in known]
+        for point, arrays in found
+    ]
+    note = "Mean and standard deviation over the cycles of all runs. The range is that of the ideal curve."
+    if axis and len(found) > 3 and min(axis[1]) > 0.0:
+        laws = [
+            power_law(axis[1], [largest_error(arrays, name).mean for _, arrays in found])
+            for name, *_ in known
+        ]
+        rows.append(
+            [
+                "exponent of a power law",
+                *(f"{p:.2f} ± {error:.2f}" for p, error in laws),
+                *("" for _ in known),
+            ]
+        )
+    head = [f"{title} [{unit}]" for _, title, unit, _ in known] + [
+        f"{title}, of its range" for _, title, *_ in known
+    ]
+    return Table(
+        caption="Largest error against the ideal leg in one cycle", head=["", *head], rows=rows, note=note
+    )
+
+
+def _sum_table(found: Found) -> list[Table]:
+    """Errors of all clearances at once against the sum of each place, if the last point has all joints."""
+    *alone, (_, whole) = found
+    each = [joint for _, arrays in alone for joint in clearance_joints_of(arrays)]
+    if len(alone) < 2 or sorted(each) != sorted(clearance_joints_of(whole)):
+        return []
+    rows = []
+    for name, title, unit, factor in _known(found):
+        total = sum(largest_error(arrays, name).mean for _, arrays in alone)
+        together = largest_error(whole, name)
+        part = f"{100.0 * together.mean / total:.0f} %"
+        rows.append([f"{title} [{unit}]", with_spread(together, factor), number(factor * total), part])
+    head = ("largest error", "all at once", "sum of the places alone", "of the sum")
+    return [Table(caption="All clearances at once against the sum of each place", head=head, rows=rows)]
+
+
+def _joint_rows(found: Found) -> list[tuple[str, Arrays, str]]:
+    return [
+        (point.label if point.label == joint else f"{point.label}: {joint}", arrays, joint)
+        for point, arrays in found
+        for joint in clearance_joints_of(arrays)
+    ]
+
+
+def _force_table(found: Found) -> Table:
+    rows = [
+        [
+            label,
+            *(with_spread(of_joint(arrays, name, joint), factor) for name, (_, factor) in _FORCES.items()),
+        ]
+        for label, arrays, joint in _joint_rows(found)
+    ]
+    note = (
+        "Mean and standard deviation: largest forces and impacts over the cycles of all runs, the rest over "
+        "runs. A single largest force is a sample of a heavy tail; compare the 99 %. A periodic force "
+        "repeats to 100 %."
+    )
+    head = ["joint", *(title for title, _ in _FORCES.values())]
+    return Table(
+        caption="Contact forces and impacts of the clearance joints", head=head, rows=rows, note=note
+    )
+
+
+def _wear_table(found: Found) -> Table:
+    rows = [
+        [
+            label,
+            *(with_spread(of_joint(arrays, name, joint), factor) for name, (_, factor) in _WEAR.items()),
+            *(_zone_text(worst_zone(arrays, joint, fraction)) for fraction in (0.5, 0.9)),
+        ]
+        for label, arrays, joint in _joint_rows(found)
+    ]
+    note = (
+        "1 pm per cycle is 1 µm in a million cycles. Mean and standard deviation over runs. Angles are in "
+        "the frame of the body with the bushing. Depths are proportional to the wear coefficient."
+    )
+    head = ["joint", *(title for title, _ in _WEAR.values()), "zone with half of the wear", "zone with 90 %"]
+    return Table(caption="Wear of the bushings", head=head, rows=rows, note=note)
+
+
+def _life_table(lives: Found) -> Table:
+    rows = []
+    for point, arrays in lives:
+        mean, cycles = arrays["clearance_mean_m"], spread(arrays["cycles"][:, -1])
+        rates = arrays["rate_m_per_cycle"].mean(axis=(3, 4), dtype=float)  # of bushing and journal
+        for k, joint in enumerate(clearance_joints_of(arrays)):
+            opened, new, end = (
+                spread(each) for each in (mean[:, -1, k] - mean[:, 0, k], rates[:, 0, k], rates[:, 1, k])
+            )
+            texts = with_spread(opened, 1.0e3), with_spread(new, 1.0e12), with_spread(end, 1.0e12)
+            rows.append([f"{point.label}: {joint}", with_spread(cycles, 1.0e-6), *texts])
+    head = (
+        "joint",
+        "life [million cycles]",
+        "opened by then [mm]",
+        "wear when new [pm/cycle]",
+        "at the end [pm/cycle]",
+    )
+    note = "Mean and standard deviation over runs. A life ends when the first joint has opened as configured."
+    return Table(caption="Lives with wear feedback", head=head, rows=rows, note=note)
+
+
+def _exponent_table(exponents: Found) -> Table:
+    rows = []
+    for point, arrays in exponents:
+        one, (runs, cycles) = (
+            exponent(arrays["stretch_per_cycle"], 1.0, _FORGET),
+            arrays["stretch_per_cycle"].shape,
+        )
+        grows = number(math.log(1000.0) / one.value) if one.value > 0.0 else "–"
+        rows.append(
+            [point.label, f"{one.value:.2f} ± {one.error:.2f}", grows, f"{runs} × {cycles - _FORGET}"]
+        )
+    head = ("", "exponent [1/cycle]", "cycles in which an error grows a thousandfold", "pairs × cycles")
+    note = "Mean and standard error over pairs of neighbours (Benettin and others 1980). Above 0: chaotic."
+    return Table(caption="Largest Lyapunov exponent", head=head, rows=rows, note=note)
+
+
+def _claims(results: StudyResults) -> list[Part]:
+    claims = results.claims()
+    rejected = ", ".join(f"{reason.replace('_', ' ')} {count}" for reason, count in claims.rejected.items())
+    drawn = claims.legs + sum(claims.rejected.values())
+    rows = []
+    for one in claims.claims:
+        low, high = (100.0 * end for end in one.interval)
+        part = "–" if one.fraction is None else f"{100.0 * one.fraction:.0f} ({low:.0f} to {high:.0f})"
+        decides = ", ".join(f"{each.factor} ({each.rank_correlation:+.2f})" for each in one.influences)
+        counts = [str(one.count(state)) for state in (HOLDS, FAILS, UNDECIDED)]
+        rows.append([one.claim.place, one.claim.text, *counts, part, one.file_state or "–", decides or "–"])
+    ends = ("of the decided legs [%]", "leg of the file", "decided by (rank correlation)")
+    note = (
+        f"Undecided: within the scatter over runs (Student's t, {CONFIDENCE:.0%}). Fraction: with Wilson's "
+        f"interval of {CONFIDENCE:.0%}. Decided by: lengths and masses whose rank correlation is significant "
+        "after Holm's correction; positive if a longer or heavier body favours the claim."
+    )
+    text = f"{claims.legs} of {drawn} drawn legs walk{rejected and f'. Rejected: {rejected}'}."
+    head = ("clearance in", "claim", HOLDS, FAILS, UNDECIDED, *ends)
+    caption = "The paper's claims in legs of different lengths and masses"
+    return [Text(text), Table(caption=caption, head=head, rows=rows, note=note, is_text=True)]
+
+
+# Pictures.
+
+
+def _axis(found: Found) -> tuple[str, list[float]] | None:
+    """Label and values of the one quantity that varies from point to point; None if it is not a number."""
+    varied = [key for key in _AXES if len({point.settings.get(key) for point, _ in found}) > 1]
+    if len(varied) != 1:
+        return None
+    label, factor = _AXES[varied[0]]
+    return label, [factor * point.settings[varied[0]] for point, _ in found]
+
+
+def _comparison(found: Found) -> Gallery:
+    """A chart of each statistic over the varied quantity, or over the points by name."""
+    joints = list(dict.fromkeys(joint for _, arrays in found for joint in clearance_joints_of(arrays)))
+    pictures = []
+    for name, title, unit, factor in _known(found):
+        errors = [largest_error(arrays, name) for _, arrays in found]
+        pictures.append(_chart(found, f"{title}, largest error [{unit}]", factor, {"": errors}))
+    for name in _CHARTS:
+        title, factor = (_FORCES | _WEAR)[name]
+        lines = {
+            joint: [
+                of_joint(arrays, name, joint) if joint in clearance_joints_of(arrays) else None
+                for _, arrays in found
+            ]
+            for joint in joints
+        }
+        pictures.append(_chart(found, title, factor, lines))
+    return Gallery(pictures=pictures, caption="Points: means. Bars: from the 10th to the 90th percentile.")
+
+
+def _chart(found: Found, title: str, factor: float, lines: Mapping[str, Sequence[Spread | None]]) -> Picture:
+    """Means with bars; of each line a value, or None, for each point."""
+    axis, texts, figure = _axis(found), [], new_figure(4.6, 3.0)
+    axes = figure.subplots()
+    for k, (name, spreads) in enumerate(lines.items()):
+        known = [(i, one) for i, one in enumerate(spreads) if one]
+        x = [axis[1][i] if axis else i + 0.06 * (k - 0.5 * len(lines)) for i, _ in known]
+        low, mean, high = factor * np.array([(one.low, one.mean, one.high) for _, one in known]).T
+        look: dict[str, Any] = {"color": BODY_COLOURS[k % 7], "marker": "os^Dv"[k % 5], "ms": 4.0}
+        bars = np.maximum(0.0, (mean - low, high - mean))
+        axes.errorbar(
+            x, mean, bars, label=name or None, linewidth=float(axis is not None), elinewidth=1.0, **look
+        )
+        texts.append(f"{name} {', '.join(f'{value:.3g}' for value in mean)}")
+    if not axis:
+        labels = [point.label for point, _ in found]
+        axes.set_xticks(range(len(found)), labels, rotation=20 if len(found) > 4 else 0)
+        axes.set_xlim(-0.5, len(found) - 0.5)
+    axes.set_ylim(0.0, 1.15 * axes.dataLim.y1 or 1.0)
+    finish(axes, title, x=axis[0] if axis else "", columns=5)
+    return Picture(image=png(figure), alt=f"{title}: {'; '.join(texts)}")
+
+
+def _curves(found: Found) -> list[Gallery]:
+    """Curves over the crank angle: a gallery for each quantity, with a picture for each point."""
+    galleries = []
+    for name, title, unit, factor in _known(found):
+        is_toe, apart = name.startswith("toe"), name == "toe_position_m"
+        panels = []
+        for _, arrays in found:
+            ideal = factor * arrays[f"ideal_{name}"] * (not apart)
+            band, example = (
+                factor * arrays[f"{kind}_{name}"] + ideal * is_toe for kind in ("band", "example")
+            )
+            panels.append(
+                [each.reshape(*each.shape[: each.ndim - is_toe], -1) for each in (ideal, band, example)]
+            )
+        what = f"{title}, deviation from the ideal leg" if apart else title
+        galleries.append(
+            _curve_gallery(found, f"{what} [{unit}]", panels, [["x", "y"] if is_toe else [""]] * len(found))
+        )
+    panels = [
+        [
+            arrays["ideal_joint_force_n"][:, np.searchsorted(arrays["joints"], arrays["clearance_joints"])],
+            arrays["band_contact_force_n"],
+            np.linalg.norm(arrays["example_contact_force_n"], axis=-1),
+        ]
+        for _, arrays in found
+    ]
+    title = f"contact force [N], logarithmic; at {LEAST_N} N the journal is free"
+    return [
+        *galleries,
+        _curve_gallery(found, title, panels, [clearance_joints_of(arrays) for _, arrays in found], True),
+    ]
+
+
+def _curve_gallery(
+    found: Found, title: str, panels: list[list[Floats]], names: list[list[str]], is_log: bool = False
+) -> Gallery:
+    """Pictures of curves: ideal (s, n), band (3, s, n) and example (s, n) of n components at each point."""
+    low = min(float(curve.min()) for point in panels for curve in point[:2])
+    high = max(float(curve.max()) for point in panels for curve in point[:2])
+    margin, pictures = 0.05 * (high - low) or 1.0, []
+    for (point, _), curves, components in zip(found, panels, names, strict=True):
+        figure = new_figure(4.6, 1.2 * len(components) + 0.75)
+        every = np.atleast_1d(figure.subplots(len(components), 1, sharex=True))
+        for i, (axes, component) in enumerate(zip(every, components, strict=True)):
+            ideal, band, example = (
+                np.maximum(each[..., i], LEAST_N) if is_log else each[..., i] for each in curves
+            )
+            angle = np.arange(len(example)) * (360.0 / len(example))
+            axes.fill_between(angle, band[0], band[-1], color=SKY, alpha=0.45, linewidth=0.0)
+            axes.plot(angle, ideal, color=INK, linewidth=1.2, linestyle=(0, (4, 2)))
+            axes.plot(angle, example, color=BLUE, linewidth=0.7)
+            axes.set(xlim=(0.0, 360.0), xticks=(0.0, 90.0, 180.0, 270.0, 360.0))
+            axes.set(yscale="log") if is_log else axes.set(ylim=(low - margin, high + margin))
+            finish(axes, "" if i else point.label, y=component)
+        every[-1].set_xlabel("crank angle [°]", fontsize=SMALL)
+        pictures.append(Picture(image=png(figure), alt=f"{title} over the crank angle, {point.label}"))
+    return Gallery(pictures=pictures, caption=f"{title[0].upper()}{title[1:]}. {_KEY}")
+
+
+def _worn(mechanism: Mechanism, label: str, arrays: Arrays, depth: Floats) -> Picture:
+    """Worn surfaces of the clearance joints, from their mean depth (k, 2, N) [m] over the runs."""
+    joints = clearance_joints_of(arrays)
+    radii = tuple(mechanism.clearances[joint].bushing_radius for joint in joints)
+    image = png(worn_bushings(np.asarray(depth, dtype=float), tuple(joints), radii, label))
+    alt = f"Worn bushings and journals, {label}: sections with exaggerated depth, depth over the angle"
+    return Picture(image=image, alt=alt, wide=len(joints) > 2)
+
+
+def _life_gallery(lives: Found) -> Gallery:
+    pictures = []
+    for point, arrays in lives:
+        figure, joints = new_figure(4.6, 3.0), clearance_joints_of(arrays)
+        axes = figure.subplots()
+        mean, largest = 1.0e3 * arrays["clearance_mean_m"], 1.0e3 * arrays["clearance_max_m"]
+        for run, cycles in enumerate(1.0e-6 * arrays["cycles"]):
+            draw_clearances(
+                axes, cycles, mean[run], largest[run], joints if run == 0 else [None] * len(joints)
+            )
+        finish(axes, point.label, x="gait cycles [millions]", y="radial clearance [mm]", columns=5)
+        pictures.append(Picture(image=png(figure), alt=f"Clearances of {point.label} over the life"))
+    return Gallery(
+        pictures=pictures, caption="Full: mean around the joint. Dashed: largest. One line for each run."
+    )
+
+
+def _slider(mechanism: Mechanism, found: Found) -> Fragment:
+    """The leg over a gait cycle, with the forces of an example run of each point."""
+    linkage, frames = build_linkage(mechanism), len(found[0][1]["example_eccentricity_m"])
+    motion = one_cycle(linkage, frames, 1.0)
+    runs = []
+    for point, arrays in found:
+        places = arrays["example_eccentricity_m"] / point.clearance_m
+        run = run_data(point.label, clearance_joints_of(arrays), arrays["example_contact_force_n"], places)
+        runs.append(run | {"clearance_mm": round(1.0e3 * point.clearance_m, 4)})
+    longest_n = max(run["largest_n"] for run in runs)
+    reach = Reach(linkage, 1, motion.crank_angle, motion.q, turns=True)
+    data = leg_data(reach) | {"digits": 0, "skip": 2, "runs": runs, "longest_n": longest_n}
+    radius = mechanism.clearances[clearance_joints_of(found[0][1])[0]].bushing_radius
+    factor = _CLEARANCE_FRACTION * radius / found[0][0].clearance_m
+    caption = (
+        "One gait cycle of one run, as an example. The leg is to scale. Arrows show the force of the bushing "
+        f"on the pin; their length grows with the root of the force, up to {longest_n:.0f} N. Circles show "
+        f"each pin in its bushing, with the clearance magnified about {factor:.0f} times."
+    )
+    return leg_slider(
+        data, "The leg at the chosen crank angle, with the contact forces in its clearance joints", caption
+    )
+
+
+# Poincaré maps, phase portraits and bifurcation diagrams.
+
+
+def _sections_of_cycles(results: StudyResults) -> dict[str, Sequence[Part]]:
+    """Parts of the points of the task ``section``, by the title of their section of the page."""
+    pairs, parts = results.of("section"), dict[str, Sequence[Part]]()
+    for point, arrays in pairs:
+        if point.settings["portrait_cycles"]:
+            cycles, angle = len(arrays["section_rate_mps"]), point.settings["crank_angle_deg"]
+            text = f"One point per cycle at crank angle {angle:g}°, over {cycles} cycles."
+            parts["Poincaré maps"] = [
+                _map_table(point.clearance_m, arrays),
+                _planes(point.clearance_m, arrays, "section", text),
+            ]
+            text = (
+                "The journal's place in its bushing against its rate, some cycles of one run as an example."
+            )
+            parts["Phase portraits"] = [_planes(point.clearance_m, arrays, "portrait", text)]
+    diagrams = []
+    for key, fixed in (("clearance_m", "speed_rpm"), ("speed_rpm", "clearance_m")):
+        base = getattr(results.settings, fixed, None)
+        along = [
+            pair
+            for pair in pairs
+            if pair[0].settings[fixed] == base and not pair[0].settings["portrait_cycles"]
+        ]
+        if len(along) > 1:
+            diagrams.append(_bifurcation(key, sorted(along, key=lambda pair: pair[0].settings[key])))
+    return parts | {"Bifurcation diagrams": diagrams}
+
+
+def _map_table(clearance_m: float, arrays: Arrays) -> Table:
+    places, rows = arrays["section_eccentricity_m"] / clearance_m, []
+    for k, joint in enumerate(clearance_joints_of(arrays)):
+        scatter = float(np.sqrt(np.square(places[:, k] - places[:, k].mean(axis=0)).sum(axis=1).mean()))
+        period = period_of(places[:, k], _LONGEST, _SAME)
+        rows.append([joint, number(scatter), "none" if period is None else str(period)])
+    head = ("joint", "scatter (RMS) [clearances]", f"period, up to {_LONGEST} [cycles]")
+    return Table(caption="Scatter of the map", head=head, rows=rows)
+
+
+def _planes(clearance_m: float, arrays: Arrays, kind: str, caption: str) -> Gallery:
+    """A picture for each joint: its place against its rate, x and y side by side."""
+    places, rates, pictures = (
+        arrays[f"{kind}_eccentricity_m"] / clearance_m,
+        1.0e3 * arrays[f"{kind}_rate_mps"],
+        [],
+    )
+    for k, joint in enumerate(clearance_joints_of(arrays)):
+        figure = new_figure(4.8, 2.5)
+        for i, axes in enumerate(figure.subplots(1, 2)):
+            style = "." if kind == "section" else "-"
+            axes.plot(places[:, k, i], rates[:, k, i], style, color=BLUE, markersize=2.0, linewidth=0.35)
+            finish(axes, joint, x=f"{'xy'[i]} / clearance", y="" if i else "rate [mm/s]")
+        most = np.abs(rates[:, k]).max()
+        alt = f"{caption.partition('.')[0]}: joint {joint}, rates within {most:.0f} mm/s"
+        pictures.append(Picture(image=png(figure), alt=alt))
+    return Gallery(
+        pictures=pictures,
+        caption=f"{caption} Beyond 1 and -1 clearances the journal presses into the bushing.",
+    )
+
+
+def _bifurcation(key: str, found: Found) -> Gallery:
+    """Places of the journals once per cycle over a setting, a picture for each joint."""
+    (label, factor), pictures = _AXES[key], []
+    for k, joint in enumerate(clearance_joints_of(found[0][1])):
+        figure = new_figure(4.8, 3.2)
+        for i, axes in enumerate(figure.subplots(2, 1, sharex=True)):
+            for point, arrays in found:
+                places = arrays["section_eccentricity_m"][:, k, i] / point.clearance_m
+                at = np.full(len(places), factor * point.settings[key])
+                axes.plot(at, places, "o", color=BLUE, markersize=1.8, markeredgewidth=0.0, alpha=0.6)
+            finish(axes, "" if i else joint, x=label if i else "", y=f"{'xy'[i]} / clearance")
+        pictures.append(Picture(image=png(figure), alt=f"Places of joint {joint} over the {label}"))
+    return Gallery(
+        pictures=pictures, caption=f"The journal's place in its bushing once per cycle, over the {label}."
+    )

@@ -280,7 +280,7 @@ def _print_verdict(console: Console, state: "LegState", joint_words: Callable[[s
     whose = f" joint {', '.join(map(joint_words, verdict.joints))}" if verdict.joints else ""
     head = f"{verdict.state.words.upper()}{whose}"
     console.print(f"\n[bold]{head}[/bold]: {as_plain(verdict.why)}", soft_wrap=True)
-    for title, text in (("to do", verdict.do), *decision_of(state, joint_words).notes):
+    for title, text in (("to do", verdict.do), *decision_of(state)):
         console.print(f"{title.lower():<10} {as_plain(text)}", soft_wrap=True, markup=False)
     page = share_directory() / guide_to(verdict)
     console.print(f"code       {verdict.fault_code}, see {page}", soft_wrap=True)

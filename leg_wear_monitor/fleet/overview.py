@@ -17,7 +17,7 @@ from leg_wear_monitor.files import data_frame, json_text, write_whole
 from leg_wear_monitor.fleet.description import fleet_directory
 from leg_wear_monitor.fleet.recordings import read_lines
 from leg_wear_monitor.monitor.alarms import ADVICE, time_words
-from leg_wear_monitor.monitor.verdict.decision import decision_of
+from leg_wear_monitor.monitor.verdict.decision import how_soon
 from leg_wear_monitor.state import JointClearance, LegState, LifeHours, State
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ class LegOverview:
         """The deadline of the leg's verdict, as on the page of the leg itself."""
         if self.state is None:
             return "record its gait, then update the fleet"
-        return decision_of(self.state, str).urgency
+        return how_soon(self.state)
 
     @property
     def used_fraction(self) -> dict[str, float]:

@@ -17,7 +17,7 @@ from markupsafe import Markup, escape
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.alarms import time_words
-from leg_wear_monitor.monitor.verdict.decision import HOW_SURE, decision_of, figures_of, joints_in_words
+from leg_wear_monitor.monitor.verdict.decision import HOW_SURE, decision_of, figures_of
 from leg_wear_monitor.playback.result import ReplaySummary
 from leg_wear_monitor.state import Figure, Level, State, Verdict
 
@@ -488,8 +488,8 @@ def verdict_banner(summary: ReplaySummary, guide: str, certainty: str) -> Banner
     """
     verdict = summary.verdict
     symbol, severity = STATE_LOOKS[verdict.state]
-    decision = decision_of(summary, summary.leg.joint_words)
-    notes = [("Do", verdict.do), *decision.notes, ("Code", verdict.fault_code)]
+    joints = ", ".join(map(summary.leg.joint_words, verdict.joints))
+    notes = [("Do", verdict.do), *decision_of(summary), ("Code", verdict.fault_code)]
     if verdict.since_ns:
         notes.append(("Since", since_words(summary, verdict.since_ns)))
     if verdict.not_valid:
@@ -501,7 +501,7 @@ def verdict_banner(summary: ReplaySummary, guide: str, certainty: str) -> Banner
     return Banner(
         symbol=symbol,
         word=verdict.state.words.upper(),
-        subject=joints_in_words(verdict.joints, summary.leg.joint_words),
+        subject=f"joint {joints}" if joints else "",
         text=verdict.why,
         notes=notes,
         severity=severity,

@@ -1,22 +1,19 @@
-"""What a verdict asks of a person: how sure it is, how soon to act, what an error costs, and what settles it.
+"""How soon to act on a verdict, how sure it is, the check that settles it, and the cost of an error.
 
-A view of a verdict: all of it follows from the verdict and the remaining life, and nothing is kept.
+One table, with a row per code. Nothing here is kept: all of it follows from the verdict's code and state.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from functools import cache
-from pathlib import PurePosixPath
 
 import attrs
 
 from leg_wear_monitor.configuration.strict import read_document, structure
 from leg_wear_monitor.files import share_directory
-from leg_wear_monitor.monitor.alarms import amount
-from leg_wear_monitor.monitor.forecast.forecast import three_digits
-from leg_wear_monitor.monitor.verdict.verdict import code_of_rule, guide_to
-from leg_wear_monitor.state import Figure, JointClearance, LegState, LifeHours, State, Verdict
+from leg_wear_monitor.monitor.verdict.verdict import code_of_rule
+from leg_wear_monitor.state import LegState, State
 
-# How often findings were right where the truth is known, from the one file that has these figures.
+# How often verdicts were right in cases with a known truth, from the one file with these values.
 
 
 FIGURES_FILE = "config/certainty.yaml"
@@ -25,22 +22,30 @@ _HUNDRED = 100
 
 @attrs.frozen(kw_only=True)
 class MeasuredFigure:
-    """How often something was right where the truth is known.
+    """How often a verdict was right in cases with a known truth, and the conditions of these cases.
 
     Attributes
     ----------
     right : float
-        Cases that were right; without `of`, a number for itself.
+        Number of right cases; without `of`, a value for itself.
     of : int or None
-        Cases in all.
+        Number of cases.
     words : str
-        What was right, after the number of cases.
+        Sentence part after the number of cases.
     where : str
-        More of what it was measured on.
+        Details of the cases.
     source : str
         Page with all results, below the share directory.
     date : str
-        Of the measurement.
+        Date of the measurement.
+    on_ground : bool or None
+        Whether the legs walked on the ground (True) or in the air (False); None if it makes no difference.
+    needs_sure_names : bool
+        Whether the cases had a model that fits the leg, so that the names of joints were sure.
+    needs_diagnosis : bool
+        Whether the drive torque showed the modelled clearances before the case.
+    by : str or None
+        Source of the joint's clearance in these cases; None for any source.
     """
 
     right: float
@@ -49,6 +54,10 @@ class MeasuredFigure:
     where: str
     source: str
     date: str
+    on_ground: bool | None = None
+    needs_sure_names: bool = False
+    needs_diagnosis: bool = False
+    by: str | None = None
 
     @property
     def counted(self) -> str:
@@ -62,10 +71,21 @@ class MeasuredFigure:
         counted = f"{int(_HUNDRED * self.right / (self.of or 1))} of {_HUNDRED}" if is_long else self.counted
         return f"{counted} {self.words}"
 
+    def holds_for(self, state: LegState) -> bool:
+        """Whether this leg meets the conditions of the cases."""
+        joints = state.verdict.joints
+        by = state.clearances[joints[0]].believed_by if joints and joints[0] in state.clearances else None
+        return (
+            self.on_ground in (None, bool(state.load.peak_n))
+            and not (self.needs_sure_names and state.diagnosis.reason)
+            and not (self.needs_diagnosis and state.diagnosis.state != "as_counted")
+            and (self.by is None or self.by == by)
+        )
+
 
 @cache
 def measured_figures() -> Mapping[str, MeasuredFigure]:
-    """The figures by name.
+    """The measured values by name.
 
     Raises
     ------
@@ -76,278 +96,206 @@ def measured_figures() -> Mapping[str, MeasuredFigure]:
     return structure(document, dict[str, MeasuredFigure], FIGURES_FILE, "")
 
 
-OF_CODE: Mapping[str, tuple[str, ...]] = {
-    "CLEARANCE_SEEN": ("torque_stop", "false_findings"),
-    "CLEARANCE_CHANGED": ("torque_name", "false_findings"),
-    "CLEARANCE_CORRECTED": ("torque_name", "false_findings"),
-    "CLEARANCE_DEPARTURE": ("encoder_name",),
-    "CLEARANCE": ("life_interval",),
-    "CLEARANCE_BELIEVED": ("life_interval",),
-    "CLEARANCE_NEAR": ("life_interval",),
-    "REMAINING_LIFE": ("life_interval",),
-    "GROWTH": ("growth_interval",),
-    "TORQUE_LOAD": ("load_name",),
-    "NONE": ("opened_found",),
-}
-"""Figures that say how often a finding with this code is right."""
-
-_ON_GROUND = "_on_ground"  # end of the name of a figure for legs that carry a load
-_COUNTED_CODES = ("CLEARANCE", "CLEARANCE_BELIEVED", "CLEARANCE_NEAR")
-# Guides whose codes say what the monitor knows of itself; the others are findings on the leg.
-_KNOWN_OF_ITSELF = ("input", "node", "not_observed", "gait")
-_REPLACED_CODE = "PART_REPLACED"
-_ENTERED_CODES = (_REPLACED_CODE, "FOOT_LOAD_MISSING")
-
-
-def figures_of(state: LegState) -> tuple[MeasuredFigure, ...]:
-    """The figures that say how often such a verdict is right; empty where none was measured."""
-    verdict, code = state.verdict, code_of_rule(state.verdict)
-    joint = state.clearances.get(verdict.joints[0]) if verdict.joints else None
-    by = joint.believed_by if joint else None
-    if code in _COUNTED_CODES and by == "measured":
-        return ()
-    names = ("encoder_name",) if code == "CLEARANCE_SEEN" and by == "encoders" else OF_CODE.get(code, ())
-    figures = measured_figures()
-    if state.load.peak_n:
-        names = tuple(name + _ON_GROUND if name + _ON_GROUND in figures else name for name in names)
-    return tuple(figures[name] for name in names)
-
-
-def _certainty(state: LegState) -> str:
-    code, figures = code_of_rule(state.verdict), figures_of(state)
-    if figures:
-        return "; ".join(figure.text for figure in figures)
-    if code in _COUNTED_CODES:
-        return "as sure as the clearance that was measured"
-    if code in _ENTERED_CODES or _guide(state.verdict) in _KNOWN_OF_ITSELF:
-        return "sure: the monitor knows this of its input, or it was entered"
-    return "not known: how often such a finding is right was not measured"
-
-
-# What a wrong answer costs either way, and the one check that settles it, by guide.
-
-
-@attrs.frozen
-class _Stakes:
-    """Cost of following a false finding, cost of not following a right one, and what tells the two apart."""
-
-    if_false: str
-    if_ignored: str
-    check: str
-
-
-_MEASURE_JOINT = "rock {joints} by hand with the drive blocked, and measure its radial clearance{limit}"
-_OF_GUIDE: Mapping[str, _Stakes] = {
-    "joint_at_limit": _Stakes(
-        "a stop and a measurement for nothing",
-        "the joint knocks harder with each gait cycle, and what it breaks may let the leg fall",
-        _MEASURE_JOINT,
-    ),
-    "clearance_changed": _Stakes(
-        "a stop and a measurement for nothing",
-        "a broken bushing goes on to the limit, and wears its neighbours",
-        _MEASURE_JOINT,
-    ),
-    "torque_sensor": _Stakes(
-        "a look at parameters that are right",
-        "no joint is observed by the torque: a bushing that breaks stays unnoticed",
-        "hold the leg still with a known weight on a known lever, and compare the torque that is reported",
-    ),
-    "torque_mismatch": _Stakes(
-        "a stop to rock the joints for nothing",
-        "what is loose, bent or broken stays unnoticed, and nothing that is counted is valid",
-        "rock each joint by hand with the drive blocked: play in one says which",
-    ),
-    "load_and_friction": _Stakes(
-        "a look at foot and drive for nothing",
-        "joints wear faster under the load than is counted, or the drive runs dry",
-        "let the leg walk in the air with a warm drive: it ends if load or cold grease was the cause",
-    ),
-    "foot_load": _Stakes(
-        "a look at the sensor for nothing",
-        "forces, wear and remaining life are those of a wrong load",
-        "read the sensor with the foot in the air, and under a known weight",
-    ),
-    "force_growth_life": _Stakes(
-        "a measurement for nothing",
-        "the joint reaches its limit before its replacement is planned",
-        _MEASURE_JOINT,
-    ),
-    "input": _Stakes(
-        "a look at topics and cables for nothing",
-        "nothing is counted or observed while the leg walks",
-        "look at the messages that the reason names: `ros2 topic hz`, or `leg-wear-monitor check`",
-    ),
-    "gait": _Stakes(
-        "a look at parameters that are right",
-        "nothing is counted, or for a gait that is not this leg's",
-        "turn the crank to a known angle at a known cadence, and compare what is reported",
-    ),
-    "not_observed": _Stakes(
-        "joints rocked by hand for nothing",
-        "a bushing that breaks changes nothing that is received, and stays unnoticed",
-        "rock each joint by hand with the drive blocked",
-    ),
-    "node": _Stakes(
-        "a look at files and clocks for nothing",
-        "wear is counted twice, or not kept",
-        "look at the file or the clock that the reason names",
-    ),
-    "healthy": _Stakes(
-        "an opening that the torque does not show yet goes on until it does",
-        "",
-        "rock each joint by hand with the drive blocked: none has play that you feel",
-    ),
-    "index": _Stakes(
-        "a look for nothing", "what the alarm says goes on", "see the guide of the alarm in the list"
-    ),
-}
-_REPLACED = _Stakes(
-    "some gait cycles of walking",
-    "a wrong part, or one that is mounted badly, stays unnoticed",
-    "let the leg walk for 20 gait cycles at the commanded cadence, and see the verdict then",
-)
-
-
-# How soon, and when to look again.
-
-
-_AT_LATEST_H = 240.0  # a month of eight hours a day: no forecast was tested on a real leg
-_OF_WEAR = ("REMAINING_LIFE", "GROWTH")  # what wear does; a joint that opens at once does not wait for it
-_LOOK_AT = 0.5  # of the time after which one leg in ten is at a limit
+# One row per code. The sentences are constants: the values are in the verdict's reason and its evidence.
 
 
 HOW_SURE = "How sure"
+NOT_MEASURED = "Not known: nobody has measured how often such a verdict is right on a leg like this."
+_KNOWN = "Sure: the monitor knows this from its input or its ledger."
+_ENTERED = "Sure: an operator entered it."
+_AS_MEASURED = "As sure as the measured clearance."
+
+_ROCK = "Block the drive, rock the joint by hand, and measure its radial clearance."
+_ROCK_ALL = "Block the drive, and rock each joint by hand."
+_NEXT_STOP = "At the next stop."
+_SOON: Mapping[State, str] = {
+    State.STOP: "Stop when it is safe. Do not walk before this is settled.",
+    State.INSPECT: "Before the next use: the leg may get worse faster than the forecast says.",
+    State.NOT_MONITORED: "Before the next use: until then, the monitor cannot detect a loosening joint.",
+    State.WATCH: _NEXT_STOP,
+    State.HEALTHY: "Nothing is urgent. Look again after half of the shortest remaining life (p10), at most "
+    "after a month.",
+}
+"""How soon to act, by state, for a code that has no sentence of its own."""
 
 
 @attrs.frozen(kw_only=True)
-class Decision:
-    """A verdict as a decision.
+class Advice:
+    """The constant columns of a code.
 
     Attributes
     ----------
-    certainty : str
-        How often such a finding is right, and on what that was measured.
-    urgency : str
-        How soon to act.
     if_wrong : str
-        What an error costs either way.
+        Cost of following a false verdict, and of ignoring a true one.
     check : str
-        What settles it.
-    again : str
-        When to look again at a healthy leg; empty for another one.
+        The one check that settles it.
+    soon : str
+        How soon to act; empty if only the state decides.
+    sure : str
+        How sure the verdict is without a measured value.
+    measured : tuple of str
+        Names of the measured values that say how often it is right.
     """
 
-    certainty: str
-    urgency: str
     if_wrong: str
     check: str
-    again: str = ""
-
-    @property
-    def notes(self) -> list[tuple[str, str]]:
-        """All of it as lines, each with its title."""
-        lines = [
-            ("How soon", self.urgency),
-            ("Look again", self.again),
-            (HOW_SURE, self.certainty),
-            ("Check", self.check),
-            ("If wrong", self.if_wrong),
-        ]
-        return [(title, text) for title, text in lines if text]
+    soon: str = ""
+    sure: str = NOT_MEASURED
+    measured: tuple[str, ...] = ()
 
 
-def decision_of(state: LegState, joint_words: Callable[[str], str]) -> Decision:
-    """The verdict of a leg as a decision.
+_AT_LIMIT = Advice(
+    if_wrong="If this is a false alarm, you lose one stop. If it is real and ignored, the joint knocks "
+    "harder with each gait cycle, and a broken part may let the leg fall.",
+    check=_ROCK,
+    sure=_AS_MEASURED,
+    measured=("life_interval",),
+)
+_CHANGED = Advice(
+    if_wrong="If this is a false alarm, you lose one stop. If it is real and ignored, a broken bushing wears "
+    "to its limit and damages its neighbours.",
+    check=_ROCK,
+    measured=("torque_name", "torque_name_on_ground", "false_findings"),
+)
+_TORQUE_SENSOR = Advice(
+    if_wrong="If this is false, you check parameters that are right. If it is true and ignored, the torque "
+    "shows no joint, and a breaking bushing stays undetected.",
+    check="Hold the leg still with a known weight on a known lever, and compare the reported torque.",
+)
+_OTHER_LEG = Advice(
+    if_wrong="If this is a false alarm, you lose one stop. If it is real and ignored, a loose, bent or "
+    "broken part stays undetected, and no modelled value is valid.",
+    check=_ROCK_ALL,
+)
+_LOAD = Advice(
+    if_wrong="If this is false, you check the foot and the drive for nothing. If it is true and ignored, "
+    "joints wear faster than modelled, or the drive runs dry.",
+    check="Let the leg walk in the air with a warm drive. The verdict ends if load or cold grease caused it.",
+)
+_FOOT_SENSOR = Advice(
+    if_wrong="If this is false, you check the sensor for nothing. If it is true and ignored, forces, wear "
+    "and remaining life belong to a wrong load.",
+    check="Read the sensor with the foot in the air, and under a known weight.",
+)
+_WEAR = Advice(
+    if_wrong="If this is false, you lose one measurement. If it is true and ignored, the joint reaches its "
+    "limit before you have planned its replacement.",
+    check=_ROCK,
+)
+_INPUT = Advice(
+    if_wrong="If this is false, you check topics and cables for nothing. If it is true and ignored, the leg "
+    "walks without a monitor.",
+    check="Look at the messages that the reason names: `ros2 topic hz`, or `leg-wear-monitor check`.",
+    sure=_KNOWN,
+)
+_GAIT = Advice(
+    if_wrong="If this is false, you check parameters that are right. If it is true and ignored, the monitor "
+    "models no wear, or the wear of a different gait.",
+    check="Turn the crank to a known angle at a known cadence, and compare the reported values.",
+    sure=_KNOWN,
+)
+_BLIND = Advice(
+    if_wrong="If this is false, you rock joints for nothing. If it is true and ignored, a breaking bushing "
+    "stays undetected.",
+    check=_ROCK_ALL,
+    sure=_KNOWN,
+)
+_NODE = Advice(
+    if_wrong="If this is false, you check files and clocks for nothing. If it is true and ignored, wear is "
+    "modelled twice or lost.",
+    check="Check the file or the clock that the reason names.",
+    sure=_KNOWN,
+)
+_ALARM = Advice(
+    if_wrong="If this is false, you look once for nothing. If it is true and ignored, the fault of the alarm "
+    "goes on.",
+    check="Follow the guide of the alarm in the list of alarms.",
+)
+_LIFE_SOON = "Within the remaining life (p10) of the joint."
 
-    Parameters
-    ----------
-    state : LegState
-    joint_words : callable
-        A joint with its label, such as ``G (knee)``.
-    """
-    verdict = state.verdict
-    code = code_of_rule(verdict)
-    stakes = _REPLACED if code == _REPLACED_CODE else _OF_GUIDE[_guide(verdict)]
-    is_healthy = verdict.state is State.HEALTHY
-    wrong = (
-        stakes.if_false
-        if is_healthy
-        else f"false: {stakes.if_false}; right and not followed: {stakes.if_ignored}"
-    )
-    return Decision(
-        certainty=_certainty(state),
-        urgency=_urgency(verdict, _life(state), joint_words),
-        if_wrong=wrong,
-        check=_check(stakes, verdict, state.clearances, joint_words),
-        again=_again(_life(state)) if is_healthy else "",
-    )
+ADVICE: Mapping[str, Advice] = {
+    "CLEARANCE": _AT_LIMIT,
+    "CLEARANCE_SEEN": attrs.evolve(_AT_LIMIT, sure=NOT_MEASURED, measured=("torque_stop", "encoder_name")),
+    "CLEARANCE_BELIEVED": _AT_LIMIT,
+    "CLEARANCE_CHANGED": _CHANGED,
+    "CLEARANCE_CORRECTED": _CHANGED,
+    "CLEARANCE_DEPARTURE": attrs.evolve(_CHANGED, measured=("encoder_name",)),
+    "TORQUE_SIGN": _TORQUE_SENSOR,
+    "TORQUE_SCALE": _TORQUE_SENSOR,
+    "TORQUE_TIMING": _TORQUE_SENSOR,
+    "TORQUE_NOISE": _TORQUE_SENSOR,
+    "TORQUE_BIAS": _TORQUE_SENSOR,
+    "TORQUE_MASS": _OTHER_LEG,
+    "MECHANISM_CHANGED": _OTHER_LEG,
+    "TORQUE_MISMATCH": _OTHER_LEG,
+    "TORQUE_LOAD": attrs.evolve(_LOAD, measured=("load_name",)),
+    "FRICTION_CHANGED": _LOAD,
+    "FOOT_LOAD_STUCK": _FOOT_SENSOR,
+    "FOOT_LOAD_ZERO": _FOOT_SENSOR,
+    "FOOT_LOAD_SCALE": _FOOT_SENSOR,
+    "FOOT_LOAD_EXCHANGED": _FOOT_SENSOR,
+    "FOOT_LOAD_SIGN": _FOOT_SENSOR,
+    "FOOT_LOAD_MISSING": attrs.evolve(_FOOT_SENSOR, sure=_KNOWN),
+    "IMPACT_FORCE": _WEAR,
+    "GROWTH": attrs.evolve(_WEAR, soon=_LIFE_SOON, measured=("growth_interval",)),
+    "REMAINING_LIFE": attrs.evolve(_WEAR, soon=_LIFE_SOON, measured=("life_interval",)),
+    "CLEARANCE_NEAR": attrs.evolve(_WEAR, sure=_AS_MEASURED, measured=("life_interval",)),
+    "MATERIAL_LIMIT": _WEAR,
+    "PART_REPLACED": Advice(
+        if_wrong="If this is false, you lose some gait cycles. If it is true and ignored, a wrong or badly "
+        "mounted part stays undetected.",
+        check="Let the leg walk for 20 gait cycles at the commanded cadence, and read the verdict again.",
+        soon="With the next gait cycles: until then, the monitor knows nothing of the new part.",
+        sure=_ENTERED,
+    ),
+    "BAD_INPUT": _INPUT,
+    "NO_GAIT_CYCLE": _INPUT,
+    "ALREADY_COUNTED": _NODE,
+    "CRANK_ZERO": _GAIT,
+    "NOT_FOLLOWED": _GAIT,
+    "NOT_THIS_LEG": _GAIT,
+    "CADENCE": _GAIT,
+    "NO_DRIVE_TORQUE": _BLIND,
+    "TORQUE_NOT_COMPARED": _BLIND,
+    "NOT_OBSERVED": _BLIND,
+    "ENCODER": _BLIND,
+    "ALARM": _ALARM,
+    "NONE": Advice(
+        if_wrong="A loosening joint stays undetected until the torque or the encoders show it.",
+        check=f"{_ROCK_ALL} None has play that you feel.",
+        measured=("opened_found", "opened_found_on_ground"),
+    ),
+}
+"""The advice by the code of the rule."""
 
 
-def _guide(verdict: Verdict) -> str:
-    return PurePosixPath(guide_to(verdict)).stem
+def figures_of(state: LegState) -> tuple[MeasuredFigure, ...]:
+    """The measured values that say how often such a verdict is right on a leg like this; may be empty."""
+    figures = measured_figures()
+    rows = (figures[name] for name in _advice(state).measured)
+    return tuple(row for row in rows if row.holds_for(state))
 
 
-def _life(state: LegState) -> LifeHours | None:
-    """That of the verdict's joint that lasts shortest, without one of the leg; None where it is not valid."""
-    if Figure.FORECAST in state.verdict.not_valid:
-        return None
-    named = [life for joint in state.verdict.joints or ("leg",) if (life := state.life.get(joint))]
-    return min(named, key=lambda life: life.p10_h, default=None)
+def _advice(state: LegState) -> Advice:
+    return ADVICE.get(code_of_rule(state.verdict), _ALARM)  # an older ledger may have other codes
 
 
-def _urgency(verdict: Verdict, life: LifeHours | None, joint_words: Callable[[str], str]) -> str:
-    hours = f"within {_hours(life.p10_h)} of walking" if life else ""
-    whose = joints_in_words(verdict.joints, joint_words)
-    match verdict.state:
-        case State.STOP:
-            return "before the next use: stop when it is safe, and do not walk before it is settled"
-        case State.INSPECT if hours and whose and code_of_rule(verdict) in _OF_WEAR:
-            return f"{hours}: {whose} is at its limit by then with a probability of 10 %"
-        case State.INSPECT if whose:
-            return "before the next use: the joint may open faster than wear does, which the forecast counts"
-        case State.INSPECT:
-            return "before the next use: how long it can wait is not known"
-        case State.NOT_MONITORED:
-            return "before the next use: until then nobody sees a joint that opens"
-        case State.WATCH if code_of_rule(verdict) == _REPLACED_CODE:
-            return "with the next gait cycles: until then nothing is known of the new part"
-        case State.WATCH:
-            return f"at the next stop, {hours} at the latest" if hours else "at the next stop"
-    return "nothing is urgent"
+def how_soon(state: LegState) -> str:
+    """How soon to act on the verdict of a leg."""
+    return _advice(state).soon or _SOON[state.verdict.state]
 
 
-def _hours(hours: float) -> str:
-    return f"about {three_digits(hours)} h" if hours >= 1.0 else "less than an hour"
+def how_sure(state: LegState) -> str:
+    """How often such a verdict is right; says so if nothing was measured on a leg like this."""
+    return "; ".join(figure.text for figure in figures_of(state)) or _advice(state).sure
 
 
-def _again(life: LifeHours | None) -> str:
-    if life is None:
-        return "at the next stop: how long the leg lasts is not known"
-    hours = _LOOK_AT * life.p10_h
-    if hours >= _AT_LATEST_H:
-        return f"after {_AT_LATEST_H:.0f} h of walking, a month of eight hours a day"
-    return (
-        f"after {_hours(hours)} of walking, half of the time after which a joint is at its limit with a "
-        "probability of 10 %"
-    )
-
-
-def _check(
-    stakes: _Stakes,
-    verdict: Verdict,
-    clearances: Mapping[str, JointClearance],
-    joint_words: Callable[[str], str],
-) -> str:
-    joints = verdict.joints
-    known = clearances.get(joints[0]) if joints else None
-    limit = f" (limit {amount(known.limit_m, 'm')})" if known else ""
-    return stakes.check.format(
-        joints=joints_in_words(joints, joint_words) or "the joints",
-        limit=limit,
-    )
-
-
-def joints_in_words(joints: Sequence[str], joint_words: Callable[[str], str]) -> str:
-    """Such as ``joint G (knee)``; empty without joints."""
-    return f"joint {', '.join(map(joint_words, joints))}" if joints else ""
+def decision_of(state: LegState) -> list[tuple[str, str]]:
+    """The verdict of a leg as lines for a person, each with its title."""
+    advice = _advice(state)
+    return [
+        ("How soon", how_soon(state)),
+        (HOW_SURE, how_sure(state)),
+        ("Check", advice.check),
+        ("If wrong", advice.if_wrong),
+    ]

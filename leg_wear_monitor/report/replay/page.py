@@ -7,7 +7,7 @@ import attrs
 from leg_wear_monitor.files import or_nan, share_directory
 from leg_wear_monitor.monitor.alarm_specs import KINDS
 from leg_wear_monitor.monitor.alarms import amount, joint_of, raised_values, time_words
-from leg_wear_monitor.monitor.verdict.decision import decision_of, figures_of
+from leg_wear_monitor.monitor.verdict.decision import figures_of, how_sure
 from leg_wear_monitor.monitor.verdict.situation import COUNTED
 from leg_wear_monitor.monitor.verdict.verdict import guide_to
 from leg_wear_monitor.playback.result import (
@@ -197,7 +197,7 @@ def certainty_section(summary: ReplaySummary) -> Section:
         note="Nothing was measured on a real leg.",
         is_text=True,
     )
-    unknown = Text(decision_of(summary, summary.leg.joint_words).certainty)
+    unknown = Text(how_sure(summary))
     return Section("How sure is the verdict?", [table if rows else unknown], is_folded=True)
 
 

@@ -26,6 +26,7 @@ from leg_wear_monitor.report.replay.joints import counted_mm
 from leg_wear_monitor.state import Figure
 
 _STEADY = 0.1  # of the commanded cadence to either side, less does not fill the picture
+_NEAR = 3.0  # a limit further than so many times the largest value would only flatten the curve
 
 
 def _over_time(
@@ -171,6 +172,12 @@ def _force_panel(summary: ReplaySummary, joint: str) -> Panel:
         for name, colour, columns in forces
         if joint in columns and _is_known(columns[joint])
     ]
+    limits = summary.monitor.limits
+    limit = dict(zip(summary.joints, limits.joint_impact_force_n, strict=False)).get(
+        joint, limits.impact_force_n
+    )
+    if any(np.nanmax(one.values) > limit / _NEAR for one in series):
+        series.append(_limit("limit", "N", limit, summary.history.stamp_ns))
     is_valid = Figure.IMPACT_FORCES not in summary.verdict.not_valid
     return Panel("Contact force", series if is_valid else [], low=0.0, height=150)
 

@@ -254,18 +254,6 @@ class Tracker:
     """How the crank's motion is estimated from its samples."""
 
     bandwidth_hz: float = quantity("Hz", "bandwidth of the crank's tracker", within=(1.0, 100.0), default=8.0)
-    lag_s: float = quantity(
-        "s",
-        "delay of the leg behind the newest sample, for smoothing; 0: 0.8 / bandwidth_hz",
-        within=(0.0, 1.0),
-        default=0.0,
-    )
-    node_interval_s: float = quantity(
-        "s",
-        "time between the nodes of the leg's motion, for which a sample waits at most; 0: 0.2 / bandwidth_hz",
-        within=(0.0, 0.2),
-        default=0.0,
-    )
     reorder_window_s: float = quantity(
         "s", "time for which a sample waits for earlier ones", within=(0.0, 0.5), default=0.02
     )

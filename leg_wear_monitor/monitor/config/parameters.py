@@ -75,6 +75,8 @@ def _walk(kind: type, prefix: str) -> Iterator[Parameter]:
         if attrs.has(field.type):
             yield from _walk(field.type, f"{name}.")
             continue
+        if "doc" not in metadata:  # a constant of the method
+            continue
         yield Parameter(
             name=name,
             type=_TYPES[field.type],

@@ -148,7 +148,10 @@ def _not_next_to_0(sigma: float) -> str | None:
 
 @attrs.frozen(kw_only=True)
 class Forecasting:
-    """Uncertainties of the forecast as standard deviations; those of factors are of the natural logarithm."""
+    """Uncertainties of the forecast as standard deviations; those of factors are of the natural logarithm.
+
+    What has no description is a constant of the method, not a parameter.
+    """
 
     wear_coefficient_sigma: float = quantity(
         "",
@@ -158,29 +161,12 @@ class Forecasting:
         default=0.0,
         check=_not_next_to_0,
     )
-    load_sigma: float = quantity(
-        "",
-        "standard deviation of the logarithm of future wear per cycle, because load and pace vary",
-        within=(0.0, 3.0),
-        default=0.1,
-    )
-    model_sigma: float = quantity(
-        "",
-        "standard deviation of the logarithm of the growth, which is assumed constant without simulated "
-        "lives, and beyond them (docs/explanation/forecast.md)",
-        within=(0.0, 3.0),
-        default=0.4,
-    )
-    clearance_sigma_m: float = quantity(
-        "m", "standard deviation of a new joint's clearance", within=(1.0e-9, 1.0e-3), default=5.0e-6
-    )
+    load_sigma: float = 0.1  # of future wear per cycle, because load and pace vary
+    model_sigma: float = 0.4  # of the growth without simulated lives, and beyond them (forecast.md)
+    clearance_sigma_m: float = 5.0e-6  # of a new joint's clearance
     duty_hours_per_day: float = quantity("h", "walking per day", within=(0.01, 24.0), default=8.0)
-    duty_sigma: float = quantity(
-        "", "standard deviation of the logarithm of the walking per day", within=(0.0, 3.0), default=0.2
-    )
-    window_cycles: int = quantity(
-        "", "gait cycles over which the growth of the forecast is averaged", within=(10, 100000), default=2000
-    )
+    duty_sigma: float = 0.2  # of the walking per day
+    window_cycles: int = 2000  # over which growth is averaged, because single gait cycles scatter
     life: str = described(
         "file that `leg-wear-monitor life --lives 16 --json` wrote for this leg: how growth changes as all "
         "clearances open; empty: the one that comes with the package for just this leg, if there is one",

@@ -125,12 +125,7 @@ class Limits:
 class Alarms:
     """When a level changes."""
 
-    deadband: float = live_quantity(
-        "",
-        "fraction of a limit by which a value must fall below it before the level falls",
-        within=(0.0, 0.9),
-        default=0.05,
-    )
+    deadband: float = 0.05  # of a limit; a value at its limit must not switch the level in each gait cycle
     on_delay_cycles: int = live_quantity(
         "", "consecutive gait cycles beyond a limit before the level rises", within=(1, 1000), default=3
     )
@@ -197,12 +192,8 @@ class TorqueDiagnosis:
         "file of torque references of this leg, as `reference` and `commission` write it; empty: none",
         default="",
     )
-    false_alarm_hours: float = quantity(
-        "h",
-        "mean time of walking between two false findings; longer: changes are found later",
-        within=(1.0, 1.0e6),
-        default=240.0,
-    )
+    # mean time of walking between two false findings [h]: 30 days of 8 hours; longer finds changes later
+    false_alarm_hours: float = 240.0
 
 
 @attrs.frozen(kw_only=True)

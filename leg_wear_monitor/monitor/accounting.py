@@ -83,7 +83,7 @@ class PartLife:
 
 @attrs.define
 class AccountingState:
-    """What changes; every value is immutable, so a shallow copy is a snapshot.
+    """What changes.
 
     Attributes
     ----------

@@ -121,12 +121,6 @@ _BATCH = 2  # cycles per batch: neighbouring cycles are correlated
 _NO_NEWS = 1.0e6  # times the prior variance: no information
 
 
-ClearanceRegressionSnapshot = tuple[
-    AngleReference | None, Estimate | None, tuple[tuple[Floats, Floats], ...], tuple[Floats, ...]
-]
-"""All of a `ClearanceRegression`; nothing in it changes."""
-
-
 class ClearanceRegression:
     """Estimates clearances from encoders, cycle by cycle.
 
@@ -250,15 +244,6 @@ class ClearanceRegression:
         rest = np.eye(len(mean)) - gain
         covariance = rest @ prior @ rest.T + gain @ noise @ gain.T
         return Estimate(mean, covariance * np.outer(scale, scale), before.joints)
-
-    def snapshot(self) -> ClearanceRegressionSnapshot:
-        """The whole state."""
-        return self._reference, self._before, tuple(self._cycles), tuple(self._each)
-
-    def restore(self, snapshot: ClearanceRegressionSnapshot) -> None:
-        """Go back to a snapshot."""
-        self._reference, self._before, cycles, each = snapshot
-        self._cycles, self._each = list(cycles), list(each)
 
 
 # Estimate of a joint's clearance from further encoders.

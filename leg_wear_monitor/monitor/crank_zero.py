@@ -10,7 +10,7 @@ import math
 import attrs
 import numpy as np
 
-from leg_wear_monitor.compiled.kernel import Record, Records, entry, kernel, new_records, record_of
+from leg_wear_monitor.compiled.kernel import Record, entry, kernel, new_records, record_of
 from leg_wear_monitor.estimate.torque_model import TorqueModel
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.crank_walk import LEAST_TURNS, MOST_TURNS, Walk, Zero, last_walk, zero_of
@@ -134,7 +134,7 @@ _NONE: Samples = np.zeros(0, GAIT_SAMPLE)
 
 @attrs.define
 class CrankZeroState:
-    """State of the search; every value is immutable, so a shallow copy is a snapshot.
+    """State of the search.
 
     Attributes
     ----------
@@ -179,10 +179,6 @@ class CrankZeroState:
     before_s: float = 0.0
 
 
-CrankZeroSnapshot = tuple[CrankZeroState, Records]
-"""Complete state."""
-
-
 class CrankZero:
     """Finds the zero of the crank's encoder.
 
@@ -205,9 +201,7 @@ class CrankZero:
 
     def warm_up(self) -> None:
         """Compile, before the first sample."""
-        now = self.snapshot()
-        self.passed(np.zeros(1, GAIT_SAMPLE), ends_period=False)
-        self.restore(now)
+        self.passed(_NONE, ends_period=False)
 
     def passed(self, samples: Samples, ends_period: bool) -> Samples:
         """Samples to be followed now, with the zero: these, earlier ones that waited, or none.
@@ -250,15 +244,6 @@ class CrankZero:
         state = self.state
         last_s = _duration_s(state.waiting[-1:], self._gap_s)
         return state.before_s + state.dropped_s + state.waiting_s + last_s
-
-    def snapshot(self) -> CrankZeroSnapshot:
-        """A copy of the whole state."""
-        return attrs.evolve(self.state), self._series.copy()
-
-    def restore(self, snapshot: CrankZeroSnapshot) -> None:
-        """Restore a snapshot of a search with the same parameters."""
-        state, self._series[:] = snapshot
-        self.state = attrs.evolve(state)
 
     def _add(self, samples: Samples, out: list[Samples]) -> None:
         """Add samples without an event."""

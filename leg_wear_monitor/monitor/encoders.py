@@ -17,7 +17,6 @@ from leg_wear_monitor.monitor.angle_regression import (
     ClearanceEstimate,
     ClearanceObservation,
     ClearanceRegression,
-    ClearanceRegressionSnapshot,
     Estimate,
     binned,
     clearance_estimates,
@@ -30,7 +29,6 @@ from leg_wear_monitor.twin.angle_reference import PHASES, AngleReferenceRun, ang
 from leg_wear_monitor.twin.reference import CrankProfile, cycle_profile, mean_profile
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, KeepsSamples, Samples, newest, of_crank, within
 from leg_wear_monitor.twin.statistics import CycleStatistics
-from leg_wear_monitor.twin.torque_reference import ReferenceSnapshot
 
 # Errors of the encoders: unknown at first, estimated together with the clearances of a leg whose clearances
 # are nearly known (commissioning), then fixed and stored in the ledger.
@@ -179,8 +177,6 @@ _FAULTY_RAD = 0.1
 class EncoderState:
     """State of an `EncoderObserver` besides its regression and its reference.
 
-    Every value is immutable, so a shallow copy is a snapshot.
-
     Attributes
     ----------
     samples : EncoderSamples
@@ -255,10 +251,6 @@ _PROFILE_CYCLES = 10  # gait cycles whose crank motion is averaged for a referen
 # A reference is renewed if an observable clearance, or the crank's speed as a fraction of its mean, differs
 # from that of the reference by more; and at the earliest this many cycles after the last one.
 _CLEARANCE_DEPARTURE_M, _SPEED_DEPARTURE, _LEAST_BETWEEN_REFERENCES = 1.0e-4, 0.015, 100
-
-
-EncoderSnapshot = tuple[EncoderState, ClearanceRegressionSnapshot, ReferenceSnapshot]
-"""Whole state of an `EncoderObserver`."""
 
 
 class EncoderObserver(KeepsSamples):
@@ -372,18 +364,6 @@ class EncoderObserver(KeepsSamples):
             )
             return (ClearanceEstimate(observation=observation),) * len(counted_m)
         return clearance_estimates(found, counted_m)
-
-    def snapshot(self) -> EncoderSnapshot:
-        """A copy of the whole state."""
-        regression = self._clearance_regression.snapshot()
-        return attrs.evolve(self.state), regression, self._reference.snapshot()
-
-    def restore(self, snapshot: EncoderSnapshot) -> None:
-        """Restore a snapshot of the same mechanism and parameters; later results are equal bit for bit."""
-        state, regression, reference = snapshot
-        self.state = attrs.evolve(state)
-        self._clearance_regression.restore(regression)
-        self._reference.restore(reference)
 
     def _add_cycle(self, begin_ns: int, end_ns: int) -> None:
         """Add a gait cycle to the regression, unless other encoders are present than before."""

@@ -287,7 +287,7 @@ _FASTER = 1.1  # than commanded; the default tolerance of the cadence is a tenth
 
 @attrs.define
 class AlarmEvaluationState:
-    """State of the evaluation; every value is immutable, so a shallow copy is a snapshot.
+    """State of the evaluation.
 
     Attributes
     ----------

@@ -183,14 +183,6 @@ class FootLoadCheck:
         cycles = self.state.cycles
         return np.mean([each.force_n for each in cycles], axis=0).T if cycles else None
 
-    def snapshot(self) -> FootLoadState:
-        """A copy of the whole state."""
-        return attrs.evolve(self.state)
-
-    def restore(self, snapshot: FootLoadState) -> None:
-        """Restore a snapshot of checks of the same mechanism and parameters."""
-        self.state = attrs.evolve(snapshot)
-
     def _stance_phases(self, up: Floats) -> Floats:
         """Phases (2,) [turns] at which a vertical force rises and falls, around the middle of stance."""
         low = min(float(np.median(up)), 0.0)

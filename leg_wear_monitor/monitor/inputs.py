@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from leg_wear_monitor.compiled.kernel import Record, Records, entry, kernel, new_records, record_of
+from leg_wear_monitor.compiled.kernel import Record, entry, kernel, new_records, record_of
 from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin.sample import (
     GAIT_SAMPLE,
@@ -236,7 +236,7 @@ class InputGuard:
     def warm_up(self) -> None:
         """Compile, before the first sample."""
         self.checked(np.zeros(1, GAIT_SAMPLE))
-        self.restore(new_records(1, STATE))
+        self._states[:] = new_records(1, STATE)
 
     def checked(self, samples: Samples) -> Samples:
         """The same samples; a copy with faults where some cannot be used."""
@@ -291,11 +291,3 @@ class InputGuard:
         if _DEGREES / _NEAR < ratio < _DEGREES * _NEAR:
             return text + "it seems to be in degrees; radians are expected"
         return text + "check its unit (radians), crank.gear_ratio and cadence.commanded_rpm"
-
-    def snapshot(self) -> Records:
-        """A copy of the whole state."""
-        return self._states.copy()
-
-    def restore(self, snapshot: Records) -> None:
-        """Restore a snapshot of a guard with the same settings."""
-        self._states[:] = snapshot

@@ -1,14 +1,12 @@
-"""The parts of a monitor: their construction, the state that is common to them, and its snapshots."""
+"""The parts of a monitor: their construction, and the state that they share."""
 
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import attrs
 import numpy as np
 
-from leg_wear_monitor.compiled.kernel import Records
 from leg_wear_monitor.estimate.cause import Cause, Change, TorqueExplanation
 from leg_wear_monitor.estimate.torque_model import torque_model
 from leg_wear_monitor.mechanism.arrays import Floats
@@ -16,8 +14,7 @@ from leg_wear_monitor.mechanism.materials import bushing_of
 from leg_wear_monitor.mechanism.person import with_toe_force
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor import alarm_specs
-from leg_wear_monitor.monitor.accounting import Accounting, AccountingState
-from leg_wear_monitor.monitor.alarms import Alarm
+from leg_wear_monitor.monitor.accounting import Accounting
 from leg_wear_monitor.monitor.config.fitting import fitted, twin_settings
 from leg_wear_monitor.monitor.config.inputs import AT_START
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -29,11 +26,10 @@ from leg_wear_monitor.monitor.encoders import EncoderObserver
 from leg_wear_monitor.monitor.evaluation import (
     A_CYCLE,
     AlarmEvaluation,
-    AlarmEvaluationState,
     EvaluationPeriods,
 )
 from leg_wear_monitor.monitor.foot_load import FootLoadCheck
-from leg_wear_monitor.monitor.forecast.forecaster import Forecaster, ForecastState
+from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow
 from leg_wear_monitor.monitor.forecast.model_error import ModelError, model_error
 from leg_wear_monitor.monitor.gait_evidence import NO_MISMATCH, MismatchWindow, TorqueRecord
@@ -42,7 +38,7 @@ from leg_wear_monitor.monitor.ledger.entry import Measurement, SimulatedReferenc
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport
 from leg_wear_monitor.monitor.verdict.verdict import Finding, estimate
-from leg_wear_monitor.twin.digital_twin import DigitalTwin, TwinSnapshot
+from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.reference import LegParameters
 from leg_wear_monitor.twin.sample import GROUND, NO_LOAD
 from leg_wear_monitor.twin.statistics import Event
@@ -55,9 +51,6 @@ _CONTRADICTS = 3.0  # standard deviations between what the torque shows and what
 # of the example in the air, 17 pm a gait cycle, 17 um; a correction is 90 um at least (diagnosis.md)
 _LATELY_CYCLES = 100_000
 _LEAST_BEFORE = 3  # kept gait cycles that show a leg without a change
-
-
-# The changing state of a monitor, without its ledger.
 
 
 @attrs.define
@@ -75,23 +68,6 @@ class MonitorState:
     findings: tuple[Finding, ...] = ()
     mismatch: MismatchWindow = NO_MISMATCH
     has_ended: bool = False
-
-
-@attrs.frozen(eq=False)
-class MonitorSnapshot:
-    """Snapshot of a monitor without its ledger.
-
-    ``observers`` are the snapshots of `Parts.observers`, None where a monitor has no such part.
-    """
-
-    twin: TwinSnapshot
-    state: MonitorState
-    accounting: AccountingState
-    evaluation: AlarmEvaluationState
-    forecast: ForecastState
-    alarms: dict[str, Alarm]
-    evaluation_periods: Records
-    observers: tuple[Any, ...]
 
 
 class Parts:
@@ -302,37 +278,6 @@ class Parts:
         alarms = self.evaluation.board.alarms.values()
         shown = frozenset(alarm.name for alarm in alarms if silent.get(alarm.cause))
         return alarm_specs.OF_TORQUE | shown if is_gone else shown
-
-    @property
-    def observers(self) -> tuple[Any, ...]:
-        """What looks at samples beside the twin, and has snapshots of its own; None for what is not there."""
-        return self.guard, self.encoders, self.torque, self.crank_zero, self.foot_load
-
-    def snapshot(self) -> MonitorSnapshot:
-        """A copy of the whole state, except for the ledger's."""
-        return MonitorSnapshot(
-            self.twin.snapshot(),
-            attrs.evolve(self.state),
-            attrs.evolve(self.accounting.state),
-            attrs.evolve(self.evaluation.state),
-            attrs.evolve(self.forecaster.state),
-            self.evaluation.board.alarms,
-            self.evaluation_periods.state.copy(),
-            tuple(each.snapshot() if each else None for each in self.observers),
-        )
-
-    def restore(self, snapshot: MonitorSnapshot) -> None:
-        """Restore a snapshot of a monitor with the same mechanism and parameters, bit for bit."""
-        self.twin.restore(snapshot.twin)
-        self.state = attrs.evolve(snapshot.state)
-        self.accounting.state = attrs.evolve(snapshot.accounting)
-        self.evaluation.state = attrs.evolve(snapshot.evaluation)
-        self.forecaster.state = attrs.evolve(snapshot.forecast)
-        self.evaluation.board.alarms = snapshot.alarms
-        self.evaluation_periods.state[:] = snapshot.evaluation_periods
-        for each, kept in zip(self.observers, snapshot.observers, strict=True):
-            if each and kept is not None:
-                each.restore(kept)
 
     def leave(self) -> None:
         """Leave what is simulated ahead: the process is about to end."""

@@ -51,7 +51,7 @@ from leg_wear_monitor.monitor.operators import (
     reset_wear,
     undo_reset,
 )
-from leg_wear_monitor.monitor.parts import MonitorSnapshot, Parts
+from leg_wear_monitor.monitor.parts import Parts
 from leg_wear_monitor.monitor.reports import (
     AlarmList,
     CycleReport,
@@ -391,14 +391,6 @@ class WearMonitor:
     def status(self) -> tuple[Status, ...]:
         """Statuses for /diagnostics; their names and order are constant."""
         return statuses(self._parts, self.state_report)
-
-    def snapshot(self) -> MonitorSnapshot:
-        """A copy of the whole state, except for the ledger's."""
-        return self._parts.snapshot()
-
-    def restore(self, snapshot: MonitorSnapshot) -> None:
-        """Restore a snapshot of a monitor with the same mechanism and parameters, bit for bit."""
-        self._parts.restore(snapshot)
 
     def configure(self, config: MonitorConfig) -> None:
         """Apply parameters that may change while the monitor runs; see `parameters.changed`.

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 from ledger_contents import rows_of
-from reported import as_new
 
 from leg_wear_monitor import Mechanism, WearMonitor
 from leg_wear_monitor import open_ledger as wear_ledger
@@ -130,15 +129,12 @@ def gait() -> Callable[..., Samples]:
 
 @pytest.fixture(scope="session")
 def new_monitor(leg: Mechanism) -> Callable[..., WearMonitor]:
-    """Makes a monitor of the default leg as new, without a ledger; always the same one: tables take time."""
-    renewed = as_new(WearMonitor(leg))
+    """Makes a monitor of the default leg without a ledger."""
 
-    def again(values: Mapping[str, Any] = MappingProxyType({})) -> WearMonitor:
-        one = renewed()
-        one.configure(config_from(values))
-        return one
+    def make(values: Mapping[str, Any] = MappingProxyType({})) -> WearMonitor:
+        return WearMonitor(leg, config_from(values))
 
-    return again
+    return make
 
 
 @pytest.fixture

@@ -1,7 +1,6 @@
 """The sensor of the foot load: what it shows of a leg in full coordinates, and each of its faults by name."""
 
 from collections.abc import Callable
-from functools import cache
 
 import numpy as np
 import pytest
@@ -39,18 +38,15 @@ def walk() -> Samples:
     return samples(list(readings(SyntheticLeg(config), config)), START)
 
 
-@cache
-def as_new(model: str, source: str) -> tuple[lw.WearMonitor, object]:
-    """A monitor, whose tables take time, and its state before the first sample."""
+def new_monitor(model: str = "measured", source: str = "wrench") -> lw.WearMonitor:
+    """A monitor before the first sample."""
     config = config_from(MEASURED | {"load.model": model, "foot_load.source": source})
-    monitor = lw.WearMonitor(lw.load_mechanism("bionic_leg"), config)
-    return monitor, monitor.snapshot()
+    return lw.WearMonitor(lw.load_mechanism("bionic_leg"), config)
 
 
 def monitored(walk: Samples, model: str = "measured", source: str = "wrench") -> lw.WearMonitor:
-    """A monitor after the walk; the same one for each model and source."""
-    monitor, new = as_new(model, source)
-    monitor.restore(new)
+    """A monitor after the walk."""
+    monitor = new_monitor(model, source)
     for block in np.array_split(walk, 7):
         monitor.update(block)
     return monitor
@@ -153,9 +149,7 @@ def test_a_wrong_load_does_not_wear(walk):
     """
     knee_n = []
     for change in (lambda t, force: 10.0 * force, held):
-        monitor, new = as_new("measured", "wrench")
-        monitor.restore(new)
-        cycles = monitor.update(changed(change, walk)).cycles
+        cycles = new_monitor().update(changed(change, walk)).cycles
         knee_n.append(np.mean([one.joints[2].mean_force_n for one in cycles[-3:]]))
     assert knee_n[0] == pytest.approx(73.0, rel=0.1)
     assert knee_n[1] == pytest.approx(229.0, rel=0.2)
@@ -194,27 +188,24 @@ def test_words_on_missing_samples_say_what_acts(walk, model, is_sent, words):
 
 def test_noise_without_a_load_does_not_wear_and_is_reported(walk):
     """The knee bears 73 N in the air; under this noise alone it was pressed as by a load."""
-    monitor, new = as_new("measured", "wrench")
-    monitor.restore(new)
+    monitor = new_monitor()
     noise = np.random.default_rng(1)
     cycles = monitor.update(changed(lambda t, force: 60.0 * noise.standard_normal(force.shape), walk)).cycles
     assert of_foot_load(monitor) == {"foot_load_stuck"}
     assert np.mean([one.joints[2].mean_force_n for one in cycles[-3:]]) == pytest.approx(73.0, rel=0.1)
     # a load that begins on the ground is one from the fourth step on
-    monitor.restore(new)
     later = changed(
         lambda t, force: np.where((t > 5.0)[:, None], force, 15.0 * noise.standard_normal(force.shape)), walk
     )
-    cycles = monitor.update(later).cycles
+    cycles = new_monitor().update(later).cycles
     assert np.mean([one.joints[2].mean_force_n for one in cycles[-2:]]) == pytest.approx(229.0, rel=0.2)
 
 
 def test_single_spikes_do_not_wear_and_are_reported(walk):
     """One sample of 3 kN in every other swing was taken for a force: it doubled those of hip and knee."""
-    monitor, new = as_new("measured", "wrench")
     forces_n = []
     for size_n in (0.0, 3000.0):
-        monitor.restore(new)
+        monitor = new_monitor()
         spiked = changed(
             lambda t, force, size_n=size_n: force + (np.abs(t % 2.0 - 0.8)[:, None] < 0.002) * [0.0, size_n],
             walk,
@@ -232,13 +223,11 @@ def test_single_spikes_do_not_wear_and_are_reported(walk):
 
 def test_a_silent_sensor_leaves_the_mean_of_the_steps_before_and_not_the_last_one(walk):
     """Each step has another size; the last one before the silence acted in all gait cycles after it."""
-    monitor, new = as_new("measured", "wrench")
     last_n = []
     for size in (1.0, 2.0):  # of the last step
-        monitor.restore(new)
         larger = changed(lambda t, force, size=size: np.where((t > 7.0)[:, None], size, 1.0) * force, walk)
         is_sent = (larger["kind"] != LOAD) | (larger["stamp_ns"] < START + 8 * S)
-        cycles = monitor.update(larger[is_sent]).cycles
+        cycles = new_monitor().update(larger[is_sent]).cycles
         last_n.append(cycles[-1].joints[2].mean_force_n)
     # a seventh of the mean is that of the last step
     assert last_n[1] == pytest.approx(last_n[0], rel=0.3)
@@ -257,17 +246,11 @@ def test_a_contact_switch_gives_heel_strike_and_toe_off(walk):
     assert monitor.state.load.toe_off_phase == pytest.approx(stance.toe_off, abs=0.05)
 
 
-def test_blocks_and_snapshots_change_nothing(walk):
+def test_blocks_change_nothing(walk):
     walk = walk[: len(walk) // 2]
-    one, new = as_new("measured", "wrench")
-    one.restore(new)
-    other = lw.WearMonitor(lw.load_mechanism("bionic_leg"), config_from(MEASURED))
+    one, other = new_monitor(), new_monitor()
     whole = one.update(walk)
-    parts = [other.update(block) for block in np.array_split(walk[:1500], 11)]
-    kept = other.snapshot()
-    other.update(walk[:500])
-    other.restore(kept)
-    parts.append(other.update(walk[1500:]))
+    parts = [other.update(block) for block in np.array_split(walk, 17)]
     cycles = [cycle for part in parts for cycle in part.cycles]
     forces = [[each.joints[0].mean_force_n for each in found] for found in (whole.cycles, cycles)]
     assert forces[0] == forces[1]

@@ -190,7 +190,7 @@ RENEWED_NS = 60_000_000_000
 
 @attrs.define
 class ForecastState:
-    """What changes; every value is immutable, so a shallow copy is a snapshot.
+    """What changes.
 
     Attributes
     ----------

@@ -41,20 +41,16 @@ def test_it_is_found_within_four_turns_and_no_sample_is_lost(seed: int, walk, ne
 
 
 @pytest.mark.parametrize(("stop", "cuts"), [(700, (1, 333)), (1300, ()), (1603, (1400, 1602))])
-def test_it_does_not_depend_on_blocks_nor_on_a_restored_snapshot(
-    stop: int, cuts: tuple[int, ...], walk, new_search, feed
-) -> None:
+def test_it_does_not_depend_on_blocks(stop: int, cuts: tuple[int, ...], walk, new_search, feed) -> None:
     sent = np.concatenate([walk(4.0, 1.0), walk(1.5, -2.0, begin_s=4.0, seed=1)])
-    whole, parts, other = new_search(), new_search(), new_search()
+    whole, parts = new_search(), new_search()
     expected = feed(whole, sent)
     periods = EvaluationPeriods(SECOND // A_CYCLE)
     begun = feed(parts, sent[:stop], cuts, periods)
-    feed(other, walk(0.6, 0.3, seed=5))  # its own state goes
-    other.restore(parts.snapshot())
-    rest = feed(other, sent[stop:], (), periods)
+    rest = feed(parts, sent[stop:], (), periods)
     assert np.concatenate([begun, rest]).tobytes() == expected.tobytes()
-    assert (other.state.zero, other.cause) == (whole.state.zero, whole.cause)
-    assert other.unmonitored_s == whole.unmonitored_s
+    assert (parts.state.zero, parts.cause) == (whole.state.zero, whole.cause)
+    assert parts.unmonitored_s == whole.unmonitored_s
 
 
 def without_torque(samples: Samples) -> Samples:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from reported import as_new, status_of
+from reported import status_of
 
 from leg_wear_monitor import ConfigError, WearMonitor
 from leg_wear_monitor.mechanism.position import TURN
@@ -68,28 +68,31 @@ def quick(monitor):
 
 @pytest.fixture(scope="module")
 def new_watch(leg):
-    """Gives a monitor with encoders."""
-    return as_new(quick(WearMonitor(leg, config_from(WATCHED))))
+    """Makes a monitor with encoders."""
+    return lambda: quick(WearMonitor(leg, config_from(WATCHED)))
 
 
 @pytest.fixture(scope="module")
 def commissioned(new_watch, read):
-    """A snapshot of a monitor whose encoders are commissioned."""
-    monitor = new_watch()
-    reports = monitor.update(read(24.0, shift=(0.0, 2.9, -1.0)))
-    found = {joint.seen.observation for joint in reports.cycles[15].joints}
-    assert found == {ClearanceObservation.COMMISSIONING}
-    return monitor.snapshot()
+    """Makes a monitor whose encoders are commissioned."""
+
+    def make():
+        monitor = new_watch()
+        reports = monitor.update(read(24.0, shift=(0.0, 2.9, -1.0)))
+        found = {joint.seen.observation for joint in reports.cycles[15].joints}
+        assert found == {ClearanceObservation.COMMISSIONING}
+        return monitor
+
+    return make
 
 
 def seen(reports):
     return {joint.joint: joint.seen for joint in reports.cycles[-1].joints}
 
 
-def test_encoders_are_commissioned_and_show_what_is_there(new_watch, commissioned, read):
+def test_encoders_are_commissioned_and_show_what_is_there(commissioned, read):
     """Wherever they count from."""
-    monitor = new_watch()
-    monitor.restore(commissioned)
+    monitor = commissioned()
     values = status_of(monitor, "encoders").values
     assert values["hip_scale_error"] == pytest.approx(ERRORS[4], abs=5e-4)
     assert values["knee_offset_rad"] == pytest.approx(2.88, abs=2e-3)
@@ -103,9 +106,8 @@ def test_encoders_are_commissioned_and_show_what_is_there(new_watch, commissione
     assert reports.cycles[-1].joints[0].forecast.measurements == 1
 
 
-def test_a_worn_joint_is_found_named_and_alarmed(new_watch, commissioned, read):
-    monitor = new_watch()
-    monitor.restore(commissioned)
+def test_a_worn_joint_is_found_named_and_alarmed(commissioned, read):
+    monitor = commissioned()
     worn = FRESH + np.array([0.0, 0.0, 1.5e-4, 0.0, 0.0])
     samples = read(25.0, 24.0, worn, shift=(0.0, 2.9, -1.0))
     reports = monitor.update(samples)
@@ -147,30 +149,15 @@ def messy(read):
 
 @settings(max_examples=2)
 @given(cuts=st.lists(st.integers(0, 2200), min_size=3, max_size=12))
-def test_what_encoders_show_does_not_depend_on_blocks(new_watch, commissioned, read, cuts):
+def test_what_encoders_show_does_not_depend_on_blocks(commissioned, read, cuts):
     stream = messy(read)
-    monitor = new_watch()
-    monitor.restore(commissioned)
+    monitor = commissioned()
     whole = said(monitor, [monitor.update(stream)])
     assert "SEEN" in whole[0]
-    monitor.restore(commissioned)
+    monitor = commissioned()
     blocks = np.split(stream, sorted(min(cut, len(stream)) for cut in cuts))
     reports = [monitor.update(block) for block in blocks if len(block)]
     assert said(monitor, reports) == whole
-
-
-def test_a_restored_monitor_goes_on_bit_for_bit(new_watch, read):
-    """In the middle of a simulated reference, too."""
-    monitor = new_watch()
-    monitor.update(read(2.5))
-    assert monitor._parts.encoders._reference.is_busy
-    middle, rest = monitor.snapshot(), read(6.0, 2.5)
-    first = said(monitor, [monitor.update(rest)])
-    _, (reference, *_), _ = monitor._parts.encoders.snapshot()
-    monitor.restore(middle)
-    assert said(monitor, [monitor.update(rest)]) == first
-    _, (again, *_), _ = monitor._parts.encoders.snapshot()
-    np.testing.assert_array_equal(again.columns, reference.columns)
 
 
 @pytest.mark.parametrize(

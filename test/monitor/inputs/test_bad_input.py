@@ -43,7 +43,7 @@ def counted(monitor):
     return sum(counts.faulty.values()) + dropped + sum(counts.used.values())
 
 
-@settings(max_examples=60)
+@settings(max_examples=20)
 @given(st.lists(faulty | not_finite | stampless, min_size=1, max_size=300))
 def test_samples_that_cannot_be_used_are_counted_by_name_and_wear_nothing(new_monitor, samples):
     monitor = new_monitor()
@@ -56,7 +56,7 @@ def test_samples_that_cannot_be_used_are_counted_by_name_and_wear_nothing(new_mo
     assert sum(value for key, value in shown.items() if key.startswith("faulty_")) == len(samples)
 
 
-@settings(max_examples=60)
+@settings(max_examples=20)
 @given(st.lists(anything, min_size=1, max_size=300))
 def test_nothing_that_comes_breaks_the_monitor(new_monitor, samples):
     monitor = new_monitor()

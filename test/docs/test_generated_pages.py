@@ -97,7 +97,7 @@ def monitor_parameters(_name: str) -> str:
     return table("name | type | unit | default | bounds | live | what it is", rows)
 
 
-def publisher_parameters() -> str:
+def publisher_parameters(_name: str) -> str:
     pytest.importorskip("rclpy")
     from leg_wear_monitor.ros.gait_publisher import PublisherConfig
 
@@ -106,12 +106,6 @@ def publisher_parameters() -> str:
         for one in parameters_of(PublisherConfig).values()
     )
     return table("name | type | unit | default | bounds | what it is", rows)
-
-
-def of_ros(name: str) -> str:
-    if name == "parameters":
-        return publisher_parameters()
-    return table("`fault_code` | meaning", ((f"`{code}`", meaning) for code, meaning in FAULT_CODES.items()))
 
 
 def mechanism_keys(name: str) -> str:
@@ -254,13 +248,10 @@ def meanings() -> Iterator[tuple[str, str]]:
     """Each code with a line for each place that reports it."""
     for rule in RULES:
         yield rule.code, f"- Verdict *{rule.state.words}*: {in_words(rule.why)}."
-        if rule.not_valid:
-            yield rule.code, f"- Not valid meanwhile: {', '.join(each.words for each in rule.not_valid)}."
-        yield rule.code, f"- To do: {in_words(rule.do)}."
     for alarm in (*OF_A_JOINT, *OF_THE_LEG):
         code = alarm.name("").strip().upper().replace(" ", "_")
         name = alarm.name("<joint>") if alarm in OF_A_JOINT else alarm.name()
-        yield code, f"- Alarm `{name}`: {alarm.meaning}. Limit: {alarm.limit_words}."
+        yield code, f"- Alarm `{name}`: [value and limit](monitor.md#alarms)."
     for code, meaning in FAULT_CODES.items():
         yield code, f"- Status: {meaning}."
 
@@ -287,7 +278,7 @@ PAGES: dict[str, Callable[[str], str]] = {
     "reference/mechanism_file.md": mechanism_keys,
     "reference/monitor.md": of_monitor,
     "reference/parameters.md": monitor_parameters,
-    "reference/ros.md": of_ros,
+    "reference/ros.md": publisher_parameters,
 }
 
 

@@ -14,7 +14,6 @@ import numpy as np
 # What names the entries of a mapping; joints do, unless a mapping is here.
 KEYS = {
     "topics": "topic", "faulty": "fault", "made_with": "program", "values": "key", "bodies_m": "body",
-    "poses": "body",
     "counts": "state", "cycles_not_used": "reason",
     "standard_error": "field", "lowest": "column", "highest": "column",
 }  # fmt: skip

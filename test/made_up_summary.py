@@ -7,7 +7,6 @@ import numpy as np
 
 from leg_wear_monitor.bags.findings import Severity
 from leg_wear_monitor.mechanism.materials import BushingLoad
-from leg_wear_monitor.messages.leg_motion import PHASES, CycleMotion, CycleTorque, JointMotion
 from leg_wear_monitor.monitor.angle_regression import ClearanceObservation
 from leg_wear_monitor.monitor.config.settings import Limits
 from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, LegForecast, Quantiles
@@ -47,13 +46,6 @@ from leg_wear_monitor.state import (
 )
 
 LIFE = Quantiles(1.0, 2.0, 3.0)
-
-
-def _cycle(stamp_ns: int) -> CycleMotion:
-    """A pin that lies still in each joint."""
-    still = {joint: (JointMotion((0.0, -3e-4), 10.0, 5.0),) * PHASES for joint in "AB"}
-    torque = CycleTorque((1.0, None) * (PHASES // 2), (1.0,) * PHASES)
-    return CycleMotion(stamp_ns, torque, still)
 
 
 def made_up_state() -> LegState:
@@ -132,9 +124,8 @@ def made_up_summary() -> ReplaySummary:
             bodies_m={"thigh": ((0.0, 0.0), (0.0, -0.4)), "shank": ((0.0, -0.4), (0.1, -0.8), (-0.1, -0.8))},
             joints={
                 "A": LegJoint(label="", place_m=(0.0, 0.0), is_on_ground=True),
-                "B": LegJoint(label="knee", place_m=(0.0, -0.4), is_on_ground=False, body="shank"),
+                "B": LegJoint(label="knee", place_m=(0.0, -0.4), is_on_ground=False),
             },
-            poses=dict.fromkeys(("thigh", "shank"), ((0.0, 0.0, 0.0),) * PHASES),
         ),
         wall_s=0.5,
         real_time_factor=4e-9,
@@ -155,7 +146,6 @@ def made_up_summary() -> ReplaySummary:
         ),
         history=ReplayHistory(stamp_ns=stamps, **columns),
         wear_depth_m={"A": WornDepth(np.array([1e-9, 0.0]), np.zeros(2))},
-        motion=(_cycle(5), _cycle(6)),
         advice="advice",
         made_with={"leg_wear_monitor": "1"},
     )  # fmt: skip

@@ -1,18 +1,15 @@
-"""Keeps the content of a source, renews it while somebody looks, and hands each viewer what has changed."""
+"""Keeps the page of a leg, renews it while somebody looks, and sends each viewer the changes."""
 
 import asyncio
 import json
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
-from pathlib import Path
 from typing import Any
 
 import attrs
 
-from leg_wear_monitor.dashboard.motion import MotionFeed
-from leg_wear_monitor.dashboard.source import Content, Source
-from leg_wear_monitor.report.guide import document_page
+from leg_wear_monitor.dashboard.leg_page import Content
+from leg_wear_monitor.dashboard.live_leg import LiveLeg
 
 MOST_VIEWERS = 100
 
@@ -33,11 +30,11 @@ class Hub:
 
     Parameters
     ----------
-    source : Source
+    leg : LiveLeg
     """
 
-    def __init__(self, source: Source) -> None:
-        self._source = source
+    def __init__(self, leg: LiveLeg) -> None:
+        self._leg = leg
         self._content: Content | None = None
         self._numbers: dict[str, int] = {}  # of each region: counts up when it changes
         self._lock = asyncio.Lock()
@@ -45,11 +42,6 @@ class Hub:
         self._viewers: set[Viewer] = set()
         self._sent: dict[tuple[tuple[str, int], ...], str] = {}  # messages of this tick, by what is given
         self.is_closing = False
-
-    @property
-    def motion(self) -> MotionFeed | None:
-        """Frames of the moving leg; None where nothing moves."""
-        return self._source.motion
 
     @property
     def viewers(self) -> int:
@@ -105,13 +97,8 @@ class Hub:
         """
         await self._renew()
         if self._content is None:
-            raise RuntimeError("a source without content")
+            raise RuntimeError("a leg without content")
         return self._content
-
-    async def document(self, path: Path) -> tuple[str, str]:
-        """A document as a page, and its policy."""
-        page: tuple[str, str] = await self._work(partial(document_page, path))
-        return page
 
     async def message(self, viewer: Viewer) -> str:
         """What a viewer does not have yet, as one server-sent event."""
@@ -124,23 +111,22 @@ class Hub:
         return self._sent[key]
 
     def _event(self, given: Mapping[str, int]) -> str:
-        content, freshness = self._content, self._source.freshness()
+        content, freshness = self._content, self._leg.freshness()
         regions = content.regions if content else {}
         changed = {name: text for name, text in regions.items() if given.get(name) != self._numbers[name]}
         state = {
             **attrs.asdict(freshness),
-            "page": content.page if content else "",
             "words": attrs.asdict(content.words) if content else {},
             "regions": changed,
         }
         return f"event: state\ndata: {json.dumps(state, allow_nan=False)}\n\n"
 
     async def _renew(self) -> bool:
-        """Whether the content is another one."""
+        """Whether the content has changed."""
         async with self._lock:
-            if not await self._work(self._source.renew) and self._content is not None:
+            if not self._leg.has_news() and self._content is not None:
                 return False
-            before, self._content = self._content, await self._work(self._source.content)
+            before, self._content = self._content, await self._work(self._leg.content)
         regions = before.regions if before else {}
         for name, markup in self._content.regions.items():
             if regions.get(name) != markup:

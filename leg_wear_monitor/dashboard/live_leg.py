@@ -2,6 +2,7 @@
 
 import math
 import threading
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import islice
 from typing import Any
@@ -10,34 +11,30 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.configuration.strict import structure
-from leg_wear_monitor.dashboard import source as region
-from leg_wear_monitor.dashboard.motion import MotionFeed, motion_region
-from leg_wear_monitor.dashboard.source import (
+from leg_wear_monitor.dashboard.leg_page import (
     NOTHING_KNOWN,
     Content,
     Freshness,
     LegSetup,
-    Words,
     leg_content,
+    summary_of_now,
+    trends_markup,
     unknown_leg,
-    view_of,
-    words_of,
 )
 from leg_wear_monitor.errors import ConfigError, printable
 from leg_wear_monitor.files import finite_or_none, number_of, or_nan, received_json
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, SEEN_COLUMNS, SUMMARY_COLUMNS
 from leg_wear_monitor.playback.result import ReplayHistory, ReplayStatus, ReplaySummary
-from leg_wear_monitor.report.replay.page import belief, raised_alarms
 from leg_wear_monitor.state import SCHEMA_VERSION, LegState, Level
 
 # Messages as other processes sent them; nothing in them is trusted.
 
 
 MOST = 200
-"""Statuses in a message, values in a status, entries of a list: what exceeds it is not from a monitor."""
+"""Statuses in a message, values in a status, entries of a list: a monitor sends fewer."""
 
-_MOST_CHARACTERS = 10**6  # of a state; that of a leg with five joints has 10 000
+_MOST_CHARACTERS = 10**6  # of a state; a leg with five joints has 10 000
 _HUGE = 2.0**63  # no stamp, no count and no value in SI units is that large
 _CODE, _NO_DATA = "fault_code", "no_data_s"
 
@@ -75,7 +72,7 @@ def received_state(text: str, source: str) -> LegState:
     Raises
     ------
     ConfigError
-        If it is no state, or one of another version.
+        If it is no state, or one of a different version.
     """
     record = received_json(text, source, _MOST_CHARACTERS)
     record = structure(_clean(record), dict[str, Any], source, "")
@@ -97,83 +94,10 @@ def _clean(part: Any) -> Any:
     return None if is_huge else part
 
 
-# What was heard of a leg over time, in a bounded number of rows.
-
-
-MOST_ROWS = 600
-"""So many points are as many as a screen shows; twice as many are thinned by two."""
-
-_MAXIMA = ("peak_force_n",)  # of a group of gait cycles, its largest value
-
-
-@attrs.frozen
-class Row:
-    """Values at a stamp, by column and, for those of a joint, by its name; what is absent is not known."""
-
-    stamp_ns: int
-    leg: Mapping[str, float | None]
-    joints: Mapping[str, Mapping[str, float | None]]
-
-
-class Trends:
-    """The rows, the older ones thinned like the newer ones: always every so many."""
-
-    def __init__(self) -> None:
-        self._begin()
-
-    def _begin(self) -> None:
-        self._rows: list[Row] = []
-        self._every = 1  # rows that were given, for one that is kept
-        self._waiting: list[Row] = []
-
-    def add(self, row: Row) -> None:
-        """Keep a row; one of another time base, before the last, begins anew."""
-        if self._rows and row.stamp_ns < self._rows[-1].stamp_ns:
-            self._begin()
-        self._waiting.append(row)
-        if len(self._waiting) < self._every:
-            return
-        self._rows.append(_merged(self._waiting))
-        self._waiting.clear()
-        if len(self._rows) >= 2 * MOST_ROWS:
-            self._rows = [_merged(self._rows[k : k + 2]) for k in range(0, len(self._rows), 2)]
-            self._every *= 2
-
-    def history(self, joints: Sequence[str]) -> ReplayHistory:
-        """The rows as columns; all NaN in columns that were never heard."""
-        rows = [*self._rows, *self._waiting[-1:]]
-        columns: dict[str, Any] = {name: _column(row.leg.get(name) for row in rows) for name in CYCLE_COLUMNS}
-        columns |= {
-            name: {joint: _column(row.joints.get(name, {}).get(joint) for row in rows) for joint in joints}
-            for name in SUMMARY_COLUMNS.values()
-        }
-        stamps = np.array([row.stamp_ns for row in rows], np.int64)
-        return ReplayHistory(stamp_ns=stamps, **columns)
-
-
-def _merged(rows: Sequence[Row]) -> Row:
-    """One row for some: the last values that are known, and the largest of what counts as such."""
-    leg: dict[str, float | None] = {}
-    joints: dict[str, dict[str, float | None]] = {}
-    for row in rows:
-        leg |= {name: value for name, value in row.leg.items() if value is not None}
-        for name, values in row.joints.items():
-            kept = joints.setdefault(name, {})
-            for joint, value in values.items():
-                before = kept.get(joint)
-                if value is not None and (name not in _MAXIMA or before is None or value > before):
-                    kept[joint] = value
-    return Row(rows[-1].stamp_ns, leg, joints)
-
-
-def _column(values: Iterable[float | None]) -> Floats:
-    return np.array([or_nan(value) for value in values], float)
-
-
+_ROWS = 1200  # of the trends: twenty minutes at one report per second
 OLD_AFTER_S = 5.0  # the monitor reports every second, whether the leg walks or not
-_REPORTS = 3.0  # or so many of its reports did not come
-_TRENDS_S = 5.0  # charts are many kilobytes: not with each message
-
+_REPORTS = 3.0  # or this many of its reports did not come
+_TRENDS_S = 5.0  # charts are many kilobytes, so the page does not send them with each message
 _GAIT = {"cycle": "cycles", "cadence_rpm": "cadence_rpm"}
 _TORQUE = {
     "measured_torque_rms_nm": "measured_rms_nm",
@@ -184,8 +108,17 @@ _TORQUE = {
 }
 
 
+@attrs.frozen
+class Row:
+    """Values at a stamp, by column, or by column and joint; a value that is absent is not known."""
+
+    stamp_ns: int
+    leg: Mapping[str, float | None]
+    joints: Mapping[str, Mapping[str, float | None]]
+
+
 class LiveLeg:
-    """A source that receives what a monitor publishes, from any thread.
+    """Receives the messages of a monitor, from any thread.
 
     Parameters
     ----------
@@ -207,30 +140,18 @@ class LiveLeg:
         self._statuses: dict[str, ReplayStatus] = {}
         self._leg_silent_s: float | None = None
         self._peaks_n: dict[str, float | None] = {}
-        self._trends = Trends()
+        self._rows: deque[Row] = deque(maxlen=_ROWS)
         self._arrived_s: float | None = None
         self._is_new = True
-        self._drawn: tuple[float, str] = (-math.inf, "")
-        self._moving = ""
-        self.motion = MotionFeed()
-
-    # --- what the monitor says ---
+        self._trends: tuple[float, str] = (-math.inf, "")
 
     def take_setup(self, setup: LegSetup | None, why_not: str = "") -> None:
         """The leg's parameters, or why they are not known."""
         with self._lock:
             self._setup, self._why_unknown, self._is_new = setup, printable(why_not), True
-            if setup is not None and setup.mechanism is not None:
-                self._moving = motion_region(setup.mechanism, setup.monitor.limits.torque_mismatch)
-
-    def take_motion(self, text: str) -> None:
-        """A message of ``~/motion``."""
-        with self._lock:
-            clearances = self._state.clearances
-        self.motion.add(text, f"{self._node}/motion", clearances)
 
     def take_diagnostics(self, stamp_ns: int, statuses: Iterable[ReplayStatus]) -> None:
-        """A message of ``/diagnostics``; those of other nodes are left out."""
+        """A message of ``/diagnostics``; statuses of other nodes are left out."""
         own = own_statuses(self._node, statuses)
         if not own:
             return
@@ -239,10 +160,12 @@ class LiveLeg:
             verdict = own.pop("verdict", None)
             self._leg_silent_s = verdict.values.get(_NO_DATA) if verdict else None
             self._statuses = own
-            self._trends.add(self._row(stamp_ns))
+            if self._rows and stamp_ns < self._rows[-1].stamp_ns:  # a different time base
+                self._rows.clear()
+            self._rows.append(self._row(stamp_ns))
 
     def take_state(self, text: str) -> None:
-        """A message of ``~/state``; what is no state is left out, and reported."""
+        """A message of ``~/state``; the page reports a message that it cannot read."""
         try:
             state, fault = received_state(text, f"{self._node}/state"), ""
         except ConfigError as error:
@@ -268,72 +191,65 @@ class LiveLeg:
                 values = self._statuses[status].values
                 leg |= {column: values.get(name) for column, name in columns.items()}
         joints = self._state.clearances
-        counted = {joint: each.counted_m for joint, each in joints.items()}
-        seen = {name: {joint: getattr(each, name) for joint, each in joints.items()} for name in SEEN_COLUMNS}
-        return Row(stamp_ns, leg, {"counted_m": counted, **seen, "peak_force_n": self._peaks_n})
+        columns_m = {
+            name: {joint: getattr(each, name) for joint, each in joints.items()}
+            for name in ("counted_m", *SEEN_COLUMNS)
+        }
+        return Row(stamp_ns, leg, {**columns_m, "peak_force_n": self._peaks_n})
 
-    # --- what the page shows ---
-
-    def renew(self) -> bool:
-        """Whether anything was heard since the last content."""
+    def has_news(self) -> bool:
+        """Whether the leg has received anything since the last content."""
         return self._is_new
 
     def content(self) -> Content:
-        """The page with all that was heard last."""
+        """The page with everything that was received last."""
         with self._lock:
-            view, why_unknown = self._view(), self._fault or ("" if self._setup else self._why_unknown)
+            now, why_unknown = self._now(), self._fault or ("" if self._setup else self._why_unknown)
             self._is_new = False
-        regions = {
-            region.VERDICT: region.verdict_region(view),
-            region.JOINTS: region.joints_region(view, why_unknown),
-            **({region.MOTION: self._moving} if self._moving else {}),
-            region.ALARMS: raised_alarms(view, otherwise="No alarm is raised."),
-            region.BELIEF: belief(view),
-            region.TRENDS: self._trends_region(view),
-            region.STATUS: region.status_region(view),
-        }
-        return leg_content(regions, self._words(view), self.freshness(), "Live, data ")
+        return leg_content(now, printable(self._node), self.freshness(), why_unknown, self._charts(now))
 
     def freshness(self) -> Freshness:
         """Since when nothing was heard of the monitor; or, if it speaks, since when it has no data."""
         with self._lock:
             arrived_s, leg_s = self._arrived_s, self._leg_silent_s
+        old_after_s = max(OLD_AFTER_S, _REPORTS * self._setup.report_s) if self._setup else OLD_AFTER_S
         if arrived_s is None:
             return Freshness(
                 None,
                 f"WAITING for the monitor {printable(self._node)}: no message yet on {self._waited_for}. "
                 "Is it running, with this name and this ROS_DOMAIN_ID?",
-                self._old_after_s,
+                old_after_s,
             )
         age_s = self._clock() - arrived_s
         silence = "nothing is heard of the monitor; is it running?"
-        if leg_s is not None and age_s < self._old_after_s:
+        if leg_s is not None and age_s < old_after_s:
             age_s += leg_s
             silence = "the monitor runs, but receives nothing from the leg; see its status below"
-        return Freshness(age_s, silence, self._old_after_s)
+        return Freshness(age_s, silence, old_after_s)
 
-    def _words(self, view: ReplaySummary) -> Words:
-        node, leg = printable(self._node), printable(view.monitor.hardware_id) or "a leg"
-        which = ", ".join(filter(None, [view.monitor.mechanism, f"live from {node}"]))
-        return words_of(view, node, f"Joint wear of {leg}", which)
-
-    @property
-    def _old_after_s(self) -> float:
-        return max(OLD_AFTER_S, _REPORTS * self._setup.report_s) if self._setup else OLD_AFTER_S
-
-    def _trends_region(self, view: ReplaySummary) -> str:
-        now_s, (drawn_s, markup) = self._clock(), self._drawn
-        if now_s - drawn_s >= _TRENDS_S or len(view.history.stamp_ns) < 3:
-            markup = region.trends_region(view, "Since this dashboard was started.")
-            self._drawn = now_s, markup
+    def _charts(self, now: ReplaySummary) -> str:
+        now_s, (drawn_s, markup) = self._clock(), self._trends
+        if now_s - drawn_s >= _TRENDS_S or len(now.history.stamp_ns) < 3:
+            markup = trends_markup(now)
+            self._trends = now_s, markup
         return markup
 
-    def _view(self) -> ReplaySummary:
+    def _now(self) -> ReplaySummary:
         setup, gait = self._setup or unknown_leg(), self._statuses.get("gait")
-        return view_of(
-            setup,
-            self._state,
-            self._trends.history(setup.joints),
-            status=list(self._statuses.values()),
-            missing="" if self._state.life_cycles else gait.message if gait else "nothing was heard",
-        )
+        missing = "" if self._state.life_cycles else gait.message if gait else "nothing was heard"
+        history = _history(self._rows, setup.monitor.clearance_joints)
+        return summary_of_now(setup, self._state, history, list(self._statuses.values()), missing)
+
+
+def _history(rows: Sequence[Row], joints: Sequence[str]) -> ReplayHistory:
+    """The rows as columns; a column that was never received is all NaN."""
+    columns: dict[str, Any] = {name: _column(row.leg.get(name) for row in rows) for name in CYCLE_COLUMNS}
+    columns |= {
+        name: {joint: _column(row.joints.get(name, {}).get(joint) for row in rows) for joint in joints}
+        for name in SUMMARY_COLUMNS.values()
+    }
+    return ReplayHistory(stamp_ns=np.array([row.stamp_ns for row in rows], np.int64), **columns)
+
+
+def _column(values: Iterable[float | None]) -> Floats:
+    return np.array([or_nan(value) for value in values], float)

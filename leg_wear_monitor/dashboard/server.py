@@ -13,15 +13,13 @@ from tornado.iostream import IOStream, StreamClosedError
 from tornado.web import Application, HTTPError, RequestHandler
 
 from leg_wear_monitor.dashboard.hosts import is_allowed, own_names
-from leg_wear_monitor.dashboard.hub import MOST_VIEWERS, Hub
+from leg_wear_monitor.dashboard.hub import Hub
 from leg_wear_monitor.errors import LegWearError, printable
-from leg_wear_monitor.report.guide import document_path
 
 MOST_CONNECTIONS = 300  # of the viewers of a hub, and what their browsers keep open beside
 
 _WRITE_S = 20.0  # a viewer that takes nothing for so long is sent away
 _IDLE_S = 20.0  # so is a connection without a whole request for so long; a browser just makes a new one
-_FRAME_S, _QUIET_S = 0.05, 5.0  # of the moving leg: 20 frames a second
 _REQUEST_BYTES = 16_384
 _HEADERS = {
     "Cache-Control": "no-store",
@@ -149,8 +147,6 @@ def application(hub: Hub, host: str) -> Application:
         [
             (r"/", _Page, common),
             (r"/events", _Events, common),
-            (r"/motion", _Motion, common),
-            (r"/docs/([A-Za-z0-9_/]+\.md)", _Document, common),
         ],
         default_handler_class=_Nothing,
         default_handler_args=common,
@@ -197,33 +193,16 @@ class _Reading(RequestHandler):
         if not isinstance(value, HTTPError) and not self._hub.is_closing:
             super().log_exception(kind, value, trace)
 
-    async def show(self, html: str, policy: str) -> None:
-        """Answer with a page."""
-        self.set_header("Content-Security-Policy", f"{policy}; frame-ancestors 'none'")
-        self.set_header("Content-Type", "text/html; charset=utf-8")
-        try:
-            await asyncio.wait_for(self.finish(html), _WRITE_S)
-        except (StreamClosedError, TimeoutError):
-            self.request.connection.stream.close()  # type: ignore[union-attr]
-
 
 class _Page(_Reading):
     async def get(self) -> None:
         content = await self._hub.content()
-        await self.show(content.html, content.policy)
-
-    head = get
-
-
-class _Document(_Reading):
-    """A document that comes with the package; its links lead to others."""
-
-    async def get(self, name: str) -> None:
-        path = document_path(name)
-        if path is None:
-            raise HTTPError(HTTPStatus.NOT_FOUND)
-        html, policy = await self._hub.document(path)
-        await self.show(html, f"{policy}; base-uri 'none'; form-action 'none'")
+        self.set_header("Content-Security-Policy", f"{content.policy}; frame-ancestors 'none'")
+        self.set_header("Content-Type", "text/html; charset=utf-8")
+        try:
+            await asyncio.wait_for(self.finish(content.html), _WRITE_S)
+        except (StreamClosedError, TimeoutError):
+            self.request.connection.stream.close()  # type: ignore[union-attr]
 
     head = get
 
@@ -253,37 +232,6 @@ class _Events(_Reading):
         """Wake up, to end."""
         if hasattr(self, "_bell"):
             self._bell.set()
-
-
-class _Motion(_Reading):
-    """Frames of the moving leg, as they come."""
-
-    async def get(self) -> None:
-        feed = self._hub.motion
-        if feed is None:
-            raise HTTPError(HTTPStatus.NOT_FOUND)
-        if feed.viewers >= MOST_VIEWERS:
-            raise HTTPError(HTTPStatus.SERVICE_UNAVAILABLE)
-        self.set_header("Content-Type", "text/event-stream; charset=utf-8")
-        feed.viewers += 1
-        number, quiet_s = 0, 0.0
-        try:
-            await asyncio.wait_for(self.flush(), _WRITE_S)
-            while not self._hub.is_closing and not self.request.connection.stream.closed():  # type: ignore[union-attr]
-                frames = feed.after(number)
-                quiet_s = 0.0 if frames else quiet_s + _FRAME_S
-                if frames or quiet_s >= _QUIET_S:  # a word from time to time finds out who is gone
-                    self.write("".join(f"event: frame\ndata: {text}\n\n" for _, text in frames) or ":\n\n")
-                    await asyncio.wait_for(self.flush(), _WRITE_S)
-                    number, quiet_s = frames[-1][0] if frames else number, 0.0
-                await asyncio.sleep(_FRAME_S)
-        except (StreamClosedError, TimeoutError):
-            self.request.connection.stream.close()  # type: ignore[union-attr]
-        finally:
-            feed.viewers -= 1
-
-    def head(self) -> None:
-        self.set_header("Content-Type", "text/event-stream; charset=utf-8")
 
 
 class _Nothing(_Reading):

@@ -1,7 +1,6 @@
 """History of a replay, gait cycle by gait cycle, and the sink of its messages."""
 
 from array import array
-from collections import deque
 from contextlib import nullcontext, suppress
 from pathlib import Path
 
@@ -12,12 +11,11 @@ from leg_wear_monitor.files import or_nan
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.messages.encode import LegDrawing
 from leg_wear_monitor.messages.leg_markers import LegMarkers
-from leg_wear_monitor.messages.leg_motion import CycleMotion, whole_cycles
 from leg_wear_monitor.messages.outputs import ALARMS, DIAGNOSTICS, FORECAST, STATE, VERDICT, Messages
 from leg_wear_monitor.messages.streams import ForecastTimes, topic_of
 from leg_wear_monitor.monitor.alarms import Alarm, has_changed
 from leg_wear_monitor.monitor.config.parameters import NODE
-from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, Reports, SampleReports
+from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, Reports
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.state import Level
 
@@ -53,7 +51,6 @@ CYCLE_COLUMNS = (
     "friction_nm",
 )
 _MOST_CHANGES = 10_000
-_PIECES = 6  # of samples, usually of a second each: three gait cycles at 40 rpm
 
 
 class History:
@@ -83,8 +80,6 @@ class History:
         self._cycles = array("d")
         self._joints = array("d")
         self._before: dict[str, Alarm] = {}
-        self._begin: list[SampleReports] = []
-        self._end: deque[SampleReports] = deque(maxlen=_PIECES)
 
     def __len__(self) -> int:
         return len(self._stamps)
@@ -106,19 +101,6 @@ class History:
                 self.worst[alarm.kind] = max(self.worst.get(alarm.kind, Level.OK), alarm.level)
                 if len(self.changes) < _MOST_CHANGES:
                     self.changes.append((alarms.stamp_ns, alarm))
-
-    def add_samples(self, samples: SampleReports) -> None:
-        """Keep those that the first and the last gait cycle are played from."""
-        if np.isfinite(samples.crank_angle_rad).any():
-            self._end.append(samples)
-            if len(self._begin) < _PIECES:
-                self._begin.append(samples)
-
-    @property
-    def motion(self) -> tuple[CycleMotion, ...]:
-        """The second whole gait cycle, the first with a torque that has settled, and the last one."""
-        begin, end = (whole_cycles(self.clearance_joints, kept) for kept in (self._begin, self._end))
-        return tuple({each.stamp_ns: each for each in begin[1:2] + end[-1:]}.values())
 
     @property
     def stamp_ns(self) -> Ints:

@@ -192,7 +192,6 @@ def _about_the_ledger(result: ReplayResult) -> list[Finding]:
 def _take(result: ReplayResult, samples: Samples, sink: Sink | None) -> None:
     """Process samples with the monitor, and store the reports."""
     reports = result.monitor.update(samples)
-    result.history.add_samples(reports.samples)
     for cycle in reports.cycles:
         result.history.add_cycle(cycle)
         result.evidence.add(cycle)

@@ -11,7 +11,6 @@ from leg_wear_monitor.configuration.strict import structure_of_version
 from leg_wear_monitor.files import data_frame, finite_or_none
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.materials import BushingLoad
-from leg_wear_monitor.messages.leg_motion import CycleMotion
 from leg_wear_monitor.monitor.angle_regression import ClearanceObservation
 from leg_wear_monitor.monitor.config.settings import Limits
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
 
 
 Place = tuple[float, float]
-Pose = tuple[float, float, float]
 
 
 @attrs.frozen(kw_only=True)
@@ -42,14 +40,11 @@ class LegJoint:
         Its place at crank angle 0.
     is_on_ground : bool
         Whether it joins a body to the ground.
-    body : str
-        Moving body at whose place it is; empty on the ground.
     """
 
     label: str
     place_m: Place
     is_on_ground: bool
-    body: str = ""
 
 
 @attrs.frozen(kw_only=True)
@@ -62,15 +57,10 @@ class ReplayLeg:
         Corners of each moving body.
     joints : dict of str to LegJoint
         All joints, those without clearance too.
-    poses : dict of str to tuple of tuples
-        How each moving body lies in 72 equal steps of a turn of the crank, against crank angle 0: it is
-        turned about the origin [rad], then moved by x and y [m]. Empty for a crank that does not turn
-        through, and in a file of an older version.
     """
 
     bodies_m: dict[str, tuple[Place, ...]] = attrs.Factory(dict)
     joints: dict[str, LegJoint] = attrs.Factory(dict)
-    poses: dict[str, tuple[Pose, ...]] = attrs.Factory(dict)
 
     def joint_words(self, joint: str) -> str:
         """A joint by its name and its label, such as ``G (knee)``."""
@@ -484,9 +474,6 @@ class ReplaySummary(LegState):
         The gait cycles over time.
     wear_depth_m : dict of str to WornDepth
         Wear around the surfaces of each joint since the start of the ledger, or of the replay without one.
-    motion : tuple of CycleMotion
-        The first gait cycle with a settled torque, and the last one; one where the two are the same, none
-        where no whole one was followed.
     advice : str
         Limits of the results: the absence of an alarm does not mean the joints are healthy.
     made_with : dict of str to str
@@ -508,7 +495,6 @@ class ReplaySummary(LegState):
     lost: Lost
     history: ReplayHistory
     wear_depth_m: dict[str, WornDepth]
-    motion: tuple[CycleMotion, ...] = ()
     advice: str
     made_with: dict[str, str] = attrs.Factory(dict)
 

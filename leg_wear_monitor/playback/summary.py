@@ -14,10 +14,8 @@ from leg_wear_monitor.bags.findings import Finding
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.files import with_same_fields
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
-from leg_wear_monitor.mechanism.position import carriers, is_on_ground, outline_of, rotated
-from leg_wear_monitor.mechanism.reach import Reach, reach_of
-from leg_wear_monitor.mechanism.spec import GROUND, Mechanism
-from leg_wear_monitor.messages.leg_motion import PHASES
+from leg_wear_monitor.mechanism.position import is_on_ground, outline_of
+from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms import ADVICE
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
@@ -30,7 +28,6 @@ from leg_wear_monitor.playback.result import (
     EncoderEvidence,
     LegJoint,
     Place,
-    Pose,
     ReplayFinding,
     ReplayGait,
     ReplayHistory,
@@ -177,7 +174,6 @@ class ReplayResult:
             lost=monitor.lost,
             history=_history(self.history),
             wear_depth_m=_wear(self),
-            motion=self.history.motion if is_known else (),
             advice=ADVICE,
             made_with=dict(made_with or {}),
         )
@@ -223,7 +219,7 @@ def settings_of(config: MonitorConfig, mechanism: Mechanism) -> ReplayMonitor:
 
 def leg_shape(mechanism: Mechanism) -> ReplayLeg:
     """A mechanism as a picture needs it."""
-    (bodies, joints), reach = outline_of(mechanism), reach_of(mechanism, None, PHASES)
+    bodies, joints = outline_of(mechanism)
     return ReplayLeg(
         bodies_m={body: _places(corners) for body, corners in bodies.items()},
         joints={
@@ -231,23 +227,10 @@ def leg_shape(mechanism: Mechanism) -> ReplayLeg:
                 label=mechanism.joints[name].label,
                 place_m=_places(place[None])[0],
                 is_on_ground=is_on_ground(mechanism, name),
-                body=carriers(mechanism, name)[1].removeprefix(GROUND),
             )
             for name, place in joints.items()
         },
-        poses=_poses(reach) if reach.turns else {},
     )
-
-
-def _poses(reach: Reach) -> dict[str, tuple[Pose, ...]]:
-    """Turn about the origin and place of each moving body, against the first position."""
-    poses = {}
-    for i, body in enumerate(reach.mechanism.bodies, start=1):
-        turn = reach.q[:, i, 2] - reach.q[0, i, 2]
-        moved = reach.q[:, i, :2] - rotated(reach.q[0, i, :2], turn)
-        rows = np.column_stack([turn, moved]).round(5).tolist()
-        poses[body] = tuple((angle, x, y) for angle, x, y in rows)
-    return poses
 
 
 def _places(points: Floats) -> tuple[Place, ...]:

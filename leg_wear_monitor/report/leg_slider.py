@@ -13,11 +13,9 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import carriers, corners, is_on_ground, point_path, rotated
 from leg_wear_monitor.mechanism.reach import DeadPoint, Reach
 from leg_wear_monitor.mechanism.spec import GROUND
-from leg_wear_monitor.messages.leg_motion import JointMotion
 from leg_wear_monitor.report.figure import BODY_COLOURS
 from leg_wear_monitor.report.leg_picture import in_line
 from leg_wear_monitor.report.page import Fragment, render, template_text
-from leg_wear_monitor.state import JointClearance
 
 ARROW_FRACTION = 0.3  # length of the longest arrow, as a fraction of the picture's height
 
@@ -141,25 +139,6 @@ def run_data(
             pins[name]["e"] = (places[:, k] * _FLIP).round(3).tolist()
     largest_n = float(np.linalg.norm(forces_n, axis=-1).max())
     return {"label": label, "pins": pins, "largest_n": largest_n}
-
-
-_AT_LIMIT, _MOST_GAP, _LEAST_GAP = 0.5, 0.85, 0.02  # drawn clearance, as a fraction of the bushing's radius
-
-
-def drawn_pin(motion: JointMotion, clearance: JointClearance) -> dict[str, Any]:
-    """A joint as the page draws it: y downwards, lengths in clearances, forces in N."""
-    x, y = motion.eccentricity_m
-    size = (x * x + y * y) ** 0.5
-    pushed = (-motion.force_n * x / size, motion.force_n * y / size) if size else (0.0, 0.0)
-    counted = clearance.counted_m or 1.0
-    width = clearance.believed_m or counted
-    gap = min(max(_AT_LIMIT * width / clearance.limit_m, _LEAST_GAP), _MOST_GAP)
-    return {
-        "e": [round(x / counted, 3), round(-y / counted, 3)],
-        "f": [round(pushed[0], 1), round(pushed[1], 1)],
-        "hit": round(motion.impact_n, 1),
-        "gap": round(gap, 3),
-    }
 
 
 def leg_slider(data: dict[str, Any], alt: str, caption: str) -> Fragment:

@@ -484,7 +484,7 @@ def verdict_banner(summary: ReplaySummary, guide: str, certainty: str) -> Banner
     guide : str
         Address of the verdict's guide.
     certainty : str
-        Address of what its certainty was measured on.
+        Address of the cases on which its certainty was measured; no link if empty.
     """
     verdict = summary.verdict
     symbol, severity = STATE_LOOKS[verdict.state]
@@ -496,7 +496,7 @@ def verdict_banner(summary: ReplaySummary, guide: str, certainty: str) -> Banner
         figures = ", ".join(figure.words for figure in verdict.not_valid)
         notes.append(("Not valid", f"{figures}: {reason(verdict)}"))
     links = {"Do": ("step by step", guide)}
-    if figures_of(summary):
+    if certainty and figures_of(summary):
         links[HOW_SURE] = ("measured on what", certainty)
     return Banner(
         symbol=symbol,

@@ -21,12 +21,11 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from leg_wear_monitor.dashboard.leg_page import LegSetup, leg_setup
 from leg_wear_monitor.dashboard.live_leg import MOST, LiveLeg, received_status
-from leg_wear_monitor.dashboard.source import LegSetup, leg_setup
 from leg_wear_monitor.errors import ConfigError, LegWearError, printable
 from leg_wear_monitor.mechanism.loader import is_file_name, load_mechanism, shipped_mechanisms
 from leg_wear_monitor.messages import outputs
-from leg_wear_monitor.messages.leg_motion import MOTION
 from leg_wear_monitor.messages.qos import LATCHED, Qos
 from leg_wear_monitor.messages.streams import Output, topic_of
 from leg_wear_monitor.monitor.config.fitting import fitted
@@ -38,7 +37,6 @@ from leg_wear_monitor.ros.running import WAKE_S, executor_for, spin, stamp_ns_of
 
 
 _ASK_AGAIN_S = 2.0
-_LOOK_S = 0.25  # between somebody who opens the page and the first frame
 _HEARD = (outputs.STATE, outputs.DIAGNOSTICS, outputs.CLEARANCES)
 
 
@@ -115,18 +113,6 @@ class _Listener(Node):
             DiagnosticArray,
             lambda m: leg.take_diagnostics(stamp_ns_of(m.header.stamp), _statuses(m)),
         )
-
-        self._motion: Any = None
-        self.create_timer(_LOOK_S, self._look)
-
-    def _look(self) -> None:
-        """Subscribe to the moving leg while somebody looks: the monitor makes its frames only then."""
-        is_wanted = self._leg.motion.viewers > 0
-        if is_wanted and self._motion is None:
-            self._motion = self._subscribe(MOTION, String, lambda m: self._leg.take_motion(m.data))
-        elif not is_wanted and self._motion is not None:
-            self.destroy_subscription(self._motion)
-            self._motion = None
 
     def _subscribe(self, output: Output, kind: type, take: Callable[[Any], None]) -> Any:
         return self.create_subscription(kind, topic_of(output, self._monitor), take, _profile(output.qos))

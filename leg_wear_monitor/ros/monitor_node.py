@@ -35,7 +35,7 @@ from leg_wear_monitor.monitor.wear_monitor import WearMonitor, open_monitor
 from leg_wear_monitor.ros.health import Load, load_status, recording_status
 from leg_wear_monitor.ros.inputs import Inbox, Inputs, check_stamps
 from leg_wear_monitor.ros.measure import measured, not_stored, offer_measure, with_storage
-from leg_wear_monitor.ros.outputs import BlackBox, MarkerTopic, MotionTopic, Outlets
+from leg_wear_monitor.ros.outputs import BlackBox, MarkerTopic, Outlets
 from leg_wear_monitor.ros.parameters import Parameters
 from leg_wear_monitor.ros.running import ClosingNode, release_memory, repeated, run, spin
 from leg_wear_monitor.ros.supervision import Supervision
@@ -249,7 +249,6 @@ class MonitorNode(ClosingNode):
         self._serve()
         self._supervision = Supervision(self, self._monitor, config)
         self._markers = MarkerTopic(self, self._outlets, self._monitor, lambda: self._supervision.is_current)
-        self._motion = MotionTopic(self, self._monitor.clearance_joints)
         self._send_state()
         inputs = self._inputs = Inputs(self, config)
         self._supervision.inputs = inputs.topics
@@ -352,7 +351,6 @@ class MonitorNode(ClosingNode):
     def _publish(self, reports: Reports, coarse: bool) -> None:
         now_ns = time.time_ns()
         self._markers.publish(reports)
-        self._motion.publish(reports.samples)
         reports = attrs.evolve(
             reports,
             alarms=tuple(map(self._supervision.alarms, reports.alarms)),

@@ -3,7 +3,7 @@
 import re
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from datetime import UTC, datetime
 from functools import cached_property
@@ -28,10 +28,9 @@ from visualization_msgs.msg import MarkerArray
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.messages.encode import LegDrawing
 from leg_wear_monitor.messages.leg_markers import LINKAGE, MARKERS, SILENT_NS, LegMarkers
-from leg_wear_monitor.messages.leg_motion import MOTION, LegMotion
 from leg_wear_monitor.messages.qos import Qos
 from leg_wear_monitor.messages.streams import Outgoing, Output
-from leg_wear_monitor.monitor.reports import Reports, SampleReports
+from leg_wear_monitor.monitor.reports import Reports
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.ros.running import until_down
 
@@ -326,35 +325,6 @@ class Outlets:
         with until_down(self._context), handle:  # as `publish`, which checks the kind of each message
             for at in range(0, len(whole), size):
                 handle.publish_raw(whole[at : at + size])
-
-
-# Topic ``~/motion`` of the node, for a page that moves.
-
-
-class MotionTopic:
-    """``~/motion``, while somebody subscribes; it is not recorded.
-
-    Parameters
-    ----------
-    node : rclpy.node.Node
-    joints : sequence of str
-        The clearance joints.
-    """
-
-    def __init__(self, node: Node, joints: Sequence[str]) -> None:
-        self._context, self._joints = node.context, joints
-        self._publisher = node.create_publisher(String, MOTION.name, qos_profile(MOTION.qos))
-        self._motion: LegMotion | None = None
-
-    def publish(self, samples: SampleReports) -> None:
-        """Publish the frames of samples."""
-        with until_down(self._context):
-            if not self._publisher.get_subscription_count():
-                self._motion = None
-                return
-            self._motion = self._motion or LegMotion(self._joints)
-            for frame in self._motion.of(samples):
-                self._publisher.publish(String(data=frame.to_json()))
 
 
 # Topics ``~/markers`` and ``~/linkage_states`` of the node; `messages.leg_markers` makes them.

@@ -9,8 +9,8 @@ from contextlib import contextmanager
 import pytest
 from heard_leg import NODE, Clock, walk
 
+from leg_wear_monitor.dashboard.leg_page import leg_setup
 from leg_wear_monitor.dashboard.live_leg import LiveLeg
-from leg_wear_monitor.dashboard.source import leg_setup
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.settings import MonitorConfig

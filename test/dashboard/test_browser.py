@@ -6,7 +6,7 @@ from browser import NEEDS_CHROMIUM, WIDTHS
 from heard_leg import raised, state_of, walk
 
 pytest.importorskip("tornado")
-from live_browser import LivePage, wait_for
+from live_browser import LivePage
 
 from leg_wear_monitor.dashboard.live_leg import OLD_AFTER_S
 from leg_wear_monitor.state import State
@@ -68,27 +68,3 @@ def test_what_is_wrong_would_be_seen(tmp_path):
         assert any("nothing is not defined" in line for line in page.console)
     finally:
         page.close()
-
-
-RENEW = """(() => {
-  const region = document.querySelector("[data-region=motion]");
-  region.innerHTML = region.innerHTML.replace(/ data-ready="1"/, "");
-  document.dispatchEvent(new Event("replaced"));
-})()"""
-
-
-@pytest.mark.parametrize("page", [390], indirect=True)
-def test_the_leg_goes_on_moving_when_its_part_of_the_page_is_renewed(page, leg):
-    """The picture before it is out of sight then, and is not the one that counts."""
-    page.value("document.getElementById('leg-slider').scrollIntoView()")
-    wait_for(lambda: leg.motion.viewers == 1, "a viewer")
-    for _ in range(5):
-        page.value(RENEW)
-        # two frames later the browser has told which pictures are seen
-        page.value("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done())))")
-        page.value("new Promise((done) => setTimeout(done, 50))")
-        assert page.value("document.querySelector('#leg-slider .play').textContent") == "Pause"
-        wait_for(lambda: leg.motion.viewers == 1, "the viewer again", 10.0)
-    page.value("document.getElementById('leg-slider').style.display = 'none'")
-    leg.take_motion("")  # who is gone is noticed when there is something for him
-    wait_for(lambda: leg.motion.viewers == 0, "nobody to look")

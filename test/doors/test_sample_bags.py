@@ -36,8 +36,7 @@ NUMBERS = {
     "ground": {"diagnostics": 98, "clearance_states": 96, "impact_forces": 19513, "predicted_torque": 19513},
 }
 SECTIONS = [
-    "Joints", "Are these values valid?", "Alarms", "A gait cycle to play", "Guide", "Guide",
-    "How sure is the verdict?",
+    "Joints", "Are these values valid?", "Alarms", "Guide", "Guide", "How sure is the verdict?",
     "Joints over time", "Forecast", "Wear around each bushing",
     "Changes of alarms", "Input health", "The recording", "Made with",
 ]  # fmt: skip

@@ -21,8 +21,9 @@ from leg_wear_monitor.errors import LegWearError, closed_on_interrupt
 from leg_wear_monitor.files import share_directory
 
 if TYPE_CHECKING:
+    from leg_wear_monitor.dashboard.leg_page import LegSetup
+    from leg_wear_monitor.dashboard.live_leg import LiveLeg
     from leg_wear_monitor.dashboard.server import Place
-    from leg_wear_monitor.dashboard.source import LegSetup, Source
     from leg_wear_monitor.ros.listeners import DemoListener
 
 
@@ -243,14 +244,7 @@ _NODE = "/leg_wear_monitor"
 
 @click.command(short_help="Show a leg live in a browser, for reading only.")
 @common.option(
-    "--node",
-    "[NAME]",
-    f"Full name of a running monitor, such as /left/leg_wear_monitor.  [default: {_NODE}]",
-    is_flag=False,
-    flag_value=_NODE,
-)
-@common.file_option(
-    "--ledger", "FILE", "A ledger instead, which a monitor may be writing meanwhile.", exists=True
+    "--node", "NAME", "Full name of a running monitor, such as /left/leg_wear_monitor.", default=_NODE
 )
 @common.config_option
 @common.option(
@@ -259,37 +253,22 @@ _NODE = "/leg_wear_monitor"
 @common.option(
     "--port", "PORT", "Port to listen on; 0 for any free one.", type=click.IntRange(0, 65535), default=8350
 )
-def dashboard(node: str | None, ledger: Path | None, config: Path | None, host: str, port: int) -> int:
+def dashboard(node: str, config: Path | None, host: str, port: int) -> int:
     """Serve a page with the verdict, the leg and the trends, renewed while you look, until Ctrl-C.
 
     The page cannot change anything. It is served to this machine only, unless --host says otherwise: it has
     no password. --config is needed for a leg with a mechanism file of its own.
     """
-    if node and ledger:
-        raise click.UsageError("--node and --ledger cannot be combined")
     import_module("tornado")
     from leg_wear_monitor.dashboard.server import listen
 
-    with _source(node, ledger, config) as source:
-        _serve(source, listen(host, port))
+    with _live(node, config) as leg:
+        _serve(leg, listen(host, port))
     return 0
 
 
 @contextmanager
-def _source(node: str | None, ledger: Path | None, config: Path | None) -> Iterator["Source"]:
-    if ledger:
-        from leg_wear_monitor.cli.verbs.upkeep import leg_of
-        from leg_wear_monitor.dashboard.ledger_leg import LedgerLeg
-
-        settings, leg = leg_of(config, ledger)
-        yield LedgerLeg(ledger, settings, leg, time.time)
-    else:
-        with _live(node or _NODE, config) as source:
-            yield source
-
-
-@contextmanager
-def _live(node: str, config: Path | None) -> Iterator["Source"]:
+def _live(node: str, config: Path | None) -> Iterator["LiveLeg"]:
     common.need_rclpy()
     from leg_wear_monitor.dashboard.live_leg import LiveLeg
     from leg_wear_monitor.ros.listeners import full_name, listening, topics_of
@@ -301,7 +280,7 @@ def _live(node: str, config: Path | None) -> Iterator["Source"]:
 
 
 def _setup(config: Path, node: str) -> "LegSetup":
-    from leg_wear_monitor.dashboard.source import leg_setup
+    from leg_wear_monitor.dashboard.leg_page import leg_setup
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.monitor.config.fitting import fitted
     from leg_wear_monitor.monitor.config.parameters import load_config
@@ -310,7 +289,7 @@ def _setup(config: Path, node: str) -> "LegSetup":
     return leg_setup(settings, fitted(load_mechanism(settings.mechanism), settings))
 
 
-def _serve(source: "Source", place: "Place") -> None:
+def _serve(leg: "LiveLeg", place: "Place") -> None:
     """Serve until a signal."""
     from leg_wear_monitor.dashboard.hosts import is_local
     from leg_wear_monitor.dashboard.hub import Hub
@@ -326,12 +305,12 @@ def _serve(source: "Source", place: "Place") -> None:
                 "and no encryption",
                 err=True,
             )
-        waits = source.freshness()
+        waits = leg.freshness()
         if waits.age_s is None:
             click.echo(waits.silence)
         click.echo(f"serving {place.address} (read-only, Ctrl-C ends it)")
 
     async def run() -> None:
-        await serve(Hub(source), place, ready)
+        await serve(Hub(leg), place, ready)
 
     asyncio.run(run())

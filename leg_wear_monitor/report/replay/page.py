@@ -42,7 +42,6 @@ from leg_wear_monitor.report.replay.charts import (
 )
 from leg_wear_monitor.report.replay.forecast_section import forecast_section, wear_section
 from leg_wear_monitor.report.replay.joints import joints_and_leg
-from leg_wear_monitor.report.replay.motion import motion_section
 from leg_wear_monitor.state import AlarmChange, Figure, JointClearance, LegAlarm, Level
 
 # Alarms: those that are raised at the end, and all changes over time.
@@ -326,7 +325,7 @@ def replay_page(summary: ReplaySummary) -> Page:
     valid = [*_entered(summary), Fragment(belief(summary))]
     sections = [_joints(summary), Section("Are these values valid?", valid)]
     raised = raised_alarms(summary, otherwise="No alarm is raised at the end.")
-    sections += [Section("Alarms", [Fragment(raised)]), *motion_section(summary)]
+    sections += [Section("Alarms", [Fragment(raised)])]
     shown = len(sections)
     if summary.gait.believable_cycles:
         sections += [joint_section(summary), forecast_section(summary), wear_section(summary)]
@@ -339,7 +338,7 @@ def replay_page(summary: ReplaySummary) -> Page:
         sections=[*sections[:shown], *guides, sure, *sections[shown:]],
         versions=summary.made_with,
         banner=verdict_banner(summary, f"#{guides[0].anchor}", f"#{sure.anchor}"),
-        styles=("uplot/uPlot.min.css", "replay/replay.css", "guide.css", "torque_phase.css"),
+        styles=("uplot/uPlot.min.css", "replay/replay.css", "guide.css"),
         libraries=("uplot/uPlot.iife.min.js", "replay/charts.js"),
         has_dark=True,
     )

@@ -32,7 +32,7 @@
       text = "NO DATA for " + duration(old) + ": " + silence;
     } else {
       isOld = false;
-      text = settings.fresh + duration(old) + " old";
+      text = "Live, data " + duration(old) + " old";
     }
     strip.textContent = text;
     root.toggleAttribute("data-old", isOld);
@@ -59,25 +59,6 @@
     document.dispatchEvent(new Event("replaced"));
   }
 
-  function isFilledIn() {
-    return Array.from(document.querySelectorAll("input")).some((input) => input.value || input === document.activeElement);
-  }
-
-  function another() {  // the page itself is another one
-    if (!isFilledIn()) {
-      location.reload();
-      return;
-    }
-    if (document.getElementById("another")) return;
-    const link = document.createElement("a"), line = document.createElement("p");
-    link.href = "";
-    link.textContent = "Load the page again.";
-    line.id = "another";
-    line.className = "freshness";
-    line.append("What this page shows has changed. ", link);
-    strip.after(line);
-  }
-
   const events = new EventSource("events");
   events.addEventListener("state", (event) => {
     const state = JSON.parse(event.data);
@@ -86,8 +67,7 @@
     silence = state.silence;
     oldAfter = state.old_after_s;
     words = state.words;
-    if (state.page !== settings.page) another();
-    else Object.entries(state.regions).forEach(([name, markup]) => replace(name, markup));
+    Object.entries(state.regions).forEach(([name, markup]) => replace(name, markup));
     tell();
   });
   setInterval(() => {

@@ -1,7 +1,6 @@
 """``leg-wear-monitor replay`` and ``report``."""
 
 import json
-import os
 import time
 import warnings
 from collections.abc import Iterator
@@ -65,18 +64,6 @@ TIMES = ("header", "log", "publish")
     type=click.Choice(("verdict", "alarm", "warning", "input", *KINDS)),
     multiple=True,
 )
-@click.option(
-    "--separately",
-    is_flag=True,
-    help="Replay each recording with a monitor of its own, several at a time: reports in DIR/NAME of --out, "
-    "one row per recording in DIR/recordings.csv.",
-)
-@common.option(
-    "--workers",
-    "N",
-    "Number of local processes of --separately.  [default: cores]",
-    type=click.IntRange(min=1),
-)
 @common.json_option("the summary")
 def replay(
     bags: tuple[Path, ...],
@@ -84,23 +71,15 @@ def replay(
     json_file: Path | None,
     allow_partial: bool,
     fail_on: tuple[str, ...],
-    separately: bool,
-    workers: int | None,
     **options: Any,
 ) -> int:
     """Replay recordings through the monitor: MCAP, .db3, CSV and Parquet files or bag directories.
 
-    Several paths are one recording, unless --separately is given. Exits with 1 if parts of it were lost, if
+    Several paths are one recording. Exits with 1 if parts of it were lost, if
     no gait cycle in it fits this leg, if all of it is in the ledger already, or if the verdict is or an alarm
     was one of --fail-on.
     """
     common.check_outputs(json_file, out)
-    if separately:
-        return _separately(
-            bags, out, json_file, workers or os.cpu_count() or 1, allow_partial, fail_on, **options
-        )
-    if workers is not None:
-        raise click.UsageError("--workers needs --separately")
     written: list[Path] = []
 
     def write(result: "ReplayResult", wall_s: float) -> None:
@@ -120,44 +99,6 @@ def replay(
     if is_report_there and result.monitor.is_all_counted:
         click.echo(f"warning: {out}: nothing was counted, so the earlier report stays as it is", err=True)
     return common.WITH_FINDINGS if is_failed(result, allow_partial, fail_on) else 0
-
-
-def _separately(
-    bags: tuple[Path, ...],
-    out: Path | None,
-    json_file: Path | None,
-    workers: int,
-    allow_partial: bool,
-    fail_on: tuple[str, ...],
-    config: Path | None,
-    time_source: str,
-    crank_joint: str | None,
-    node: str | None,
-    ledger: Path | None,
-    **options: Any,
-) -> int:
-    if out is None:
-        raise click.UsageError("--separately needs --out DIR")
-    if json_file is not None:
-        raise click.UsageError(
-            "--separately and --json cannot be combined: DIR/NAME/summary.json has the summary"
-        )
-    if ledger is not None:
-        fault = "a ledger counts recordings in their order. Expected no --ledger with --separately"
-        raise ConfigError("--ledger", str(ledger), fault)
-    from leg_wear_monitor.cli.separately import replay_separately
-
-    return replay_separately(
-        bags,
-        _config(config, crank_joint, node),
-        out,
-        workers,
-        allow_partial=allow_partial,
-        fail_on=fail_on,
-        time=time_source,
-        node=node,
-        **options,
-    )
 
 
 def _run(

@@ -191,6 +191,14 @@ class Accounting:
         """Gait cycles of the leg before this run."""
         return int(self._before.get("cycles", 0))
 
+    def limit_before_m(self, joint: str) -> float | None:
+        """Limit of a joint's clearance [m] that the ledger was written with; None if it does not know it."""
+        if limit_m := self._before.get(clearance_limit_key(joint)):
+            return limit_m
+        entry = self.ledger.entry if self.ledger else None
+        own = [one for one in (entry.alarms if entry else ()) if one.name == CLEARANCE.name(joint)]
+        return own[0].limit if own and not math.isnan(own[0].limit) else None
+
     @property
     def unmonitored_s(self) -> float:
         """Time in which the leg was not followed in this run.

@@ -16,7 +16,7 @@ from leg_wear_monitor.monitor.verdict.verdict import Finding
 from leg_wear_monitor.state import Level
 
 
-def cleared_at(ledger: Ledger, stamps: Collection[int], now: Mapping[str, Alarm]) -> tuple[Alarm, ...]:
+def cleared_at(ledger: Ledger | None, stamps: Collection[int], now: Mapping[str, Alarm]) -> tuple[Alarm, ...]:
     """Alarms that were cleared or acknowledged at some stamps and have not changed since: raised again.
 
     They are not acknowledged: what they rested on is as it was, and nobody has seen to it.
@@ -29,6 +29,8 @@ def cleared_at(ledger: Ledger, stamps: Collection[int], now: Mapping[str, Alarm]
     now : mapping of str to Alarm
         Present alarms by name; one that is still raised knows more of itself than the history does.
     """
+    if ledger is None:
+        return ()
     history: dict[str, list[AlarmEvent]] = {}
     for event in ledger.alarm_history:
         history.setdefault(event.alarm.name, []).append(event)

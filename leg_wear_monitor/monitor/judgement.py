@@ -76,7 +76,9 @@ def is_forecast_valid(parts: Parts, found: Sequence[Finding]) -> bool:
     return parts.evaluation.is_model_valid() and not invalid
 
 
-def evaluate_clearances(parts: Parts, joints: Sequence[JointSituation]) -> tuple[AlarmList, ...]:
+def evaluate_clearances(
+    parts: Parts, joints: Sequence[JointSituation], stamp_ns: int
+) -> tuple[AlarmList, ...]:
     """Compare clearances by measurement and by estimate with their limits: at once, for none scatters."""
     board, values, sources = parts.evaluation.board, {}, {}
     for joint in joints:
@@ -85,7 +87,7 @@ def evaluate_clearances(parts: Parts, joints: Sequence[JointSituation]) -> tuple
         if known is not None:
             values[name], sources[name] = known.clearance_m, (known.sigma_m, known.by)
     cycles = parts.config.alarms.on_delay_cycles
-    return board.evaluate(values, parts.twin.intake.stamp_ns, cycles, sources) if values else ()
+    return board.evaluate(values, stamp_ns, cycles, sources) if values else ()
 
 
 def shown(parts: Parts, joint: JointSituation) -> KnownClearance | None:
@@ -138,7 +140,11 @@ def _joint_situations(parts: Parts, diagnosis: Diagnosis) -> tuple[JointSituatio
             joint=joint,
             counted_m=counted_m[k],
             limit_m=limits_m[k],
-            believed_m=report.forecast.now_m if report and report.forecast else math.nan,
+            believed_m=(
+                report.forecast.now_m
+                if report and report.forecast
+                else parts.forecaster.believed_m(k, counted_m[k])
+            ),
             seen=tuple(one for one in (by_encoders, by_torque) if one),
             is_used=bool(report and by_encoders and report.seen and report.seen.believed),
             label=parts.mechanism.joints[joint].label,

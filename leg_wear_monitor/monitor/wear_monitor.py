@@ -44,12 +44,13 @@ from leg_wear_monitor.monitor.ledger.entry import (
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import Ledger, open_ledger
 from leg_wear_monitor.monitor.operators import (
-    Acknowledged,
+    Cleared,
     acknowledge,
     measure,
     renew_forecast,
     reset_wear,
     undo_reset,
+    withdraw,
 )
 from leg_wear_monitor.monitor.parts import Parts
 from leg_wear_monitor.monitor.reports import (
@@ -264,7 +265,8 @@ class WearMonitor:
                 self._accounting.note(new)
         observe_torque(parts)
         situation = situation_of(parts)
-        self._take_changes(evaluate_clearances(parts, situation.joints), changes)
+        stamp_ns = self._twin.intake.stamp_ns
+        self._take_changes(evaluate_clearances(parts, situation.joints, stamp_ns), changes)
         return attrs.evolve(situation, alarms=tuple(self._board.alarms.values()))
 
     def _take_changes(self, changed: tuple[AlarmList, ...], changes: list[AlarmList]) -> None:
@@ -407,7 +409,7 @@ class WearMonitor:
             if observer:
                 observer.config = config
 
-    def acknowledge(self, stamp_ns: int) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
+    def acknowledge(self, stamp_ns: int) -> Cleared:
         """Acknowledge all alarms, and the interruption of the previous run.
 
         Returns
@@ -426,14 +428,14 @@ class WearMonitor:
         if changed:
             self._parts.keep()
 
-    def reset_wear(self, joint: str, stamp_ns: int, who: str) -> Acknowledged:
+    def reset_wear(self, joint: str, stamp_ns: int, who: str) -> Cleared:
         """Reset the wear of a joint whose part was replaced; its history stays in the ledger.
 
         What rested on the former part is acknowledged and clears.
 
         Returns
         -------
-        Acknowledged
+        cleared, kept : tuple of Alarm
             Alarms that cleared, and alarms that are still raised.
 
         Raises
@@ -482,6 +484,24 @@ class WearMonitor:
             For a joint without clearance, or impossible values.
         """
         return measure(self._parts, joint, float(clearance_m), float(sigma_m), int(stamp_ns), who, accept)
+
+    def withdraw(self, measurement: int, stamp_ns: int, who: str) -> Measurement:
+        """Withdraw a measurement: it stays in the ledger unused, and a stop that it ended returns.
+
+        Parameters
+        ----------
+        measurement : int
+            Its `id`.
+        stamp_ns : int
+            Not 0.
+        who : str
+
+        Raises
+        ------
+        LegWearError
+            If the ledger has no such measurement, or it is withdrawn already.
+        """
+        return withdraw(self._parts, measurement, int(stamp_ns), who)
 
     def renew_forecast(self) -> CycleReport | None:
         """Renew the forecast now; otherwise it may be a minute old.
@@ -552,6 +572,26 @@ class WearMonitor:
         """Joints whose wear the ledger has counted with another wear coefficient, when it was opened."""
         ledger = self._accounting.ledger
         return coefficient_doubts(ledger.entry.joints, self.mechanism) if ledger and ledger.entry else ()
+
+    @property
+    def limit_doubts(self) -> tuple[Doubt, ...]:
+        """Joints whose clearance limit was different when the ledger was last written."""
+        limits = zip(self.clearance_joints, self.clearance_limits_m, strict=True)
+        known = {joint: (self._accounting.limit_before_m(joint), limit) for joint, limit in limits}
+        return tuple(
+            Doubt(
+                f"limit of joint {joint}",
+                f"{1e3 * before:.4g} mm in the ledger and {1e3 * now:.4g} mm in the parameters",
+            )
+            for joint, (before, now) in known.items()
+            if before is not None and before != now
+        )
+
+    @property
+    def has_ledger_entry(self) -> bool:
+        """Whether the ledger had wear of this leg when it was opened."""
+        ledger = self._accounting.ledger
+        return ledger is not None and ledger.entry is not None
 
     @property
     def is_all_counted(self) -> bool:

@@ -83,9 +83,7 @@ def measured(monitor: WearMonitor, wanted: dict[str, Any], stamp_ns: int) -> str
         For a joint without clearance, or impossible values; then nothing is entered.
     """
     found = monitor.measure(**wanted, stamp_ns=stamp_ns, who=WHO)
-    limit_m = monitor.clearance_limits_m[monitor.clearance_joints.index(found.measurement.joint)]
-    lines = found.lines(limit_m, monitor.config.limits.warn_fraction, monitor.measurements[:-1])
-    return with_storage("; ".join(lines), not_stored(monitor))
+    return with_storage("; ".join(found.lines), not_stored(monitor))
 
 
 def not_stored(monitor: WearMonitor) -> str:

@@ -24,12 +24,12 @@ from leg_wear_monitor.messages.cdr import Decoder
 from leg_wear_monitor.messages.outputs import Messages
 from leg_wear_monitor.messages.qos import SENSOR_DATA
 from leg_wear_monitor.messages.streams import STREAMS, ForecastTimes
-from leg_wear_monitor.monitor.alarms import ADVICE, ALREADY_COUNTED, Alarm
+from leg_wear_monitor.monitor.alarms import ADVICE, ALREADY_COUNTED
 from leg_wear_monitor.monitor.config.fitting import check_limits, parameter_doubts
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.forecaster import life_doubts
 from leg_wear_monitor.monitor.ledger.entry import JointWear
-from leg_wear_monitor.monitor.operators import wear_words
+from leg_wear_monitor.monitor.operators import alarm_words, wear_words
 from leg_wear_monitor.monitor.reports import Reports, Status
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor, open_monitor
 from leg_wear_monitor.ros.health import Load, load_status, recording_status
@@ -425,8 +425,7 @@ class MonitorNode(ClosingNode):
         self._markers.operated()
         cleared, kept = (*cleared, *own_cleared), (*kept, *own_kept)
         self._send_state()
-        reply = f"cleared: {_listed(cleared)}; still present: {_listed(kept)}"
-        return with_storage(reply, not_stored(self._monitor))
+        return with_storage(alarm_words(cleared, kept), not_stored(self._monitor))
 
     def _save(self) -> str:
         self._monitor.save()
@@ -448,11 +447,11 @@ class MonitorNode(ClosingNode):
         stamp_ns = audit_time(self._ros_now_ns())
         if not self._confirmation.is_confirmed(joint):
             raise LegWearError(asked_once(joint, self._monitor.wear_of(joint)))
-        done = self._monitor.reset_wear(joint, stamp_ns, "service ~/reset_wear")
+        alarms = alarm_words(*self._monitor.reset_wear(joint, stamp_ns, "service ~/reset_wear"))
         self._send_state_and_forecast()
         fault = not_stored(self._monitor)
         history = "" if fault else f", history kept; ~/undo_reset/{joint} reverts it"
-        reply = f"joint {joint}: new surfaces{history}; alarms {done.words}; confirm by walking"
+        reply = f"joint {joint}: new surfaces{history}; alarms {alarms}; confirm by walking"
         return with_storage(reply, fault)
 
     def _undo_reset(self, joint: str) -> str:
@@ -460,10 +459,6 @@ class MonitorNode(ClosingNode):
         was = self._monitor.undo_reset(joint, stamp_ns, "service ~/undo_reset")
         self._send_state_and_forecast()
         return with_storage(undone(joint, was), not_stored(self._monitor))
-
-
-def _listed(alarms: Sequence[Alarm]) -> str:
-    return ", ".join(alarm.name for alarm in alarms) or "none"
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -17,7 +17,8 @@ from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.ledger.entry import AlarmEvent, Entry, JointWear
 from leg_wear_monitor.monitor.ledger.ledger import open_ledger
-from leg_wear_monitor.monitor.operators import note_verdict_of
+from leg_wear_monitor.monitor.operators import note_verdict
+from leg_wear_monitor.monitor.parts import Parts
 
 Run = Callable[..., Result]
 
@@ -75,7 +76,8 @@ def worn_ledger(tmp_path: Path) -> Callable[..., Path]:
     def write(config: MonitorConfig | None = None, alarms: tuple[Alarm, ...] = ()) -> Path:
         """The alarms were raised at their worst values; the verdict is that of them."""
         config, path, leg = config or MonitorConfig(), tmp_path / "wear.ledger", load_mechanism("bionic_leg")
-        kept = open_ledger(leg, attrs.evolve(config, ledger=attrs.evolve(config.ledger, path=str(path))))
+        config = attrs.evolve(config, ledger=attrs.evolve(config.ledger, path=str(path)))
+        kept = open_ledger(leg, config)
         worn = np.full((2, 720), 3.0e-5)
         nominal = {name: sum(leg.clearances[name].wear_coefficient) for name in leg.clearance_joints}
         joints = tuple(JointWear(name, worn, 4000, 4000.0, 0, k) for name, k in nominal.items())
@@ -83,7 +85,10 @@ def worn_ledger(tmp_path: Path) -> Callable[..., Path]:
         entry = Entry(stamp_ns=10**9, joints=joints, totals=totals, alarms=alarms, spans=((0, 10**9, 0),))
         for alarm in alarms:
             kept.note(AlarmEvent(alarm.raised_ns, attrs.evolve(alarm, value=alarm.worst)))
-        note_verdict_of(kept, entry, leg, config, 10**9)
+        kept.keep(entry, closed=True)
+        kept.close()
+        kept = open_ledger(leg, config)
+        note_verdict(Parts(leg, config, kept), 10**9)
         kept.keep(entry, closed=True)
         kept.close()
         return path

@@ -31,16 +31,19 @@ def test_a_measurement_is_kept_and_explained(run, ledger):
     assert rows(ledger) == [("A", pytest.approx(4.2e-4), pytest.approx(6e-5), 4000, 1)]
 
 
-def test_another_wear_coefficient_than_that_of_the_counted_wear_is_reported(run, ledger, tmp_path):
+def test_a_different_wear_coefficient_is_reported_and_needs_the_parameter_file(
+    run, refused, ledger, tmp_path
+):
     config = tmp_path / "monitor.yaml"
     config.write_text("/**:\n  ros__parameters:\n    wear_coefficients_per_pa: [2.0e-15]\n")
     given = ("measure", "A", "0.42", "--sigma", "0.005", "--ledger", str(ledger))
     assert run(*given).stderr == ""
     (line,) = run(*given, "--config", str(config)).stderr.splitlines()
     assert line.startswith(
-        f"warning: {config}: wear coefficient of joint A: 4e-15 1/Pa (bushing and journal together), and the "
-        "wear in the ledger was counted with 2e-15 1/Pa; that wear stays as counted"
+        f"warning: {config}: wear coefficient of joints A, B, G, I, J: 4e-15 1/Pa (bushing and journal "
+        "together), and the wear in the ledger was counted with 2e-15 1/Pa; that wear stays as counted"
     )
+    assert "name the parameter file of this leg" in refused(*given)
 
 
 def test_a_contradiction_ends_with_findings_and_leaves_wear_as_it_is(run, ledger):
@@ -146,7 +149,7 @@ def test_a_stop_by_a_limit_of_the_leg_is_not_judged_by_another_one(run, refused,
         alarms=(Alarm(kind="clearance", subject="G", present=Level.ERROR, sigma=1e-5, **stop),)
     )
     arguments = ("measure", "G", "0.5", "--sigma", "0.01", "--ledger", str(path))
-    fault = "the limit of joint G is 0.45 mm in the ledger and 0.6 mm without parameters"
+    fault = "limit of joint G: 0.45 mm in the ledger and 0.6 mm in the parameters; name the parameter file"
     assert fault in refused(*arguments)
     assert (rows(path), verdict(path)[0]) == ([], "stop")
     assert "at its limit" in run(*arguments, "--config", "mine.yaml").stdout

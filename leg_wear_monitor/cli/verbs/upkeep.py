@@ -2,26 +2,23 @@
 
 import getpass
 import time
-from collections.abc import Iterator
-from contextlib import closing, contextmanager, nullcontext
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, nullcontext
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import click
 
 from leg_wear_monitor.cli import common
-from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.errors import ConfigError, LegWearError
 
 if TYPE_CHECKING:
     from leg_wear_monitor.mechanism.spec import Mechanism
     from leg_wear_monitor.monitor.config.settings import MonitorConfig
     from leg_wear_monitor.monitor.ledger.entry import Measurement
-    from leg_wear_monitor.monitor.ledger.ledger import Ledger
-
-
-# The measurements of a ledger on the command line: opened, listed, withdrawn.
+    from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 
 
 LAST = "last"
@@ -30,7 +27,7 @@ LAST = "last"
 def leg_of(
     config: Path | None, ledger: Path | None, node: str | None = None
 ) -> tuple["MonitorConfig", "Mechanism"]:
-    """The parameters of a node, with the ledger that is asked for, and the leg as they want it."""
+    """The parameters of a node with the ledger that is asked for, and the leg by these parameters."""
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.monitor.config.fitting import fitted
     from leg_wear_monitor.monitor.config.parameters import load_config
@@ -40,8 +37,7 @@ def leg_of(
     if ledger is not None:
         # who names a ledger means its leg, unless the parameters name one
         hardware = settings.hardware_id or hardware_id_of(ledger)
-        kept = attrs.evolve(settings.ledger, path=str(ledger))
-        settings = attrs.evolve(settings, ledger=kept, hardware_id=hardware)
+        settings = attrs.evolve(_on(settings, ledger), hardware_id=hardware)
     elif node is not None:
         settings = settings.on_node(node)
     if not settings.ledger.path:
@@ -49,88 +45,84 @@ def leg_of(
     return settings, fitted(load_mechanism(settings.mechanism), settings)
 
 
+def _on(settings: "MonitorConfig", ledger: Path) -> "MonitorConfig":
+    """The parameters with a different ledger."""
+    return attrs.evolve(settings, ledger=attrs.evolve(settings.ledger, path=str(ledger)))
+
+
 @contextmanager
 def opened(
-    config: Path | None,
-    ledger: Path | None,
-    dry_run: bool,
-    joint: str | None = None,
-    node: str | None = None,
-) -> Iterator[tuple["Ledger", "Mechanism", "MonitorConfig"]]:
-    """The ledger, the leg and its parameters; a copy of the ledger, if nothing shall be written."""
+    config: Path | None, ledger: Path | None, dry_run: bool, joint: str | None = None, node: str | None = None
+) -> Iterator["WearMonitor"]:
+    """A monitor on the ledger, which is written at the end or not at all; on a copy of it for a dry run."""
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.monitor.ledger.file import copy_of
-    from leg_wear_monitor.monitor.ledger.ledger import open_ledger
+    from leg_wear_monitor.monitor.wear_monitor import open_monitor
 
     settings, leg = leg_of(config, ledger, node)
+    path = Path(settings.ledger.path)
     if joint is not None:
-        leg.clearance_joint(joint)  # refuses another one before a ledger is made
-    plain = load_mechanism(settings.mechanism)  # without its parameters, which a ledger applies itself
-    with copy_of(settings.ledger.path) if dry_run else nullcontext(settings.ledger.path) as path:
-        kept = attrs.evolve(settings, ledger=attrs.evolve(settings.ledger, path=str(path)))
-        with closing(cast("Ledger", open_ledger(plain, kept))) as there:  # a path is given
-            yield there, leg, settings
+        leg.clearance_joint(joint)  # refuses an unknown joint before a ledger is made
+    with copy_of(path) if dry_run else nullcontext(path) as place:
+        with common.compilation("monitor", how_long="about a minute"):
+            monitor = open_monitor(load_mechanism(settings.mechanism), _on(settings, place), at_end=True)
+        try:
+            if config is None:
+                _check_parameters(monitor)
+            common.warn_of(str(config), monitor.coefficient_doubts)
+            yield monitor
+        except BaseException:
+            monitor.abandon()
+            raise
+        monitor.close()
 
 
-def check_limit(
-    kept: "Ledger", leg: "Mechanism", settings: "MonitorConfig", joint: str, config: Path | None
-) -> float:
-    """Limit of a joint's clearance [m]; that of a leg with a limit of its own is in its parameters only."""
-    from leg_wear_monitor.monitor.operators import clearance_limits, limit_in
-
-    limit_m, known_m = clearance_limits(leg, settings)[joint], limit_in(kept, joint)
-    if config is None and known_m is not None and known_m != limit_m:
-        fault = (
-            f"the limit of joint {joint} is {1e3 * known_m:.4g} mm in the ledger and {1e3 * limit_m:.4g} mm "
-            "without parameters; name the parameter file of this leg"
-        )
-        raise ConfigError("--config", "", fault)
-    return limit_m
+def _say(lines: Iterable[str], dry_run: bool) -> None:
+    """Print the outcome of an action once it is written."""
+    for line in (*lines, *(["dry run: nothing was written"] if dry_run else [])):
+        click.echo(line)
 
 
-def check_limits(kept: "Ledger", leg: "Mechanism", settings: "MonitorConfig", config: Path | None) -> None:
-    """Refuse to judge anew by other limits than the monitor's, which could end a stop."""
-    for joint in leg.clearance_joints:
-        check_limit(kept, leg, settings, joint, config)
+def _check_parameters(monitor: "WearMonitor") -> None:
+    """Refuse to act without the leg's own parameters: by different limits, a stop could end."""
+    for doubt in (*monitor.limit_doubts, *monitor.coefficient_doubts):
+        raise ConfigError("--config", "", f"{doubt}; name the parameter file of this leg")
+
+
+def _need_wear(monitor: "WearMonitor") -> None:
+    if not monitor.has_ledger_entry:
+        raise LegWearError("the ledger contains no wear yet")
 
 
 def list_measurements(joint: str | None, config: Path | None, ledger: Path | None, node: str | None) -> None:
     """Print the measurements of a ledger, or of a joint, a line each; the ledger is left as it is."""
-    with opened(config, ledger, True, joint, node) as (kept, leg, _):
-        own = _of_joint(kept, leg.clearance_joint(joint) if joint else None)
-        for each in own:
-            click.echo(_line(each))
-        if not own:
-            click.echo("no clearance was measured yet")
+    from leg_wear_monitor.monitor.ledger_state import content_of
+
+    settings, leg = leg_of(config, ledger, node)
+    name = leg.clearance_joint(joint) if joint else None
+    own = _of_joint(content_of(Path(settings.ledger.path), leg, settings).measurements, name)
+    for each in own:
+        click.echo(_line(each))
+    if not own:
+        click.echo("no clearance was measured yet")
 
 
-def _of_joint(kept: "Ledger", joint: str | None) -> list["Measurement"]:
+def _of_joint(measurements: Iterable["Measurement"], joint: str | None) -> list["Measurement"]:
     """The measurements of a joint, or of all."""
-    return [each for each in kept.measurements if joint in (None, each.joint)]
+    return [each for each in measurements if joint in (None, each.joint)]
 
 
-def withdraw(
-    joint: str | None,
-    which: str,
-    who: str,
-    config: Path | None,
-    ledger: Path | None,
-    dry_run: bool,
-    node: str | None,
-) -> None:
-    """Withdraw a measurement, by its number or the last one of a joint, and print what it is then."""
-    from leg_wear_monitor.monitor.operators import withdraw_in
-
-    with opened(config, ledger, dry_run, joint, node) as (kept, leg, settings):
-        number = _number(kept, leg.clearance_joint(joint) if joint else None, which)
-        (own,) = (each.joint for each in kept.measurements if each.id == number)
-        check_limit(kept, leg, settings, own, config)
-        click.echo(_line(withdraw_in(kept, leg, settings, number, time.time_ns(), who)))
+def withdraw(joint: str | None, which: str, **options: Any) -> None:
+    """Withdraw a measurement, by its number or the last one of a joint, and print its new state."""
+    with opened(**options, joint=joint) as monitor:
+        number = _number(monitor, monitor.mechanism.clearance_joint(joint) if joint else None, which)
+        line = _line(monitor.withdraw(number, time.time_ns(), getpass.getuser()))
+    _say([line], options["dry_run"])
 
 
-def _number(kept: "Ledger", joint: str | None, which: str) -> int:
+def _number(monitor: "WearMonitor", joint: str | None, which: str) -> int:
     """Number of the measurement that is meant."""
-    own = _of_joint(kept, joint)
+    own = _of_joint(monitor.measurements, joint)
     whose = f"of joint {joint} " if joint else ""
     if which == LAST:
         open_ones = [each.id for each in own if not each.is_withdrawn]
@@ -185,13 +177,12 @@ def acknowledge(
     if node is not None and config is None:
         common.check_alone(ledger=ledger, dry_run=dry_run)
         return _triggered(node, "acknowledge_alarms", wait_s)
-    from leg_wear_monitor.monitor.operators import acknowledge_in
+    from leg_wear_monitor.monitor.operators import alarm_words
 
-    with opened(config, ledger, dry_run, node=node) as (kept, leg, settings):
-        check_limits(kept, leg, settings, config)
-        click.echo(acknowledge_in(kept, leg, settings, time.time_ns()).words)
-    if dry_run:
-        click.echo("dry run: nothing was written")
+    with opened(config, ledger, dry_run, node=node) as monitor:
+        _need_wear(monitor)
+        line = alarm_words(*monitor.acknowledge(time.time_ns()))
+    _say([line], dry_run)
     return 0
 
 
@@ -224,33 +215,24 @@ def reset(
         common.check_alone(ledger=ledger, dry_run=dry_run)
         service = f"{'undo_reset' if undo else 'reset_wear'}/{joint}"
         return _triggered(node, service, wait_s, times=1 if undo else 2)  # a reset is confirmed
-    _reset_in(joint, config, ledger, undo, dry_run, node)
-    if dry_run:
-        click.echo("dry run: nothing was written")
-    return 0
-
-
-def _reset_in(
-    joint: str, config: Path | None, ledger: Path | None, undo: bool, dry_run: bool, node: str | None
-) -> None:
-    """Enter it into a ledger, and print what came of it."""
-    from leg_wear_monitor.monitor.operators import reset_in, undo_in, wear_words
+    from leg_wear_monitor.monitor.operators import alarm_words, wear_words
 
     now_ns, who = time.time_ns(), getpass.getuser()
-    with opened(config, ledger, dry_run, joint, node) as (kept, leg, settings):
-        check_limits(kept, leg, settings, config)
-        joint = leg.clearance_joint(joint)
+    with opened(config, ledger, dry_run, joint, node) as monitor:
+        _need_wear(monitor)
+        joint = monitor.mechanism.clearance_joint(joint)
         if undo:
-            words = wear_words(undo_in(kept, leg, settings, joint, now_ns, who))
-            click.echo(
-                f"joint {joint}: the reset is undone, {words} are counted, including those since the reset"
-            )
-            return
-        was, done = reset_in(kept, leg, settings, joint, now_ns, who)
-    words = wear_words(was)
-    click.echo(f"joint {joint}: new surfaces, {words} are set to 0, history kept; --undo reverts it")
-    click.echo(f"alarms {done.words}")
-    click.echo("confirm by walking: the next gait cycles show whether the repair is good")
+            words = wear_words(monitor.undo_reset(joint, now_ns, who))
+            lines = [f"the reset is undone, {words} are counted, including those since the reset"]
+        else:
+            words = wear_words(monitor.wear_of(joint))
+            lines = [
+                f"new surfaces, {words} are set to 0, history kept; --undo reverts it",
+                f"alarms {alarm_words(*monitor.reset_wear(joint, now_ns, who))}",
+                "confirm by walking: the next gait cycles show whether the repair is good",
+            ]
+    _say([f"joint {joint}: {lines[0]}", *lines[1:]], dry_run)
+    return 0
 
 
 # ``leg-wear-monitor measure``: a clearance that somebody measured, into the ledger.
@@ -280,6 +262,7 @@ def measure(
     joint: str | None,
     mm: float | None,
     sigma: float | None,
+    accept: bool,
     listed: bool,
     withdrawn: str | None,
     node: str | None,
@@ -297,7 +280,7 @@ def measure(
         alone = {name: options[name] for name in ("ledger", "dry_run")}
         common.check_alone(**alone, list=listed, withdraw=withdrawn)
     if listed or withdrawn:
-        is_new = mm is not None or sigma is not None or options.pop("accept")
+        is_new = mm is not None or sigma is not None or accept
         if is_new or (listed and withdrawn):
             raise click.UsageError(
                 "--list and --withdraw cannot be combined, nor used with MM, --sigma or --accept"
@@ -306,19 +289,17 @@ def measure(
         list_measurements(joint, options["config"], options["ledger"], node)
         return 0
     if withdrawn:
-        withdraw(joint, withdrawn, getpass.getuser(), node=node, **options)
+        withdraw(joint, withdrawn, node=node, **options)
         return 0
     if joint is None or mm is None or sigma is None:
         raise click.UsageError("expected JOINT MM --sigma MM, or --list, or --withdraw")
     size = joint, 1.0e-3 * mm, 1.0e-3 * sigma
     if node is not None and is_live:
-        return _on_node(node, *size, accept=options["accept"], wait_s=wait_s)
-    lines, has_findings = _measured(*size, node=node, **options)
-    for line in lines:
-        click.echo(line)
-    if options["dry_run"]:
-        click.echo("dry run: nothing was written")
-    return common.WITH_FINDINGS if has_findings else 0
+        return _on_node(node, *size, accept=accept, wait_s=wait_s)
+    with opened(**options, joint=joint, node=node) as monitor:
+        found = monitor.measure(*size, time.time_ns(), getpass.getuser(), accept)
+    _say(found.lines, options["dry_run"])
+    return common.WITH_FINDINGS if found.has_findings else 0
 
 
 def _on_node(node: str, joint: str, clearance_m: float, sigma_m: float, accept: bool, wait_s: float) -> int:
@@ -330,52 +311,3 @@ def _on_node(node: str, joint: str, clearance_m: float, sigma_m: float, accept: 
     reply = measure_on(node, joint, clearance_m, sigma_m, accept, wait_s)
     click.echo(reply)
     return common.WITH_FINDINGS if asks_to_act(reply) else 0
-
-
-def _measured(
-    joint: str,
-    clearance_m: float,
-    sigma_m: float,
-    config: Path | None,
-    ledger: Path | None,
-    accept: bool,
-    dry_run: bool,
-    node: str | None,
-) -> tuple[tuple[str, ...], bool]:
-    """What came of a measurement, a line each, and whether the caller has to act."""
-    from leg_wear_monitor.monitor.forecast.measurement import measure as evaluate
-    from leg_wear_monitor.monitor.forecast.wear_coefficients import coefficient_doubts, usual_prior
-    from leg_wear_monitor.monitor.ledger.entry import new_part
-    from leg_wear_monitor.monitor.operators import measured_in, shown_in
-    from leg_wear_monitor.monitor.verdict.situation import SOURCES
-
-    with opened(config, ledger, dry_run, joint, node) as (kept, leg, settings):
-        joint = leg.clearance_joint(joint)
-        limit_m = check_limit(kept, leg, settings, joint, config)
-        parts = {wear.name: wear for wear in kept.entry.joints} if kept.entry else {}
-        part = parts.get(joint) or new_part(joint)
-        common.warn_of(str(config or "parameters"), coefficient_doubts([part], leg))
-        found = evaluate(
-            settings.forecast,
-            leg.clearances[joint],
-            part,
-            kept.measurements,
-            clearance_m=clearance_m,
-            sigma_m=sigma_m,
-            stamp_ns=time.time_ns(),
-            who=getpass.getuser(),
-            kept_ns=kept.kept_ns,
-            accept=accept,
-            prior=usual_prior(settings.forecast, leg.clearances[joint]),
-            corrections=kept.corrections,
-        )
-        shown = shown_in(kept, joint)
-        if shown:
-            by = SOURCES[shown.by]
-            found = attrs.evolve(found, shown_m=shown.clearance_m, shown_sigma_m=shown.sigma_m, shown_by=by)
-        kept.note(found.measurement)
-        entry, eased = measured_in(kept, leg, settings, found.measurement)
-        kept.record(entry)
-        found = attrs.evolve(found, eased=eased)
-    lines = found.lines(limit_m, settings.limits.warn_fraction, kept.measurements)
-    return lines, found.has_findings(limit_m)

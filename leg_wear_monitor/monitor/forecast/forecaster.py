@@ -1,5 +1,6 @@
 """The forecast as gait cycles come in: renewed once a minute of their stamps, or when more is known."""
 
+import math
 import reprlib
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
@@ -8,7 +9,7 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.configuration import Doubt
-from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.errors import ConfigError, LegWearError
 from leg_wear_monitor.files import read_json, share_directory
 from leg_wear_monitor.life.result import SCHEMA_VERSION
 from leg_wear_monitor.mechanism.arrays import Floats
@@ -379,6 +380,22 @@ class Forecaster:
         self.state.measurements += (found.measurement,)
         self._update_coefficients(k, found.after)
         return found
+
+    def withdrawn(self, number: int, stamp_ns: int, who: str) -> Measurement:
+        """Withdraw the measurement with an `id`; the estimate of its joint is renewed by `replaced`."""
+        found = {one.id: one for one in self.state.measurements if one.id}
+        if number not in found or found[number].is_withdrawn:
+            fault = "is withdrawn already" if number in found else "is not in the ledger"
+            raise LegWearError(f"measurement {number}: {fault}")
+        now = attrs.evolve(found[number], withdrawn_ns=stamp_ns, withdrawn_by=who)
+        measurements = self.state.measurements
+        self.state.measurements = tuple(now if one.id == number else one for one in measurements)
+        return now
+
+    def believed_m(self, k: int, counted_m: float) -> float:
+        """Median of the clearance of joint k by counting and measurements; NaN without a measurement."""
+        estimate = self.state.coefficient_estimates[k]
+        return estimate.clearance_m(counted_m - self._fresh_m[k]) if estimate.observations else math.nan
 
     def use_estimate(self, k: int, observation: ClearanceAtWear, replaced_ns: int) -> bool:
         """Update with a clearance estimated from encoders, instead of the previous one.

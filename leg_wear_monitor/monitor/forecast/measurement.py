@@ -9,7 +9,7 @@ import numpy as np
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.estimate.cause import SURE_SIGMAS
 from leg_wear_monitor.mechanism.plausible import measured_fault, sigma_fault
-from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
+from leg_wear_monitor.mechanism.spec import Clearance
 from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     ClearanceAtWear,
@@ -17,7 +17,6 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     CoefficientPrior,
     corrections_of,
     estimate_coefficient,
-    usual_prior,
 )
 from leg_wear_monitor.monitor.ledger.entry import JointWear, Measurement, Recount
 
@@ -77,6 +76,10 @@ class MeasurementResult:
     eased : str
         What became of an alarm of the clearance that an earlier measurement had raised, such as ``ends``;
         empty if it stays.
+    limit_m, warn_fraction : float
+        Limit of the joint's clearance, and the fraction of it at which its alarm begins.
+    earlier : sequence of Measurement
+        All of the ledger, without this one.
     """
 
     measurement: Measurement
@@ -89,6 +92,9 @@ class MeasurementResult:
     shown_sigma_m: float = math.nan
     shown_by: str = ""
     eased: str = ""
+    limit_m: float = math.nan
+    warn_fraction: float = math.nan
+    earlier: Sequence[Measurement] = ()
 
     @property
     def agrees(self) -> bool:
@@ -96,7 +102,7 @@ class MeasurementResult:
         sigma_m = math.hypot(self.measurement.sigma_m, self.shown_sigma_m)
         return abs(self.measurement.clearance_m - self.shown_m) <= SURE_SIGMAS * sigma_m  # not with NaN
 
-    def _compared(self, limit_m: float) -> list[str]:
+    def _compared(self) -> list[str]:
         """The measurement against what encoders or the drive torque showed."""
         if math.isnan(self.shown_m) or math.isnan(self.shown_sigma_m):
             return []
@@ -104,23 +110,14 @@ class MeasurementResult:
         if self.agrees:
             return [f"{AGREES} {self.shown_by} shows, {shown}"]
         line = f"{self.shown_by} showed {shown}, and this measurement contradicts it"
-        if now.clearance_m + SURE_SIGMAS * now.sigma_m < limit_m <= self.shown_m:
+        if now.clearance_m + SURE_SIGMAS * now.sigma_m < self.limit_m <= self.shown_m:
             line += f": the alarm clearance {now.joint} is acknowledged with it"
         return [line]
 
-    def lines(self, limit_m: float, warn_fraction: float, earlier: Sequence[Measurement]) -> tuple[str, ...]:
-        """The measurement and what came of it, for operators, a line each.
-
-        Parameters
-        ----------
-        limit_m : float
-            Of the joint's clearance.
-        warn_fraction : float
-            Of the limit, where its alarm begins.
-        earlier : sequence of Measurement
-            All of the ledger, without this one.
-        """
-        now = self.measurement
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """The measurement and what came of it, for operators, a line each."""
+        now, limit_m, warn_fraction = self.measurement, self.limit_m, self.warn_fraction
         size = f"{_mm(now.clearance_m)} ± {_mm(now.sigma_m)}"
         lines = [f"{now.joint}: {size}, {now.cycles} gait cycles after the part was new"]
         lines.append(f"{_mm(self.counted_m)} is counted (limit {_mm(limit_m)}); that stays as it is")
@@ -133,18 +130,19 @@ class MeasurementResult:
             lines.append(f"the measured clearance is above {part}: the alarm clearance {now.joint} is raised")
         if self.eased:
             lines.append(f"the alarm clearance {now.joint} that an earlier measurement raised {self.eased}")
-        lines += self._compared(limit_m)
+        lines += self._compared()
         if self.agrees and self.contradicts:  # the counting is wrong, not the measurement
             used = "uses" if now.counts else "does not use"
             lines.append(f"the joint has opened otherwise than counted; the forecast {used} the measurement")
             lines += self.words[-1:] if now.counts else []
-            return (*lines, validity([*earlier, now]))
-        return (*lines, *self.words, validity([*earlier, now]))
+            return (*lines, validity([*self.earlier, now]))
+        return (*lines, *self.words, validity([*self.earlier, now]))
 
-    def has_findings(self, limit_m: float) -> bool:
+    @property
+    def has_findings(self) -> bool:
         """Whether the caller has to act: the measurement contradicts the model, or is at the limit."""
         is_odd = self.contradicts and not self.agrees
-        return is_odd or self.measurement.clearance_m >= limit_m
+        return is_odd or self.measurement.clearance_m >= self.limit_m
 
 
 def asks_to_act(reply: str) -> bool:
@@ -187,24 +185,6 @@ def observations_of(
         for m in measurements
         if m.joint == joint and m.replaced_ns == replaced_ns and m.counts and not m.is_withdrawn
     ]
-
-
-def believed_clearance_m(
-    leg: Mechanism,
-    settings: Forecasting,
-    part: JointWear,
-    measurements: Sequence[Measurement],
-    corrections: Sequence[Recount],
-) -> float:
-    """Median of what counting and the measurements of a part give together; NaN without measurements."""
-    key = (part.name, part.replaced_ns)
-    used = observations_of(measurements, *key)
-    if not used:
-        return math.nan
-    clearance = leg.clearances[part.name]
-    fresh_m, prior = clearance.radial_clearance, usual_prior(settings, clearance)
-    corrected = corrections_of(corrections, *key)
-    return estimate_coefficient(settings, fresh_m, used, prior, corrected).clearance_m(part.mean_m)
 
 
 def measure(

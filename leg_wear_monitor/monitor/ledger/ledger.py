@@ -164,38 +164,6 @@ class Ledger:
         """Queue an event; it is written with the next entry."""
         self._events.append(event)
 
-    def withdraw(self, measurement: int, stamp_ns: int, who: str) -> Measurement:
-        """Withdraw a measurement of an earlier run; the withdrawal is an event, the measurement stays.
-
-        Parameters
-        ----------
-        measurement : int
-            Its `id`.
-        stamp_ns : int
-            Not 0.
-        who : str
-
-        Returns
-        -------
-        Measurement
-            The withdrawn measurement.
-
-        Raises
-        ------
-        LedgerError
-            If no measurement has this `id`, or it is already withdrawn.
-        """
-        found = {each.id: each for each in self.measurements}
-        if measurement not in found:
-            known = ", ".join(map(str, found)) or "none"
-            raise LedgerError(f"{self.path}: has no measurement {measurement}, it has {known}")
-        if found[measurement].is_withdrawn:
-            raise LedgerError(f"{self.path}: measurement {measurement} is withdrawn already")
-        now = attrs.evolve(found[measurement], withdrawn_ns=stamp_ns, withdrawn_by=who)
-        self.measurements = tuple(now if each.id == measurement else each for each in self.measurements)
-        self.note(now)
-        return now
-
     @property
     def last_verdict(self) -> Verdict | None:
         """The verdict since its last stored change; None without one.
@@ -267,22 +235,6 @@ class Ledger:
             self._kept_moving_s = entry.moving_s
         return kept
 
-    def record(self, entry: Entry | None = None) -> None:
-        """Write the events since the last entry; for a run that monitors nothing.
-
-        Parameters
-        ----------
-        entry : Entry, optional
-            To replace the last one, which otherwise stays in force; its loads are of that one's run.
-
-        Raises
-        ------
-        LedgerError
-            If they could not be written.
-        """
-        if not self._write(self._run(closed=True), entry and attrs.evolve(entry, loads=())):
-            raise LedgerError(f"{self.path}: {self.fault}")
-
     def abandon(self) -> None:
         """End a run that monitored nothing or is to be discarded, and close the file.
 
@@ -292,8 +244,8 @@ class Ledger:
             If that could not be written.
         """
         try:
-            if not self.at_end:
-                self.record()
+            if not self.at_end and not self._write(self._run(closed=True)):
+                raise LedgerError(f"{self.path}: {self.fault}")
         finally:
             self.close()
 

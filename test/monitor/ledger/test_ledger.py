@@ -8,7 +8,7 @@ from contextlib import closing
 import attrs
 import numpy as np
 import pytest
-from ledger_contents import contents, measured
+from ledger_contents import contents
 
 from leg_wear_monitor.estimate.signature import CommissionedTorque
 from leg_wear_monitor.mechanism.loader import load_mechanism
@@ -66,8 +66,7 @@ def test_a_run_without_an_entry_and_one_before_events_alone_are_cut_off_too(open
     ledger.close()
     between = open_ledger()
     between.note(ForecastPoint(5, 7, "A", 1.0, 2.0, 3.0))
-    between.record()
-    between.close()
+    between.abandon()
     assert open_ledger().cut_off_s is not None
 
 
@@ -383,25 +382,6 @@ def test_baselines_are_of_the_parts_since_the_last_reset_whatever_the_clocks_say
         found = reopened(*noted)
         assert [one.stamp_ns for one in found.commissioned_torques] == kept
         found.close()
-
-
-def test_a_measurement_that_is_withdrawn_is_kept_and_reported_as_withdrawn(open_ledger):
-    ledger = open_ledger()
-    ledger.note(measured())
-    ledger.record()
-    ledger.close()
-    ledger = open_ledger()
-    (found,) = ledger.measurements
-    assert not found.is_withdrawn
-    assert ledger.withdraw(found.id, 77, "bob").is_withdrawn
-    with pytest.raises(LedgerError, match="is withdrawn already"):
-        ledger.withdraw(found.id, 78, "bob")
-    with pytest.raises(LedgerError, match="has no measurement 9, it has 1"):
-        ledger.withdraw(9, 78, "bob")
-    ledger.record()
-    ledger.close()
-    (found,) = open_ledger().measurements
-    assert (found.withdrawn_ns, found.withdrawn_by, found.counts) == (77, "bob", True)
 
 
 def test_a_reset_can_be_read_whole_until_it_is_undone(open_ledger, entry_at):

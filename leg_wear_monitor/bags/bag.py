@@ -28,11 +28,11 @@ from leg_wear_monitor.bags.findings import (
 )
 from leg_wear_monitor.bags.mcap_file import McapFile
 from leg_wear_monitor.bags.piece import Channel, Due, Piece
-from leg_wear_monitor.bags.table_layout import CSV, PARQUET
+from leg_wear_monitor.bags.table_layout import CSV, PARQUET, REMEDIES
 from leg_wear_monitor.bags.zstd import ZSTD_MAGIC, expand_message, expanded
 from leg_wear_monitor.configuration.strict import events_with_depth
 from leg_wear_monitor.errors import printable, system_asked
-from leg_wear_monitor.messages.streams import Stream, streams_of
+from leg_wear_monitor.messages.streams import Stream, changed_fields, streams_of
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin import TORQUE
 
@@ -209,7 +209,9 @@ def _mode(path: Path) -> int | None:
 def _file(path: Path, mode: int, types: dict[str, str] | None = None) -> BagFile:
     match = _NAME.fullmatch(path.name) or _TABLE.fullmatch(path.name)
     if match is None:
-        raise RecordingError(str(path), "", f"is no recording by its name, expected {_EXPECTED}")
+        remedy = REMEDIES.get(path.suffix.lower())
+        text = remedy.format(path=path) if remedy else f"not a recording by its name. Expected {_EXPECTED}"
+        raise RecordingError(str(path), "", text)
     if what := irregular_kind(mode):
         raise RecordingError(str(path), "", f"is {what}, expected a file")
     return BagFile(path, match[1].lower(), match[2] is not None, types or {})
@@ -343,23 +345,9 @@ def check_channel(stream: Stream, channel: Channel, known_type: str, where: str)
         raise RecordingError(where, channel.topic, f"is of type {kind}, expected {stream.type}")
     if channel.encoding != "cdr":
         raise RecordingError(where, channel.topic, f"is encoded as {channel.encoding!r}, expected 'cdr'")
-    if channel.definition_encoding == "ros2msg" and channel.definition:
-        fields = _fields(channel.definition)
-        if fields != stream.fields:
-            text = f"defines {kind} by {'; '.join(fields)}, expected {'; '.join(stream.fields)}"
-            raise RecordingError(where, channel.topic, text)
-
-
-def _fields(definition: str) -> tuple[str, ...]:
-    """Type and name of each field in a definition's main part, without constants and comments."""
-    fields = []
-    for line in definition.splitlines():
-        if line.startswith("====="):
-            break
-        words = line.split("#")[0].split()
-        if len(words) == 2 and "=" not in words[1]:
-            fields.append(f"{words[0].split('/')[-1]} {words[1]}")
-    return tuple(fields)
+    if changed := changed_fields(kind, channel.definition, channel.definition_encoding):
+        text = f"is defined differently than in ROS 2 ({listed(changed)})"
+        raise RecordingError(where, channel.topic, text)
 
 
 def listed(names: Iterable[str]) -> str:

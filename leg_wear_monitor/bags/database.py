@@ -15,7 +15,7 @@ from rosbags.interfaces import MessageDefinitionFormat
 from rosbags.rosbag2 import Reader, ReaderError
 
 from leg_wear_monitor.bags.budget import Budget
-from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
+from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity, open_regular
 from leg_wear_monitor.bags.piece import Channel, Due, Piece
 from leg_wear_monitor.messages.cdr import MESSAGE
 
@@ -53,7 +53,7 @@ class DatabaseFile:
         journals = [each for end in _JOURNALS if _size(each := file.with_name(file.name + end))]
         self.size = sum(map(_size, (file, *journals)))
         try:
-            file.open("rb").close()  # SQLite does not say why it cannot open a file
+            open_regular(file).close()  # SQLite does not say why it cannot open a file
             self._reader: Any = stack.enter_context(Reader(_prepared(file, journals, budget, stack)))
         except apsw.IOError as error:
             raise OSError(errno.EIO, str(error)) from error

@@ -104,6 +104,9 @@ _KINDS = {
 }
 
 
+_POINTER = b"version https://git-lfs.github.com/spec/"
+
+
 def irregular_kind(mode: int) -> str:
     """What a path with this `os.stat` mode is, such as "a pipe"; empty for a regular file."""
     return "" if stat.S_ISREG(mode) else _KINDS.get(stat.S_IFMT(mode), "no file")
@@ -114,6 +117,8 @@ def open_regular(path: Path) -> IO[bytes]:
 
     Raises
     ------
+    RecordingError
+        If it is a pointer of git-LFS.
     OSError
         If it cannot be opened or is not a regular file (it may have been replaced since an earlier check).
     """
@@ -123,7 +128,12 @@ def open_regular(path: Path) -> IO[bytes]:
     if what:
         os.close(descriptor)
         raise OSError(0, f"is {what}, expected a file", str(path))
-    return os.fdopen(descriptor, "rb")
+    file = os.fdopen(descriptor, "rb")
+    if file.read(len(_POINTER)) == _POINTER:
+        file.close()
+        raise RecordingError(str(path), "", "a pointer of git-LFS, not the file itself. Run: git lfs pull")
+    file.seek(0)
+    return file
 
 
 # Check that the clocks of a recording agree: header stamps against log times.

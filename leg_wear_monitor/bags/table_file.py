@@ -314,8 +314,8 @@ class TableFile:
     ) -> None:
         self.path, self._config, self._encoder = path, config, Encoder(config)
         self.findings: list[Finding] = []
-        source = open_table(path, content, storage, budget)
-        self.size, self.names = source.size, source.names
+        source = open_table(path, content, storage, budget, config.input.columns.crank_angle)
+        self.size, self.names = source.size, source.head.names
         self.counts = Counts(config, self._encoder.is_effort, source.word)
         parts = TableRows(path, source, config, self.findings).parts()
         first = next((rows for rows in parts if len(rows.line)), None)

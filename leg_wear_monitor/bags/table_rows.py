@@ -1,6 +1,5 @@
 """Rows of tables: CSV, Parquet, arrays and data frames, read by pyarrow, as numbers in SI units."""
 
-import csv
 import io
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.bags.budget import Budget
 from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError
+from leg_wear_monitor.bags.table_head import Head, head_of
 from leg_wear_monitor.bags.table_layout import (
     CSV,
     MOST_NS,
@@ -27,6 +27,7 @@ from leg_wear_monitor.bags.table_layout import (
     Rows,
     columns_of,
     dates,
+    is_number,
     places,
 )
 from leg_wear_monitor.errors import printable
@@ -63,20 +64,17 @@ class Source(Protocol):
 
     Attributes
     ----------
-    names : list of str
-        Names of all columns.
+    head : Head
+        Names of all columns, and what precedes the first row.
     size : int
         Bytes of the table.
     word : str
         Name of a row in messages: ``line`` or ``row``.
-    header : int
-        Lines before the first row.
     """
 
-    names: list[str]
+    head: Head
     size: int
     word: str
-    header: int
 
     def parts(self, columns: list[int], lost: "Lost") -> Iterator[Part]:
         """Rows of the columns with these indices, part by part."""
@@ -108,7 +106,9 @@ class Lost:
             self.tell(f"{self._count - self.MOST} more {self._word}s are lost")
 
 
-def open_table(path: Path, content: IO[bytes] | Any, storage: str, budget: Budget) -> Source:
+def open_table(
+    path: Path, content: IO[bytes] | Any, storage: str, budget: Budget, wanted: str = ""
+) -> Source:
     """Open a table.
 
     Parameters
@@ -120,6 +120,8 @@ def open_table(path: Path, content: IO[bytes] | Any, storage: str, budget: Budge
     storage : str
         `CSV`, `PARQUET`, or empty for columns in memory.
     budget : Budget
+    wanted : str
+        Name of a column, by which a line with the names of columns is recognised.
 
     Raises
     ------
@@ -127,7 +129,7 @@ def open_table(path: Path, content: IO[bytes] | Any, storage: str, budget: Budge
         If it is no such table.
     """
     if storage == CSV:
-        return _Csv(path, content, budget)
+        return _Csv(path, content, budget, wanted)
     return _Parquet(path, content, budget) if storage == PARQUET else _Frame(path, content)
 
 
@@ -154,7 +156,7 @@ class TableRows:
     def __init__(self, path: Path, source: Source, config: MonitorConfig, findings: list[Finding]) -> None:
         self._path, self._source, self._table = path, source, config.input
         self._columns = columns_of(config)
-        self._places = places(str(path), source.names, self._columns)
+        self._places = places(str(path), source.head.names, source.head.taken, self._columns)
         self._lost = Lost(path, source.word, findings)
 
     def parts(self) -> Iterator[Rows]:
@@ -196,7 +198,7 @@ class TableRows:
         """Stamps of rows without a column of the time."""
         if not self._table.rate_hz:
             return line
-        row = line - 1 - self._source.header
+        row = line - 1 - self._source.head.lines
         passed = np.rint(row * (1.0e9 / self._table.rate_hz)).astype(np.int64)
         return np.asarray(passed + self._table.start_ns)
 
@@ -205,7 +207,7 @@ class TableRows:
         array = array.cast(pa.float64()) if pa.types.is_null(array.type) else array
         kind = array.type
         if _is_text(kind):
-            return numbers(array)
+            return numbers(self._with_points(array))
         if not (pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind)):
             fault = f"column {column.name!r} is of type {kind}, expected numbers"
             raise RecordingError(str(self._path), column.parameter, fault)
@@ -218,7 +220,9 @@ class TableRows:
         kind, unit = array.type, self._table.units.stamp
         if _is_text(kind):
             texts = [_text(text) for text in array.to_pylist()] if unit == DATE else []
-            return dates(texts) if unit == DATE else self._of_texts(array, 10 ** STAMPS[unit])
+            if unit == DATE:
+                return dates(texts, self._table.date_format)
+            return self._of_texts(self._with_points(array), 10 ** STAMPS[unit])
         is_date = pa.types.is_timestamp(kind) or pa.types.is_date(kind)
         if not (is_date or pa.types.is_integer(kind) or pa.types.is_floating(kind)):
             fault = f"column {column.name!r} is of type {kind}, expected numbers or dates"
@@ -232,6 +236,11 @@ class TableRows:
         wide = array if kind == pa.uint64() else array.cast(_WIDE[pa.types.is_integer(kind)])
         stamps, within = self._of_numbers(_numpy(wide, 0), 10 ** STAMPS[unit])
         return stamps, within & np.asarray(array.is_valid())
+
+    def _with_points(self, texts: Any) -> Any:
+        """Texts of numbers with decimal points."""
+        comma = self._source.head.has_decimal_comma
+        return pa.compute.replace_substring(texts, ",", ".") if comma else texts
 
     def _of_numbers(self, times: NDArray[Any], scale: int) -> tuple[_Stamps, _Bools]:
         """Stamps of times in a unit of `scale` nanoseconds, exact to what a double has."""
@@ -285,7 +294,7 @@ def numbers(texts: Any) -> tuple[Floats, _Bools, _Bools]:
     for k, cell in enumerate(texts.to_pylist()):
         text = _text(cell).strip()
         there[k] = bool(text)
-        good[k] = not text or _is_number(text)
+        good[k] = not text or is_number(text)
         values[k] = float(text) if text and good[k] else np.nan
     return values, there, good
 
@@ -316,26 +325,18 @@ def _text(cell: Any) -> str:
     return "" if cell is None else str(cell)
 
 
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return "_" not in text
-
-
 def _fault(column: Column, text: str) -> str:
     """What is wrong with a cell."""
     shown, unit = printable(text.strip(), 60), column.unit
     if column.key == STAMP and (not shown or shown == "nan"):
         return f"empty, expected a time in {unit}"
     if column.key == STAMP and unit == DATE:
-        return f"{shown!r} is no date and time in UTC, expected one such as 2026-03-01 09:00:00.001"
-    if _is_number(text) and not math.isfinite(float(text)):
+        return f"{shown!r} does not match input.date_format (default: 2026-03-01 09:00:00.001, in UTC)"
+    if is_number(text) and not math.isfinite(float(text)):
         return f"{shown} is no time, expected one in {unit}"
-    if _is_number(text):
+    if is_number(text):
         return f"{shown} {unit} is no time from 1902 to 2038; another unit (input.units.stamp)?"
-    hint = "; a decimal comma?" if _is_number(text.replace(",", ".", 1)) else ""
+    hint = "; a decimal comma?" if is_number(text.replace(",", ".", 1)) else ""
     if column.key == STAMP and dates([text])[1][0]:
         hint = f"; a date ({column.parameter.replace('columns', 'units')}: {DATE})?"
     return f"{shown!r} is not a number, expected one in {unit}{hint}"
@@ -346,8 +347,7 @@ def _fault(column: Column, text: str) -> str:
 
 _BLOCK = 2**21
 _OF_A_BYTE = 32  # memory of cells, rows and samples per byte of text
-_UTF8_MARK, _UTF16_MARKS = b"\xef\xbb\xbf", (b"\xff\xfe", b"\xfe\xff")
-_SEPARATORS = ",;\t"
+_UTF16_MARKS = b"\xff\xfe", b"\xfe\xff"
 
 
 class _Lines(io.RawIOBase):
@@ -378,39 +378,41 @@ def _end_of_lines(file: IO[bytes], size: int, block: int) -> int:
     return 0
 
 
+def _decoded(data: bytes) -> str:
+    """Text of a file: UTF-8, or the encoding of spreadsheets in Western Europe."""
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", "replace")
+
+
 class _Csv:
     word = "line"
 
-    def __init__(self, path: Path, file: IO[bytes], budget: Budget) -> None:
+    def __init__(self, path: Path, file: IO[bytes], budget: Budget, wanted: str) -> None:
         self._file, self.size = file, file.seek(0, 2)
         self._block = min(_BLOCK, budget.part_limit // _OF_A_BYTE)
         self._end = _end_of_lines(file, self.size, self._block)
         file.seek(0)
-        first = file.readline(self._block)
+        start = file.read(self._block)
         if not self.size:
             raise RecordingError(str(path), "", "is empty, expected a line with the names of the columns")
-        if first.startswith(_UTF16_MARKS) or b"\0" in first:
+        if start.startswith(_UTF16_MARKS) or b"\0" in start:
             raise RecordingError(str(path), "", "is not a text in UTF-8, expected a CSV file in UTF-8")
-        if not first.endswith(b"\n"):
+        if b"\n" not in start:
             raise RecordingError(str(path), "", "has no complete line, expected the names of the columns")
-        # numpy.savetxt writes the names behind a number sign
-        header = first.removeprefix(_UTF8_MARK).decode("utf-8", "replace").removeprefix("#").strip()
-        separator = max(_SEPARATORS, key=header.count)
-        self._separator = separator if separator in header else " "
-        names = [cell.strip() for cell in next(csv.reader([header], delimiter=self._separator), [])]
-        self.header = int(not all(map(_is_number, names)))
-        self.names = names if self.header else [str(k + 1) for k in range(len(names))]
+        self.head = head_of(_decoded(start[: start.rindex(b"\n")]).split("\n"), wanted)
 
     def parts(self, columns: list[int], lost: Lost) -> Iterator[Part]:
         """Rows of some columns, as texts."""
         skipped: list[int] = []
-        names = [str(k) for k in range(len(self.names))]
+        names = [str(k) for k in range(len(self.head.names))]
         wanted = [names[k] for k in columns]
 
         def skip(row: Any) -> str:
             skipped.append(row.number)
             if row.text.strip():
-                more = row.actual_columns > row.expected_columns and self._separator == ","
+                more = row.actual_columns > row.expected_columns and self.head.separator == ","
                 hint = "; decimal commas?" if more else ""
                 if lines := row.text.count("\n"):
                     hint = f"; a quote has no end on its line, and takes {lines} lines with it"
@@ -419,7 +421,7 @@ class _Csv:
             return "skip"
 
         reader = self._reader(names, wanted, skip)
-        line, at = 1 + self.header, 0
+        line, at = 1 + self.head.lines, 0
         try:
             for batch in reader:
                 texts = [batch.column(name) for name in wanted]
@@ -438,10 +440,10 @@ class _Csv:
 
     def _reader(self, names: list[str], wanted: list[str], skip: Any) -> Any:
         read = pyarrow.csv.ReadOptions(
-            use_threads=False, block_size=self._block, skip_rows=self.header, column_names=names
+            use_threads=False, block_size=self._block, skip_rows=self.head.lines, column_names=names
         )
         parse = pyarrow.csv.ParseOptions(
-            delimiter=self._separator, ignore_empty_lines=False, invalid_row_handler=skip
+            delimiter=self.head.separator, ignore_empty_lines=False, invalid_row_handler=skip
         )
         convert = pyarrow.csv.ConvertOptions(
             include_columns=wanted, column_types=dict.fromkeys(wanted, pa.binary())
@@ -453,13 +455,13 @@ class _Csv:
 
 
 class _Parquet:
-    word, header = "row", 0
+    word = "row"
 
     def __init__(self, path: Path, file: IO[bytes], budget: Budget) -> None:
         self._budget, self.size = budget, file.seek(0, 2)
         try:
             self._file = pyarrow.parquet.ParquetFile(file, page_checksum_verification=True)
-            self.names = list(self._file.schema_arrow.names)
+            self.head = Head(list(self._file.schema_arrow.names))
         except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
             fault = f"is not a readable Parquet file: {one_line(error)}"
             raise RecordingError(str(path), "", fault) from error
@@ -467,7 +469,7 @@ class _Parquet:
     def parts(self, columns: list[int], lost: Lost) -> Iterator[Part]:
         """Rows of some columns; what a damaged group still had is lost."""
         head, first = self._file.metadata, 0
-        names = [self.names[k] for k in columns]
+        names = [self.head.names[k] for k in columns]
         for group in range(head.num_row_groups):
             end = first + head.row_group(group).num_rows
             at = first
@@ -493,18 +495,18 @@ def _expanded_size(group: Any, names: set[str]) -> int:
 
 
 class _Frame:
-    word, header = "row", 0
+    word = "row"
 
     def __init__(self, path: Path, table: Any) -> None:
         self._path, self._table = path, table if isinstance(table, Mapping) else _named(table)
-        self.names = [str(name) for name in self._table]
+        self.head = Head([str(name) for name in self._table])
         self.size = len(next(iter(self._table.values()), ()))  # rows, of which each counts the same
 
     def parts(self, columns: list[int], lost: Lost) -> Iterator[Part]:
         """Rows of some columns; NaN is null."""
         content = list(self._table.values())
-        arrays = [self._array(self.names[k], content[k]) for k in columns]
-        lengths = {self.names[k]: len(array) for k, array in zip(columns, arrays, strict=True)}
+        arrays = [self._array(self.head.names[k], content[k]) for k in columns]
+        lengths = {self.head.names[k]: len(array) for k, array in zip(columns, arrays, strict=True)}
         if len(set(lengths.values())) > 1:
             words = ", ".join(f"{name} {length}" for name, length in lengths.items())
             raise RecordingError(str(self._path), "", f"has columns of different lengths: {words}")

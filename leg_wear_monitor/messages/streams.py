@@ -3,8 +3,10 @@
 `cdr` parses the messages of a stream; `twin` defines the use of its samples.
 """
 
+import re
 from collections.abc import Iterator, Mapping
 from functools import cache
+from itertools import zip_longest
 from typing import TYPE_CHECKING
 
 import attrs
@@ -36,8 +38,6 @@ class Stream:
         Relative topic name.
     type : str
         Message type, such as ``sensor_msgs/msg/JointState``.
-    fields : tuple of str
-        Fields of the type's main definition; names of nested types without their package.
     kind : int
         Kind of its samples, a key of `twin.KINDS`.
     source : str
@@ -52,33 +52,28 @@ class Stream:
     code: int
     topic: str
     type: str
-    fields: tuple[str, ...]
     kind: int
     source: str = ""
     has_stamp: bool = True
     is_needed: bool = False
 
 
-_JOINTS = "Header header", "string[] name", "float64[] position", "float64[] velocity", "float64[] effort"
-_INTERFACES = "Header header", "string[] joint_names", "InterfaceValue[] interface_values"
-_WRENCH = "Header header", "Wrench wrench"
-
 STREAMS = (
     # also carries the angles of further encoders, and the torque if its source is the effort
-    Stream(code=JOINT_STATE, topic="joint_states", type="sensor_msgs/msg/JointState", fields=_JOINTS,
-           kind=CRANK, is_needed=True),
-    Stream(code=WRENCH_STAMPED, topic="drive_torque", type="geometry_msgs/msg/WrenchStamped", fields=_WRENCH,
-           kind=TORQUE, source="wrench"),
-    Stream(code=FLOAT64, topic="drive_torque", type="std_msgs/msg/Float64", fields=("float64 data",),
-           kind=TORQUE, source="float64", has_stamp=False),
+    Stream(code=JOINT_STATE, topic="joint_states", type="sensor_msgs/msg/JointState", kind=CRANK,
+           is_needed=True),
+    Stream(code=WRENCH_STAMPED, topic="drive_torque", type="geometry_msgs/msg/WrenchStamped", kind=TORQUE,
+           source="wrench"),
+    Stream(code=FLOAT64, topic="drive_torque", type="std_msgs/msg/Float64", kind=TORQUE,
+           source="float64", has_stamp=False),
     Stream(code=INTERFACES, topic="dynamic_joint_states", type="control_msgs/msg/DynamicJointState",
-           fields=_INTERFACES, kind=TORQUE, source="interface"),
-    Stream(code=LOAD_WRENCH, topic="foot_load", type="geometry_msgs/msg/WrenchStamped", fields=_WRENCH,
-           kind=LOAD, source="wrench"),
-    Stream(code=LOAD_FLOAT64, topic="foot_load", type="std_msgs/msg/Float64", fields=("float64 data",),
-           kind=LOAD, source="float64", has_stamp=False),
-    Stream(code=CONTACT, topic="foot_load", type="std_msgs/msg/Bool", fields=("bool data",),
-           kind=LOAD, source="contact", has_stamp=False),
+           kind=TORQUE, source="interface"),
+    Stream(code=LOAD_WRENCH, topic="foot_load", type="geometry_msgs/msg/WrenchStamped", kind=LOAD,
+           source="wrench"),
+    Stream(code=LOAD_FLOAT64, topic="foot_load", type="std_msgs/msg/Float64", kind=LOAD,
+           source="float64", has_stamp=False),
+    Stream(code=CONTACT, topic="foot_load", type="std_msgs/msg/Bool", kind=LOAD,
+           source="contact", has_stamp=False),
 )  # fmt: skip
 
 
@@ -176,6 +171,42 @@ def definition(name: str) -> Definition:
     """Definition of a message type of ROS 2's common interfaces or of ros2_control."""
     text, _ = types().generate_msgdef(name, ros_version=2)
     return Definition(text, types().hash_rihs01(name))
+
+
+def changed_fields(name: str, text: str, encoding: str) -> list[str]:
+    """Fields, as ``type.field``, in a recorded definition that differ from the known definition.
+
+    Parameters
+    ----------
+    name : str
+        The message type. It is returned if its definition cannot be parsed.
+    text : str
+        The recorded definition, with the definitions of nested types; empty if there is none.
+    encoding : str
+        ``ros2msg`` or ``ros2idl``; a different one is not compared.
+    """
+    if not text or encoding not in ("ros2msg", "ros2idl"):
+        return []
+    from rosbags.typesys import TypesysError, get_types_from_idl, get_types_from_msg
+
+    try:
+        if encoding == "ros2msg":
+            recorded = get_types_from_msg(text, name)
+        else:
+            # each type follows a line of equal signs; rosbags parses neither that line nor the next ones
+            plain = re.sub(r"^(IDL: |#).*\n", "", text, flags=re.MULTILINE)
+            parts = filter(str.strip, re.split(r"^=+\n", plain, flags=re.MULTILINE))
+            recorded = {key: one for part in parts for key, one in get_types_from_idl(part).items()}
+    except (TypesysError, ValueError):
+        return [name]
+    known = types().fielddefs
+    pairs = [(key, list(recorded[key][1]), list(known[key][1])) for key in recorded if key in known]
+    return [
+        f"{key}.{found[0] if found else expected[0]}"
+        for key, ours, theirs in pairs
+        for found, expected in zip_longest(ours, theirs)
+        if found != expected
+    ]
 
 
 # Times of forecast messages: a minute after the last one, after an alarm change, on a new answer.

@@ -15,7 +15,7 @@ import click
 
 from leg_wear_monitor.cli import common
 from leg_wear_monitor.cli.verbs.study import DEFAULT_MODEL
-from leg_wear_monitor.errors import ConfigWarning, LegWearError, extras_hinted
+from leg_wear_monitor.errors import ConfigError, ConfigWarning, LegWearError, extras_hinted
 from leg_wear_monitor.files import json_text, package_version, share_directory
 
 if TYPE_CHECKING:
@@ -48,7 +48,8 @@ def check(configs: tuple[str, ...]) -> int:
 
     Prints a summary of each correct file, and a line on stderr for each fault. A value that is probably in
     another unit causes a warning; the exit code is then 1. Tables (.csv, .parquet) are read with the columns
-    and units of the parameter file before them: check monitor.yaml leg.csv.
+    and units of the parameter file before them: check monitor.yaml leg.csv. Without a parameter file, the
+    command proposes one: check leg.csv.
     """
     with warnings.catch_warnings(record=True) as doubted:
         warnings.simplefilter("always", ConfigWarning)
@@ -109,9 +110,11 @@ def _kernels() -> str:
 
 
 def _files(names: tuple[str, ...]) -> Mapping[str, Callable[[], str]]:
+    from leg_wear_monitor.bags.table_layout import is_table_name
+
     files, parameters = {}, None
     for name in names:
-        is_table = name.lower().endswith((".csv", ".parquet"))
+        is_table = is_table_name(name)
         files[name] = partial(_table, name, parameters) if is_table else partial(_file, name)
         parameters = name if name.endswith((".yaml", ".yml")) else parameters
     return files
@@ -121,15 +124,25 @@ def _table(name: str, parameters: str | None) -> str:
     """Read a table, and say what was understood of it."""
     from leg_wear_monitor.bags.findings import Severity
     from leg_wear_monitor.bags.reader import understood
-    from leg_wear_monitor.monitor.config.parameters import load_config
+    from leg_wear_monitor.bags.table_proposal import propose
+    from leg_wear_monitor.monitor.config.parameters import config_from, load_config
 
-    lines, findings = understood(Path(name), load_config(parameters))
+    proposal = None if parameters else propose(Path(name))
+    if proposal and proposal.missing:
+        click.echo(proposal.text)
+        fault = f"no column is recognised. Complete the parameters above. Expected one of: {proposal.columns}"
+        raise ConfigError(name, " and ".join(proposal.missing), fault)
+    config = config_from(proposal.values) if proposal else load_config(parameters)
+    lines, findings = understood(Path(name), config)
     for finding in findings:
         if finding.severity is Severity.LOSS:
             warnings.warn(str(finding), ConfigWarning, stacklevel=2)
         else:
             lines.append(f"note: {finding.text}")
-    return f"\n{'':13} ".join(lines)
+    text = f"\n{'':13} ".join(lines)
+    return (
+        f"{text}\nread with these parameters. Copy them to start.yaml:\n{proposal.text}" if proposal else text
+    )
 
 
 def _file(name: str) -> str:

@@ -27,7 +27,12 @@ SPEEDS: Mapping[str, tuple[float, float]] = {
 }
 COUNTS = "counts"
 """Unit of an encoder's raw position; `TableInput.counts_per_turn` says how many make a turn."""
-TORQUES: Mapping[str, tuple[float, float]] = {"N m": (1.0, 1.0), "N mm": (1.0, 1000.0)}
+TORQUES: Mapping[str, tuple[float, float]] = {
+    "N m": (1.0, 1.0),
+    "N mm": (1.0, 1000.0),
+    "Nm": (1.0, 1.0),
+    "Nmm": (1.0, 1000.0),
+}
 # not N, which the YAML parser of ROS takes for false
 FORCES: Mapping[str, tuple[float, float]] = {"newton": (1.0, 1.0), "kN": (1000.0, 1.0)}
 """Factor and divisor to SI of angles, speeds, torques and forces; a division by 1000 is rounded once."""
@@ -108,6 +113,11 @@ class TableInput:
         "rows per second of a table without a column of the time; 0: there is input.columns.stamp",
         within=(0.0, 1.0e6),
         default=0.0,
+    )
+    date_format: str = described(
+        "format of the dates of input.units.stamp date, such as %d.%m.%Y %H:%M:%S.%f; in UTC, unless it has "
+        "%z; empty: ISO 8601, such as 2026-03-01 09:00:00.001",
+        default="",
     )
     start: str = described(
         "date and time at which the time is 0, such as 2026-03-01T09:00:00Z; empty: 1970",

@@ -144,7 +144,7 @@ clean:
 
 # The locks anew: of what constraints.txt pins, the hashes of all files, so that one lock serves Python 3.11 to 3.13.
 lock: .venv-tools/installed
-	$(LOCK) --constraint constraints.txt --extra ros --extra bags --extra test --extra lint --extra dask --extra studies --extra dashboard \
+	$(LOCK) --constraint constraints.txt --extra ros --extra bags --extra test --extra lint --extra dask --extra dashboard \
 		--output-file requirements.lock setup.py
 	printf 'setuptools\nwheel\n' | $(LOCK) --constraint constraints.txt --output-file requirements-build.lock -
 	$(LOCK) --fork-strategy fewest --constraint constraints.txt --output-file requirements-docs.lock requirements-docs.in

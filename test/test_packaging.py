@@ -10,7 +10,7 @@ import pytest
 import setuptools
 
 ROOT = Path(__file__).parents[1]
-EXTRAS = ("ros", "bags", "test", "lint", "dask", "studies", "dashboard")  # that `make` installs
+EXTRAS = ("ros", "bags", "test", "lint", "dask", "dashboard")  # that `make` installs
 
 
 def normal(name):

@@ -30,25 +30,25 @@ from leg_wear_monitor.report.figure import (
 from leg_wear_monitor.report.leg_picture import leg_picture
 from leg_wear_monitor.report.leg_slider import leg_data, leg_slider, run_data
 from leg_wear_monitor.report.page import Fragment, Gallery, Page, Part, Picture, Section, Table, Text
-from leg_wear_monitor.studies.kinds import STUDIES
-from leg_wear_monitor.studies.life_tasks import exponent, period_of
-from leg_wear_monitor.studies.plan import (
+from leg_wear_monitor.studies.paper import CLAIMS, STANDARD_ERRORS, Responses, responses_of
+from leg_wear_monitor.studies.run import StudyResults
+from leg_wear_monitor.studies.tables import (
     ARCHARD,
     DEPTH,
-    ERRORS,
     TITLES,
-    Arrays,
     Found,
     Spread,
     clearance_joints_of,
+    exponent,
     fraction_of_range,
     largest_error,
     of_joint,
+    period_of,
     power_law,
     spread,
     worst_zone,
 )
-from leg_wear_monitor.studies.results import CONFIDENCE, FAILS, HOLDS, UNDECIDED, StudyResults
+from leg_wear_monitor.studies.tasks import ERRORS, Arrays
 
 _UNITS = (("mm", 1.0e3), ("m/s", 1.0), ("m/s²", 1.0), ("N m", 1.0))
 _QUANTITIES = tuple((name, title, *unit) for name, title, unit in zip(ERRORS, TITLES, _UNITS, strict=True))
@@ -86,8 +86,8 @@ def study_page(results: StudyResults) -> Page:
     lines += [f"Not computed yet: {', '.join(results.missing)}."] if results.missing else []
     parts: dict[str, Sequence[Part]] = {"Missing points": [Text(line) for line in lines]}
     parts["Question"] = _question(results)
-    if results.of("leg"):
-        parts["Claims of the paper"] = _claims(results)
+    if responses := responses_of(found):
+        parts["Claims of the paper"] = [_claims(responses)]
     if found:
         shown = found if len(found) <= _MOST_SHOWN else [found[0], found[len(found) // 2], found[-1]]
         parts["Results"] = [_error_table(found), *_sum_table(found), _force_table(found), _wear_table(found)]
@@ -115,8 +115,8 @@ def study_page(results: StudyResults) -> Page:
     buffer = io.StringIO()
     YAML().dump(attrs.asdict(results.settings), buffer)
     return Page(
-        title=f"{STUDIES[results.study].title}: {results.mechanism.name}",
-        summary=STUDIES[results.study].question,
+        title=f"{results.settings.title}: {results.mechanism.name}",
+        summary=results.settings.question,
         sections=[Section(title, each) for title, each in parts.items() if each],
         configuration=buffer.getvalue(),
         versions={**results.versions, "seed": str(results.settings.ensemble.seed)},
@@ -131,7 +131,7 @@ def _question(results: StudyResults) -> list[Part]:
         f"positions. Each run counts {ensemble.cycles} gait cycles after {ensemble.skip_cycles} cycles that "
         "it does not count. Motion with clearance is chaotic, so a single run is only an example."
     )
-    joints = list(dict.fromkeys(name for point in results.points for name in point.clearance_joints))
+    joints = list(dict.fromkeys(name for point in results.points for name in point.settings["clearances"]))
     lacking = [joint for joint in joints if lacks_wear(results.mechanism.clearances[joint])]
     if lacking:
         text += f" The material pair of {', '.join(lacking)} has no wear coefficient, so its wear is unknown."
@@ -213,13 +213,18 @@ def _error_table(found: Found) -> Table:
 
 def _sum_table(found: Found) -> list[Table]:
     """Errors of all clearances at once against the sum of each place, if the last point has all joints."""
-    *alone, (_, whole) = found
-    each = [joint for _, arrays in alone for joint in clearance_joints_of(arrays)]
-    if len(alone) < 2 or sorted(each) != sorted(clearance_joints_of(whole)):
+    *others, (_, whole) = found
+    alone, each = [], set[str]()
+    for _, arrays in others:
+        joints = set(clearance_joints_of(arrays))
+        if not joints & each:
+            alone.append(arrays)
+            each |= joints
+    if len(alone) < 2 or each != set(clearance_joints_of(whole)):
         return []
     rows = []
     for name, title, unit, factor in _known(found):
-        total = sum(largest_error(arrays, name).mean for _, arrays in alone)
+        total = sum(largest_error(arrays, name).mean for arrays in alone)
         together = largest_error(whole, name)
         part = f"{100.0 * together.mean / total:.0f} %"
         rows.append([f"{title} [{unit}]", with_spread(together, factor), number(factor * total), part])
@@ -309,27 +314,11 @@ def _exponent_table(exponents: Found) -> Table:
     return Table(caption="Largest Lyapunov exponent", head=head, rows=rows, note=note)
 
 
-def _claims(results: StudyResults) -> list[Part]:
-    claims = results.claims()
-    rejected = ", ".join(f"{reason.replace('_', ' ')} {count}" for reason, count in claims.rejected.items())
-    drawn = claims.legs + sum(claims.rejected.values())
-    rows = []
-    for one in claims.claims:
-        low, high = (100.0 * end for end in one.interval)
-        part = "–" if one.fraction is None else f"{100.0 * one.fraction:.0f} ({low:.0f} to {high:.0f})"
-        decides = ", ".join(f"{each.factor} ({each.rank_correlation:+.2f})" for each in one.influences)
-        counts = [str(one.count(state)) for state in (HOLDS, FAILS, UNDECIDED)]
-        rows.append([one.claim.place, one.claim.text, *counts, part, one.file_state or "–", decides or "–"])
-    ends = ("of the decided legs [%]", "leg of the file", "decided by (rank correlation)")
-    note = (
-        f"Undecided: within the scatter over runs (Student's t, {CONFIDENCE:.0%}). Fraction: with Wilson's "
-        f"interval of {CONFIDENCE:.0%}. Decided by: lengths and masses whose rank correlation is significant "
-        "after Holm's correction; positive if a longer or heavier body favours the claim."
-    )
-    text = f"{claims.legs} of {drawn} drawn legs walk{rejected and f'. Rejected: {rejected}'}."
-    head = ("clearance in", "claim", HOLDS, FAILS, UNDECIDED, *ends)
-    caption = "The paper's claims in legs of different lengths and masses"
-    return [Text(text), Table(caption=caption, head=head, rows=rows, note=note, is_text=True)]
+def _claims(responses: Responses) -> Table:
+    rows = [[claim.place, claim.text, claim.state(responses)] for claim in CLAIMS]
+    note = f"Undecided: within {STANDARD_ERRORS:g} standard errors over the runs."
+    head = ("clearance in", "claim", "this leg")
+    return Table(caption="The paper's claims", head=head, rows=rows, note=note, is_text=True)
 
 
 # Pictures.
@@ -502,26 +491,19 @@ def _slider(mechanism: Mechanism, found: Found) -> Fragment:
 def _sections_of_cycles(results: StudyResults) -> dict[str, Sequence[Part]]:
     """Parts of the points of the task ``section``, by the title of their section of the page."""
     pairs, parts = results.of("section"), dict[str, Sequence[Part]]()
-    for point, arrays in pairs:
-        if point.settings["portrait_cycles"]:
-            cycles, angle = len(arrays["section_rate_mps"]), point.settings["crank_angle_deg"]
-            text = f"One point per cycle at crank angle {angle:g}°, over {cycles} cycles."
-            parts["Poincaré maps"] = [
-                _map_table(point.clearance_m, arrays),
-                _planes(point.clearance_m, arrays, "section", text),
-            ]
-            text = (
-                "The journal's place in its bushing against its rate, some cycles of one run as an example."
-            )
-            parts["Phase portraits"] = [_planes(point.clearance_m, arrays, "portrait", text)]
+    for point, arrays in results.of("portrait"):
+        cycles, angle = len(arrays["section_rate_mps"]), point.settings["crank_angle_deg"]
+        text = f"One point per cycle at crank angle {angle:g}°, over {cycles} cycles."
+        parts["Poincaré maps"] = [
+            _map_table(point.clearance_m, arrays),
+            _planes(point.clearance_m, arrays, "section", text),
+        ]
+        text = "The journal's place in its bushing against its rate, some cycles of one run as an example."
+        parts["Phase portraits"] = [_planes(point.clearance_m, arrays, "portrait", text)]
     diagrams = []
     for key, fixed in (("clearance_m", "speed_rpm"), ("speed_rpm", "clearance_m")):
-        base = getattr(results.settings, fixed, None)
-        along = [
-            pair
-            for pair in pairs
-            if pair[0].settings[fixed] == base and not pair[0].settings["portrait_cycles"]
-        ]
+        base = getattr(results.settings, fixed)
+        along = [pair for pair in pairs if pair[0].settings[fixed] == base]
         if len(along) > 1:
             diagrams.append(_bifurcation(key, sorted(along, key=lambda pair: pair[0].settings[key])))
     return parts | {"Bifurcation diagrams": diagrams}

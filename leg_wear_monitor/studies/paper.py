@@ -1,98 +1,104 @@
-"""The claims of the paper's sections 6 and 7 that statistics of a leg can test, in our words.
+"""The claims of the paper's sections 6 and 7 that statistics of the leg can test, in our words.
 
-The text of the paper was not at hand: the claims are as others who read it handed them on.
+The text of the paper was not at hand: the claims are as readers of the paper handed them on.
 """
 
-from collections.abc import Callable, Iterator
-from itertools import pairwise, product
+from collections.abc import Callable, Mapping
+from itertools import pairwise
 
 import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.studies.kinds import ALL, FOOT, HIP, KNEE, PLACES, RIGID_KNEE, SETS
-from leg_wear_monitor.studies.plan import DEPTH, ERRORS, TITLES, Arrays, Estimate, Names
+from leg_wear_monitor.studies.tables import DEPTH, TITLES, Estimate, Found, clearance_joints_of
+from leg_wear_monitor.studies.tasks import ERRORS, Arrays
+from leg_wear_monitor.wear import BUSHING, wear_zone
 
-# The measure of a claim in one leg, above 0 where the claim holds: the logarithm of a ratio, or a difference
-# of fractions.
+Names = tuple[str, ...]
+HIP, KNEE, FOOT = ("A", "B"), ("G",), ("I", "J")
+PLACES = (HIP, KNEE, FOOT)
+ALL, RIGID_KNEE = HIP + KNEE + FOOT, HIP + FOOT
+SETS = (*PLACES, RIGID_KNEE, ALL)
 
+Responses = Mapping[Names, Arrays]
+"""Response of the leg by the clearance joints, for each of `SETS`."""
+Measure = Callable[[Responses], Estimate]
+"""Measure of a claim, above 0 where the claim holds: the logarithm of a ratio, or a difference."""
 
+HOLDS, FAILS, UNDECIDED = "holds", "fails", "undecided"
+STANDARD_ERRORS = 3.0  # a measure within so many of its standard errors decides nothing
 _TINY = 1.0e-300  # in place of a mean of 0, such as of impacts that do not occur
+_SUM_WITHIN = 0.1  # deviation up to which the effect of all at once counts as the sum
+_REGULAR = 0.5  # fraction of a force's variance from which on it counts as regular: most of it repeats
 
 
-_OF_WEAR = (DEPTH, "zone_deg", "zone_centre_deg")
+@attrs.frozen
+class Claim:
+    """A claim: where the clearances are, its text, and its measure."""
+
+    place: str
+    text: str
+    measure: Measure
+
+    def state(self, responses: Responses) -> str:
+        """Whether the claim holds or fails, or whether the scatter over runs leaves it undecided."""
+        effect = self.measure(responses)
+        if abs(effect.score) < STANDARD_ERRORS:
+            return UNDECIDED
+        return HOLDS if effect.value > 0.0 else FAILS
 
 
-def of_runs(leg: Arrays, name: str, where: Names, joint: str = "") -> Floats:
-    """A statistic (r,) of a leg in every run with clearance there; of a joint, if it has one.
+def responses_of(found: Found) -> Responses | None:
+    """Responses of a study by clearance joints; None unless the study has all of `SETS`."""
+    by_joints = {tuple(clearance_joints_of(arrays)): arrays for _, arrays in found}
+    return by_joints if set(SETS) <= set(by_joints) else None
 
-    NaN of wear that is not counted, as without a wear coefficient.
+
+def of_runs(responses: Responses, name: str, where: Names, joint: str = "") -> Floats:
+    """A statistic (r,) of the leg in every run with clearance there; of a joint, if it has one.
+
+    NaN for wear that is not counted, as without a wear coefficient.
     """
-    values = leg[f"set{SETS.index(where)}_{name}"]
-    found = np.asarray(values[:, where.index(joint)] if joint else values, dtype=float)
-    if name in _OF_WEAR and not leg[f"set{SETS.index(where)}_{DEPTH}"][:, where.index(joint)].any():
-        return np.full_like(found, np.nan)
-    return found
+    arrays = responses[where]
+    if not joint:
+        return np.asarray(arrays[f"error_{name}"].mean(axis=1))
+    k, every = where.index(joint), list(arrays["joints"]).index(joint)
+    profiles = arrays[DEPTH][:, k, BUSHING]
+    if name == DEPTH:
+        return np.asarray(profiles.max(axis=1) if profiles.any() else np.full(len(profiles), np.nan))
+    if name.startswith("zone"):
+        zones = np.array([wear_zone(profile, 0.5) or (np.nan, np.nan) for profile in profiles])
+        return np.asarray(zones[:, 1] - zones[:, 0] if name == "zone_deg" else zones.mean(axis=1))
+    if name == "peak_force_n":
+        return np.asarray(arrays[name][..., every].mean(axis=1))
+    if name == "impacts":
+        return np.asarray(arrays[name][..., k].mean(axis=1))
+    if name == "p99_force_n":
+        return np.asarray(arrays[name][:, every])
+    return np.asarray(arrays[f"{name}_by_run"][:, k])
 
 
 def log_ratio(x: Floats, y: Floats, paired: bool) -> Estimate:
     """Logarithm of mean x over mean y, (r,) each; ``paired`` if they are of the same runs."""
     mean_x, mean_y = np.maximum(x.mean(), _TINY), np.maximum(y.mean(), _TINY)
-    return _measured(float(np.log(mean_x / mean_y)), _error(x / mean_x, y / mean_y, paired))
+    return _measured(float(np.log(mean_x / mean_y)), x / mean_x, y / mean_y, paired)
 
 
-def difference(x: Floats, y: Floats, paired: bool) -> Estimate:
+def difference(x: Floats, y: Floats, paired: bool = True) -> Estimate:
     """Mean x minus mean y."""
-    return _measured(float(x.mean() - y.mean()), _error(x, y, paired))
+    return _measured(float(x.mean() - y.mean()), x, y, paired)
 
 
-def _measured(value: float, error: float) -> Estimate:
-    """A measure; 0, which decides nothing, where the value is not known."""
+def _measured(value: float, x: Floats, y: Floats, paired: bool) -> Estimate:
+    """A measure with the standard error of a difference of means; 0, which decides nothing, if unknown."""
+    variance = np.var(x - y, ddof=1) if paired else np.var(x, ddof=1) + np.var(y, ddof=1)
+    error = float(np.sqrt(variance / len(x)))
     return Estimate(value, error) if np.isfinite(value) else Estimate(0.0, 0.0)
 
 
-def _error(x: Floats, y: Floats, paired: bool) -> float:
-    """Standard error of the difference of the means."""
-    variance = np.var(x - y, ddof=1) if paired else np.var(x, ddof=1) + np.var(y, ddof=1)
-    return float(np.sqrt(variance / len(x)))
-
-
-def least(effects: list[Estimate]) -> Estimate:
-    """The measure of a claim with several conditions: that of the condition that holds by least."""
+def _weakest(effects: list[Estimate]) -> Estimate:
+    """The condition that holds by least: a claim with several conditions needs all of them."""
     return min(effects, key=lambda effect: effect.value)
-
-
-def greatest(effects: list[Estimate]) -> Estimate:
-    """The measure of a claim with alternatives: that of the one that holds by most."""
-    return max(effects, key=lambda effect: effect.value)
-
-
-Measure = Callable[[Arrays], Estimate]
-
-_SUM_WITHIN = 0.1  # deviation up to which the effect of all at once counts as the sum, as on a study's page
-_REGULAR = 0.5  # fraction of a force's variance from which on it counts as regular: most of it repeats
-_TITLES = dict(zip(ERRORS, TITLES, strict=True))
-
-
-@attrs.frozen
-class Claim:
-    """A claim.
-
-    Attributes
-    ----------
-    key : str
-        Name in the data.
-    place : str
-        Where the clearances are.
-    text : str
-    measure : callable
-        Its measure in a leg.
-    """
-
-    key: str
-    place: str
-    text: str
-    measure: Measure
 
 
 _Pair = tuple[Names, str, Names, str]  # clearance joints and joint that are above, and those below
@@ -101,53 +107,65 @@ _Pair = tuple[Names, str, Names, str]  # clearance joints and joint that are abo
 def _above(name: str, *pairs: _Pair) -> Measure:
     """A statistic is greater in the first place than in the second one, in each pair."""
 
-    def measure(leg: Arrays) -> Estimate:
-        effects = []
-        for over, above, under, below in pairs:
-            values = of_runs(leg, name, over, above), of_runs(leg, name, under, below)
-            effects.append(log_ratio(*values, over == under))
-        return least(effects)
+    def measure(leg: Responses) -> Estimate:
+        return _weakest([
+            log_ratio(of_runs(leg, name, over, above), of_runs(leg, name, under, below), over == under)
+            for over, above, under, below in pairs
+        ])  # fmt: skip
 
     return measure
+
+
+def _in_one(name: str, where: Names, *pairs: str) -> Measure:
+    """As `_above`, for pairs of joints such as ``AB`` with the same clearance joints."""
+    return _above(name, *((where, pair[0], where, pair[1]) for pair in pairs))
+
+
+def _with_all(name: str, joints: str, place: Names) -> Measure:
+    """A statistic of these joints is greater with all five clearances than with the place alone."""
+    return _above(name, *((ALL, joint, place, joint) for joint in joints))
 
 
 def _repeats(where: Names, more: str, less: str) -> Measure:
     """Forces of the joints ``more`` repeat more than those of ``less``, on the mean of each group."""
 
-    def mean(leg: Arrays, joints: str) -> Floats:
+    def mean(leg: Responses, joints: str) -> Floats:
         each = [of_runs(leg, "repeats_contact_force", where, joint) for joint in joints]
         return np.asarray(np.mean(each, axis=0))
 
-    return lambda leg: difference(mean(leg, more), mean(leg, less), True)
+    return lambda leg: difference(mean(leg, more), mean(leg, less))
 
 
-def _regular(leg: Arrays) -> Estimate:
+def _regular(leg: Responses) -> Estimate:
     repeats = of_runs(leg, "repeats_contact_force", KNEE, "G")
-    return difference(repeats, np.full_like(repeats, _REGULAR), True)
+    return difference(repeats, np.full_like(repeats, _REGULAR))
 
 
-def _by_derivative(leg: Arrays) -> Estimate:
+def _by_derivative(leg: Responses) -> Estimate:
     """Errors as fractions of the ideal curve's range: displacement < velocity < acceleration, in all sets."""
 
     def fraction(where: Names, name: str) -> Floats:
-        reach = leg[f"set{SETS.index(where)}_ideal_range_{name}"]
-        return of_runs(leg, f"error_{name}", where) / reach
+        reach = float(np.ptp(leg[where][f"ideal_{name}"], axis=0).max())
+        return of_runs(leg, name, where) / reach
 
-    pairs = product(SETS, pairwise(ERRORS[:3]))
-    return least([log_ratio(fraction(s, after), fraction(s, before), True) for s, (before, after) in pairs])
+    return _weakest([
+        log_ratio(fraction(where, after), fraction(where, before), True)
+        for where in SETS
+        for before, after in pairwise(ERRORS[:3])
+    ])  # fmt: skip
 
 
-def _apart_from_sum(leg: Arrays) -> Estimate:
+def _apart_from_sum(leg: Responses) -> Estimate:
     """How far errors of all at once are from the sum of the places, in the quantity where it is farthest."""
     effects = []
     for name in ERRORS:
-        total = np.sum([of_runs(leg, f"error_{name}", place) for place in PLACES], axis=0)
-        ratio = log_ratio(of_runs(leg, f"error_{name}", ALL), total, False)
+        total = np.sum([of_runs(leg, name, place) for place in PLACES], axis=0)
+        ratio = log_ratio(of_runs(leg, name, ALL), total, False)
         effects.append(Estimate(abs(ratio.value) - np.log1p(_SUM_WITHIN), ratio.error))
-    return greatest(effects)
+    return max(effects, key=lambda effect: effect.value)
 
 
-def _zones(leg: Arrays, one: tuple[Names, str], other: tuple[Names, str]) -> tuple[Floats, Floats]:
+def _zones(leg: Responses, one: tuple[Names, str], other: tuple[Names, str]) -> tuple[Floats, Floats]:
     """How far the middles of two zones are from each other, and half of their widths together [turns]."""
     middles = of_runs(leg, "zone_centre_deg", *one), of_runs(leg, "zone_centre_deg", *other)
     between = np.abs((middles[0] - middles[1] + 180.0) % 360.0 - 180.0)
@@ -155,84 +173,76 @@ def _zones(leg: Arrays, one: tuple[Names, str], other: tuple[Names, str]) -> tup
     return between / 360.0, reach / 360.0
 
 
-def _stays(leg: Arrays) -> Estimate:
+def _stays(leg: Responses) -> Estimate:
     """B's zones, alone and with all five, lie over each other: their middles are nearer than half widths."""
     between, reach = _zones(leg, (HIP, "B"), (ALL, "B"))
-    return difference(reach, between, True)
+    return difference(reach, between)
 
 
-def _differ(leg: Arrays) -> Estimate:
+def _differ(leg: Responses) -> Estimate:
     """The zones of I and J, both in the frame of the foot, have nothing in common."""
     between, reach = _zones(leg, (FOOT, "I"), (FOOT, "J"))
-    return difference(between, reach, True)
+    return difference(between, reach)
 
 
-def _ranked(name: str) -> Claim:
-    text = f"the hip disturbs the {_TITLES[name]} most, the foot least"
-    measure = _above(f"error_{name}", (HIP, "", KNEE, ""), (KNEE, "", FOOT, ""))
-    return Claim(f"hip_most_{name}", "one place", text, measure)
+def _places(name: str) -> Measure:
+    return _above(name, (HIP, "", KNEE, ""), (KNEE, "", FOOT, ""))
 
 
-def _more_than_alone(name: str) -> Claim:
-    text = f"the {_TITLES[name]} is disturbed more than by any place alone"
-    measure = _above(f"error_{name}", *((ALL, "", place, "") for place in PLACES))
-    return Claim(f"all_more_{name}", "all five", text, measure)
+def _more_than_alone(name: str) -> Measure:
+    return _above(name, *((ALL, "", place, "") for place in PLACES))
 
 
-def _harder(key: str, joints: str, place: Names) -> Claim:
-    """Forces with all five above those with the place alone, at each of these joints."""
-    are, names = "are" if len(joints) > 1 else "is", " and ".join(joints)
-    alone = {HIP: "hip", KNEE: "knee", FOOT: "foot"}[place]
-    measure = _above("p99_force_n", *((ALL, joint, place, joint) for joint in joints))
-    return Claim(key, "all five", f"{names} {are} hit harder than with the {alone} alone", measure)
+_REPEATS_LESS = "the forces of I and J repeat less than those of A, B and G, on the mean"
+_ZONES_WIDEN = "half of B's wear lies in a narrower zone than that of G, half of G's than that of I"
+_BY_DERIVATIVE = "velocity is disturbed more than displacement, acceleration more than velocity"
+_P99 = "p99_force_n"
 
-
-def _claims() -> Iterator[Claim]:
-    """All claims, in the order of the paper's places: each place alone, then all five at once."""
-    yield Claim("a_shallow", "hip", "A wears less deep than B", _above(DEPTH, (HIP, "B", HIP, "A")))
-    text = "impacts are denser at A than at B"
-    yield Claim("a_denser", "hip", text, _above("impacts", (HIP, "A", HIP, "B")))
-    text = "half of B's wear lies in a narrower zone than that of A"
-    yield Claim("b_zone", "hip", text, _above("zone_deg", (HIP, "A", HIP, "B")))
-    yield Claim("b_chaotic", "hip", "B's force repeats less than A's", _repeats(HIP, "A", "B"))
-    yield Claim("g_regular", "knee", "most of the variance of G's force repeats", _regular)
-    yield Claim("j_deeper", "foot", "J wears deeper than I", _above(DEPTH, (FOOT, "J", FOOT, "I")))
-    yield Claim("j_harder", "foot", "J is hit harder than I", _above("peak_force_n", (FOOT, "J", FOOT, "I")))
-    yield from map(_ranked, ERRORS)
-    text = "velocity is disturbed more than displacement, acceleration more than velocity"
-    yield Claim("by_derivative", "each", text, _by_derivative)
-    yield from map(_more_than_alone, (ERRORS[0], ERRORS[3]))
-    yield Claim("not_the_sum", "all five", "the effect is not the sum of the places alone", _apart_from_sum)
-    deepest = _above(DEPTH, *((ALL, "A", ALL, joint) for joint in "BGIJ"))
-    yield Claim("a_worst", "all five", "A wears deepest", deepest)
-    text = "A wears deeper than with the hip alone"
-    yield Claim("a_worse", "all five", text, _above(DEPTH, (ALL, "A", HIP, "A")))
-    mildest = _above(DEPTH, *((ALL, joint, ALL, "J") for joint in "ABGI"))
-    yield Claim("j_mildest", "all five", "J wears least deep", mildest)
-    text = "J wears less deep than with the foot alone"
-    yield Claim("j_falls", "all five", text, _above(DEPTH, (FOOT, "J", ALL, "J")))
-    text = "G wears less deep than A and B, deeper than I and J"
-    orders = [(joint, "G") for joint in HIP] + [("G", joint) for joint in FOOT]
-    between = _above(DEPTH, *((ALL, above, ALL, below) for above, below in orders))
-    yield Claim("g_between", "all five", text, between)
-    text = "the forces of I and J repeat less than those of A, B and G, on the mean"
-    yield Claim("disorder", "all five", text, _repeats(ALL, "ABG", "IJ"))
-    text = "half of B's wear lies in a narrower zone than that of G, half of G's than that of I"
-    widen = _above("zone_deg", (KNEE, "G", HIP, "B"), (FOOT, "I", KNEE, "G"))
-    yield Claim("zones_widen", "each", text, widen)
-    yield Claim("b_stays", "all five", "B's zone stays where it is with the hip alone", _stays)
-    yield Claim("i_j_differ", "foot", "the zones of I and J have nothing in common", _differ)
-    text = "half of A's wear lies in a wider zone than that of B"
-    yield Claim("a_wide", "all five", text, _above("zone_deg", (ALL, "A", ALL, "B")))
-    yield _harder("a_harder", "A", HIP)
-    yield _harder("b_harder", "B", HIP)
-    yield _harder("g_harder", "G", KNEE)
-    yield _harder("foot_harder", "IJ", FOOT)
-    text = "I and J are hit less hard than with a rigid knee"
-    buffered = _above("p99_force_n", *((RIGID_KNEE, joint, ALL, joint) for joint in FOOT))
-    yield Claim("g_buffers_foot", "all five", text, buffered)
-    text = "the drive torque is disturbed less than with a rigid knee"
-    yield Claim("g_buffers_drive", "all five", text, _above(f"error_{ERRORS[3]}", (RIGID_KNEE, "", ALL, "")))
-
-
-CLAIMS = tuple(_claims())
+CLAIMS = (
+    Claim("hip", "A wears less deep than B", _in_one(DEPTH, HIP, "BA")),
+    Claim("hip", "impacts are denser at A than at B", _in_one("impacts", HIP, "AB")),
+    Claim("hip", "half of B's wear lies in a narrower zone than that of A", _in_one("zone_deg", HIP, "AB")),
+    Claim("hip", "B's force repeats less than A's", _repeats(HIP, "A", "B")),
+    Claim("knee", "most of the variance of G's force repeats", _regular),
+    Claim("foot", "J wears deeper than I", _in_one(DEPTH, FOOT, "JI")),
+    Claim("foot", "J is hit harder than I", _in_one("peak_force_n", FOOT, "JI")),
+    *(
+        Claim("one place", f"the hip disturbs the {title} most, the foot least", _places(name))
+        for name, title in zip(ERRORS, TITLES, strict=True)
+    ),
+    Claim("each", _BY_DERIVATIVE, _by_derivative),
+    *(
+        Claim("all five", f"the {title} is disturbed more than by any place alone", _more_than_alone(name))
+        for name, title in zip(ERRORS, TITLES, strict=True)
+        if name in ("toe_position_m", "drive_torque_nm")
+    ),
+    Claim("all five", "the effect is not the sum of the places alone", _apart_from_sum),
+    Claim("all five", "A wears deepest", _in_one(DEPTH, ALL, "AB", "AG", "AI", "AJ")),
+    Claim("all five", "A wears deeper than with the hip alone", _with_all(DEPTH, "A", HIP)),
+    Claim("all five", "J wears least deep", _in_one(DEPTH, ALL, "AJ", "BJ", "GJ", "IJ")),
+    Claim("all five", "J wears less deep than with the foot alone", _above(DEPTH, (FOOT, "J", ALL, "J"))),
+    Claim(
+        "all five",
+        "G wears less deep than A and B, deeper than I and J",
+        _in_one(DEPTH, ALL, "AG", "BG", "GI", "GJ"),
+    ),
+    Claim("all five", _REPEATS_LESS, _repeats(ALL, "ABG", "IJ")),
+    Claim("each", _ZONES_WIDEN, _above("zone_deg", (KNEE, "G", HIP, "B"), (FOOT, "I", KNEE, "G"))),
+    Claim("all five", "B's zone stays where it is with the hip alone", _stays),
+    Claim("foot", "the zones of I and J have nothing in common", _differ),
+    Claim("all five", "half of A's wear lies in a wider zone than that of B", _in_one("zone_deg", ALL, "AB")),
+    Claim("all five", "A is hit harder than with the hip alone", _with_all(_P99, "A", HIP)),
+    Claim("all five", "B is hit harder than with the hip alone", _with_all(_P99, "B", HIP)),
+    Claim("all five", "G is hit harder than with the knee alone", _with_all(_P99, "G", KNEE)),
+    Claim("all five", "I and J are hit harder than with the foot alone", _with_all(_P99, "IJ", FOOT)),
+    Claim(
+        "all five",
+        "I and J are hit less hard than with a rigid knee",
+        _above(_P99, *((RIGID_KNEE, joint, ALL, joint) for joint in FOOT)),
+    ),
+    Claim(
+        "all five",
+        "the drive torque is disturbed less than with a rigid knee",
+        _above("drive_torque_nm", (RIGID_KNEE, "", ALL, "")),
+    ),
+)

@@ -21,7 +21,7 @@ from leg_wear_monitor.monitor.config.parameters import PARAMETERS, parameters_of
 from leg_wear_monitor.monitor.ledger.schema import FORMAT, TABLES, create_tables
 from leg_wear_monitor.monitor.verdict.decision import measured_figures
 from leg_wear_monitor.monitor.verdict.rules import RULES
-from leg_wear_monitor.studies.kinds import STUDIES
+from leg_wear_monitor.studies.study import Study, Sweep
 
 ROOT = Path(__file__).parents[2]
 PART = re.compile(r"(<!-- (\S[\w ]*) -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -61,13 +61,6 @@ def value(of: Any) -> str:
 
 
 def study_keys(_name: str) -> str:
-    users: dict[str, list[str]] = {}
-    fields: dict[str, attrs.Attribute[Any]] = {}
-    for name, kind in STUDIES.items():
-        for key, field in fields_of(kind):
-            users.setdefault(key, []).append(name)
-            fields[key] = field
-
     def row(key: str, field: "attrs.Attribute[Any]") -> Iterator[str]:
         default, metadata = field.default, field.metadata
         yield from (f"`{key}`", metadata["unit"])
@@ -75,12 +68,10 @@ def study_keys(_name: str) -> str:
             yield "required"
         else:
             yield ", ".join(map(str, default)) if isinstance(default, tuple) else str(default)
-        yield bounds(metadata, WORDS)
-        yield from ("all" if len(users[key]) == len(STUDIES) else ", ".join(users[key]), metadata["doc"])
+        yield from (bounds(metadata, WORDS), metadata["doc"])
 
-    return table(
-        "key | unit | default | bounds | studies | what it is", (row(*one) for one in fields.items())
-    )
+    fields = [one for one in fields_of(Study) if one[0] != "sweeps"] + list(fields_of(Sweep, "sweeps[]."))
+    return table("key | unit | default | bounds | meaning", (row(*one) for one in fields))
 
 
 def monitor_parameters(_name: str) -> str:
@@ -287,11 +278,10 @@ def written(name: str) -> str:
 
 
 def renewed(name: str) -> str:
-    """A page with its parts as the source has them; those that a study writes (``legs``) stay."""
-    own = {"appendix/study.md": {"legs"}}.get(name, set())
+    """A page with its parts as the source has them."""
 
     def part(found: re.Match[str]) -> str:
-        return found[0] if found[2] in own else found[1] + PAGES[name](found[2]) + found[3]
+        return found[1] + PAGES[name](found[2]) + found[3]
 
     return PART.sub(part, written(name))
 

@@ -22,7 +22,7 @@ def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         "wrong.yaml": FOUR_BAR.replace("mass: 0.40", "mass: 0"),
         "open.yaml": FOUR_BAR.replace("C: [0.200, 0.0]", "C: [0.500, 0.0]"),
         "monitor.yaml": LEDGER,
-        "study.yaml": "joints: [G]\nclearances_m: [0.0003]\nruns: 2\n",
+        "study.yaml": "title: a\nquestion: b?\nclearances: [G]\nsweeps: []\nruns: 2\n",
         "fleet.yaml": "legs:\n  - {id: a, recordings: '*.mcap', colour: red}\n",
         "trash.mcap": "no recording\n",
     }.items():
@@ -74,7 +74,7 @@ def test_what_is_done_and_what_is_found(run, code: int, line: str) -> None:
         ("measure Q 0.4 --sigma 0.01 --config monitor.yaml", "'Q'"),
         ("acknowledge --ledger no.ledger", "no.ledger"),
         ("reset G --ledger no.ledger", "no.ledger"),
-        ("study size --config study.yaml --out study", "study.yaml: runs"),
+        ("study study.yaml --out study", "study.yaml: runs"),
         ("report .", "."),
         ("fleet update fleet.yaml", "fleet.yaml: legs.a.colour"),
         ("fleet report nowhere", "nowhere"),

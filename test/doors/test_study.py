@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 
 KEPT = Path(__file__).parent / "kept" / "location.json"
-STUDY = """mechanism: bionic_leg
-sets: [[A, B], [G], [I, J]]
+STUDY = """title: location
+question: where?
+sweeps: [{{clearances: [[A, B], [G], [I, J]]}}]
 clearance_m: 0.0003
 ensemble: {{runs: 4, cycles: 5, skip_cycles: 1, traced_cycles: 1, perturb_fraction: 0.3, seed: {seed}}}
 """
@@ -29,7 +30,7 @@ FAR = 9.0
 def line(directory: Path, seed: int) -> list[str]:
     """Arguments of the study, whose settings are written into a directory."""
     (directory / "location.yaml").write_text(STUDY.format(seed=seed))
-    return ["study", "location", "--config", str(directory / "location.yaml"), "--workers", "1"]
+    return ["study", str(directory / "location.yaml"), "--workers", "1"]
 
 
 def figures(out: Path) -> dict[str, float]:
@@ -62,16 +63,33 @@ def test_its_figures_are_those_that_are_kept(study: Path) -> None:
     assert {name: value for name, value in far.items() if abs(value) > FAR} == {}
 
 
-def test_a_point_that_was_altered_is_refused_and_computed_again_to_the_bit(study: Path, run: Any) -> None:
-    """It alone, and the page that comes of all."""
+def test_a_point_that_is_damaged_is_refused_and_computed_again_to_the_bit(study: Path, run: Any) -> None:
+    """The study computes this point alone, and writes the same page."""
     before = {path.name: path.read_bytes() for path in (study / "out").rglob("*") if path.is_file()}
     point = next((study / "out" / "points").iterdir())
     point.write_bytes(before[point.name][:-200] + bytes(200))
     refused = run("report", study / "out")
     assert refused.code == 2 and point.name in refused.lines[0]
+    point.unlink()
     done = run(*line(study, 1), "--out", study / "out")
     assert done.code == 0 and done.out.startswith("points: 3, 1 computed now\n")
     assert {path.name: path.read_bytes() for path in (study / "out").rglob("*") if path.is_file()} == before
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("sweeps: []\nspeed: 60", "study.yaml: speed: unknown key"),
+        ("sweeps: [{speed_rpm: [60], clearance_m: [0.0003]}]", "varies clearance_m and speed_rpm"),
+        ("sweeps: [{keep: [forces]}]", "'forces' is not one of response, life"),
+        ("sweeps: [{clearances: [[Z]]}]", "'Z' has no clearance settings"),
+        ("sweeps: [{speed_rpm: [60]}]", "has no clearance joint"),
+    ],
+)
+def test_a_wrong_study_file_is_refused_in_one_line(run: Any, tmp_path: Path, line: str, said: str) -> None:
+    (tmp_path / "study.yaml").write_text(f"title: a\nquestion: b\n{line}\n")
+    done = run("study", tmp_path / "study.yaml", "--out", tmp_path / "out")
+    assert done.code == 2 and len(done.lines) == 1 and said in done.lines[0]
 
 
 def renewed() -> dict[str, list[float]]:

@@ -8,36 +8,33 @@ import pytest
 from matplotlib import pyplot
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.studies.execution import parse_settings, run_study
-from leg_wear_monitor.studies.results import StudyResults, load_results
+from leg_wear_monitor.studies.run import StudyResults, load_results, run_study
+from leg_wear_monitor.studies.study import parse_study
 
-ENSEMBLE = {"runs": 2, "cycles": 2, "skip_cycles": 1, "traced_cycles": 1}
-DIAGRAM = {"clearances_m": [2.0e-4, 3.0e-4], "speeds_rpm": [20, 60], "cycles": 4, "skip_cycles": 1}
-
+SMALL = {
+    "ensemble": {"runs": 2, "cycles": 2, "skip_cycles": 1, "traced_cycles": 1},
+    "life": {"opens_m": 5.0e-6, "jump_m": 1.0e-5, "cycles": 2, "runs": 2},
+    "exponent": {"runs": 2, "cycles": 10, "renewals": 16},
+    "section": {"cycles": 4, "skip_cycles": 1},
+    "portrait": {"cycles": 6, "skip_cycles": 1, "portrait_cycles": 2},
+}
 TINY = {
-    "size": {"joints": ["G"], "clearances_m": [1.0e-4, 2.0e-4, 3.0e-4, 4.0e-4]},
-    "speed": {"joints": ["G"], "speeds_rpm": [45, 60]},
-    "location": {"sets": [["A", "B"], ["G"]]},
-    "multi": {"sets": [["G"], ["I", "J"]]},
-    "laws": {
-        "joints": ["G"], "normal_laws": ["hertz", "flores"], "friction_laws": ["none"],
-        "friction_coefficients": [0.1],
-    },
-    "load": {
-        "joints": ["G"], "loads_n": [0, 300],
-        "life": {"opens_m": 5.0e-6, "jump_m": 1.0e-5, "cycles": 2, "runs": 2},
-        "exponent": {"runs": 2, "cycles": 10, "renewals": 16},
-    },
-    "legs": {"legs": 1, "draw_seed": 3},
-    "wear": {
-        "sets": [["I", "J"]],
-        "life": {"opens_m": 5.0e-6, "jump_m": 1.0e-5, "cycles": 2, "runs": 2},
-    },
-    "chaos": {
-        "joints": ["A", "B"], "others": [["G"]], "section_cycles": 6,
-        "exponent": {"runs": 2, "cycles": 10, "renewals": 16}, "bifurcation": DIAGRAM,
-    },
-}  # fmt: skip
+    "size": [{"clearance_m": [1.0e-4, 2.0e-4, 3.0e-4, 4.0e-4]}],
+    "speed": [{"speed_rpm": [45, 60]}],
+    "location": [{"clearances": [["A", "B"], ["G"]]}],
+    "multi": [
+        {"clearances": [["A", "B"], ["G"], ["I", "J"], ["A", "B", "I", "J"], ["A", "B", "G", "I", "J"]]}
+    ],
+    "laws": [{"normal_law": ["hertz", "flores"]}, {"friction": ["none"]}, {"friction_coefficient": [0.1]}],
+    "load": [{"ground_n": [0, 300], "keep": ["response", "life", "exponent"]}],
+    "wear": [{"clearances": [["I", "J"]], "keep": ["response", "life"]}],
+    "chaos": [
+        {"keep": ["response", "portrait"]},
+        {"clearances": [["A", "B"], ["G"]], "keep": ["exponent"]},
+        {"clearance_m": [2.0e-4, 3.0e-4], "keep": ["section"]},
+        {"speed_rpm": [20, 60], "keep": ["section"]},
+    ],
+}
 
 
 @pytest.fixture(scope="session")
@@ -46,7 +43,8 @@ def study(tmp_path_factory) -> Callable[[str], StudyResults]:
 
     def results(name: str) -> StudyResults:
         out: Path = tmp_path_factory.mktemp(name)
-        run_study(name, parse_settings(name, {"ensemble": ENSEMBLE, **TINY[name]}, name), out)
+        document = {"title": name, "question": f"{name}?", "clearances": ["G"], "sweeps": TINY[name], **SMALL}
+        run_study(parse_study(document, name), out)
         return load_results(out)
 
     return cache(results)

@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.studies.life_tasks import exponent, lyapunov_exponent, stretches
+from leg_wear_monitor.studies.tables import exponent
+from leg_wear_monitor.studies.tasks import lyapunov_exponent, stretches
 
 
 def measured(advance, starts, steps, step_time=1.0, skip=50, comparable=None, distance=1.0e-9):
@@ -88,7 +89,7 @@ def test_neighbours_that_meet_do_not_end_the_count():
 
 
 SETTINGS = {
-    "clearance_joints": ["G"], "clearance_m": 3.0e-4, "perturb_fraction": 0.3, "seed": 1, "skip_cycles": 2,
+    "clearances": ["G"], "clearance_m": 3.0e-4, "perturb_fraction": 0.3, "seed": 1, "skip_cycles": 2,
     "runs": 2, "cycles": 6, "renewals": 32, "distance": 1.0e-8, "tolerance_m": 1.0e-9,
 }  # fmt: skip
 
@@ -97,9 +98,9 @@ SETTINGS = {
 def test_a_leg_that_stays_in_contact_forgets_and_one_that_bounces_does_not():
     """At 20 rpm the knee stays in contact all the time; the hip at 60 rpm bounces."""
     calm = lyapunov_exponent(load_mechanism(), SETTINGS | {"speed_rpm": 20.0})["stretch_per_cycle"]
-    wild = lyapunov_exponent(
-        load_mechanism(), SETTINGS | {"clearance_joints": ["A", "B"], "speed_rpm": 60.0}
-    )["stretch_per_cycle"]
+    wild = lyapunov_exponent(load_mechanism(), SETTINGS | {"clearances": ["A", "B"], "speed_rpm": 60.0})[
+        "stretch_per_cycle"
+    ]
     assert calm.shape == wild.shape == (2, 6)
     assert calm.mean() < 0.0
     assert wild.mean() > 10.0
@@ -107,7 +108,7 @@ def test_a_leg_that_stays_in_contact_forgets_and_one_that_bounces_does_not():
 
 @pytest.mark.chaotic
 def test_the_exponent_of_the_leg_does_not_depend_on_how_far_the_neighbour_stands():
-    place = SETTINGS | {"clearance_joints": ["A", "B"], "speed_rpm": 60.0}
+    place = SETTINGS | {"clearances": ["A", "B"], "speed_rpm": 60.0}
     near, far = (
         lyapunov_exponent(load_mechanism(), place | {"distance": distance})["stretch_per_cycle"].mean()
         for distance in (1.0e-9, 1.0e-6)

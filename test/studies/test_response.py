@@ -11,13 +11,20 @@ from leg_wear_monitor.dynamics.run import TORQUE_ERROR, new_run_statistics, stea
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.person import on_the_ground
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.studies.leg_tasks import run_ensemble
-from leg_wear_monitor.studies.life_tasks import SAMPLES, ensemble, observed_legs, start_angles
-from leg_wear_monitor.studies.plan import ERRORS, fraction_of_range
+from leg_wear_monitor.studies.study import parse_study
+from leg_wear_monitor.studies.tables import fraction_of_range
+from leg_wear_monitor.studies.tasks import (
+    ERRORS,
+    SAMPLES,
+    ensemble,
+    observed_legs,
+    run_ensemble,
+    start_angles,
+)
 from leg_wear_monitor.wear import BUSHING
 
 PLACE = {
-    "clearance_joints": ["G"],
+    "clearances": ["G"],
     "clearance_m": 3.0e-4,
     "speed_rpm": 60.0,
     "perturb_fraction": 0.3,
@@ -66,7 +73,12 @@ def test_a_crank_turns_as_in_its_file_and_curves_are_by_its_angle():
     assert off[0] < 0.1 * off[1]
 
 
-def test_a_load_of_a_point_replaces_the_load_of_the_file(tiny):
+def points(**sweep):
+    document = {"title": "a", "question": "b?", "clearances": ["G"], "sweeps": [sweep]}
+    return parse_study(document, "study").points()
+
+
+def test_a_load_of_a_point_replaces_the_load_of_the_file():
     """0 N is a load as well; a point without a load keeps the load of the file."""
     leg = on_the_ground(load_mechanism(), 600.0)
 
@@ -74,9 +86,9 @@ def test_a_load_of_a_point_replaces_the_load_of_the_file(tiny):
         settings = point.settings | {"runs": 1}
         return max(up for _, up in ensemble(leg, settings)[0].mechanism.loads["ground"].force)
 
-    in_the_air, _, _, loaded, *_ = tiny("load", joints=["G"], loads_n=[0, 300]).points()
+    in_the_air, loaded = points(ground_n=[0, 300])
     assert [peak_n(point) for point in (in_the_air, loaded)] == [0.0, pytest.approx(300.0, rel=1.0e-3)]
-    (own,) = tiny("size", joints=["G"], clearances_m=[3.0e-4]).points()
+    (own,) = points(clearance_m=[3.0e-4])
     assert peak_n(own) == pytest.approx(600.0, rel=1.0e-3)
 
 
@@ -173,7 +185,7 @@ def test_runs_start_on_the_grid_one_in_each_part_of_a_turn():
 
 
 def test_friction_and_laws_reach_the_joints():
-    settings = PLACE | {"runs": 2, "friction": {"coefficient": 0.0}, "normal_law": "hertz"}
+    settings = PLACE | {"runs": 2, "friction_coefficient": 0.0, "normal_law": "hertz"}
     (leg, other) = observed_legs(ensemble(load_mechanism(), settings))
     assert leg.setup.contacts.friction[0, 0] == 0.0
     assert leg.setup.contacts.hysteresis[0] == 0.0

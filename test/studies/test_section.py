@@ -6,10 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.studies.life_tasks import SAMPLES, period_of, poincare_section
+from leg_wear_monitor.studies.tables import period_of
+from leg_wear_monitor.studies.tasks import SAMPLES, poincare_section
 
 SETTINGS = {
-    "clearance_joints": ["G"], "clearance_m": 3.0e-4, "perturb_fraction": 0.3, "seed": 1, "skip_cycles": 4,
+    "clearances": ["G"], "clearance_m": 3.0e-4, "perturb_fraction": 0.3, "seed": 1, "skip_cycles": 4,
     "runs": 1, "cycles": 6, "portrait_cycles": 1, "crank_angle_deg": 90.0,
 }  # fmt: skip
 
@@ -39,7 +40,7 @@ def test_a_section_at_another_angle_is_another_one(calm):
 
 def test_a_bouncing_joint_has_no_period():
     arrays = poincare_section(
-        load_mechanism(), SETTINGS | {"clearance_joints": ["A", "B"], "speed_rpm": 60.0, "cycles": 12}
+        load_mechanism(), SETTINGS | {"clearances": ["A", "B"], "speed_rpm": 60.0, "cycles": 12}
     )
     for k in range(2):
         assert period_of(arrays["section_rate_mps"][:, k], 4, 1.0e-6) is None

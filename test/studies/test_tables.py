@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.mechanism.loader import load_mechanism
-from leg_wear_monitor.studies.plan import Point
-from leg_wear_monitor.studies.results import StudyResults, joint_columns, point_columns
+from leg_wear_monitor.studies.run import StudyResults
+from leg_wear_monitor.studies.study import Point
+from leg_wear_monitor.studies.tables import joint_columns, point_columns
 
 ERRORS = ("toe_position_m", "toe_velocity_mps", "toe_acceleration_mps2", "drive_torque_nm")
 
@@ -35,7 +36,7 @@ def response(factor, clearance_joints):
 
 
 def point(label, clearance_joints, clearance_m):
-    settings = {"clearance_joints": clearance_joints, "clearance_m": clearance_m, "speed_rpm": 60.0}
+    settings = {"clearances": clearance_joints, "clearance_m": clearance_m, "speed_rpm": 60.0}
     return Point(label=label, task="response", settings=settings)
 
 
@@ -81,7 +82,7 @@ def test_with_pandas_they_are_frames(found):
     pytest.importorskip("pandas")
     points, arrays = zip(*found, strict=True)
     results = StudyResults(
-        study="size", settings=None, mechanism=load_mechanism(), points=(*points, point("late", ["G"], 3e-4)),
+        settings=None, mechanism=load_mechanism(), points=(*points, point("late", ["G"], 3e-4)),
         arrays=(*arrays, {}), versions={},
     )  # fmt: skip
     frames = results.to_pandas()

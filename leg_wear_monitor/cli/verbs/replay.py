@@ -179,7 +179,7 @@ def report(directory: Path) -> int:
         raise ConfigError(str(directory), "", fault)
     from leg_wear_monitor.cli.verbs.study import write_study_page
 
-    return write_study_page(directory)  # checksums tell what was altered: the rest are programming errors
+    return write_study_page(directory)
 
 
 def _replay(directory: Path) -> int:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from leg_wear_monitor.dynamics.result import SimulationResult
     from leg_wear_monitor.mechanism.spec import Mechanism
     from leg_wear_monitor.report.drawing import Drawing
-    from leg_wear_monitor.studies.plan import Study
+    from leg_wear_monitor.studies.study import Study
 
 
 # ``leg-wear-monitor study``: the paper's parameter studies, each with a page of its own.
@@ -29,59 +29,48 @@ NAMES = tuple(sorted(path.stem for path in (share_directory() / "config" / "stud
 
 
 @click.command(
-    short_help="Run one of the parameter studies of the paper.",
+    short_help="Run a parameter study.",
     help=f"""Compute a study and write its page.
 
-    NAME is one of {", ".join(NAMES)}. What DIR holds already for the same leg, settings and code is kept, so
-    an interrupted study goes on where it was.
+    STUDY is a YAML file, or one of {", ".join(NAMES)}. Points that DIR already has for the same leg, settings
+    and code are kept: the same command continues an interrupted study.
     """,
 )
-@click.argument("name", type=click.Choice(NAMES), metavar="NAME")
-@common.option("--mechanism", "FILE", "Another leg than that of the study file.")
-@common.path_option("--config", "FILE", "Study file.  [default: config/studies/NAME.yaml of the package]")
+@click.argument("name", metavar="STUDY")
+@common.option("--mechanism", "FILE", "Use a different leg than the study file.")
 @common.path_option("--out", "DIR", "Data and page.", required=True)
 @common.workers_option
 @common.scheduler_option("compute")
-def study(
-    name: str,
-    mechanism: str | None,
-    config: Path | None,
-    out: Path,
-    workers: int | None,
-    scheduler: str | None,
-) -> int:
+def study(name: str, mechanism: str | None, out: Path, workers: int | None, scheduler: str | None) -> int:
     """Compute a study and write its page; the help above says more."""
     import attrs
 
-    from leg_wear_monitor.studies.execution import load_settings
+    from leg_wear_monitor.studies.study import read_study
 
-    settings = load_settings(name, config)
+    settings = read_study(name)
     if mechanism is not None:
         settings = attrs.evolve(settings, mechanism=mechanism)
     common.check_directory("--out", out)
-    computed, total = _compute(name, settings, out, workers, scheduler)
+    computed, total = _compute(settings, out, workers, scheduler)
     click.echo(f"points: {total}, {computed} computed now")
     return write_study_page(out)
 
 
-def _compute(
-    name: str, settings: "Study", out: Path, workers: int | None, scheduler: str | None
-) -> tuple[int, int]:
+def _compute(settings: "Study", out: Path, workers: int | None, scheduler: str | None) -> tuple[int, int]:
     import os
 
     from leg_wear_monitor.dynamics.clearance.stepper import motion_beside
     from leg_wear_monitor.dynamics.simulation import simulate
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.mechanism.plausible import doubts
-    from leg_wear_monitor.studies.execution import run_study
+    from leg_wear_monitor.studies.run import run_study
 
     leg = load_mechanism(settings.mechanism)
     with common.compilation("clearance"), motion_beside():  # once, and not in every worker at the same time
         if leg.clearances:
             simulate(leg, clearances=[next(iter(leg.clearances))], cycles=1.0 / 256.0, skip_cycles=0.0)
-    with common.progress_bar(f"study {name}") as progress:
+    with common.progress_bar(f"study {settings.title}") as progress:
         computed = run_study(
-            name,
             settings,
             out,
             workers=workers or os.cpu_count() or 1,
@@ -94,16 +83,12 @@ def _compute(
 
 def write_study_page(path: Path) -> int:
     """Draw the page of a study from the data in its directory; 1 if something is missing there."""
-    from leg_wear_monitor.files import json_text
     from leg_wear_monitor.report.page import page_html
     from leg_wear_monitor.report.study_page import study_page
-    from leg_wear_monitor.studies.results import load_results
+    from leg_wear_monitor.studies.run import load_results
 
     results = load_results(path)
-    contents = {"report.html": page_html(study_page(results)).encode()}
-    if results.of("leg"):
-        contents["claims.json"] = json_text(results.claims().to_dict()).encode()
-    for file in common.write_directory(path, contents):
+    for file in common.write_directory(path, {"report.html": page_html(study_page(results)).encode()}):
         click.echo(f"written: {file}")
     for label, fault in results.faults:
         click.echo(f"warning: point {label}: {fault}", err=True)

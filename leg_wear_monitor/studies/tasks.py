@@ -1,25 +1,44 @@
-"""Tasks over many cycles: ensembles, lives, exponents of Lyapunov, sections of Poincaré."""
+"""Tasks of a study's points: response to clearance, wear life, Lyapunov exponent, Poincaré section."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import attrs
 import numpy as np
 
-from leg_wear_monitor.contact.arrays import clearance_settings
 from leg_wear_monitor.dynamics.batch import Leg, prepare_legs
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper, Moment, Snapshot
 from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, build_tables
-from leg_wear_monitor.dynamics.run import DONE, RunStatistics, Setup, new_run_statistics, steady_drive, stop
+from leg_wear_monitor.dynamics.result import JointResult
+from leg_wear_monitor.dynamics.run import (
+    BEGIN,
+    DONE,
+    IMPACTS,
+    SPEED,
+    RunStatistics,
+    Setup,
+    new_run_statistics,
+    steady_drive,
+    stop,
+)
+from leg_wear_monitor.dynamics.statistics import drive_torque, joint_statistics
 from leg_wear_monitor.errors import ConfigError, SimulationError
 from leg_wear_monitor.life.jumps import JumpControl
 from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
+from leg_wear_monitor.mechanism import position
 from leg_wear_monitor.mechanism.arrays import Flags, Floats
 from leg_wear_monitor.mechanism.person import on_the_ground
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.studies.plan import Arrays, Estimate
+from leg_wear_monitor.workers import package_digest
+
+Arrays = dict[str, np.ndarray[Any, Any]]
+"""Result of a point; `run_ensemble` lists the arrays of a response, with their shapes."""
+
+ERRORS = ("toe_position_m", "toe_velocity_mps", "toe_acceleration_mps2", "drive_torque_nm")
+"""Quantities of a response that are compared with the ideal leg, which has no clearance. Of each, the array
+``error_<name>`` has the largest deviation in each cycle, and ``ideal_<name>`` the curve of the ideal leg."""
 
 # Sampling grid of the studies.
 
@@ -85,21 +104,18 @@ class ObservedLeg:
 # Ensembles: legs with equal parameters that differ in the initial positions of crank and journals.
 
 
-def with_friction(mechanism: Mechanism, settings: dict[str, Any]) -> Mechanism:
-    """The mechanism with the values of a setting ``friction`` in all its clearance joints."""
-    changes = settings.get("friction", {})
+def changed(mechanism: Mechanism, settings: dict[str, Any]) -> Mechanism:
+    """The mechanism under the point's force of the ground and with its friction, where the point has them.
+
+    0 N replaces a load of the ground that the mechanism file has.
+    """
+    keys = {"friction": "law", "friction_coefficient": "coefficient"}
+    friction = {key: settings[name] for name, key in keys.items() if name in settings}
     clearances = {
-        name: attrs.evolve(own, friction=attrs.evolve(own.friction, **changes))
+        name: attrs.evolve(own, friction=attrs.evolve(own.friction, **friction))
         for name, own in mechanism.clearances.items()
     }
-    return attrs.evolve(mechanism, clearances=clearances)
-
-
-def loaded(mechanism: Mechanism, settings: dict[str, Any]) -> Mechanism:
-    """The mechanism under the force of the ground, its vertical peak ``ground_n`` [N] if that is given.
-
-    0 N takes the place of a load of the ground that the mechanism has, too.
-    """
+    mechanism = attrs.evolve(mechanism, clearances=clearances)
     return on_the_ground(mechanism, settings["ground_n"]) if "ground_n" in settings else mechanism
 
 
@@ -122,26 +138,24 @@ def ensemble(mechanism: Mechanism, settings: dict[str, Any]) -> list[Leg]:
     ----------
     mechanism : Mechanism
     settings : dict
-        ``clearance_joints``, ``clearance_m`` [m], ``speed_rpm``, ``runs``, ``seed``, ``perturb_fraction`` (of
-        the smallest clearance); optional ``normal_law``, ``friction`` and ``ground_n`` [N].
+        ``clearances``, ``clearance_m`` [m], ``speed_rpm``, ``runs``, ``seed``, ``perturb_fraction`` (of the
+        clearance); optional keys as in `sweeps`.
 
     Returns
     -------
     list of Leg
         One for each run.
     """
-    mechanism = loaded(with_friction(mechanism, settings), settings)
-    clearance_joints, clearance_m = settings["clearance_joints"], settings["clearance_m"]
-    smallest = min(c.radial_clearance for c in clearance_settings(mechanism, clearance_joints, clearance_m))
+    mechanism = changed(mechanism, settings)
     return [
         Leg(
             mechanism=mechanism,
-            clearances=clearance_joints,
-            clearance_m=clearance_m,
+            clearances=settings["clearances"],
+            clearance_m=settings["clearance_m"],
             speed_rpm=speed_rpm_of(mechanism, settings),
             normal_law=settings.get("normal_law"),
             crank_angle_rad=angle,
-            perturb_m=settings["perturb_fraction"] * smallest,
+            perturb_m=settings["perturb_fraction"] * settings["clearance_m"],
             seed=settings["seed"] + member,
         )
         for member, angle in enumerate(start_angles(settings["runs"], settings["seed"]))
@@ -178,8 +192,164 @@ def check_points(mechanism: Mechanism, settings: list[dict[str, Any]]) -> None:
     legs = [ensemble(mechanism, each | {"runs": 1})[0] for each in settings]
     for leg in {repr(leg): leg for leg in legs}.values():
         if not leg.clearances:
-            raise ConfigError("joints", "", "names no joint")
+            raise ConfigError("clearances", "", "a point has no clearance joint, expected at least one")
         leg.prepare()
+
+
+# Response of the leg to clearance: errors, forces, wear and curves of a cycle over an ensemble.
+
+
+BAND = (0.05, 0.5, 0.95)  # quantiles of the ensemble's cycles: lower end of the band, median, upper end
+
+_FIGURES = (
+    "mean_force_n", "rms_force_n", "p99_force_n",
+    "contact_fraction", "friction_work_j_per_cycle", "archard_integral_j_per_cycle",
+)  # fmt: skip
+
+
+def run_ensemble(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
+    """Response of a leg with clearances, compared with the ideal leg.
+
+    Returns
+    -------
+    dict of arrays
+        For runs r, cycles c, joints j, clearance joints k, sectors N and samples s of a cycle from crank
+        angle 0:
+        ``error_<name>`` (r, c): largest error in each cycle, for the names in `ERRORS`;
+        ``peak_force_n`` (r, c, j), ``impacts`` (r, c, k): of each cycle;
+        ``mean_force_n``, ``rms_force_n``, ``p99_force_n`` (r, j): over the run;
+        ``contact_fraction``, ``friction_work_j_per_cycle``, ``archard_integral_j_per_cycle``,
+        ``impact_speed_mps`` (mean approach speed) (r, k); ``rms_torque_nm`` (r,);
+        ``wear_depth_m_per_cycle`` (r, k, 2, N): of bushing and journal;
+        ``band_<name>`` (3, s, ...): quantiles `BAND` of the curves; ``example_<name>`` (s, ...): first cycle
+        of the first run; ``ideal_<name>`` (s, ...): curve of the ideal linkage;
+        ``repeats_contact_force`` (k,), ``repeats_eccentricity`` (k, 2): fraction of the variance of the
+        force, and of the eccentricity along the ground's x and y, that the mean cycle explains; with
+        ``_by_run`` (r, ...) appended their jackknife pseudo-values, for their scatter over runs.
+
+    Raises
+    ------
+    SimulationError
+        If the motion diverges.
+    """
+    legs = observed_legs(ensemble(mechanism, settings))
+    members = [_follow(leg, settings) for leg in legs]
+    linkage, clearance_joints = legs[0].setup.linkage, legs[0].setup.clearance_joints
+    result = {name: np.array([member[name] for member in members]) for name in members[0] if name != "curves"}
+    curves = {
+        name: np.concatenate([member["curves"][name] for member in members]) for name in members[0]["curves"]
+    }
+    result |= _bands(curves, len(members)) | _ideal(linkage, legs[0].setup.speed)
+    result["joints"], result["clearance_joints"] = (
+        np.array(list(mechanism.joints)),
+        np.array(clearance_joints),
+    )
+    return result
+
+
+def _follow(leg: ObservedLeg, settings: dict[str, Any]) -> dict[str, Any]:
+    """Statistics and curves of one run, by the names of `run_ensemble` without the axis r."""
+    setup = leg.setup
+    joints, clearance_joints = len(setup.linkage.mechanism.joints), list(setup.contacts.joint)
+    leg.advance(settings["skip_cycles"] * SAMPLES, new_run_statistics(joints))
+    statistics, depth = new_run_statistics(joints), setup.surfaces.depth.copy()
+    shift = round(leg.stepper.crank_angle / position.TURN * SAMPLES) % SAMPLES
+    largest: list[Floats] = []
+    peaks: list[Floats] = []
+    impacts = [statistics.impacts.copy()]
+    cycles: list[dict[str, Floats]] = []
+    for cycle in range(settings["cycles"]):
+        if cycle < settings["traced_cycles"]:
+            cycles.append(_curves(list(leg.moments(statistics)), shift, setup.speed > 0.0))
+        else:
+            leg.advance(SAMPLES, statistics)
+        largest.append(statistics.response.copy())
+        peaks.append(statistics.peak.copy())
+        impacts.append(statistics.impacts.copy())
+        statistics.response[:], statistics.peak[:] = 0.0, 0.0
+    found = joint_statistics(setup, statistics, setup.surfaces.depth - depth, settings["cycles"])
+    member = {f"error_{name}": np.array(largest)[:, i] for i, name in enumerate(ERRORS)}
+    member |= {name: _known(found.values(), name) for name in _FIGURES}
+    return member | {
+        "peak_force_n": np.array(peaks),
+        "impacts": np.diff(np.array(impacts), axis=0)[:, clearance_joints],
+        "impact_speed_mps": _impact_speed(statistics, clearance_joints),
+        "rms_torque_nm": drive_torque(statistics).rms,
+        "wear_depth_m_per_cycle": (setup.surfaces.depth - depth) / settings["cycles"],
+        "curves": {name: np.array([one[name] for one in cycles]) for name in cycles[0]},
+    }
+
+
+def _known(joints: Iterable[JointResult], name: str) -> Floats:
+    """Values of the joints that have this statistic; those of contact exist for clearance joints only."""
+    values = [getattr(joint, name) for joint in joints]
+    return np.array([value for value in values if value is not None])
+
+
+def _impact_speed(statistics: RunStatistics, clearance_joints: list[int]) -> Floats:
+    """Mean approach speed (k,) [m/s] of the recorded impacts; 0 without impacts."""
+    counts = [min(IMPACTS, int(statistics.impacts[joint])) for joint in clearance_joints]
+    rows = [statistics.impact[joint, :count] for joint, count in zip(clearance_joints, counts, strict=True)]
+    return np.array([row[row[:, BEGIN] >= 0.0, SPEED].mean() if len(row) else 0.0 for row in rows])
+
+
+def _curves(moments: list[Moment], shift: int, turns_forwards: bool) -> dict[str, Floats]:
+    """Curves (s, ...) of one cycle by the crank angle from 0 on; the states begin at the sample ``shift``."""
+    deviation = np.array([moment.deviation for moment in moments])
+    curves = {
+        "toe_position_m": deviation[:, 0],
+        "toe_velocity_mps": deviation[:, 1],
+        "toe_acceleration_mps2": deviation[:, 2],
+        "drive_torque_nm": np.array([moment.torque for moment in moments]),
+        "eccentricity_m": np.array([moment.e for moment in moments]),
+        "eccentricity_rate_mps": np.array([moment.rate for moment in moments]),
+        "contact_force_n": np.array([moment.force for moment in moments]),
+    }
+    if not turns_forwards:  # angles descend
+        curves, shift = {name: curve[::-1] for name, curve in curves.items()}, shift + 1
+    return {name: np.roll(curve, shift, axis=0) for name, curve in curves.items()}
+
+
+def _bands(curves: dict[str, Floats], runs: int) -> Arrays:
+    """Quantiles, an example and the periodicity of each curve; curves (r c, s, ...) of r runs."""
+    result: Arrays = {f"example_{name}": curve[0] for name, curve in curves.items()}
+    magnitude = np.linalg.norm(curves["contact_force_n"], axis=-1)
+    bands = {name: curve for name, curve in curves.items() if name.startswith(("toe", "drive"))}
+    bands["contact_force_n"] = magnitude
+    for name, curve in bands.items():
+        result[f"band_{name}"] = np.quantile(curve, BAND, axis=0).astype(np.float32)
+    for name, curve in (("contact_force", magnitude), ("eccentricity", curves["eccentricity_m"])):
+        result[f"repeats_{name}"] = _repeats(curve)
+        result[f"repeats_{name}_by_run"] = _by_run(curve, runs)
+    return result
+
+
+def _repeats(curve: Floats) -> Floats:
+    """Fraction (...) of the variance of curves (n, s, ...) that their mean over n explains; 1 if equal."""
+    middle = curve.mean(axis=0)
+    whole = np.square(curve - middle.mean(axis=0)).mean(axis=(0, 1))
+    mean = np.square(middle - middle.mean(axis=0)).mean(axis=0)
+    return np.asarray(mean / np.maximum(whole, 1.0e-300))
+
+
+def _by_run(curve: Floats, runs: int) -> Floats:
+    """Jackknife pseudo-values (r, ...) of `_repeats`, one run left out; their mean has no bias 1 / n."""
+    whole, members = _repeats(curve), np.split(curve, runs)
+    without = [_repeats(np.concatenate(members[:i] + members[i + 1 :])) for i in range(runs)]
+    return np.asarray(runs * whole - (runs - 1) * np.array(without))
+
+
+def _ideal(linkage: position.Linkage, speed: float) -> Arrays:
+    """Curves (s, ...) of the ideal linkage at the same samples."""
+    motion = position.one_cycle(linkage, SAMPLES, speed)
+    result: Arrays = {
+        "ideal_drive_torque_nm": motion.drive_torque,
+        "ideal_joint_force_n": np.linalg.norm(motion.joint_force, axis=2),
+    }
+    if linkage.mechanism.toe is not None:
+        path = position.point_motion(motion, linkage, *linkage.mechanism.toe)
+        result |= {f"ideal_{name}": part for name, part in zip(ERRORS, path, strict=False)}
+    return result
 
 
 # Wear lives with wear feedback, by cycle jumps, sampled at equal increases of the largest clearance.
@@ -206,10 +376,10 @@ def wear_life(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
     SimulationError
         If the motion diverges, or no joint wears.
     """
-    mechanism = loaded(mechanism, settings)
+    mechanism = changed(mechanism, settings)
     lives = [_life(mechanism, settings, run) for run in range(settings["runs"])]
     result = {name: np.array([life[name] for life in lives]) for name in lives[0]}
-    return result | {"clearance_joints": np.array(settings["clearance_joints"])}
+    return result | {"clearance_joints": np.array(settings["clearances"])}
 
 
 def _life(mechanism: Mechanism, settings: dict[str, Any], member: int) -> dict[str, Floats]:
@@ -222,7 +392,7 @@ def _life(mechanism: Mechanism, settings: dict[str, Any], member: int) -> dict[s
             jump=JumpControl.of(settings["jump_m"]),
             seed=settings["seed"] + member,
         ),
-        clearances=settings["clearance_joints"],
+        clearances=settings["clearances"],
         clearance_m=settings["clearance_m"],
         speed_rpm=speed_rpm_of(mechanism, settings),
     )
@@ -321,31 +491,6 @@ def _beside(state: Floats, counts: Flags, offset: Floats) -> Floats:
     return near
 
 
-def exponent(logs: Floats, step_time: float, skip: int = 0) -> Estimate:
-    """Lyapunov exponent from the growth factors of independent runs, with its standard error.
-
-    The standard error is the larger one of those over runs and over steps, because few runs may agree by
-    chance.
-
-    Parameters
-    ----------
-    logs : (runs, steps) array
-        Logarithmic growth factors [-].
-    step_time : float
-        Duration of a step, in the unit of time of the exponent.
-    skip : int
-        Number of first steps to leave out, in which the separation turns into the fastest growing direction.
-
-    Returns
-    -------
-    Estimate
-    """
-    rates = logs[:, skip:] / step_time
-    each = rates.mean(axis=1)
-    errors = each.std(ddof=1) / np.sqrt(len(each)), rates.std(ddof=1) / np.sqrt(rates.size)
-    return Estimate(float(each.mean()), float(max(errors)))
-
-
 # The largest Lyapunov exponent of a leg.
 #
 # The eccentricities are continuous, but their rates change within the short duration of an impact: if the
@@ -370,7 +515,7 @@ def lyapunov_exponent(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
         If the motion diverges.
     """
     legs = observed_legs(ensemble(mechanism, settings), settings["tolerance_m"])
-    logs = np.array([_follow(leg, settings) for leg in legs])
+    logs = np.array([_growth(leg, settings) for leg in legs])
     runs, cycles = settings["runs"], settings["cycles"]
     return {
         "clearance_joints": np.array(legs[0].setup.clearance_joints),
@@ -379,7 +524,7 @@ def lyapunov_exponent(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
     }
 
 
-def _follow(leg: ObservedLeg, settings: dict[str, Any]) -> Floats:
+def _growth(leg: ObservedLeg, settings: dict[str, Any]) -> Floats:
     """Logarithmic growth factors (steps,) of one run."""
     stepper, statistics = leg.stepper, new_run_statistics(len(leg.setup.linkage.mechanism.joints))
     leg.advance(settings["skip_cycles"] * SAMPLES, statistics)
@@ -433,7 +578,7 @@ def poincare_section(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
         If the motion diverges.
     """
     start = round(settings["crank_angle_deg"] / 360.0 * SAMPLES) % SAMPLES * (TURN / SAMPLES)
-    first = ensemble(mechanism, settings)[0]
+    first = ensemble(mechanism, settings | {"runs": 1})[0]
     (leg,) = observed_legs([attrs.evolve(first, crank_angle_rad=start)])
     statistics = new_run_statistics(len(mechanism.joints))
     leg.advance(settings["skip_cycles"] * SAMPLES, statistics)
@@ -452,24 +597,32 @@ def poincare_section(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
     }
 
 
-def period_of(points: Floats, longest: int, tolerance: float) -> int | None:
-    """Period of a Poincaré section.
+# Tasks by name, and their execution in a worker.
 
-    Parameters
-    ----------
-    points : (n, m) array
-        Points of the section.
-    longest : int
-        Longest period to try.
-    tolerance : float
-        Largest difference between equal points, in the unit of the points.
 
-    Returns
-    -------
-    int or None
-        Number of points after which the section repeats; None if it does not.
+TASKS: dict[str, Callable[[Mechanism, dict[str, Any]], Arrays]] = {
+    "response": run_ensemble,
+    "life": wear_life,
+    "exponent": lyapunov_exponent,
+    "section": poincare_section,
+    "portrait": poincare_section,
+}
+
+
+def code_digest() -> str:
+    """Digest of the sources that produce results: the physics, and these tasks."""
+    folders = ("configuration", "mechanism", "contact", "dynamics", "life")
+    return package_digest(*folders, "wear.py", "studies/tasks.py")
+
+
+def compute(task: str, mechanism: Mechanism, settings: dict[str, Any], code: str) -> Arrays:
+    """Compute the result of a point in a worker, whose sources must have the caller's digest ``code``.
+
+    If the motion diverges, the result is only ``fault`` (), the message: divergence is a valid result.
     """
-    for period in range(1, min(longest, len(points) - 1) + 1):
-        if np.abs(points[period:] - points[:-period]).max() <= tolerance:
-            return period
-    return None
+    if code_digest() != code:
+        raise RuntimeError("a worker has a different version of leg_wear_monitor than the caller")
+    try:
+        return TASKS[task](mechanism, settings)
+    except SimulationError as error:
+        return {"fault": np.array(str(error))}

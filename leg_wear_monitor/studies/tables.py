@@ -1,0 +1,228 @@
+"""Statistics of a study's points, and its tables."""
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import attrs
+import numpy as np
+from numpy.typing import ArrayLike
+
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.studies.study import Point
+from leg_wear_monitor.studies.tasks import ERRORS, Arrays
+from leg_wear_monitor.wear import BUSHING, wear_zone
+
+Found = Sequence[tuple[Point, Arrays]]
+"""Points of a study, each with its result."""
+
+TITLES = ("toe displacement", "toe velocity", "toe acceleration", "drive torque")
+"""The quantities in `ERRORS` in words."""
+# wear depth, and normal force times sliding distance: by Archard's law the worn volume is proportional to it
+DEPTH, ARCHARD = "wear_depth_m_per_cycle", "archard_integral_j_per_cycle"
+_OF_ALL_JOINTS = ("peak_force_n", "mean_force_n", "rms_force_n", "p99_force_n")  # others: of clearance joints
+
+
+@attrs.frozen
+class Estimate:
+    """A value and its standard error, such as a mean over runs, or by how much a claim of the paper holds.
+
+    Attributes
+    ----------
+    value : float
+    error : float
+        Its standard error, from the scatter over runs; in the unit of the value.
+    """
+
+    value: float
+    error: float
+
+    @property
+    def score(self) -> float:
+        """The value as a multiple of its standard error, with its sign; infinite if only the error is 0."""
+        if self.error > 0.0:
+            return self.value / self.error
+        return float(np.copysign(np.inf, self.value)) if self.value else 0.0
+
+
+class Spread(NamedTuple):
+    """Mean and standard deviation of all values of an ensemble, and their 10th and 90th percentile."""
+
+    mean: float
+    deviation: float
+    low: float
+    high: float
+
+
+def spread(values: ArrayLike) -> Spread:
+    """Spread of all values of an array of any shape."""
+    array = np.asarray(values, dtype=float)
+    low, high = np.quantile(array, (0.1, 0.9))
+    return Spread(float(array.mean()), float(array.std()), float(low), float(high))
+
+
+def largest_error(arrays: Arrays, name: str) -> Spread:
+    """Spread of the largest deviation in each cycle, over the cycles of all runs; ``name`` as in `ERRORS`."""
+    return spread(arrays[f"error_{name}"])
+
+
+def fraction_of_range(arrays: Arrays, name: str) -> float:
+    """Mean of the largest deviations as a fraction of the range of the ideal curve.
+
+    Of a quantity of the toe, it is the range of x or y, the larger one.
+    """
+    return largest_error(arrays, name).mean / float(np.ptp(arrays[f"ideal_{name}"], axis=0).max())
+
+
+def clearance_joints_of(arrays: Arrays) -> list[str]:
+    """Names of the clearance joints of a response, (k,)."""
+    return [str(name) for name in arrays["clearance_joints"]]
+
+
+def of_joint(arrays: Arrays, name: str, joint: str) -> Spread:
+    """Spread of a statistic of a joint over runs, or over all their cycles if it has a value for each cycle.
+
+    Forces are known of all joints, other statistics of the clearance joints.
+    """
+    if name in _OF_ALL_JOINTS:
+        return spread(arrays[name][..., [str(other) for other in arrays["joints"]].index(joint)])
+    k = clearance_joints_of(arrays).index(joint)
+    # wear depths are (runs, k, 2, sectors): of each run, the deepest sector of the bushing
+    return spread(arrays[name][:, k, BUSHING].max(axis=1) if name == DEPTH else arrays[name][..., k])
+
+
+def worst_zone(arrays: Arrays, joint: str, fraction: float) -> tuple[float, float] | None:
+    """Narrowest zone of a joint's bushing that contains a fraction of its wear, averaged over runs.
+
+    Begin and end [deg] in the bushing's frame, as `wear_zone` returns them; None without wear.
+    """
+    profiles = arrays[DEPTH][:, clearance_joints_of(arrays).index(joint), BUSHING]
+    return wear_zone(np.asarray(profiles.mean(axis=0)), fraction)
+
+
+def power_law(values: ArrayLike, effects: ArrayLike) -> tuple[float, float]:
+    """Exponent p of a law effect ~ value^p by least squares of the logarithms, and its standard error.
+
+    Parameters
+    ----------
+    values : (n,) array
+        What is varied, such as the clearance; above 0.
+    effects : (n,) array
+        What follows from each, such as the largest deviation; above 0.
+
+    Returns
+    -------
+    exponent, error : float
+        The error is NaN for less than four points, whose scatter says too little.
+    """
+    x, y = np.log(np.asarray(values, dtype=float)), np.log(np.asarray(effects, dtype=float))
+    if len(x) < 4:
+        return float(np.polyfit(x, y, 1)[0]), math.nan
+    slope, covariance = np.polyfit(x, y, 1, cov=True)
+    return float(slope[0]), float(np.sqrt(covariance[0, 0]))
+
+
+def exponent(logs: Floats, step_time: float, skip: int = 0) -> Estimate:
+    """Lyapunov exponent from the growth factors of independent runs, with its standard error.
+
+    The standard error is the larger one of those over runs and over steps, because few runs may agree by
+    chance.
+
+    Parameters
+    ----------
+    logs : (runs, steps) array
+        Logarithmic growth factors [-].
+    step_time : float
+        Duration of a step, in the unit of time of the exponent.
+    skip : int
+        Number of first steps to leave out, in which the separation turns into the fastest growing direction.
+
+    Returns
+    -------
+    Estimate
+    """
+    rates = logs[:, skip:] / step_time
+    each = rates.mean(axis=1)
+    errors = each.std(ddof=1) / np.sqrt(len(each)), rates.std(ddof=1) / np.sqrt(rates.size)
+    return Estimate(float(each.mean()), float(max(errors)))
+
+
+def period_of(points: Floats, longest: int, tolerance: float) -> int | None:
+    """Period of a Poincaré section.
+
+    Parameters
+    ----------
+    points : (n, m) array
+        Points of the section.
+    longest : int
+        Longest period to try.
+    tolerance : float
+        Largest difference between equal points, in the unit of the points.
+
+    Returns
+    -------
+    int or None
+        Number of points after which the section repeats; None if it does not.
+    """
+    for period in range(1, min(longest, len(points) - 1) + 1):
+        if np.abs(points[period:] - points[:-period]).max() <= tolerance:
+            return period
+    return None
+
+
+# Responses of a study's points as columns of tables; mean and deviation of a statistic after a dot.
+
+
+Columns = dict[str, list[Any]]
+
+_OF_JOINTS = (
+    "peak_force_n",
+    "mean_force_n",
+    "rms_force_n",
+    "p99_force_n",
+    "impacts",
+    "impact_speed_mps",
+    "contact_fraction",
+    "friction_work_j_per_cycle",
+    ARCHARD,
+    DEPTH,
+)
+
+
+def point_columns(found: Found) -> Columns:
+    """One row a point: largest errors of toe and drive in a cycle against the ideal leg, and the torque.
+
+    None for the errors of a toe that the leg does not have.
+    """
+    columns: Columns = {
+        "point": [point.label for point, _ in found],
+        "clearance_joints": [", ".join(clearance_joints_of(arrays)) for _, arrays in found],
+        "clearance_m": [point.clearance_m for point, _ in found],
+        "speed_rpm": [point.settings["speed_rpm"] for point, _ in found],
+    }
+    for name in ERRORS:
+        is_known = f"ideal_{name}"
+        errors = [largest_error(arrays, name) if is_known in arrays else None for _, arrays in found]
+        columns |= _means(name, errors)
+    return columns | _means("rms_torque_nm", [spread(arrays["rms_torque_nm"]) for _, arrays in found])
+
+
+def joint_columns(found: Found) -> Columns:
+    """One row a point and clearance joint: forces, impacts, contact, and wear of the bushing."""
+    rows = [(point, arrays, joint) for point, arrays in found for joint in clearance_joints_of(arrays)]
+    columns: Columns = {
+        "point": [point.label for point, _, _ in rows],
+        "joint": [joint for _, _, joint in rows],
+        "clearance_m": [point.clearance_m for point, _, _ in rows],
+        "speed_rpm": [point.settings["speed_rpm"] for point, _, _ in rows],
+    }
+    for name in _OF_JOINTS:
+        columns |= _means(name, [of_joint(arrays, name, joint) for _, arrays, joint in rows])
+    return columns
+
+
+def _means(name: str, values: Sequence[Spread | None]) -> Columns:
+    return {
+        f"{name}.mean": [None if value is None else value.mean for value in values],
+        f"{name}.deviation": [None if value is None else value.deviation for value in values],
+    }

@@ -48,7 +48,7 @@ from leg_wear_monitor.monitor.config.inputs import EFFORT, FLOAT64
 from leg_wear_monitor.monitor.config.parameters import config_from, load_config, values_of
 from leg_wear_monitor.monitor.config.sections import drive_figures
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.verdict.verdict import CauseWords
+from leg_wear_monitor.monitor.verdict.causes import sentence
 
 # Sentences on what cannot be determined, on what does not fit, and on what is worth knowing.
 
@@ -144,8 +144,7 @@ def _drives(found: proposal.Found) -> str:
     friction, sigma = found.friction_nm
     size = float(one.predicted.std()) / abs(one.gain)
     if friction < -_SURE * sigma and abs(friction) > 0.02 * size:
-        words = CauseWords(found.base.crank, found.base.drive_torque)
-        return f"{words.cause(NamedCause(Cause.BIAS, friction, sigma))}: zero the torque sensor"
+        return f"{sentence(NamedCause(Cause.BIAS, friction, sigma))}: zero the torque sensor"
     return ""
 
 

@@ -11,9 +11,10 @@ from leg_wear_monitor.monitor.alarm_specs import CLEARANCE, MISMATCH
 from leg_wear_monitor.monitor.alarms import Alarm, joint_of
 from leg_wear_monitor.monitor.ledger.entry import AlarmEvent
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
-from leg_wear_monitor.monitor.verdict.situation import BOTH, ERROR_OF, MEASURED, SEEN
-from leg_wear_monitor.monitor.verdict.verdict import Finding
-from leg_wear_monitor.state import Level
+from leg_wear_monitor.monitor.verdict.conditions import ERROR_OF
+from leg_wear_monitor.monitor.verdict.situation import BOTH, MEASURED, SEEN
+from leg_wear_monitor.monitor.verdict.verdict import code_of_rule
+from leg_wear_monitor.state import Level, Verdict
 
 
 def cleared_at(ledger: Ledger | None, stamps: Collection[int], now: Mapping[str, Alarm]) -> tuple[Alarm, ...]:
@@ -65,9 +66,9 @@ def rested_on(alarms: Iterable[Alarm], joint: str, named: Iterable[str]) -> tupl
     return tuple(alarm.name for alarm in (*own, *mismatch))
 
 
-def named_for_clearance(findings: Iterable[Finding]) -> frozenset[str]:
+def named_for_clearance(findings: Iterable[Verdict]) -> frozenset[str]:
     """Joints that findings name for their clearance."""
-    of_clearance = (each for each in findings if each.code.startswith("CLEARANCE"))
+    of_clearance = (each for each in findings if code_of_rule(each).startswith("CLEARANCE"))
     return frozenset(joint for each in of_clearance for joint in each.joints)
 
 

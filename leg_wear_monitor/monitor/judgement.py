@@ -9,7 +9,7 @@ import attrs
 from leg_wear_monitor.estimate.cause import Cause, NamedCause, TorqueExplanation
 from leg_wear_monitor.files import finite_or_none
 from leg_wear_monitor.monitor import alarm_specs
-from leg_wear_monitor.monitor.alarms import Alarm, state_of
+from leg_wear_monitor.monitor.alarms import ALREADY_COUNTED, CRANK_ZERO, NOT_FOLLOWED, Alarm, state_of
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.encoders import faults
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast, Quantiles
@@ -28,7 +28,7 @@ from leg_wear_monitor.monitor.verdict.situation import (
     joint_status,
     surest,
 )
-from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, Finding, dated, has_changed, verdict_of
+from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, dated, has_changed, verdict_of
 from leg_wear_monitor.state import (
     Drive,
     Estimate,
@@ -70,7 +70,7 @@ def update_verdict(parts: Parts, situation: Situation | None = None) -> tuple[Ve
     return (report,)
 
 
-def is_forecast_valid(parts: Parts, found: Sequence[Finding]) -> bool:
+def is_forecast_valid(parts: Parts, found: Sequence[Verdict]) -> bool:
     """Whether the leg is in the range of the model, and is the counted one by some findings."""
     invalid = any(Figure.FORECAST in finding.not_valid for finding in found)
     return parts.evaluation.is_model_valid() and not invalid
@@ -98,7 +98,7 @@ def shown(parts: Parts, joint: JointSituation) -> KnownClearance | None:
 
 def situation_of(parts: Parts) -> Situation:
     """What the verdict depends on, at the end of an evaluation period."""
-    evaluation, config, twin = parts.evaluation, parts.config, parts.twin
+    evaluation, config = parts.evaluation, parts.config
     last, explained = parts.state.last, parts.explanation
     alarms, diagnosis = evaluation.board.alarms, parts.diagnosis
     return Situation(
@@ -106,25 +106,15 @@ def situation_of(parts: Parts) -> Situation:
         alarms=tuple(alarms.values()),
         quantities=alarm_specs.QUANTITIES,
         has_cycle=last is not None,
-        is_all_counted=parts.accounting.is_all_counted,
         has_torque=last is not None and last.torque_samples > 0,
         mismatch=last.torque_mismatch if last else math.nan,
         mismatch_limit=config.limits.torque_mismatch,
         acts=parts.foot_load.acts if parts.foot_load else "",
         torque_causes=evaluation.present_causes(last, parts.state.torque) if last else {},
-        without_zero="" if parts.guard.cause else parts.without_zero,
-        unfollowed=_unfollowed(parts),
+        notes=_notes(parts),
         input_causes=tuple(evaluation.causes),
-        is_out_of_step=_is_out_of_step(parts),
-        cadence_rpm=twin.speed_radps * 30.0 / math.pi,
-        commanded_rpm=config.cadence.commanded_rpm,
-        tolerance_rpm=config.cadence.tolerance_rpm,
-        doubts=_doubts(parts),
-        encoder_faults=tuple(faults(config.encoders.names, parts.encoders.state)) if parts.encoders else (),
         diagnosis=diagnosis,
         explained=explained if evaluation.board.level(alarm_specs.MISMATCH.name()) else None,
-        crank=config.crank,
-        drive_torque=config.drive_torque,
     )
 
 
@@ -148,7 +138,6 @@ def _joint_situations(parts: Parts, diagnosis: Diagnosis) -> tuple[JointSituatio
             seen=tuple(one for one in (by_encoders, by_torque) if one),
             is_used=bool(report and by_encoders and report.seen and report.seen.believed),
             label=parts.mechanism.joints[joint].label,
-            load=report.load if report else None,
             replaced_ns=part.replaced_ns,
             part_cycles=walked.cycles - part.cycles,
         )
@@ -164,11 +153,28 @@ def with_measured(joint: JointSituation, measured: Measurement | None) -> JointS
     return attrs.evolve(joint, measured=by, is_measurement_used=measured.counts)
 
 
-def _is_out_of_step(parts: Parts) -> bool:
-    """Whether the leg walks at another cadence: not where it only starts or stops, after a right one."""
-    last = parts.state.last
-    was_right = last is not None and parts.config.cadence.allows(last.cadence_rpm)
-    return parts.twin.tracking is Tracking.OUT_OF_STEP and not was_right
+def _notes(parts: Parts) -> dict[str, tuple[str, ...]]:
+    """What the parts of the monitor report for rules of the verdict, by the rule's code."""
+    wrong_zero = "" if parts.guard.cause else parts.without_zero
+    notes = {
+        ALREADY_COUNTED: ("",) if parts.accounting.is_all_counted else (),
+        CRANK_ZERO: (wrong_zero,) if wrong_zero else (),
+        NOT_FOLLOWED: tuple(filter(None, (_unfollowed(parts),))),
+        "NOT_THIS_LEG": _doubts(parts),
+        "CADENCE": _other_cadence(parts),
+        "ENCODER": tuple(faults(parts.config.encoders.names, parts.encoders.state)) if parts.encoders else (),
+    }
+    return {code: texts for code, texts in notes.items() if texts}
+
+
+def _other_cadence(parts: Parts) -> tuple[str, ...]:
+    """That the leg walks at another cadence: not where it only starts or stops, after a right one."""
+    last, cadence = parts.state.last, parts.config.cadence
+    was_right = last is not None and cadence.allows(last.cadence_rpm)
+    if parts.twin.tracking is not Tracking.OUT_OF_STEP or was_right:
+        return ()
+    rpm, commanded = parts.twin.speed_radps * 30.0 / math.pi, cadence.commanded_rpm
+    return (f"it walks at {rpm:.3g} rpm, expected {commanded:g} ± {cadence.tolerance_rpm:g} rpm",)
 
 
 def _doubts(parts: Parts) -> tuple[str, ...]:
@@ -178,7 +184,8 @@ def _doubts(parts: Parts) -> tuple[str, ...]:
         return ()
     if parts.is_torque_wrong:
         last = attrs.evolve(last, torque_samples=0)
-    return tuple(doubts(last, parts.config))
+    found = doubts(last, parts.config)
+    return ("; ".join(found),) if found else ()
 
 
 def _unfollowed(parts: Parts) -> str:
@@ -196,7 +203,7 @@ _FACTORS = (Cause.SCALE, Cause.SIGN)
 _TURN = 2.0 * math.pi
 
 
-def leg_state(parts: Parts, findings: Sequence[Finding], situation: Situation) -> LegState:
+def leg_state(parts: Parts, findings: Sequence[Verdict], situation: Situation) -> LegState:
     """State of the leg now, with the verdict of some findings."""
     last, verdict, diagnosis = parts.state.last, verdict_of(findings), situation.diagnosis
     explained, alarms = parts.explanation, parts.evaluation.board.alarms
@@ -236,7 +243,7 @@ def leg_alarm(alarm: Alarm) -> LegAlarm:
 
 
 def joint_clearance(
-    joint: JointSituation, alarm: Alarm | None, findings: Sequence[Finding | Verdict], new_m: float
+    joint: JointSituation, alarm: Alarm | None, findings: Sequence[Verdict], new_m: float
 ) -> JointClearance:
     """Clearance of a joint, and what findings say of it.
 
@@ -245,8 +252,8 @@ def joint_clearance(
     joint : JointSituation
     alarm : Alarm or None
         That of the joint's clearance.
-    findings : sequence of Finding or Verdict
-        Those of the verdict, or the verdict alone.
+    findings : sequence of Verdict
+        Those of the rules, or the verdict alone.
     new_m : float
         The clearance when new.
     """

@@ -37,7 +37,8 @@ from leg_wear_monitor.monitor.inputs import InputGuard
 from leg_wear_monitor.monitor.ledger.entry import Measurement, SimulatedReference
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport
-from leg_wear_monitor.monitor.verdict.verdict import Finding, estimate
+from leg_wear_monitor.monitor.verdict.verdict import estimate
+from leg_wear_monitor.state import Verdict
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.reference import LegParameters
 from leg_wear_monitor.twin.sample import GROUND, NO_LOAD
@@ -65,7 +66,7 @@ class MonitorState:
     torque: TorqueRecord
     last: CycleReport | None = None
     happened: Event | None = None
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[Verdict, ...] = ()
     mismatch: MismatchWindow = NO_MISMATCH
     has_ended: bool = False
 

@@ -13,7 +13,7 @@ from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointForecast, 
 from leg_wear_monitor.monitor.forecast.measurement import judged_clearance_m
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.verdict.situation import KnownClearance, joint_status, surest
-from leg_wear_monitor.monitor.verdict.verdict import Finding, verdict_of
+from leg_wear_monitor.monitor.verdict.verdict import verdict_of
 from leg_wear_monitor.state import LegState, Level, Verdict
 from leg_wear_monitor.twin.statistics import SampleStatistics
 
@@ -184,14 +184,14 @@ class VerdictReport:
     ----------
     stamp_ns : int
         When it changed.
-    findings : tuple of Finding
-        What it is made of; at least one.
+    findings : tuple of Verdict
+        Those of the rules that hold; at least one.
     leg : LegState or None
         The leg then, in a report of its state; None in a report of a changed verdict.
     """
 
     stamp_ns: int
-    findings: tuple[Finding, ...]
+    findings: tuple[Verdict, ...]
     leg: LegState | None = None
 
     @property

@@ -36,10 +36,8 @@ from leg_wear_monitor.monitor.reports import CycleReport, Status, VerdictReport
 from leg_wear_monitor.monitor.torque_status import diagnosis_status, torque_status
 from leg_wear_monitor.monitor.verdict.situation import believed_words
 from leg_wear_monitor.monitor.verdict.verdict import (
-    Finding,
     estimate,
     level_of,
-    verdict_of,
     with_unit,
 )
 from leg_wear_monitor.state import JointClearance, Level, State, Verdict
@@ -213,7 +211,7 @@ def _with_measured(joint: Status, measured: Measurement | None) -> Status:
     return attrs.evolve(joint, message=f"{joint.message}; {words}", values=joint.values | values)
 
 
-def _as_judged(joint: Status, known: JointClearance, findings: Sequence[Finding]) -> Status:
+def _as_judged(joint: Status, known: JointClearance, findings: Sequence[Verdict]) -> Status:
     """A joint's status with its believed clearance, and with what the verdict's findings say of it."""
     values, message = joint.values, joint.message
     if known.believed_m is not None:
@@ -226,11 +224,11 @@ def _as_judged(joint: Status, known: JointClearance, findings: Sequence[Finding]
         return joint
     # a finding counts that is worse than the joint's own alarms; of equals, one that asks to inspect or stop
     worst = max(findings, key=lambda finding: finding.state.severity)
-    level, is_grave = level_of(verdict_of([worst])), worst.state in (State.INSPECT, State.STOP)
+    level, is_grave = level_of(worst), worst.state in (State.INSPECT, State.STOP)
     if level < joint.level or (level is joint.level and not is_grave):
         return joint
-    code = "_".join((worst.code, *worst.joints))
-    return attrs.evolve(joint, level=level, fault_code=code, message=f"{worst.state.words}: {message}")
+    message = f"{worst.state.words}: {message}"
+    return attrs.evolve(joint, level=level, fault_code=worst.fault_code, message=message)
 
 
 def _load_values(load: BushingLoad) -> dict[str, float]:

@@ -12,7 +12,8 @@ from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState, 
 from leg_wear_monitor.monitor.gait_evidence import offset_error_rad
 from leg_wear_monitor.monitor.parts import Parts
 from leg_wear_monitor.monitor.reports import Status
-from leg_wear_monitor.monitor.verdict.verdict import EVIDENCE, CauseWords, diagnosis_words, with_unit
+from leg_wear_monitor.monitor.verdict.causes import CAUSES, explanation, sentence
+from leg_wear_monitor.monitor.verdict.verdict import diagnosis_words, with_unit
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.statistics import NotCompared
 
@@ -50,17 +51,15 @@ def torque_status(parts: Parts) -> Status:
     for why in NotCompared:
         values[f"not_compared_{why.value}_cycles"] = float(record.not_compared.get(why.value, 0))
     raised = {name for name in _TORQUE if evaluation.board.alarms[name].level is not Level.OK}
-    messages = []
-    speed = explained.speed_radps if explained else last.cadence_rpm * math.pi / 30.0
-    words = CauseWords(parts.config.crank, parts.config.drive_torque, speed, parts.diagnosis)
+    messages, diagnosis = [], parts.diagnosis
     if alarm_specs.MISMATCH.name() in raised:
-        causes = f": {words.explanation(explained)}" if explained else ""
+        causes = f": {explanation(explained, diagnosis)}" if explained else ""
         messages = [f"the measured torque differs from the predicted one{causes}"]
         values |= _explained_values(explained) if explained else {}
         code = explained.named[0].cause.fault_code if explained and explained.named else code
     if not parts.is_torque_wrong:  # those are estimates for the torque as received
         present = evaluation.present_causes(last, record)
-        messages += map(words.cause, present.values())
+        messages += [sentence(one, diagnosis) for one in present.values()]
         past = [name for name in CAUSES_OF_ALARMS if name in raised and name not in present]
         messages += [f"the {alarm_specs.QUANTITIES[name]} was beyond its limit" for name in past]
     if not messages and math.isnan(last.torque_mismatch):
@@ -104,7 +103,7 @@ def _explained_values(explained: TorqueExplanation) -> dict[str, float]:
     """Values of the first explanation of a mismatch, and what it leaves."""
     values = {"unexplained": explained.after, "unexplained_sigma": explained.after_sigma}
     for one in explained.alternatives[0] if explained.alternatives else ():
-        name, unit = EVIDENCE[one.cause]
-        name = f"{name}_{one.subject}".rstrip("_")
-        values |= {with_unit(name, unit): one.value, with_unit(f"{name}_sigma", unit): one.sigma}
+        row = CAUSES[one.cause]
+        name = f"{row.name}_{one.subject}".rstrip("_")
+        values |= {with_unit(name, row.unit): one.value, with_unit(f"{name}_sigma", row.unit): one.sigma}
     return values

@@ -64,8 +64,7 @@ from leg_wear_monitor.monitor.reports import (
 )
 from leg_wear_monitor.monitor.status import statuses
 from leg_wear_monitor.monitor.verdict.situation import SEEN, Situation, is_observed
-from leg_wear_monitor.monitor.verdict.verdict import Finding
-from leg_wear_monitor.state import LegState
+from leg_wear_monitor.state import LegState, Verdict
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics, joined
 
@@ -307,7 +306,7 @@ class WearMonitor:
         situation = situation_of(self._parts)
         return self._state_report(verdict_report(self._parts, situation).findings, situation)
 
-    def _state_report(self, findings: tuple[Finding, ...], situation: Situation) -> VerdictReport:
+    def _state_report(self, findings: tuple[Verdict, ...], situation: Situation) -> VerdictReport:
         leg = leg_state(self._parts, findings, situation)
         return VerdictReport(leg.stamp_ns, findings, leg)
 

@@ -18,7 +18,7 @@ from leg_wear_monitor.monitor.reports import AlarmList, Status, VerdictReport
 from leg_wear_monitor.monitor.status import alarms_status, verdict_status
 from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.situation import Situation
-from leg_wear_monitor.monitor.verdict.verdict import Finding, dated
+from leg_wear_monitor.monitor.verdict.verdict import code_of_rule, dated
 from leg_wear_monitor.ros import health
 from leg_wear_monitor.ros.inputs import (
     Arrival,
@@ -28,7 +28,7 @@ from leg_wear_monitor.ros.inputs import (
     WrenchAxis,
     publishers_of,
 )
-from leg_wear_monitor.state import LegAlarms, Level
+from leg_wear_monitor.state import LegAlarms, Level, Verdict
 from leg_wear_monitor.twin import CRANK, KINDS
 from leg_wear_monitor.twin.sample import NO_FAULT, Samples
 
@@ -215,9 +215,9 @@ class Supervision:
         now = health.with_worse(leg.alarms.now, map(leg_alarm, self._alarms.raised))
         return attrs.evolve(report, leg=attrs.evolve(leg, alarms=LegAlarms(now=now)))
 
-    def _with_axis(self, finding: Finding) -> Finding:
+    def _with_axis(self, finding: Verdict) -> Verdict:
         """A finding about the drive torque with its cause, if the torque is about another axis."""
-        if finding.code not in _OF_AXIS:
+        if code_of_rule(finding) not in _OF_AXIS:
             return finding
         do = "correct drive_torque.axis and start the monitor again; then acknowledge the alarms"
         return attrs.evolve(finding, why=f"{finding.why}; {self._other_axis}", do=do)

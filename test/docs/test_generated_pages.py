@@ -207,7 +207,7 @@ def ledger_tables(_name: str) -> str:
 
 def in_words(text: str) -> str:
     """A rule's text; what it fills in is in italics, and in capitals in a command."""
-    text = re.sub(r"\{(past|acts|causes|doubt|then)\}", "", text)
+    text = re.sub(r"\{(past|acts|causes|then)\}", "", text)
     text = re.sub(r"`[^`]*`", lambda code: re.sub(r"\{(\w+)\}", lambda word: word[1].upper(), code[0]), text)
     return re.sub(r"\{(\w+)\}", r"*\1*", text)
 

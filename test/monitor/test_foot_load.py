@@ -113,7 +113,7 @@ def other_foot(t, force):
 def test_each_fault_of_the_sensor_is_named(walk, change, alarm):
     monitor = monitored(changed(change, walk))
     assert of_foot_load(monitor) - {"input_rate foot_load", "input_gaps foot_load"} == {alarm}
-    found = {finding.code: finding for finding in monitor.verdict.findings}
+    found = {finding.fault_code: finding for finding in monitor.verdict.findings}
     assert FOOT_LOAD_WORDS[alarm] in found[alarm.upper()].why
     status = status_of(monitor, "foot_load")
     assert status.level is Level.ERROR and FOOT_LOAD_WORDS[alarm] in status.message
@@ -165,7 +165,7 @@ def test_missing_samples_are_named_and_the_crank_is_monitored(walk, begin_s, end
     )
     monitor = monitored(walk[~gone])
     assert f"{alarm} foot_load" in of_foot_load(monitor)
-    assert "FOOT_LOAD_MISSING" in {finding.code for finding in monitor.verdict.findings}
+    assert "FOOT_LOAD_MISSING" in {finding.fault_code for finding in monitor.verdict.findings}
     assert monitor.lost.unmonitored_s < 1.0
 
 
@@ -181,7 +181,7 @@ def test_missing_samples_are_named_and_the_crank_is_monitored(walk, begin_s, end
 def test_words_on_missing_samples_say_what_acts(walk, model, is_sent, words):
     t = 1.0e-9 * (walk["stamp_ns"] - START)
     monitor = monitored(walk[(walk["kind"] != LOAD) | is_sent(t)], model)
-    found = {finding.code: finding for finding in monitor.verdict.findings}
+    found = {finding.fault_code: finding for finding in monitor.verdict.findings}
     assert words in found["FOOT_LOAD_MISSING"].why
     assert words in status_of(monitor, "foot_load").message
 

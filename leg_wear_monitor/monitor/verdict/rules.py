@@ -5,20 +5,64 @@ docs/reference/monitor.md lists them; a test compares the two.
 
 from functools import partial
 
+import attrs
+
 from leg_wear_monitor.monitor import alarms
-from leg_wear_monitor.monitor.verdict import subject_rules
-from leg_wear_monitor.monitor.verdict.situation import (
-    EVERYTHING,
-    OF_THE_GAIT,
-    OF_THE_MODEL,
-    Rule,
-    Situation,
-    blinding,
-    of_foot_load,
-    raised,
-)
-from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, NONE, Finding
-from leg_wear_monitor.state import Figure, Level, State
+from leg_wear_monitor.monitor.verdict import conditions
+from leg_wear_monitor.monitor.verdict.conditions import Condition, noted, raised
+from leg_wear_monitor.monitor.verdict.situation import Situation
+from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, NONE
+from leg_wear_monitor.state import Figure, Level, State, Verdict
+
+EVERYTHING = tuple(Figure)
+OF_THE_GAIT = (Figure.GROWTH, Figure.IMPACT_FORCES)
+OF_THE_MODEL = (*OF_THE_GAIT, Figure.FORECAST)
+
+
+@attrs.frozen(kw_only=True)
+class Rule:
+    """A rule.
+
+    Attributes
+    ----------
+    code : str
+        Stable name.
+    state : State
+    hits : callable
+        Its condition: the cases in a situation for which it holds.
+    why, do : str
+        Texts, with the words of a hit in braces; in ``do``, ``{joints}`` names all joints
+        of the hits with their labels, and ``{joint}`` is the first one as commands take it.
+    not_valid : tuple of Figure
+        Kinds of values that are not valid while the rule applies.
+    """
+
+    code: str
+    state: State
+    hits: Condition
+    why: str
+    do: str
+    not_valid: tuple[Figure, ...] = ()
+
+    def found(self, situation: Situation) -> Verdict | None:
+        """The verdict by this rule alone, with all of its cases; None if it does not hold."""
+        hits = self.hits(situation)
+        if not hits:
+            return None
+        joints = tuple(dict.fromkeys(hit.joint for hit in hits if hit.joint))
+        not_valid = {*self.not_valid, *(figure for hit in hits for figure in hit.not_valid)}
+        words = {"joints": situation.joints_words(joints), **hits[0].words, "joint": hits[0].joint}
+        return Verdict(
+            fault_code="_".join((self.code, *joints)),
+            state=max((self.state, *(hit.state for hit in hits)), key=lambda state: state.severity),
+            joints=joints,
+            why="; ".join(dict.fromkeys(self.why.format(**hit.words) for hit in hits)),
+            do=self.do.format(**words),
+            since_ns=min((hit.since_ns for hit in hits if hit.since_ns), default=0),
+            evidence=tuple(each for hit in hits for each in hit.evidence),
+            not_valid=tuple(figure for figure in Figure if figure in not_valid),
+        )
+
 
 _stop, _inspect, _not_monitored, _watch = (
     partial(Rule, state=state) for state in (State.STOP, State.INSPECT, State.NOT_MONITORED, State.WATCH)
@@ -49,7 +93,7 @@ def _cause(code: str, meaning: str, state: State = State.INSPECT, not_valid: tup
     return Rule(
         code=code,
         state=state,
-        hits=subject_rules.has_cause(code),
+        hits=conditions.has_cause(code),
         why=f"the drive torque differs from the prediction: {meaning}{{causes}}",
         do=f"{{remedy}}; {_ACKNOWLEDGE}",
         not_valid=not_valid,
@@ -80,20 +124,20 @@ def _foot_load(kind: str) -> Rule:
 RULES = (
     _stop(
         code="CLEARANCE",
-        hits=subject_rules.counted_at_limit,
+        hits=conditions.counted_at_limit,
         why="the {known} clearance of joint {joint} is {value} (limit {limit}){past}",
         do=_REPLACE,
     ),
     _stop(
         code="CLEARANCE_SEEN",
-        hits=subject_rules.seen_at_limit,
-        why="according to {by}, the clearance of joint {joint} is {value} (limit {limit}){past}{doubt}",
+        hits=conditions.seen_at_limit,
+        why="according to {by}, the clearance of joint {joint} is {value} (limit {limit}){past}",
         do=_REPLACE,
         not_valid=EVERYTHING,
     ),
     _stop(
         code="CLEARANCE_BELIEVED",
-        hits=subject_rules.believed_at_limit,
+        hits=conditions.believed_at_limit,
         why="counting and measurements together give a clearance of {value} in joint {joint} (limit {limit})",
         do=_REPLACE,
     ),
@@ -102,20 +146,20 @@ RULES = (
     _cause("TORQUE_TIMING", "its time does not fit the crank angle"),
     _inspect(
         code="CLEARANCE_CHANGED",
-        hits=subject_rules.diagnosed,
+        hits=conditions.diagnosed,
         why="the drive torque shows a {change}",
         do=_ROCK,
         not_valid=EVERYTHING,
     ),
     _inspect(
         code="CLEARANCE_CORRECTED",
-        hits=subject_rules.corrected,
+        hits=conditions.corrected,
         why="the drive torque showed a {change}; the counted clearance is corrected",
         do=_ROCK,
     ),
     _inspect(
         code="CLEARANCE_DEPARTURE",
-        hits=subject_rules.departing,
+        hits=conditions.departing,
         why="the encoders show a clearance of joint {joint} that differs from the counted one by {value} "
         "(limit {limit}){past}",
         do=f"{_ROCK}; {_ACKNOWLEDGE}",
@@ -126,7 +170,7 @@ RULES = (
     _cause("TORQUE_LOAD", "a load acts at the foot", State.WATCH, OF_THE_MODEL),
     _inspect(
         code="TORQUE_MISMATCH",
-        hits=subject_rules.mismatch,
+        hits=conditions.mismatch,
         why="the drive torque does not fit the counted leg, so the forecast is not valid: {value} of the "
         "predicted RMS is not explained (limit {limit}){past}{causes}",
         do="stop when it is safe, block the drive and rock each joint; measure the joint with play and enter "
@@ -157,7 +201,7 @@ RULES = (
     ),
     _not_monitored(
         code=alarms.ALREADY_COUNTED,
-        hits=subject_rules.all_counted,
+        hits=noted(alarms.ALREADY_COUNTED),
         why="everything that was received is in the ledger already: nothing was counted",
         do="nothing, if a recording was replayed again; for its report, replay it without a ledger; "
         "on a live leg, check the clock of the samples",
@@ -165,7 +209,7 @@ RULES = (
     ),
     _not_monitored(
         code=alarms.CRANK_ZERO,
-        hits=subject_rules.without_zero,
+        hits=noted(alarms.CRANK_ZERO),
         why="{cause}",
         do="let the leg walk steadily at the commanded cadence; if the zero is still not found, check the "
         "drive torque and its parameters, or set crank.zero to known and crank.offset_rad",
@@ -173,81 +217,82 @@ RULES = (
     ),
     _not_monitored(
         code="NOT_FOLLOWED",
-        hits=subject_rules.unfollowed,
+        hits=noted("NOT_FOLLOWED"),
         why="{cause}",
         do=f"repair the input of the crank; {_COUNTED}",
         not_valid=OF_THE_GAIT,
     ),
     _not_monitored(
         code="BAD_INPUT",
-        hits=blinding,
+        hits=conditions.blinding,
         why="the {quantity} is {value} (limit {limit}){causes}",
         do=f"repair the input; {_COUNTED}",
         not_valid=OF_THE_GAIT,
     ),
     _not_monitored(
         code="NOT_THIS_LEG",
-        hits=subject_rules.doubtful,
+        hits=noted("NOT_THIS_LEG"),
         why="the gait does not fit this leg: {cause}",
         do="compare the parameters with the leg: mechanism, cadence, crank and drive_torque",
         not_valid=EVERYTHING,
     ),
     _not_monitored(
         code=NO_GAIT_CYCLE,
-        hits=subject_rules.no_cycle,
+        hits=conditions.no_cycle,
         why="the monitor has not received a whole gait cycle yet",
         do=f"let the leg walk; if it walks already: {_COUNTED}",
     ),
     *map(_foot_load, _FOOT_LOAD),
     _watch(
         code="FOOT_LOAD_MISSING",
-        hits=of_foot_load,
+        hits=conditions.of_foot_load,
         why="the {quantity} is {value} (limit {limit}){acts}",
         do="repair the sensor of the foot load or its publisher, or set foot_load.source to none",
         not_valid=OF_THE_GAIT,
     ),
     _watch(
         code="MATERIAL_LIMIT",
-        hits=subject_rules.outside_limits,
-        why="joint {joint}: {outside}; its wear coefficient does not hold",
+        hits=raised("material_limit", least=Level.ERROR),
+        why="joint {joint} is loaded {value} times the limits of its material{past}; its wear coefficient "
+        "does not hold",
         do="compare the material of the mechanism file with the part, and load and cadence with its limits; "
         f"until then, measure the clearance of joint {{joints}} regularly; {_ACKNOWLEDGE}",
         not_valid=(Figure.GROWTH, Figure.FORECAST),
     ),
     _watch(
         code="PART_REPLACED",
-        hits=subject_rules.replaced,
+        hits=conditions.replaced,
         why="joint {joint} was replaced on {when}, {cycles} gait cycles ago",
         do="confirm by walking: let the leg walk on at the commanded cadence, and see the verdict then",
     ),
     _watch(
         code="NO_DRIVE_TORQUE",
-        hits=subject_rules.no_torque,
+        hits=conditions.no_torque,
         why="joints {joints} cannot be observed: {cause}",
         do="provide the drive torque (drive_torque.source); until then, rock the joints by hand regularly",
     ),
     _watch(
         code="TORQUE_NOT_COMPARED",
-        hits=subject_rules.not_compared,
-        why="the comparison of the drive torque needs more gait cycles{causes}",
+        hits=conditions.not_compared,
+        why="the comparison of the drive torque needs more gait cycles",
         do="let the leg walk on",
     ),
     _watch(
         code="NOT_OBSERVED",
-        hits=subject_rules.not_observed,
+        hits=conditions.not_observed,
         why="the drive torque does not show the clearances of joints {joints}{causes}",
         do="{then}rock these joints by hand regularly",
     ),
     _watch(
         code="CADENCE",
-        hits=subject_rules.other_cadence,
-        why="the leg {walks}; the commanded cadence is {commanded} ± {tolerance}",
+        hits=conditions.other_cadence,
+        why="the leg does not walk at the commanded cadence: {cause}",
         do=f"walk at the commanded cadence, or set cadence.commanded_rpm; {_ACKNOWLEDGE}",
         not_valid=(Figure.FORECAST,),
     ),
     _watch(
         code="ENCODER",
-        hits=subject_rules.encoder_faults,
+        hits=noted("ENCODER"),
         why="encoder {cause}",
         do="repair the encoder, or remove it from encoders.names",
     ),
@@ -267,7 +312,7 @@ RULES = (
     Rule(
         code=NONE,
         state=State.HEALTHY,
-        hits=subject_rules.nothing_found,
+        hits=conditions.nothing_found,
         why="no alarm is raised, and {observed}",
         do=f"nothing now. {alarms.ADVICE}",
     ),
@@ -275,8 +320,7 @@ RULES = (
 """In the order of precedence among equal states."""
 
 
-def findings(situation: Situation) -> tuple[Finding, ...]:
-    """All rules that hold in a situation, in the order of the table; that of a healthy leg only alone."""
-    results = (rule.found(situation) for rule in RULES)
-    found = tuple(finding for finding in results if finding is not None)
-    return tuple(finding for finding in found if finding.code != NONE) or found
+def findings(situation: Situation) -> tuple[Verdict, ...]:
+    """Verdicts of all rules that hold, in the order of the table; that of a healthy leg only alone."""
+    found = tuple(each for rule in RULES if (each := rule.found(situation)) is not None)
+    return tuple(each for each in found if each.fault_code != NONE) or found

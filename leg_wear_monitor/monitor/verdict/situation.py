@@ -1,18 +1,16 @@
-"""What rules judge: the situation of leg and joints, the believed clearance, and the form of a rule."""
+"""What rules judge: the situation of leg and joints, and the believed clearance."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import attrs
 
 from leg_wear_monitor.estimate.cause import SURE_SIGMAS, NamedCause, TorqueExplanation
 from leg_wear_monitor.files import or_nan
-from leg_wear_monitor.mechanism.materials import BushingLoad
-from leg_wear_monitor.monitor.alarms import Alarm, amount, joint_of, time_words
-from leg_wear_monitor.monitor.config.inputs import Crank, DriveTorque
+from leg_wear_monitor.monitor.alarms import Alarm, amount
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
-from leg_wear_monitor.monitor.verdict.verdict import Finding, estimate
-from leg_wear_monitor.state import Evidence, Figure, JointClearance, Level, State, Verdict
+from leg_wear_monitor.monitor.verdict.verdict import estimate
+from leg_wear_monitor.state import JointClearance, Level, State, Verdict
 
 # What a verdict depends on, and nothing else; the defaults are those of a leg without a fault.
 
@@ -72,8 +70,6 @@ class JointSituation:
         Whether it rests on `measured`; not on one that contradicts the model.
     replaced_ns, part_cycles : int
         When its part was replaced, 0 if it never was, and the gait cycles of this part.
-    load : BushingLoad or None
-        That of the last gait cycle; None before it.
     """
 
     joint: str
@@ -87,7 +83,6 @@ class JointSituation:
     replaced_ns: int = 0
     part_cycles: int = 0
     label: str = ""
-    load: BushingLoad | None = None
 
 
 @attrs.frozen(kw_only=True)
@@ -102,8 +97,6 @@ class Situation:
         Noun of each alarm's value, by the alarm's name; by its kind for an alarm of a joint.
     has_cycle : bool
         Whether a whole gait cycle was monitored in this run.
-    is_all_counted : bool
-        Whether the ledger already contained the wear of all samples of this run.
     has_torque : bool
         Whether the last gait cycle has samples of the drive torque.
     mismatch, mismatch_limit : float
@@ -113,54 +106,38 @@ class Situation:
         What acts as a foot load; empty without its sensor, and for a ledger.
     torque_causes : mapping of str to NamedCause
         Causes of an impossible bias, drift or lag of the torque, by the alarm.
-    without_zero : str
-        Why nothing is monitored while the crank's zero is not known; empty if it is.
-    unfollowed : str
-        Why the crank is not followed at present; empty if it is.
+    notes : mapping of str to sequence of str
+        What observers report for a rule, a sentence each, by the rule's code.
     input_causes : tuple of str
         Sentences on unused samples.
-    is_out_of_step : bool
-        Whether the cadence is outside of its tolerance.
-    cadence_rpm, commanded_rpm, tolerance_rpm : float
-    doubts : tuple of str
-        Why the last gait cycle is unlikely to be one of this leg.
-    encoder_faults : tuple of str
     diagnosis : Diagnosis
         What the drive torque shows.
     explained : TorqueExplanation or None
         What explains a torque mismatch; None without one, and in its first gait cycles.
-    crank, drive_torque : Crank, DriveTorque
-        Present parameters, which a remedy changes.
     """
 
     joints: tuple[JointSituation, ...] = ()
     alarms: tuple[Alarm, ...] = ()
     quantities: Mapping[str, str] = attrs.field(factory=dict)
     has_cycle: bool = True
-    is_all_counted: bool = False
     has_torque: bool = True
     mismatch: float = 0.0
     mismatch_limit: float = math.nan
     acts: str = ""
     torque_causes: Mapping[str, NamedCause] = attrs.field(factory=dict)
-    without_zero: str = ""
-    unfollowed: str = ""
+    notes: Mapping[str, Sequence[str]] = attrs.field(factory=dict)
     input_causes: tuple[str, ...] = ()
-    is_out_of_step: bool = False
-    cadence_rpm: float = math.nan
-    commanded_rpm: float = math.nan
-    tolerance_rpm: float = math.nan
-    doubts: tuple[str, ...] = ()
-    encoder_faults: tuple[str, ...] = ()
     diagnosis: Diagnosis = Diagnosis()
     explained: TorqueExplanation | None = None
-    crank: Crank = Crank()
-    drive_torque: DriveTorque = DriveTorque()
 
     def joint_words(self, joint: str) -> str:
         """A joint with its label, such as ``G (knee)``."""
         label = next((each.label for each in self.joints if each.joint == joint), "")
         return f"{joint} ({label})" if label else joint
+
+    def joints_words(self, joints: Sequence[str]) -> str:
+        """Joints with their labels."""
+        return ", ".join(map(self.joint_words, joints))
 
     def alarm_of(self, joint: str) -> Alarm | None:
         """The alarm of a joint's clearance; None if it is not listed."""
@@ -272,7 +249,7 @@ def believed(joint: JointSituation, alarm: Alarm | None, is_counted_leg: bool) -
     return joint.measured or surest(joint.seen)
 
 
-def joint_status(joint: str, is_known: bool, findings: Sequence[Finding | Verdict]) -> State:
+def joint_status(joint: str, is_known: bool, findings: Sequence[Verdict]) -> State:
     """What findings say of a joint: the worst that names it, or whether anything valid is known of it."""
     found = [finding.state for finding in findings if joint in finding.joints]
     is_blind = any(finding.state is State.NOT_MONITORED for finding in findings)
@@ -304,180 +281,3 @@ def _takes_back(shown: KnownClearance, limit_m: float) -> bool:
 def is_observed(alarm: Alarm, by: Sequence[str] = (MEASURED, BOTH, *SEEN)) -> bool:
     """Whether an alarm of the clearance is present because of what some sources say, not counting alone."""
     return alarm.present is not Level.OK and alarm.cause in by
-
-
-# A rule of the verdict: condition, state and texts in one entry.
-
-
-EVERYTHING = tuple(Figure)
-OF_THE_GAIT = (Figure.GROWTH, Figure.IMPACT_FORCES)
-OF_THE_MODEL = (Figure.GROWTH, Figure.IMPACT_FORCES, Figure.FORECAST)
-
-
-@attrs.frozen(kw_only=True)
-class Hit:
-    """One case for which the condition of a rule holds.
-
-    Attributes
-    ----------
-    words : mapping of str to str
-        Words for the braces of the rule's texts.
-    joint : str
-        The joint concerned, empty if it is none.
-    since_ns : int
-        Stamp since which it holds, 0 if it is not known.
-    evidence : tuple of Evidence
-    not_valid : tuple of Figure
-        In addition to the rule's.
-    state : State
-        Where it is more severe than the rule's.
-    """
-
-    words: Mapping[str, str] = attrs.field(factory=dict)
-    joint: str = ""
-    since_ns: int = 0
-    evidence: tuple[Evidence, ...] = ()
-    not_valid: tuple[Figure, ...] = ()
-    state: State = State.HEALTHY
-
-
-@attrs.frozen(kw_only=True)
-class Rule:
-    """A rule.
-
-    Attributes
-    ----------
-    code : str
-        Stable name.
-    state : State
-    hits : callable
-        Its condition: the cases in a situation for which it holds.
-    why, do : str
-        Texts, with the words of a hit in braces; in ``do``, ``{joints}`` names all joints
-        of the hits with their labels, and ``{joint}`` is the first one as commands take it.
-    not_valid : tuple of Figure
-        Kinds of values that are not valid while the rule applies.
-    """
-
-    code: str
-    state: State
-    hits: Callable[[Situation], Sequence[Hit]]
-    why: str
-    do: str
-    not_valid: tuple[Figure, ...] = ()
-
-    def found(self, situation: Situation) -> Finding | None:
-        """The finding if the rule holds, with all of its cases."""
-        hits = self.hits(situation)
-        if not hits:
-            return None
-        joints = tuple(dict.fromkeys(hit.joint for hit in hits if hit.joint))
-        since = [hit.since_ns for hit in hits if hit.since_ns]
-        not_valid = {*self.not_valid, *(figure for hit in hits for figure in hit.not_valid)}
-        words = {"joints": ", ".join(map(situation.joint_words, joints)), **hits[0].words}
-        return Finding(
-            code=self.code,
-            state=max((self.state, *(hit.state for hit in hits)), key=lambda state: state.severity),
-            joints=joints,
-            why="; ".join(dict.fromkeys(self.why.format(**hit.words) for hit in hits)),
-            do=self.do.format(**(words | {"joint": hits[0].joint})),
-            since_ns=min(since, default=0),
-            evidence=tuple(each for hit in hits for each in hit.evidence),
-            not_valid=tuple(figure for figure in Figure if figure in not_valid),
-        )
-
-
-# Conditions on alarms. A latched alarm counts like a present one until somebody acknowledges it.
-
-
-Condition = Callable[[Situation], Sequence[Hit]]
-
-
-def raised(*kinds: str, least: Level = Level.WARN, most: Level = Level.ERROR) -> Condition:
-    """Alarms of some kinds (all if none is given) from a level up to another one."""
-
-    def hits(situation: Situation) -> Sequence[Hit]:
-        return [
-            hit_of(alarm, situation)
-            for alarm in situation.alarms
-            if least <= alarm.level <= most and (not kinds or alarm.kind in kinds)
-        ]
-
-    return hits
-
-
-def blinding(situation: Situation) -> Sequence[Hit]:
-    """Present faults of the input of the crank; those of torque and foot load stop no counting."""
-    kinds = ("input_sources", "input_rate", "input_samples", "input_gaps", "input_silence")
-    causes = f": {situation.input_causes[0]}" if situation.input_causes else ""  # the most frequent
-    return [
-        hit_of(alarm, situation, causes=causes)
-        for alarm in situation.alarms
-        if alarm.kind in kinds
-        and alarm.subject not in ("torque", "foot_load")
-        and alarm.present is Level.ERROR
-    ]
-
-
-def of_foot_load(situation: Situation) -> Sequence[Hit]:
-    """Present lack of samples of the foot load."""
-    return [
-        hit_of(alarm, situation)
-        for alarm in situation.alarms
-        if alarm.subject == "foot_load" and alarm.present is Level.ERROR
-    ]
-
-
-ERROR_OF = "standard error of "
-"""Before the name of some evidence, the name of that of its standard error."""
-
-
-def known_evidence(name: str, known: KnownClearance, limit_m: float) -> tuple[Evidence, ...]:
-    """A clearance as evidence, with its standard error if that is known."""
-    error = Evidence(f"{ERROR_OF}{name}", known.sigma_m, None, "m")
-    return (Evidence(name, known.clearance_m, limit_m, "m"), *([] if math.isnan(known.sigma_m) else [error]))
-
-
-def hit_of(alarm: Alarm, situation: Situation, **words: str) -> Hit:
-    """An alarm as a case of a rule: its last value if that is beyond the limit, else its worst one."""
-    is_present = alarm.present is alarm.level  # a level that has fallen has a value within the limit
-    is_known = is_present and not math.isnan(alarm.value)
-    value, past = alarm.worst, ""
-    if math.isnan(alarm.worst) or (is_known and (alarm.worst >= alarm.limit) is (alarm.value >= alarm.limit)):
-        value = alarm.value
-    elif is_known:  # within the limit, but not by the deadband
-        past = f", {amount(alarm.value, alarm.unit)} now"
-    if not is_present:
-        past = f" (since {time_words(alarm.raised_ns)}; now within its limit)"
-    own, noun = joint_of(alarm.name), situation.quantity(alarm)
-    joint = situation.joint_words(own)
-    texts = {
-        "quantity": f"{noun} of joint {joint}" if own else noun,
-        "joint": joint,
-        "value": amount(value, alarm.unit),
-        "limit": amount(alarm.limit, alarm.unit),
-        "past": past,
-        "acts": f"; {situation.acts}" if situation.acts else "",
-        "known": "counted",
-    }
-    evidence: tuple[Evidence, ...] = ()
-    each = _measured(alarm, value, situation)
-    if each is not None and each.measured is not None:
-        texts["known"] = "measured" if value <= each.measured.clearance_m else "estimated"
-        texts["past"] += f"; {each.measured.words} was measured, {amount(each.counted_m, 'm')} is counted"
-        evidence = (
-            *known_evidence(f"measured clearance {each.joint}", each.measured, each.limit_m),
-            Evidence(f"counted clearance {each.joint}", each.counted_m, each.limit_m, "m"),
-        )
-    return Hit(
-        words=texts | words,
-        joint=own,
-        since_ns=alarm.raised_ns,
-        evidence=(Evidence(alarm.name, value, alarm.limit, alarm.unit), *evidence),
-    )
-
-
-def _measured(alarm: Alarm, value: float, situation: Situation) -> JointSituation | None:
-    """The joint of an alarm of the clearance, if its value is known by measurement and not by counting."""
-    own = (each for each in situation.joints if alarm.kind == "clearance" and each.joint == alarm.subject)
-    return next((each for each in own if each.measured is not None and value > each.counted_m), None)

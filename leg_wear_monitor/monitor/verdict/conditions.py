@@ -1,0 +1,452 @@
+"""Conditions of the verdict's rules: the cases in a situation for which each holds."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+import attrs
+
+from leg_wear_monitor.estimate.cause import Cause, Change
+from leg_wear_monitor.monitor.alarms import CAUSES_OF_ALARMS, Alarm, amount, joint_of, time_words
+from leg_wear_monitor.monitor.diagnosis.state import DiagnosisState
+from leg_wear_monitor.monitor.verdict.causes import CAUSES, evidence_of, explanation, remedy, sentence
+from leg_wear_monitor.monitor.verdict.situation import (
+    BOTH,
+    MEASURED,
+    SEEN,
+    SOURCES,
+    JointSituation,
+    KnownClearance,
+    Situation,
+    at_limit_by_estimate,
+)
+from leg_wear_monitor.monitor.verdict.verdict import estimate
+from leg_wear_monitor.state import Evidence, Figure, Level, State
+
+
+@attrs.frozen(kw_only=True)
+class Hit:
+    """One case for which the condition of a rule holds.
+
+    Attributes
+    ----------
+    words : mapping of str to str
+        Words for the braces of the rule's texts.
+    joint : str
+        The joint concerned, empty if it is none.
+    since_ns : int
+        Stamp since which it holds, 0 if it is not known.
+    evidence : tuple of Evidence
+    not_valid : tuple of Figure
+        In addition to the rule's.
+    state : State
+        Where it is more severe than the rule's.
+    """
+
+    words: Mapping[str, str] = attrs.field(factory=dict)
+    joint: str = ""
+    since_ns: int = 0
+    evidence: tuple[Evidence, ...] = ()
+    not_valid: tuple[Figure, ...] = ()
+    state: State = State.HEALTHY
+
+
+Condition = Callable[[Situation], Sequence[Hit]]
+
+
+def noted(code: str) -> Condition:
+    """What observers report for the rule of this code, a sentence each."""
+    return lambda situation: [Hit(words={"cause": text}) for text in situation.notes.get(code, ())]
+
+
+# Conditions on alarms. A latched alarm counts like a present one until somebody acknowledges it.
+
+
+def raised(*kinds: str, least: Level = Level.WARN, most: Level = Level.ERROR) -> Condition:
+    """Alarms of some kinds (all if none is given) from a level up to another one."""
+    return lambda situation: [
+        hit_of(alarm, situation)
+        for alarm in situation.alarms
+        if least <= alarm.level <= most and (not kinds or alarm.kind in kinds)
+    ]
+
+
+_OF_INPUT = ("input_sources", "input_rate", "input_samples", "input_gaps", "input_silence")
+
+
+def blinding(situation: Situation) -> Sequence[Hit]:
+    """Present faults of the input of the crank; those of torque and foot load stop no counting."""
+    return [
+        hit_of(alarm, situation)
+        for alarm in situation.alarms
+        if alarm.present is Level.ERROR
+        and alarm.kind in _OF_INPUT
+        and alarm.subject not in ("torque", "foot_load")
+    ]
+
+
+def of_foot_load(situation: Situation) -> Sequence[Hit]:
+    """Present lack of samples of the foot load."""
+    lack = (each for each in situation.alarms if each.subject == "foot_load" and each.present is Level.ERROR)
+    return [hit_of(alarm, situation) for alarm in lack]
+
+
+ERROR_OF = "standard error of "
+"""Before the name of some evidence, the name of its standard error."""
+
+
+def known_evidence(name: str, known: KnownClearance, limit_m: float) -> tuple[Evidence, ...]:
+    """A clearance as evidence, with its standard error if that is known."""
+    error = Evidence(f"{ERROR_OF}{name}", known.sigma_m, None, "m")
+    return (Evidence(name, known.clearance_m, limit_m, "m"), *([] if math.isnan(known.sigma_m) else [error]))
+
+
+_KNOWN_BY = {MEASURED: "measured", BOTH: "estimated"}
+
+
+def hit_of(alarm: Alarm, situation: Situation) -> Hit:
+    """An alarm as a case of a rule: its last value if that is beyond the limit, else its worst one."""
+    is_present = alarm.present is alarm.level  # a level that has fallen has a value within the limit
+    is_known = is_present and not math.isnan(alarm.value)
+    value, past = alarm.worst, ""
+    if math.isnan(alarm.worst) or (is_known and (alarm.worst >= alarm.limit) is (alarm.value >= alarm.limit)):
+        value = alarm.value
+    elif is_known:  # within the limit, but not by the deadband
+        past = f", {amount(alarm.value, alarm.unit)} now"
+    if not is_present:
+        past = f" (since {time_words(alarm.raised_ns)}; now within its limit)"
+    own, noun = joint_of(alarm.name), situation.quantity(alarm)
+    joint = situation.joint_words(own)
+    evidence = [Evidence(alarm.name, value, alarm.limit, alarm.unit)]
+    each = next((each for each in situation.joints if each.joint == own and alarm.kind == "clearance"), None)
+    if each is not None and each.measured is not None and value > each.counted_m:
+        evidence += known_evidence(f"measured clearance {own}", each.measured, each.limit_m)
+        evidence.append(Evidence(f"counted clearance {own}", each.counted_m, each.limit_m, "m"))
+    return Hit(
+        words={
+            "quantity": f"{noun} of joint {joint}" if own else noun,
+            "joint": joint,
+            "value": amount(value, alarm.unit),
+            "limit": amount(alarm.limit, alarm.unit),
+            "past": past,
+            "acts": f"; {situation.acts}" if situation.acts else "",
+            "causes": f": {situation.input_causes[0]}" if situation.input_causes else "",
+            "known": _KNOWN_BY.get(alarm.cause, "counted"),
+        },
+        joint=own,
+        since_ns=alarm.raised_ns,
+        evidence=tuple(evidence),
+    )
+
+
+# Conditions on what explains the drive torque: one code a cause, whoever finds it.
+#
+# A torque mismatch is explained while its alarm is raised, further alarms of the torque are limits of single
+# causes, and the diagnosis shows what has changed since the leg was commissioned.
+
+
+def has_cause(code: str) -> Condition:
+    """The drive torque has a cause of this code; the surest way of finding it decides."""
+    return lambda situation: (
+        _explained(code, situation) or _beyond_limits(code, situation) or _diagnosed(code, situation)
+    )
+
+
+def _explained(code: str, situation: Situation) -> list[Hit]:
+    """A torque mismatch that is explained, where the first of its causes has this code."""
+    explained = situation.explained
+    if explained is None or not explained.named or explained.named[0].cause.fault_code != code:
+        return []
+    alarms = raised("torque_mismatch")(situation)
+    return [
+        Hit(
+            words={
+                "causes": f": {explanation(explained, situation.diagnosis)}",
+                "remedy": " and ".join(map(remedy, explained.named)),
+            },
+            since_ns=alarms[0].since_ns if alarms else 0,
+            evidence=tuple(map(evidence_of, explained.named)),
+            state=State.INSPECT,
+        )
+    ]
+
+
+def _beyond_limits(code: str, situation: Situation) -> list[Hit]:
+    """Alarms of a bias, a drift or a lag beyond its bounds."""
+    kinds = [kind for kind, cause in CAUSES_OF_ALARMS.items() if cause.fault_code == code]
+    hits = []
+    for hit in raised(*kinds, least=Level.ERROR)(situation) if kinds else ():
+        alarm = hit.evidence[0].name  # the evidence of a raised alarm is the alarm's value, by its name
+        cause = situation.torque_causes.get(alarm)
+        words = ": the {quantity} is {value} (limit {limit}){past}".format(**hit.words)
+        words += f"; {sentence(cause, situation.diagnosis)}" if cause else ""
+        do = remedy(cause) if cause else CAUSES[CAUSES_OF_ALARMS[alarm]].do
+        hits.append(attrs.evolve(hit, words={"causes": words, "remedy": do}, state=State.INSPECT))
+    return hits
+
+
+def _diagnosed(code: str, situation: Situation) -> list[Hit]:
+    """Significant changes that the diagnosis shows, other than of a clearance."""
+    return [
+        Hit(
+            words={
+                "causes": f": {words_of(change, situation)}{doubt(situation)}",
+                "remedy": remedy(change),
+            },
+            since_ns=change.since_ns,
+            evidence=(evidence_of(change),),
+        )
+        for change in changes(situation)
+        if change.cause.fault_code == code
+    ]
+
+
+def mismatch(situation: Situation) -> Sequence[Hit]:
+    """The drive torque is not that of the counted leg; with what may cause it, as far as that is known."""
+    possible = [sentence(cause, situation.diagnosis) for cause in situation.torque_causes.values()]
+    possible += [words_of(change, situation) for change in changes(situation)]
+    causes = f"; possible cause: {'; '.join(possible)}" if possible else ""
+    if situation.explained is not None:
+        causes = f"; {explanation(situation.explained, situation.diagnosis)}{causes}"
+    found = raised("torque_mismatch", least=Level.ERROR)(situation)
+    return [attrs.evolve(hit, words={**hit.words, "causes": causes}) for hit in found]
+
+
+def changes(situation: Situation) -> tuple[Change, ...]:
+    """What the drive torque shows that has changed; empty without an estimator."""
+    if situation.diagnosis.state is not DiagnosisState.CHANGED:
+        return ()
+    return tuple(change for change in situation.diagnosis.changes if not change.is_corrected)
+
+
+def words_of(change: Change, situation: Situation) -> str:
+    """A change in words, such as ``clearance of 0.62 mm ± 0.03 mm in joint G (0.3 mm is counted)``."""
+    if change.cause is Cause.CLEARANCE:
+        value, counted = estimate(change.value, change.sigma, "m"), amount(change.counted, "m")
+        verb, joint = "was" if change.is_corrected else "is", situation.joint_words(change.subject)
+        words = f"clearance of {value} in joint {joint} ({counted} {verb} counted)"
+        if change.value < change.counted:
+            words += ", less than before: if its part was replaced, reset the joint"
+    else:
+        words = sentence(change, situation.diagnosis)
+    return f"{words} (or {change.runner_up})" if change.runner_up and not change.is_named else words
+
+
+def doubt(situation: Situation) -> str:
+    """Why what the drive torque shows is not sure; empty if it is."""
+    return f"; {situation.diagnosis.reason}" if situation.diagnosis.reason else ""
+
+
+# Conditions on clearances: those that the forecast believes, and those that measurements show.
+
+
+CONFIRMED_CYCLES = 20  # gait cycles of a new part; another leg is found in fewer
+
+
+def believed_at_limit(situation: Situation) -> Sequence[Hit]:
+    """Joints whose clearance is at its limit by what the forecast believes, measurements included."""
+    return [
+        Hit(
+            words={
+                "joint": situation.joint_words(each.joint),
+                "value": amount(each.believed_m, "m"),
+                "limit": amount(each.limit_m, "m"),
+            },
+            joint=each.joint,
+            evidence=(Evidence(f"believed clearance {each.joint}", each.believed_m, each.limit_m, "m"),),
+        )
+        for each in situation.joints
+        if each.believed_m >= each.limit_m
+    ]
+
+
+def counted_at_limit(situation: Situation) -> Sequence[Hit]:
+    """Alarms of clearances that are at their limit as counted or as measured.
+
+    The forecast is valid only if it has the joint at its limit as well: not beside a measurement that it does
+    not use, or believes in part only, nor beside an alarm that is only latched.
+    """
+    alarms = (alarm for alarm in situation.alarms if alarm.kind == "clearance" and alarm.cause not in SEEN)
+    hits = [hit_of(alarm, situation) for alarm in alarms if alarm.level is Level.ERROR]
+    below = {each.joint for each in situation.joints if not _forecast_m(each) >= each.limit_m}  # NaN, too
+    return [attrs.evolve(hit, not_valid=(Figure.FORECAST,)) if hit.joint in below else hit for hit in hits]
+
+
+def _forecast_m(each: JointSituation) -> float:
+    """What the forecast takes for a joint's clearance; by counting alone, it only follows a minute later."""
+    return each.believed_m if each.is_used or each.is_measurement_used else each.counted_m
+
+
+def seen_at_limit(situation: Situation) -> Sequence[Hit]:
+    """Joints whose clearance is surely at its limit by what encoders or the drive torque show, or showed.
+
+    What they showed stays until somebody acknowledges it, or a measurement contradicts it.
+    """
+    hits = []
+    for each in situation.joints:
+        alarm = situation.alarm_of(each.joint)
+        seen = at_limit_by_estimate(each, alarm)
+        if seen is None:
+            continue
+        raised_ns = alarm.raised_ns if alarm is not None and alarm.level is Level.ERROR else 0
+        past, unsure = doubt(situation) if seen.by == "torque" else "", ""
+        if seen not in each.seen:
+            past = f" (since {time_words(raised_ns)}; not shown now)"
+        if each.measured is not None:
+            unsure = f"; {each.measured.words} was measured"
+        words = {
+            "joint": situation.joint_words(each.joint),
+            "by": SOURCES[seen.by],
+            "value": seen.words,
+            "limit": amount(each.limit_m, "m"),
+            "past": past + unsure,
+        }
+        evidence = known_evidence(f"clearance {each.joint} by {seen.by}", seen, each.limit_m)
+        hits.append(Hit(words=words, joint=each.joint, since_ns=raised_ns, evidence=evidence))
+    return hits
+
+
+def replaced(situation: Situation) -> Sequence[Hit]:
+    """Joints whose part is so new that neither gait cycles nor sensors confirm the repair yet."""
+    is_as_counted = situation.diagnosis.state is DiagnosisState.AS_COUNTED
+    return [
+        Hit(
+            words={
+                "joint": situation.joint_words(each.joint),
+                "when": time_words(each.replaced_ns),
+                "cycles": str(each.part_cycles),
+            },
+            joint=each.joint,
+        )
+        for each in situation.joints
+        if each.replaced_ns
+        and each.part_cycles < CONFIRMED_CYCLES
+        and not (each.seen and (is_as_counted or each.is_used))
+    ]
+
+
+def departing(situation: Situation) -> Sequence[Hit]:
+    """Joints whose clearance by encoders differs from the counted one; the forecast may use it."""
+    used = {each.joint for each in situation.joints if each.is_used}
+    return [
+        hit if hit.joint in used else attrs.evolve(hit, not_valid=(Figure.FORECAST,))
+        for hit in raised("clearance_departure", least=Level.ERROR)(situation)
+    ]
+
+
+def diagnosed(situation: Situation) -> Sequence[Hit]:
+    """Clearances that have changed by the drive torque, and that are not corrected."""
+    found = [change for change in changes(situation) if change.cause is Cause.CLEARANCE]
+    return [_clearance_hit(change, situation, doubt(situation)) for change in found]
+
+
+def corrected(situation: Situation) -> Sequence[Hit]:
+    """Changes by which counted clearances were corrected."""
+    found = (change for change in situation.diagnosis.changes if change.is_corrected)
+    return [_clearance_hit(change, situation) for change in found]
+
+
+def _clearance_hit(change: Change, situation: Situation, addition: str = "") -> Hit:
+    """A changed clearance in words, with an addition and with what somebody measured at that joint."""
+    own = (each.measured for each in situation.joints if each.joint == change.subject)
+    measured = next(own, None)
+    if measured is not None and measured.words not in addition:
+        addition += f"; {measured.words} was measured"
+    return Hit(
+        words={"change": f"{words_of(change, situation)}{addition}"},
+        joint=change.subject,
+        since_ns=change.since_ns,
+        evidence=(Evidence(f"clearance {change.subject} by torque", change.value, math.nan, "m"),),
+    )
+
+
+# Conditions on the motion, and on what is observed of the joints.
+
+
+def no_cycle(situation: Situation) -> Sequence[Hit]:
+    """No whole gait cycle was monitored in this run."""
+    return [] if situation.has_cycle else [Hit()]
+
+
+def other_cadence(situation: Situation) -> Sequence[Hit]:
+    """The cadence is outside of its tolerance, or was for so long that its alarm is raised."""
+    notes, alarms = situation.notes.get("CADENCE", ()), raised("cadence", least=Level.ERROR)(situation)
+    if not notes and not alarms:
+        return []
+    cause = notes[0] if notes else "it walked at a different one for several gait cycles"
+    since_ns, evidence = (alarms[0].since_ns, alarms[0].evidence) if alarms else (0, ())
+    return [Hit(words={"cause": cause}, since_ns=since_ns, evidence=evidence)]
+
+
+def no_torque(situation: Situation) -> Sequence[Hit]:
+    """Neither the drive torque nor encoders show the joints.
+
+    The state is `WATCH`: wear is counted from the motion alone, so the leg is monitored, and its alarms of
+    clearance, growth and forces hold for the counted leg. But no measurement can contradict the counting: a
+    bushing that breaks changes nothing that is received. So nobody may be told that the leg is healthy.
+    """
+    is_stuck = any(each.kind == "input_torque" and each.present is Level.ERROR for each in situation.alarms)
+    if not situation.has_cycle or not situation.unobserved or (situation.has_torque and not is_stuck):
+        return []
+    cause = "the drive torque is stuck or saturated" if situation.has_torque else "there is no drive torque"
+    return [Hit(words={"joints": situation.joints_words(situation.unobserved), "cause": cause})]
+
+
+def not_compared(situation: Situation) -> Sequence[Hit]:
+    """There is a drive torque, but not yet enough of it to be compared, or to raise the mismatch."""
+    if not situation.has_torque or not situation.has_cycle:
+        return []
+    for alarm in situation.alarms:
+        if alarm.kind == "torque_mismatch" and alarm.level is Level.OK and alarm.beyond[1]:
+            return [hit_of(alarm, situation)]
+    is_known = not math.isnan(situation.mismatch) or not situation.unobserved
+    return [] if is_known else [Hit()]
+
+
+def not_observed(situation: Situation) -> Sequence[Hit]:
+    """The diagnosis does not show some joints yet, or not at all, and no encoder does.
+
+    The mismatch of the torque shows broken hip and knee joints, but not those of the foot
+    (monitor.md), so a leg without a mismatch is not known to be healthy. A diagnosis that is off is the
+    choice of somebody, and does not raise this.
+    """
+    found = situation.diagnosis
+    blind = [each.joint for each in situation.joints if not each.seen]
+    is_on = found.state in (DiagnosisState.WAITING, DiagnosisState.AS_COUNTED)
+    if not is_on or not blind or not situation.has_cycle or not situation.has_torque:
+        return []
+    is_to_walk = found.state is DiagnosisState.WAITING or bool(found.next_step)
+    reasons = [" yet"] if is_to_walk else [""]
+    reasons += filter(None, (found.reason, found.next_step))
+    words = {
+        "joints": situation.joints_words(blind),
+        "causes": "; ".join(reasons),
+        "then": "let the leg walk on at a steady cadence; until then, " if is_to_walk else "",
+    }
+    unused = tuple(
+        Evidence(f"cycles not used: {reason}", float(number), math.nan, "")
+        for reason, number in found.cycles_not_used.items()
+    )
+    return [Hit(words=words, evidence=unused)]
+
+
+_LEAST_REST = 0.01  # of the drive torque: below it, noise and tolerances of the leg decide
+
+
+def nothing_found(situation: Situation) -> Sequence[Hit]:
+    """Always holds; it counts where no other rule does."""
+    if not situation.has_torque or math.isnan(situation.mismatch):
+        return [Hit(words={"observed": "the encoders show the counted clearances"})]
+    rest, limit, found = situation.mismatch, situation.mismatch_limit, situation.diagnosis
+    observed = [
+        "the drive torque agrees with the counted leg: "
+        + (f"{100.0 * rest:.2g} %" if rest >= _LEAST_REST else "less than 1 %")
+        + f" of its RMS is not explained (limit {100.0 * limit:.3g} %)"
+    ]
+    known = [each for each in found.sigma_m if not math.isnan(each)]
+    if found.state is DiagnosisState.OFF and found.reason:
+        observed.append(f"the torque is not compared with wider joints: {found.reason}")
+    elif known:
+        observed.append(f"{found.cycles} gait cycles show clearances to ± {amount(max(known), 'm')}")
+    observed += filter(None, (found.next_step,))
+    evidence = (Evidence("torque_mismatch", rest, limit, ""),)
+    return [Hit(words={"observed": "; ".join(observed)}, evidence=evidence)]

@@ -125,7 +125,7 @@ class Counts:
             gap = f"the time jumps by {self._gaps.size_s:.6g} s at {word} {self._gaps.line}"
             yield f"{gap}{self._gaps.more}; the leg was not monitored in between", note
         if self._zero:
-            text = "a time of 0 is that of a clock that is not set, and counts as faulty; set input.start"
+            text = "a time of 0 is that of a clock that is not set, and counts as faulty; set table.start"
             yield text, note
         if self._unused:
             text = f"{self._unused} torques have no angle in their row; drive_torque.source 'effort' needs it"
@@ -164,9 +164,9 @@ class Encoder:
     def __init__(self, config: MonitorConfig) -> None:
         self._crank, self._further = config.crank_joint, config.encoders.names
         self._torque = config.drive_torque
-        self.has_torque = bool(config.input.columns.drive_torque)
+        self.has_torque = bool(config.table.columns.drive_torque)
         self._streams = {stream.kind: stream for stream in streams_of(config)}
-        self._load = self._streams.get(LOAD) if config.input.columns.foot_load else None
+        self._load = self._streams.get(LOAD) if config.table.columns.foot_load else None
 
     @property
     def is_effort(self) -> bool:
@@ -314,7 +314,7 @@ class TableFile:
     ) -> None:
         self.path, self._config, self._encoder = path, config, Encoder(config)
         self.findings: list[Finding] = []
-        source = open_table(path, content, storage, budget, config.input.columns.crank_angle)
+        source = open_table(path, content, storage, budget, config.table.columns.crank_angle)
         self.size, self.names = source.size, source.head.names
         self.counts = Counts(config, self._encoder.is_effort, source.word)
         parts = TableRows(path, source, config, self.findings).parts()

@@ -99,10 +99,10 @@ class Rows:
 
 def columns_of(config: MonitorConfig) -> tuple[Column, ...]:
     """Columns to read, the time first if there is one."""
-    names, units = config.input.columns, config.input.units
+    names, units = config.table.columns, config.table.units
     scales = {
         STAMP: (1.0, 1.0),
-        CRANK_ANGLE: config.input.angle_scale,
+        CRANK_ANGLE: config.table.angle_scale,
         CRANK_SPEED: tables.SPEEDS[units.crank_speed],
         DRIVE_TORQUE: tables.TORQUES[units.drive_torque],
     }
@@ -112,12 +112,12 @@ def columns_of(config: MonitorConfig) -> tuple[Column, ...]:
     if config.foot_load.source == WRENCH:
         scales[FOOT_LOAD_ALONG] = force
     own = [
-        Column(key, getattr(names, key), f"input.columns.{key}", _unit(key, units), *scale)
+        Column(key, getattr(names, key), f"table.columns.{key}", _unit(key, units), *scale)
         for key, scale in scales.items()
-        if getattr(names, key) and not (key == STAMP and config.input.rate_hz)
+        if getattr(names, key) and not (key == STAMP and config.table.rate_hz)
     ]
     further = [
-        Column(name, name, "encoders.names", units.crank_angle, *config.input.angle_scale)
+        Column(name, name, "encoders.names", units.crank_angle, *config.table.angle_scale)
         for name in config.encoders.names
     ]
     return (*own, *further)
@@ -290,7 +290,7 @@ def _wraps(angle: Floats) -> int:
 
 def _other_turn(angle: Floats, config: MonitorConfig) -> str:
     """Doubt about the unit of an angle that jumps back by a turn of another unit; empty if there is none."""
-    unit, (factor, divisor) = config.input.units.crank_angle, config.input.angle_scale
+    unit, (factor, divisor) = config.table.units.crank_angle, config.table.angle_scale
     of_unit = factor / divisor
     if _wraps(angle) < _LEAST_TURNS:
         return ""
@@ -302,23 +302,23 @@ def _other_turn(angle: Floats, config: MonitorConfig) -> str:
         if other != unit and max(raw / turn, turn / raw) < _SAME:
             value = f"the angle jumps back by about {raw:.3g} each turn"
             text = f"{value}, in {unit!r} a turn is {turns[unit]:.4g}: is it in {other!r}"
-            return f"{text} (input.units.crank_angle)?"
+            return f"{text} (table.units.crank_angle)?"
     return ""
 
 
 def _cadence(joint_rpm: float, has_turned: bool, config: MonitorConfig) -> str:
     """Doubt about the angle, or the time once it has turned, if another unit gives the commanded cadence."""
-    units, found = config.input.units, []
+    units, found = config.table.units, []
     rpm, commanded = abs(joint_rpm) / config.crank.gear_ratio, abs(config.cadence.commanded_rpm)
     if 1.0 / _FAR <= rpm / commanded <= _FAR:
         return ""
-    if has_turned and units.stamp in tables.STAMPS and not config.input.rate_hz:
+    if has_turned and units.stamp in tables.STAMPS and not config.table.rate_hz:
         for other, power in tables.STAMPS.items():
-            found.append((rpm * 10.0 ** (tables.STAMPS[units.stamp] - power), "input.units.stamp", other))
-    factor, divisor = config.input.angle_scale
+            found.append((rpm * 10.0 ** (tables.STAMPS[units.stamp] - power), "table.units.stamp", other))
+    factor, divisor = config.table.angle_scale
     for other, (its_factor, its_divisor) in tables.ANGLES.items():
         of_other = rpm * (its_factor / its_divisor) / (factor / divisor)
-        found.append((of_other, "input.units.crank_angle", other))
+        found.append((of_other, "table.units.crank_angle", other))
     sentence = f"the crank turns at {rpm:.3g} rpm, commanded are {commanded:g} rpm"
     best, key, other = min(found, key=lambda each: abs(math.log(each[0] / commanded)))
     fits = 1.0 / _NEAR < best / commanded < _NEAR
@@ -335,7 +335,7 @@ def _speed(speed: Floats, steps_s: Floats, turned: Floats, config: MonitorConfig
         or (by_speed / by_angle > 1.0 / _APART and by_speed / by_angle < _APART)
     ):
         return ""
-    unit = config.input.units.crank_speed
+    unit = config.table.units.crank_speed
     of_unit = tables.SPEEDS[unit][0] / tables.SPEEDS[unit][1]
     text = (
         f"crank_speed is {by_speed / passed_s / of_unit:.4g} {unit} in the mean, but the angle turns at "
@@ -344,5 +344,5 @@ def _speed(speed: Floats, steps_s: Floats, turned: Floats, config: MonitorConfig
     for other, (factor, divisor) in tables.SPEEDS.items():
         ratio = by_speed / of_unit * (factor / divisor) / by_angle
         if other != unit and 1.0 / _APART < ratio < _APART:
-            return f"{text}: is it in {other!r} (input.units.crank_speed)?"
+            return f"{text}: is it in {other!r} (table.units.crank_speed)?"
     return f"{text}: one of the two columns or its unit is wrong"

@@ -112,7 +112,7 @@ def _proposal(names: Sequence[str], units: Sequence[str], texts: Sequence[Sequen
     found = _columns(names)
     for key in (STAMP, CRANK_ANGLE, DRIVE_TORQUE, CRANK_SPEED):
         places = found[key]
-        parameter = f"input.columns.{key}"
+        parameter = f"table.columns.{key}"
         if not places and key == CRANK_SPEED:
             continue
         values[parameter] = names[places[0]] if places else ""
@@ -125,15 +125,15 @@ def _proposal(names: Sequence[str], units: Sequence[str], texts: Sequence[Sequen
         for place in found[key][:1]:
             named = _unit(key, names[place], units[place])
             found_values = _of_time(texts[place], named) if key == STAMP else [(f"units.{key}", named)]
-            values |= {f"input.{name}": value for name, value in found_values if value}
+            values |= {f"table.{name}": value for name, value in found_values if value}
             if not named and key != STAMP:
-                notes[f"input.columns.{key}"] = f"unit unknown: set input.units.{key}"
-    if values.get(f"input.units.{CRANK_ANGLE}") == COUNTS:
-        values["input.counts_per_turn"], notes["input.counts_per_turn"] = 4096.0, "counts of your encoder"
-    if "%d/%m" in values.get("input.date_format", ""):
-        notes["input.date_format"] = "%m/%d/%Y if the month comes first"
+                notes[f"table.columns.{key}"] = f"unit unknown: set table.units.{key}"
+    if values.get(f"table.units.{CRANK_ANGLE}") == COUNTS:
+        values["table.counts_per_turn"], notes["table.counts_per_turn"] = 4096.0, "counts of your encoder"
+    if "%d/%m" in values.get("table.date_format", ""):
+        notes["table.date_format"] = "%m/%d/%Y if the month comes first"
     shown = [f"{name} ({cells[0]})" if cells else name for name, cells in zip(names, texts, strict=True)]
-    needed = (f"input.columns.{key}" for key in (STAMP, CRANK_ANGLE))
+    needed = (f"table.columns.{key}" for key in (STAMP, CRANK_ANGLE))
     return Proposal(values, notes, tuple(name for name in needed if not values[name]), listed(shown))
 
 

@@ -154,7 +154,7 @@ class TableRows:
     """
 
     def __init__(self, path: Path, source: Source, config: MonitorConfig, findings: list[Finding]) -> None:
-        self._path, self._source, self._table = path, source, config.input
+        self._path, self._source, self._table = path, source, config.table
         self._columns = columns_of(config)
         self._places = places(str(path), source.head.names, source.head.taken, self._columns)
         self._lost = Lost(path, source.word, findings)
@@ -230,7 +230,7 @@ class TableRows:
         if is_date != (unit == DATE):
             found = "dates" if is_date else "numbers"
             fault = f"{unit!r} does not fit column {column.name!r}, which has {found}"
-            raise RecordingError(str(self._path), "input.units.stamp", fault)
+            raise RecordingError(str(self._path), "table.units.stamp", fault)
         if is_date:
             return _of_dates(array)
         wide = array if kind == pa.uint64() else array.cast(_WIDE[pa.types.is_integer(kind)])
@@ -331,11 +331,11 @@ def _fault(column: Column, text: str) -> str:
     if column.key == STAMP and (not shown or shown == "nan"):
         return f"empty, expected a time in {unit}"
     if column.key == STAMP and unit == DATE:
-        return f"{shown!r} does not match input.date_format (default: 2026-03-01 09:00:00.001, in UTC)"
+        return f"{shown!r} does not match table.date_format (default: 2026-03-01 09:00:00.001, in UTC)"
     if is_number(text) and not math.isfinite(float(text)):
         return f"{shown} is no time, expected one in {unit}"
     if is_number(text):
-        return f"{shown} {unit} is no time from 1902 to 2038; another unit (input.units.stamp)?"
+        return f"{shown} {unit} is no time from 1902 to 2038; another unit (table.units.stamp)?"
     hint = "; a decimal comma?" if is_number(text.replace(",", ".", 1)) else ""
     if column.key == STAMP and dates([text])[1][0]:
         hint = f"; a date ({column.parameter.replace('columns', 'units')}: {DATE})?"

@@ -42,6 +42,8 @@ RENAMED = {
 
 def new_name(name: str) -> str | None:
     """Present name of a renamed key, including its sections; None for a key that was not renamed."""
+    if name.startswith("input."):
+        return "table." + name.removeprefix("input.")
     section, dot, key = name.rpartition(".")
     return f"{section}{dot}{RENAMED[key]}" if key in RENAMED else None
 

@@ -33,7 +33,7 @@ def _unit_words(measured: float, predicted: float) -> str:
     if not any(1.0 / 3.0 < factor * measured / predicted < 3.0 for factor in (1.0e-3, 1.0e3)):
         return ""
     return (
-        "; that is a factor of 1000: check its unit (of a table input.units.drive_torque, "
+        "; that is a factor of 1000: check its unit (of a table table.units.drive_torque, "
         "else drive_torque.scale)"
     )
 

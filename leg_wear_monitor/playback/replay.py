@@ -53,7 +53,7 @@ def replay(
     ----------
     paths : path, table, or iterable of these
         MCAP, .db3, CSV and Parquet files, bag directories; tables in memory, which are data frames or
-        mappings of column names to arrays. Several are read as one recording. ``input`` of the parameters
+        mappings of column names to arrays. Several are read as one recording. ``table`` of the parameters
         names the columns of tables and their units.
     config : MonitorConfig or path, optional
         Parameters, or the parameter file of the node; default: the file shipped with the package.

@@ -29,7 +29,7 @@ from leg_wear_monitor.messages import outputs
 from leg_wear_monitor.messages.qos import LATCHED, Qos
 from leg_wear_monitor.messages.streams import Output, topic_of
 from leg_wear_monitor.monitor.config.fitting import fitted
-from leg_wear_monitor.monitor.config.parameters import PARAMETERS, config_from
+from leg_wear_monitor.monitor.config.parameters import PARAMETERS, config_from, is_of_node
 from leg_wear_monitor.playback.result import ReplayStatus
 from leg_wear_monitor.ros.running import WAKE_S, executor_for, spin, stamp_ns_of
 
@@ -122,7 +122,7 @@ class _Listener(Node):
         self._client = self.create_client(GetParameters, f"{self._monitor}/get_parameters")
         self._asked: Future | None = None
         self._timer = self.create_timer(_ASK_AGAIN_S, self._ask_now)
-        self._names = list(PARAMETERS)
+        self._names = [name for name in PARAMETERS if is_of_node(name)]
         self._ask_now()
 
     def _ask_now(self) -> None:

@@ -21,6 +21,7 @@ from leg_wear_monitor.errors import ConfigError, did_you_mean, printable
 from leg_wear_monitor.monitor.config.parameters import (
     Parameter,
     changed,
+    is_of_node,
     parameters_of,
     structured,
     values_of,
@@ -299,7 +300,8 @@ class Parameters(Generic[Config]):
         given |= {name: text for name, text in (empty or {}).items() if not given.get(name)}
         self.config: Config = structured(kind, given, self._source)
         for name, value in values_of(self.config).items():
-            _declare(node, parameters_of(kind)[name], value)
+            if is_of_node(name):
+                _declare(node, parameters_of(kind)[name], value)
 
     def follow(
         self,

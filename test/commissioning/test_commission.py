@@ -26,7 +26,7 @@ from .conftest import MakeWalk, Record, Robot, Walk, columns_of
 
 CRANK = JointName("/joint_states", "crank")
 SENSOR = TorqueSource(WRENCH, "/drive_torque", "z")
-NS = {"input.units.stamp": "ns"}
+NS = {"table.units.stamp": "ns"}
 Propose = Callable[..., CommissioningResult]
 # What clearances of 0.3 mm in five joints do to phase and torque, at 60 rpm in ten turns
 PHASE_RAD, TORQUE = 0.03, 0.05
@@ -234,7 +234,7 @@ def test_the_limit_of_the_mismatch_is_that_of_the_leg(
             "drive_torque": torque + 0.1 * random.standard_normal(len(angle)),
         }
         result = commission(table, config)
-        assert result.config is not None and result.config.input == config.input
+        assert result.config is not None and result.config.table == config.table
         assert result.item("crank.sign").value == -1
         assert result.item("crank.offset_rad").value == pytest.approx(1.0, abs=0.03)
         (item,) = (each for each in result.items if each.name == "limits.torque_mismatch")

@@ -114,4 +114,4 @@ def test_the_pages_have_the_numbers_and_units_of_the_code() -> None:
     for words, number in numbers.items():
         assert f"{words} {number:,}".replace(",", " ") in reference
     assert f"{1.0 / TAKE_S:g} times a second the node takes" in reference
-    assert f"`input.units.foot_load` is {' or '.join(f'`{unit}`' for unit in FORCES)}" in tables
+    assert f"`table.units.foot_load` is {' or '.join(f'`{unit}`' for unit in FORCES)}" in tables

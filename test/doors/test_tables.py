@@ -131,7 +131,7 @@ def test_check_of_a_table_alone_proposes_parameters_with_which_it_is_read(
     done = run("check", table)
     assert (done.code, done.lines) == (0, [])
     proposal = done.out[done.out.index("/**:") :]
-    found = YAML(typ="safe").load(proposal)["/**"]["ros__parameters"]["input"]
+    found = YAML(typ="safe").load(proposal)["/**"]["ros__parameters"]["table"]
     assert found["columns"] == columns
     assert found["units"] == units
     config = write("start.yaml", proposal)
@@ -157,7 +157,7 @@ def test_rows_of_numbers_are_rows_without_names(run, write: Write, start: str) -
     (line,) = done.lines
     assert "Expected one of: 1 (0), 2 (1.0), 3 (0.0), 4 (" in line
     columns = 'stamp: "2", crank_angle: "3", drive_torque: "4"'
-    config = write("start.yaml", f"/**: {{ros__parameters: {{input: {{columns: {{{columns}}}}}}}}}\n")
+    config = write("start.yaml", f"/**: {{ros__parameters: {{table: {{columns: {{{columns}}}}}}}}}\n")
     assert samples_of(table, config)[:2] == (ROWS, ROWS)
 
 
@@ -172,7 +172,7 @@ def test_the_message_shows_the_line_that_was_taken_for_the_names(run, write: Wri
 
 @pytest.mark.parametrize("unit", ["Nm", "N m"])
 def test_a_torque_in_nm_may_be_written_without_a_space(run, write: Write, unit: str) -> None:
-    text = f"/**: {{ros__parameters: {{input: {{units: {{drive_torque: {unit}}}}}}}}}\n"
+    text = f"/**: {{ros__parameters: {{table: {{units: {{drive_torque: {unit}}}}}}}}}\n"
     assert run("check", write("start.yaml", text), write("leg.csv", CASES["plain"])).code == 0
 
 

@@ -100,6 +100,11 @@ PARAMETERS: Mapping[str, Parameter] = parameters_of(MonitorConfig)
 """Those of the monitor."""
 
 
+def is_of_node(name: str) -> bool:
+    """Whether a node has the parameter. Parameters of tables are for recordings only."""
+    return not name.startswith("table.")
+
+
 def config_from(values: Mapping[str, Any], source: str = "parameters") -> MonitorConfig:
     """Configuration of the monitor; see `structured`."""
     return structured(MonitorConfig, values, source)

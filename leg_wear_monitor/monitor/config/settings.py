@@ -239,7 +239,7 @@ class MonitorConfig:
     drive: DriveParameters = described("", factory=DriveParameters)
     foot_load: FootLoad = described("", factory=FootLoad)
     load: Load = described("", factory=Load)
-    input: TableInput = described("", factory=TableInput)
+    table: TableInput = described("", factory=TableInput)
     cadence: Cadence = described("", factory=Cadence)
     tracker: Tracker = described("", factory=Tracker)
     limits: Limits = described("", factory=Limits)

@@ -47,7 +47,7 @@ class Columns:
     """Names of the columns."""
 
     stamp: str = described(
-        "column of the time; not read if input.rate_hz is set", default="time", check=_filled
+        "column of the time; not read if table.rate_hz is set", default="time", check=_filled
     )
     crank_angle: str = described(
         "column of the position of the crank's joint", default="crank_angle", check=_filled
@@ -70,14 +70,14 @@ class Units:
 
     stamp: str = choice(
         (*STAMPS, DATE),
-        "unit of the time, since 1970 or since input.start; date: dates and times such as "
+        "unit of the time, since 1970 or since table.start; date: dates and times such as "
         "2026-03-01 09:00:00.001, in UTC",
         default="s",
     )
     crank_angle: str = choice(
         (*ANGLES, COUNTS),
         "unit of the position, also of further encoders; counts: those of the encoder, "
-        "input.counts_per_turn a turn",
+        "table.counts_per_turn a turn",
         default="rad",
     )
     crank_speed: str = choice(tuple(SPEEDS), "unit of the speed", default="rad/s")
@@ -110,12 +110,12 @@ class TableInput:
     )
     rate_hz: float = quantity(
         "Hz",
-        "rows per second of a table without a column of the time; 0: there is input.columns.stamp",
+        "rows per second of a table without a column of the time; 0: there is table.columns.stamp",
         within=(0.0, 1.0e6),
         default=0.0,
     )
     date_format: str = described(
-        "format of the dates of input.units.stamp date, such as %d.%m.%Y %H:%M:%S.%f; in UTC, unless it has "
+        "format of the dates of table.units.stamp date, such as %d.%m.%Y %H:%M:%S.%f; in UTC, unless it has "
         "%z; empty: ISO 8601, such as 2026-03-01 09:00:00.001",
         default="",
     )

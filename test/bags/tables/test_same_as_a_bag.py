@@ -12,7 +12,7 @@ from leg_wear_monitor.monitor.config.inputs import TORQUE_SOURCES
 from leg_wear_monitor.monitor.config.parameters import config_from
 
 Read = Callable[..., Any]
-NS = {"input.units.stamp": "ns", "input.columns.crank_speed": "crank_speed"}
+NS = {"table.units.stamp": "ns", "table.columns.crank_speed": "crank_speed"}
 NAMES = ("time", "crank_angle", "crank_speed", "drive_torque")
 FIELDS = ("stamp_ns", "crank_angle_rad", "crank_velocity_radps", "torque_nm")
 
@@ -66,7 +66,7 @@ def test_arrays_frames_and_parquet_give_the_samples_of_the_bag(tmp_path, sent, e
 
 
 def test_dates_are_stamps_to_the_nanosecond(tmp_path, sent, expected, read):
-    config = config_from(NS | {"input.units.stamp": "date"})
+    config = config_from(NS | {"table.units.stamp": "date"})
     columns = columns_of(expected(sent))
     dates = columns["time"].view("datetime64[ns]")
     assert read(columns | {"time": dates}, config=config)[0].tobytes() == expected(sent).tobytes()
@@ -84,7 +84,7 @@ def test_times_in_any_unit_are_exact(tmp_path, read, unit, power, start_ns):
     stamps = start_ns + np.random.default_rng(power).integers(1, 10**13, 300)
     lines = [f"{Decimal(int(stamp)).scaleb(-power)},0.5" for stamp in stamps]
     (tmp_path / "a.csv").write_text("\n".join(["time,crank_angle", *lines]) + "\n")
-    config = config_from({"input.units.stamp": unit, "input.columns.drive_torque": ""})
+    config = config_from({"table.units.stamp": unit, "table.columns.drive_torque": ""})
     assert np.array_equal(read(tmp_path / "a.csv", config=config)[0]["stamp_ns"], stamps)
 
 
@@ -106,12 +106,12 @@ def test_a_torque_comes_as_the_parameters_say(read, source):
 def test_units_become_si(read):
     config = config_from(
         {
-            "input.units.stamp": "ms",
-            "input.units.crank_angle": "deg",
-            "input.units.crank_speed": "rpm",
-            "input.units.drive_torque": "N mm",
-            "input.columns.crank_speed": "speed",
-            "input.start": "2026-03-01T00:00:00Z",
+            "table.units.stamp": "ms",
+            "table.units.crank_angle": "deg",
+            "table.units.crank_speed": "rpm",
+            "table.units.drive_torque": "N mm",
+            "table.columns.crank_speed": "speed",
+            "table.start": "2026-03-01T00:00:00Z",
         }
     )
     columns = {"time": [0, 1], "crank_angle": [90, 180], "speed": [60, 30], "drive_torque": [12345, 0.1]}
@@ -144,10 +144,10 @@ def test_further_encoders_are_columns_by_their_names(read):
 def test_rows_without_a_time_come_at_their_rate(tmp_path, read):
     config = config_from(
         {
-            "input.columns.drive_torque": "",
-            "input.columns.crank_angle": "2",
-            "input.rate_hz": 400.0,
-            "input.start": "1970-01-01T00:00:01",
+            "table.columns.drive_torque": "",
+            "table.columns.crank_angle": "2",
+            "table.rate_hz": 400.0,
+            "table.start": "1970-01-01T00:00:01",
         }
     )
     (tmp_path / "a.csv").write_text("7,0.1\n7,x\n7,0.3\n")  # and no names: columns have numbers
@@ -171,7 +171,7 @@ def test_several_files_and_a_bag_are_one_recording(tmp_path, traffic, write_bag,
 def test_a_file_larger_than_a_block_is_read_whole(tmp_path, read):
     stamps = 1 + np.arange(60_000)
     columns = {"time": stamps, "crank_angle": np.random.default_rng(0).normal(size=len(stamps))}
-    config = config_from({"input.units.stamp": "ms", "input.columns.drive_torque": ""})
+    config = config_from({"table.units.stamp": "ms", "table.columns.drive_torque": ""})
     path = write_csv(tmp_path / "a.csv", columns)
     samples, _ = read(path, config=config, memory_mb=16.0)
     assert np.array_equal(samples["crank_angle_rad"], columns["crank_angle"])

@@ -78,6 +78,10 @@ FILES = [
         ["limits.warn_share", "is now called limits.warn_fraction"],
     ),
     ("/**: {ros__parameters: {loose_joints: [A]}}", ["loose_joints", "is now called clearance_joints"]),
+    (
+        "/**: {ros__parameters: {input: {units: {stamp: ms}}}}",
+        ["input.units.stamp", "is now called table.units.stamp"],
+    ),
     ("/**: {ros__parameters: {limits: {warn: 0.7}}}", ["limits.warn", "unknown parameter", "warn_fraction"]),
 ]
 

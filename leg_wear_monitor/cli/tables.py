@@ -119,7 +119,7 @@ def _wear_cells(joint: "JointResult") -> list[str]:
         figure(joint.archard_integral_j_per_cycle),
         figure(1.0e12 * depth.bushing_max),
         figure(1.0e12 * depth.journal_max),
-        "-" if zone is None else f"{zone[0] % 360.0:.0f} to {zone[1] % 360.0:.0f}",
+        "-" if zone is None else f"{zone[0]:.0f} to {zone[1]:.0f}",
     ]
 
 

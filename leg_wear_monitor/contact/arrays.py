@@ -44,13 +44,22 @@ class ContactArrays(NamedTuple):
     wear_coefficient: Floats
 
 
+_KEYS = {"clearance_m": "radial_clearance", "normal_law": "normal_law", "restitution": "restitution"}
+_OF_FRICTION = {"friction": "law", "friction_coefficient": "coefficient"}
+
+
 def clearance_settings(
-    mechanism: Mechanism,
-    joints: Sequence[str],
-    clearance_m: float | None = None,
-    normal_law: str | None = None,
+    mechanism: Mechanism, joints: Sequence[str], **options: float | str | None
 ) -> list[Clearance]:
-    """Settings of the clearance joints, with a common clearance [m] and a common normal law if given.
+    """Settings of the clearance joints, with the same values for all of them in place of the mechanism's own.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    joints : sequence of str
+    **options
+        ``clearance_m``, ``normal_law``, ``restitution``, ``friction``, ``friction_coefficient``: as in
+        `simulate`.
 
     Returns
     -------
@@ -62,11 +71,10 @@ def clearance_settings(
     ConfigError
         Names the joint without settings, or the invalid setting.
     """
-    changes: dict[str, Any] = {}
-    if clearance_m is not None:
-        changes["radial_clearance"] = clearance_m
-    if normal_law is not None:
-        changes["normal_law"] = normal_law
+    given: dict[str, Any] = {name: value for name, value in options.items() if value is not None}
+    changes = {key: given[name] for name, key in _KEYS.items() if name in given}
+    of_friction = {key: given[name] for name, key in _OF_FRICTION.items() if name in given}
+    options_of = {key: name.replace("_", "-") for name, key in (_KEYS | _OF_FRICTION).items()}
     settings = {}
     for name in joints:
         if name not in mechanism.clearances:
@@ -76,11 +84,12 @@ def clearance_settings(
                 "",
                 f"{name!r} has no clearance settings in {mechanism.source}, expected some of: {known}",
             )
+        own = mechanism.clearances[name]
         try:
-            settings[name] = attrs.evolve(mechanism.clearances[name], **changes)
+            friction = attrs.evolve(own.friction, **of_friction)
+            settings[name] = attrs.evolve(own, friction=friction, **changes)
         except FieldError as error:
-            option = {"radial_clearance": "clearance-m", "normal_law": "normal-law"}[error.key]
-            raise ConfigError(option, "", f"{error.fault} (joint {name})") from error
+            raise ConfigError(options_of[error.key], "", f"{error.fault} (joint {name})") from error
         _refuse_stiffness(mechanism.source, name, settings[name])
     _warn_of_restitution(mechanism.source, settings)
     return list(settings.values())

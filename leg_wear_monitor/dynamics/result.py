@@ -158,8 +158,8 @@ class JointResult:
     wear_depth_m_per_cycle : WearDepth or None
         Of both surfaces.
     wear_zone_deg : tuple of two floats or None
-        Narrowest zone (from, to) [deg] with 90 % of the bushing's wear, in the frame of the bushing's body;
-        None without wear.
+        Narrowest zone (from, to) [deg] with 90 % of the bushing's wear, in the frame of the bushing's body,
+        from 0 to 360; ``to`` is below ``from`` if the zone crosses 0. None without wear.
     clearance_m : ClearanceResult or None
         Radial clearance at the end.
     mean_pressure_pa : float or None
@@ -228,7 +228,7 @@ class Impact:
     peak_n: float
 
 
-@attrs.frozen(eq=False)
+@attrs.frozen(eq=False, repr=False)
 class Trace:
     """n samples at equal time steps.
 
@@ -251,6 +251,9 @@ class Trace:
     toe_y_m: Floats | None
     drive_torque_nm: Floats
     force_n: dict[str, Floats]
+
+    def __repr__(self) -> str:
+        return f"<Trace: {len(self.crank_angle_rad)} samples, joints {', '.join(self.force_n)}>"
 
 
 # Parts of a simulation's result as JSON objects.
@@ -342,7 +345,7 @@ SCHEMA_VERSION = 1
 """Version of the JSON schema; incremented when a field is renamed, removed or changes its meaning."""
 
 
-@attrs.frozen(eq=False)
+@attrs.frozen(eq=False, repr=False)
 class SimulationResult:
     """Result of `simulate` over the counted cycles.
 
@@ -394,6 +397,13 @@ class SimulationResult:
     standard_error: dict[str, float] | None = None
     clearance_joints: tuple[str, ...] = ()
     surfaces: Surfaces | None = None
+
+    def __repr__(self) -> str:
+        joints = ", ".join(self.clearance_joints) or "none"
+        return (
+            f"<SimulationResult: {self.mechanism}, model {self.model}, {self.speed_rpm:g} rpm, "
+            f"{self.cycles:g} gait cycles, clearance joints {joints}>"
+        )
 
     def to_dict(self, wall_s: float | None = None) -> dict[str, Any]:
         """Plain object: what ``simulate --json`` writes.

@@ -208,12 +208,13 @@ def prepare(
     mechanism: Mechanism,
     *,
     clearances: Sequence[str] | None = None,
-    clearance_m: float | None = None,
     speed_rpm: float | None = None,
     wear: bool = False,
-    normal_law: str | None = None,
+    **of_contacts: float | str | None,
 ) -> Setup:
-    """Check that a mechanism can move, and prepare it for a run; parameters as in `simulate`.
+    """Check that a mechanism can move, and prepare it for a run.
+
+    Parameters are as in `simulate`; ``of_contacts`` are options of `clearance_settings`.
 
     Returns
     -------
@@ -226,7 +227,8 @@ def prepare(
     AssemblyError
         If the linkage does not close or has a dead point.
     """
-    check_kinds(clearance_m=clearance_m, speed_rpm=speed_rpm)
+    numbers = ("clearance_m", "restitution", "friction_coefficient")
+    check_kinds(speed_rpm=speed_rpm, **{name: of_contacts.get(name) for name in numbers})
     clearance_joints = (
         mechanism.clearance_joints if clearances is None else given_joints(clearances, mechanism)
     )
@@ -235,7 +237,7 @@ def prepare(
         check_cycle(linkage)
     except AssemblyError as error:
         raise AssemblyError(f"{error}{suspects(mechanism)}") from error
-    settings = clearance_settings(mechanism, clearance_joints, clearance_m, normal_law)
+    settings = clearance_settings(mechanism, clearance_joints, **of_contacts)
     contacts = compile_contacts(mechanism, clearance_joints, settings)
     return Setup(
         linkage,
@@ -259,6 +261,10 @@ def simulate(
     model: str | None = None,
     wear: bool = False,
     normal_law: str | None = None,
+    restitution: float | None = None,
+    friction: str | None = None,
+    friction_coefficient: float | None = None,
+    toe: str | None = None,
     trace: int = 0,
     intervals: int | None = None,
     progress: Callable[[float], None] | None = None,
@@ -285,6 +291,14 @@ def simulate(
         Whether wear widens the clearances during the run; it is counted in any case.
     normal_law : str, optional
         Normal contact law of all clearance joints.
+    restitution : float, optional
+        Coefficient of restitution of all clearance joints.
+    friction : str, optional
+        Friction law of all clearance joints.
+    friction_coefficient : float, optional
+        Friction coefficient of all clearance joints.
+    toe : str, optional
+        Point whose motion is reported, with its body, such as ``shank.G``; default: the point called ``toe``.
     trace : int
         Stored samples per cycle; 0 for none. The first is where counting begins: at crank angle 0 after whole
         ``skip_cycles``, and of the ideal leg. They do not change the run. Each is integrated to its own
@@ -321,18 +335,16 @@ def simulate(
     True
     """
     mechanism = given_mechanism(mechanism)
+    mechanism = mechanism if toe is None else mechanism.with_toe(toe)
     check_kinds(cycles=cycles, duration_s=duration_s, skip_cycles=skip_cycles, trace=trace, wear=wear)
     check_kinds(intervals=intervals)
-    setup = prepare(
-        mechanism,
-        clearances=clearances,
-        clearance_m=clearance_m,
-        speed_rpm=speed_rpm,
-        wear=wear,
-        normal_law=normal_law,
-    )
+    of_contacts: dict[str, float | str | None] = {
+        "clearance_m": clearance_m, "normal_law": normal_law, "restitution": restitution,
+        "friction": friction, "friction_coefficient": friction_coefficient,
+    }  # fmt: skip
+    setup = prepare(mechanism, clearances=clearances, speed_rpm=speed_rpm, wear=wear, **of_contacts)
     if not setup.clearance_joints:
-        of_joints = {"clearance-m": clearance_m, "wear": wear or None, "normal-law": normal_law}
+        of_joints = of_contacts | {"wear": wear or None}
         is_ideal = isinstance(mechanism.drive, SpeedDrive)
         _refuse(of_joints | ({"model": model, "intervals": intervals} if is_ideal else {}))
     model = model or default_model(mechanism)
@@ -356,7 +368,9 @@ def _refuse(options: Mapping[str, object]) -> None:
     """Refuse options that a leg without clearance joints would ignore."""
     for name, value in options.items():
         if value is not None:
-            raise ConfigError(name, "", "is for clearance joints, and no joint has clearance")
+            raise ConfigError(
+                name.replace("_", "-"), "", "is for clearance joints, and no joint has clearance"
+            )
 
 
 def _check_intervals(intervals: int | None, model: str) -> None:

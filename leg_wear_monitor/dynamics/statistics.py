@@ -51,7 +51,7 @@ def drive_torque(statistics: RunStatistics) -> TorqueResult:
         rms=float(np.sqrt(square)),
         min=float(statistics.drive_range[0]),
         max=float(statistics.drive_range[1]),
-        p99=signed_percentile(statistics.torque_time, 0.99),
+        p99=min(signed_percentile(statistics.torque_time, 0.99), float(statistics.drive_range[1])),
         max_abs=float(np.abs(statistics.drive_range).max()),
         max_error=float(statistics.response[3]),
     )
@@ -203,13 +203,20 @@ def joint_statistics(
         psi, doubt = _contact(setup, k, found[name].p99_force_n)
         found[name] = attrs.evolve(
             found[name],
-            wear_zone_deg=wear_zone(worn[k, BUSHING]),
+            wear_zone_deg=_within_turn(wear_zone(worn[k, BUSHING])),
             clearance_m=_clearance(setup, k),
             holds_for=regime_of(setup.linkage.mechanism.clearances[name]),
             contact_half_angle_deg=math.degrees(psi),
             outside_contact_law=doubt,
         )
     return found
+
+
+def _within_turn(zone: tuple[float, float] | None) -> tuple[float, float] | None:
+    """The zone with both angles from 0 to 360 [deg]; ``to`` is the smaller one if the zone crosses 0."""
+    if zone is None or zone[1] <= 360.0:
+        return zone
+    return zone[0], zone[1] - 360.0
 
 
 def _mean_loads(
@@ -223,7 +230,8 @@ def _mean_loads(
         forces = JointResult(
             mean_force_n=float(mean),
             rms_force_n=float(np.sqrt(square)),
-            p99_force_n=percentile(statistics.force_time[joint], 0.99),
+            # a percentile is exact to the width of its bin, which may reach beyond the largest force
+            p99_force_n=min(percentile(statistics.force_time[joint], 0.99), float(statistics.peak[joint])),
             max_force_n=float(statistics.peak[joint]),
         )
         if name not in setup.clearance_joints:

@@ -12,7 +12,7 @@ import click
 from leg_wear_monitor.cli import common
 from leg_wear_monitor.errors import ConfigError, ConfigWarning, LegWearError, printable
 from leg_wear_monitor.files import Stamp, share_directory, stamp_of
-from leg_wear_monitor.mechanism import NORMAL_LAWS
+from leg_wear_monitor.mechanism import FRICTION_LAWS, NORMAL_LAWS
 
 if TYPE_CHECKING:
     from leg_wear_monitor.dynamics.result import SimulationResult
@@ -288,6 +288,19 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
     f"Normal contact law of all clearance joints: {', '.join(NORMAL_LAWS)}.",
     type=click.Choice(NORMAL_LAWS),
 )
+@common.number_option(
+    "--restitution", "E", "Coefficient of restitution of all clearance joints.", "", above=0.0
+)
+@common.option(
+    "--friction",
+    "NAME",
+    f"Friction law of all clearance joints: {', '.join(FRICTION_LAWS)}.",
+    type=click.Choice(FRICTION_LAWS),
+)
+@common.number_option(
+    "--friction-coefficient", "MU", "Friction coefficient of all clearance joints.", "", at_least=0.0
+)
+@common.option("--toe", "BODY.POINT", "Point whose motion is reported.  [default: the point called toe]")
 @click.option(
     "--trace",
     type=click.IntRange(min=0),

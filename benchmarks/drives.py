@@ -176,7 +176,7 @@ def watched(
     first: int = 0,
     config: MonitorConfig | None = None,
     periods: int = 1,
-    counted_m: np.ndarray = NEW,
+    modelled_m: np.ndarray = NEW,
 ) -> tuple[observer.TorqueObserver, list[str]]:
     """The observer after gait cycles with given signatures; what it named, corrected or stopped, and when.
 
@@ -185,7 +185,7 @@ def watched(
     """
     left, reference = iter(rows), shipped_references(leg)[0]
     one = one or observer.TorqueObserver(leg, config or MonitorConfig(), size_nm, NEW)
-    counted, found = counted_m.copy(), []
+    counted, found = modelled_m.copy(), []
     joints, limit_m, second = leg.clearance_joints, MonitorConfig().limits.clearance_m, 10**9
 
     def next_cycle(state, begin_ns, end_ns):

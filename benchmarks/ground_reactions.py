@@ -19,8 +19,8 @@ from leg_wear_monitor.mechanism.person import (
     PHASES,
     Stance,
     nominal_stance,
-    on_the_ground,
     stance_template,
+    with_ground_reaction,
     with_toe_force,
 )
 from leg_wear_monitor.mechanism.position import build_linkage
@@ -124,7 +124,7 @@ def wear(measured: list[Measured], peak_n: float, runs: int, cycles: int) -> Ite
     """Rows on wear counted under the template, against wear under each shape in full coordinates."""
     leg = load_mechanism("bionic_leg")
     stance = nominal_stance(build_linkage(leg))
-    known = archard(on_the_ground(leg, peak_n), "clearance", runs, cycles)
+    known = archard(with_ground_reaction(leg, peak_n), "clearance", runs, cycles)
     air = archard(leg, "clearance", runs, cycles)
     template = Measured("template itself", *(one[None] for one in stance_template(S)))
     template = template._replace(fore_aft=FORE_AFT * template.fore_aft)

@@ -59,7 +59,7 @@ def against_every_cycle(leg: Mechanism, cycles: int) -> None:
     )
     print("                              wear off, % | profile off, RMS % of deepest | worst sector, deg")
     for length in LENGTHS:
-        jump = JumpControl(opens_m=length)
+        jump = JumpControl(max_wear_per_jump_m=length)
         began = time.process_time()
         lives = [
             lived(leg, LifeSettings(jump=jump, seed=seed), HASTE, FAR_M, float(cycles)) for seed in SEEDS

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from leg_wear_monitor.life.result import Duty, Life
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.mechanism.materials import Material, load_material, materials
-    from leg_wear_monitor.mechanism.person import on_the_ground, with_person
+    from leg_wear_monitor.mechanism.person import with_ground_reaction, with_person
     from leg_wear_monitor.mechanism.sourced import Drive, drives, load_drive
     from leg_wear_monitor.mechanism.spec import Mechanism
     from leg_wear_monitor.monitor.config.parameters import load_config
@@ -79,7 +79,7 @@ _HOME = {
     "load_material": "mechanism.materials",
     "load_mechanism": "mechanism.loader",
     "materials": "mechanism.materials",
-    "on_the_ground": "mechanism.person",
+    "with_ground_reaction": "mechanism.person",
     "open_ledger": "monitor.ledger.ledger",
     "plot": "report.plot",
     "replay": "playback.replay",
@@ -129,13 +129,13 @@ __all__ = [
     "load_material",
     "load_mechanism",
     "materials",
-    "on_the_ground",
     "open_ledger",
     "plot",
     "replay",
     "share_directory",
     "simulate",
     "simulate_life",
+    "with_ground_reaction",
     "with_person",
 ]
 

@@ -14,7 +14,7 @@ import attrs
 from leg_wear_monitor.configuration import part_document
 from leg_wear_monitor.files import finite_or_none, json_text
 
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
 """Of the JSON; counts up when a field is renamed, removed or means something else."""
 
 
@@ -155,20 +155,20 @@ class JointClearance:
 
     Attributes
     ----------
-    believed_m : float or None
+    best_estimate_m : float or None
         The clearance that the verdict rests on; None where nothing known of the joint is valid.
-    believed_sigma_m : float or None
+    best_estimate_sigma_m : float or None
         Its standard deviation.
-    believed_by : str or None
-        Whose it is: ``counted``, ``torque``, ``encoders``, ``measured``, or ``both`` for what counting and
-        measurements give together.
-    counted_m : float
+    best_estimate_source : str or None
+        Its source: ``modelled``, ``torque``, ``encoders``, ``measured``, or ``wear_and_measurement`` if
+        modelled wear and measurements give it together.
+    modelled_m : float
         Clearance when new, plus the wear counted since.
-    seen_m : float or None
+    estimated_m : float or None
         Clearance that measurements of the gait show.
-    seen_sigma_m : float or None
+    estimated_sigma_m : float or None
         Its standard deviation.
-    seen_by : tuple of str
+    estimated_by : tuple of str
         What shows it, such as ``encoders``.
     measured_m : float or None
         Clearance that somebody measured last on this part.
@@ -182,13 +182,13 @@ class JointClearance:
         What the verdict's findings say of the joint; ``not_monitored`` where nothing known of it is valid.
     """
 
-    believed_m: float | None = None
-    believed_sigma_m: float | None = None
-    believed_by: str | None = None
-    counted_m: float
-    seen_m: float | None = None
-    seen_sigma_m: float | None = None
-    seen_by: tuple[str, ...] = ()
+    best_estimate_m: float | None = None
+    best_estimate_sigma_m: float | None = None
+    best_estimate_source: str | None = None
+    modelled_m: float
+    estimated_m: float | None = None
+    estimated_sigma_m: float | None = None
+    estimated_by: tuple[str, ...] = ()
     measured_m: float | None = None
     measured_sigma_m: float | None = None
     new_m: float
@@ -280,7 +280,7 @@ class TorqueDiagnosis:
     Attributes
     ----------
     state : str
-        ``off``, ``waiting``, ``as_counted`` or ``changed``.
+        ``off``, ``waiting``, ``as_modelled`` or ``changed``.
     reason : str
         Why there is no estimate yet, or why it is not to be believed now; empty otherwise.
     cycles_used : int

@@ -40,8 +40,8 @@ class Clock:
 def state_of(second=1, clearance_m=3.1e-4, **verdict):
     """The state of a leg whose joints all have one clearance; healthy, unless its verdict is another."""
     joint = JointClearance(
-        believed_m=clearance_m, believed_by="counted", counted_m=clearance_m, new_m=3.0e-4, limit_m=6.0e-4,
-        status=State.HEALTHY,
+        best_estimate_m=clearance_m, best_estimate_source="modelled", modelled_m=clearance_m, new_m=3.0e-4,
+        limit_m=6.0e-4, status=State.HEALTHY,
     )  # fmt: skip
     return LegState(
         verdict=attrs.evolve(HEALTHY, **verdict),

@@ -64,12 +64,13 @@ def made_up_state() -> LegState:
         ),
         clearances={
             "A": JointClearance(
-                believed_m=5e-4, believed_sigma_m=1e-5, believed_by="encoders", counted_m=4e-4, seen_m=5e-4,
-                seen_sigma_m=1e-5, seen_by=("encoders",), new_m=3e-4, limit_m=6e-4, status=State.INSPECT,
+                best_estimate_m=5e-4, best_estimate_sigma_m=1e-5, best_estimate_source="encoders",
+                modelled_m=4e-4, estimated_m=5e-4, estimated_sigma_m=1e-5, estimated_by=("encoders",),
+                new_m=3e-4, limit_m=6e-4, status=State.INSPECT,
             ),
             "B": JointClearance(
-                believed_m=4e-4, believed_by="counted", counted_m=4e-4, new_m=3e-4, limit_m=6e-4,
-                status=State.HEALTHY,
+                best_estimate_m=4e-4, best_estimate_source="modelled", modelled_m=4e-4, new_m=3e-4,
+                limit_m=6e-4, status=State.HEALTHY,
             ),
         },
         drive=Drive(

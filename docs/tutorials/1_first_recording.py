@@ -98,10 +98,10 @@ knocking = lw.replay(checkout / "bags/knocking.mcap", config).summary()
 
 print(knocking.verdict.state.value, knocking.verdict.joints, knocking.verdict.fault_code)
 for joint, clearance in knocking.clearances.items():
-    if clearance.seen_m is None:
+    if clearance.estimated_m is None:
         print(f"{joint}: not observable")
     else:
-        print(f"{joint}: {1e3 * clearance.seen_m:.2f} ± {1e3 * clearance.seen_sigma_m:.2f} mm")
+        print(f"{joint}: {1e3 * clearance.estimated_m:.2f} ± {1e3 * clearance.estimated_sigma_m:.2f} mm")
 
 # %%
 # Draw when it happened, and where:
@@ -114,9 +114,9 @@ when.axhline(config.limits.torque_mismatch, color="gray", linestyle="--", label=
 when.set(xlabel="gait cycle", ylabel="torque mismatch", ylim=(0, None))
 when.legend()
 
-joints = [joint for joint, one in knocking.clearances.items() if one.seen_m is not None]
-seen = [1e3 * knocking.clearances[joint].seen_m for joint in joints]
-sigma = [1e3 * knocking.clearances[joint].seen_sigma_m for joint in joints]
+joints = [joint for joint, one in knocking.clearances.items() if one.estimated_m is not None]
+seen = [1e3 * knocking.clearances[joint].estimated_m for joint in joints]
+sigma = [1e3 * knocking.clearances[joint].estimated_sigma_m for joint in joints]
 where.errorbar(joints, seen, yerr=sigma, fmt="o", capsize=4, label="shown by the torque")
 where.axhline(1e3 * knocking.clearances["G"].limit_m, color="gray", linestyle="--", label="limit")
 where.set(xlabel="joint", ylabel="radial clearance [mm]", ylim=(0, None))

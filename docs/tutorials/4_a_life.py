@@ -56,8 +56,8 @@ replayed = lw.replay(bags / "healthy.mcap", config)
 monitor, counted = replayed.monitor, replayed.summary()
 
 walked = factor * counted.cycles
-counted_m = counted.clearances["A"].counted_m
-print(f"after {walked:.3g} gait cycles the counted clearance of A is {1e3 * counted_m:.3f} mm")
+modelled_m = counted.clearances["A"].modelled_m
+print(f"after {walked:.3g} gait cycles the counted clearance of A is {1e3 * modelled_m:.3f} mm")
 
 
 def hours_left(forecast):

@@ -11,7 +11,7 @@ Then you let it wear through days of standing, walking and carrying, and learn w
 # ----------------------------
 #
 # The default leg walks in the air.
-# ``on_the_ground`` lets the ground push its toe as it pushes a person's foot in stance.
+# ``with_ground_reaction`` lets the ground push its toe as it pushes a person's foot in stance.
 # The number is the largest vertical force: someone of 75 kg has 800 N, and an exoskeleton that carries a part of it has less.
 
 import matplotlib.pyplot as plt
@@ -22,7 +22,7 @@ cycles = 10  # gait cycles of each simulation
 leg = lw.load_mechanism("bionic_leg")
 loads_n = (0, 300, 600)
 
-results = [lw.simulate(lw.on_the_ground(leg, load_n), cycles=cycles) for load_n in loads_n]
+results = [lw.simulate(lw.with_ground_reaction(leg, load_n), cycles=cycles) for load_n in loads_n]
 
 print("mean force [N] in")
 for load_n, result in zip(loads_n, results, strict=True):
@@ -70,7 +70,7 @@ carrying = lw.with_person(leg, 80.0)
 for name in ("thigh", "shank", "foot"):
     print(f"{name}: {leg.bodies[name].mass:.1f} kg, with the person {carrying.bodies[name].mass:.1f} kg")
 
-carried = lw.simulate(lw.on_the_ground(carrying, 600), cycles=cycles)
+carried = lw.simulate(lw.with_ground_reaction(carrying, 600), cycles=cycles)
 print(f"drive torque: rms {results[-1].drive_torque_nm.rms:.0f} N m without the person's leg, "
       f"{carried.drive_torque_nm.rms:.0f} N m with it")  # fmt: skip
 for joint, before, after in zip(leg.clearance_joints, ground, archard(carried), strict=True):

@@ -15,7 +15,7 @@ import numpy as np
 
 from leg_wear_monitor import Mechanism, SimulationResult, load_mechanism, simulate
 from leg_wear_monitor.dynamics.batch import Leg, simulate_batch
-from leg_wear_monitor.mechanism.person import on_the_ground
+from leg_wear_monitor.mechanism.person import with_ground_reaction
 
 LEGS = ("bionic_leg", "jansen_leg")
 SPEEDS_RPM = (30.0, 60.0, 90.0)
@@ -182,7 +182,7 @@ def ground_tables(runs: int, cycles: int) -> Iterator[Comparison]:
     print(f"\n### On the ground: {leg.name}, 60 rpm\n")
     table("vertical peak [N]", "joint", *FIGURES.values(), ZONE)
     for load_n in LOADS_N:
-        case = Case(on_the_ground(leg, load_n), SETS[-1], 60.0)
+        case = Case(with_ground_reaction(leg, load_n), SETS[-1], 60.0)
         full, other = (case.simulated(runs, cycles, model) for model in ("full", "clearance"))
         for k, joint in enumerate(case.clearance_joints):
             figures = [compare(full.joints[:, k, i], other.joints[:, k, i]) for i in range(len(FIGURES))]

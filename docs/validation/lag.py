@@ -80,15 +80,15 @@ def followed(settings: TrackerSettings, torque: Floats) -> tuple[Floats, float]:
 def main() -> None:
     """Print the table."""
     truth, torque = leg()
-    for lag_s, node_interval_s in LAGS_S:
-        settings = TrackerSettings(lag_s=lag_s, node_interval_s=node_interval_s)
+    for lag_s, knot_interval_s in LAGS_S:
+        settings = TrackerSettings(lag_s=lag_s, knot_interval_s=knot_interval_s)
         angle, speed, acceleration = motion_errors(settings)
         slower = motion_errors(settings, 200.0)[2]
         wear, unexplained = followed(settings, torque)
         first = wear[:, 0].mean() / truth[:, 0].mean() - 1.0
         rest = wear[:, 1:].sum(axis=1).mean() / truth[:, 1:].sum(axis=1).mean() - 1.0
         print(
-            f"| {1e3 * lag_s:.0f} | {1e3 * node_interval_s:.0f} | {1e3 * angle:.2f} | {speed:.4f} "
+            f"| {1e3 * lag_s:.0f} | {1e3 * knot_interval_s:.0f} | {1e3 * angle:.2f} | {speed:.4f} "
             f"| {acceleration:.2f}, {slower:.2f} | {unexplained:.2f} "
             f"| {100.0 * first:+.1f} % | {100.0 * rest:+.1f} % |",
             flush=True,

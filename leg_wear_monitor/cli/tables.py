@@ -244,7 +244,7 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
         else:
             console.print(_joints(result))
             for joint, one in monitor.state.clearances.items():
-                if one.believed_by not in (None, COUNTED):
+                if one.best_estimate_source not in (None, COUNTED):
                     console.print(f"joint {joint}: {believed_words(one)}")
         console.print(f"torque {_by_torque(result)}", soft_wrap=True)
         if words := walked_words(monitor.walked):
@@ -317,11 +317,11 @@ def _believed(result: "ReplayResult") -> Table:
     table = plain_table(("\njoint", "clearance\nmm", "±\nmm", "\naccording to"), 1, 4)
     for joint, one in result.monitor.state.clearances.items():
         name = result.monitor.mechanism.joint_words(joint)
-        if one.believed_m is None or one.believed_by is None:
+        if one.best_estimate_m is None or one.best_estimate_source is None:
             table.add_row(name, NOT_VALID, "-", "-")
             continue
-        sigma = "-" if one.believed_sigma_m is None else f"{1.0e3 * one.believed_sigma_m:.3f}"
-        table.add_row(name, f"{1.0e3 * one.believed_m:.3f}", sigma, SOURCES[one.believed_by])
+        sigma = "-" if one.best_estimate_sigma_m is None else f"{1.0e3 * one.best_estimate_sigma_m:.3f}"
+        table.add_row(name, f"{1.0e3 * one.best_estimate_m:.3f}", sigma, SOURCES[one.best_estimate_source])
     return table
 
 

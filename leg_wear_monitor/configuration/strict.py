@@ -27,15 +27,13 @@ from leg_wear_monitor.files import share_directory
 
 
 RENAMED = {
-    "drop_share": "drop_fraction",
-    "duplicate_share": "duplicate_fraction",
-    "fault_share": "fault_fraction",
-    "late_share": "late_fraction",
-    "bad_sample_share": "bad_sample_fraction",
+    "correct": "apply_corrections",
+    "knock_on_delay_cycles": "impact_on_delay_cycles",
+    "life": "growth_law_file",
     "loose_joints": "clearance_joints",
-    "lost_time_share": "lost_time_fraction",
-    "perturb_share": "perturb_fraction",
-    "stuck_torque_share": "stuck_torque_fraction",
+    "node_interval_s": "knot_interval_s",
+    "opens_m": "max_wear_per_jump_m",
+    "stops": "stop_recording_dir",
     "warn_share": "warn_fraction",
 }
 

@@ -193,7 +193,7 @@ class LiveLeg:
         joints = self._state.clearances
         columns_m = {
             name: {joint: getattr(each, name) for joint, each in joints.items()}
-            for name in ("counted_m", *SEEN_COLUMNS)
+            for name in ("modelled_m", *SEEN_COLUMNS)
         }
         return Row(stamp_ns, leg, {**columns_m, "peak_force_n": self._peaks_n})
 

@@ -64,20 +64,20 @@ class ChangeDetector:
     Parameters
     ----------
     explainer : Explainer
-    counted_m : (k,) array
+    modelled_m : (k,) array
         Counted clearances.
     false_alarm_cycles : float
         Mean number of gait cycles between two false alarms.
     """
 
-    def __init__(self, explainer: Explainer, counted_m: Floats, false_alarm_cycles: float) -> None:
+    def __init__(self, explainer: Explainer, modelled_m: Floats, false_alarm_cycles: float) -> None:
         model = explainer.model
-        expected = model.at(counted_m)[0]
+        expected = model.at(modelled_m)[0]
         changes: list[Floats] = []
-        for k in range(len(counted_m)):
-            fresh = min(explainer.fresh_m[k], counted_m[k])
-            sizes = [factor * counted_m[k] for factor in FACTORS] + [fresh, math.sqrt(fresh * counted_m[k])]
-            changes += [model.at(opened(counted_m, k, size))[0] - expected for size in sizes]
+        for k in range(len(modelled_m)):
+            fresh = min(explainer.fresh_m[k], modelled_m[k])
+            sizes = [factor * modelled_m[k] for factor in FACTORS] + [fresh, math.sqrt(fresh * modelled_m[k])]
+            changes += [model.at(opened(modelled_m, k, size))[0] - expected for size in sizes]
         self._of_joints = len(changes)
         changes += [each for one in (model.masses, model.friction) for each in one.change[one.grid != 1.0]]
         # for a leg that shows as much less of an opening as the model may be off
@@ -93,13 +93,13 @@ class ChangeDetector:
         self._half = np.where(is_possible, 0.5 * information + _SIGMAS * drift, np.inf)
         self._excess = excess(_scatter(explainer, change))
         self.threshold = threshold(false_alarm_cycles, len(change))
-        self._step, self._counted_m = (information - self._half) / self._excess, counted_m
+        self._step, self._modelled_m = (information - self._half) / self._excess, modelled_m
 
     def unseen_m(self, cycles: int) -> Floats:
         """Widest clearances (k,) [m] that are not expected to be detected within some gait cycles."""
-        steps = self._step[: self._of_joints].reshape(len(self._counted_m), -1)[:, : len(FACTORS)]
+        steps = self._step[: self._of_joints].reshape(len(self._modelled_m), -1)[:, : len(FACTORS)]
         factors = np.where(cycles * steps < self.threshold, FACTORS, 1.0)
-        return np.asarray(factors.max(axis=1) * self._counted_m)
+        return np.asarray(factors.max(axis=1) * self._modelled_m)
 
     def fresh(self) -> DetectorState:
         """State before the first gait cycle."""
@@ -121,12 +121,12 @@ class ChangeDetector:
         return int(state.since_ns[best]) if state.sums[best] > self.threshold else 0
 
 
-def first_changed(explainer: Explainer, signatures: Floats, counted_m: Floats, changed_m: Floats) -> int:
+def first_changed(explainer: Explainer, signatures: Floats, modelled_m: Floats, changed_m: Floats) -> int:
     """Index of the first of some gait cycles, signatures (n, F), that belongs to a change of clearances.
 
     It is where the likelihood of the cycles before as counted, and of those after as changed, is largest.
     """
-    before, after = (explainer.model.at(clearance)[0] for clearance in (counted_m, changed_m))
+    before, after = (explainer.model.at(clearance)[0] for clearance in (modelled_m, changed_m))
     weighted = np.linalg.solve(explainer.covariance(1), after - before)
     middle = 0.5 * (before + after) + explainer.baseline.offset
     gain = (signatures - middle) @ weighted

@@ -54,7 +54,7 @@ def fit_clearances(
     mean: Floats,
     cycles: int,
     start_m: Floats,
-    counted_m: Floats,
+    modelled_m: Floats,
     known_sigma_m: Floats | float = 0.0,
 ) -> ClearanceFit:
     """Generalised least squares over the logarithms of all clearances.
@@ -65,18 +65,18 @@ def fit_clearances(
     mean : (F,) array
         Mean signature.
     cycles : int
-    start_m, counted_m : (k,) arrays
+    start_m, modelled_m : (k,) arrays
         Where the search begins, and the counted clearances.
     known_sigma_m : (k,) array, optional
         Standard deviations of the clearances that the baseline was taken with.
     """
     model = explainer.model
-    measured, counted = mean - explainer.baseline.offset, np.log(counted_m)
+    measured, counted = mean - explainer.baseline.offset, np.log(modelled_m)
     low, high = np.log(_LEAST_FACTOR * model.joints.grid[:, 0]), np.log(model.joints.grid[:, -1])
-    new, flat = np.log(np.minimum(counted_m, explainer.fresh_m)), np.eye(len(counted_m)) / _FLAT
+    new, flat = np.log(np.minimum(modelled_m, explainer.fresh_m)), np.eye(len(modelled_m)) / _FLAT
     clearance: Floats = start_m
     for _ in range(_FIT_ROUNDS):  # what the model may be off depends on the clearances
-        change = model.at(clearance)[0] - model.at(counted_m)[0]
+        change = model.at(clearance)[0] - model.at(modelled_m)[0]
         scatter = model.scatter_at(clearance) + float(explainer.error(change[None])[0])
         whiten, log_size = explainer.whitening(cycles, scatter)
 
@@ -89,7 +89,7 @@ def fit_clearances(
         found = gauss_newton(at, np.log(clearance), low=low, high=high)
         clearance = np.asarray(np.exp(found.x), dtype=np.float64)
     # what a clearance changes is known to a fraction, and so is a clearance that is far from the counted one
-    uncertain = np.hypot(_MODEL_M, MODEL_ERROR * (clearance - counted_m))
+    uncertain = np.hypot(_MODEL_M, MODEL_ERROR * (clearance - modelled_m))
     # a baseline after a correction hides what that is off
     covariance = found.covariance * np.outer(clearance, clearance) + np.diag(uncertain**2 + known_sigma_m**2)
     square = float(np.square(found.point.rest[: len(mean)]).mean())
@@ -105,18 +105,18 @@ def best_fit(
     explainer: Explainer,
     mean: Floats,
     cycles: int,
-    counted_m: Floats,
+    modelled_m: Floats,
     starts: Sequence[Floats],
     known_sigma_m: Floats | float = 0.0,
 ) -> ClearanceFit:
     """All clearances from a mean signature, from the best of several starts: there are several minima."""
-    fits = [fit_clearances(explainer, mean, cycles, start, counted_m, known_sigma_m) for start in starts]
+    fits = [fit_clearances(explainer, mean, cycles, start, modelled_m, known_sigma_m) for start in starts]
     return min(fits, key=lambda fit: fit.unlikely)
 
 
-def starts_of(explainer: Explainer, change: Change | None, counted_m: Floats) -> list[Floats]:
+def starts_of(explainer: Explainer, change: Change | None, modelled_m: Floats) -> list[Floats]:
     """Clearances (k,) [m] where searches begin: after a change, and from there with each joint wider."""
-    widest, first = explainer.model.joints.grid[:, -1], start_of(change, explainer.joints, counted_m)
+    widest, first = explainer.model.joints.grid[:, -1], start_of(change, explainer.joints, modelled_m)
     wider = np.minimum(_ELSEWHERE * first, np.maximum(widest, first))
     return [first, *(opened(first, k, size) for k, size in enumerate(wider.tolist()))]
 
@@ -134,8 +134,8 @@ def with_rivals(
     return attrs.evolve(found, covariance=found.covariance + np.diag(apart**2))
 
 
-def start_of(change: Change | None, joints: Sequence[str], counted_m: Floats) -> Floats:
+def start_of(change: Change | None, joints: Sequence[str], modelled_m: Floats) -> Floats:
     """Clearances (k,) [m] after a change."""
     if change is None or change.cause is not Cause.CLEARANCE:
-        return counted_m
-    return opened(counted_m, joints.index(change.subject), change.value)
+        return modelled_m
+    return opened(modelled_m, joints.index(change.subject), change.value)

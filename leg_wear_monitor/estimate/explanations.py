@@ -224,7 +224,7 @@ class _Seen(NamedTuple):
         return self.mean - self.expected
 
     @property
-    def as_counted(self) -> "Misfits":
+    def as_modelled(self) -> "Misfits":
         """How well a leg as counted explains it."""
         return Misfits(self.rest[None], self.covariance)
 
@@ -295,7 +295,7 @@ class Explainer:
         variance = np.maximum(self._stays, 0.0) + 1.0 / cycles + scatter
         return self._apart / np.sqrt(variance)[:, None], self._log_size + float(np.log(variance).sum())
 
-    def explanations(self, mean: Floats, cycles: int, counted_m: Floats) -> list[Explanation]:
+    def explanations(self, mean: Floats, cycles: int, modelled_m: Floats) -> list[Explanation]:
         """Single causes of a change, the best first.
 
         Parameters
@@ -303,19 +303,19 @@ class Explainer:
         mean : (F,) array
             Mean signature of the cycles since the change.
         cycles : int
-        counted_m : (k,) array
+        modelled_m : (k,) array
             Counted clearances.
         """
         model = self.model
-        expected, scatter = self.baseline.offset + model.at(counted_m)[0], model.scatter_at(counted_m)
+        expected, scatter = self.baseline.offset + model.at(modelled_m)[0], model.scatter_at(modelled_m)
         seen = _Seen(mean, cycles, expected, self.covariance(cycles), scatter)
-        nothing = seen.as_counted.explanation(0, NamedCause(Cause.UNKNOWN, 0.0, 0.0))
+        nothing = seen.as_modelled.explanation(0, NamedCause(Cause.UNKNOWN, 0.0, 0.0))
         found = [nothing]
         found += self._others(seen)
         found += self._late(seen)
         more, noises = self._noise(seen)
         found += more
-        for k, counted in enumerate(counted_m.tolist()):
+        for k, counted in enumerate(modelled_m.tolist()):
             one = _Quantity(Cause.CLEARANCE, self.joints[k], model.joints, k, counted)
             least, widest = min(counted, self.fresh_m[k]), max(model.joints.grid[k, -1], counted)
             found.append(self._best(seen, one, np.geomspace(_LEAST_FACTOR * least, widest, _SIZES), noises))
@@ -335,7 +335,7 @@ class Explainer:
         if not self.channels:
             return []
         change = np.array([one.column for one in self.channels])
-        possible = Misfits(seen.rest - change, seen.covariance).square < _LEFT * seen.as_counted.square
+        possible = Misfits(seen.rest - change, seen.covariance).square < _LEFT * seen.as_modelled.square
         if not possible.any():
             return []
         misfits = Misfits(seen.rest - change, seen.covariance + _diagonal(MODEL_ERROR * change))
@@ -352,12 +352,12 @@ class Explainer:
         shown = np.array([one.shown(seen.expected) for one in self.noises])
         variance = np.array([one.variance(seen.expected, seen.cycles) for one in self.noises])
         misfits = Misfits(seen.mean - shown, seen.covariance + _diagonal(np.sqrt(variance)))
-        as_counted = seen.as_counted
+        as_modelled = seen.as_modelled
         known_nm = self.model.sensor.noise_nm
         is_less = np.array([one.noise_nm for one in self.noises]) < known_nm
-        possible = misfits.square < _LEFT * as_counted.square
+        possible = misfits.square < _LEFT * as_modelled.square
         # less noise is clear even where an opening makes up for it
-        usable = possible | (is_less & (as_counted.value - misfits.value > 2.0 * SURE_OF_NAME))
+        usable = possible | (is_less & (as_modelled.value - misfits.value > 2.0 * SURE_OF_NAME))
         if not usable.any():
             return [], ()
         best = int(np.where(usable, misfits.value, np.inf).argmin())
@@ -531,7 +531,7 @@ def _vertex(x: Floats, y: Floats, best: int) -> tuple[float, float]:
     return float(np.clip(place, x[i - 1], x[i + 1])), float((2.0 / bend) ** 0.5)
 
 
-def as_counted(explanations: Sequence[Explanation]) -> Explanation:
+def as_modelled(explanations: Sequence[Explanation]) -> Explanation:
     """Among all explanations, that nothing has changed."""
     return next(one for one in explanations if one.cause is Cause.UNKNOWN)
 
@@ -543,7 +543,7 @@ def change_of(explanations: Sequence[Explanation], since_ns: int) -> Change | No
     two joints that opened at once, it has to be as much better than the next: by the square of Birge's ratio.
     """
     best = explanations[0]
-    nothing = as_counted(explanations)
+    nothing = as_modelled(explanations)
     log_odds = 0.5 * (nothing.misfit - best.misfit)
     if log_odds < SURE_LOG_ODDS or not best.explains(nothing.square):
         if nothing.square <= POOREST:
@@ -575,7 +575,7 @@ def with_doubt(change: Change, explanations: Sequence[Explanation]) -> Change:
     """
     if change.cause is not Cause.CLEARANCE:
         return change
-    best, nothing, times = explanations[0], as_counted(explanations), change.value / change.counted
+    best, nothing, times = explanations[0], as_modelled(explanations), change.value / change.counted
     needed = _SURE_BY_AMONG_OTHERS if _WIDER <= times < _WIDE else _SURE_BY
     is_apart = best.square <= _SURE_SQUARE or change.runner_up_log_odds >= needed
     if is_apart or (times >= _WIDE and best.square <= _OF_WIDE * nothing.square):

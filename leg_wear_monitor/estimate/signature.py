@@ -638,11 +638,11 @@ class CommissionedTorque:
     is_interim: bool = False
 
     @sigma_m.default
-    def _as_counted(self) -> Floats:
+    def _as_modelled(self) -> Floats:
         return np.zeros(len(self.clearance_m))
 
     @property
-    def is_as_counted(self) -> bool:
+    def is_as_modelled(self) -> bool:
         """Whether the clearances were the counted ones, not corrected."""
         return not self.sigma_m.any()
 

@@ -83,9 +83,9 @@ class LegOverview:
         """Fraction of each joint's clearance, from new to limit, that is used up; joints with a value."""
         clearances = self.state.clearances if self.state else {}
         return {
-            joint: (one.believed_m - one.new_m) / (one.limit_m - one.new_m)
+            joint: (one.best_estimate_m - one.new_m) / (one.limit_m - one.new_m)
             for joint, one in clearances.items()
-            if one.believed_m is not None
+            if one.best_estimate_m is not None
         }
 
     @property
@@ -124,7 +124,7 @@ class LegOverview:
             "do": verdict.do if verdict else "",
             "how_soon": self.how_soon,
             "worst_joint": joint,
-            "clearance_m": clearance.believed_m if clearance else None,
+            "clearance_m": clearance.best_estimate_m if clearance else None,
             "limit_m": clearance.limit_m if clearance else None,
             "life_p10_h": life.p10_h if life else None,
             "life_p50_h": life.p50_h if life else None,

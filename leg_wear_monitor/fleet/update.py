@@ -311,7 +311,7 @@ def _is_same(now: LegState, summary: ReplaySummary, content: LedgerContent) -> b
         and content.measurements == summary.measurements
         and now.clearances.keys() == summary.clearances.keys()
         and all(
-            abs(one.counted_m - summary.clearances[joint].counted_m) < _SAME_M
+            abs(one.modelled_m - summary.clearances[joint].modelled_m) < _SAME_M
             for joint, one in now.clearances.items()
         )
     )

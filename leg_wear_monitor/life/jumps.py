@@ -24,7 +24,7 @@ _TOLERATED = 0.1  # tolerated error of a jump as a fraction of its deepest chang
 class JumpControl:
     """Limits on the length and the error of a jump."""
 
-    opens_m: float = quantity(
+    max_wear_per_jump_m: float = quantity(
         "m", "deepest change of a surface that a jump may make", above=0.0, default=3.0e-5
     )
     tolerance_m: float = quantity(
@@ -35,9 +35,9 @@ class JumpControl:
     )
 
     @classmethod
-    def of(cls, opens_m: float) -> "JumpControl":
+    def of(cls, max_wear_per_jump_m: float) -> "JumpControl":
         """Control with a deepest change per jump [m] and an error tolerance of 10 % of it."""
-        return cls(opens_m=opens_m, tolerance_m=_TOLERATED * opens_m)
+        return cls(max_wear_per_jump_m=max_wear_per_jump_m, tolerance_m=_TOLERATED * max_wear_per_jump_m)
 
 
 @attrs.frozen(eq=False)
@@ -111,7 +111,7 @@ def _ratio(before: Floats, after: Floats) -> Floats:
 def longest_jump(rate: WearRate, control: JumpControl) -> float:
     """Largest number of gait cycles of a jump by the change of the surfaces; infinite without wear."""
     deepest = float(rate.depth.sum(axis=1).max(initial=0.0))
-    return control.opens_m / deepest if deepest > 0.0 else math.inf
+    return control.max_wear_per_jump_m / deepest if deepest > 0.0 else math.inf
 
 
 def jump_error(first: WearRate, last: WearRate, cycles: float) -> Floats:

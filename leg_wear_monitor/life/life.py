@@ -78,12 +78,13 @@ def check_life(
         fault = limit_fault(joint, float(fresh), float(radius), float(limit))
         if fault:
             raise ConfigError("limit-m", "", fault)
-    jumps = float((limits - fresh_m).min() / jump.opens_m)
+    jumps = float((limits - fresh_m).min() / jump.max_wear_per_jump_m)
     if jumps > MOST_JUMPS:
         raise ConfigError(
-            "opens-m",
+            "max-wear-per-jump-m",
             "",
-            f"{jump.opens_m:g} m a jump takes {jumps:.2g} jumps to the limit, expected at most {MOST_JUMPS}",
+            f"{jump.max_wear_per_jump_m:g} m per jump takes {jumps:.2g} jumps to the limit, "
+            f"expected at most {MOST_JUMPS}",
         )
 
 
@@ -105,7 +106,7 @@ class LifeSettings:
     perturb_fraction : float
         Journals start up to this fraction of the smallest clearance from the centre.
     jump : JumpControl
-        How far a jump may go: deepest change of a surface ``opens_m`` and error ``tolerance_m`` [m].
+        Limits of a jump: deepest change of a surface ``max_wear_per_jump_m``, error ``tolerance_m`` [m].
     seed : int
         Of where the legs start.
     """

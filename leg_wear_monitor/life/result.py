@@ -19,7 +19,7 @@ from leg_wear_monitor.mechanism.materials import (
     rating_life_hours,
     regime_of,
 )
-from leg_wear_monitor.mechanism.person import on_the_ground
+from leg_wear_monitor.mechanism.person import with_ground_reaction
 from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ class Duty:
         ConfigError
             For a mechanism without a toe that moves to and fro.
         """
-        return [on_the_ground(mechanism, peak) for peak in self.hours_by_peak]
+        return [with_ground_reaction(mechanism, peak) for peak in self.hours_by_peak]
 
 
 SCHEMA_VERSION = 1

@@ -286,7 +286,7 @@ def with_toe_force(mechanism: Mechanism, force: Floats, name: str = GROUND_LOAD)
     return attrs.evolve(mechanism, loads={**mechanism.loads, name: load})
 
 
-def on_the_ground(mechanism: Mechanism, peak_n: float) -> Mechanism:
+def with_ground_reaction(mechanism: Mechanism, peak_n: float) -> Mechanism:
     """The mechanism under the force of the ground on its toe, in the stance of a person.
 
     Parameters
@@ -304,7 +304,7 @@ def on_the_ground(mechanism: Mechanism, peak_n: float) -> Mechanism:
     Examples
     --------
     >>> import leg_wear_monitor as lw
-    >>> leg = lw.on_the_ground(lw.load_mechanism("bionic_leg"), 300.0)
+    >>> leg = lw.with_ground_reaction(lw.load_mechanism("bionic_leg"), 300.0)
     >>> round(max(up for _, up in leg.loads["ground"].force))
     300
     """

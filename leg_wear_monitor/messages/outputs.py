@@ -44,7 +44,7 @@ def _remaining_p50_h(joint: JointReport) -> float | None:
 SCALARS: Mapping[str, Callable[[JointReport], float | None]] = MappingProxyType(
     {
         "clearance_m": lambda joint: joint.clearance_m,
-        "seen_m": lambda joint: joint.seen_m,
+        "estimated_m": lambda joint: joint.estimated_m,
         "remaining_p50_h": _remaining_p50_h,
         "peak_force_n": lambda joint: joint.peak_force_n,
     }

@@ -60,7 +60,7 @@ def _usual(alarms: "Alarms") -> int:
 
 
 def _knock(alarms: "Alarms") -> int:
-    return alarms.knock_on_delay_cycles
+    return alarms.impact_on_delay_cycles
 
 
 @attrs.frozen(kw_only=True)

@@ -252,7 +252,7 @@ def has_changed(before: Alarm, after: Alarm) -> bool:
 
 
 NO_FAULT = "NONE"
-INPUT_SILENCE, NOT_FOLLOWED, CRANK_ZERO = "INPUT_SILENCE", "NOT_FOLLOWED", "CRANK_ZERO"
+INPUT_SILENCE, TRACKING_LOST, CRANK_ZERO = "INPUT_SILENCE", "TRACKING_LOST", "CRANK_ZERO"
 ENCODERS, DIAGNOSIS = "ENCODERS", "DIAGNOSIS"
 LEDGER_NOT_WRITTEN, LEDGER_INTERRUPTED = "LEDGER_NOT_WRITTEN", "LEDGER_INTERRUPTED"
 SAMPLES_DROPPED, SAMPLES_NOT_PUBLISHED = "SAMPLES_DROPPED", "SAMPLES_NOT_PUBLISHED"
@@ -281,7 +281,7 @@ FOOT_LOAD_WORDS = {
 FAULT_CODES = {
     NO_FAULT: "nothing is wrong",
     INPUT_SILENCE: "no samples come; each status that has no current data then has this code",
-    NOT_FOLLOWED: "the samples of the crank cannot be followed, see `input`",
+    TRACKING_LOST: "the samples of the crank cannot be followed, see `input`",
     CRANK_ZERO: "the zero of the crank's encoder is not found yet, see `crank zero`",
     ENCODERS: "a further encoder gives no usable angles",
     DIAGNOSIS: "the drive torque shows a change; the code of the verdict names it",
@@ -344,7 +344,7 @@ def guide_of(code: str) -> str:
     Parameters
     ----------
     code : str
-        Without joints: ``CLEARANCE_SEEN``, not ``CLEARANCE_SEEN_G``.
+        Without joints: ``CLEARANCE_DETECTED``, not ``CLEARANCE_DETECTED_G``.
     """
     return _guides().get(code, f"{FOLDER}/index.md")
 

@@ -295,20 +295,20 @@ class ClearanceEstimate:
         return abs(self.departure_m) if self.is_other else 0.0 * self.departure_m
 
 
-def clearance_estimates(found: Estimate, counted_m: Floats) -> tuple[ClearanceEstimate, ...]:
+def clearance_estimates(found: Estimate, modelled_m: Floats) -> tuple[ClearanceEstimate, ...]:
     """Estimates of each joint, compared with the counted clearances (k,) [m]."""
     return tuple(
         _estimate(float(clearance), float(sigma), float(counted))
-        for clearance, sigma, counted in zip(found.clearance_m, found.sigma_m, counted_m, strict=True)
+        for clearance, sigma, counted in zip(found.clearance_m, found.sigma_m, modelled_m, strict=True)
     )
 
 
-def _estimate(clearance_m: float, sigma_m: float, counted_m: float) -> ClearanceEstimate:
+def _estimate(clearance_m: float, sigma_m: float, modelled_m: float) -> ClearanceEstimate:
     if sigma_m > ESTIMATED_M:
         return ClearanceEstimate(observation=ClearanceObservation.NOT_OBSERVABLE)
     return ClearanceEstimate(
         observation=ClearanceObservation.SEEN,
         clearance_m=clearance_m,
         sigma_m=sigma_m,
-        departure_m=clearance_m - counted_m,
+        departure_m=clearance_m - modelled_m,
     )

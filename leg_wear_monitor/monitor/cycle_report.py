@@ -187,7 +187,7 @@ def correct(parts: Parts, change: Change) -> None:
 
 def _take_parameters(parts: Parts, found: LegParameters | None) -> None:
     """Let the twin walk on with the masses, lengths and friction that the drive torque shows."""
-    if found is None or found == parts.twin.parameters or not parts.config.diagnosis.correct:
+    if found is None or found == parts.twin.parameters or not parts.config.diagnosis.apply_corrections:
         return
     parts.twin.set_parameters(found)
     stamp_ns = parts.twin.intake.followed_stamp_ns

@@ -355,15 +355,15 @@ class EncoderObserver(KeepsSamples):
         self._clearance_regression.forget()
         self.state.found, self.state.is_requested, self.state.updated_ns = None, False, 0
 
-    def estimates(self, counted_m: Floats) -> tuple[ClearanceEstimate, ...]:
+    def estimates(self, modelled_m: Floats) -> tuple[ClearanceEstimate, ...]:
         """Clearance estimate of each joint, compared with the counted clearances (k,) [m]."""
         found = self.state.found
         if found is None:
             observation = (
                 ClearanceObservation.COMMISSIONING if self.commissions else ClearanceObservation.WAITING
             )
-            return (ClearanceEstimate(observation=observation),) * len(counted_m)
-        return clearance_estimates(found, counted_m)
+            return (ClearanceEstimate(observation=observation),) * len(modelled_m)
+        return clearance_estimates(found, modelled_m)
 
     def _add_cycle(self, begin_ns: int, end_ns: int) -> None:
         """Add a gait cycle to the regression, unless other encoders are present than before."""
@@ -466,12 +466,12 @@ class EncoderObserver(KeepsSamples):
         departure_m = np.abs(found.clearance_m - reference.clearance_m)
         return bool((departure_m[found.sigma_m <= ESTIMATED_M] > _CLEARANCE_DEPARTURE_M).any())
 
-    def _reference_clearances(self, counted_m: Floats) -> Floats:
+    def _reference_clearances(self, modelled_m: Floats) -> Floats:
         """Clearances for a new reference: estimated where observable, counted elsewhere."""
         found = self.state.found
         if found is None:
-            return counted_m
-        return np.where(found.sigma_m <= ESTIMATED_M, found.clearance_m, counted_m)
+            return modelled_m
+        return np.where(found.sigma_m <= ESTIMATED_M, found.clearance_m, modelled_m)
 
     def _evaluate_again(self) -> None:
         """Evaluate the kept cycles again, with a prior from the present errors of the encoders."""

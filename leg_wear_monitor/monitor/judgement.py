@@ -9,7 +9,7 @@ import attrs
 from leg_wear_monitor.estimate.cause import Cause, NamedCause, TorqueExplanation
 from leg_wear_monitor.files import finite_or_none
 from leg_wear_monitor.monitor import alarm_specs
-from leg_wear_monitor.monitor.alarms import ALREADY_COUNTED, CRANK_ZERO, NOT_FOLLOWED, Alarm, state_of
+from leg_wear_monitor.monitor.alarms import ALREADY_COUNTED, CRANK_ZERO, TRACKING_LOST, Alarm, state_of
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.encoders import faults
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast, Quantiles
@@ -121,19 +121,19 @@ def situation_of(parts: Parts) -> Situation:
 def _joint_situations(parts: Parts, diagnosis: Diagnosis) -> tuple[JointSituation, ...]:
     """What is known of each joint's clearance now."""
     last, measured, joints = parts.state.last, parts.measured, parts.clearance_joints
-    counted_m, limits_m = parts.twin.clearance_mean_m.tolist(), parts.evaluation.board.clearance_limits_m
+    modelled_m, limits_m = parts.twin.clearance_mean_m.tolist(), parts.evaluation.board.clearance_limits_m
     walked, found = parts.accounting.state, []
     for k, (joint, part) in enumerate(zip(joints, walked.parts, strict=True)):
         report = last.joints[k] if last else None
         by_encoders, by_torque = report.by_encoders if report else None, shown_by_torque(k, diagnosis)
         one = JointSituation(
             joint=joint,
-            counted_m=counted_m[k],
+            modelled_m=modelled_m[k],
             limit_m=limits_m[k],
-            believed_m=(
+            best_estimate_m=(
                 report.forecast.now_m
                 if report and report.forecast
-                else parts.forecaster.believed_m(k, counted_m[k])
+                else parts.forecaster.best_estimate_m(k, modelled_m[k])
             ),
             seen=tuple(one for one in (by_encoders, by_torque) if one),
             is_used=bool(report and by_encoders and report.seen and report.seen.believed),
@@ -159,7 +159,7 @@ def _notes(parts: Parts) -> dict[str, tuple[str, ...]]:
     notes = {
         ALREADY_COUNTED: ("",) if parts.accounting.is_all_counted else (),
         CRANK_ZERO: (wrong_zero,) if wrong_zero else (),
-        NOT_FOLLOWED: tuple(filter(None, (_unfollowed(parts),))),
+        TRACKING_LOST: tuple(filter(None, (_unfollowed(parts),))),
         "NOT_THIS_LEG": _doubts(parts),
         "CADENCE": _other_cadence(parts),
         "ENCODER": tuple(faults(parts.config.encoders.names, parts.encoders.state)) if parts.encoders else (),
@@ -261,13 +261,13 @@ def joint_clearance(
     one = believed(joint, alarm, Figure.CLEARANCES not in not_valid)
     best = surest(joint.seen)
     return JointClearance(
-        believed_m=one.clearance_m if one else None,
-        believed_sigma_m=finite_or_none(one.sigma_m) if one else None,
-        believed_by=one.by if one else None,
-        counted_m=joint.counted_m,
-        seen_m=best.clearance_m if best else None,
-        seen_sigma_m=best.sigma_m if best else None,
-        seen_by=(best.by,) if best else (),
+        best_estimate_m=one.clearance_m if one else None,
+        best_estimate_sigma_m=finite_or_none(one.sigma_m) if one else None,
+        best_estimate_source=one.by if one else None,
+        modelled_m=joint.modelled_m,
+        estimated_m=best.clearance_m if best else None,
+        estimated_sigma_m=best.sigma_m if best else None,
+        estimated_by=(best.by,) if best else (),
         measured_m=joint.measured.clearance_m if joint.measured else None,
         measured_sigma_m=joint.measured.sigma_m if joint.measured else None,
         new_m=new_m,

@@ -78,7 +78,7 @@ def _clearance(
     joint, totals = part.name, found.entry.totals if found.entry else {}
     limit_m = totals.get(clearance_limit_key(joint), limit_m)
     last = last_measured(found.measurements, joint, part.replaced_ns)
-    situation = JointSituation(joint=joint, counted_m=new_m + part.mean_m, limit_m=limit_m)
+    situation = JointSituation(joint=joint, modelled_m=new_m + part.mean_m, limit_m=limit_m)
     alarms = found.entry.alarms if found.entry else ()
     own = next((each for each in alarms if (each.kind, each.subject) == ("clearance", joint)), None)
     return joint_clearance(with_measured(situation, last), own, [verdict], new_m)

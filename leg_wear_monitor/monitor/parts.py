@@ -126,7 +126,7 @@ class Parts:
         )
         is_diagnosed = self.config.diagnosis.enabled and self.config.wear_acceleration == 1.0
         self.torque = self._torque_observer(ledger) if is_diagnosed else None
-        if self.torque and self.torque.state.parameters and self.config.diagnosis.correct:
+        if self.torque and self.torque.state.parameters and self.config.diagnosis.apply_corrections:
             self.twin.set_parameters(self.torque.state.parameters)
         if ledger and ledger.entry:
             board, stamp_ns = self.evaluation.board, ledger.entry.stamp_ns

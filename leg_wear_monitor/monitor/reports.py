@@ -74,12 +74,12 @@ class JointReport:
         return KnownClearance("encoders", self.seen.clearance_m, self.seen.sigma_m)
 
     @property
-    def seen_m(self) -> float | None:
+    def estimated_m(self) -> float | None:
         """Clearance that encoders or the drive torque show, the surer one; None if neither shows it."""
         return self._surest.clearance_m if self._surest else None
 
     @property
-    def seen_sigma_m(self) -> float | None:
+    def estimated_sigma_m(self) -> float | None:
         """Standard deviation of this clearance; None without one."""
         return self._surest.sigma_m if self._surest else None
 
@@ -90,8 +90,8 @@ class JointReport:
     @property
     def judged_clearance_m(self) -> float:
         """Clearance that is compared with the limit: the counted one, or a larger one by measurement."""
-        believed_m = self.forecast.now_m if self.forecast else math.nan
-        return judged_clearance_m(self.clearance_m, self.measured, believed_m)
+        best_estimate_m = self.forecast.now_m if self.forecast else math.nan
+        return judged_clearance_m(self.clearance_m, self.measured, best_estimate_m)
 
 
 @attrs.frozen(kw_only=True)
@@ -205,7 +205,9 @@ class VerdictReport:
         if self.leg is None:
             raise ValueError("a report of a changed verdict has no state of the leg")
         clearances = {
-            joint: attrs.evolve(one, status=joint_status(joint, one.believed_m is not None, self.findings))
+            joint: attrs.evolve(
+                one, status=joint_status(joint, one.best_estimate_m is not None, self.findings)
+            )
             for joint, one in self.leg.clearances.items()
         }
         return attrs.evolve(self.leg, verdict=self.verdict, clearances=clearances)

@@ -16,7 +16,7 @@ from leg_wear_monitor.monitor.alarms import (
     FOOT_LOAD_WORDS,
     LEDGER_INTERRUPTED,
     LEDGER_NOT_WRITTEN,
-    NOT_FOLLOWED,
+    TRACKING_LOST,
     Alarm,
     amount,
     code_of,
@@ -118,7 +118,7 @@ def _gait(parts: Parts) -> Status:
     cadence = parts.evaluation.board.alarms[alarm_specs.CADENCE.name()]
     message, level, code = tracking.name.lower().replace("_", " "), cadence.level, code_of(cadence)
     if parts.guard.cause:
-        message, level, code = "not monitored: see input", Level.ERROR, NOT_FOLLOWED
+        message, level, code = "not monitored: see input", Level.ERROR, TRACKING_LOST
     elif parts.without_zero:
         message, level, code = "not monitored: see crank zero", max(level, Level.WARN), CRANK_ZERO
     elif event and tracking in (Tracking.STARTING, Tracking.OUT_OF_STEP):
@@ -153,7 +153,7 @@ def _input(parts: Parts) -> Status:
     messages = [*evaluation.causes, *([f"see: {', '.join(bad)}"] if bad else [])]
     message = "; ".join(messages) or "in order"
     if guard.cause:
-        level, code = Level.ERROR, NOT_FOLLOWED
+        level, code = Level.ERROR, TRACKING_LOST
     return Status("input", level, message, {name: float(value) for name, value in values.items()}, code)
 
 
@@ -214,10 +214,14 @@ def _with_measured(joint: Status, measured: Measurement | None) -> Status:
 def _as_judged(joint: Status, known: JointClearance, findings: Sequence[Verdict]) -> Status:
     """A joint's status with its believed clearance, and with what the verdict's findings say of it."""
     values, message = joint.values, joint.message
-    if known.believed_m is not None:
-        values = {"believed_m": known.believed_m, f"believed_by_{known.believed_by}": 1.0, **values}
-        if known.believed_sigma_m is not None:
-            values["believed_sigma_m"] = known.believed_sigma_m
+    if known.best_estimate_m is not None:
+        values = {
+            "best_estimate_m": known.best_estimate_m,
+            f"best_estimate_source_{known.best_estimate_source}": 1.0,
+            **values,
+        }
+        if known.best_estimate_sigma_m is not None:
+            values["best_estimate_sigma_m"] = known.best_estimate_sigma_m
         message = f"{believed_words(known)}; {message}"
     joint = attrs.evolve(joint, values=values, message=message)
     if not findings:
@@ -253,7 +257,7 @@ def _encoders(encoders: EncoderObserver, parts: Parts) -> Status:
             values[f"{name}_scale_error"] = float(state.errors.mean[1 + len(settings.names) + i])
     for joint in last.joints if last else ():
         if joint.seen:
-            values[f"{joint.joint}_seen_m"] = joint.seen.clearance_m
+            values[f"{joint.joint}_estimated_m"] = joint.seen.clearance_m
             values[f"{joint.joint}_sigma_m"] = joint.seen.sigma_m
             values[f"{joint.joint}_departure_m"] = joint.seen.departure_m
     wrong = faults(settings.names, state)

@@ -31,12 +31,12 @@ JOINT_COLUMNS = (
     "mean_force_n",
     "impacts",
 )
-SEEN_COLUMNS = ("seen_m", "seen_sigma_m")
+SEEN_COLUMNS = ("estimated_m", "estimated_sigma_m")
 """What encoders or the drive torque show best of a joint."""
 
 _OF_A_JOINT = (*JOINT_COLUMNS, *SEEN_COLUMNS)
 
-SUMMARY_COLUMNS = {name: name.replace("clearance_", "counted_") for name in _OF_A_JOINT}
+SUMMARY_COLUMNS = {name: name.replace("clearance_", "modelled_") for name in _OF_A_JOINT}
 """Names of the columns of a joint in a summary, whose one clearance of a joint is the believed one."""
 
 CYCLE_COLUMNS = (

@@ -336,9 +336,9 @@ class ReplayHistory:
         Foot load, as estimated, up positive.
     friction_nm : (n,) array
         Friction of the drive, as estimated.
-    counted_m : dict of str to (n,) array
+    modelled_m : dict of str to (n,) array
         Counted mean radial clearance around the bushing.
-    counted_max_m : dict of str to (n,) array
+    modelled_max_m : dict of str to (n,) array
         Counted largest radial clearance around the bushing.
     growth_m_per_cycle : dict of str to (n,) array
         Growth of the mean clearance in a gait cycle.
@@ -350,10 +350,10 @@ class ReplayHistory:
         Mean contact force.
     impacts : dict of str to (n,) array
         Number of impacts.
-    seen_m : dict of str to (n,) array
+    estimated_m : dict of str to (n,) array
         Mean radial clearance that encoders or the drive torque show, the surer one; empty in a file of an
         older version.
-    seen_sigma_m : dict of str to (n,) array
+    estimated_sigma_m : dict of str to (n,) array
         Its standard deviation; empty in a file of an older version.
     lowest : dict of str to (n,) array
         Of cadence, torques, mismatch, load and friction, by their names: the smallest value in each group;
@@ -372,20 +372,20 @@ class ReplayHistory:
     torque_mismatch: Floats
     load_n: Floats
     friction_nm: Floats
-    counted_m: dict[str, Floats]
-    counted_max_m: dict[str, Floats]
+    modelled_m: dict[str, Floats]
+    modelled_max_m: dict[str, Floats]
     growth_m_per_cycle: dict[str, Floats]
     peak_force_n: dict[str, Floats]
     p99_force_n: dict[str, Floats]
     mean_force_n: dict[str, Floats]
     impacts: dict[str, Floats]
-    seen_m: dict[str, Floats] = attrs.Factory(dict)
-    seen_sigma_m: dict[str, Floats] = attrs.Factory(dict)
+    estimated_m: dict[str, Floats] = attrs.Factory(dict)
+    estimated_sigma_m: dict[str, Floats] = attrs.Factory(dict)
     lowest: dict[str, Floats] = attrs.Factory(dict)
     highest: dict[str, Floats] = attrs.Factory(dict)
 
     def columns(self) -> dict[str, Floats | Ints]:
-        """Columns of a table over time; a joint's value after a dot: ``counted_m.A``."""
+        """Columns of a table over time; a joint's value after a dot: ``modelled_m.A``."""
         columns: dict[str, Floats | Ints] = {}
         for name, value in attrs.asdict(self, recurse=False).items():
             if isinstance(value, dict):

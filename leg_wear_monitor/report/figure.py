@@ -110,7 +110,7 @@ def time_of(summary: ReplaySummary, stamps_ns: Ints) -> tuple[Floats, str]:
 
 def opened(summary: ReplaySummary) -> tuple[dict[str, Floats], str]:
     """How much each clearance has opened since the first gait cycle, by joint, and the unit."""
-    columns = summary.history.counted_m if len(summary.history.stamp_ns) else {}
+    columns = summary.history.modelled_m if len(summary.history.stamp_ns) else {}
     metres = {joint: values - values[0] for joint, values in columns.items()}
     scale, unit = length_unit(max((_greatest(values) for values in metres.values()), default=0.0))
     return {joint: scale * values for joint, values in metres.items()}, unit

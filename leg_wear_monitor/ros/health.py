@@ -31,7 +31,7 @@ _NOW = {
     **{f"{kind.name}_rate_hz": 0.0 for kind in KINDS.values()},
 }
 # statuses of the node itself or of faults; they remain valid during silence
-_KEPT = ("verdict", "input", "alarms", "ledger", "load", "topics", "recording", "clock")
+_KEPT = ("verdict", "input", "alarms", "ledger", "cpu_load", "topics", "recording", "clock")
 _NOTHING_WRONG = "in order"
 
 
@@ -336,7 +336,7 @@ def load_status(load: Load, inbox: Inbox, is_recorded: bool = False) -> Status:
         "shed_messages": float(dropped),
     }
     load.worst_delay_s, load.dropped_reported = load.delay_s, dropped
-    return Status("load", level, message, values, code)
+    return Status("cpu_load", level, message, values, code)
 
 
 def topics_status(topics: Iterable[InputTopic], now_ns: int, started_ns: int) -> Status:

@@ -237,7 +237,9 @@ class MonitorNode(ClosingNode):
         self._messages = Messages(config, self._monitor.clearance_joints, self.get_fully_qualified_name())
         self._is_stop = self._monitor.verdict.verdict.state is State.STOP  # of the ledger: not a new one
         report = self.get_logger().info
-        self._black_box = BlackBox(config.record.path, config.record.stops, config.hardware, report)
+        self._black_box = BlackBox(
+            config.record.path, config.record.stop_recording_dir, config.hardware, report
+        )
         self._outlets = Outlets(self, self._messages.outputs, self._black_box)
         self._forecasts = ForecastTimes()
         self._compile(decoder)

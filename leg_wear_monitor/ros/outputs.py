@@ -68,7 +68,9 @@ class StopRecorder:
         try:
             self._directory.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise LegWearError(f"record.stops: {directory} cannot be made: {error.strerror}") from error
+            raise LegWearError(
+                f"record.stop_recording_dir: {directory} cannot be made: {error.strerror}"
+            ) from error
         self._kept: deque[tuple[int, str, bytes | NDArray[np.uint8]]] = deque()
         self._topics: dict[str, tuple[str, Qos]] = {}
         self._writer: McapWriter | None = None
@@ -95,7 +97,7 @@ class StopRecorder:
         if self._writer is not None:
             return
         path = self._directory / f"stop-{_utc(now_ns * 1.0e-9)}-{self._leg}.mcap"
-        self._writer = _writer("record.stops", path, self._report)
+        self._writer = _writer("record.stop_recording_dir", path, self._report)
         self._channels = {name: self._writer.channel(name, *spec) for name, spec in self._topics.items()}
         self._until_ns = now_ns + _AFTER_NS
         for kept in self._kept:

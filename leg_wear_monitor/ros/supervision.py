@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 
 # Statuses that are logged; the others follow from alarms, which are logged already.
-STATUSES = ("topics", "load", "recording", "ledger", "clock")
+STATUSES = ("topics", "cpu_load", "recording", "ledger", "clock")
 
 
 def _write(logger: RcutilsLogger, level: Level, text: str) -> None:

@@ -77,7 +77,7 @@ class Ensemble:
 class LifeSettings:
     """How far wear is followed, and by what jumps, as in `leg_wear_monitor.simulate_life`."""
 
-    opens_m: float = quantity(
+    max_wear_per_jump_m: float = quantity(
         "m",
         "opening of the mean clearance of the joint that wears fastest",
         within=(1.0e-7, 0.1),

@@ -28,7 +28,7 @@ from leg_wear_monitor.life.jumps import JumpControl
 from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
 from leg_wear_monitor.mechanism import position
 from leg_wear_monitor.mechanism.arrays import Flags, Floats
-from leg_wear_monitor.mechanism.person import on_the_ground
+from leg_wear_monitor.mechanism.person import with_ground_reaction
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.workers import package_digest
@@ -116,7 +116,7 @@ def changed(mechanism: Mechanism, settings: dict[str, Any]) -> Mechanism:
         for name, own in mechanism.clearances.items()
     }
     mechanism = attrs.evolve(mechanism, clearances=clearances)
-    return on_the_ground(mechanism, settings["ground_n"]) if "ground_n" in settings else mechanism
+    return with_ground_reaction(mechanism, settings["ground_n"]) if "ground_n" in settings else mechanism
 
 
 def speed_rpm_of(mechanism: Mechanism, settings: dict[str, Any]) -> float:
@@ -396,13 +396,13 @@ def _life(mechanism: Mechanism, settings: dict[str, Any], member: int) -> dict[s
         clearance_m=settings["clearance_m"],
         speed_rpm=speed_rpm_of(mechanism, settings),
     )
-    life = simulate_life(run, limit_m=run.fresh_m + settings["opens_m"], horizon_cycles=np.inf)
+    life = simulate_life(run, limit_m=run.fresh_m + settings["max_wear_per_jump_m"], horizon_cycles=np.inf)
     opened = (life.clearance_m - run.fresh_m).max(axis=1)
-    if opened[-1] < settings["opens_m"]:
+    if opened[-1] < settings["max_wear_per_jump_m"]:
         raise SimulationError(
             f"none of {', '.join(run.clearance_joints)} wears, look at their wear_coefficient"
         )
-    cycles = np.interp(np.linspace(0.0, settings["opens_m"], STATES), opened, life.cycles)
+    cycles = np.interp(np.linspace(0.0, settings["max_wear_per_jump_m"], STATES), opened, life.cycles)
     depth = between(life.cycles, life.depth, cycles)
     rate = between(life.cycles, np.array([point.rate.depth for point in run.points]), cycles[[0, -1]])
     toe = np.array([point.toe_position_m for point in run.points])

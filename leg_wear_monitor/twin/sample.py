@@ -139,7 +139,7 @@ def has_value_of(samples: Samples, kind: int) -> NDArray[np.bool_]:
 
 FOREVER = 1.0e9
 
-_FROM_ZERO = ("lag_s", "node_interval_s", "reorder_window_s", "largest_speed_radps")
+_FROM_ZERO = ("lag_s", "knot_interval_s", "reorder_window_s", "largest_speed_radps")
 
 SAMPLINGS = AVERAGE, INSTANT = "average", "instant"
 LOAD_SOURCES = NO_LOAD, WRENCH, FLOAT64, CONTACT = "none", "wrench", "float64", "contact"
@@ -171,7 +171,7 @@ class TrackerSettings:
     lag_s : float
         Delay of the leg behind the newest sample, for smoothing by later samples; 0 selects
         0.8 / bandwidth_hz.
-    node_interval_s : float
+    knot_interval_s : float
         Least time between two spline nodes of the leg's motion: a sample waits for the first node after it;
         0 selects 0.2 / bandwidth_hz.
     bridge_limit_s : float
@@ -201,7 +201,7 @@ class TrackerSettings:
     velocity_gate_radps: float = 0.5
     reorder_window_s: float = 0.02
     lag_s: float = 0.0
-    node_interval_s: float = 0.0
+    knot_interval_s: float = 0.0
     bridge_limit_s: float = 0.5
     mark_gap_s: float = 0.05
     backward_jump_s: float = 1.0
@@ -244,7 +244,7 @@ class TrackerSettings:
     @property
     def node_interval(self) -> float:
         """The least time between spline nodes in use [s]."""
-        return self.node_interval_s or 0.2 / self.bandwidth_hz
+        return self.knot_interval_s or 0.2 / self.bandwidth_hz
 
 
 @attrs.frozen(kw_only=True)

@@ -14,11 +14,11 @@ from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.monitor.forecast.forecaster import read_lives
 from leg_wear_monitor.monitor.ledger.entry import fingerprint
 
-ONE = ("life", "--mechanism", "four_bar", "--legs", "1", "--cycles", "2", "--opens-m", "5e-5")
+ONE = ("life", "--mechanism", "four_bar", "--legs", "1", "--cycles", "2", "--max-wear-per-jump-m", "5e-5")
 
 
 def test_life_tells_when_each_joint_reaches_its_limit(run, tmp_path):
-    result = run(*ONE, "--limit-m", "5.2e-4", "--lives", "3", "--out", "out")
+    result = run(*ONE, "--limit-m", "5.2e-4", "--ensemble-size", "3", "--out", "out")
     assert result.exit_code == 0
     life = json.loads((tmp_path / "out" / "life.json").read_text())
     assert (tmp_path / "out" / "life.png").read_bytes().startswith(b"\x89PNG")
@@ -108,8 +108,8 @@ def test_the_table_of_a_life_has_its_first_and_its_last_point(points):
         ("--limit-m 0.0002", "--limit-m: 0.0002 m is not between 0.0002 m, the new clearance of joint B,"),
         ("--limit-m 0.6", "0.008 m, the radius of its bushing; did you mean 0.0006 m (0.6 mm)?"),
         (
-            "--opens-m 1e-15",
-            "--opens-m: 1e-15 m a jump takes 4e+11 jumps to the limit, expected at most 10000",
+            "--max-wear-per-jump-m 1e-15",
+            "--max-wear-per-jump-m: 1e-15 m per jump takes 4e+11 jumps to the limit, expected at most 10000",
         ),
         ("--duty 300", "--duty: '300' is not N:hours a day, expected such as 0:2,300:5,600:1"),
     ],

@@ -131,7 +131,7 @@ def test_a_withdrawn_measurement_does_not_end_a_stop(run, worn_ledger, present):
     stop = {"level": Level.ERROR, "worst": 1.7e-3, "limit": 6e-4, "raised_ns": 5, "cause": "torque"}
     path = worn_ledger(alarms=(Alarm(kind="clearance", subject="G", present=present, sigma=4e-4, **stop),))
     before = verdict(path)[:2]
-    assert before == ("stop", "CLEARANCE_SEEN_G")
+    assert before == ("stop", "CLEARANCE_DETECTED_G")
     for mm in ("0.36", "0.37"):
         run("measure", "knee", mm, "--sigma", "0.01", "--ledger", str(path))
         assert verdict(path)[0] != "stop"

@@ -40,19 +40,23 @@ def test_verdict_status_json_and_terminal_tell_one_story_of_the_joint(knocked):
     evidence = found["verdict"]["evidence"][0]
     joint = found["clearances"]["G"]
     assert (found["verdict"]["state"], found["verdict"]["joints"]) == ("stop", ["G"])
-    assert joint["believed_m"] == evidence["value"]
-    assert (joint["believed_by"], joint["status"]) == ("torque", "stop")
-    assert joint["believed_m"] > joint["limit_m"] > joint["counted_m"]
+    assert joint["best_estimate_m"] == evidence["value"]
+    assert (joint["best_estimate_source"], joint["status"]) == ("torque", "stop")
+    assert joint["best_estimate_m"] > joint["limit_m"] > joint["modelled_m"]
     (status,) = (each for each in found["status"] if each["name"] == "joint G")
-    assert (status["level"], status["fault_code"]) == ("ERROR", "CLEARANCE_SEEN_G")
-    assert status["values"]["believed_m"] == joint["believed_m"]
+    assert (status["level"], status["fault_code"]) == ("ERROR", "CLEARANCE_DETECTED_G")
+    assert status["values"]["best_estimate_m"] == joint["best_estimate_m"]
     (row,) = (line for line in output.splitlines() if line.startswith("G (knee)"))
-    assert row.split()[2] == f"{1e3 * joint['believed_m']:.3f}"
+    assert row.split()[2] == f"{1e3 * joint['best_estimate_m']:.3f}"
     alarm = next(each for each in found["alarms"]["now"] if each["name"] == "clearance G")
-    assert alarm["worst"] == joint["believed_m"]
+    assert alarm["worst"] == joint["best_estimate_m"]
     # beside G at 2 mm the fit of all finds I at 0.6 mm: what several joints change does not add up
-    assert [name for name, each in found["clearances"].items() if each["believed_by"] == "torque"] == ["G"]
-    first, last = (next(v for v in line if v is not None) for line in _ends(found["history"]["seen_m"]["G"]))
+    assert [
+        name for name, each in found["clearances"].items() if each["best_estimate_source"] == "torque"
+    ] == ["G"]
+    first, last = (
+        next(v for v in line if v is not None) for line in _ends(found["history"]["estimated_m"]["G"])
+    )
     assert last > 1.5e-3 > first
 
 
@@ -61,7 +65,7 @@ def test_the_verdict_in_the_ledger_names_the_same_value(knocked):
     found = json.loads((place / "out" / "summary.json").read_text())
     assert last_reason(place / "wear.ledger") == found["verdict"]["why"]
     worst = rows_of(place / "wear.ledger", "SELECT worst FROM alarm WHERE kind = 'clearance'")
-    assert worst == [(found["clearances"]["G"]["believed_m"],)]
+    assert worst == [(found["clearances"]["G"]["best_estimate_m"],)]
 
 
 def last_reason(ledger):
@@ -84,7 +88,7 @@ def test_the_page_of_the_stop_shows_the_estimates_and_links_the_guide(knocked):
     page = (knocked[0] / "out" / "report.html").read_text()
     joints = json.loads((knocked[0] / "out" / "summary.json").read_text())["clearances"]
     joint = joints["G"]
-    value, sigma = (1e3 * joint[name] for name in ("believed_m", "believed_sigma_m"))
+    value, sigma = (1e3 * joint[name] for name in ("best_estimate_m", "best_estimate_sigma_m"))
     assert abs(value - 2.0) < 2.0 * sigma  # the bushing is broken out to 2 mm
     assert f"estimated {value:.2f} ± {sigma:.2f} mm by the drive torque" in page
     assert page.count("mm by the drive torque") == 1  # the others are not observable
@@ -103,7 +107,7 @@ GUIDES = (
 @pytest.mark.parametrize("guide", GUIDES)
 def test_what_the_guides_say_of_this_recording_is_about_what_it_gives(knocked, guide):
     joint = json.loads((knocked[0] / "out" / "summary.json").read_text())["clearances"]["G"]
-    value, sigma = (1e3 * joint[name] for name in ("believed_m", "believed_sigma_m"))
+    value, sigma = (1e3 * joint[name] for name in ("best_estimate_m", "best_estimate_sigma_m"))
     text = (share_directory() / "docs" / guide).read_text(encoding="utf-8")
     (estimate,) = re.findall(r"(2\.\d+) mm ± (0\.\d+) mm", text)
     assert abs(float(estimate[0]) - value) < 0.5 * sigma

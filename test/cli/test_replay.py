@@ -146,7 +146,7 @@ def test_a_summary_of_another_version_is_refused(refused, tmp_path, version, sho
     (tmp_path / "out" / "summary.json").write_text(json.dumps(record))
     line = refused("report", "out")
     assert line.startswith(f"error: out/summary.json: schema_version: {shown}")
-    assert "is not 3" in line and line.endswith("replay the recording again")
+    assert "is not 4" in line and line.endswith("replay the recording again")
     assert len(line) < 200
 
 

@@ -59,7 +59,9 @@ def test_the_fleet_of_examples_fleet_needs_a_person_at_one_leg(tmp_path, monkeyp
     assert done.exit_code == 0, done.output
     run_script(EXAMPLES / "fleet" / "worn.py", monkeypatch, str(tmp_path))
     worst, other = capsys.readouterr().out.splitlines()
-    assert worst.startswith("right-07: stop CLEARANCE_SEEN_G; G ") and other.startswith("left-07: healthy ")
+    assert worst.startswith("right-07: stop CLEARANCE_DETECTED_G; G ") and other.startswith(
+        "left-07: healthy "
+    )
 
 
 def test_the_cells_of_examples_notebook_run():

@@ -67,8 +67,8 @@ def test_the_first_recording(learnt, capsys):
     # G breaks at the begin of the fifth gait cycle; a mismatch lasts for three of four before it is sure
     assert not above[:4].any() and above[6:].all() and len(above) == 10
     clearances = lesson.knocking.clearances
-    seen = {joint: one for joint, one in clearances.items() if one.seen_m is not None}
-    assert [joint for joint, one in seen.items() if one.seen_m > one.limit_m] == ["G"]
+    seen = {joint: one for joint, one in clearances.items() if one.estimated_m is not None}
+    assert [joint for joint, one in seen.items() if one.estimated_m > one.limit_m] == ["G"]
 
 
 def test_your_own_linkage(learnt, capsys):
@@ -112,12 +112,12 @@ def test_a_life_and_its_forecast(learnt):
     lesson = learnt("4_a_life")
     ends = [lesson.life.cycles_to(k, lesson.limit_m) for k in range(len(lesson.life.clearance_joints))]
     assert ends[0] == min(ends) == pytest.approx(18e6, rel=0.05)
-    assert lesson.counted_m == pytest.approx(
+    assert lesson.modelled_m == pytest.approx(
         np.interp(lesson.walked, lesson.life.cycles, lesson.life.clearance_m[:, 0]), abs=3e-6
     )
     (p10, p50, p90), (p10_after, p50_after, p90_after) = lesson.before, lesson.after
     assert p50 == pytest.approx((ends[0] - lesson.walked) / 3600, rel=0.15)
-    assert not lesson.found.contradicts and lesson.counted_m < 0.000325
+    assert not lesson.found.contradicts and lesson.modelled_m < 0.000325
     assert p50_after < p50 and p90_after - p10_after < (p90 - p10) / 3
 
 

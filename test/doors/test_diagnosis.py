@@ -35,13 +35,13 @@ def test_the_opened_joint_is_named_with_its_clearance_and_no_other_one_is(opened
     """Over 5 moved starts (2026-11-25): G 0.900 mm."""
     summary = opened(joint)
     assert (summary.verdict.state.value, summary.verdict.joints) == ("stop", (joint,))
-    assert summary.verdict.fault_code == f"CLEARANCE_SEEN_{joint}"
+    assert summary.verdict.fault_code == f"CLEARANCE_DETECTED_{joint}"
     for name, clearance in summary.clearances.items():
         if name == joint:
-            assert clearance.seen_by == ("torque",)
-            assert clearance.believed_m == pytest.approx(OPENED_M, abs=2.0e-4)
+            assert clearance.estimated_by == ("torque",)
+            assert clearance.best_estimate_m == pytest.approx(OPENED_M, abs=2.0e-4)
         else:  # the change of one joint hides the others
-            assert (clearance.seen_by, clearance.believed_m) == ((), None)
+            assert (clearance.estimated_by, clearance.best_estimate_m) == ((), None)
 
 
 @pytest.mark.parametrize(
@@ -60,7 +60,7 @@ def test_a_healthy_leg_is_healthy(healthy, change, coulomb_nm: float) -> None:
     assert summary.drive.coulomb_nm.value == pytest.approx(coulomb_nm, abs=0.3)
     for clearance in summary.clearances.values():
         assert clearance.status.value == "healthy"
-        assert clearance.believed_m == pytest.approx(3.0e-4, abs=2.0e-5)
+        assert clearance.best_estimate_m == pytest.approx(3.0e-4, abs=2.0e-5)
 
 
 def test_before_a_joint_opens_nothing_is_reported(healthy) -> None:
@@ -85,6 +85,6 @@ def test_a_wrong_torque_is_named_and_accuses_no_joint(healthy, change, code: str
     summary = lw.replay({**healthy, "drive_torque": change(healthy["drive_torque"])}).summary()
     assert (summary.verdict.state.value, summary.verdict.joints) == ("inspect", ())
     assert summary.verdict.fault_code.startswith(code)
-    assert all(clearance.seen_by == () for clearance in summary.clearances.values())
+    assert all(clearance.estimated_by == () for clearance in summary.clearances.values())
     if code == "TORQUE_SCALE":
         assert summary.drive.scale.value == pytest.approx(1.5, abs=0.1)

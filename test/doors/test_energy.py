@@ -40,7 +40,7 @@ def test_energy_in_clearance_coordinates(leg, case: str) -> None:
     coefficient, push_n, clearance_m, bound = CASES[case]
     walking = with_friction(leg, coefficient)
     if push_n:
-        walking = lw.on_the_ground(walking, push_n)
+        walking = lw.with_ground_reaction(walking, push_n)
     energy = lw.simulate(walking, clearance_m=clearance_m, cycles=10).energy_j
     assert closes(energy, bound)
     assert (energy.friction_loss > 0.0) == (coefficient > 0.0)

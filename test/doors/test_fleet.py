@@ -106,7 +106,7 @@ def test_the_table_and_the_page_have_each_leg(fleet, run) -> None:
     table = lw.Fleet(fleet[1]).to_pandas()
     assert table.leg.tolist() == WORST_FIRST
     worst = table.iloc[0]
-    assert (worst.worst_joint, worst.fault_code) == ("G", "CLEARANCE_SEEN_G")
+    assert (worst.worst_joint, worst.fault_code) == ("G", "CLEARANCE_DETECTED_G")
     assert worst.clearance_m > worst.limit_m
     lines = (fleet[1] / "fleet.csv").read_text().splitlines()
     assert [line.split(",")[0] for line in lines] == ["leg", *WORST_FIRST]
@@ -239,12 +239,12 @@ def test_a_repair_and_a_measurement_show_at_the_next_update(run, fleet, tmp_path
     assert run(*update).code == 0
     leg = lw.Fleet(out).overview.leg("knocking")
     knee = leg.state.clearances["G"]
-    assert (leg.word, knee.status.value, knee.counted_m) == ("watch", "watch", knee.new_m)
+    assert (leg.word, knee.status.value, knee.modelled_m) == ("watch", "watch", knee.new_m)
     assert run("measure", "B", "0.63", "--sigma", "0.006", "--ledger", ledger, "--config", config).code == 1
     assert run(*update).code == 0
     leg = lw.Fleet(out).overview.leg("knocking")
     assert leg.state.verdict.fault_code == "CLEARANCE_B"
-    assert (leg.state.clearances["B"].believed_m, leg.state.life["B"]) == (0.00063, None)
+    assert (leg.state.clearances["B"].best_estimate_m, leg.state.life["B"]) == (0.00063, None)
     assert "CLEARANCE_B" in (out / "report.html").read_text()
 
 

@@ -114,12 +114,12 @@ def test_the_verdict_is_the_one_that_is_written_beside(bag: Replayed) -> None:
     assert {key: verdict[key] for key in expected} == expected
     assert bag.code == (0 if expected["state"] == "healthy" else 1)  # by --fail-on verdict
     assert "forecast" not in expected["not_valid"] or not any(bag.found["life"].values())
-    if verdict["fault_code"].startswith("CLEARANCE_SEEN"):
+    if verdict["fault_code"].startswith("CLEARANCE_DETECTED"):
         assert [bag.found["clearances"][joint]["status"] for joint in verdict["joints"]] == ["stop"]
     for name, joint in bag.found["clearances"].items():
-        is_at_limit = joint["believed_m"] is not None and joint["believed_m"] >= joint["limit_m"]
+        is_at_limit = joint["best_estimate_m"] is not None and joint["best_estimate_m"] >= joint["limit_m"]
         assert is_at_limit == (expected["state"] == "stop" and name in verdict["joints"])
-        assert 0.99 * joint["new_m"] < joint["counted_m"] < joint["limit_m"]
+        assert 0.99 * joint["new_m"] < joint["modelled_m"] < joint["limit_m"]
 
 
 def test_the_terminal_names_the_guide_of_the_code(bag: Replayed) -> None:
@@ -135,8 +135,8 @@ def test_the_terminal_gives_no_number_that_the_verdict_does_not_believe(bag: Rep
     clearance, *others = re.split(r"\s{2,}", row)[1:]
     if "according to" in bag.printed:  # what is believed, in place of what is counted
         assert "clearances" in not_valid
-        believed_m = bag.found["clearances"]["A"]["believed_m"]
-        assert clearance == ("not valid" if believed_m is None else f"{1e3 * believed_m:.3f}")
+        best_estimate_m = bag.found["clearances"]["A"]["best_estimate_m"]
+        assert clearance == ("not valid" if best_estimate_m is None else f"{1e3 * best_estimate_m:.3f}")
         return
     assert (clearance == "not valid") == ("clearances" in not_valid)
     if clearance != "not valid":
@@ -167,7 +167,7 @@ def test_clearances_and_forces_in_messages_are_those_of_the_summary_to_the_bit(b
     ]
     for number, joint in enumerate(joints):
         assert {state.name[number] for state in states} == {f"{joint}_clearance"}
-        assert [state.position[number] for state in states] == history["counted_m"][joint]
+        assert [state.position[number] for state in states] == history["modelled_m"][joint]
         assert [state.effort[number] for state in states] == history["peak_force_n"][joint]
 
 

@@ -110,7 +110,7 @@ def test_jumps_meet_every_single_cycle(leg):
         )
         assert status[0] == DONE
     every = setup.surfaces.depth.mean(axis=2).sum(axis=1)
-    settings = LifeSettings(legs=2, cycles=5, jump=JumpControl(opens_m=2e-5))
+    settings = LifeSettings(legs=2, cycles=5, jump=JumpControl(max_wear_per_jump_m=2e-5))
     run = LifeRun(leg, settings, clearances=("A", "B"), wear_factor=factor)
     simulate_life(run, limit_m=9.0e-3, horizon_cycles=float(cycles))
     assert run.points[-1].cycles == pytest.approx(cycles)

@@ -13,7 +13,7 @@ from leg_wear_monitor.studies.study import parse_study
 
 SMALL = {
     "ensemble": {"runs": 2, "cycles": 2, "skip_cycles": 1, "traced_cycles": 1},
-    "life": {"opens_m": 5.0e-6, "jump_m": 1.0e-5, "cycles": 2, "runs": 2},
+    "life": {"max_wear_per_jump_m": 5.0e-6, "jump_m": 1.0e-5, "cycles": 2, "runs": 2},
     "exponent": {"runs": 2, "cycles": 10, "renewals": 16},
     "section": {"cycles": 4, "skip_cycles": 1},
     "portrait": {"cycles": 6, "skip_cycles": 1, "portrait_cycles": 2},

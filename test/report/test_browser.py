@@ -156,7 +156,7 @@ window.addEventListener("load", () => setTimeout(() => {
 
 def test_codes_of_a_guide_are_whole(tmp_path):
     summary = made_up_summary()
-    summary = attrs.evolve(summary, verdict=attrs.evolve(summary.verdict, fault_code="CLEARANCE_SEEN_A"))
+    summary = attrs.evolve(summary, verdict=attrs.evolve(summary.verdict, fault_code="CLEARANCE_DETECTED_A"))
     found, _ = browse([page_html(replay_page(summary))], tmp_path, CUT)
     assert all(page["words"] >= 4 for page in found)
     assert [page["cut"] for page in found] == [0, 0]

@@ -204,4 +204,4 @@ def test_what_is_kept_of_a_break_out_replays_to_its_stop(stage, tmp_path: Path) 
     (kept,) = (tmp_path / "stops").iterdir()
     again = replay(kept, config_from({})).monitor.verdict.verdict
     assert (again.fault_code, again.evidence) == (live.fault_code, live.evidence)
-    assert again.fault_code == "CLEARANCE_SEEN_G"
+    assert again.fault_code == "CLEARANCE_DETECTED_G"

@@ -128,7 +128,7 @@ def test_an_opened_knee_is_shown_by_the_current_in_the_air(stage: Any, stand_ins
     status = walking.status_after(13.0)
     verdict = walking.monitor.node.monitor.verdict.verdict
     assert (verdict.state, verdict.joints) == (State.INSPECT, ("G",))
-    shown_m = walking.monitor.node.monitor.state.clearances["G"].believed_m
+    shown_m = walking.monitor.node.monitor.state.clearances["G"].best_estimate_m
     assert shown_m == pytest.approx(0.45e-3, abs=5.0 * 0.032e-3)
     assert "its sensor is stuck, or the leg walks in the air" in status["foot_load"].message
     walking.end()

@@ -9,7 +9,7 @@ from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
 from leg_wear_monitor.dynamics.full_run import FullRun
 from leg_wear_monitor.dynamics.run import TORQUE_ERROR, new_run_statistics, steady_drive
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.mechanism.person import on_the_ground
+from leg_wear_monitor.mechanism.person import with_ground_reaction
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.studies.study import parse_study
 from leg_wear_monitor.studies.tables import fraction_of_range
@@ -80,7 +80,7 @@ def points(**sweep):
 
 def test_a_load_of_a_point_replaces_the_load_of_the_file():
     """0 N is a load as well; a point without a load keeps the load of the file."""
-    leg = on_the_ground(load_mechanism(), 600.0)
+    leg = with_ground_reaction(load_mechanism(), 600.0)
 
     def peak_n(point):
         settings = point.settings | {"runs": 1}

@@ -41,7 +41,7 @@ def test_unknown_codes_are_refused(name: str, code: int) -> None:
     [
         (TrackerSettings, "bandwidth_hz", 0.0, {}), (TrackerSettings, "bandwidth_hz", 0.1, {}),
         (TrackerSettings, "gate_rad", math.nan, {}), (TrackerSettings, "lag_s", -1.0, {}),
-        (TrackerSettings, "commanded_speed_radps", 0.0, {}), (TrackerSettings, "node_interval_s", -0.01, {}),
+        (TrackerSettings, "commanded_speed_radps", 0.0, {}), (TrackerSettings, "knot_interval_s", -0.01, {}),
         (TrackerSettings, "reorder_window_s", 2.0, {}), (TrackerSettings, "largest_speed_radps", -1.0, {}),
         (TwinSettings, "wear_acceleration", math.nan, {}), (TwinSettings, "torque_bandwidth_hz", 0.0, {}),
         (TwinSettings, "load_shape", "round", {}), (TwinSettings, "torque_sampling", "median", {}),

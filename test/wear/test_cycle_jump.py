@@ -50,7 +50,7 @@ def test_a_rate_is_the_mean_and_its_scatter_falls_with_the_number_of_cycles():
 
 
 def test_no_jump_goes_deeper_than_it_may():
-    control = JumpControl(opens_m=1e-5)
+    control = JumpControl(max_wear_per_jump_m=1e-5)
     assert longest_jump(rate(2e-9), control) == pytest.approx(5000.0)
     assert longest_jump(rate(0.0), control) == np.inf
 

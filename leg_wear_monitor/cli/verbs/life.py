@@ -39,12 +39,12 @@ _TABLE_ROWS = 12  # most rows of the printed table, spread over the life
     "[default: the mechanism's own loads]",
 )
 @common.number_option(
-    "--opens-m", "M", "Deepest change of a surface in a jump.  [default: 3e-05]", "m", above=0.0
+    "--max-wear-per-jump-m", "M", "Deepest change of a surface in a jump.  [default: 3e-05]", "m", above=0.0
 )
 @common.option("--legs", "N", "Number of legs averaged.  [default: 2]", type=click.IntRange(min=1))
 @common.option("--cycles", "N", "Gait cycles of each leg averaged.  [default: 4]", type=click.IntRange(min=2))
 @common.option(
-    "--lives",
+    "--ensemble-size",
     "N",
     "Number of lives for --json; lives after the first have different wear coefficients, from which the "
     "forecast finds the effect of joints on each other.",
@@ -83,7 +83,9 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
     common.say(json_file, [*printed, *_remarks(leg, result, options["wear_factor"])], written)
 
 
-def _lives(leg: "Mechanism", lives: int, opens_m: float | None, duty: str | None, **options: Any) -> "Lives":
+def _lives(
+    leg: "Mechanism", ensemble_size: int, max_wear_per_jump_m: float | None, duty: str | None, **options: Any
+) -> "Lives":
     """Check the options, and simulate the lives."""
     import attrs
     import numpy as np
@@ -97,8 +99,8 @@ def _lives(leg: "Mechanism", lives: int, opens_m: float | None, duty: str | None
     # options that were not given have the defaults of LifeSettings
     given = {name: value for name in ("legs", "cycles") if (value := options.pop(name)) is not None}
     settings = LifeSettings(**given)
-    if opens_m is not None:
-        settings = attrs.evolve(settings, jump=JumpControl.of(opens_m))
+    if max_wear_per_jump_m is not None:
+        settings = attrs.evolve(settings, jump=JumpControl.of(max_wear_per_jump_m))
     loads = None if duty is None else Duty.parse(duty)
     # bad settings are refused before the kernels are compiled, which takes a while
     joints = clearance_settings(leg, leg.clearance_joints)
@@ -107,7 +109,7 @@ def _lives(leg: "Mechanism", lives: int, opens_m: float | None, duty: str | None
     clearance_m, radius_m = sizes.reshape(-1, 2).T
     check_life(leg.clearance_joints, clearance_m, radius_m, options["limit_m"], settings.jump)
     with common.compilation("clearance"), common.progress_bar("life") as progress:
-        return list(simulate_lives(leg, settings, lives, progress=progress, duty=loads, **options))
+        return list(simulate_lives(leg, settings, ensemble_size, progress=progress, duty=loads, **options))
 
 
 def _document(leg: "Mechanism", lives: "Lives", limit_m: float) -> dict[str, Any]:

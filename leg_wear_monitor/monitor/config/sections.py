@@ -167,8 +167,8 @@ class Forecasting:
     duty_hours_per_day: float = quantity("h", "walking per day", within=(0.01, 24.0), default=8.0)
     duty_sigma: float = 0.2  # of the walking per day
     window_cycles: int = 2000  # over which growth is averaged, because single gait cycles scatter
-    life: str = described(
-        "file that `leg-wear-monitor life --lives 16 --json` wrote for this leg: how growth changes as all "
-        "clearances open; empty: the one that comes with the package for just this leg, if there is one",
+    growth_law_file: str = described(
+        "file that `leg-wear-monitor life --ensemble-size 16 --json` wrote for this leg: how growth changes "
+        "as all clearances open. Empty: use the file that the package has for this leg",
         default="",
     )

@@ -129,7 +129,7 @@ class Alarms:
     on_delay_cycles: int = live_quantity(
         "", "consecutive gait cycles beyond a limit before the level rises", within=(1, 1000), default=3
     )
-    knock_on_delay_cycles: int = live_quantity(
+    impact_on_delay_cycles: int = live_quantity(
         "", "on-delay of the alarms of impact forces", within=(1, 1000), default=1
     )
 
@@ -164,7 +164,7 @@ class Record:
     """A recording of what the node receives and publishes."""
 
     path: str = described("MCAP file to write; empty: none", default="")
-    stops: str = described(
+    stop_recording_dir: str = described(
         "directory for MCAP files of the 30 s before and 10 s after each stop verdict; empty: none",
         default="",
     )
@@ -184,7 +184,7 @@ class TorqueDiagnosis:
     """Clearances that the drive torque shows (docs/explanation/diagnosis.md)."""
 
     enabled: bool = described("whether clearances are estimated from the drive torque", default=True)
-    correct: bool = described(
+    apply_corrections: bool = described(
         "whether a counted clearance is corrected where the drive torque surely shows another one",
         default=True,
     )

@@ -120,7 +120,7 @@ class Evidence:
         if reported and state.changes and state.changes[-1].subject == reported[-1].subject:
             state.changes = (_since(state.changes[-1], reported[-1].since_ns, state),)
 
-    def settle(self, state: TorqueState, change: Change, counted_m: Floats) -> None:
+    def settle(self, state: TorqueState, change: Change, modelled_m: Floats) -> None:
         """Make the gait cycles since a change those of the commissioned leg, with clearances (k,) [m].
 
         What the correction is off does then not look like a further change; it stays in the standard
@@ -129,9 +129,9 @@ class Evidence:
         """
         explainer = self._models.explainer(state)  # of the baseline before
         state.cycles = tuple(cycle for cycle in state.cycles if cycle.begin_ns >= change.since_ns)
-        before, sigma_m = state.commissioned, counted_m.copy()
+        before, sigma_m = state.commissioned, modelled_m.copy()
         if before is not None and before.before is not None:  # joints that were corrected since stay known
-            sigma_m = np.where(before.is_unknown, counted_m, before.sigma_m)
+            sigma_m = np.where(before.is_unknown, modelled_m, before.sigma_m)
         sigma_m[explainer.joints.index(change.subject)] = change.sigma
         if before is not None:
             signatures_before = before.signatures - before.mean + explainer.baseline.offset
@@ -139,7 +139,7 @@ class Evidence:
         state.forget_baselines()
         channel = before.channel if before else DIRECT
         state.commissioned = state.baseline(
-            state.cycles, counted_m, sigma_m=sigma_m, channel=channel, before=before
+            state.cycles, modelled_m, sigma_m=sigma_m, channel=channel, before=before
         )
         state.settled = (*state.settled, attrs.evolve(change, is_corrected=True))
 
@@ -158,21 +158,21 @@ class Evidence:
         explainer = self._models.explainer_since(known.before, state.reference, state)
         if explainer is None:
             return None
-        counted_m, mean, cycles = state.counted_m, state.signatures.mean(axis=0), len(state.cycles)
-        explanations = explainer.explanations(mean, cycles, counted_m)
+        modelled_m, mean, cycles = state.modelled_m, state.signatures.mean(axis=0), len(state.cycles)
+        explanations = explainer.explanations(mean, cycles, modelled_m)
         change = change_of(explanations, state.settled[-1].since_ns if state.settled else known.stamp_ns)
         is_found = change is not None and change.is_sure and change.is_wide
         if is_found and explanations[0].square <= _WHOLLY and not is_last:
             return change
-        found = best_fit(explainer, mean, cycles, counted_m, starts_of(explainer, None, counted_m))
+        found = best_fit(explainer, mean, cycles, modelled_m, starts_of(explainer, None, modelled_m))
         state.commissioned = attrs.evolve(known, before=None)
         if found.square <= _WHOLLY:
-            corrected_m = np.abs(counted_m - known.before.clearance_m).max()
-            apart_m = np.abs(found.clearance_m - counted_m)
+            corrected_m = np.abs(modelled_m - known.before.clearance_m).max()
+            apart_m = np.abs(found.clearance_m - modelled_m)
             own_m = np.sqrt(found.sigma_m**2 + apart_m**2 + (MODEL_ERROR * corrected_m) ** 2)
             own_m = np.hypot(own_m, known.before.sigma_m)
             # as wide as is corrected, but not surely: J at 0.60 mm beside B was 0.57 ± 0.06, or it was I
-            own_m = np.where(found.clearance_m >= CORRECTED_FROM * counted_m, counted_m, own_m)
+            own_m = np.where(found.clearance_m >= CORRECTED_FROM * modelled_m, modelled_m, own_m)
             state.know_corrected(np.where(known.is_unknown, own_m, known.sigma_m))
         state.fit_due = 0
         return None
@@ -190,7 +190,7 @@ class Evidence:
         mean = known.mean if known else state.signatures.mean(axis=0)
         if known is None:
             state.sensor = attrs.evolve(state.sensor, channel=DIRECT)
-        elif known.is_as_counted:
+        elif known.is_as_modelled:
             state.sensor = self._models.channel(state.reference, state.sensor, known)
             if known.channel != state.sensor.channel:
                 state.commissioned = attrs.evolve(known, channel=state.sensor.channel)
@@ -225,7 +225,7 @@ class Evidence:
         mean = np.mean([cycle.signature for cycle in cycles], axis=0)
         explanations: Sequence[Explanation] = ()
         if since_ns or state.commissioned is None:
-            explanations = self._models.explainer(state).explanations(mean, len(cycles), state.counted_m)
+            explanations = self._models.explainer(state).explanations(mean, len(cycles), state.modelled_m)
         if state.interim is not None:
             explanations = self._beside_interim(state, cycles, explanations)
             cycles = cycles[-len(state.cycles) :]
@@ -262,7 +262,7 @@ class Evidence:
         if change.cause in (Cause.CLEARANCE, Cause.NOISE) or len(since) < COMMISSIONING_CYCLES:
             return
         baseline = state.baseline(
-            since, state.counted_m, sigma_m=known.sigma_m, channel=known.channel, is_interim=True
+            since, state.modelled_m, sigma_m=known.sigma_m, channel=known.channel, is_interim=True
         )
         if change.cause in (Cause.LAG, Cause.TIMING) and state.reference and state.sensor:
             behind = self._models.channel(state.reference, state.sensor, baseline).channel
@@ -288,7 +288,7 @@ class Evidence:
         recent = cycles if explanations else cycles[-SETTLING_CYCLES:]
         mean = np.mean([cycle.signature for cycle in recent], axis=0)
         explainer = self._models.explainer(state, is_commissioned=True)
-        alone = explainer.explanations(mean, len(recent), state.counted_m)
+        alone = explainer.explanations(mean, len(recent), state.modelled_m)
         change, reported = change_of(alone, 0), [(one.cause, one.subject) for one in state.interim_changes]
         if change is None:
             is_over = True
@@ -333,7 +333,7 @@ class Evidence:
         if len(before) < _LEAST_BEFORE:
             return False
         explainer, mean = self._models.explainer(state), np.mean(before, axis=0)
-        return _is_of_reference(explainer.explanations(mean, len(before), state.counted_m))
+        return _is_of_reference(explainer.explanations(mean, len(before), state.modelled_m))
 
     def _change(
         self, state: TorqueState, explanations: Sequence[Explanation], since_ns: int
@@ -358,8 +358,8 @@ class Evidence:
         if change is None or change.cause is not Cause.CLEARANCE:
             return change
         explainer = self._models.explainer(state)
-        changed_m = start_of(change, explainer.joints, state.counted_m)
-        first = first_changed(explainer, state.signatures, state.counted_m, changed_m)
+        changed_m = start_of(change, explainer.joints, state.modelled_m)
+        first = first_changed(explainer, state.signatures, state.modelled_m, changed_m)
         return _since(attrs.evolve(change, since_ns=state.cycles[first].begin_ns), since_ns, state)
 
     def _fit(
@@ -371,10 +371,10 @@ class Evidence:
         explanations: Sequence[Explanation],
     ) -> ClearanceFit:
         """Estimate of all clearances from the mean signature (F,) of some cycles."""
-        explainer, counted_m = self._models.explainer(state), state.counted_m
-        starts = starts_of(explainer, change, counted_m)
+        explainer, modelled_m = self._models.explainer(state), state.modelled_m
+        starts = starts_of(explainer, change, modelled_m)
         known_sigma_m = state.commissioned.sigma_m if state.commissioned else 0.0
-        found = best_fit(explainer, mean, cycles, counted_m, starts, known_sigma_m)
+        found = best_fit(explainer, mean, cycles, modelled_m, starts, known_sigma_m)
         found = with_rivals(found, explanations, explainer.joints)
         if change is not None and change.cause is Cause.CLEARANCE:  # it hides another one that opened with it
             others = np.array([joint != change.subject for joint in explainer.joints])
@@ -439,7 +439,7 @@ def _report_wide(state: TorqueState, fit: ClearanceFit, joints: Sequence[str], s
 
     With doubt, as the load was found with what the joint changes of the torque.
     """
-    beyond = (fit.clearance_m - state.counted_m) / fit.sigma_m
+    beyond = (fit.clearance_m - state.modelled_m) / fit.sigma_m
     k = int(np.argmax(beyond))
     change = Change(
         cause=Cause.CLEARANCE,
@@ -447,7 +447,7 @@ def _report_wide(state: TorqueState, fit: ClearanceFit, joints: Sequence[str], s
         since_ns=since_ns,
         value=float(fit.clearance_m[k]),
         sigma=float(fit.sigma_m[k]),
-        counted=float(state.counted_m[k]),
+        counted=float(state.modelled_m[k]),
         log_odds=0.5 * float(beyond[k]) ** 2,
         runner_up=Cause.LOAD.value,
         runner_up_log_odds=0.0,

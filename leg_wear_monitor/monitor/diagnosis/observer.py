@@ -71,7 +71,7 @@ class TorqueObserver(KeepsSamples):
     config : MonitorConfig
     size_nm : float
         RMS of the leg's drive torque at the commanded speed.
-    counted_m : (k,) array
+    modelled_m : (k,) array
         Counted clearances.
     commissioned : sequence of CommissionedTorque, optional
         Those of the ledger, the last one first.
@@ -90,7 +90,7 @@ class TorqueObserver(KeepsSamples):
         mechanism: Mechanism,
         config: MonitorConfig,
         size_nm: float,
-        counted_m: Floats,
+        modelled_m: Floats,
         commissioned: Sequence[CommissionedTorque] = (),
         parameters: LegParameters | None = None,
         references: Sequence[TorqueReference] = (),
@@ -106,7 +106,7 @@ class TorqueObserver(KeepsSamples):
         self._up = upwards(mechanism)
         self._references = References(mechanism, self.models, whole, part, is_drive_known, self._is_on_ground)
         self._evidence = Evidence(self.models)
-        counted_m = np.asarray(counted_m, float).copy()
+        modelled_m = np.asarray(modelled_m, float).copy()
         if parameters is None:  # those that files and unfinished references were made with
             own = LegParameters.none(mechanism)
             made = (one.parameters for one in references if not one.is_of_parameters)
@@ -118,7 +118,7 @@ class TorqueObserver(KeepsSamples):
             whole_leg = parameters or LegParameters.none(mechanism)
             parameters = attrs.evolve(whole_leg, compliance=compliance_of(figures.stiffness_nm_per_rad))
         self.state = TorqueState(
-            counted_m,
+            modelled_m,
             baselines=tuple(commissioned),
             parameters=parameters,
             load_rounds=LOAD_ROUNDS if parameters is not None and parameters.load.size else 0,
@@ -170,12 +170,12 @@ class TorqueObserver(KeepsSamples):
         if state.reference is not None:
             self._evidence.review(state, self.config)
 
-    def end_period(self, counted_m: Floats, depth: Floats) -> Change | None:
+    def end_period(self, modelled_m: Floats, depth: Floats) -> Change | None:
         """Evaluate the gait cycles that ended, and go on with what is simulated for the reference.
 
         Parameters
         ----------
-        counted_m : (k,) array
+        modelled_m : (k,) array
             Counted mean clearances.
         depth : (k, 2, N) array
             Counted wear [m].
@@ -186,13 +186,13 @@ class TorqueObserver(KeepsSamples):
             Of a counted clearance that is surely wrong, and shall be corrected before the next period.
         """
         state = self.state
-        self._follow_counted(counted_m)
+        self._follow_counted(modelled_m)
         self._follow_load()
         ended = self.evaluate_due(self._evaluate)
-        is_renewed = self._references.advance(state, counted_m, depth)
+        is_renewed = self._references.advance(state, modelled_m, depth)
         if self._found_load() or is_renewed:
             self._evidence.review(state, self.config)
-        if not ended or not self.config.diagnosis.correct or self._references.is_to_identify(state):
+        if not ended or not self.config.diagnosis.apply_corrections or self._references.is_to_identify(state):
             return None
         if not self.models.is_sure(state):
             return None
@@ -224,20 +224,20 @@ class TorqueObserver(KeepsSamples):
         others_m = state.commissioned.sigma_m
         state.know_corrected(np.where(np.arange(len(others_m)) == k, known_sigma_m, others_m))
 
-    def corrected(self, change: Change, counted_m: Floats) -> None:
+    def corrected(self, change: Change, modelled_m: Floats) -> None:
         """Compare with the corrected clearances (k,) [m] from now on."""
-        counted_m = np.asarray(counted_m, float).copy()
+        modelled_m = np.asarray(modelled_m, float).copy()
         state = self.state
         state.settled = state.corrections
-        self._evidence.settle(state, change, counted_m)
-        self._restart(counted_m)
+        self._evidence.settle(state, change, modelled_m)
+        self._restart(modelled_m)
 
-    def replaced(self, counted_m: Floats) -> None:
+    def replaced(self, modelled_m: Floats) -> None:
         """Start again after the replacement of a part: the leg has to be commissioned again."""
         self.state.settled = ()
         self.state.fit, self.state.fit_cycles, self.state.fit_due = None, 0, 0  # it is of the former part
         self.state.forget_baselines()
-        self._restart(counted_m)
+        self._restart(modelled_m)
 
     @property
     def parameters(self) -> LegParameters | None:
@@ -266,7 +266,7 @@ class TorqueObserver(KeepsSamples):
     def begin_epoch(self) -> None:
         """Forget kept samples and gait cycles, because stamps start again."""
         self.state.samples, self.state.due = TorqueSamples(), ()
-        self._restart(self.state.counted_m)
+        self._restart(self.state.modelled_m)
 
     @property
     def _load(self) -> FootLoad | None:
@@ -314,7 +314,7 @@ class TorqueObserver(KeepsSamples):
         clearance_m, sigma_m = self._observed(state.fit)
         return attrs.evolve(
             found,
-            state=DiagnosisState.CHANGED if state.not_corrected else DiagnosisState.AS_COUNTED,
+            state=DiagnosisState.CHANGED if state.not_corrected else DiagnosisState.AS_MODELLED,
             reason=_joined(doubt(state, self._references, self.models), other_sensor(state)),
             cycles=state.fit_cycles,
             clearance_m=tuple(clearance_m.tolist()),
@@ -338,9 +338,9 @@ class TorqueObserver(KeepsSamples):
         known = self.state.commissioned
         if self.state.interim_changes:
             observable &= False
-        elif known is not None and known.is_as_counted:  # a corrected one is known from its correction
+        elif known is not None and known.is_as_modelled:  # a corrected one is known from its correction
             unseen_m = self.models.detector(self.state, self.config).unseen_m(WINDOW_CYCLES)
-            observable &= unseen_m <= CORRECTED_FROM * self.state.counted_m
+            observable &= unseen_m <= CORRECTED_FROM * self.state.modelled_m
         clearance_m, sigma_m = (
             np.where(observable, each, math.nan) for each in (fit.clearance_m, fit.sigma_m)
         )
@@ -400,11 +400,11 @@ class TorqueObserver(KeepsSamples):
         state = self.state
         if state.commissioned is not None or state.changes or len(state.cycles) < COMMISSIONING_CYCLES:
             return
-        known = state.baseline(state.cycles, state.counted_m)
+        known = state.baseline(state.cycles, state.modelled_m)
         # what a correction left unknown is not known better at another cadence
         corrected = state.corrected
         if corrected is not None:
-            sigma_m = np.where(corrected.is_unknown, state.counted_m, corrected.sigma_m)
+            sigma_m = np.where(corrected.is_unknown, state.modelled_m, corrected.sigma_m)
             known = attrs.evolve(known, sigma_m=sigma_m, channel=corrected.channel)
         state.commissioned = known
         if state.is_load_new and state.load_rounds >= LOAD_ROUNDS:  # the new load explains what was reported
@@ -413,10 +413,10 @@ class TorqueObserver(KeepsSamples):
             state.load_rounds, state.renewed_n = 0, float(np.mean(state.carried_n))
         self._evidence.review(state, self.config)
 
-    def _restart(self, counted_m: Floats) -> None:
+    def _restart(self, modelled_m: Floats) -> None:
         """Forget the kept cycles, because the leg, or what is counted of it, has changed."""
         state = self.state
-        state.counted_m = np.asarray(counted_m, float).copy()
+        state.modelled_m = np.asarray(modelled_m, float).copy()
         state.forget_cycles()
         state.forget_interims()
         state.detector, state.has_failed = None, False
@@ -442,7 +442,7 @@ class TorqueObserver(KeepsSamples):
         state.settled += state.not_by_load
         state.is_load_new, state.is_load_other, state.load, state.load_rounds = True, True, None, 0
         state.forget_baselines()
-        self._restart(state.counted_m)
+        self._restart(state.modelled_m)
 
     def _has_moved(self, peak_n: float, cycles: int) -> bool:
         """Whether the foot carried another load in the last gait cycles than in the reference."""
@@ -463,8 +463,8 @@ class TorqueObserver(KeepsSamples):
         state.forget_baselines()
         return True
 
-    def _follow_counted(self, counted_m: Floats) -> None:
+    def _follow_counted(self, modelled_m: Floats) -> None:
         """Compare with the counted clearances as they grow."""
         state = self.state
-        if (np.abs(counted_m / state.counted_m - 1.0) > 0.005).any():
-            state.counted_m = np.asarray(counted_m, float).copy()
+        if (np.abs(modelled_m / state.modelled_m - 1.0) > 0.005).any():
+            state.modelled_m = np.asarray(modelled_m, float).copy()

@@ -71,7 +71,7 @@ class _ModelsOfState:
     commissioned: signature.CommissionedTorque | None
     explainer: Explainer
     misfit: float | None = None
-    counted_m: Floats | None = None
+    modelled_m: Floats | None = None
     detector: ChangeDetector | None = None
 
 
@@ -107,17 +107,17 @@ class LegModels:
 
         None before there is a reference about the corrected clearances.
         """
-        if state.sensor is None or _is_far(reference, state.counted_m) or not before.is_of(state.sensor):
+        if state.sensor is None or _is_far(reference, state.modelled_m) or not before.is_of(state.sensor):
             return None
-        return explainer_of(self._mechanism, reference, state.sensor, before, state.counted_m)
+        return explainer_of(self._mechanism, reference, state.sensor, before, state.modelled_m)
 
     def detector(self, state: TorqueState, config: MonitorConfig) -> ChangeDetector:
         """Tests for a change of the counted clearances."""
         own = self._of(state)
-        if own.detector is None or own.counted_m is not state.counted_m:
+        if own.detector is None or own.modelled_m is not state.modelled_m:
             cycles = 60.0 * abs(config.cadence.commanded_rpm) * config.diagnosis.false_alarm_hours
-            own.detector = ChangeDetector(own.explainer, state.counted_m, cycles)
-            own.counted_m = state.counted_m
+            own.detector = ChangeDetector(own.explainer, state.modelled_m, cycles)
+            own.modelled_m = state.modelled_m
         return own.detector
 
     def misfit(self, state: TorqueState) -> float:
@@ -126,7 +126,7 @@ class LegModels:
         It is not known for the baseline after a correction, since the corrected clearance is not exact.
         """
         commissioned = state.commissioned
-        if state.reference is None or commissioned is None or not commissioned.is_as_counted:
+        if state.reference is None or commissioned is None or not commissioned.is_as_modelled:
             return 0.0
         own = self._of(state, is_commissioned=True)
         if own.misfit is None:
@@ -298,7 +298,7 @@ class References:
         if self._run is not None:
             self._run.leave()
 
-    def advance(self, state: TorqueState, counted_m: Floats, depth: Floats) -> bool:
+    def advance(self, state: TorqueState, modelled_m: Floats, depth: Floats) -> bool:
         """Choose a reference, continue its simulation, or begin a new one if required.
 
         Returns
@@ -307,18 +307,18 @@ class References:
             Whether the reference of the state was replaced, so that the kept cycles must be evaluated again.
         """
         if self._run is not None and self._run.is_busy:
-            return self._continue(self._run, state, counted_m, depth)
+            return self._continue(self._run, state, modelled_m, depth)
         if state.has_failed:
             return False
         if len(state.waiting) >= (FIRST_CYCLES if state.reference is None else UNLIKE_CYCLES):
-            return self._choose(state, counted_m, depth)
+            return self._choose(state, modelled_m, depth)
         if state.reference is None or len(state.cycles) < FIRST_CYCLES:
             return False
         own, identified = state.reference.parameters, state.parameters
-        if _is_far(state.reference, counted_m):
-            self._begin(own if state.is_final else identified, counted_m, depth, state.profile)
+        if _is_far(state.reference, modelled_m):
+            self._begin(own if state.is_final else identified, modelled_m, depth, state.profile)
         elif not state.is_final and identified not in (None, own):  # identified at another cadence or earlier
-            self._begin(identified, counted_m, depth, state.reference.profile)
+            self._begin(identified, modelled_m, depth, state.reference.profile)
         elif self._may_be_loaded(state):
             self._begin_under_load(state, state.reference, depth)
         elif self.is_to_identify(state):
@@ -395,7 +395,7 @@ class References:
             self._running().begin_identification(clearance_m, depth, profile, start)
 
     def _continue(
-        self, run: TorqueReferenceRun, state: TorqueState, counted_m: Floats, depth: Floats
+        self, run: TorqueReferenceRun, state: TorqueState, modelled_m: Floats, depth: Floats
     ) -> bool:
         """Continue the simulation for a period, and use what it completes.
 
@@ -403,7 +403,7 @@ class References:
         """
         found = run.advance()
         if found is not None and state.is_identifying:
-            self._identify(state, found, counted_m, depth)
+            self._identify(state, found, modelled_m, depth)
         elif found is not None:
             self._install(state, found)
             return True
@@ -411,7 +411,7 @@ class References:
             _abandon(state)
         return False
 
-    def _choose(self, state: TorqueState, counted_m: Floats, depth: Floats) -> bool:
+    def _choose(self, state: TorqueState, modelled_m: Floats, depth: Floats) -> bool:
         """Use a given reference of the same motion, preferably one of this leg, or begin a new one."""
         profile = mean_profile([cycle.profile for cycle in state.waiting])
         drive = state.parameters.compliance if state.parameters else 0.0
@@ -421,7 +421,7 @@ class References:
         if alike:
             self._install(state, next((one for one in alike if one.parameters == state.parameters), alike[0]))
             return True
-        self._begin(state.parameters, counted_m, depth, profile)
+        self._begin(state.parameters, modelled_m, depth, profile)
         return False
 
     def _running(self) -> TorqueReferenceRun:
@@ -432,15 +432,15 @@ class References:
         return self._run
 
     def _begin(
-        self, parameters: LegParameters | None, counted_m: Floats, depth: Floats, profile: CrankProfile
+        self, parameters: LegParameters | None, modelled_m: Floats, depth: Floats, profile: CrankProfile
     ) -> None:
         """Begin the simulation of a reference, or continue that of an earlier run."""
         own = parameters or LegParameters.none(self._mechanism)
-        part = self._unfinished(own, profile, counted_m)
+        part = self._unfinished(own, profile, modelled_m)
         if part is not None:
             self._running().go_on(part, depth)
         else:
-            self._running().begin(counted_m, depth, profile, own)
+            self._running().begin(modelled_m, depth, profile, own)
 
     def _unfinished(
         self, own: LegParameters, profile: CrankProfile, clearance_m: Floats, is_of_parameters: bool = False
@@ -453,7 +453,7 @@ class References:
             return None
         return part if profile.is_like(part.profile) and not _is_far(part, clearance_m) else None
 
-    def _identify(self, state: TorqueState, legs: TorqueReference, counted_m: Floats, depth: Floats) -> None:
+    def _identify(self, state: TorqueState, legs: TorqueReference, modelled_m: Floats, depth: Floats) -> None:
         """Find the parameters that explain the commissioned leg, and begin a reference with them.
 
         A single leg among `legs` is one under a load: then the force is found again, or is final.
@@ -465,13 +465,13 @@ class References:
                 self._begin_under_load(state, legs, depth)
             else:
                 state.parameters = legs.parameters
-                self._begin(state.parameters, counted_m, depth, legs.profile)
+                self._begin(state.parameters, modelled_m, depth, legs.profile)
         elif state.commissioned is not None:
             explainer = self._models.explainer(state, is_commissioned=True)
             state.parameters = identification.identified_leg(
                 legs, explainer.model, explainer.nuisances, state.commissioned, self._is_drive_known
             )
-            self._begin(state.parameters, counted_m, depth, legs.profile)
+            self._begin(state.parameters, modelled_m, depth, legs.profile)
 
     def _install(self, state: TorqueState, reference: TorqueReference) -> None:
         """Use a new reference at its cadence.
@@ -504,9 +504,9 @@ class References:
             state.parameters = before.parameters
 
 
-def _is_far(reference: TorqueReference, counted_m: Floats) -> bool:
+def _is_far(reference: TorqueReference, modelled_m: Floats) -> bool:
     """Whether the expected leg of a reference has other clearances than the counted ones (k,) [m]."""
-    expected_m = np.maximum(counted_m, LEAST_CLEARANCE_M)  # no leg is simulated with less
+    expected_m = np.maximum(modelled_m, LEAST_CLEARANCE_M)  # no leg is simulated with less
     return bool((np.abs(reference.clearance_m[0] / expected_m - 1.0) > _FAR_FRACTION).any())
 
 

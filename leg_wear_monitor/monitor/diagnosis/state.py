@@ -70,7 +70,7 @@ class DiagnosisState(Enum):
 
     OFF = "off"
     WAITING = "waiting"
-    AS_COUNTED = "as_counted"
+    AS_MODELLED = "as_modelled"
     CHANGED = "changed"
 
 
@@ -259,7 +259,7 @@ class TorqueState:
     reference : TorqueReference or None
     cycles : tuple of SignedCycle
         The last gait cycles at the reference's cadence.
-    counted_m : (k,) array
+    modelled_m : (k,) array
         Counted clearances that the detector compares with.
     commissioned : CommissionedTorque or None
         At the reference's cadence.
@@ -313,7 +313,7 @@ class TorqueState:
         Whether the leg could not be simulated for a reference.
     """
 
-    counted_m: Floats
+    modelled_m: Floats
     samples: TorqueSamples = TorqueSamples()
     due: tuple[tuple[int, int], ...] = ()
     sensor: TorqueSensor | None = None
@@ -358,11 +358,11 @@ class TorqueState:
         """Signatures (n, F) of the kept cycles."""
         return np.array([cycle.signature for cycle in self.cycles])
 
-    def baseline(self, cycles: Sequence[SignedCycle], counted_m: Floats, **more: Any) -> CommissionedTorque:
+    def baseline(self, cycles: Sequence[SignedCycle], modelled_m: Floats, **more: Any) -> CommissionedTorque:
         """Baseline of some gait cycles by the present sensor; ``more`` are further attributes."""
         signatures, temperature_c = np.array([one.signature for one in cycles]), temperature_of(cycles)
         own = {"speed": self.profile.speed, "temperature_c": temperature_c, **more}
-        found = CommissionedTorque(cycles[-1].end_ns, counted_m, signatures, **own)
+        found = CommissionedTorque(cycles[-1].end_ns, modelled_m, signatures, **own)
         return found.measured_by(self.sensor) if self.sensor else found
 
     @property
@@ -449,11 +449,11 @@ class TorqueState:
     @property
     def corrected(self) -> CommissionedTorque | None:
         """A baseline after a correction, of any cadence; None without one."""
-        return next((one for one in self.all_commissioned if not one.is_as_counted), None)
+        return next((one for one in self.all_commissioned if not one.is_as_modelled), None)
 
     def know_corrected(self, sigma_m: Floats) -> None:
         """Give the baselines after a correction, of all cadences, other standard deviations (k,) [m]."""
-        self._baselines_as(lambda one: one if one.is_as_counted else attrs.evolve(one, sigma_m=sigma_m))
+        self._baselines_as(lambda one: one if one.is_as_modelled else attrs.evolve(one, sigma_m=sigma_m))
 
     def at(self, profile: CrankProfile) -> AtCadence | None:
         """Another cadence than the present one whose crank turns as in a profile."""
@@ -522,7 +522,7 @@ class TorqueState:
         """Clearances that joints surely have by so many last fits; minus infinity where there are fewer."""
         least_m = self.least_m[-number:]
         if len(least_m) < number or self.is_load_other:
-            return (-math.inf,) * len(self.counted_m)
+            return (-math.inf,) * len(self.modelled_m)
         return tuple(np.min(least_m, axis=0).tolist())
 
     def forget_cycles(self, since_ns: int = 0) -> None:

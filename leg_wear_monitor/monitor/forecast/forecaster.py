@@ -82,7 +82,7 @@ def life_doubts(config: MonitorConfig, leg: Mechanism) -> tuple[Doubt, ...]:
     ConfigError
         If the file of lives cannot be used.
     """
-    given = config.forecast.life
+    given = config.forecast.growth_law_file
     ends_m = float(law_of(leg, given, config.forecast.model_sigma).widest_m.max(initial=0.0))
     joints = leg.clearance_joints
     limits = dict(zip(joints, config.limits.of_clearances(len(joints))[1], strict=True))
@@ -95,7 +95,7 @@ def life_doubts(config: MonitorConfig, leg: Mechanism) -> tuple[Doubt, ...]:
         f"{1e3 * limits[joint]:g} mm; the forecast takes growth for constant beyond, expected those of "
         f"`leg-wear-monitor life --limit-m {limits[joint]:g}`"
     )
-    return (Doubt("forecast.life", text),)
+    return (Doubt("forecast.growth_law_file", text),)
 
 
 def read_lives(path: str, mechanism: Mechanism) -> Sequence[SimulatedLife]:
@@ -248,7 +248,7 @@ class Forecaster:
         self._settings, self._clearance_joints = settings, mechanism.clearance_joints
         self._clearances = [mechanism.clearances[joint] for joint in mechanism.clearance_joints]
         self._fresh_m = [clearance.radial_clearance for clearance in self._clearances]
-        self._law = law_of(mechanism, settings.life, settings.model_sigma)
+        self._law = law_of(mechanism, settings.growth_law_file, settings.model_sigma)
         self.state = ForecastState(
             growth=tuple(GrowthWindow() for _ in self._clearance_joints),
             coefficient_estimates=(),
@@ -392,10 +392,10 @@ class Forecaster:
         self.state.measurements = tuple(now if one.id == number else one for one in measurements)
         return now
 
-    def believed_m(self, k: int, counted_m: float) -> float:
+    def best_estimate_m(self, k: int, modelled_m: float) -> float:
         """Median of the clearance of joint k by counting and measurements; NaN without a measurement."""
         estimate = self.state.coefficient_estimates[k]
-        return estimate.clearance_m(counted_m - self._fresh_m[k]) if estimate.observations else math.nan
+        return estimate.clearance_m(modelled_m - self._fresh_m[k]) if estimate.observations else math.nan
 
     def use_estimate(self, k: int, observation: ClearanceAtWear, replaced_ns: int) -> bool:
         """Update with a clearance estimated from encoders, instead of the previous one.

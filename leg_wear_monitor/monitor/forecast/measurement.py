@@ -66,7 +66,7 @@ class MeasurementResult:
         Of the joint's wear coefficient.
     contradicts : bool
         Whether the model holds it next to impossible.
-    counted_m : float
+    modelled_m : float
         Clearance that the twin had counted for this part.
     words : tuple of str
         For people, a line each.
@@ -86,7 +86,7 @@ class MeasurementResult:
     before: CoefficientEstimate
     after: CoefficientEstimate
     contradicts: bool
-    counted_m: float
+    modelled_m: float
     words: tuple[str, ...]
     shown_m: float = math.nan
     shown_sigma_m: float = math.nan
@@ -120,7 +120,7 @@ class MeasurementResult:
         now, limit_m, warn_fraction = self.measurement, self.limit_m, self.warn_fraction
         size = f"{_mm(now.clearance_m)} ± {_mm(now.sigma_m)}"
         lines = [f"{now.joint}: {size}, {now.cycles} gait cycles after the part was new"]
-        lines.append(f"{_mm(self.counted_m)} is counted (limit {_mm(limit_m)}); that stays as it is")
+        lines.append(f"{_mm(self.modelled_m)} is counted (limit {_mm(limit_m)}); that stays as it is")
         if now.clearance_m >= limit_m:
             lines.append(
                 f"{AT_LIMIT}: stop the leg when it is safe; the alarm clearance {now.joint} is raised"
@@ -158,22 +158,24 @@ def last_measured(measurements: Sequence[Measurement], joint: str, replaced_ns: 
     return own[-1] if own else None
 
 
-def judged_clearance_m(counted_m: float, measured: Measurement | None, believed_m: float = math.nan) -> float:
+def judged_clearance_m(
+    modelled_m: float, measured: Measurement | None, best_estimate_m: float = math.nan
+) -> float:
     """Clearance that is compared with the limit: the counted one, or a larger one by measurement.
 
     Parameters
     ----------
-    counted_m : float
+    modelled_m : float
     measured : Measurement or None
         The last one of the part. A measurement that does not count for the forecast is still what somebody
         found on the leg.
-    believed_m : float
+    best_estimate_m : float
         Median of what counting and measurements together give; NaN if it is not known.
     """
     if measured is None:
-        return counted_m
-    believed = [believed_m] if measured.counts and not math.isnan(believed_m) else []
-    return max(counted_m, measured.clearance_m, *believed)
+        return modelled_m
+    believed = [best_estimate_m] if measured.counts and not math.isnan(best_estimate_m) else []
+    return max(modelled_m, measured.clearance_m, *believed)
 
 
 def observations_of(
@@ -268,7 +270,7 @@ def measure(
         before=before,
         after=after,
         contradicts=contradicts,
-        counted_m=fresh_m + observation.wear_m,
+        modelled_m=fresh_m + observation.wear_m,
         words=(*words, _change(before, after, per_pa)),
     )
 

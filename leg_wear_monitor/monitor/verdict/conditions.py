@@ -118,9 +118,9 @@ def hit_of(alarm: Alarm, situation: Situation) -> Hit:
     joint = situation.joint_words(own)
     evidence = [Evidence(alarm.name, value, alarm.limit, alarm.unit)]
     each = next((each for each in situation.joints if each.joint == own and alarm.kind == "clearance"), None)
-    if each is not None and each.measured is not None and value > each.counted_m:
+    if each is not None and each.measured is not None and value > each.modelled_m:
         evidence += known_evidence(f"measured clearance {own}", each.measured, each.limit_m)
-        evidence.append(Evidence(f"counted clearance {own}", each.counted_m, each.limit_m, "m"))
+        evidence.append(Evidence(f"counted clearance {own}", each.modelled_m, each.limit_m, "m"))
     return Hit(
         words={
             "quantity": f"{noun} of joint {joint}" if own else noun,
@@ -248,14 +248,14 @@ def believed_at_limit(situation: Situation) -> Sequence[Hit]:
         Hit(
             words={
                 "joint": situation.joint_words(each.joint),
-                "value": amount(each.believed_m, "m"),
+                "value": amount(each.best_estimate_m, "m"),
                 "limit": amount(each.limit_m, "m"),
             },
             joint=each.joint,
-            evidence=(Evidence(f"believed clearance {each.joint}", each.believed_m, each.limit_m, "m"),),
+            evidence=(Evidence(f"believed clearance {each.joint}", each.best_estimate_m, each.limit_m, "m"),),
         )
         for each in situation.joints
-        if each.believed_m >= each.limit_m
+        if each.best_estimate_m >= each.limit_m
     ]
 
 
@@ -273,7 +273,7 @@ def counted_at_limit(situation: Situation) -> Sequence[Hit]:
 
 def _forecast_m(each: JointSituation) -> float:
     """What the forecast takes for a joint's clearance; by counting alone, it only follows a minute later."""
-    return each.believed_m if each.is_used or each.is_measurement_used else each.counted_m
+    return each.best_estimate_m if each.is_used or each.is_measurement_used else each.modelled_m
 
 
 def seen_at_limit(situation: Situation) -> Sequence[Hit]:
@@ -307,7 +307,7 @@ def seen_at_limit(situation: Situation) -> Sequence[Hit]:
 
 def replaced(situation: Situation) -> Sequence[Hit]:
     """Joints whose part is so new that neither gait cycles nor sensors confirm the repair yet."""
-    is_as_counted = situation.diagnosis.state is DiagnosisState.AS_COUNTED
+    is_as_modelled = situation.diagnosis.state is DiagnosisState.AS_MODELLED
     return [
         Hit(
             words={
@@ -320,7 +320,7 @@ def replaced(situation: Situation) -> Sequence[Hit]:
         for each in situation.joints
         if each.replaced_ns
         and each.part_cycles < CONFIRMED_CYCLES
-        and not (each.seen and (is_as_counted or each.is_used))
+        and not (each.seen and (is_as_modelled or each.is_used))
     ]
 
 
@@ -411,7 +411,7 @@ def not_observed(situation: Situation) -> Sequence[Hit]:
     """
     found = situation.diagnosis
     blind = [each.joint for each in situation.joints if not each.seen]
-    is_on = found.state in (DiagnosisState.WAITING, DiagnosisState.AS_COUNTED)
+    is_on = found.state in (DiagnosisState.WAITING, DiagnosisState.AS_MODELLED)
     if not is_on or not blind or not situation.has_cycle or not situation.has_torque:
         return []
     is_to_walk = found.state is DiagnosisState.WAITING or bool(found.next_step)

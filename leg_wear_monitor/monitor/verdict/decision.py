@@ -74,11 +74,15 @@ class MeasuredFigure:
     def holds_for(self, state: LegState) -> bool:
         """Whether this leg meets the conditions of the cases."""
         joints = state.verdict.joints
-        by = state.clearances[joints[0]].believed_by if joints and joints[0] in state.clearances else None
+        by = (
+            state.clearances[joints[0]].best_estimate_source
+            if joints and joints[0] in state.clearances
+            else None
+        )
         return (
             self.on_ground in (None, bool(state.load.peak_n))
             and not (self.needs_sure_names and state.diagnosis.reason)
-            and not (self.needs_diagnosis and state.diagnosis.state != "as_counted")
+            and not (self.needs_diagnosis and state.diagnosis.state != "as_modelled")
             and (self.by is None or self.by == by)
         )
 
@@ -215,8 +219,10 @@ _LIFE_SOON = "Within the remaining life (p10) of the joint."
 
 ADVICE: Mapping[str, Advice] = {
     "CLEARANCE": _AT_LIMIT,
-    "CLEARANCE_SEEN": attrs.evolve(_AT_LIMIT, sure=NOT_MEASURED, measured=("torque_stop", "encoder_name")),
-    "CLEARANCE_BELIEVED": _AT_LIMIT,
+    "CLEARANCE_DETECTED": attrs.evolve(
+        _AT_LIMIT, sure=NOT_MEASURED, measured=("torque_stop", "encoder_name")
+    ),
+    "CLEARANCE_ESTIMATED": _AT_LIMIT,
     "CLEARANCE_CHANGED": _CHANGED,
     "CLEARANCE_CORRECTED": _CHANGED,
     "CLEARANCE_DEPARTURE": attrs.evolve(_CHANGED, measured=("encoder_name",)),
@@ -252,7 +258,7 @@ ADVICE: Mapping[str, Advice] = {
     "NO_GAIT_CYCLE": _INPUT,
     "ALREADY_COUNTED": _NODE,
     "CRANK_ZERO": _GAIT,
-    "NOT_FOLLOWED": _GAIT,
+    "TRACKING_LOST": _GAIT,
     "NOT_THIS_LEG": _GAIT,
     "CADENCE": _GAIT,
     "NO_DRIVE_TORQUE": _BLIND,

@@ -129,14 +129,14 @@ RULES = (
         do=_REPLACE,
     ),
     _stop(
-        code="CLEARANCE_SEEN",
+        code="CLEARANCE_DETECTED",
         hits=conditions.seen_at_limit,
         why="according to {by}, the clearance of joint {joint} is {value} (limit {limit}){past}",
         do=_REPLACE,
         not_valid=EVERYTHING,
     ),
     _stop(
-        code="CLEARANCE_BELIEVED",
+        code="CLEARANCE_ESTIMATED",
         hits=conditions.believed_at_limit,
         why="counting and measurements together give a clearance of {value} in joint {joint} (limit {limit})",
         do=_REPLACE,
@@ -216,8 +216,8 @@ RULES = (
         not_valid=OF_THE_GAIT,
     ),
     _not_monitored(
-        code="NOT_FOLLOWED",
-        hits=noted("NOT_FOLLOWED"),
+        code="TRACKING_LOST",
+        hits=noted("TRACKING_LOST"),
         why="{cause}",
         do=f"repair the input of the crank; {_COUNTED}",
         not_valid=OF_THE_GAIT,

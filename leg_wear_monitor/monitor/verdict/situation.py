@@ -56,9 +56,9 @@ class JointSituation:
     joint : str
     label : str
         What operators call the joint, such as ``knee``; empty if it has no label.
-    counted_m, limit_m : float
+    modelled_m, limit_m : float
         Counted mean radial clearance, and its limit.
-    believed_m : float
+    best_estimate_m : float
         Median of what the forecast believes of the clearance; NaN before the first forecast.
     measured : KnownClearance or None
         What a person measured last on the present part.
@@ -73,9 +73,9 @@ class JointSituation:
     """
 
     joint: str
-    counted_m: float
+    modelled_m: float
     limit_m: float
-    believed_m: float = math.nan
+    best_estimate_m: float = math.nan
     measured: KnownClearance | None = None
     seen: tuple[KnownClearance, ...] = ()
     is_used: bool = False
@@ -160,7 +160,7 @@ class Situation:
 # Which clearance of a joint is believed, and by whom: all views and the clearance alarm draw from here.
 
 
-COUNTED, MEASURED, BOTH = "counted", "measured", "both"
+COUNTED, MEASURED, BOTH = "modelled", "measured", "wear_and_measurement"
 SEEN = ("torque", "encoders")
 SOURCES = {
     COUNTED: "counting",
@@ -173,20 +173,20 @@ SOURCES = {
 
 def believed_words(one: JointClearance) -> str:
     """The believed clearance, such as ``1.66 mm ± 0.4 mm according to the drive torque``; empty if none."""
-    if one.believed_m is None or one.believed_by is None:
+    if one.best_estimate_m is None or one.best_estimate_source is None:
         return ""
-    known = KnownClearance(one.believed_by, one.believed_m, or_nan(one.believed_sigma_m))
+    known = KnownClearance(one.best_estimate_source, one.best_estimate_m, or_nan(one.best_estimate_sigma_m))
     return f"{known.words} according to {SOURCES[known.by]}"
 
 
 def judged(joint: JointSituation) -> KnownClearance:
     """The counted clearance, or a larger one by measurement: what somebody found on the leg counts."""
-    found = [KnownClearance(COUNTED, joint.counted_m, math.nan)]
+    found = [KnownClearance(COUNTED, joint.modelled_m, math.nan)]
     if joint.measured is not None:
         found.append(joint.measured)
     rests_on_it = joint.measured is not None and joint.is_measurement_used
-    if rests_on_it or joint.believed_m >= joint.limit_m:  # never with NaN
-        found.append(KnownClearance(BOTH, joint.believed_m, math.nan))
+    if rests_on_it or joint.best_estimate_m >= joint.limit_m:  # never with NaN
+        found.append(KnownClearance(BOTH, joint.best_estimate_m, math.nan))
     return max((one for one in found if not math.isnan(one.clearance_m)), key=lambda one: one.clearance_m)
 
 

@@ -22,7 +22,7 @@ def level_of(verdict: Verdict) -> Level:
 
 
 def code_of_rule(verdict: Verdict) -> str:
-    """The verdict's code without its joints: that of the rule, such as ``CLEARANCE_SEEN``."""
+    """The verdict's code without its joints: that of the rule, such as ``CLEARANCE_DETECTED``."""
     return verdict.fault_code.removesuffix("".join(f"_{joint}" for joint in verdict.joints))
 
 
@@ -86,7 +86,7 @@ def estimate(value: float, sigma: float, unit: str) -> str:
 _STATES = {
     DiagnosisState.OFF: "off",
     DiagnosisState.WAITING: "waiting",
-    DiagnosisState.AS_COUNTED: "the drive torque shows the counted clearances",
+    DiagnosisState.AS_MODELLED: "the drive torque shows the counted clearances",
     DiagnosisState.CHANGED: "the drive torque shows a change",
 }
 

@@ -143,9 +143,9 @@ def joint_trends(summary: ReplaySummary, joint: str) -> list[Part]:
 def _clearance_panel(summary: ReplaySummary, joint: str) -> Panel:
     history, known = summary.history, summary.clearances.get(joint)
     series: list[Series] = []
-    seen_mm = 1.0e3 * history.seen_m.get(joint, np.array([]))
+    seen_mm = 1.0e3 * history.estimated_m.get(joint, np.array([]))
     if _is_known(seen_mm):
-        reach = SURE_SIGMAS * 1.0e3 * history.seen_sigma_m.get(joint, np.full_like(seen_mm, np.nan))
+        reach = SURE_SIGMAS * 1.0e3 * history.estimated_sigma_m.get(joint, np.full_like(seen_mm, np.nan))
         high, low = seen_mm + reach, np.maximum(seen_mm - reach, 0.0)
         series += [
             Series("estimate, high", "mm", high, style="edge"),
@@ -153,9 +153,9 @@ def _clearance_panel(summary: ReplaySummary, joint: str) -> Panel:
             Series("estimate", "mm", seen_mm, width=2.0),
         ]
     bands = [(0, 1)] if series else []
-    counted_m = history.counted_m.get(joint, np.array([]))
-    if _is_known(counted_m) and Figure.CLEARANCES not in summary.verdict.not_valid:
-        series.append(Series("counted", "mm", 1.0e3 * counted_m, "--ink"))
+    modelled_m = history.modelled_m.get(joint, np.array([]))
+    if _is_known(modelled_m) and Figure.CLEARANCES not in summary.verdict.not_valid:
+        series.append(Series("counted", "mm", 1.0e3 * modelled_m, "--ink"))
     if series and known:
         series.append(_limit("limit", "mm", 1.0e3 * known.limit_m, history.stamp_ns))
     title = f"Clearance of joint {summary.leg.joint_words(joint)}"

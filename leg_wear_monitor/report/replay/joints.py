@@ -49,9 +49,9 @@ class JointView:
     alarms: tuple[LegAlarm, ...]
 
     @property
-    def counted_m(self) -> float | None:
+    def modelled_m(self) -> float | None:
         """As counted; None while that is not valid."""
-        return self.clearance.counted_m if self.clearance and not self.doubt else None
+        return self.clearance.modelled_m if self.clearance and not self.doubt else None
 
     @property
     def seen(self) -> tuple[float, float, str] | None:
@@ -63,17 +63,21 @@ class JointView:
         known = self.clearance
         if known is None:
             return None
-        if known.believed_by in SEEN and known.believed_m is not None:
-            return known.believed_m, known.believed_sigma_m or 0.0, SOURCES[str(known.believed_by)]
-        by = " and ".join(SOURCES.get(one, one) for one in known.seen_by)
-        return None if known.seen_m is None else (known.seen_m, known.seen_sigma_m or 0.0, by)
+        if known.best_estimate_source in SEEN and known.best_estimate_m is not None:
+            return (
+                known.best_estimate_m,
+                known.best_estimate_sigma_m or 0.0,
+                SOURCES[str(known.best_estimate_source)],
+            )
+        by = " and ".join(SOURCES.get(one, one) for one in known.estimated_by)
+        return None if known.estimated_m is None else (known.estimated_m, known.estimated_sigma_m or 0.0, by)
 
     @property
     def mark(self) -> tuple[float, float] | None:
         """The clearance that was measured by hand, or else is seen, and its standard deviation [m]."""
         known = self.clearance
-        if known is not None and known.believed_m is not None and known.believed_by == MEASURED:
-            return known.believed_m, known.believed_sigma_m or 0.0
+        if known is not None and known.best_estimate_m is not None and known.best_estimate_source == MEASURED:
+            return known.best_estimate_m, known.best_estimate_sigma_m or 0.0
         return self.seen[:2] if self.seen else None
 
 
@@ -103,7 +107,7 @@ def _view(summary: ReplaySummary, joint: str) -> JointView:
 def counted_mm(summary: ReplaySummary, joint: str) -> str:
     """A joint's counted clearance [mm] in the digits that are known of it."""
     found = summary.joints.get(joint)
-    counted = summary.clearances[joint].counted_m
+    counted = summary.clearances[joint].modelled_m
     if found is None or found.forecast is None or found.forecast.clearance_m is None:
         return f"{1.0e3 * counted:.3f}"
     may_be = found.forecast.clearance_m
@@ -112,7 +116,7 @@ def counted_mm(summary: ReplaySummary, joint: str) -> str:
 
 def _used(clearance: JointClearance) -> float | None:
     """Used fraction of the wear allowance, by the clearance that the verdict rests on."""
-    shown_m, allowance = clearance.believed_m, clearance.limit_m - clearance.new_m
+    shown_m, allowance = clearance.best_estimate_m, clearance.limit_m - clearance.new_m
     if shown_m is None:
         return None
     if allowance <= 0.0:
@@ -122,7 +126,7 @@ def _used(clearance: JointClearance) -> float | None:
 
 def _look(summary: ReplaySummary, joint: str, clearance: JointClearance | None, used: float | None) -> str:
     """Look of a joint: as the verdict says, where it names the joint."""
-    if clearance is None or clearance.believed_m is None or used is None:
+    if clearance is None or clearance.best_estimate_m is None or used is None:
         return "unknown"
     is_named = joint in summary.verdict.joints
     if used >= 1.0 or (is_named and summary.verdict.state is State.STOP):
@@ -130,7 +134,7 @@ def _look(summary: ReplaySummary, joint: str, clearance: JointClearance | None, 
     if is_named and summary.verdict.state is State.INSPECT:
         return "near"
     warn_m = summary.monitor.limits.warn_fraction * clearance.limit_m
-    return "near" if used >= _NEAR or clearance.believed_m >= warn_m > clearance.new_m else "fine"
+    return "near" if used >= _NEAR or clearance.best_estimate_m >= warn_m > clearance.new_m else "fine"
 
 
 # A row a joint: clearance against limit, remaining life and alarms, on common axes.
@@ -205,7 +209,7 @@ def _most_m(views: Sequence[JointView]) -> float:
     """End of the clearance axis [m]: all limits and marks, unless that is far beyond them."""
     known = [view for view in views if view.clearance]
     greatest = max((view.clearance.limit_m for view in known if view.clearance), default=1.0e-3)
-    ends = [view.counted_m or 0.0 for view in known]
+    ends = [view.modelled_m or 0.0 for view in known]
     ends += [view.mark[0] + _SIGMAS * view.mark[1] for view in known if view.mark]
     return min(max(1.1 * greatest, 1.02 * max(ends, default=0.0)), _MOST_LIMITS * greatest)
 
@@ -215,8 +219,8 @@ def _clearance(view: JointView, most_m: float) -> dict[str, Span] | None:
     if view.clearance is None:
         return None
     bar = {"limit": _span(view.clearance.limit_m, view.clearance.limit_m, most_m)}
-    if view.counted_m is not None:
-        bar["counted"] = _span(0.0, view.counted_m, most_m)
+    if view.modelled_m is not None:
+        bar["counted"] = _span(0.0, view.modelled_m, most_m)
     if view.mark is not None:
         mark_m, reach = view.mark[0], _SIGMAS * view.mark[1]
         bar["seen"] = _span(mark_m, mark_m, most_m)
@@ -235,9 +239,9 @@ def _clearance_words(summary: ReplaySummary, view: JointView) -> list[tuple[str,
         return [("not-valid", f"counted {view.doubt}")]
     seen = []
     if view.seen:
-        seen_m, sigma = view.seen[0], 1.0e3 * view.seen[1]
+        estimated_m, sigma = view.seen[0], 1.0e3 * view.seen[1]
         digits = 2 if sigma >= 0.1 else 3
-        around = f"{1.0e3 * seen_m:.{digits}f} ± {sigma:.{digits}f}"
+        around = f"{1.0e3 * estimated_m:.{digits}f} ± {sigma:.{digits}f}"
         seen.append(("", f"estimated {around} mm by {view.seen[2]}"))
     if view.clearance.measured_m is not None:
         sigma = 1.0e3 * (view.clearance.measured_sigma_m or 0.0)
@@ -372,12 +376,12 @@ def _is_near(one: Place, other: Place) -> bool:
 
 def _words(view: JointView) -> str:
     known = view.clearance
-    if known is None or known.believed_m is None:
+    if known is None or known.best_estimate_m is None:
         return NOT_VALID if known else "not known"
     if view.used is None:
         return "not monitored"
     if view.used >= 1.0:
-        return f"{1.0e3 * known.believed_m:.3g} mm, limit {1.0e3 * known.limit_m:.3g} mm"
+        return f"{1.0e3 * known.best_estimate_m:.3g} mm, limit {1.0e3 * known.limit_m:.3g} mm"
     if view.look == "over":  # the verdict says so, and is newer than the joint's last report
         return "at its limit, see the verdict"
     return f"{100.0 * view.used:.0f} % used"

@@ -78,7 +78,10 @@ def _source(known: JointClearance | None, clearance_m: float | None) -> str | No
     """Who says that a joint has a clearance: the verdict may rest on another one by now."""
     if known is None or clearance_m is None:
         return None
-    sources = [(known.believed_m, known.believed_by), *((known.seen_m, by) for by in known.seen_by)]
+    sources = [
+        (known.best_estimate_m, known.best_estimate_source),
+        *((known.estimated_m, by) for by in known.estimated_by),
+    ]
     return next((by for value_m, by in sources if value_m == clearance_m), None)
 
 
@@ -88,7 +91,7 @@ def _alarm_doubt(summary: ReplaySummary, alarm: LegAlarm) -> str:
         return ""
     kind, _, subject = alarm.name.partition(" ")
     figure, clearance = KINDS[kind].figure if kind in KINDS else None, summary.clearances.get(subject)
-    if figure is Figure.CLEARANCES and clearance and clearance.believed_by not in (None, COUNTED):
+    if figure is Figure.CLEARANCES and clearance and clearance.best_estimate_source not in (None, COUNTED):
         return ""
     return not_valid(summary.verdict, figure) if figure else ""
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.mechanism.person import PERSON_TOLERANCE, on_the_ground, with_person
+from leg_wear_monitor.mechanism.person import PERSON_TOLERANCE, with_ground_reaction, with_person
 from leg_wear_monitor.monitor.forecast.model_error import ModelError, model_error
 from leg_wear_monitor.twin.reference import MASS_TOLERANCE
 
@@ -65,7 +65,7 @@ def test_no_growth_has_no_error_by_impacts():
 @pytest.mark.parametrize(("peak_n", "simulated"), [(300.0, (2.6, 6.0, 4.2)), (600.0, (4.6, 7.9, 6.1))])
 def test_a_load_whose_size_is_not_sure_widens_growth_by_its_sensitivity(peak_n, simulated) -> None:
     """Of A, B and G, ideal motion makes most: 10 % of load are so many % of simulated growth (appendix)."""
-    leg = on_the_ground(load_mechanism("bionic_leg"), peak_n)
+    leg = with_ground_reaction(load_mechanism("bionic_leg"), peak_n)
     known, unsure = (model_error(leg, leg.drive.speed, load_sigma=sigma) for sigma in (0.0, 0.1))
     assert not known.load.any()
     for k, percent in enumerate(simulated):

@@ -23,9 +23,9 @@ def state(code: str, by: str = "torque", on_ground: bool = False, doubt: str = "
     )  # fmt: skip
     return LegState(
         verdict=verdict,
-        clearances={"G": JointClearance(believed_by=by, counted_m=3e-4, new_m=3e-4, limit_m=6e-4)},
+        clearances={"G": JointClearance(best_estimate_source=by, modelled_m=3e-4, new_m=3e-4, limit_m=6e-4)},
         load=FootLoad(source="estimated", peak_n=300.0) if on_ground else FootLoad(),
-        diagnosis=TorqueDiagnosis(state="as_counted" if code == "NONE" else "changed", reason=doubt),
+        diagnosis=TorqueDiagnosis(state="as_modelled" if code == "NONE" else "changed", reason=doubt),
     )
 
 
@@ -42,11 +42,11 @@ def test_every_rule_has_its_columns_and_every_measured_value_is_cited() -> None:
         ("CLEARANCE_CHANGED", {}, ("torque_name", "false_findings")),
         ("CLEARANCE_CHANGED", {"doubt": "the model does not fit"}, ("false_findings",)),
         ("CLEARANCE_CHANGED", {"on_ground": True}, ("torque_name_on_ground",)),
-        ("CLEARANCE_SEEN", {}, ("torque_stop",)),
-        ("CLEARANCE_SEEN", {"by": "encoders"}, ("encoder_name",)),
-        ("CLEARANCE_SEEN", {"doubt": "the model does not fit"}, ()),
-        ("CLEARANCE_SEEN", {"on_ground": True}, ()),
-        ("CLEARANCE", {"by": "counted"}, ("life_interval",)),
+        ("CLEARANCE_DETECTED", {}, ("torque_stop",)),
+        ("CLEARANCE_DETECTED", {"by": "encoders"}, ("encoder_name",)),
+        ("CLEARANCE_DETECTED", {"doubt": "the model does not fit"}, ()),
+        ("CLEARANCE_DETECTED", {"on_ground": True}, ()),
+        ("CLEARANCE", {"by": "modelled"}, ("life_interval",)),
         ("CLEARANCE", {"by": "measured"}, ()),
         ("NONE", {}, ("opened_found",)),
         ("NONE", {"on_ground": True}, ("opened_found_on_ground",)),

@@ -32,7 +32,7 @@ from leg_wear_monitor.monitor.verdict.verdict import dated, guide_to, has_change
 from leg_wear_monitor.state import Figure, Level, State, Verdict
 
 JOINTS = ("A", "G")
-NEW = tuple(JointSituation(joint=joint, counted_m=3.0e-4, limit_m=6.0e-4) for joint in JOINTS)
+NEW = tuple(JointSituation(joint=joint, modelled_m=3.0e-4, limit_m=6.0e-4) for joint in JOINTS)
 HEALTHY = Situation(joints=NEW, quantities=alarm_specs.QUANTITIES, mismatch=0.031, mismatch_limit=0.1)
 BOARD = AlarmBoard(
     config_from({"encoders.names": ["knee"], "encoders.joints": ["G"], "foot_load.source": "wrench"}),
@@ -90,7 +90,7 @@ def seen(by: str, clearance_m: float, sigma_m: float, **more: Any) -> tuple[Join
 
 
 def at_limit(**more: Any) -> tuple[JointSituation, ...]:
-    return (NEW[0], attrs.evolve(NEW[1], counted_m=6.1e-4, **more))
+    return (NEW[0], attrs.evolve(NEW[1], modelled_m=6.1e-4, **more))
 
 
 ALL, OF_THE_WALK = tuple(Figure), (Figure.GROWTH, Figure.IMPACT_FORCES)
@@ -99,7 +99,7 @@ CASES = [
     (raised("clearance G") | {"joints": at_limit()}, State.STOP, "CLEARANCE_G", ()),
     *(  # what stops the leg is not in the forecast
         (raised("clearance G") | {"joints": joints}, State.STOP, "CLEARANCE_G", (Figure.FORECAST,))
-        for joints in (NEW, at_limit(is_measurement_used=True, believed_m=5.0e-4))
+        for joints in (NEW, at_limit(is_measurement_used=True, best_estimate_m=5.0e-4))
     ),
     (raised("clearance G", Level.WARN), State.WATCH, "CLEARANCE_NEAR_G", ()),
     (raised("growth G", Level.WARN), State.WATCH, "ALARM_G", ()),
@@ -109,11 +109,16 @@ CASES = [
         "CLEARANCE_A_G",
         (Figure.FORECAST,),
     ),
-    ({"joints": seen("torque", 6.7e-4, 3.0e-5)}, State.STOP, "CLEARANCE_SEEN_G", ALL),
+    ({"joints": seen("torque", 6.7e-4, 3.0e-5)}, State.STOP, "CLEARANCE_DETECTED_G", ALL),
     ({"joints": (attrs.evolve(NEW[0], replaced_ns=1, part_cycles=19),)}, State.WATCH, "PART_REPLACED_A", ()),
     ({"joints": (attrs.evolve(NEW[0], replaced_ns=1, part_cycles=20),)}, State.HEALTHY, "NONE", ()),
     ({"joints": seen("encoders", 6.2e-4, 3.0e-5)}, State.HEALTHY, "NONE", ()),  # not surely
-    ({"joints": (NEW[0], attrs.evolve(NEW[1], believed_m=6.1e-4))}, State.STOP, "CLEARANCE_BELIEVED_G", ()),
+    (
+        {"joints": (NEW[0], attrs.evolve(NEW[1], best_estimate_m=6.1e-4))},
+        State.STOP,
+        "CLEARANCE_ESTIMATED_G",
+        (),
+    ),
     (shown(Cause.CLEARANCE, "G"), State.INSPECT, "CLEARANCE_CHANGED_G", ALL),
     (
         {"diagnosis": Diagnosis(changes=(change(Cause.CLEARANCE, "G", is_corrected=True),))},
@@ -131,7 +136,7 @@ CASES = [
     (shown(Cause.LOAD), State.WATCH, "TORQUE_LOAD", (Figure.GROWTH, Figure.IMPACT_FORCES, Figure.FORECAST)),
     (shown(Cause.FRICTION), State.WATCH, "FRICTION_CHANGED", ()),
     (shown(Cause.JOINT_FRICTION), State.WATCH, "FRICTION_CHANGED", ()),
-    ({"diagnosis": Diagnosis(state=DiagnosisState.AS_COUNTED)}, State.WATCH, "NOT_OBSERVED", ()),
+    ({"diagnosis": Diagnosis(state=DiagnosisState.AS_MODELLED)}, State.WATCH, "NOT_OBSERVED", ()),
     (raised("clearance_departure G", Level.WARN), State.WATCH, "ALARM_G", ()),
     (raised("clearance_departure G"), State.INSPECT, "CLEARANCE_DEPARTURE_G", ALL),
     (
@@ -162,7 +167,7 @@ CASES = [
     (raised("growth A"), State.INSPECT, "GROWTH_A", ()),
     (raised("remaining_life A"), State.INSPECT, "REMAINING_LIFE_A", ()),
     (
-        {"notes": {"ALREADY_COUNTED": ("",), "NOT_FOLLOWED": ("for 8 s",)}, "has_cycle": False},
+        {"notes": {"ALREADY_COUNTED": ("",), "TRACKING_LOST": ("for 8 s",)}, "has_cycle": False},
         State.NOT_MONITORED,
         "ALREADY_COUNTED",
         OF_THE_WALK,
@@ -175,7 +180,7 @@ CASES = [
     (raised("input_gaps foot_load"), State.WATCH, "FOOT_LOAD_MISSING", OF_THE_GAIT),
     (raised("material_limit A"), State.WATCH, "MATERIAL_LIMIT_A", (Figure.GROWTH, Figure.FORECAST)),
     (raised("material_limit A", Level.WARN), State.WATCH, "ALARM_A", ()),
-    (noted("NOT_FOLLOWED", "two series of crank angles"), State.NOT_MONITORED, "NOT_FOLLOWED", OF_THE_WALK),
+    (noted("TRACKING_LOST", "two series of crank angles"), State.NOT_MONITORED, "TRACKING_LOST", OF_THE_WALK),
     (raised("input_samples"), State.NOT_MONITORED, "BAD_INPUT", OF_THE_WALK),
     (raised("input_samples", present=Level.OK), State.WATCH, "ALARM", ()),
     (raised("input_rate torque"), State.WATCH, "ALARM", ()),
@@ -207,7 +212,7 @@ CASES = [
     ({"diagnosis": Diagnosis(reason="diagnosis.enabled is false")}, State.HEALTHY, "NONE", ()),
     (
         {
-            "diagnosis": Diagnosis(state=DiagnosisState.AS_COUNTED, clearance_m=(3e-4, math.nan)),
+            "diagnosis": Diagnosis(state=DiagnosisState.AS_MODELLED, clearance_m=(3e-4, math.nan)),
             "joints": (seen_as_new("torque")[0], NEW[1]),
         },
         State.WATCH,
@@ -216,7 +221,7 @@ CASES = [
     ),
     (
         {
-            "diagnosis": Diagnosis(state=DiagnosisState.AS_COUNTED, clearance_m=(3e-4, 3e-4)),
+            "diagnosis": Diagnosis(state=DiagnosisState.AS_MODELLED, clearance_m=(3e-4, 3e-4)),
             "joints": seen_as_new("torque"),
         },
         State.HEALTHY,
@@ -293,7 +298,7 @@ def test_one_story_of_a_torque_that_is_not_as_predicted(
     """Seen before: a dead zone of the torque sensor was friction by the diagnosis, and a mass beside it."""
     found = diagnosis(change(**{"cause": Cause.FRICTION} | values))
     assert found.contradicts(explained(*causes, after=after)) is is_other
-    past = attrs.evolve(found, state=DiagnosisState.AS_COUNTED)
+    past = attrs.evolve(found, state=DiagnosisState.AS_MODELLED)
     assert not past.contradicts(explained(*causes, after=after))
 
 
@@ -340,7 +345,7 @@ def test_every_cause_of_the_diagnosis_has_a_rule_and_words(cause: Cause) -> None
 
 def test_a_reason_to_stop_is_not_hidden_by_an_input_that_fails() -> None:
     fault = "the crank has not been followed for 4 s"
-    verdict = judged(joints=at_limit(), alarms=(alarm("clearance G"),), notes={"NOT_FOLLOWED": (fault,)})
+    verdict = judged(joints=at_limit(), alarms=(alarm("clearance G"),), notes={"TRACKING_LOST": (fault,)})
     assert verdict.state is State.STOP
     assert verdict.why.endswith("the leg is not monitored now: the crank has not been followed for 4 s")
     assert verdict.not_valid == (Figure.GROWTH, Figure.IMPACT_FORCES)
@@ -403,18 +408,18 @@ WAITING = Diagnosis(state=DiagnosisState.WAITING, reason="gait cycles: 2 of 5")
 
 
 @pytest.mark.parametrize(
-    ("missing", "seen_by", "why"),
+    ("missing", "estimated_by", "why"),
     [
         ({"has_torque": False}, "the encoders show", "joints G cannot be observed: there is no drive torque"),
         ({"diagnosis": WAITING}, "the drive torque agrees", "of joints G yet; gait cycles: 2 of 5"),
     ],
     ids=["torque", "diagnosis"],
 )
-def test_joints_that_encoders_show_need_no_torque_and_no_diagnosis(missing, seen_by, why) -> None:
+def test_joints_that_encoders_show_need_no_torque_and_no_diagnosis(missing, estimated_by, why) -> None:
     eyes = seen_as_new("encoders")
     every, some = judged(**missing, joints=eyes), judged(**missing, joints=(eyes[0], NEW[1]))
     assert (every.state, some.state) == (State.HEALTHY, State.WATCH)
-    assert every.why.startswith(f"no alarm is raised, and {seen_by}")
+    assert every.why.startswith(f"no alarm is raised, and {estimated_by}")
     assert some.why.endswith(why)
 
 
@@ -506,7 +511,7 @@ def test_a_friction_that_comes_with_another_temperature_says_both(now: float, th
     alarmed = judged(
         alarms=(alarm("torque_drift"),),
         torque_causes={"torque_drift": NamedCause(Cause.FRICTION, 2.0, 0.1)},
-        diagnosis=attrs.evolve(known, changes=(), state=DiagnosisState.AS_COUNTED),
+        diagnosis=attrs.evolve(known, changes=(), state=DiagnosisState.AS_MODELLED),
     )
     words = " (the drive is at -5 °C, and was at 41 °C then)"
     for verdict in (judged(diagnosis=known), alarmed):

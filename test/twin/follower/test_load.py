@@ -12,7 +12,7 @@ from leg_wear_monitor.dynamics.clearance.stepper import ClearanceRun
 from leg_wear_monitor.dynamics.clearance.tables import build_tables
 from leg_wear_monitor.dynamics.run import FORCE, TORQUE, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.mechanism.person import on_the_ground, with_person
+from leg_wear_monitor.mechanism.person import with_ground_reaction, with_person
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle, point_motion
 from leg_wear_monitor.mechanism.spec import ConstantLoad
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
@@ -129,7 +129,7 @@ def test_a_load_that_is_not_asked_for_does_not_act(leg, walk_under):
 @pytest.mark.parametrize("peak_n", [pytest.param(100.0, marks=pytest.mark.slow), 600.0])
 def test_a_stance_that_nobody_declared_is_a_load_and_no_mismatch(leg, twin, peak_n):
     """A push explains it badly: the healthy leg had a mismatch of 0.15 to 0.4, and its alarm at 0.1."""
-    samples, force = measured(on_the_ground(leg, peak_n), 12, 0.0)
+    samples, force = measured(with_ground_reaction(leg, peak_n), 12, 0.0)
     half = len(samples) // 2
     cycles = twin.update(samples[:half]).cycles
     before = twin.snapshot()

@@ -197,10 +197,10 @@ def test_encoder_noise_makes_little_acceleration(gait, rate_hz, bound):
     assert speed[steady].mean() == pytest.approx(TURN, rel=1.0e-4)
 
 
-@pytest.mark.parametrize("lag_s, node_interval_s", [(0.0, 0.0), (0.1, 0.005), (0.04, 0.025), (0.003, 0.01)])
-def test_a_sample_waits_for_lag_window_and_the_next_node_at_most(gait, lag_s, node_interval_s):
+@pytest.mark.parametrize("lag_s, knot_interval_s", [(0.0, 0.0), (0.1, 0.005), (0.04, 0.025), (0.003, 0.01)])
+def test_a_sample_waits_for_lag_window_and_the_next_node_at_most(gait, lag_s, knot_interval_s):
     """At 1 kHz, sample by sample; a node and the newest sample may each come a period late."""
-    settings = TrackerSettings(lag_s=lag_s, node_interval_s=node_interval_s)
+    settings = TrackerSettings(lag_s=lag_s, knot_interval_s=knot_interval_s)
     tracker, period_ns, waited = CrankTracker(settings), S // 1000, []
     for sample in cut(gait(3.0, 1000.0), range(3000)):
         stamp = int(sample["stamp_ns"][0]) if len(sample) else 0
@@ -355,7 +355,7 @@ def test_outliers_change_little_and_a_crank_that_is_elsewhere_is_found_again(gai
     assert len(steps.of(START)) == 2
 
 
-def on_the_ground(crank: Samples, rate_hz: float, transient: float = 0.0, spikes: int = 0) -> Samples:
+def with_ground_reaction(crank: Samples, rate_hz: float, transient: float = 0.0, spikes: int = 0) -> Samples:
     """The crank and a foot load: steps of 300 N that differ, 5 % of noise; every so many samples a spike."""
     config = GaitConfig(load=LoadConfig(ground_n=300.0, heel_strike_transient=transient))
     ground, random = Ground(load_mechanism("bionic_leg"), config), np.random.default_rng(1)
@@ -376,7 +376,7 @@ def on_the_ground(crank: Samples, rate_hz: float, transient: float = 0.0, spikes
 @pytest.mark.parametrize("transient", [0.0, 0.5, 1.5])
 def test_no_heel_strike_is_an_outlier(gait, rate_hz, transient):
     """At 100 Hz the transient of 20 ms may be one sample."""
-    tracker, samples = CrankTracker(TrackerSettings()), on_the_ground(gait(20.0), rate_hz, transient)
+    tracker, samples = CrankTracker(TrackerSettings()), with_ground_reaction(gait(20.0), rate_hz, transient)
     track([samples], tracker)
     assert tracker.state.counts.load_outliers == 0
     assert tracker.state.counts.used[LOAD] > 19.5 * rate_hz
@@ -385,7 +385,7 @@ def test_no_heel_strike_is_an_outlier(gait, rate_hz, transient):
 @pytest.mark.parametrize("rate_hz", [25.0, 100.0, 1000.0])
 def test_a_spike_of_the_foot_load_is_counted_and_does_not_push(gait, rate_hz):
     """Also not by the filter, which takes the sample ahead; and blocks and snapshots change nothing."""
-    samples, spikes = on_the_ground(gait(20.0), rate_hz, spikes=37), 37
+    samples, spikes = with_ground_reaction(gait(20.0), rate_hz, spikes=37), 37
     tracker, one = CrankTracker(TrackerSettings()), CrankTracker(TrackerSettings())
     found, counts = track([samples], tracker), tracker.state.counts
     number = np.count_nonzero(samples["stamp_ns"][samples["kind"] == LOAD] <= tracker.state.clock.released_ns)
@@ -402,7 +402,7 @@ def test_a_spike_of_the_foot_load_is_counted_and_does_not_push(gait, rate_hz):
 
 
 def test_a_force_of_two_samples_is_a_force(gait):
-    samples = on_the_ground(gait(5.0), 100.0)
+    samples = with_ground_reaction(gait(5.0), 100.0)
     struck = np.flatnonzero(samples["kind"] == LOAD)[200:202]
     samples["foot_force_n"][struck] = 0.0, 3000.0
     tracker = CrankTracker(TrackerSettings())

@@ -8,7 +8,7 @@ from typing import Any
 
 import attrs
 
-from leg_wear_monitor.monitor.ledger.entry import Entry, Measurement
+from leg_wear_monitor.monitor.ledger.entry import Entry
 
 
 def contents(entry: Entry | None) -> object:
@@ -21,27 +21,19 @@ def contents(entry: Entry | None) -> object:
     return entry.stamp_ns, joints, sorted(entry.totals.items()), sorted(alarms), spans
 
 
-def measured(**own: Any) -> Measurement:
-    """A measured clearance of joint A that counts, good to 2 µm, after 60 µm of counted wear."""
-    usual = {"stamp_ns": 1, "joint": "A", "who": "ann", "clearance_m": 4.2e-4, "sigma_m": 2e-6}
-    usual |= {"wear_m": 6e-5, "cycles": 9, "replaced_ns": 0, "expected_below": 0.5, "counts": True}
-    return Measurement(**(usual | own))
-
-
 def rows_of(path: Path, query: str) -> list[Any]:
     """What a query finds in a ledger."""
     with closing(sqlite3.connect(path)) as db:
         return db.execute(query).fetchall()
 
 
-def keep_journal(path: Path, journal: Path, cut: Path | None = None) -> None:
-    """Copy a ledger's journal, and the ledger, in the midst of a transaction, as a power cut leaves them."""
+def cut_off(path: Path, copy: Path) -> None:
+    """Copy a ledger and its journal in the midst of a transaction, as a power cut leaves them."""
     with closing(sqlite3.connect(path, isolation_level=None)) as db:
         db.execute("PRAGMA cache_size = 1")
         db.execute("BEGIN")
-        db.execute("UPDATE surface SET depth = zeroblob(length(depth))")
-        db.execute("UPDATE span SET end_ns = 1")
-        shutil.copy(f"{path}-journal", journal)
-        if cut:
-            shutil.copy(path, cut)
+        db.execute("UPDATE joint SET depth = zeroblob(length(depth))")
+        db.execute("UPDATE run SET spans = '[]'")
+        shutil.copy(f"{path}-journal", f"{copy}-journal")
+        shutil.copy(path, copy)
         db.execute("ROLLBACK")

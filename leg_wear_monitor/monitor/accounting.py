@@ -386,15 +386,15 @@ class Accounting:
         now = self._twin.intake.followed_stamp_ns
         is_due = now and not 0 <= now - self._tried_ns < self._checkpoint_ns
         if is_due and (self.not_kept_s > 0.0 or self.ledger.waiting or self.ledger.fault):
-            self.keep(alarms, whole=False)
+            self.keep(alarms)
 
-    def keep(self, alarms: Iterable[Alarm], closed: bool = False, whole: bool = True) -> bool:
+    def keep(self, alarms: Iterable[Alarm], closed: bool = False) -> bool:
         """Write an entry; False without a ledger, or if it could not be written."""
         if self.ledger is None:
             return False
         entry = self._entry(alarms)
         self._tried_ns = self._twin.intake.followed_stamp_ns
-        kept = self.ledger.keep(entry, closed, whole=whole)
+        kept = self.ledger.keep(entry, closed)
         if kept:
             self._kept_s = entry.totals["moving_s"]
         return kept

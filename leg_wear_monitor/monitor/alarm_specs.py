@@ -361,11 +361,6 @@ KINDS: "dict[str, AlarmSpec[Any]]" = {spec.kind: spec for spec in ALL}
 """The kinds of alarms, each with a spec: those of one kind have the same unit and figure."""
 
 
-def with_its_unit(alarm: Alarm) -> Alarm:
-    """An alarm of a ledger, which does not keep units, with that of its kind."""
-    return attrs.evolve(alarm, unit=KINDS[alarm.kind].unit if alarm.kind in KINDS else "")
-
-
 QUANTITIES = {
     **{spec.kind: spec.quantity for spec in (*JOINT, *ENCODERS)},
     **{spec.name(): spec.quantity for spec in (*TORQUE, *GAIT, *OF_INPUT, *OF_FOOT_LOAD)},

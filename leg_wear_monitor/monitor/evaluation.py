@@ -192,8 +192,7 @@ class AlarmBoard:
         """
         for alarm in alarms:
             is_done = alarm.acknowledged and alarm.name not in self._limits
-            known = alarm_specs.with_its_unit(alarm)
-            self.alarms[alarm.name] = cleared(known) if is_done else known
+            self.alarms[alarm.name] = cleared(alarm) if is_done else alarm
 
     def level(self, *names: str) -> Level:
         """Highest shown level of some alarms."""

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.alarm_specs import with_its_unit
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.forecast.measurement import last_measured
@@ -64,9 +63,7 @@ def state_in_ledger(found: LedgerContent, mechanism: Mechanism, config: MonitorC
             for part in known
         },
         life={part.name: None if is_doubted else _life(found, part) for part in known},
-        alarms=LegAlarms(
-            now=tuple(leg_alarm(with_its_unit(each)) for each in (entry.alarms if entry else ()))
-        ),
+        alarms=LegAlarms(now=tuple(map(leg_alarm, entry.alarms if entry else ()))),
         stamp_ns=entry.stamp_ns if entry else 0,
         life_cycles=found.cycles,
     )

@@ -10,8 +10,9 @@ import attrs
 
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.monitor import alarm_specs
-from leg_wear_monitor.monitor.alarms import Alarm
-from leg_wear_monitor.monitor.cleared_alarms import cleared_at, eased, named_for_clearance, rested_on
+from leg_wear_monitor.monitor.accounting import Accounting
+from leg_wear_monitor.monitor.alarms import Alarm, joint_of
+from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.forecast.measurement import (
     MeasurementResult,
 )
@@ -30,7 +31,6 @@ from leg_wear_monitor.monitor.ledger.entry import (
     Measurement,
     VerdictEvent,
 )
-from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.parts import Parts
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, with_forecast
 from leg_wear_monitor.monitor.verdict.rules import findings
@@ -45,34 +45,6 @@ from leg_wear_monitor.monitor.verdict.situation import (
 )
 from leg_wear_monitor.monitor.verdict.verdict import dated, verdict_of
 from leg_wear_monitor.state import Level
-
-
-def last_reset(ledger: Ledger | None, joint: str, now: JointWear) -> tuple[Ledger, Audit, JointWear]:
-    """The last reset of a joint that was not taken back, in its ledger, and the joint's wear before it.
-
-    Parameters
-    ----------
-    ledger : Ledger or None
-    joint : str
-    now : JointWear
-        The joint, as the monitor counts it.
-
-    Raises
-    ------
-    LegWearError
-        If there is none, or it is of other surfaces.
-    """
-    if ledger is None:
-        raise LegWearError(f"joint {joint}: no ledger is used, so the wear before a reset is not stored")
-    if ledger.fault:
-        raise LegWearError(f"joint {joint}: the ledger was not written: {ledger.fault}; try again when it is")
-    found = ledger.last_reset(joint)
-    if found is None or found.joint is None:
-        raise LegWearError(f"joint {joint}: the ledger has no reset to undo")
-    if found.joint.depth.shape != now.depth.shape:
-        raise LegWearError(f"joint {joint}: had {found.joint.depth.shape[1]} sectors when it was reset")
-    return ledger, found, found.joint
-
 
 Cleared = tuple[tuple[Alarm, ...], tuple[Alarm, ...]]
 """Alarms that an acknowledgement or a replaced part cleared, and alarms that are still raised."""
@@ -102,13 +74,13 @@ def reset_wear(parts: Parts, joint: str, stamp_ns: int, who: str) -> Cleared:
     """See `WearMonitor.reset_wear`."""
     board, state = parts.evaluation.board, parts.state
     was = parts.accounting.replace(joint, stamp_ns)
-    gone = rested_on(board.alarms.values(), joint, _named_for_clearance(parts))
+    gone = _rested_on(board.alarms.values(), joint, _named_for_clearance(parts))
     cleared = tuple(board.alarms[name] for name in gone)
     board.clear(gone)
     if alarm_specs.MISMATCH.name() in gone:
         state.mismatch = NO_MISMATCH
     _part_changed(parts, joint, stamp_ns)
-    parts.accounting.note(Audit(stamp_ns, who, "reset_wear", was))
+    parts.accounting.note(Audit(stamp_ns, who, "reset_wear", was, cleared))
     _note_alarms(parts, stamp_ns)
     note_verdict(parts, stamp_ns)
     parts.keep()
@@ -118,20 +90,33 @@ def reset_wear(parts: Parts, joint: str, stamp_ns: int, who: str) -> Cleared:
 def undo_reset(parts: Parts, joint: str, stamp_ns: int, who: str) -> JointWear:
     """See `WearMonitor.undo_reset`."""
     accounting, board = parts.accounting, parts.evaluation.board
-    ledger, reset, before = last_reset(accounting.ledger, joint, accounting.wear_of(joint))
+    reset, before = _last_reset(accounting, joint)
     since = accounting.put_back(joint, before)
-    raised = {alarm.name: alarm for alarm in cleared_at(ledger, [reset.stamp_ns], board.alarms)}
-    known = {name: alarm_specs.with_its_unit(raised[name]) for name in raised if name in board.alarms}
-    board.alarms = board.alarms | known
+    _raise_again(board, reset.alarms)
     _part_changed(parts, joint, before.replaced_ns)
-    name = alarm_specs.CLEARANCE.name(joint)
-    if name in known and _ends(_situation(parts, joint), known[name]):
-        board.acknowledge_one(name)  # as it was before the reset
-    accounting.note(Audit(stamp_ns, who, "undo_reset", since, undoes=reset.id))
+    accounting.note(Audit(stamp_ns, who, "undo_reset", since))
     _note_alarms(parts, stamp_ns)
     note_verdict(parts, stamp_ns)
     parts.keep()
     return accounting.wear_of(joint)
+
+
+def _last_reset(accounting: Accounting, joint: str) -> tuple[Audit, JointWear]:
+    """The last reset of a joint, and its wear before; what happened before that cannot be undone."""
+    if accounting.ledger is None:
+        raise LegWearError(f"joint {joint}: no ledger is used, so the wear before a reset is not stored")
+    own = [one for one in accounting.ledger.audits if one.joint and one.joint.name == joint]
+    resets = [one for one in own if one.what in ("reset_wear", "undo_reset")]
+    if not resets or resets[-1].joint is None or resets[-1].what != "reset_wear":
+        raise LegWearError(f"joint {joint}: the ledger has no reset to undo")
+    return resets[-1], resets[-1].joint
+
+
+def _raise_again(board: AlarmBoard, alarms: Iterable[Alarm]) -> None:
+    """Set alarms as they were before an action that is taken back, unless they are more severe now."""
+    now = board.alarms
+    known = [alarm for alarm in alarms if alarm.name in now and alarm.level >= now[alarm.name].level]
+    board.alarms = now | {alarm.name: alarm for alarm in known}
 
 
 def measure(
@@ -166,7 +151,10 @@ def measure(
     renew_forecast(parts)
     before, board = parts.evaluation.board.alarms, parts.evaluation.board
     is_ended = _compare(parts, joint, stamp_ns)
-    found = attrs.evolve(found, eased=eased(before.values(), board.alarms.values(), joint))
+    was, now = (alarms[alarm_specs.CLEARANCE.name(joint)] for alarms in (before, board.alarms))
+    if now.level < was.level or (now.acknowledged and not was.acknowledged):
+        accounting.note(Audit(stamp_ns, who, "measure", alarms=(was,)))  # a withdrawal raises it again
+        found = attrs.evolve(found, eased=_eased(was, now))
     _note_clearance_verdict(parts, before, joint, stamp_ns, is_ended)
     renew_forecast(parts)  # without a remaining life, if the verdict rests on what it does not use
     parts.keep()
@@ -180,11 +168,10 @@ def withdraw(parts: Parts, number: int, stamp_ns: int, who: str) -> Measurement:
     accounting.note(found)
     if found.replaced_ns == accounting.wear_of(found.joint).replaced_ns:
         parts.forecaster.replaced(found.joint, found.replaced_ns)
-        name, before = alarm_specs.CLEARANCE.name(found.joint), board.alarms
-        joint = _situation(parts, found.joint)
-        for alarm in cleared_at(accounting.ledger, _withdrawn_ns(parts, found), before):
-            if alarm.name == name and not _ends(joint, alarm):  # a different measurement may end it as well
-                board.alarms = board.alarms | {name: alarm_specs.with_its_unit(alarm)}
+        before, joint = board.alarms, _situation(parts, found.joint)
+        for alarm in _eased_by_withdrawn(parts, found):
+            if not _ends(joint, alarm):  # a different measurement may end it as well
+                _raise_again(board, [alarm])
         is_ended = _compare(parts, found.joint, stamp_ns)
         _note_alarms(parts, stamp_ns)
         _note_clearance_verdict(parts, before, found.joint, stamp_ns, is_ended)
@@ -192,11 +179,23 @@ def withdraw(parts: Parts, number: int, stamp_ns: int, who: str) -> Measurement:
     return found
 
 
-def _withdrawn_ns(parts: Parts, like: Measurement) -> list[int]:
-    """Stamps of the withdrawn measurements of a part."""
-    part = (like.joint, like.replaced_ns)
-    measurements = parts.forecaster.measurements
-    return [one.stamp_ns for one in measurements if one.is_withdrawn and (one.joint, one.replaced_ns) == part]
+def _eased_by_withdrawn(parts: Parts, like: Measurement) -> tuple[Alarm, ...]:
+    """The alarm that the first of the withdrawn measurements of a part eased, as it was before."""
+    part, ledger = (like.joint, like.replaced_ns), parts.accounting.ledger
+    withdrawn = [one for one in parts.forecaster.measurements if one.is_withdrawn]
+    stamps = {one.stamp_ns for one in withdrawn if (one.joint, one.replaced_ns) == part}
+    audits = [one for one in ledger.audits if one.what == "measure"] if ledger else []
+    eased = (alarm for one in audits if one.stamp_ns in stamps for alarm in one.alarms)
+    return tuple(alarm for alarm in eased if alarm.subject == like.joint)[:1]
+
+
+def _eased(was: Alarm, now: Alarm) -> str:
+    """In words, what a measurement made of an alarm that an earlier measurement raised; empty for others."""
+    if was.cause not in (MEASURED, BOTH):
+        return ""
+    if now.level < was.level:
+        return "is lowered" if now.level is not Level.OK else "ends"
+    return "is acknowledged"
 
 
 def renew_forecast(parts: Parts) -> CycleReport | None:
@@ -222,13 +221,33 @@ def _note_alarms(parts: Parts, stamp_ns: int) -> None:
     parts.accounting.note_alarms(AlarmList(stamp_ns, tuple(parts.evaluation.board.alarms.values())))
 
 
+def _rested_on(alarms: Iterable[Alarm], joint: str, named: Iterable[str]) -> tuple[str, ...]:
+    """Names of the raised alarms that rested on the part of a joint that was replaced.
+
+    The joint's own ones; and the torque mismatch if this joint explains it: if its clearance was at a limit,
+    or the verdict named it for its clearance.
+
+    Parameters
+    ----------
+    alarms : iterable of Alarm
+    joint : str
+    named : iterable of str
+        Joints that the verdict named for their clearance.
+    """
+    raised = [alarm for alarm in alarms if alarm.level is not Level.OK]
+    own = [alarm for alarm in raised if joint_of(alarm.name) == joint]
+    explains = joint in named or any(alarm.kind == alarm_specs.CLEARANCE.kind for alarm in own)
+    mismatch = [alarm for alarm in raised if explains and alarm.kind == alarm_specs.MISMATCH.kind]
+    return tuple(alarm.name for alarm in (*own, *mismatch))
+
+
 def _named_for_clearance(parts: Parts) -> frozenset[str]:
     """Joints that the last verdict named for their clearance: of this run, or else of the ledger."""
-    if parts.state.findings:
-        return named_for_clearance(parts.state.findings)
     ledger = parts.accounting.ledger
-    last = ledger.last_verdict if ledger else None
-    return frozenset(last.joints) if last and last.fault_code.startswith("CLEARANCE") else frozenset()
+    last = ledger.verdict if ledger else None
+    found = parts.state.findings or ((last,) if last else ())
+    of_clearance = (one for one in found if one.fault_code.startswith("CLEARANCE"))
+    return frozenset(joint for one in of_clearance for joint in one.joints)
 
 
 def note_verdict(parts: Parts, stamp_ns: int, milder: bool = True) -> None:
@@ -243,7 +262,7 @@ def note_verdict(parts: Parts, stamp_ns: int, milder: bool = True) -> None:
         return
     now = situation_of(parts)
     known = Situation(joints=now.joints, alarms=now.alarms, quantities=now.quantities, mismatch=math.nan)
-    verdict, last = verdict_of(dated(findings(known), (), stamp_ns)), parts.accounting.ledger.last_verdict
+    verdict, last = verdict_of(dated(findings(known), (), stamp_ns)), parts.accounting.ledger.verdict
     if milder or last is None or verdict.state.severity >= last.state.severity:
         parts.accounting.note(VerdictEvent(stamp_ns, verdict))
 
@@ -267,7 +286,7 @@ def _compare(parts: Parts, joint: str, stamp_ns: int) -> bool:
         parts.accounting.note_alarms(change)
     if is_ended:
         board.acknowledge_one(name)
-        _note_alarms(parts, stamp_ns)  # with the stamp of the measurement, by which a withdrawal finds it
+        _note_alarms(parts, stamp_ns)
     return is_ended
 
 

@@ -13,6 +13,7 @@ from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.cli import common
 from leg_wear_monitor.cli.main import cli
 from leg_wear_monitor.files import share_directory
+from leg_wear_monitor.monitor.alarm_specs import KINDS
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.ledger.entry import AlarmEvent, Entry, JointWear
@@ -75,6 +76,7 @@ def worn_ledger(tmp_path: Path) -> Callable[..., Path]:
 
     def write(config: MonitorConfig | None = None, alarms: tuple[Alarm, ...] = ()) -> Path:
         """The alarms were raised at their worst values; the verdict is that of them."""
+        alarms = tuple(attrs.evolve(alarm, unit=KINDS[alarm.kind].unit) for alarm in alarms)
         config, path, leg = config or MonitorConfig(), tmp_path / "wear.ledger", load_mechanism("bionic_leg")
         config = attrs.evolve(config, ledger=attrs.evolve(config.ledger, path=str(path)))
         kept = open_ledger(leg, config)

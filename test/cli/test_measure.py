@@ -95,12 +95,14 @@ def test_what_is_near_the_limit_or_at_it_is_said_and_at_it_the_caller_has_to_act
 
 def alarms(path):
     now = rows_of(path, "SELECT subject, level, acknowledged, worst, cause FROM alarm")
-    return now, rows_of(path, "SELECT subject, level FROM alarm_history")
+    return now, rows_of(path, "SELECT alarm ->> 'subject', alarm ->> 'level' FROM alarm_history")
 
 
 def verdict(path):
     ((*row, evidence),) = rows_of(
-        path, "SELECT state, fault_code, evidence FROM verdict ORDER BY id DESC LIMIT 1"
+        path,
+        "SELECT verdict ->> 'state', verdict ->> 'fault_code', verdict -> 'evidence' FROM verdict "
+        "ORDER BY id DESC LIMIT 1",
     )
     return *row, json.loads(evidence)
 

@@ -70,7 +70,7 @@ def test_the_verdict_in_the_ledger_names_the_same_value(knocked):
 
 def last_reason(ledger):
     """Of the verdict in a ledger."""
-    ((why,),) = rows_of(ledger, "SELECT why FROM verdict ORDER BY id DESC LIMIT 1")
+    ((why,),) = rows_of(ledger, "SELECT verdict ->> 'why' FROM verdict ORDER BY id DESC LIMIT 1")
     return why
 
 

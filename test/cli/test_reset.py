@@ -8,7 +8,6 @@ from ledger_contents import rows_of
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.ledger.entry import AlarmEvent
 from leg_wear_monitor.monitor.ledger.ledger import open_ledger
 from leg_wear_monitor.state import Level
 
@@ -42,17 +41,19 @@ def content(path):
 
 def last_verdict(path):
     _, kept = opened(path)
-    verdict = kept.last_verdict
+    verdict = kept.verdict
     kept.close()
     return verdict
 
 
 def history(path):
-    return rows_of(path, "SELECT kind, subject, level FROM alarm_history ORDER BY id")
+    alarm = "alarm ->> 'kind', alarm ->> 'subject', alarm ->> 'level'"
+    return rows_of(path, f"SELECT {alarm} FROM alarm_history ORDER BY id")
 
 
 def audits(path):
-    return rows_of(path, "SELECT what, joint, cycles, moving_s, undoes FROM audit")
+    joint = "joint ->> 'name', joint ->> 'cycles', joint ->> 'moving_s'"
+    return rows_of(path, f"SELECT what, {joint} FROM audit")
 
 
 def test_a_reset_gives_new_surfaces_and_keeps_the_history(run, ledger):
@@ -76,7 +77,7 @@ def test_a_reset_gives_new_surfaces_and_keeps_the_history(run, ledger):
     alarms = {alarm.name: alarm for alarm in after.alarms}
     assert set(alarms) == {"clearance A"}
     assert not alarms["clearance A"].acknowledged
-    assert audits(ledger) == [("reset_wear", "G", 4000, 4000.0, None)]
+    assert audits(ledger) == [("reset_wear", "G", 4000, 4000.0)]
 
 
 def test_an_undone_reset_is_as_before(run, ledger):
@@ -91,7 +92,7 @@ def test_an_undone_reset_is_as_before(run, ledger):
         assert attrs.astuple(one)[2:] == attrs.astuple(other)[2:]
     again = run("reset", "G", "--undo", "--ledger", str(ledger))
     assert (again.exit_code, again.stderr) == (2, "error: joint G: the ledger has no reset to undo\n")
-    assert audits(ledger)[1] == ("undo_reset", "G", 0, 0.0, 1)
+    assert audits(ledger)[1] == ("undo_reset", "G", 0, 0.0)
 
 
 def test_what_a_reset_has_cleared_is_raised_again_once_it_is_undone(run, ledger):
@@ -100,24 +101,16 @@ def test_what_a_reset_has_cleared_is_raised_again_once_it_is_undone(run, ledger)
     assert history(ledger)[len(rises) :] == [("impact_force", "G", 0), ("clearance", "G", 0)]
     assert "G" not in last_verdict(ledger).joints
     run("reset", "G", "--undo", "--ledger", str(ledger))
-    for one, other in zip(before.alarms, content(ledger)[0].alarms, strict=True):
+    alarms = (
+        sorted(each, key=lambda alarm: alarm.name) for each in (before.alarms, content(ledger)[0].alarms)
+    )
+    for one, other in zip(*alarms, strict=True):
         assert not other.acknowledged
         for name in ("name", "level", "worst", "limit", "raised_ns", "cause"):
             assert getattr(one, name) == getattr(other, name)
         assert str(one.sigma) == str(other.sigma)
     now = last_verdict(ledger)
     assert (now.state, now.fault_code, now.joints) == (stopped.state, stopped.fault_code, stopped.joints)
-
-
-def test_an_alarm_that_was_seen_to_since_a_reset_is_not_raised_by_its_undoing(run, ledger):
-    run("reset", "G", "--ledger", str(ledger))
-    _, kept = opened(ledger)
-    impact = Alarm(kind="impact_force", subject="G", level=Level.WARN)
-    for stamp_ns, level in ((10**18, Level.WARN), (10**18 + 1, Level.OK)):
-        kept.note(AlarmEvent(stamp_ns, attrs.evolve(impact, level=level)))
-    kept.abandon()
-    run("reset", "G", "--undo", "--ledger", str(ledger))
-    assert {alarm.name for alarm in content(ledger)[0].alarms} == {"clearance A", "clearance G"}
 
 
 def test_a_dry_run_leaves_the_ledger_as_it_is(run, ledger):

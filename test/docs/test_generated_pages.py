@@ -3,6 +3,7 @@
 ``python test/test_generated_pages.py`` renews them.
 """
 
+import inspect
 import re
 import sqlite3
 from collections.abc import Callable, Iterable, Iterator
@@ -18,7 +19,7 @@ from leg_wear_monitor.mechanism import materials, sourced, spec
 from leg_wear_monitor.monitor import alarm_specs
 from leg_wear_monitor.monitor.alarms import FAULT_CODES, guide_of
 from leg_wear_monitor.monitor.config.parameters import PARAMETERS, parameters_of
-from leg_wear_monitor.monitor.ledger.schema import FORMAT, TABLES, create_tables
+from leg_wear_monitor.monitor.ledger.rows import FORMAT, TABLES, create_tables
 from leg_wear_monitor.monitor.verdict.decision import measured_figures
 from leg_wear_monitor.monitor.verdict.rules import RULES
 from leg_wear_monitor.studies.study import Study, Sweep
@@ -188,20 +189,23 @@ def of_drives(name: str) -> str:
     return table(head, map(row, sourced.drives()))
 
 
+PLAIN_TABLES = {
+    "binding": "The leg and the parameters that the wear belongs to.",
+    "entry": "The last entry: joints, alarms and totals are of this stamp, spans and loads are in the row of "
+    "its run. The checksum is the CRC-32 of all of them.",
+    "total": "Counters over all runs, and values in force, such as the limit of each clearance.",
+}
+
+
 def ledger_tables(_name: str) -> str:
-    comments = re.findall(r"((?:^-- .*\n)+)CREATE TABLE (\w+)", TABLES, re.MULTILINE)
-    remarks = {name: " ".join(line[3:] for line in text.splitlines()) for text, name in comments}
+    words = {name: inspect.getdoc(kind).splitlines()[0] for kind, name in TABLES.items()} | PLAIN_TABLES
     lines = [f"The format is {FORMAT} (`PRAGMA user_version`)."]
     with closing(sqlite3.connect(":memory:", isolation_level=None)) as db:
         create_tables(db)
-        names = [name for (name,) in db.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
-        for one in sorted(names):
-            columns = []
-            for _, name, kind, not_null, _, key in db.execute(f"PRAGMA table_info({one})"):
-                remark = " (key)" if key else "" if not_null else " (may be null)"
-                columns.append(f"`{name}` {kind}{remark}")
-            words = remarks[one][0].upper() + remarks[one][1:]
-            lines += ["", f"## {one}", "", f"{words}.", "", f"Columns: {', '.join(columns)}."]
+        for one in sorted(words):
+            found = db.execute(f"PRAGMA table_info({one})")
+            columns = [f"`{name}` {kind}{' (key)' if key else ''}" for _, name, kind, _, _, key in found]
+            lines += ["", f"## {one}", "", words[one], "", f"Columns: {', '.join(columns)}."]
     return "\n".join([*lines, ""])
 
 

@@ -95,31 +95,6 @@ def binding_of(mechanism: Mechanism, config: MonitorConfig) -> Binding:
 
 
 @attrs.frozen
-class Run:
-    """A run of the monitor.
-
-    Attributes
-    ----------
-    number : int
-        Number of the run, 0 before the first.
-    closed : bool
-        Whether the run ended normally.
-    interval_s : float
-        Longest time in motion between two of its entries.
-    epoch : int
-        Epoch of the clock at the end of the run.
-    boot_id : str
-        Boot of the computer; empty if unknown.
-    """
-
-    number: int = 0
-    closed: bool = True
-    interval_s: float = 0.0
-    epoch: int = 0
-    boot_id: str = ""
-
-
-@attrs.frozen
 class WalkedLoad:
     """Gait cycles under foot loads of about one size.
 
@@ -145,6 +120,37 @@ class WalkedLoad:
     def of_cycle(cls, peak_n: float, moving_s: float) -> "WalkedLoad":
         """One gait cycle."""
         return cls(_CLASS_N * round(peak_n / _CLASS_N), 1, moving_s, peak_n, 0.0)
+
+
+@attrs.frozen
+class Run:
+    """A run of the monitor.
+
+    Attributes
+    ----------
+    number : int
+        Number of the run, 0 before the first.
+    closed : bool
+        Whether the run ended normally.
+    interval_s : float
+        Longest time in motion between two of its entries.
+    epoch : int
+        Epoch of the clock at the end of the run.
+    boot_id : str
+        Boot of the computer; empty if unknown.
+    spans : tuple of (int, int, int)
+        Begin and end [ns] of the time spans whose wear is counted, and their clock epochs.
+    loads : tuple of WalkedLoad
+        Foot loads that acted.
+    """
+
+    number: int = 0
+    closed: bool = True
+    interval_s: float = 0.0
+    epoch: int = 0
+    boot_id: str = ""
+    spans: tuple[tuple[int, int, int], ...] = ()
+    loads: tuple[WalkedLoad, ...] = ()
 
 
 def together(loads: Iterable[WalkedLoad]) -> tuple[WalkedLoad, ...]:
@@ -279,18 +285,15 @@ class Audit:
     who, what : str
     joint : JointWear or None
         State of the joint before the change.
-    undoes : int or None
-        The `id` of the change that this one reverts.
-    id : int
-        Number of its row in the ledger, 0 before it is written.
+    alarms : tuple of Alarm
+        Alarms that the change cleared or eased, as they were before.
     """
 
     stamp_ns: int
     who: str
     what: str
     joint: JointWear | None = None
-    undoes: int | None = None
-    id: int = 0
+    alarms: tuple[Alarm, ...] = ()
 
 
 @attrs.frozen

@@ -1,33 +1,43 @@
 """The ledger: what is kept is what was given; what cannot be continued is refused and left as it is."""
 
+import math
+import os
 import sqlite3
 import subprocess
 import sys
 from contextlib import closing
+from functools import partial
 
 import attrs
 import numpy as np
 import pytest
-from ledger_contents import contents
+from ledger_contents import contents, cut_off, rows_of
 
 from leg_wear_monitor.estimate.signature import CommissionedTorque
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.parameters import config_from
+from leg_wear_monitor.monitor.ledger import rows
 from leg_wear_monitor.monitor.ledger.entry import (
     AlarmEvent,
     Audit,
     Binding,
     ClearancePoint,
+    Commissioned,
+    CorrectedClearance,
     ForecastPoint,
+    IdentifiedLeg,
+    JointWear,
+    Measurement,
     SimulatedReference,
+    VerdictEvent,
     binding_of,
 )
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
-from leg_wear_monitor.monitor.ledger.schema import FORMAT, UNRELEASED_ID
-from leg_wear_monitor.state import Level
+from leg_wear_monitor.monitor.ledger.rows import FORMAT
+from leg_wear_monitor.state import Evidence, Figure, Level, State, Verdict
 from leg_wear_monitor.twin.reference import POINTS, CrankProfile, LegParameters
 from leg_wear_monitor.twin.torque_reference import CYCLES, TorqueReference
 
@@ -70,7 +80,7 @@ def test_a_run_without_an_entry_and_one_before_events_alone_are_cut_off_too(open
     assert open_ledger().cut_off_s is not None
 
 
-def test_history_and_audit_trail_are_appended_once(open_ledger, entry_at, rows):
+def test_history_and_audit_trail_are_appended_once(open_ledger, entry_at, tmp_path):
     ledger = open_ledger()
     for second in (1, 2):
         entry = entry_at(second)
@@ -80,12 +90,12 @@ def test_history_and_audit_trail_are_appended_once(open_ledger, entry_at, rows):
         ledger.keep(entry)
     ledger.keep(entry_at(3))
     ledger.close()
-    audit = rows("SELECT stamp_ns, who, what, joint, cycles, depth FROM audit")
-    alarms = rows("SELECT stamp_ns, kind, level, value FROM alarm_history")
+    rows = partial(rows_of, tmp_path / "wear.ledger")
+    audit = rows("SELECT stamp_ns, who, what, joint ->> 'name', joint ->> 'cycles' FROM audit")
+    alarms = rows("SELECT stamp_ns, alarm ->> 'kind', alarm ->> 'value' FROM alarm_history")
     points = rows("SELECT stamp_ns, cycle, joint, clearance_m FROM history")
-    depth = [entry_at(second).joints[0].depth.tobytes() for second in (1, 2)]
-    assert audit == [(s, "ann", "reset_wear", "A", s, depth[s - 1]) for s in (1, 2)]
-    assert alarms == [(s, "cadence", 0, None) for s in (1, 2)]  # SQLite keeps a NaN as NULL
+    assert audit == [(s, "ann", "reset_wear", "A", s) for s in (1, 2)]
+    assert alarms == [(s, "cadence", None) for s in (1, 2)]  # a NaN is null
     assert points == [(s, 7, "A", 3.0e-4) for s in (1, 2)]
 
 
@@ -127,30 +137,24 @@ def newer(path):
         db.execute(f"PRAGMA user_version = {FORMAT + 1}")
 
 
-def unreleased(number):
-    """Makes a ledger as the formats before the first release had it, with a log beside it."""
-
-    def make(path):
-        with closing(sqlite3.connect(path)) as db:
-            db.execute("PRAGMA journal_mode = WAL" if number < 4 else "PRAGMA journal_mode = DELETE")
-            db.execute("CREATE TABLE joint (name TEXT PRIMARY KEY, depth BLOB NOT NULL) STRICT")
-            db.execute(f"PRAGMA application_id = {UNRELEASED_ID}")
-            db.execute(f"PRAGMA user_version = {number}")
-        path.with_name(path.name + "-log").write_bytes(b"LWMLOG1")
-
-    return make
+def older(path):
+    newer(path)
+    with closing(sqlite3.connect(path)) as db:
+        db.execute("ALTER TABLE joint ADD COLUMN bushing_m REAL")
+        db.execute(f"PRAGMA user_version = {FORMAT}")
 
 
 @pytest.mark.parametrize(
     ("make", "said"),
     [
-        *((unreleased(n), rf"has the unreleased format {n}, .* move it away to begin") for n in range(1, 18)),
-        (lambda path: path.write_bytes(b""), "is empty, not a ledger"),
+        (older, "is not a ledger of format 1, .* move it away to begin with new parts"),
+        (lambda path: path.write_bytes(b""), "is not a ledger of format 1"),
         (lambda path: path.write_text("bodies: {}\n" * 1000), "damaged or not a ledger"),
         (lambda path: path.mkdir(), "cannot be opened"),
         (lambda path: path.symlink_to("nowhere"), "cannot be opened"),
-        (not_a_ledger, "not a ledger"),
-        (newer, f"has format {FORMAT + 1}, this version knows up to {FORMAT}"),
+        (not_a_ledger, "is not a ledger of format 1"),
+        (os.mkfifo, "cannot be opened: it is not a file"),
+        (newer, "is not a ledger of format 1"),
     ],
 )
 def test_what_is_no_ledger_is_refused_and_left_alone(open_ledger, tmp_path, make, said):
@@ -210,24 +214,7 @@ def test_no_damage_goes_unnoticed(open_ledger, entry_at, tmp_path):
     assert refused > 40  # the rest of the file is not in use
 
 
-def test_a_write_that_fails_is_said_and_made_up_for(open_ledger, entry_at):
-    ledger = open_ledger()
-    ledger.keep(entry_at(1))
-    ledger._db.execute("PRAGMA query_only = ON")  # what a file system gone read-only gives
-    ledger.note(Audit(2, "ann", "reset_wear"))
-    assert not ledger.keep(entry_at(2))
-    assert "readonly" in ledger.fault
-    assert ledger.kept_ns == 1 * SECOND
-    assert ledger.keep(entry_at(3))  # on a fresh connection
-    assert (ledger.fault, ledger.kept_ns) == ("", 3 * SECOND)
-    ledger.close()
-    found = open_ledger()
-    assert contents(found.entry) == contents(entry_at(3))
-    assert found.cut_off_s == 5.0
-    assert found._db.execute("SELECT count(*) FROM audit").fetchone() == (1,)
-
-
-def test_a_full_disk_is_said_and_leaves_the_last_entry(open_ledger, entry_at):
+def test_a_full_disk_is_reported_and_the_next_entry_has_what_waited(open_ledger, entry_at):
     ledger = open_ledger()
     ledger.keep(entry_at(1))
     pages = ledger._db.execute("PRAGMA page_count").fetchone()[0]
@@ -236,8 +223,19 @@ def test_a_full_disk_is_said_and_leaves_the_last_entry(open_ledger, entry_at):
         ledger.note(Audit(2, "ann", "reset_wear", entry_at(2).joints[0]))
     assert not ledger.keep(entry_at(2))
     assert "full" in ledger.fault
+    assert ledger.kept_ns == 1 * SECOND
     ledger.close()
-    assert contents(open_ledger().entry) == contents(entry_at(1))
+    found = open_ledger()
+    assert (contents(found.entry), found.cut_off_s) == (contents(entry_at(1)), 5.0)
+    found._db.execute("PRAGMA query_only = ON")  # as a file system that became read-only
+    found.note(Audit(3, "ann", "new_epoch"))
+    assert not found.keep(entry_at(3))
+    assert "readonly" in found.fault
+    found._db.execute("PRAGMA query_only = OFF")
+    assert found.keep(entry_at(4))
+    assert (found.fault, found.kept_ns) == ("", 4 * SECOND)
+    found.close()
+    assert [audit.stamp_ns for audit in open_ledger().audits] == [3]
 
 
 def test_a_ledger_moved_away_while_in_use_is_said(open_ledger, entry_at, tmp_path):
@@ -248,18 +246,6 @@ def test_a_ledger_moved_away_while_in_use_is_said(open_ledger, entry_at, tmp_pat
     assert not ledger.path.exists()  # no second ledger begins
     (tmp_path / "elsewhere").rename(ledger.path)
     assert ledger.keep(entry_at(2))
-
-
-def test_a_ledger_continued_by_another_after_a_fault_is_not_written(open_ledger, entry_at):
-    ledger = open_ledger()
-    ledger._db.execute("PRAGMA query_only = ON")
-    assert not ledger.keep(entry_at(1))  # lets go of the file
-    other = open_ledger()
-    other.keep(entry_at(5))
-    other.close()
-    assert not ledger.keep(entry_at(2))
-    assert "another monitor" in ledger.fault
-    assert contents(open_ledger().entry) == contents(entry_at(5))
 
 
 def test_a_half_made_ledger_is_no_ledger(open_ledger, tmp_path):
@@ -384,21 +370,51 @@ def test_baselines_are_of_the_parts_since_the_last_reset_whatever_the_clocks_say
         found.close()
 
 
-def test_a_reset_can_be_read_whole_until_it_is_undone(open_ledger, entry_at):
-    ledger = open_ledger()
-    assert ledger.last_reset("A") is None
-    was = entry_at(2).joints
-    for stamp, joint in ((1, was[0]), (2, was[1]), (3, entry_at(5).joints[0])):
-        ledger.note(Audit(stamp, "ann", "reset_wear", joint))
-    ledger.keep(entry_at(6))
-    last = ledger.last_reset("A")
-    assert (last.stamp_ns, last.joint.cycles, last.joint.moving_s) == (3, 5, 4.5)
-    assert last.joint.depth.tobytes() == entry_at(5).joints[0].depth.tobytes()
-    ledger.note(Audit(4, "ann", "undo_reset", entry_at(6).joints[0], undoes=last.id))
-    ledger.keep(entry_at(7))
-    first = ledger.last_reset("A")
-    assert (first.stamp_ns, first.joint.replaced_ns) == (1, was[0].replaced_ns)
-    assert ledger.last_reset("B").joint.replaced_ns == was[1].replaced_ns == 1
+def test_a_transaction_that_was_cut_off_is_undone(open_ledger, reopened, entry_at, tmp_path):
+    reopened().close()
+    cut = tmp_path / "cut.ledger"
+    cut_off(tmp_path / "wear.ledger", cut)
+    assert cut.read_bytes() != (tmp_path / "wear.ledger").read_bytes()
+    assert contents(open_ledger(path=cut).entry) == contents(entry_at(1))
+
+
+RAISED = Alarm(kind="clearance", subject="A", level=Level.WARN, value=1.0, limit=2.0, beyond=(1, 0))
+WORN = JointWear("A", np.random.default_rng(1).random((2, 720)), 7, 0.1 + 0.2, 5, 1e-15)
+LEG = LegParameters(np.array([1.02, 1.0]), np.array([0.999, 1.0]), 1.5, load=np.ones((4, 2)))
+TORQUE = (np.ones((3, POINTS), np.float16), np.full((2, POINTS), 0.3, np.float16))
+EVIDENCE = (Evidence("clearance A", 3e-4, None, "m"),)
+VERDICT = Verdict(
+    state=State.WATCH,
+    joints=("A",),
+    why="why",
+    since_ns=3,
+    do="do",
+    evidence=EVIDENCE,
+    not_valid=(Figure.FORECAST,),
+    fault_code="NONE",
+)
+EVENTS = [
+    Audit(1, "ann", "reset_wear", WORN, (RAISED,)),
+    AlarmEvent(2, RAISED),
+    ClearancePoint(3, 7, "A", 3.0e-4, 4.0e-4),
+    ForecastPoint(3, 7, "A", 1.0, 2.0, math.nan),
+    Measurement(1, "A", "ann", 3e-4, 1e-6, 1e-5, 3, 0, 0.3, counts=True),
+    CorrectedClearance(1, "A", 1e-3, 4e-5, 1e-5, 7e-4, 0),
+    Commissioned(1, ("hip",), np.zeros(1), np.arange(3.0), np.eye(3)),
+    CommissionedTorque(1, np.full(5, 3e-4), np.ones((3, 80)), before=CommissionedTorque(0, *np.ones((2, 5)))),
+    SimulatedReference(
+        1, ("thigh", "foot"), TorqueReference(CrankProfile.steady(6.0), np.ones((2, 5)), TORQUE, LEG)
+    ),
+    IdentifiedLeg(1, ("thigh", "foot"), LEG),
+    VerdictEvent(4, VERDICT),
+]
+
+
+@pytest.mark.parametrize("event", EVENTS, ids=lambda event: type(event).__name__)
+def test_an_event_is_read_to_the_bit_as_it_was_noted(reopened, event):
+    (found,) = rows.read(reopened(event)._db, type(event))
+    given, read = (attrs.asdict(each) | {"id": 0} for each in (event, found))
+    np.testing.assert_equal(read, given)
 
 
 def test_spans_are_kept_by_epochs_of_the_clock(open_ledger, entry_at):

@@ -142,8 +142,8 @@ def made_up_summary() -> ReplaySummary:
         status=(ReplayStatus(name="gait", level=Level.OK, message="m", values={"cadence_rpm": math.nan}),),
         lost=Lost(
             unmonitored_s=0.5, already_counted=0, faulty={"out_of_range": 1}, conflicting=0, implausible=0,
-            duplicates=1, late=2, stray_stamps=3, outliers=4, gaps_bridged=5, gaps_lost=6, backward_jumps=7,
-            failures=8,
+            torque_outliers=9, duplicates=1, late=2, stray_stamps=3, outliers=4, gaps_bridged=5, gaps_lost=6,
+            backward_jumps=7, failures=8,
         ),
         history=ReplayHistory(stamp_ns=stamps, **columns),
         wear_depth_m={"A": WornDepth(np.array([1e-9, 0.0]), np.zeros(2))},

@@ -29,10 +29,17 @@ from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.messages.cdr import Decoder, mark_zero_stamps
-from leg_wear_monitor.messages.names import is_without, names_in, wanted_interfaces, without_interface
-from leg_wear_monitor.messages.streams import INTERFACES, JOINT_STATE
+from leg_wear_monitor.messages.names import (
+    is_without,
+    names_in,
+    twice,
+    wanted_interfaces,
+    without_interface,
+)
+from leg_wear_monitor.messages.streams import INTERFACES, JOINT_STATE, WRENCH_STAMPED
+from leg_wear_monitor.messages.wrench_axis import WrenchAxis
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.twin import CRANK
+from leg_wear_monitor.twin import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, MISSING_JOINT, NO_FAULT, NOT_FINITE, ZERO_STAMP, Samples
 
 if TYPE_CHECKING:
@@ -160,6 +167,7 @@ class _Counts:
     found: int = 0
     missing: int = 0
     names: set[str] = attrs.Factory(set)
+    twice: str = ""
     without_interface: int = 0
     interfaces: str = ""
 
@@ -200,7 +208,9 @@ class JointNames:
             counts.interfaces = without_interface(raw, self._crank, self._interfaces)
         if len(missing) and len(counts.names) < _MOST:
             message = messages[missing[0]]
-            counts.names |= set(names_in(data[message["begin"] : message["end"]].tobytes())[:_MOST])
+            names = names_in(data[message["begin"] : message["end"]].tobytes())[:_MOST]
+            counts.names |= set(names)
+            counts.twice = counts.twice or twice(names, self._crank)
 
     def findings(self) -> list[Finding]:
         """Findings after all messages have been read.
@@ -217,6 +227,8 @@ class JointNames:
             if counts.interfaces:
                 text = f"{counts.without_interface} messages of dynamic_joint_states: {counts.interfaces}"
                 findings.append(Finding(path, text))
+            if counts.twice:
+                raise RecordingError(str(path), self._crank, counts.twice)
             if not counts.missing:
                 continue
             text = (
@@ -315,6 +327,7 @@ class Pauses:
 
 TIMES = ("header", "log", "publish")
 _TOGETHER = 4096  # smallest intended number of samples in a block
+_COMPARED = 100  # wrenches of a piece whose axes are compared
 _OF_A_SAMPLE = 800  # memory of one queued sample, including copies [bytes]
 
 
@@ -368,6 +381,7 @@ class Recording:
         self._one_leg = OneLeg()
         bag_files, self._findings = bag.find_files(paths)
         recordings = {file.path: file.recording for file in bag_files}
+        self._axis = WrenchAxis(config.drive_torque.axis)
         self._joints = JointNames(config.crank_joint, wanted_interfaces(config), recordings)
         with ExitStack() as stack:
             self._sources, lost = bag.open_sources(bag_files, config, self._budget, stack)
@@ -418,7 +432,8 @@ class Recording:
             for block in self._joined():
                 yield from self._pauses.cut(block)
         self._findings += self._joints.findings()
-        notes = self._clocks.notes()
+        notes, other_axis = self._clocks.notes(), self._axis.report()
+        self._findings += [Finding(self.files[0], other_axis)] if other_axis else []
         self._findings += [Finding(self.files[0], text, Severity.NOTE) for text in notes]
 
     def _joined(self) -> Iterator[Block]:
@@ -465,6 +480,13 @@ class Recording:
         """Decode a piece, and stamp its samples with the selected time."""
         samples = self._decoder.many(piece.data, piece.messages)
         self._joints.add_samples(bag_file.path, piece.data, piece.messages, samples)
+        wrenches = np.flatnonzero(
+            (piece.messages["type"] == WRENCH_STAMPED)
+            & (samples["kind"] == TORQUE)
+            & (samples["fault"] == NO_FAULT)
+        )
+        some = piece.messages[wrenches[:: max(1, len(wrenches) // _COMPARED)]]
+        self._axis.add(piece.data[one["begin"] : one["end"]].tobytes() for one in some)
         if len(self._sources) > 1:
             self._one_leg.add_samples(bag_file.path, samples)
         if bag_file.storage not in bag.TABLES:  # which have one clock only

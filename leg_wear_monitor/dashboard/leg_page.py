@@ -54,8 +54,9 @@ _NOT_RECORDED = ReplayRecording(
     begin_ns=0, end_ns=0, duration_s=0.0,
 )  # fmt: skip
 _NOTHING_LOST = Lost(
-    unmonitored_s=0.0, already_counted=0, faulty={}, conflicting=0, implausible=0, duplicates=0, late=0,
-    stray_stamps=0, outliers=0, gaps_bridged=0, gaps_lost=0, backward_jumps=0, failures=0,
+    unmonitored_s=0.0, already_counted=0, faulty={}, conflicting=0, implausible=0, torque_outliers=0,
+    duplicates=0, late=0, stray_stamps=0, outliers=0, gaps_bridged=0, gaps_lost=0, backward_jumps=0,
+    failures=0,
 )  # fmt: skip
 
 

@@ -29,6 +29,8 @@ _MEAN_HARMONICS = 12  # fitted harmonics of the mean torque
 # constant part, and a part for each order.
 _MEAN_ERROR, _ERROR_PER_HARMONIC = 0.01, 0.005
 _MASS_SIGMA, _LENGTH_SIGMA = 0.03, 0.006  # relative standard deviations about the mechanism file
+_FURTHEST = 0.5  # largest relative deviation: masses and lengths stay positive, whatever the torque is
+_LEAST_SWING = 0.01  # of the predicted torque's size
 # standard deviations: constant friction over the torque's size, load friction; scale and delay of the sensor
 _CONSTANT_FRICTION_SIGMA, _LOAD_FRICTION_SIGMA, _SCALE_SIGMA, _DELAY_SIGMA_S = 0.5, 0.2, 0.1, 0.04
 _RIGID_TIME_CONSTANTS_S = (0.0, 0.004, 0.008, 0.016)  # low-passes tried on a rigid drive, to 10 Hz
@@ -136,7 +138,8 @@ class _CouplingFit:
         # harmonics of the measured torque, from the middles of the phases
         middle = (np.arange(phases) + 0.5) * (TURN / phases)
         self._measured = np.exp(-1j * np.outer(self._order, middle)) @ mean / phases
-        size = float(np.std(mean))
+        # a torque that hardly varies still has the error of the model
+        size = max(float(np.std(mean)), _LEAST_SWING * sensor.size_nm)
         error = size * (_MEAN_ERROR + _ERROR_PER_HARMONIC * self._order)
         # order 0 is the mean; any other harmonic stands for its conjugate, too
         self._weight = np.where(self._order > 0.0, math.sqrt(2.0), 1.0) / error
@@ -186,6 +189,7 @@ class _CouplingFit:
             square = float(residual @ residual + np.sum((x / self._sigma) ** 2))
             information = jacobian @ jacobian.T + np.diag(self._sigma**-2.0)
             x = x + np.linalg.solve(information, jacobian @ residual - x / self._sigma**2)
+            x[:-4] = np.clip(x[:-4], -_FURTHEST, _FURTHEST)
         return _FittedLeg(square, x[:-4], deviation)
 
     def _real(self, harmonics: Floats) -> Floats:

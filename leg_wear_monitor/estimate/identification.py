@@ -59,6 +59,7 @@ _HARMONICS = 6  # of the torque that show masses and lengths rather than impacts
 _IDEAL = 0.01  # of the torque's size: what impacts change in each of them
 _STEP = 1.0e-4  # of the differences by masses and lengths, in standard deviations
 _DONE = 1.0e-3  # last step of them
+_LARGEST_LOG = 10.0  # of friction and compliance: far beyond a possible leg
 _SENSOR = 5.0  # times the usual changes of friction, scale, offset and load: they are constant here
 
 # a model with the right parameters is off by a part of the torque's size, by a part of its steps where it is
@@ -111,7 +112,8 @@ def identified_leg(
     information = slopes.T @ weighted + np.diag(sigma**-2.0)
     rest = commissioned.mean - means[0]
     found = before + np.linalg.solve(information, weighted.T @ rest - before / sigma**2)
-    mass, length, (log_friction, *log_compliance) = np.split(found, [bodies, 2 * bodies])
+    mass, length, logs = np.split(found, [bodies, 2 * bodies])
+    log_friction, *log_compliance = np.clip(logs, -_LARGEST_LOG, _LARGEST_LOG).tolist()
     compliance = near.compliance * math.exp(sum(log_compliance))
     friction = math.exp(log_friction)
     return attrs.evolve(near, mass=1.0 + mass, length=1.0 + length, friction=friction, compliance=compliance)
@@ -149,10 +151,13 @@ def leg_of_ideal_torque(
         return np.concatenate([left / unit, x])
 
     def at(x: Floats) -> Point:
+        impossible = Point(np.full(1, np.inf), lambda: np.zeros((1, len(x))))
+        if not bodies_at(x).is_possible(mechanism):
+            return impossible
         try:
             now = residual(x)
         except AssemblyError:  # such a leg cannot move
-            return Point(np.full(1, np.inf), lambda: np.zeros((1, len(x))))
+            return impossible
         steps = _STEP * np.eye(len(x))
         return Point(now, lambda: np.array([residual(x + one) - now for one in steps]).T / _STEP)
 

@@ -10,7 +10,11 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.arrays import Floats
+
+DATA_ERRORS = (LegWearError, ArithmeticError, np.linalg.LinAlgError)
+"""What measured data can make an estimator raise. Everything else is a fault of this package."""
 
 _ROUNDS = 30
 _SHORTEST = 0.001  # fraction of a step that is tried last

@@ -384,6 +384,7 @@ def _sureness(one: NamedCause) -> float:
 
 
 _MOST_CAUSES = 3
+_LEAST_FACTOR = 1.0e-5  # of the predicted RMS: far below the torque of a leg in a wrong unit
 _LARGEST_REMAINDER = 0.5  # more causes may leave at most this fraction of what fewer leave unexplained
 # alternatives to the best hypothesis may leave so many times as much unexplained, plus an error of the model
 _ALTERNATIVE_FACTOR, _MODEL_ERROR = 3.0, 0.02
@@ -421,6 +422,8 @@ def explanation(
     curves = curves_of([one.torque_profile for one in cycles], _body_torques(mechanism, speed))
     if curves is None or not curves.predicted_rms_nm > 0.0:
         return None
+    if not inner(curves.measured, curves.measured) > (_LEAST_FACTOR * curves.predicted_rms_nm) ** 2:
+        return None  # the torque does not vary: no cause follows from it
     samples = float(np.mean([one.torque_profile.number.sum() for one in cycles]))
     # a sample is taken as the mean over the period before it; the angle of an instant is half a period later
     angle = allowed.lag_s * abs(speed) + 0.5 * TURN / samples

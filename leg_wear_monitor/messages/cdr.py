@@ -127,22 +127,22 @@ def header(data, origin, end, big):
 
 @kernel
 def names(data, at, end, origin, big, wanted):
-    """Length of a sequence of texts, where in it the wanted one is (-1: nowhere), the position behind it."""
+    """Length of a sequence of texts, where in it the wanted one is (-1: not once), the position behind it."""
     count, at = counted(data, at, end, origin, big)
     if at < 0 or count > (end - at) // 4:
         return np.int64(0), np.int64(-1), np.int64(-1)
-    found = np.int64(-1)
+    found, times = np.int64(-1), 0
     for i in range(count):
         size, first, at = text(data, at, end, origin, big)
         if at < 0:
             return np.int64(0), np.int64(-1), np.int64(-1)
-        if found < 0 and size == wanted.shape[0]:
+        if size == wanted.shape[0]:
             same = True
             for k in range(size):
                 same &= data[first + k] == wanted[k]
             if same:
-                found = np.int64(i)
-    return count, found, at
+                found, times = np.int64(i), times + 1
+    return count, found if times == 1 else np.int64(-1), at
 
 
 @kernel

@@ -1,7 +1,7 @@
 """Names in a message, for reports on what is not in it."""
 
 import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,14 @@ def wanted_interfaces(config: MonitorConfig) -> dict[str, str]:
         "drive_torque.interface": config.drive_torque.interface,
         "drive.temperature_interface": config.drive.temperature_interface,
     }
+
+
+def twice(names: Sequence[str], joint: str) -> str:
+    """That a name is there several times, and at which places; empty if it is there at most once."""
+    places = [str(i + 1) for i, name in enumerate(names) if name == joint]
+    if len(places) < 2:
+        return ""
+    return f"joints {' and '.join(places)} of joint_states are both named {joint!r}: rename one of them"
 
 
 def is_without(samples: Samples, interfaces: Mapping[str, str]) -> NDArray[np.bool_]:

@@ -1,12 +1,14 @@
 """A gait cycle: its report, and what it shows of the leg, taken over into forecast and twin."""
 
+import logging
 import math
 from collections.abc import Sequence
 
 import attrs
 
-from leg_wear_monitor.estimate.cause import Cause, Change
-from leg_wear_monitor.estimate.mismatch import explanation
+from leg_wear_monitor.estimate.cause import Cause, Change, TorqueExplanation
+from leg_wear_monitor.estimate.least_squares import DATA_ERRORS
+from leg_wear_monitor.estimate.mismatch import Allowed, explanation
 from leg_wear_monitor.files import with_same_fields
 from leg_wear_monitor.monitor.alarm_specs import MISMATCH
 from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate, ClearanceObservation
@@ -21,6 +23,8 @@ from leg_wear_monitor.monitor.parts import Parts
 from leg_wear_monitor.monitor.reports import CycleReport, JointReport, shown_by_torque
 from leg_wear_monitor.twin.reference import LegParameters
 from leg_wear_monitor.twin.statistics import CycleStatistics, TorqueStatistics
+
+_LOG = logging.getLogger(__name__)
 
 
 def cycle_report(
@@ -128,13 +132,27 @@ def explain_mismatch(parts: Parts, statistics: CycleStatistics) -> None:
     parts.state.mismatch = parts.state.mismatch.with_cycle(
         statistics,
         parts.evaluation.board.alarms[MISMATCH.name()],
-        lambda cycles: explanation(parts.mechanism, cycles, allowed),
+        lambda cycles: _explained(parts, cycles, allowed),
     )
+    if not parts.state.mismatch.cycles:
+        parts.state.unexplained = ""
     if parts.torque and parts.is_torque_wrong and not was_wrong:
         # the alarm rose some gait cycles after the torque became wrong
         before = parts.config.alarms.on_delay_cycles + 1
         first = parts.state.mismatch.cycles[0]
         parts.torque.withdraw(first.begin_ns - before * (first.stamp_ns - first.begin_ns))
+
+
+def _explained(parts: Parts, cycles: Sequence[CycleStatistics], allowed: Allowed) -> TorqueExplanation | None:
+    """What explains a torque mismatch. None if the data lead to no explanation; the state says why."""
+    before, parts.state.unexplained = parts.state.unexplained, ""
+    try:
+        return explanation(parts.mechanism, cycles, allowed)
+    except DATA_ERRORS as error:
+        parts.state.unexplained = f"the torque mismatch has no explanation ({error or type(error).__name__})"
+        if parts.state.unexplained != before:
+            _LOG.warning("%s", parts.state.unexplained, exc_info=error)
+        return None
 
 
 def observe_torque(parts: Parts) -> None:

@@ -416,11 +416,16 @@ class AlarmEvaluation:
         return statistics.not_compared if is_allowed else NotCompared.CADENCE
 
     def end_cycle(
-        self, report: CycleReport, record: TorqueRecord, foot_load: Mapping[str, float] | None = None
+        self,
+        report: CycleReport,
+        record: TorqueRecord,
+        foot_load: Mapping[str, float] | None = None,
+        is_refused: bool = False,
     ) -> tuple[AlarmList, ...]:
         """Evaluate a whole gait cycle, with its torque and the record; returns all alarms if one changed.
 
-        ``foot_load`` are values of the alarms of the foot load's sensor; None without one.
+        ``foot_load`` are values of the alarms of the foot load's sensor; None without one. ``is_refused``:
+        whether the crank's input has a fault, so that its forces are not those of the leg.
         """
         self.state.cycles += 1
         sensor = (
@@ -428,9 +433,14 @@ class AlarmEvaluation:
             if foot_load is None
             else {spec.name(): spec.value(foot_load) for spec in alarm_specs.FOOT_LOAD}
         )
-        values = self._of_cycle(report, record) | sensor
-        factor = self._impact_factor(report.cadence_rpm)
-        self.state.cadence_rpm = report.cadence_rpm
+        factor = 1.0
+        if is_refused:
+            values = self._of_refused(report)
+        else:
+            values = self._of_cycle(report, record)
+            factor = self._impact_factor(report.cadence_rpm)
+            self.state.cadence_rpm = report.cadence_rpm
+        values |= sensor
         for name in self.board.observed:  # it is evaluated with all that is known, at the period's end
             values.pop(name, None)
         return self.board.evaluate(values, report.stamp_ns, impact_factor=factor)
@@ -449,6 +459,11 @@ class AlarmEvaluation:
             values |= {spec.name(joint.joint): spec.value(joint) for spec in joint_specs(self.config)}
         return values
 
+    def _of_refused(self, report: CycleReport) -> dict[str, float]:
+        """Values of a cycle whose crank has an input fault: cadence, forces and torque are not known."""
+        clearance = alarm_specs.CLEARANCE
+        return {clearance.name(joint.joint): clearance.value(joint) for joint in report.joints}
+
     def _impact_factor(self, rpm: float) -> float:
         """Factor on the limits of impact forces, which are those of the commanded cadence, at another one.
 
@@ -462,26 +477,29 @@ class AlarmEvaluation:
         fastest = min(max(abs(rpm), abs(self.state.cadence_rpm)), commanded + cadence.tolerance_rpm)
         return (fastest / commanded) ** 2 if fastest > _FASTER * commanded else 1.0
 
-    def end_period(self, skipped: int = 0) -> tuple[AlarmList, ...]:
+    def end_period(self, skipped: int = 0, is_refused: bool = False) -> tuple[AlarmList, ...]:
         """Evaluate impacts of the running gait cycle, and once per duration of a cycle the input.
 
         Parameters
         ----------
         skipped : int
             Number of samples skipped so far because their wear is already counted.
+        is_refused : bool
+            Whether the crank has an input fault: its cadence and its impacts are not known.
         """
         peaks = {
             alarm_specs.IMPACT.name(joint): float(peak)
             for joint, peak in zip(self._twin.clearance_joints, self._twin.peak_force_n, strict=True)
         }
         factor = self._impact_factor(self._twin.speed_radps * 30.0 / math.pi)
-        early = self.board.evaluate_early(peaks, self._twin.intake.followed_stamp_ns, factor)
+        stamp_ns = self._twin.intake.followed_stamp_ns
+        early = () if is_refused else self.board.evaluate_early(peaks, stamp_ns, factor)
         sources = {alarm_specs.SOURCES.name(): alarm_specs.SOURCES.value(self.guard)}
         early += self.board.evaluate(sources, self.guard.stamp_ns)
         self.state.evaluation_periods += 1
         if self.state.evaluation_periods < A_CYCLE:
             return early
-        return early + self._evaluate_input(skipped)
+        return early + self._evaluate_input(skipped, is_refused)
 
     def pause(self) -> None:
         """Note a pause of the recording: the evaluation of the input starts again with the next sample."""
@@ -496,7 +514,7 @@ class AlarmEvaluation:
         read = (*alarm_specs.INPUT, alarm_specs.FOOT_LOAD_RATE) if has_load else alarm_specs.INPUT
         return {spec.name(): spec.value(health) for spec in read}
 
-    def _evaluate_input(self, skipped: int) -> tuple[AlarmList, ...]:
+    def _evaluate_input(self, skipped: int, is_refused: bool) -> tuple[AlarmList, ...]:
         state, intake, config = self.state, self._twin.intake, self.config
         is_whole = skipped == state.skipped == state.skipped_before
         health = input_health(state.before, intake, state.torque, is_whole)
@@ -509,7 +527,7 @@ class AlarmEvaluation:
             over_time = {name: value for name, value in values.items() if math.isnan(without[name])}
             if any(value and self.board.reaches(name, value) for name, value in over_time.items()):
                 health, values = unknown, without
-        if state.cycles == 0 and self._twin.tracking is Tracking.OUT_OF_STEP:
+        if state.cycles == 0 and not is_refused and self._twin.tracking is Tracking.OUT_OF_STEP:
             speed_rpm = self._twin.speed_radps * 30.0 / math.pi
             values[alarm_specs.CADENCE.name()] = abs(speed_rpm - config.cadence.commanded_rpm)
         self.state = AlarmEvaluationState(

@@ -1,16 +1,30 @@
-"""Health of the input over a time: rates, unused samples and why, lost time, stuck torque; pauses."""
+"""The input, judged before any mechanical cause: rates, unused samples, and faults that no leg can have."""
 
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import attrs
 import numpy as np
 
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
+from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.monitor.alarms import amount, time_words
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin import CRANK, KINDS, LOAD, TORQUE
-from leg_wear_monitor.twin.sample import FAULTS, MISSING_JOINT, NO_FAULT, NOT_FINITE, Samples
-from leg_wear_monitor.twin.statistics import Intake
+from leg_wear_monitor.twin.sample import (
+    FAULTS,
+    GAIT_SAMPLE,
+    MISSING_JOINT,
+    NO_FAULT,
+    NOT_FINITE,
+    Samples,
+    has_value_of,
+    is_valid,
+    of_crank,
+    within,
+)
+from leg_wear_monitor.twin.statistics import CycleStatistics, Intake, TorqueProfile
 
 _LEAST_TORQUES = 10
 
@@ -132,13 +146,14 @@ _DROPPED = ("duplicates", "late", "stray_stamps", "outliers", "load_outliers")
 
 _SENTENCES = {
     "zero_stamp": "have a zero stamp: set header.stamp",
-    "missing_joint": "do not name the crank {crank!r}: set crank_joint to its name in joint_states",
+    "missing_joint": "do not name the crank {crank!r} exactly once: set crank_joint to its name in "
+    "joint_states",
     "empty": "have no name or no position",
     "wrong_length": "have another number of positions, velocities or efforts than of names",
     "not_finite": "have a value that is NaN or infinite ({where})",
     "undecodable": "cannot be decoded: another type or another encoding",
     "wrong_type": "are of a type that is not read",
-    "out_of_range": "have an impossible value: angles are in radians, torques in N m",
+    "out_of_range": "have an impossible value or a torque far from the others (units are rad and N m)",
     "duplicates": "repeat a stamp: two publishers, or a header.stamp that is not renewed",
     "late": "arrive more than tracker.reorder_window_s after newer ones",
     "stray_stamps": "have a stamp far from the others: see the clock of the sender",
@@ -233,3 +248,533 @@ class Pauses:
         return Pauses(
             self.number + 1, self.total_s + pause_s, self.passed_s(unmonitored_s), pause_s, unmonitored_s
         )
+
+
+# Faults of a stream that no leg can have, judged on about a gait cycle of samples.
+#
+# Each fault has a rule: its code, its stream, a predicate that gives the words of its sentence, the sentence,
+# and the remedy. The first rule of a stream that holds is the fault. While it is present, the gait cycles of
+# this stream say nothing of the leg: they raise no mechanical alarm, and no estimator uses them.
+
+
+@attrs.frozen(eq=False)
+class Stretch:
+    """Samples of about one gait cycle, in the order of their stamps.
+
+    Attributes
+    ----------
+    crank_ns, angle : (n,) arrays
+        Stamps, and crank angles that count on over turns [rad].
+    torque_ns, torque : (m,) arrays
+        Stamps, and drive torques on the crank [N m].
+    spikes : int
+        Torques that the guard left out as outliers.
+    size_nm : float
+        RMS of the predicted drive torque.
+    config : MonitorConfig
+    """
+
+    crank_ns: Ints
+    angle: Floats
+    torque_ns: Ints
+    torque: Floats
+    spikes: int
+    size_nm: float
+    config: MonitorConfig
+
+    @classmethod
+    def of(cls, samples: Samples, spikes: int, size_nm: float, config: MonitorConfig) -> "Stretch":
+        """Those of some samples in any order."""
+        cranks, torques = (within(part, 1, 2**63 - 1) for part in (of_crank(samples), of_torque(samples)))
+        angle = np.unwrap(cranks["crank_angle_rad"], period=TURN)
+        return cls(
+            cranks["stamp_ns"], angle, torques["stamp_ns"], torques["torque_nm"], spikes, size_nm, config
+        )
+
+    @property
+    def turned_rad(self) -> float:
+        """Angle by which the crank turned."""
+        return float(abs(self.angle[-1] - self.angle[0])) if len(self.angle) else 0.0
+
+    @property
+    def period_s(self) -> float:
+        """Mean time between two crank samples."""
+        return 1.0e-9 * float(self.crank_ns[-1] - self.crank_ns[0]) / max(1, len(self.crank_ns) - 1)
+
+    @property
+    def speed(self) -> float:
+        """Mean size of the crank's speed [rad/s]."""
+        return self.turned_rad / (self.period_s * (len(self.crank_ns) - 1))
+
+    @property
+    def commanded(self) -> float:
+        """Commanded size of the crank's speed [rad/s]."""
+        return abs(self.config.cadence.commanded_rpm) * TURN / 60.0
+
+
+def of_torque(samples: Samples) -> Samples:
+    """Samples with a possible drive torque."""
+    is_possible = np.abs(samples["torque_nm"]) <= KINDS[TORQUE].largest
+    known: Samples = samples[is_valid(samples) & has_value_of(samples, TORQUE) & is_possible]
+    return known
+
+
+_LEAST = 20  # samples of a stretch: fewer say nothing of its stamps and its values
+_MOVING_RAD, _STILL_RAD = 0.5, 1.0e-3  # turned in a stretch: the crank turns, it stands
+_SCATTERED, _SCATTERED_RAD = 0.12, 3.0e-3  # of stamps: of the period, and times the speed of the crank
+_HELD, _HELD_RAD = 2.5, 0.05  # samples that repeat a value, and the angle that the crank turns meanwhile
+_NO_VARIATION, _SWINGS = 1.0e-3, 0.5  # standard deviation of a torque, of the predicted RMS
+_FROZEN = 0.2  # of a gait cycle, in which a torque that freezes has the same value
+_IN_TURNS = 0.1  # by which a speed may differ from the commanded one in turns instead of radians
+_AT_END, _BESIDE = 0.05, 4  # fraction of torques at the ends of a range; times as often as the next value
+_SPIKES = 0.02  # fraction of torque samples that are outliers: fewer are counted and left out
+_ALIKE = 0.5  # correlation of torques over the crank angle
+_PHASES = (32, 16)  # of a gait cycle in which torques are compared
+_LEAST_A_PHASE = 2.0  # samples in each, on average
+
+Words = Mapping[str, str]
+
+
+def _unit(one: Stretch) -> Words | None:
+    """An angle in turns, continuous or wrapped to a turn."""
+    turns = np.unwrap(one.angle, period=1.0)
+    passed_s = one.period_s * (len(turns) - 1)
+    if passed_s <= 0.0:
+        return None
+    ratio = float(abs(turns[-1] - turns[0])) / passed_s / one.commanded
+    if abs(ratio * TURN - 1.0) > _IN_TURNS:
+        return None
+    return {"size": f"{ratio:.3g}", "ratio": f"{one.config.crank.gear_ratio / TURN:.6g}"}
+
+
+def _stamps(one: Stretch) -> Words | None:
+    """Compare how smooth the angle is over the stamps with how smooth it is from sample to sample.
+
+    Stamps of the measurement may be irregular: the angle is then smooth over them. Stamps of the arrival are
+    not those of the angles, which are smooth from sample to sample.
+    """
+    steps = np.diff(one.crank_ns) * 1.0e-9
+    if np.mean(np.abs(steps / one.period_s - 1.0)) < _SCATTERED:
+        return None
+    before, here, after = one.angle[:-2], one.angle[1:-1], one.angle[2:]
+    by_stamp = here - before - (after - before) * steps[:-1] / (steps[:-1] + steps[1:])
+    by_number = here - 0.5 * (before + after)
+    scatter_s = float(np.sqrt(np.mean(by_stamp**2) / 1.5)) / one.speed
+    is_of_arrival = np.mean(by_number**2) < 0.25 * np.mean(by_stamp**2)
+    if not is_of_arrival or scatter_s < max(_SCATTERED * one.period_s, _SCATTERED_RAD / one.commanded):
+        return None
+    return {"size": amount(scatter_s, "s"), "percent": f"{100.0 * scatter_s / one.period_s:.0f}"}
+
+
+def _held(values: Floats, stamp_ns: Ints, speed: float) -> Words | None:
+    """Values that repeat, each for the same number of samples."""
+    runs = 1 + int(np.count_nonzero(np.diff(values)))
+    held_s = 1.0e-9 * float(stamp_ns[-1] - stamp_ns[0]) / runs
+    if runs < 2 or len(values) < _HELD * runs or len(np.unique(values)) < 0.6 * runs:
+        return None
+    if held_s * speed < _HELD_RAD:
+        return None
+    return {"size": f"{len(values) / runs:.2g}", "rate": f"{1.0 / held_s:.3g}"}
+
+
+def _frozen(one: Stretch) -> Words | None:
+    enough = len(one.torque) >= _LEAST and np.std(one.torque) > _SWINGS * one.size_nm
+    return {} if enough and np.ptp(one.angle) < _STILL_RAD else None
+
+
+def _constant(one: Stretch) -> Words | None:
+    """All torques, or a part of them in a row."""
+    changes = np.flatnonzero(np.append(np.diff(one.torque), 1.0)) + 1
+    runs = np.diff(changes, prepend=0)
+    longest = int(np.argmax(runs))
+    if runs[longest] >= max(_LEAST, _FROZEN * len(one.torque)):
+        return {"size": amount(float(one.torque[changes[longest] - 1]), "N m")}
+    is_still = np.std(one.torque) <= _NO_VARIATION * one.size_nm
+    return {"size": amount(float(np.mean(one.torque)), "N m")} if is_still else None
+
+
+def _saturated(one: Stretch) -> Words | None:
+    if np.std(one.torque) <= _NO_VARIATION * one.size_nm:
+        return None
+    most = float(np.max(np.abs(one.torque)))
+    number = np.unique(one.torque, return_counts=True)[1]
+    # a torque of few digits repeats its extremes as well, but not so much more often than the next values
+    ends = [
+        int(end)
+        for end, beside in ((number[0], number[1]), (number[-1], number[-2]))
+        if end >= _BESIDE * beside
+    ]
+    known = one.config.drive_torque.saturation_nm
+    beyond = np.count_nonzero(np.abs(one.torque) >= known) if known > 0.0 else 0
+    part = max(sum(ends), beyond) / len(one.torque)
+    if part < _AT_END:
+        return None
+    return {"size": amount(most, "N m"), "percent": f"{100.0 * part:.0f}"}
+
+
+def _spikes(one: Stretch) -> Words | None:
+    part = one.spikes / (one.spikes + len(one.torque))
+    return {"percent": f"{100.0 * part:.1f}"} if part > _SPIKES else None
+
+
+@attrs.frozen(kw_only=True)
+class InputRule:
+    """A fault of a stream.
+
+    Attributes
+    ----------
+    code : str
+    kind : int
+        `CRANK` or `TORQUE`, the stream.
+    words : callable or None
+        Words of the sentence if a stretch has this fault; None if another part of `InputJudge` finds it.
+    why, do : str
+        Sentence and remedy, with words in braces.
+    needs_motion : bool
+        Whether it can only be seen while the crank turns.
+    """
+
+    code: str
+    kind: int
+    words: Callable[[Stretch], Words | None] | None
+    why: str
+    do: str
+    needs_motion: bool = True
+
+
+JUMP, NOT_OF_GAIT = "CRANK_JUMP", "TORQUE_NOT_OF_GAIT"
+_NO_JOINT = "; no joint is observed"
+INPUT_RULES = (
+    InputRule(
+        code="CRANK_FROZEN",
+        kind=CRANK,
+        words=_frozen,
+        needs_motion=False,
+        why="the crank has not moved since {since}, but the drive torque swings",
+        do="check the crank's encoder and its driver; if the leg stands under a changing load, let it walk",
+    ),
+    InputRule(
+        code="CRANK_UNIT",
+        kind=CRANK,
+        words=_unit,
+        needs_motion=False,
+        why="the crank's angle turns at {size} of the commanded cadence, as an angle in turns does",
+        do="publish radians; for a continuous position in turns, set crank.gear_ratio to {ratio}",
+    ),
+    InputRule(
+        code="CRANK_STAMPS",
+        kind=CRANK,
+        words=_stamps,
+        why="the stamps of the crank scatter by {size} ({percent} % of the sampling period), and its angle "
+        "does not: they are stamps of the arrival",
+        do="let the driver stamp each sample when it is measured (header.stamp)",
+    ),
+    InputRule(
+        code="CRANK_HELD",
+        kind=CRANK,
+        words=lambda one: _held(one.angle, one.crank_ns, one.speed),
+        why="the crank's angle changes with every {size}th sample only, at {rate} Hz: it is held in between",
+        do="publish each angle once, with the stamp of its measurement; in a table, delete the repeated rows",
+    ),
+    InputRule(
+        code=JUMP,
+        kind=CRANK,
+        words=None,
+        why="the crank's angle jumped by {size} at {since}, and has not come back: its zero is not known",
+        do="check the encoder for an overflow or lost counts, set crank.offset_rad again, and restart the "
+        "monitor",
+    ),
+    InputRule(
+        code="TORQUE_SPIKES",
+        kind=TORQUE,
+        words=_spikes,
+        why="{percent} % of the drive torques are spikes since {since}" + _NO_JOINT,
+        do="check the cable of the torque sensor and its supply",
+    ),
+    InputRule(
+        code="TORQUE_SATURATED",
+        kind=TORQUE,
+        words=_saturated,
+        why="{percent} % of the drive torques are at the end of their range since {since} ({size})"
+        + _NO_JOINT,
+        do="use a torque sensor with a wider range, or raise the limit of the driver",
+    ),
+    InputRule(
+        code="TORQUE_CONSTANT",
+        kind=TORQUE,
+        words=_constant,
+        why="the drive torque does not change since {since}: it stays at {size}" + _NO_JOINT,
+        do="check drive_torque.source, its topic or axis, and the sensor; until then, rock the joints by "
+        "hand regularly",
+    ),
+    InputRule(
+        code="TORQUE_HELD",
+        kind=TORQUE,
+        words=lambda one: (
+            _held(one.torque, one.torque_ns, one.speed) if one.turned_rad > _MOVING_RAD else None
+        ),
+        why="the drive torque changes with every {size}th sample only, at {rate} Hz: it is held in between"
+        + _NO_JOINT,
+        do="publish each torque once, with the stamp of its measurement; in a table, delete repeated values",
+    ),
+    InputRule(
+        code=NOT_OF_GAIT,
+        kind=TORQUE,
+        words=None,
+        why="the drive torque does not follow the gait since {since}: it is neither as predicted nor as in "
+        "the step before" + _NO_JOINT,
+        do="check topic, unit and source of the drive torque; until then, rock the joints by hand regularly",
+    ),
+)
+"""In the order of precedence: faults of the crank come first, for a torque is compared at its angles."""
+
+
+@attrs.frozen
+class InputFault:
+    """A fault that is present.
+
+    Attributes
+    ----------
+    code : str
+    since_ns, last_ns : int
+        Stamps of its begin, and of the last sample that showed it.
+    words : mapping of str to str
+        For the sentence and the remedy of its rule.
+    shown : int
+        In how many judgements in a row it was found.
+    """
+
+    code: str
+    since_ns: int
+    last_ns: int
+    words: Words
+    shown: int = 1
+
+    @property
+    def rule(self) -> InputRule:
+        """Its rule."""
+        return next(rule for rule in INPUT_RULES if rule.code == self.code)
+
+    @property
+    def texts(self) -> dict[str, str]:
+        """Words for sentence and remedy, with its begin."""
+        return {**self.words, "since": time_words(self.since_ns)}
+
+    @property
+    def sentence(self) -> str:
+        """What is wrong, and the remedy."""
+        return f"{self.rule.why}. {self.rule.do[0].upper()}{self.rule.do[1:]}".format(**self.texts)
+
+
+def judged(one: Stretch) -> dict[str, Words]:
+    """Faults of a stretch by their codes: the first one of each stream."""
+    found: dict[str, Words] = {}
+    is_moving = one.turned_rad > _MOVING_RAD
+    for kind, number in ((CRANK, len(one.angle)), (TORQUE, min(len(one.angle), len(one.torque)))):
+        for rule in INPUT_RULES:
+            if rule.kind != kind or rule.words is None or number < _LEAST:
+                continue
+            words = rule.words(one) if is_moving or not rule.needs_motion else None
+            if words is not None:
+                found[rule.code] = words
+                break
+    return found
+
+
+def _phase_means(profile: TorqueProfile) -> tuple[Floats, Floats] | None:
+    """Measured and predicted torque of a gait cycle in equal phases, less their means; None if too few."""
+    phases = next((n for n in _PHASES if profile.number.sum() >= _LEAST_A_PHASE * n), 0)
+    if not phases:
+        return None
+    number, measured, predicted = (
+        part.reshape(phases, -1).sum(axis=1)
+        for part in (profile.number, profile.measured_nm, profile.predicted_nm)
+    )
+    if not (number > 0.0).all():
+        return None
+    means = np.stack([measured, predicted]) / number
+    means -= means.mean(axis=1, keepdims=True)
+    return means[0], means[1]
+
+
+def _correlation(one: Floats, other: Floats) -> float:
+    """Correlation of two torques (n,) without their means; 0 for one that does not vary."""
+    size = float(np.linalg.norm(one) * np.linalg.norm(other))
+    return float(one @ other) / size if size > 0.0 else 0.0
+
+
+def _likeness(one: Floats, other: Floats) -> float:
+    """Largest size of the correlation, with the other moved by up to a twelfth of a turn, or reversed."""
+    most = len(one) // 12
+    return max(abs(_correlation(one, np.roll(other, k))) for k in range(-most, most + 1))
+
+
+_JUMP_RAD = 0.3  # by which an angle departs from a steady motion
+_JUMP_STEP_RAD = 0.2  # largest step of a crank between two samples over which a jump is known
+_PERIODS = 4  # evaluation periods of a stretch
+_KEPT_PERIODS = 12  # of which samples are kept: a gait cycle may be slower than commanded
+_AFTER = 3  # commanded gait cycles without a fault, after which it is over
+_SEEN_TWICE = (NOT_OF_GAIT,)  # one strange step is no fault of the input
+
+
+@attrs.define
+class JudgeState:
+    """State of an `InputJudge`; every value is immutable.
+
+    Attributes
+    ----------
+    pieces : tuple of Samples
+        Samples of the last evaluation periods.
+    spikes : tuple of int
+        Torque outliers up to the end of each.
+    now : tuple of Samples
+        Samples of the present one.
+    faults : mapping of str to InputFault
+        By their codes.
+    last_ns, last_rad : int, float
+        Last crank sample.
+    jumped_rad : float
+        Sum of the jumps of the crank's angle, less whole turns.
+    before : (n,) array or None
+        Torque of the gait cycle before, in equal phases.
+    has_refused : bool
+        Whether a gait cycle of this evaluation period was refused.
+    """
+
+    pieces: tuple[Samples, ...] = ()
+    spikes: tuple[int, ...] = ()
+    now: tuple[Samples, ...] = ()
+    faults: Mapping[str, InputFault] = attrs.field(factory=dict)
+    last_ns: int = 0
+    last_rad: float = math.nan
+    jumped_rad: float = 0.0
+    before: Floats | None = None
+    has_refused: bool = False
+
+
+class InputJudge:
+    """Judges the samples of crank and drive torque before anything else looks at them.
+
+    Parameters
+    ----------
+    config : MonitorConfig
+    size_nm : float
+        RMS of the predicted drive torque.
+    """
+
+    def __init__(self, config: MonitorConfig, size_nm: float) -> None:
+        self.config, self._size_nm = config, size_nm
+        self._commanded = abs(config.cadence.commanded_rpm) * TURN / 60.0
+        self._after_ns = round(_AFTER * 1.0e9 * TURN / self._commanded)
+        self.state = JudgeState()
+
+    @property
+    def faults(self) -> tuple[InputFault, ...]:
+        """Faults that are present, in the order of their rules."""
+        found = self.state.faults
+        shown = (found[rule.code] for rule in INPUT_RULES if rule.code in found)
+        return tuple(one for one in shown if one.shown > (one.code in _SEEN_TWICE))
+
+    @property
+    def trusted_before_ns(self) -> Mapping[int, int]:
+        """Stamp until which a stream with a fault was in order, by its kind: some gait cycles before it."""
+        begun: dict[int, int] = {}
+        for one in self.faults:
+            kinds = (CRANK, TORQUE) if one.rule.kind == CRANK else (TORQUE,)
+            for kind in kinds:
+                begun[kind] = min(one.since_ns - self._after_ns, begun.get(kind, one.since_ns))
+        return begun
+
+    def add_samples(self, piece: Samples) -> None:
+        """Add samples in the order of arrival."""
+        self.state.now = (*self.state.now, piece)
+
+    def end_period(self, spikes: int, is_withheld: bool) -> bool:
+        """Judge the last samples at the end of an evaluation period.
+
+        Parameters
+        ----------
+        spikes : int
+            Outliers of the torque so far.
+        is_withheld : bool
+            Whether the guard withholds samples of the crank: then it names their fault.
+
+        Returns
+        -------
+        bool
+            Whether a gait cycle was refused in this period.
+        """
+        state = self.state
+        has_refused, state.has_refused = state.has_refused, False
+        joined = np.concatenate(state.now) if state.now else np.zeros(0, GAIT_SAMPLE)
+        state.pieces = (*state.pieces, joined)[-_KEPT_PERIODS:]
+        state.spikes = (*state.spikes, spikes)[-_PERIODS - 1 :]
+        state.now = ()
+        self._look_for_jumps(of_crank(joined))
+        last = np.concatenate(state.pieces[-_PERIODS:])
+        self._take(Stretch.of(last, spikes - state.spikes[0], self._size_nm, self.config))
+        if is_withheld:
+            state.jumped_rad = 0.0
+            state.faults = {code: one for code, one in state.faults.items() if one.rule.kind != CRANK}
+        return has_refused
+
+    def end_cycle(self, statistics: CycleStatistics) -> frozenset[int]:
+        """Judge a gait cycle; returns the streams that say nothing of the leg in it."""
+        state = self.state
+        samples = np.concatenate([*state.pieces, *state.now])
+        end_ns = statistics.stamp_ns
+        own = samples[(samples["stamp_ns"] >= statistics.begin_ns) & (samples["stamp_ns"] < end_ns)]
+        self._take(Stretch.of(own, 0, self._size_nm, self.config))
+        is_strange = self._is_strange(statistics.torque_profile)
+        if is_strange:
+            self._note(NOT_OF_GAIT, {}, statistics.begin_ns, end_ns)
+        kinds = {one.rule.kind for one in state.faults.values()}
+        state.has_refused |= bool(kinds)
+        return frozenset(kinds | ({TORQUE} if CRANK in kinds else set()))
+
+    def _is_strange(self, profile: TorqueProfile) -> bool:
+        """Whether a torque is neither as predicted over the crank angle nor as in the gait cycle before."""
+        means, before = _phase_means(profile), self.state.before
+        self.state.before = None if means is None else means[0]
+        if means is None:
+            return False
+        if _likeness(*means) >= _ALIKE:
+            return False
+        is_repeated = before is not None and len(before) == len(means[0])
+        return not (is_repeated and before is not None and _correlation(means[0], before) >= _ALIKE)
+
+    def _take(self, one: Stretch) -> None:
+        """Note what a stretch shows, and forget what has not been seen for some gait cycles."""
+        newest_ns = int(one.crank_ns[-1]) if len(one.crank_ns) else 0
+        newest_ns = max(newest_ns, int(one.torque_ns[-1]) if len(one.torque_ns) else 0)
+        first_ns = int(one.crank_ns[0]) if len(one.crank_ns) else newest_ns
+        for code, words in judged(one).items():
+            self._note(code, words, first_ns, newest_ns)
+        if abs(self.state.jumped_rad) > _JUMP_RAD:
+            self._note(JUMP, {"size": amount(self.state.jumped_rad, "rad")}, first_ns, newest_ns)
+        kept = self.state.faults.values()
+        self.state.faults = {
+            one.code: one for one in kept if abs(newest_ns - one.last_ns) <= self._after_ns or not newest_ns
+        }
+
+    def _note(self, code: str, words: Words, since_ns: int, last_ns: int) -> None:
+        known = self.state.faults.get(code)
+        now = InputFault(code, since_ns, last_ns, words)
+        if known is not None:
+            now = attrs.evolve(now, since_ns=known.since_ns, shown=known.shown + 1)
+        self.state.faults = {**self.state.faults, code: now}
+
+    def _look_for_jumps(self, cranks: Samples) -> None:
+        """Add up the steps of the crank's angle that no motion makes: an outlier comes back, a jump stays."""
+        state = self.state
+        stamp_ns = np.append(np.int64(state.last_ns), cranks["stamp_ns"])
+        angle = np.append(state.last_rad, cranks["crank_angle_rad"])
+        passed_s = 1.0e-9 * np.diff(stamp_ns)
+        known = (passed_s > 0.0) & (passed_s * self._commanded <= _JUMP_STEP_RAD)
+        step = ((np.diff(angle) + math.pi) % TURN - math.pi)[known]
+        step = step[np.isfinite(step)]
+        if len(step):
+            off = step - np.median(step)
+            jumps = float(off[np.abs(off) > _JUMP_RAD].sum())
+            state.jumped_rad = (state.jumped_rad + jumps + math.pi) % TURN - math.pi
+        state.last_ns, state.last_rad = int(stamp_ns[-1]), float(angle[-1])

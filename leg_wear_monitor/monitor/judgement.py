@@ -113,6 +113,8 @@ def situation_of(parts: Parts) -> Situation:
         torque_causes=evaluation.present_causes(last, parts.state.torque) if last else {},
         notes=_notes(parts),
         input_causes=tuple(evaluation.causes),
+        input_faults=parts.judge.faults,
+        trusted_before_ns=parts.judge.trusted_before_ns,
         diagnosis=diagnosis,
         explained=explained if evaluation.board.level(alarm_specs.MISMATCH.name()) else None,
     )
@@ -182,7 +184,7 @@ def _doubts(parts: Parts) -> tuple[str, ...]:
     last = parts.state.last
     if last is None:
         return ()
-    if parts.is_torque_wrong:
+    if parts.is_torque_wrong or parts.judge.faults:
         last = attrs.evolve(last, torque_samples=0)
     found = doubts(last, parts.config)
     return ("; ".join(found),) if found else ()

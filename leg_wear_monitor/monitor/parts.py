@@ -33,6 +33,7 @@ from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow
 from leg_wear_monitor.monitor.forecast.model_error import ModelError, model_error
 from leg_wear_monitor.monitor.gait_evidence import NO_MISMATCH, MismatchWindow, TorqueRecord
+from leg_wear_monitor.monitor.input_health import InputJudge
 from leg_wear_monitor.monitor.inputs import InputGuard
 from leg_wear_monitor.monitor.ledger.entry import Measurement, SimulatedReference
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
@@ -59,7 +60,8 @@ class MonitorState:
     """State beside twin, alarms and accounting; every value is immutable.
 
     ``findings`` are those of the last evaluation period; empty before the first. ``happened``: the last event
-    of the twin. ``has_ended``: whether a gait cycle has ended since the last state of the leg was reported.
+    of the twin. ``unexplained``: why a torque mismatch has no explanation; empty if it has one or there is
+    none. ``has_ended``: whether a gait cycle has ended since the last state of the leg was reported.
     """
 
     growth: tuple[GrowthWindow, ...]
@@ -68,6 +70,7 @@ class MonitorState:
     happened: Event | None = None
     findings: tuple[Verdict, ...] = ()
     mismatch: MismatchWindow = NO_MISMATCH
+    unexplained: str = ""
     has_ended: bool = False
 
 
@@ -94,7 +97,8 @@ class Parts:
         self.mechanism = fitted(mechanism, config)
         self.clearance_joints = self.mechanism.clearance_joints
         self.twin = DigitalTwin(self.mechanism, twin_settings(self.config))
-        self.guard = InputGuard(self.twin.settings.tracker)
+        self.guard = InputGuard(self.twin.settings.tracker, self.twin.torque_size_nm)
+        self.judge = InputJudge(self.config, self.twin.torque_size_nm)
         self.foot_load = (
             FootLoadCheck(self.mechanism, self.config) if self.config.foot_load.source != NO_LOAD else None
         )
@@ -199,10 +203,10 @@ class Parts:
         if self.torque:
             found = self.torque.diagnosis
             if not self.is_torque_wrong:
-                own = self.twin.parameters
+                own, contradictions = self.twin.parameters, map(self.contradiction, found.changes)
                 return attrs.evolve(
                     found,
-                    reason="; ".join(filter(None, (found.reason, *map(self.contradiction, found.changes)))),
+                    reason="; ".join(filter(None, (found.reason, self.state.unexplained, *contradictions))),
                     bodies=self._counted_bodies(),
                     friction=own.friction,
                     compliance=own.compliance,

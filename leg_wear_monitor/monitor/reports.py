@@ -229,6 +229,8 @@ class Lost:
         Of those out of range: crank samples from two sources.
     implausible : int
         Of those out of range: crank samples in another unit.
+    torque_outliers : int
+        Drive torques left out because they are far from the others.
     duplicates : int
         Dropped samples that repeat another one.
     late : int
@@ -254,6 +256,7 @@ class Lost:
     faulty: dict[str, int]
     conflicting: int
     implausible: int
+    torque_outliers: int
     duplicates: int
     late: int
     stray_stamps: int

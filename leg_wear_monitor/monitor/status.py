@@ -41,7 +41,7 @@ from leg_wear_monitor.monitor.verdict.verdict import (
     with_unit,
 )
 from leg_wear_monitor.state import JointClearance, Level, State, Verdict
-from leg_wear_monitor.twin import KINDS, LOAD
+from leg_wear_monitor.twin import CRANK, KINDS, LOAD
 from leg_wear_monitor.twin.statistics import Tracking
 
 # Status of the crank's zero.
@@ -146,12 +146,17 @@ def _input(parts: Parts) -> Status:
     values |= {"received": counts.pop("received")} | {f"{name}_used": count for name, count in used.items()}
     # the other counters of the intake by their names, such as duplicates and gaps_lost
     values |= counts | {"already_counted": parts.accounting.state.skipped}
-    values |= {"conflicting": guard.conflicting, "implausible": guard.implausible}
+    values |= {name: getattr(guard, name) for name in ("conflicting", "implausible", "torque_outliers")}
     values |= {f"faulty_{name}": count for name, count in faulty.items()}
     level, code = evaluation.board.level(*_INPUT), _code(evaluation, _INPUT)
     bad = [name for name in _INPUT if evaluation.board.alarms[name].level is not Level.OK]
-    messages = [*evaluation.causes, *([f"see: {', '.join(bad)}"] if bad else [])]
+    faults = parts.judge.faults
+    sentences = [one.sentence for one in faults]
+    messages = [*sentences, *evaluation.causes, *([f"see: {', '.join(bad)}"] if bad else [])]
     message = "; ".join(messages) or "in order"
+    if faults:
+        is_blind = any(one.rule.kind == CRANK for one in faults)
+        level, code = max(level, Level.ERROR if is_blind else Level.WARN), faults[0].code
     if guard.cause:
         level, code = Level.ERROR, TRACKING_LOST
     return Status("input", level, message, {name: float(value) for name, value in values.items()}, code)

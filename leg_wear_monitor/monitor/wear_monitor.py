@@ -65,6 +65,7 @@ from leg_wear_monitor.monitor.reports import (
 from leg_wear_monitor.monitor.status import statuses
 from leg_wear_monitor.monitor.verdict.situation import SEEN, Situation, is_observed
 from leg_wear_monitor.state import LegState, Verdict
+from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics, joined
 
@@ -204,7 +205,7 @@ class WearMonitor:
         """Pass samples to the twin and to the observers; what was followed, and the cycles that ended."""
         parts = self._parts
         update = self._twin.update(piece)
-        for observer in (parts.evaluation, parts.encoders, parts.torque, parts.foot_load):
+        for observer in (parts.judge, parts.evaluation, parts.encoders, parts.torque, parts.foot_load):
             if observer:
                 observer.add_samples(piece)
         self._accounting.followed(update.samples)
@@ -215,17 +216,21 @@ class WearMonitor:
     def _end_cycle(self, statistics: CycleStatistics, changes: list[AlarmList]) -> CycleReport:
         """Report a gait cycle, and evaluate its alarms and its torque."""
         parts = self._parts
+        refused = parts.judge.end_cycle(statistics)
+        if refused:
+            statistics = statistics.without_torque
         if parts.encoders:
             parts.encoders.ended(statistics)
         if parts.torque:
-            parts.torque.ended(statistics, parts.is_torque_wrong, statistics.load_peak_n)
+            parts.torque.ended(statistics, parts.is_torque_wrong or bool(refused), statistics.load_peak_n)
         report = self._report(statistics)
         parts.state.has_ended = True
         sensor = parts.foot_load.ended(statistics) if parts.foot_load else None
         if parts.foot_load and sensor is not None:
             known = self._twin.freeze_load(*parts.foot_load.freezes(sensor))
             parts.foot_load.state.has_mean = known
-        self._take_changes(parts.evaluation.end_cycle(report, parts.state.torque, sensor), changes)
+        changed = parts.evaluation.end_cycle(report, parts.state.torque, sensor, CRANK in refused)
+        self._take_changes(changed, changes)
         explain_mismatch(parts, statistics)
         self._keep_torque(statistics, report)
         return report
@@ -257,7 +262,11 @@ class WearMonitor:
     def _end_period(self, changes: list[AlarmList]) -> Situation:
         """Evaluate the input, and what encoders and torque show; what the verdict then depends on."""
         parts = self._parts
-        self._take_changes(parts.evaluation.end_period(self._accounting.state.skipped), changes)
+        if parts.judge.end_period(parts.guard.torque_outliers, bool(parts.guard.cause)):
+            # later gait cycles must not be compared with this torque; only periods end alike in all blocks
+            self._twin.forget_torque()
+        is_refused = CRANK in parts.judge.trusted_before_ns
+        self._take_changes(parts.evaluation.end_period(self._accounting.state.skipped, is_refused), changes)
         if parts.encoders:
             new = parts.encoders.end_period(self._twin.clearance_mean_m, self._twin.depth)
             if new:
@@ -404,7 +413,7 @@ class WearMonitor:
         check_limits(config, self.mechanism)
         self._parts.config = config
         self._parts.evaluation.configure(config)
-        for observer in (self._parts.encoders, self._parts.torque):
+        for observer in (self._parts.judge, self._parts.encoders, self._parts.torque):
             if observer:
                 observer.config = config
 

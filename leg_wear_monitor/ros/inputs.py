@@ -1,7 +1,6 @@
-"""Inputs of the node: subscriptions, the queue of messages, checks of joint names and of the torque axis."""
+"""Inputs of the node: subscriptions, the queue of messages, checks of joint names."""
 
 import itertools
-import struct
 import threading
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import import_module
@@ -19,8 +18,8 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from leg_wear_monitor.errors import ConfigError, printable
 from leg_wear_monitor.messages.cdr import MESSAGE, Decoder
-from leg_wear_monitor.messages.names import is_without, names_in, without_interface
-from leg_wear_monitor.messages.streams import INTERFACES, JOINT_STATE, WRENCH_STAMPED, Stream, streams_of
+from leg_wear_monitor.messages.names import is_without, names_in, twice, without_interface
+from leg_wear_monitor.messages.streams import INTERFACES, JOINT_STATE, Stream, streams_of
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin import LOAD
 from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, Samples
@@ -170,7 +169,8 @@ class CrankNames:
             self._report = ""
         elif unnamed:
             names = sorted({name for joints in unnamed for name in joints})
-            self._report = (
+            again = next(filter(None, (twice(joints, self._crank) for joints in unnamed)), "")
+            self._report = again or (
                 f"no joint is named {self._crank!r}; there are {_named(names)}; set crank_joint to its name"
             )
         return self._report
@@ -454,56 +454,3 @@ def _subscribe(node: Node, topic: InputTopic) -> Subscription:
         event_callbacks=SubscriptionEventCallbacks(message_lost=lost),
         qos_overriding_options=QoSOverridingOptions.with_default_policies(),
     )
-
-
-# Check that the drive's torque is on the axis that is read; otherwise report the axis that carries one.
-
-
-_AXES = "xyz"
-_TORQUE = (struct.Struct(">3d"), struct.Struct("<3d"))  # the end of a wrench, by the byte order's bit
-_OF_A_BLOCK = 4  # messages that are read, so that this costs little
-_KEPT = 400
-_LEAST = 40
-_SWINGS = 0.3  # RMS of a drive's torque, as a fraction of the predicted one
-_STILL = 0.02  # RMS of noise and of what a sensor's axes take from each other, as a fraction of the largest
-
-
-class WrenchAxis:
-    """Compares the three torques of wrenches.
-
-    Parameters
-    ----------
-    axis : str
-        The one that is read, ``x``, ``y`` or ``z``.
-    predicted_nm : float
-        RMS of the predicted torque, as the sensor has it.
-    """
-
-    def __init__(self, axis: str, predicted_nm: float) -> None:
-        self._axis, self._predicted_nm = _AXES.index(axis), predicted_nm
-        self._torques: list[tuple[float, float, float]] = []
-
-    def note(self, arrivals: Sequence[Arrival], samples: Samples) -> None:
-        """Read some of the messages, given the samples decoded from them."""
-        wrenches = [
-            one.raw
-            for one, fault in zip(arrivals, samples["fault"], strict=True)
-            if one.code == WRENCH_STAMPED and fault == NO_FAULT
-        ]
-        for raw in wrenches[-_OF_A_BLOCK:]:
-            self._torques.append(_TORQUE[raw[1] & 1].unpack_from(raw, len(raw) - _TORQUE[0].size))
-        del self._torques[:-_KEPT]
-
-    def report(self) -> str:
-        """Report that another axis than the one that is read carries a torque; empty if that is not so."""
-        if len(self._torques) < _LEAST:
-            return ""
-        rms = np.std(self._torques, axis=0)
-        largest = int(np.argmax(np.nan_to_num(rms)))
-        if rms[largest] < _SWINGS * self._predicted_nm or rms[self._axis] > _STILL * rms[largest]:
-            return ""
-        # without values, for each change of a message is a line of the log
-        return (
-            f"the torque about {_AXES[self._axis]} does not change, the one about {_AXES[largest]} does; "
-            f"if that is the drive's, set drive_torque.axis to {_AXES[largest]}"
-        )

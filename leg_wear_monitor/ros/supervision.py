@@ -11,6 +11,7 @@ from rclpy.node import Node
 
 from leg_wear_monitor.messages.names import wanted_interfaces
 from leg_wear_monitor.messages.streams import INTERFACES, WRENCH_STAMPED, streams_of
+from leg_wear_monitor.messages.wrench_axis import WrenchAxis
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.judgement import leg_alarm
@@ -25,7 +26,6 @@ from leg_wear_monitor.ros.inputs import (
     CrankNames,
     InputTopic,
     InterfaceNames,
-    WrenchAxis,
     publishers_of,
 )
 from leg_wear_monitor.state import LegAlarms, Level, Verdict
@@ -122,10 +122,11 @@ _SAME_NAME_S = 30.0
 # A node that has just come may still show by its first message that it publishes other joints than the crank.
 _NEW_S = 3.0
 _OTHERS_S = 60.0  # for which it is known, though it publishes seldom
-# rules of the verdict that a torque about another axis can be the cause of
+_OF_A_BLOCK = 4  # wrenches that are compared, so that this costs little
+# rules of the verdict that a torque about a different axis can be the cause of
 _OF_AXIS = (
-    "FRICTION_CHANGED", "MECHANISM_CHANGED", "TORQUE_BIAS", "TORQUE_MASS", "TORQUE_MISMATCH", "TORQUE_SCALE",
-    "TORQUE_TIMING",
+    "TORQUE_CONSTANT", "FRICTION_CHANGED", "MECHANISM_CHANGED", "TORQUE_BIAS", "TORQUE_MASS",
+    "TORQUE_MISMATCH", "TORQUE_SCALE", "TORQUE_TIMING",
 )  # fmt: skip
 
 
@@ -170,7 +171,9 @@ class Supervision:
     def note(self, arrivals: Sequence[Arrival], samples: Samples) -> None:
         """Record processed messages and their samples."""
         self._names.note(arrivals, samples, time.monotonic_ns())
-        self._axis.note(arrivals, samples)
+        pairs = zip(arrivals, samples["fault"], strict=True)
+        wrenches = [one.raw for one, fault in pairs if one.code == WRENCH_STAMPED and fault == NO_FAULT]
+        self._axis.add(wrenches[-_OF_A_BLOCK:])
         self._interfaces.note(arrivals, samples)
         self._note_stamps(samples)
         self._silence.note(self._monitor.used, time.monotonic_ns(), time.time_ns())

@@ -165,6 +165,10 @@ class DigitalTwin:
             self._follower.take_parameters(linkage, friction, parameters)
             self._parameters = parameters
 
+    def forget_torque(self) -> None:
+        """Forget what the drive torque of the last gait cycles showed, because its input had a fault."""
+        self._follower.forget_torque()
+
     def freeze_load(self, is_frozen: bool, clears: bool = False) -> bool:
         """Go on with the measured load of the gait cycles before, because its samples are wrong.
 

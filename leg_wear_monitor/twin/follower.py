@@ -166,6 +166,13 @@ class LegFollower:
         self._stepper.model.law[:] = contact_laws(contacts)
         self._repeating.cycles = ()
 
+    def forget_torque(self) -> None:
+        """Forget load, frictions and lag, and the torques that repeat: they are of an input with a fault."""
+        self.estimate = cycle.LoadEstimate(self._loads[1], self._loads[0])
+        self._repeating.cycles = ()
+        self._load.set(self.estimate.acting)
+        self._set_friction()
+
     def freeze_load(self, is_frozen: bool, clears: bool) -> bool:
         """Let the mean of the measured force act, and no sample change it; returns whether there is one.
 

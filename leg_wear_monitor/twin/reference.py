@@ -42,6 +42,10 @@ MASS_TOLERANCE = 0.05
 COUPLING_DAMPING = 0.05
 
 
+# Factor by which a leg may differ from its file, and the largest friction coefficient of a mechanism file.
+_MOST, _MOST_COEFFICIENT = 2.0, 2.0
+
+
 @attrs.frozen
 class LegParameters:
     """Factors on the parameters of a mechanism, the compliance of its drive, and the ground under its toe.
@@ -80,6 +84,13 @@ class LegParameters:
     def in_air(self) -> "LegParameters":
         """Those of the leg without a load."""
         return attrs.evolve(self, load=np.zeros((0, 2)))
+
+    def is_possible(self, mechanism: Mechanism) -> bool:
+        """Whether such a leg can exist: no torque of an existing leg leads to other parameters."""
+        bodies = np.append(self.mass, self.length)
+        is_near = bool(((bodies >= 1.0 / _MOST) & (bodies <= _MOST)).all())
+        coefficients = [self.friction * one.friction.coefficient for one in mechanism.clearances.values()]
+        return is_near and self.friction > 0.0 and all(one <= _MOST_COEFFICIENT for one in coefficients)
 
     def of_bodies(self, names: Sequence[str], mechanism: Mechanism) -> "LegParameters":
         """These, of bodies in this order, in the order of the mechanism."""

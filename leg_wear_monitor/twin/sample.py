@@ -380,8 +380,9 @@ class KeepsSamples:
 
 
 def of_crank(piece: Samples) -> Samples:
-    """Samples of the crank that have a valid angle."""
-    crank: Samples = piece[(piece["kind"] == CRANK) & is_valid(piece) & np.isfinite(piece["crank_angle_rad"])]
+    """Samples of the crank that have a possible angle."""
+    is_possible = np.abs(piece["crank_angle_rad"]) <= KINDS[CRANK].largest
+    crank: Samples = piece[(piece["kind"] == CRANK) & is_valid(piece) & is_possible]
     return crank
 
 

@@ -252,6 +252,13 @@ class CycleStatistics:
         return 60.0 * self.direction / self.moving_s
 
     @property
+    def without_torque(self) -> "CycleStatistics":
+        """The gait cycle without its drive torque, as if none had come."""
+        values = {name: np.nan for name in attrs.fields_dict(TorqueStatistics) if name != "samples"}
+        torque = TorqueStatistics(samples=0, **values)
+        return attrs.evolve(self, torque=torque, not_compared=NotCompared.SAMPLES)
+
+    @property
     def is_steady(self) -> bool:
         """Whether the leg walked all the time, with no gap bridged."""
         return self.bridged_s == 0.0 and self.duration_s <= LONGEST * self.moving_s

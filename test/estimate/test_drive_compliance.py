@@ -59,3 +59,12 @@ def test_a_rigid_drive_stays_rigid(leg, channel):
 def test_what_is_stiff_enough_is_rigid():
     assert compliance_of(1.0e5) == 0.0
     assert compliance_of(1000.0) == pytest.approx(1.0e-3)
+
+
+@pytest.mark.parametrize("mean_nm", [0.0, 3.7, 1.0e-308, 1.0e-3, 73.6])
+@pytest.mark.parametrize("swing_nm", [0.0, 1.0e-308, 1.0e-3, 73.6])
+def test_no_torque_makes_the_fit_fail(leg, mean_nm: float, swing_nm: float) -> None:
+    """Signatures are bounded by eight times the size of the predicted torque."""
+    signature = mean_nm + swing_nm * np.resize([1.0, -1.0], 2 * SENSOR.phases)
+    found = leg_behind_coupling(leg, SENSOR, CrankProfile.steady(TURN), signature)
+    assert found is None or found.is_possible(leg)

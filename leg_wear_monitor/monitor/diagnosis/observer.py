@@ -4,17 +4,20 @@ All evaluation takes place at the ends of evaluation periods, which depend on th
 period evaluates the gait cycles that ended, and goes on with the simulation of a reference, if one is needed.
 """
 
+import logging
 import math
 from collections.abc import Sequence
 
 import attrs
 import numpy as np
 
+from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.estimate.cause import CORRECTED_FROM, Cause, Change
 from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
 from leg_wear_monitor.estimate.coupling import compliance_of
 from leg_wear_monitor.estimate.drive import DIRECT
 from leg_wear_monitor.estimate.ground_load import stance_phases
+from leg_wear_monitor.estimate.least_squares import DATA_ERRORS
 from leg_wear_monitor.estimate.signature import CommissionedTorque
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.person import upwards
@@ -46,6 +49,8 @@ from leg_wear_monitor.twin.reference import LegParameters
 from leg_wear_monitor.twin.sample import GROUND, MEASURED, KeepsSamples
 from leg_wear_monitor.twin.statistics import CycleStatistics
 from leg_wear_monitor.twin.torque_reference import ReferenceSnapshot, TorqueReference
+
+_LOG = logging.getLogger(__name__)
 
 # by which a load has moved, of its size: the twin's mean over twenty gait cycles is within 1 % of what the
 # foot carries, and where its shape was found under 100 N up to 23 % above it (2026-11-25)
@@ -185,6 +190,27 @@ class TorqueObserver(KeepsSamples):
         Change or None
             Of a counted clearance that is surely wrong, and shall be corrected before the next period.
         """
+        before = attrs.evolve(self.state)
+        try:
+            return self._end_period(modelled_m, depth)
+        except DATA_ERRORS as error:
+            failure = str(error) or type(error).__name__
+            if failure != before.failure:
+                trace = None if isinstance(error, LegWearError) else error
+                _LOG.warning("the diagnosis starts again: %s", failure, exc_info=trace)
+            self._start_again(before, modelled_m, failure)
+            return None
+
+    def _start_again(self, before: TorqueState, modelled_m: Floats, failure: str) -> None:
+        """Start again, because the torques so far lead to no estimate."""
+        self._references.leave()
+        self._references.restore(None)
+        settled, not_used = before.corrections, before.not_used
+        self.state = TorqueState(
+            np.asarray(modelled_m, float).copy(), settled=settled, not_used=not_used, failure=failure
+        )
+
+    def _end_period(self, modelled_m: Floats, depth: Floats) -> Change | None:
         state = self.state
         self._follow_counted(modelled_m)
         self._follow_load()
@@ -406,7 +432,7 @@ class TorqueObserver(KeepsSamples):
         if corrected is not None:
             sigma_m = np.where(corrected.is_unknown, state.modelled_m, corrected.sigma_m)
             known = attrs.evolve(known, sigma_m=sigma_m, channel=corrected.channel)
-        state.commissioned = known
+        state.commissioned, state.failure = known, ""
         if state.is_load_new and state.load_rounds >= LOAD_ROUNDS:  # the new load explains what was reported
             state.is_load_new, state.settled = False, state.corrections
         elif state.is_load_new:

@@ -40,6 +40,8 @@ def missing(state: TorqueState, references: References, config: MonitorConfig) -
         )
     if state.unused and state.unused[-1] is NotUsed.JITTER:
         return _IRREGULAR
+    if state.failure:
+        return f"not observable, because no possible leg explains the drive torque ({state.failure})"
     if state.sensor is None or state.unused[-UNUSABLE_CYCLES:] == (NotUsed.GAP,) * UNUSABLE_CYCLES:
         return "no drive torque with enough samples in a gait cycle"
     if not state.sensor.phases:

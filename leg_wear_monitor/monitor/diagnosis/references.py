@@ -468,9 +468,13 @@ class References:
                 self._begin(state.parameters, modelled_m, depth, legs.profile)
         elif state.commissioned is not None:
             explainer = self._models.explainer(state, is_commissioned=True)
-            state.parameters = identification.identified_leg(
+            found = identification.identified_leg(
                 legs, explainer.model, explainer.nuisances, state.commissioned, self._is_drive_known
             )
+            if not found.is_possible(self._mechanism):
+                _abandon(state)
+                return
+            state.parameters = found
             self._begin(state.parameters, modelled_m, depth, legs.profile)
 
     def _install(self, state: TorqueState, reference: TorqueReference) -> None:

@@ -311,6 +311,8 @@ class TorqueState:
         Whether the run simulates legs with other parameters.
     has_failed : bool
         Whether the leg could not be simulated for a reference.
+    failure : str
+        Why the torques before gave no estimate; empty once there is a baseline.
     """
 
     modelled_m: Floats
@@ -347,6 +349,7 @@ class TorqueState:
     is_load_other: bool = False
     is_identifying: bool = False
     has_failed: bool = False
+    failure: str = ""
 
     def leave_out(self, reason: NotUsed, cycles: int = 1) -> None:
         """Count gait cycles that are not used."""

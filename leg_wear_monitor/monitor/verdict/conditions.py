@@ -21,6 +21,7 @@ from leg_wear_monitor.monitor.verdict.situation import (
 )
 from leg_wear_monitor.monitor.verdict.verdict import estimate
 from leg_wear_monitor.state import Evidence, Figure, Level, State
+from leg_wear_monitor.twin import TORQUE
 
 
 @attrs.frozen(kw_only=True)
@@ -56,6 +57,13 @@ Condition = Callable[[Situation], Sequence[Hit]]
 def noted(code: str) -> Condition:
     """What observers report for the rule of this code, a sentence each."""
     return lambda situation: [Hit(words={"cause": text}) for text in situation.notes.get(code, ())]
+
+
+def has_fault(code: str) -> Condition:
+    """A stream of the input has a fault of this code."""
+    return lambda situation: [
+        Hit(words=one.texts, since_ns=one.since_ns) for one in situation.input_faults if one.code == code
+    ]
 
 
 # Conditions on alarms. A latched alarm counts like a present one until somebody acknowledges it.
@@ -288,6 +296,8 @@ def seen_at_limit(situation: Situation) -> Sequence[Hit]:
         if seen is None:
             continue
         raised_ns = alarm.raised_ns if alarm is not None and alarm.level is Level.ERROR else 0
+        if seen.by == "torque" and not situation.is_trusted((TORQUE,), raised_ns):
+            continue
         past, unsure = doubt(situation) if seen.by == "torque" else "", ""
         if seen not in each.seen:
             past = f" (since {time_words(raised_ns)}; not shown now)"
@@ -384,11 +394,10 @@ def no_torque(situation: Situation) -> Sequence[Hit]:
     clearance, growth and forces hold for the counted leg. But no measurement can contradict the counting: a
     bushing that breaks changes nothing that is received. So nobody may be told that the leg is healthy.
     """
-    is_stuck = any(each.kind == "input_torque" and each.present is Level.ERROR for each in situation.alarms)
-    if not situation.has_cycle or not situation.unobserved or (situation.has_torque and not is_stuck):
+    is_known = situation.has_torque or situation.input_faults
+    if not situation.has_cycle or not situation.unobserved or is_known:
         return []
-    cause = "the drive torque is stuck or saturated" if situation.has_torque else "there is no drive torque"
-    return [Hit(words={"joints": situation.joints_words(situation.unobserved), "cause": cause})]
+    return [Hit(words={"joints": situation.joints_words(situation.unobserved)})]
 
 
 def not_compared(situation: Situation) -> Sequence[Hit]:

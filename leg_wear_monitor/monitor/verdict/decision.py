@@ -10,8 +10,10 @@ import attrs
 
 from leg_wear_monitor.configuration.strict import read_document, structure
 from leg_wear_monitor.files import share_directory
+from leg_wear_monitor.monitor.input_health import INPUT_RULES
 from leg_wear_monitor.monitor.verdict.verdict import code_of_rule
 from leg_wear_monitor.state import LegState, State
+from leg_wear_monitor.twin import CRANK
 
 # How often verdicts were right in cases with a known truth, from the one file with these values.
 
@@ -266,6 +268,10 @@ ADVICE: Mapping[str, Advice] = {
     "NOT_OBSERVED": _BLIND,
     "ENCODER": _BLIND,
     "ALARM": _ALARM,
+    **{
+        rule.code: _INPUT if rule.kind == CRANK else attrs.evolve(_TORQUE_SENSOR, sure=_KNOWN)
+        for rule in INPUT_RULES
+    },
     "NONE": Advice(
         if_wrong="A loosening joint stays undetected until the torque or the encoders show it.",
         check=f"{_ROCK_ALL} None has play that you feel.",

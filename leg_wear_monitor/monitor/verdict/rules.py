@@ -8,11 +8,13 @@ from functools import partial
 import attrs
 
 from leg_wear_monitor.monitor import alarms
+from leg_wear_monitor.monitor.input_health import INPUT_RULES
 from leg_wear_monitor.monitor.verdict import conditions
-from leg_wear_monitor.monitor.verdict.conditions import Condition, noted, raised
+from leg_wear_monitor.monitor.verdict.conditions import Condition, has_fault, noted, raised
 from leg_wear_monitor.monitor.verdict.situation import Situation
 from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, NONE
 from leg_wear_monitor.state import Figure, Level, State, Verdict
+from leg_wear_monitor.twin import CRANK, TORQUE
 
 EVERYTHING = tuple(Figure)
 OF_THE_GAIT = (Figure.GROWTH, Figure.IMPACT_FORCES)
@@ -35,6 +37,8 @@ class Rule:
         of the hits with their labels, and ``{joint}`` is the first one as commands take it.
     not_valid : tuple of Figure
         Kinds of values that are not valid while the rule applies.
+    rests_on : tuple of int
+        Kinds of the streams that show it. A case that began after a fault of such a stream does not count.
     """
 
     code: str
@@ -43,10 +47,11 @@ class Rule:
     why: str
     do: str
     not_valid: tuple[Figure, ...] = ()
+    rests_on: tuple[int, ...] = ()
 
     def found(self, situation: Situation) -> Verdict | None:
         """The verdict by this rule alone, with all of its cases; None if it does not hold."""
-        hits = self.hits(situation)
+        hits = [hit for hit in self.hits(situation) if situation.is_trusted(self.rests_on, hit.since_ns)]
         if not hits:
             return None
         joints = tuple(dict.fromkeys(hit.joint for hit in hits if hit.joint))
@@ -97,6 +102,7 @@ def _cause(code: str, meaning: str, state: State = State.INSPECT, not_valid: tup
         why=f"the drive torque differs from the prediction: {meaning}{{causes}}",
         do=f"{{remedy}}; {_ACKNOWLEDGE}",
         not_valid=not_valid,
+        rests_on=(TORQUE,),
     )
 
 
@@ -107,6 +113,22 @@ _FOOT_LOAD = {
     alarms.EXCHANGED: "exchange the sensors, topics or columns of the two feet",
     alarms.SIGN: "correct foot_load.sign",
 }
+
+
+def _input(kind: int, state: State, not_valid: tuple[Figure, ...] = ()) -> tuple[Rule, ...]:
+    """Rules of the faults of a stream: they come before what this stream shows of the leg."""
+    return tuple(
+        Rule(
+            code=one.code,
+            state=state,
+            hits=has_fault(one.code),
+            why=one.why,
+            do=one.do,
+            not_valid=not_valid,
+        )
+        for one in INPUT_RULES
+        if one.kind == kind
+    )
 
 
 def _foot_load(kind: str) -> Rule:
@@ -150,6 +172,7 @@ RULES = (
         why="the drive torque shows a {change}",
         do=_ROCK,
         not_valid=EVERYTHING,
+        rests_on=(TORQUE,),
     ),
     _inspect(
         code="CLEARANCE_CORRECTED",
@@ -177,6 +200,7 @@ RULES = (
         "it: `leg-wear-monitor measure JOINT MM --sigma MM --config FILE --ledger FILE`, or `--node NAME`; "
         f"if none has play, check the load at the foot and the torque sensor; {_ACKNOWLEDGE}",
         not_valid=EVERYTHING,
+        rests_on=(TORQUE,),
     ),
     _cause("TORQUE_NOISE", "it has more or less noise than before", State.WATCH),
     _cause("TORQUE_BIAS", "it has a constant part that friction cannot be"),
@@ -186,6 +210,7 @@ RULES = (
         hits=raised("impact_force", least=Level.ERROR),
         why="the impact force in joint {joint} is {value} (limit {limit}){past}",
         do=f"{_ROCK}; check its lubrication and the cadence; {_ACKNOWLEDGE}",
+        rests_on=(CRANK,),
     ),
     _inspect(
         code="GROWTH",
@@ -207,6 +232,7 @@ RULES = (
         "on a live leg, check the clock of the samples",
         not_valid=OF_THE_GAIT,
     ),
+    *_input(CRANK, State.NOT_MONITORED, OF_THE_GAIT),
     _not_monitored(
         code=alarms.CRANK_ZERO,
         hits=noted(alarms.CRANK_ZERO),
@@ -243,6 +269,7 @@ RULES = (
         do=f"let the leg walk; if it walks already: {_COUNTED}",
     ),
     *map(_foot_load, _FOOT_LOAD),
+    *_input(TORQUE, State.WATCH),
     _watch(
         code="FOOT_LOAD_MISSING",
         hits=conditions.of_foot_load,
@@ -268,7 +295,7 @@ RULES = (
     _watch(
         code="NO_DRIVE_TORQUE",
         hits=conditions.no_torque,
-        why="joints {joints} cannot be observed: {cause}",
+        why="joints {joints} cannot be observed: there is no drive torque",
         do="provide the drive torque (drive_torque.source); until then, rock the joints by hand regularly",
     ),
     _watch(

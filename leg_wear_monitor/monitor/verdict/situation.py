@@ -9,6 +9,7 @@ from leg_wear_monitor.estimate.cause import SURE_SIGMAS, NamedCause, TorqueExpla
 from leg_wear_monitor.files import or_nan
 from leg_wear_monitor.monitor.alarms import Alarm, amount
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
+from leg_wear_monitor.monitor.input_health import InputFault
 from leg_wear_monitor.monitor.verdict.verdict import estimate
 from leg_wear_monitor.state import JointClearance, Level, State, Verdict
 
@@ -110,6 +111,10 @@ class Situation:
         What observers report for a rule, a sentence each, by the rule's code.
     input_causes : tuple of str
         Sentences on unused samples.
+    input_faults : tuple of InputFault
+        Faults of the streams of crank and drive torque that are present.
+    trusted_before_ns : mapping of int to int
+        By the kinds of the streams with a fault: from this stamp on, they say nothing of the leg.
     diagnosis : Diagnosis
         What the drive torque shows.
     explained : TorqueExplanation or None
@@ -127,6 +132,8 @@ class Situation:
     torque_causes: Mapping[str, NamedCause] = attrs.field(factory=dict)
     notes: Mapping[str, Sequence[str]] = attrs.field(factory=dict)
     input_causes: tuple[str, ...] = ()
+    input_faults: tuple[InputFault, ...] = ()
+    trusted_before_ns: Mapping[int, int] = attrs.field(factory=dict)
     diagnosis: Diagnosis = Diagnosis()
     explained: TorqueExplanation | None = None
 
@@ -138,6 +145,11 @@ class Situation:
     def joints_words(self, joints: Sequence[str]) -> str:
         """Joints with their labels."""
         return ", ".join(map(self.joint_words, joints))
+
+    def is_trusted(self, kinds: Sequence[int], since_ns: int) -> bool:
+        """Whether a case began before any fault of the streams that show it."""
+        ends_ns = [self.trusted_before_ns[kind] for kind in kinds if kind in self.trusted_before_ns]
+        return all(0 < since_ns < end_ns for end_ns in ends_ns)
 
     def alarm_of(self, joint: str) -> Alarm | None:
         """The alarm of a joint's clearance; None if it is not listed."""

@@ -20,6 +20,7 @@ from leg_wear_monitor.twin.sample import (
 TURN = 2.0 * np.pi
 DEGREES = 180.0 / np.pi
 SECOND = 10**9
+SIZE_NM = 2.0  # RMS of the predicted drive torque
 
 
 def other_source(gait, duration_s=3.0, begin_s=0.0, rate_hz=200.0, *, off_rad=0.5, late_ns=1_700_000):
@@ -127,7 +128,7 @@ def test_one_leg_is_never_taken_for_two_nor_for_degrees(seed, rate_hz, rpm, wrap
     samples = healthy(np.random.default_rng(seed), rate_hz, rpm)
     if wrapped:
         samples["crank_angle_rad"] %= TURN
-    guard = InputGuard(settings_at(rpm))
+    guard = InputGuard(settings_at(rpm), SIZE_NM)
     assert (guard.checked(samples)["fault"] == NO_FAULT).all()
 
 
@@ -137,8 +138,8 @@ def test_what_is_withheld_does_not_depend_on_blocks(gait, seed, cuts):
     random = np.random.default_rng(seed)
     stream = interleaved(gait(4.0), other_source(gait, 1.0, begin_s=1.0))
     stream["crank_angle_rad"][800:] *= random.choice([1.0, DEGREES])
-    whole = InputGuard(settings_at(60.0)).checked(stream)
-    guard = InputGuard(settings_at(60.0))
+    whole = InputGuard(settings_at(60.0), SIZE_NM).checked(stream)
+    guard = InputGuard(settings_at(60.0), SIZE_NM)
     parts = [guard.checked(part) for part in np.split(stream, sorted(cuts))]
     np.testing.assert_array_equal(np.concatenate(parts)["fault"], whole["fault"])
 
@@ -209,5 +210,8 @@ def test_messages_without_the_crank_are_a_fault_only_if_none_has_it(monitor, gai
     unnamed = gait(4.0, begin_s=6.0)
     unnamed["fault"] = MISSING_JOINT
     monitor.update(unnamed)
-    assert "samples do not name the crank 'crank': set crank_joint" in status_of(monitor, "input").message
+    assert (
+        "samples do not name the crank 'crank' exactly once: set crank_joint"
+        in status_of(monitor, "input").message
+    )
     assert "input_samples" in raised(monitor)

@@ -25,11 +25,13 @@ from leg_wear_monitor.monitor.alarms import (
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
+from leg_wear_monitor.monitor.input_health import INPUT_RULES, InputFault
 from leg_wear_monitor.monitor.verdict.causes import sentence
 from leg_wear_monitor.monitor.verdict.rules import OF_THE_GAIT, OF_THE_MODEL, RULES, findings
 from leg_wear_monitor.monitor.verdict.situation import JointSituation, KnownClearance, Situation
 from leg_wear_monitor.monitor.verdict.verdict import dated, guide_to, has_changed, verdict_of
 from leg_wear_monitor.state import Figure, Level, State, Verdict
+from leg_wear_monitor.twin import CRANK, TORQUE
 
 JOINTS = ("A", "G")
 NEW = tuple(JointSituation(joint=joint, modelled_m=3.0e-4, limit_m=6.0e-4) for joint in JOINTS)
@@ -93,6 +95,13 @@ def at_limit(**more: Any) -> tuple[JointSituation, ...]:
     return (NEW[0], attrs.evolve(NEW[1], modelled_m=6.1e-4, **more))
 
 
+def faulty(code: str, since_ns: int = 55) -> dict[str, Any]:
+    """What is changed of a healthy leg by a fault of the input."""
+    fault = InputFault(code, since_ns, since_ns, dict.fromkeys(("size", "percent", "rate", "ratio"), "1"))
+    return {"input_faults": (fault,), "trusted_before_ns": {fault.rule.kind: since_ns}}
+
+
+OF_CRANK, OF_TORQUE = ([rule for rule in INPUT_RULES if rule.kind == kind] for kind in (CRANK, TORQUE))
 ALL, OF_THE_WALK = tuple(Figure), (Figure.GROWTH, Figure.IMPACT_FORCES)
 CASES = [
     ({}, State.HEALTHY, "NONE", ()),
@@ -193,7 +202,13 @@ CASES = [
     (noted("NOT_THIS_LEG", "the crank turns at 240 rpm"), State.NOT_MONITORED, "NOT_THIS_LEG", ALL),
     ({"has_cycle": False, "has_torque": False}, State.NOT_MONITORED, "NO_GAIT_CYCLE", ()),
     ({"has_torque": False}, State.WATCH, "NO_DRIVE_TORQUE", ()),
-    (raised("input_torque"), State.WATCH, "NO_DRIVE_TORQUE", ()),
+    (raised("input_torque"), State.WATCH, "ALARM", ()),
+    *((faulty(rule.code), State.NOT_MONITORED, rule.code, OF_THE_WALK) for rule in OF_CRANK),
+    *((faulty(rule.code), State.WATCH, rule.code, ()) for rule in OF_TORQUE),
+    # a fault of the input that began earlier outranks what the input shows of the leg
+    (raised("torque_mismatch") | faulty("TORQUE_CONSTANT", 70), State.WATCH, "TORQUE_CONSTANT", ()),
+    (raised("impact_force A") | faulty("CRANK_STAMPS", 70), State.NOT_MONITORED, "CRANK_STAMPS", OF_THE_WALK),
+    (raised("impact_force A") | faulty("CRANK_STAMPS", 78), State.INSPECT, "IMPACT_FORCE_A", OF_THE_WALK),
     ({"mismatch": math.nan}, State.WATCH, "TORQUE_NOT_COMPARED", ()),
     # beyond its limit, and not yet for long enough
     (

@@ -1,0 +1,204 @@
+"""Inputs of a healthy leg whose sensors or drivers fail: the input is named, and no joint is accused."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import attrs
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import leg_wear_monitor as lw
+
+BAG = lw.share_directory() / "bags" / "healthy.mcap"
+CRANK, TORQUE, TURN = 0, 1, 2.0 * np.pi
+
+
+@attrs.frozen(eq=False)
+class Walk:
+    """Stamps [ns] and crank angles [rad], stamps and drive torques [N m] of the healthy recording."""
+
+    crank_ns: np.ndarray
+    angle: np.ndarray
+    torque_ns: np.ndarray
+    torque: np.ndarray
+
+    def samples(self) -> np.ndarray:
+        """All samples in the order of their stamps."""
+        crank = lw.gait_samples(self.crank_ns, crank_angle_rad=self.angle)
+        torque = lw.gait_samples(self.torque_ns, TORQUE, torque_nm=self.torque)
+        both = np.concatenate([crank, torque])
+        return both[np.argsort(both["stamp_ns"], kind="stable")]
+
+
+@pytest.fixture(scope="module")
+def walk() -> Walk:
+    make_reader = pytest.importorskip("mcap.reader").make_reader
+    decoder = pytest.importorskip("mcap_ros2.decoder").DecoderFactory()
+    crank, torque = [], []
+    with BAG.open("rb") as file:
+        for _, channel, _, message in make_reader(file, decoder_factories=[decoder]).iter_decoded_messages():
+            stamp_ns = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+            if channel.topic == "/joint_states":
+                crank.append((stamp_ns, message.position[list(message.name).index("crank")]))
+            elif channel.topic == "/drive_torque":
+                torque.append((stamp_ns, message.wrench.torque.z))
+    (crank_ns, angle), (torque_ns, values) = zip(*crank, strict=True), zip(*torque, strict=True)
+    return Walk(np.array(crank_ns), np.array(angle), np.array(torque_ns), np.array(values))
+
+
+def replaced(share: float, value: float) -> Callable[[Walk], Walk]:
+    """A function that replaces a fraction of the torques, at random, by a value."""
+
+    def change(walk: Walk) -> Walk:
+        is_spike = np.random.default_rng(9).random(len(walk.torque)) < share
+        return attrs.evolve(walk, torque=np.where(is_spike, value, walk.torque))
+
+    return change
+
+
+def torques(change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Walk], Walk]:
+    """A function that changes the torques of a walk."""
+    return lambda walk: attrs.evolve(walk, torque=change(walk.torque))
+
+
+def angles(change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Walk], Walk]:
+    """A function that changes the continuous crank angles of a walk."""
+    return lambda walk: attrs.evolve(walk, angle=change(np.unwrap(walk.angle)))
+
+
+def from_half(torque: np.ndarray, value: float) -> np.ndarray:
+    return np.where(np.arange(len(torque)) < len(torque) // 2, torque, value)
+
+
+def arrival(ms: float) -> Callable[[Walk], Walk]:
+    """A function that stamps samples when they arrive: later by a random time, in the same order."""
+
+    def late(stamp_ns: np.ndarray) -> np.ndarray:
+        delay_ns = np.random.default_rng(8).exponential(1.0e6 * ms, len(stamp_ns)).astype(np.int64)
+        spacing = 50_000 * np.arange(len(stamp_ns))
+        return np.maximum.accumulate(stamp_ns + delay_ns - spacing) + spacing
+
+    return lambda walk: attrs.evolve(walk, crank_ns=late(walk.crank_ns), torque_ns=late(walk.torque_ns))
+
+
+def held(walk: Walk) -> Walk:
+    """The crank angle changes with every tenth sample only."""
+    first = np.arange(len(walk.angle)) // 10 * 10
+    return attrs.evolve(walk, angle=walk.angle[first])
+
+
+CASES: dict[str, tuple[Callable[[Walk], Walk], str]] = {
+    "zero": (torques(lambda torque: 0.0 * torque), "TORQUE_CONSTANT"),
+    "constant": (torques(lambda torque: 0.0 * torque + 3.7), "TORQUE_CONSTANT"),
+    "denormal": (torques(lambda torque: 1.0e-308 * torque), "TORQUE_CONSTANT"),
+    "frozen": (torques(lambda torque: from_half(torque, torque[len(torque) // 2])), "TORQUE_CONSTANT"),
+    "dead": (torques(lambda torque: from_half(torque, 0.0)), "TORQUE_CONSTANT"),
+    "saturated": (torques(lambda torque: np.clip(torque, -5.0, 5.0)), "TORQUE_SATURATED"),
+    "spikes": (replaced(0.005, 600.0), "NONE"),
+    "overflow": (replaced(0.01, 32767.0), "NONE"),
+    "1e300": (replaced(0.04, 1.0e300), "TORQUE_SPIKES"),
+    "noise": (
+        torques(lambda torque: 8.0 * np.random.default_rng(1).standard_normal(len(torque))),
+        "TORQUE_NOT_OF_GAIT",
+    ),
+    "arrival 1 ms": (arrival(1.0), "CRANK_STAMPS"),
+    "arrival 2 ms": (arrival(2.0), "CRANK_STAMPS"),
+    "arrival 4 ms": (arrival(4.0), "CRANK_STAMPS"),
+    "held": (held, "CRANK_HELD"),
+    "turns": (angles(lambda angle: angle / TURN), "CRANK_UNIT"),
+    "wrapped turns": (angles(lambda angle: angle / TURN % 1.0), "CRANK_UNIT"),
+    "wrapped degrees": (angles(lambda angle: np.degrees(angle) % 360.0), "TRACKING_LOST"),
+    "none": (lambda walk: walk, "NONE"),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_input_is_named_and_no_joint_is_accused(leg: lw.Mechanism, walk: Walk, case: str) -> None:
+    change, code = CASES[case]
+    monitor = lw.WearMonitor(leg, lw.load_config(BAG.with_suffix(".yaml")))
+    monitor.update(change(walk).samples())
+    verdict = monitor.state.verdict
+    assert (verdict.fault_code, verdict.joints) == (code, ())
+    assert verdict.state.value not in ("stop", "inspect")
+    if case == "1e300":
+        assert monitor.lost.torque_outliers > 50
+    raised = [alarm for alarm in monitor.alarms.alarms if alarm.level.name == "ERROR"]
+    assert {alarm.kind for alarm in raised} <= {"input_torque", "input_samples", "input_gaps", "input_rate"}
+
+
+def rewritten(path: Path, change: Callable[[str, bytes], bytes]) -> Path:
+    """The recording with changed messages, in a new file."""
+    make_reader = pytest.importorskip("mcap.reader").make_reader
+    writer_of = pytest.importorskip("mcap.writer").Writer
+    with BAG.open("rb") as source, path.open("wb") as file:
+        writer, channels = writer_of(file), {}
+        writer.start()
+        for schema, channel, message in make_reader(source).iter_messages():
+            if channel.topic not in channels:
+                number = writer.register_schema(schema.name, schema.encoding, schema.data)
+                channels[channel.topic] = writer.register_channel(channel.topic, "cdr", number)
+            data = change(channel.topic, message.data)
+            writer.add_message(channels[channel.topic], message.log_time, data, message.publish_time)
+        writer.finish()
+    return path
+
+
+def about_x(topic: str, data: bytes) -> bytes:
+    """The torque about z becomes the one about x; the one about z is 0."""
+    return data[:-24] + data[-8:] + bytes(16) if topic == "/drive_torque" else data
+
+
+def test_a_torque_about_a_different_axis_names_the_axis(tmp_path: Path) -> None:
+    result = lw.replay(rewritten(tmp_path / "about_x.mcap", about_x), BAG.with_suffix(".yaml"))
+    summary = result.summary()
+    assert summary.verdict.fault_code == "TORQUE_CONSTANT" and summary.verdict.joints == ()
+    (finding,) = (one.text for one in summary.recording.findings)
+    assert "the torque about z does not change, the one about x does" in finding
+    assert "set drive_torque.axis to x" in finding
+
+
+def named_twice(topic: str, data: bytes) -> bytes:
+    """CDR of a message with two joints of the same name, in place of one."""
+    if topic != "/joint_states":
+        return data
+    header, name, position, none = data[:20], data[24:36], data[44:52], bytes(4)
+    two = (2).to_bytes(4, "little")
+    return header + two + name + name + two + position + position + none + none
+
+
+def test_a_joint_that_is_named_twice_is_refused(tmp_path: Path) -> None:
+    path = rewritten(tmp_path / "twice.mcap", named_twice)
+    with pytest.raises(lw.LegWearError, match="joints 1 and 2 of joint_states are both named 'crank'"):
+        lw.replay(path, BAG.with_suffix(".yaml"))
+
+
+SIGNALS = {
+    "zero": lambda angle: 0.0 * angle,
+    "constant": lambda angle: 0.0 * angle + 3.7,
+    "tiny": lambda angle: 1.0e-308 * np.sin(angle),
+    "huge": lambda angle: 1.0e300 * np.sin(angle),
+    "infinite": lambda angle: np.where(np.sin(angle) > 0.5, np.inf, angle),
+    "missing": lambda angle: np.where(np.sin(angle) > 0.0, np.nan, angle),
+    "repeated": lambda angle: np.repeat(angle[::8], 8)[: len(angle)],
+    "sound": lambda angle: 9.0 * np.sin(angle),
+    "angle": lambda angle: angle,
+}
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    angles=st.lists(st.sampled_from(sorted(SIGNALS)), min_size=1, max_size=3),
+    torque=st.sampled_from(sorted(SIGNALS)),
+)
+def test_nothing_that_arrives_ends_the_monitor(leg: lw.Mechanism, angles: list[str], torque: str) -> None:
+    monitor, n = lw.WearMonitor(leg), np.arange(400)
+    for number, name in enumerate(angles):
+        stamp_ns = 10**18 + number * 2 * 10**9 + n * 5_000_000
+        angle = TURN * n / 200.0
+        crank = lw.gait_samples(stamp_ns, crank_angle_rad=SIGNALS[name](angle))
+        drive = lw.gait_samples(stamp_ns + 1000, TORQUE, torque_nm=SIGNALS[torque](angle))
+        monitor.update(np.stack([crank, drive], axis=1).ravel())
+    assert monitor.state.verdict.joints == ()
+    assert np.isfinite(monitor.clearances_m).all()

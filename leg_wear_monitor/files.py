@@ -8,7 +8,7 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 from xml.etree import ElementTree
 
 import attrs
@@ -27,14 +27,13 @@ _Record = TypeVar("_Record", bound=attrs.AttrsInstance)
 def write_whole(path: Path, content: bytes) -> None:
     """Write a file and bring it to the disk; nobody ever sees a part of it.
 
-    Several processes may write the same file at the same time: one waits for the other, and the last one
-    counts. What a kill leaves is used by the next write.
+    Several processes may write the same file at the same time: the last one counts.
 
     Parameters
     ----------
     path : pathlib.Path
-        On a file system with locks; its directory is made if it does not exist. A symbolic link stays, and
-        the file that it leads to is written.
+        Its directory is made if it does not exist. A symbolic link stays, and the file that it leads to is
+        written.
     content : bytes
 
     Raises
@@ -43,26 +42,21 @@ def write_whole(path: Path, content: bytes) -> None:
         If the disk does not take it; the file is then as it was.
     """
     target = path.resolve()
-    part = target.with_name(f".{target.name}.part")
     with system_asked(path, "cannot be written"):
         target.parent.mkdir(parents=True, exist_ok=True)
-        with _alone(part) as file:
-            try:
+        with unfinished(target) as part:
+            with part.open("wb") as file:
                 file.write(content)
                 file.flush()
                 os.fsync(file.fileno())
-                os.replace(part, target)
-            except BaseException:
-                with suppress(OSError):  # the first fault is the one to report
-                    part.unlink()
-                raise
+            part.replace(target)
 
 
 @contextmanager
 def unfinished(path: Path) -> Iterator[Path]:
     """A new file beside ``path`` to write into; it is removed at the end, unless it was put in its place.
 
-    Those of processes that were killed are removed at the begin.
+    Those of processes that were killed are removed at the start.
 
     Parameters
     ----------
@@ -76,7 +70,8 @@ def unfinished(path: Path) -> Iterator[Path]:
     """
     remove_parts(path.parent, f"{glob.escape(path.name)}.[0-9]*")
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    with _alone(part):
+    with part.open("wb") as locked:
+        fcntl.flock(locked, fcntl.LOCK_EX)  # so that no other process removes it
         try:
             yield part
         finally:
@@ -99,26 +94,6 @@ def remove_parts(directory: Path, names: str) -> None:
                 with part.open("r+b") as file:
                     fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                     part.unlink()
-
-
-@contextmanager
-def _alone(part: Path) -> Iterator[BinaryIO]:
-    """An empty file with this name, which no other process writes meanwhile."""
-    while True:
-        with part.open("ab") as file:
-            fcntl.flock(file, fcntl.LOCK_EX)
-            if not _is_at(part, file):  # who had it before has put it in its place
-                continue
-            file.truncate(0)
-            yield file
-            return
-
-
-def _is_at(path: Path, file: BinaryIO) -> bool:
-    try:
-        return os.path.samestat(path.stat(), os.fstat(file.fileno()))
-    except FileNotFoundError:
-        return False
 
 
 # JSON as files and standard output hold it, and numbers that are not known, which it has not.

@@ -118,7 +118,7 @@ plt.show()
 
 # %%
 # The line with dots is the path of the toe.
-# ``leg-wear-monitor draw four_bar.yaml`` writes a page that moves the linkage; with ``--watch`` it draws again whenever you save the file.
+# ``leg-wear-monitor draw four_bar.yaml`` writes a page that moves the linkage.
 #
 # A linkage that does not work is drawn, too.
 # Put a decimal point in the wrong place, a crank of 500 mm:

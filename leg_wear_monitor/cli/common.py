@@ -1,11 +1,11 @@
-"""What verbs share: options, numbers within bounds, nodes as verbs, files, lines, progress, warnings."""
+"""What verbs share: options, nodes, files that are written, progress and warnings."""
 
 import math
 import sys
 import tempfile
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -23,10 +23,9 @@ from leg_wear_monitor.errors import (
 from leg_wear_monitor.files import write_whole
 
 if TYPE_CHECKING:
-    from rich.progress import Progress
-
     from leg_wear_monitor.configuration import Doubt
     from leg_wear_monitor.mechanism.spec import Mechanism
+    from leg_wear_monitor.monitor.config.settings import MonitorConfig
     from leg_wear_monitor.playback.result import ReplaySummary
 
 
@@ -34,38 +33,18 @@ WITH_FINDINGS = 1
 """Exit code of a verb that is done, with findings that the caller must see."""
 
 
-class Number(click.types.FloatParamType):
-    """Type of a finite number within bounds; for files see `leg_wear_monitor.configuration`.
+class Number(click.FloatRange):
+    """A finite number within bounds; `click` itself accepts nan and inf."""
 
-    Parameters
-    ----------
-    unit : str
-        ``""`` for a pure number.
-    above, at_least : float, optional
-        Bounds.
-    """
-
-    def __init__(self, unit: str = "", *, above: float | None = None, at_least: float | None = None) -> None:
-        self._unit, self._above, self._at_least = unit, above, at_least
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Give the number, or fail with what is expected; of a decimal comma, with what is probably meant."""
-        of_unit = f" of {self._unit}" if self._unit else ""
-        try:
-            number = float(value)
-        except ValueError:
-            expected = "one such as 0.5"
-            with suppress(ValueError):
-                meant = float(value.replace(",", "."))
-                expected = f"a decimal point; did you mean {meant:.12g}?"
-            self.fail(f"{value!r} is not a number{of_unit}, expected {expected}", param, ctx)
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Give the number, or fail and name the bounds."""
+        number = float(super().convert(value, param, ctx))
         if not math.isfinite(number):
-            self.fail(f"{number:g} is not a finite number{of_unit}", param, ctx)
-        if self._above is not None and not number > self._above:
-            self.fail(f"{number:g} is not above {self._above:g} {self._unit}".rstrip(), param, ctx)
-        if self._at_least is not None and not number >= self._at_least:
-            self.fail(f"{number:g} is not at least {self._at_least:g} {self._unit}".rstrip(), param, ctx)
+            self.fail(f"{value} is not a finite number.", param, ctx)
         return number
+
+
+POSITIVE = Number(min=0.0, min_open=True)
 
 
 @contextmanager
@@ -88,34 +67,17 @@ Option = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
 def option(name: str, metavar: str, text: str, *own: str, **of_click: Any) -> Option:
-    """Option with a value, whose default is shown; ``own`` is the name of its parameter if it has another."""
-    shown = "default" in of_click
-    return click.option(name, *own, metavar=metavar, help=text, show_default=shown, **of_click)
-
-
-def number_option(
-    name: str,
-    metavar: str,
-    text: str,
-    unit: str = "",
-    *,
-    above: float | None = None,
-    at_least: float | None = None,
-    default: float | None = None,
-) -> Option:
-    """Option with a finite number within bounds."""
-    kind = Number(unit, above=above, at_least=at_least)
-    given = {} if default is None else {"default": default}
-    return option(name, metavar, text, type=kind, **given)
+    """Option with a value, whose default is shown; ``own`` is the name of its parameter if that differs."""
+    return click.option(name, *own, metavar=metavar, help=text, show_default=True, **of_click)
 
 
 def path_option(name: str, metavar: str, text: str, *, required: bool = False, **of_path: bool) -> Option:
     """Option with a path, such as a file that has to exist."""
-    kind = click.Path(path_type=Path, **of_path)
-    return option(name, metavar, text, type=kind, required=required)
+    return option(name, metavar, text, type=click.Path(path_type=Path, **of_path), required=required)
 
 
 file_option = partial(path_option, dir_okay=False)
+out_option = partial(path_option, "--out", "DIR")
 
 mechanism_option: Option = option(
     "--mechanism",
@@ -123,91 +85,73 @@ mechanism_option: Option = option(
     "A mechanism file, or the name of one that comes with the package.",
     default="bionic_leg",
 )
-
-speed_option: Option = number_option(
-    "--speed-rpm", "RPM", "Crank speed, negative for clockwise.  [default: the mechanism's own]", "rpm"
+clearances_option: Option = option(
+    "--clearances", "A,B", "The clearance joints, or none.  [default: the mechanism's own]"
 )
-
-limit_option: Option = number_option(
-    "--limit-m", "M", "Mean radial clearance at which a joint's life ends.", "m", above=0.0, default=6.0e-4
+speed_option: Option = option(
+    "--speed-rpm",
+    "RPM",
+    "Crank speed [rpm], negative for clockwise.  [default: the mechanism's own]",
+    type=float,
 )
-
+limit_option: Option = option(
+    "--limit-m",
+    "M",
+    "Mean radial clearance [m] at which a joint's life ends.",
+    type=POSITIVE,
+    default=6.0e-4,
+)
 config_option: Option = path_option(
     "--config", "FILE", "Parameter file of the node.  [default: the one that comes with the package]"
 )
-
 ledger_option: Option = file_option(
     "--ledger", "FILE", "Ledger to write into.  [default: the one in the parameters]", exists=True
 )
-
 node_option: Option = option(
     "--node",
     "NAME",
     "Full name of a running monitor to enter it into, such as /left/leg_wear_monitor; with --config, of the "
     "node whose parameters and ledger are used.",
 )
-
 section_option: Option = option(
     "--node",
     "NAME",
     "Full name of the node whose parameters are read, such as /left/leg_wear_monitor.  "
     "[default: the only one in the file]",
 )
-
 wait_option: Option = option(
     "--wait",
     "S",
-    "With --node: longest wait for the monitor, and again for its answer.",
+    "With --node: longest wait [s] for the monitor, and again for its answer.",
     "wait_s",
-    type=click.FloatRange(min=0.0, min_open=True),
+    type=POSITIVE,
     default=10.0,
 )
-
 memory_option: Option = option(
     "--memory-mb",
     "MB",
     "Memory limit of reading, temporary files included.",
-    type=click.FloatRange(min=16.0),
+    type=Number(min=16.0),
     default=512.0,
 )
-
 workers_option: Option = option(
     "--workers", "N", "Number of local processes.  [default: cores]", type=click.IntRange(min=1)
 )
-
+scheduler_option: Option = option(
+    "--scheduler",
+    "ADDRESS",
+    "Dask scheduler whose workers compute in place of this machine, tcp://HOST:PORT.",
+)
 dry_run_option: Option = click.option("--dry-run", is_flag=True, help="Print the result and write nothing.")
-
 recordings_argument: Option = click.argument(
     "recordings", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="RECORDING..."
 )
 
 
-def clearances_option(metavar: str) -> Option:
-    """``--clearances``: names of the clearance joints, separated by commas."""
-    text = "The clearance joints.  [default: the mechanism's own]"
-    return option("--clearances", metavar, text)
-
-
 def json_option(what: str) -> Option:
     """``--json FILE`` for an object, such as ``the result``; ``-`` is standard output."""
-    return option(
-        "--json",
-        "FILE",
-        f"Write {what} as JSON; - for stdout, without other output there.",
-        "json_file",
-        type=click.Path(allow_dash=True, path_type=Path),
-    )
-
-
-def scheduler_option(does: str) -> Option:
-    """``--scheduler``: what the workers of a Dask cluster do in place of this machine."""
-    text = f"Dask scheduler whose workers {does} instead, tcp://HOST:PORT."
-    return option("--scheduler", "ADDRESS", text)
-
-
-def out_option(text: str) -> Option:
-    """``--out DIR``."""
-    return path_option("--out", "DIR", text)
+    text = f"Write {what} as JSON; - for stdout, without other output there."
+    return option("--json", "FILE", text, "json_file", type=click.Path(allow_dash=True, path_type=Path))
 
 
 def with_clearance_joints(leg: "Mechanism", names: str | None) -> "Mechanism":
@@ -229,7 +173,7 @@ def with_clearance_joints(leg: "Mechanism", names: str | None) -> "Mechanism":
     return attrs.evolve(leg, clearance_joints=joints)
 
 
-# A node as a verb: its arguments are those of ROS, and without ROS there is one line.
+# Nodes: as verbs, whose arguments are those of ROS, and as receivers of what an operator enters.
 
 
 def need_rclpy() -> None:
@@ -247,11 +191,6 @@ def check_alone(**others: object) -> None:
     if any(others.values()):
         names = ", ".join(f"--{name.replace('_', '-')}" for name in others)
         raise click.UsageError(f"--node cannot be combined with {names}")
-
-
-def joints_words(names: Sequence[str]) -> str:
-    """The clearance joints of a leg."""
-    return f"clearance joints {', '.join(names)}" if names else "no clearance joint"
 
 
 def trigger(node: str, service: str, wait_s: float, times: int = 1) -> str:
@@ -309,11 +248,8 @@ def check_file(option: str, path: Path | None) -> None:
         return
     if path.is_dir():
         raise ConfigError(option, str(path), "is a directory, expected a file to write")
-    if _is_stream(path):
-        return
-    if not path.parent.is_dir():
-        raise ConfigError(option, str(path), f"there is no directory {path.parent}")
-    _try(option, path, path.resolve().parent)
+    if not _is_stream(path):
+        _try(option, path, path.resolve().parent)
 
 
 def check_directory(option: str, path: Path) -> None:
@@ -324,13 +260,9 @@ def check_directory(option: str, path: Path) -> None:
     ConfigError
         Naming the option, the path and why not.
     """
-    if path.exists() and not path.is_dir():
-        raise ConfigError(option, str(path), "is a file, expected a directory to write to")
     above = path.resolve()
     while not above.exists():
         above = above.parent
-    if not above.is_dir():
-        raise ConfigError(option, str(path), f"{above} is a file, expected a directory")
     _try(option, path, above)
 
 
@@ -345,6 +277,12 @@ def check_outputs(json_file: Path | None, out: Path | None) -> None:
     check_file("--json", json_file)
     if out is not None:
         check_directory("--out", out)
+
+
+def _try(option: str, path: Path, directory: Path) -> None:
+    """Only writing shows it: rights, a read-only file system, an administrator whom rights do not stop."""
+    with system_asked(option, "cannot be written", path), tempfile.TemporaryFile(dir=directory):
+        return
 
 
 def write_json(path: Path | None, text: str) -> list[Path]:
@@ -408,12 +346,6 @@ def _is_stream(path: Path) -> bool:
     return path.exists() and not path.is_file()
 
 
-def _try(option: str, path: Path, directory: Path) -> None:
-    """Only writing shows it: rights, a read-only file system, an administrator whom rights do not stop."""
-    with system_asked(option, "cannot be written", path), tempfile.TemporaryFile(dir=directory):
-        return
-
-
 def page_of(summary: "ReplaySummary") -> bytes:
     """The page of a replay."""
     from leg_wear_monitor.report.page import page_html
@@ -422,7 +354,8 @@ def page_of(summary: "ReplaySummary") -> bytes:
     return page_html(replay_page(summary)).encode()
 
 
-# Values that are likely meant in another unit, as warnings: one line each on stderr.
+# Warnings of values that are likely meant in a different unit, and what a user sees while something takes
+# long, all on stderr.
 
 
 def warn_of(source: str, found: Iterable["Doubt"]) -> None:
@@ -431,57 +364,20 @@ def warn_of(source: str, found: Iterable["Doubt"]) -> None:
         warnings.warn(f"{source}: {doubt}", ConfigWarning, stacklevel=2)
 
 
-# What a user sees while something takes long, on stderr.
-
-
-def _mark(kernels: str) -> Path | None:
-    from leg_wear_monitor.compiled.kernel import cache_directory
-
-    place = cache_directory()
-    return None if place is None else place / f"{kernels}.compiled"
-
-
-def is_compiled(kernels: str) -> bool:
-    """Whether a set of kernels has once been compiled to its end, for exactly these sources."""
-    import numba
-
-    mark = _mark(kernels)
-    return bool(numba.config.DISABLE_JIT) or (mark is not None and mark.exists())
-
-
 @contextmanager
-def compilation(*kernels: str, how_long: str = "about half a minute") -> Iterator[None]:
-    """Show the time that passes while the work inside compiles sets of kernels for the first time.
+def compilation() -> Iterator[None]:
+    """Say in a line, once, that the work inside compiles: only then does it take long.
 
-    In a pipe it is one line when the first of them is compiled: what fails before it is one line, too.
+    The line comes with the first function that is compiled, so bad input is one line, too.
     """
-    if all(is_compiled(one) for one in kernels):
-        yield
-        return
-    what = f"compiling numerical kernels (once per installation, {how_long})"
-    with _shown(what) if sys.stderr.isatty() else _compilation_announced(what):
-        yield
-    mark_compiled(kernels)
-
-
-def mark_compiled(kernels: Iterable[str]) -> None:
-    """Note that sets of kernels were compiled to their end."""
-    for mark in map(_mark, kernels):
-        if mark is not None:
-            with suppress(FileNotFoundError):  # `cache --clear` meanwhile: then it is to be compiled again
-                mark.touch()
-
-
-@contextmanager
-def _compilation_announced(what: str) -> Iterator[None]:
     from leg_wear_monitor.compiled.kernel import at_compilation
 
-    printed: list[str] = []
+    announced = list[bool]()
 
     def announce() -> None:
-        if not printed:
-            printed.append(what)
-            print(what, file=sys.stderr, flush=True)
+        if not announced:
+            announced.append(True)
+            click.echo("compiling numerical kernels, once per installation, up to a minute", err=True)
 
     at_compilation.append(announce)
     try:
@@ -490,52 +386,26 @@ def _compilation_announced(what: str) -> Iterator[None]:
         at_compilation.remove(announce)
 
 
+def compile_monitor(config: "MonitorConfig") -> None:
+    """Compile what a monitor needs, once, before several processes need it at the same time."""
+    from leg_wear_monitor.dynamics.clearance.stepper import advance_beside
+    from leg_wear_monitor.mechanism.loader import load_mechanism
+    from leg_wear_monitor.monitor.wear_monitor import WearMonitor
+
+    with compilation(), advance_beside():
+        WearMonitor(load_mechanism(config.mechanism), config).warm_up()
+
+
 @contextmanager
 def progress_bar(what: str) -> Iterator[Callable[[float], None]]:
     """Give a function that takes the fraction done: it shows a bar on a terminal, and nothing in a pipe."""
-    with _shown(what, total=1.0) as show:
-        yield show
-
-
-# what shows progress on the terminal; rich shows one at a time, so what begins inside is a line of its own
-_display: list["Progress"] = []
-
-
-@contextmanager
-def _shown(what: str, total: float | None = None) -> Iterator[Callable[[float], None]]:
-    """Show a line on a terminal, with the time passed and, where there is a total, how much is done."""
     if not sys.stderr.isatty():
         yield lambda _fraction: None
         return
-    with _progress() as bar:
-        task = bar.add_task(what, total=total)
-        try:
-            yield lambda fraction: bar.update(task, completed=fraction)
-        finally:
-            bar.remove_task(task)
-
-
-@contextmanager
-def _progress() -> Iterator["Progress"]:
-    if _display:
-        yield _display[0]
-        return
     from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        Progress,
-        SpinnerColumn,
-        TaskProgressColumn,
-        TextColumn,
-        TimeElapsedColumn,
-    )
+    from rich.progress import Progress
 
-    words = TextColumn("{task.description}")
-    columns = SpinnerColumn(), words, BarColumn(), TaskProgressColumn(), TimeElapsedColumn()
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        _display.append(bar)
-        try:
-            with closed_on_interrupt(bar.stop):  # it hides the cursor
-                yield bar
-        finally:
-            _display.clear()
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(what, total=1.0)
+        with closed_on_interrupt(bar.stop):  # the bar hides the cursor
+            yield lambda fraction: bar.update(task, completed=fraction)

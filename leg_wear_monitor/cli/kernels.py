@@ -18,9 +18,6 @@ from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
 from leg_wear_monitor.twin.torque_reference import TorqueReferenceRun
 from leg_wear_monitor.workers import results
 
-SETS = ("clearance", "full", "gait", "monitor")
-"""Sets of kernels that are then there, as commands name them."""
-
 
 def _simulation() -> None:
     """Motion in clearance and in full coordinates, and the synthetic leg."""

@@ -339,13 +339,12 @@ def check_wear_is_known(mechanism: Mechanism, joints: Sequence[str]) -> None:
         )
 
 
-def regimes(mechanism: Mechanism, joints: Sequence[str], wear_factor: float = 1.0) -> dict[str, list[str]]:
-    """The joints by what their wear holds for: pair and regime, or a bare coefficient, times a factor."""
-    times = "" if wear_factor == 1.0 else f", times {wear_factor:g}"
+def regimes(mechanism: Mechanism, joints: Sequence[str]) -> dict[str, list[str]]:
+    """The joints by what their wear holds for: pair and regime, or a bare coefficient."""
     found: dict[str, list[str]] = {}
     for joint in joints:
         settings = mechanism.clearances[joint]
-        wear = " and ".join(f"{k:.3g}" for k in dict.fromkeys(settings.wear_coefficient)) + f" 1/Pa{times}"
+        wear = " and ".join(f"{k:.3g}" for k in dict.fromkeys(settings.wear_coefficient)) + " 1/Pa"
         wear = "not known: not counted" if lacks_wear(settings) else wear
         found.setdefault(f"{regime_of(settings)}, wear coefficient {wear}", []).append(joint)
     return found

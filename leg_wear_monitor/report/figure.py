@@ -1,15 +1,12 @@
-"""Figures in one style: forces, lives, worn bushings, openings."""
+"""Figures in one style: forces, lives, worn bushings."""
 
 import io
-import math
 from collections.abc import Sequence
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from leg_wear_monitor.dynamics.result import Trace
 from leg_wear_monitor.errors import printable
@@ -42,14 +39,6 @@ def png(figure: Figure, dots_per_inch: float = 100.0) -> bytes:
     """The figure as PNG; with the same libraries, equal figures give equal bytes."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=dots_per_inch, metadata={"Software": None})
-    return buffer.getvalue()
-
-
-def svg(figure: Figure, creator: str | None = None) -> bytes:
-    """The figure as SVG, for figures with few lines; equal figures give equal bytes."""
-    buffer = io.BytesIO()
-    with matplotlib.rc_context({"svg.hashsalt": "leg_wear_monitor"}):
-        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": creator})
     return buffer.getvalue()
 
 
@@ -160,25 +149,18 @@ def _draw(axes: Axes, turns: Floats, values: Floats, label: str, colour: str) ->
     tidy(axes)
 
 
-# Figure of a leg's wear life: clearances, peak forces and worn profiles over gait cycles.
-
-
-_PROFILES = 5
+# Figure of a leg's wear life: clearances and peak forces over gait cycles.
 
 
 def life_picture(life: Life) -> bytes:
-    """PNG: mean (solid) and largest (dashed) clearance, peak force, and bushing profiles at five times."""
-    joints = len(life.clearance_joints)
-    figure = new_figure(max(7.0, 2.2 * joints), 6.0)
-    grid = figure.add_gridspec(2, 2 * joints, height_ratios=(1.2, 1.0))
-    clearance, peak = figure.add_subplot(grid[0, :joints]), figure.add_subplot(grid[0, joints:])
+    """PNG: mean (solid) and largest (dashed) clearance, and peak force, over the gait cycles."""
+    figure = new_figure(9.0, 3.6)
+    clearance, peak = figure.subplots(1, 2)
     draw_life(clearance, life)
     clearance.plot([], [], color=INK, ls="--", lw=0.7, label="deepest")
-    for k in range(joints):
+    for k in range(len(life.clearance_joints)):
         peak.plot(life.cycles, 1e-3 * life.peak_force_n[:, k], color=_colour(k))
-        _profiles(figure.add_subplot(grid[1, 2 * k : 2 * k + 2]), life, k, _colour(k))
-    finish(clearance, x="gait cycles", y="radial clearance [µm]")
-    clearance.legend(fontsize=SMALL, frameon=False)
+    finish(clearance, x="gait cycles", y="radial clearance [µm]", columns=3)
     finish(peak, x="gait cycles", y="peak contact force [kN]")
     return png(figure)
 
@@ -202,116 +184,23 @@ def _colour(k: int) -> str:
     return BODY_COLOURS[k % len(BODY_COLOURS)]
 
 
-def _profiles(axes: Axes, life: Life, k: int, colour: str) -> None:
-    """Draw the wear depth of the bushing of clearance joint k over the angle, darker with age."""
-    sectors = life.depth.shape[-1]
-    angle = (np.arange(sectors) + 0.5) * (360.0 / sectors)
-    times = np.linspace(0.0, life.cycles[-1], _PROFILES + 1)[1:]
-    for shade, time in enumerate(times, 1):
-        at = int(np.abs(life.cycles - time).argmin())
-        axes.plot(angle, 1e6 * life.depth[at, k, 0], color=colour, alpha=shade / _PROFILES, lw=0.9)
-    axes.set(xlim=(0.0, 360.0), xticks=(0.0, 180.0, 360.0))
-    title = f"{life.clearance_joints[k]}: bushing [µm] by angle [°],\nat fifths of the life, darker later"
-    axes.set_title(title, fontsize=SMALL, color=INK)
-    tidy(axes)
+def worn_bushings(depth: Floats, names: Sequence[str], title: str) -> Figure:
+    """Figure of the wear depth (k, 2, N) [m] of bushing and journal over the angle, joint by joint.
 
-
-# Figure of the worn profiles of bushings and journals, joint by joint.
-
-
-_COLUMN_IN = 2.3
-_BUSHING, _JOURNAL, _RIM = 1.0, 0.86, 1.75  # drawn radii, as multiples of the bushing's radius
-_DEEPEST = 0.5  # drawn depth of the greatest wear depth, as a multiple of the bushing's radius
-_SUPERSCRIPT = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
-
-
-def worn_bushings(depth: Floats, names: Sequence[str], radius_m: Sequence[float], title: str) -> Figure:
-    """Figure of each joint's worn surfaces: a section with exaggerated depth, and the depth over the angle.
-
-    Parameters
-    ----------
-    depth : (k, 2, N) array
-        Wear depth of bushing and journal [m].
-    names : sequence of str
-        The joints, in the order of the depths.
-    radius_m : sequence of float
-        Radii of their bushings [m]; the exaggeration factor refers to them.
-    title : str
-
-    Returns
-    -------
-    Figure
+    The angles that contain 90 % of the bushing's wear are shaded.
     """
-    figure = new_figure(max(2, len(names)) * _COLUMN_IN, 4.9)
-    grid = figure.add_gridspec(3, len(names), height_ratios=(3.0, 2.0, 0.3))
     scale, unit = length_unit(float(depth.max()))
-    for k, name in enumerate(names):
-        zone = wear_zone(depth[k, BUSHING])
-        section = figure.add_subplot(grid[0, k], projection="polar")
-        exaggerated = draw_section(section, depth[k], zone, radius_m[k])
-        section.set_title(f"{name}\n{exaggerated}", fontsize=USUAL, color=INK)
-        unrolled = figure.add_subplot(grid[1, k])
-        draw_depth(unrolled, scale * depth[k], zone)
-        unrolled.set_xticks((0.0, 90.0, 180.0, 270.0, 360.0))
-        unrolled.set_xlabel("angle in its own body [°]", fontsize=SMALL)
-        if k == 0:
-            unrolled.set_ylabel(f"depth [{unit}]", fontsize=SMALL)
-    _draw_key(figure.add_subplot(grid[2, :]))
+    figure = new_figure(max(2, len(names)) * 2.3, 2.8)
+    panels = figure.subplots(1, len(names), squeeze=False)[0]
+    angle = (np.arange(depth.shape[-1]) + 0.5) * (360.0 / depth.shape[-1])
+    for axes, name, worn in zip(panels, names, depth, strict=True):
+        if (zone := wear_zone(worn[BUSHING])) is not None:
+            for turn in (0.0, -360.0):  # a zone may cross 360 degrees
+                axes.axvspan(zone[0] + turn, zone[1] + turn, color=PALE, alpha=0.6, linewidth=0.0)
+        axes.plot(angle, scale * worn[BUSHING], color=BLUE, linewidth=1.2, label="bushing")
+        axes.plot(angle, scale * worn[JOURNAL], color=VERMILION, linewidth=1.2, label="journal")
+        axes.set(xlim=(0.0, 360.0), xticks=(0.0, 90.0, 180.0, 270.0, 360.0), ylim=(0.0, None))
+        finish(axes, name, x="angle in its own body [°]", columns=1)
+    panels[0].set_ylabel(f"depth [{unit}]", fontsize=SMALL)
     figure.suptitle(title, fontsize=USUAL, fontweight="bold", color=INK)
     return figure
-
-
-def _draw_key(axes: Axes) -> None:
-    axes.set_axis_off()
-    entries = {
-        "bushing": Line2D([], [], color=BLUE, linewidth=2.0),
-        "journal": Line2D([], [], color=VERMILION, linewidth=2.0),
-        "90 % of the bushing's wear": Line2D([], [], color=INK, linewidth=4.0, solid_capstyle="butt"),
-    }
-    axes.legend(list(entries.values()), list(entries), ncols=3, fontsize=SMALL, frameon=False, loc="center")
-
-
-def draw_section(axes: Axes, depth: Floats, zone: tuple[float, float] | None, radius: float) -> str:
-    """Draw a section of bushing and journal with exaggerated wear depth (2, N) [m].
-
-    ``zone`` [deg] is marked by an arc at the rim; ``radius`` is that of the bushing [m]. Returns the
-    exaggeration in words.
-    """
-    n, greatest = depth.shape[1], float(depth.max())
-    angle = (np.arange(n + 1) + 0.5) * (TURN / n)
-    drawn = np.concatenate([depth, depth[:, :1]], axis=1) * (_DEEPEST / greatest if greatest > 0.0 else 0.0)
-    axes.fill_between(angle, _BUSHING + drawn[BUSHING], _RIM, color=BLUE, alpha=0.3, linewidth=0.0)
-    axes.plot(angle, _BUSHING + drawn[BUSHING], color=BLUE, linewidth=1.4)
-    axes.fill_between(angle, 0.0, _JOURNAL - drawn[JOURNAL], color=VERMILION, alpha=0.3, linewidth=0.0)
-    axes.plot(angle, _JOURNAL - drawn[JOURNAL], color=VERMILION, linewidth=1.4)
-    if zone is not None:
-        arc = np.deg2rad(np.linspace(*zone, 181))
-        rim = np.full(arc.shape, _RIM)
-        axes.plot(arc, rim, color=INK, linewidth=4.0, solid_capstyle="butt", clip_on=False)
-    axes.set_ylim(0.0, _RIM)
-    axes.set_yticks([])
-    axes.set_xticks(np.deg2rad([0.0, 90.0, 180.0, 270.0]))
-    axes.tick_params(labelsize=SMALL, labelcolor=INK, pad=1.0)
-    axes.grid(False)
-    axes.spines["polar"].set_visible(False)
-    return f"depth × {_factor(_DEEPEST * radius / greatest)}" if greatest > 0.0 else "no wear"
-
-
-def _factor(value: float) -> str:
-    exponent = math.floor(math.log10(value))
-    power = str(exponent).translate(_SUPERSCRIPT)
-    return f"{value:.0f}" if exponent < 3 else f"{value / 10.0**exponent:.1f}·10{power}"
-
-
-def draw_depth(axes: Axes, depth: Floats, zone: tuple[float, float] | None) -> None:
-    """Draw the depth (2, N) of bushing and journal over the angle [deg], and shade the zone."""
-    angle = (np.arange(depth.shape[1]) + 0.5) * (360.0 / depth.shape[1])
-    if zone is not None:
-        for turn in (0.0, -360.0):  # a zone may cross 360 degrees
-            axes.axvspan(zone[0] + turn, zone[1] + turn, color=PALE, alpha=0.6, linewidth=0.0)
-    for surface, colour in ((BUSHING, BLUE), (JOURNAL, VERMILION)):
-        axes.fill_between(angle, 0.0, depth[surface], color=colour, alpha=0.25, linewidth=0.0)
-        axes.plot(angle, depth[surface], color=colour, linewidth=1.0)
-    tidy(axes)
-    axes.set_xlim(0.0, 360.0)
-    axes.set_ylim(0.0, 1.05 * float(depth.max()) or 1.0)

@@ -9,10 +9,11 @@ from matplotlib.axes import Axes
 from leg_wear_monitor.dynamics.result import SimulationResult
 from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.mechanism.reach import findings, reach_of
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.playback.result import ReplaySummary
 from leg_wear_monitor.playback.summary import ReplayResult
-from leg_wear_monitor.report.drawing import draw_drawing, drawing_of
+from leg_wear_monitor.report.drawing import first_position
 from leg_wear_monitor.report.figure import (
     BLUE,
     BODY_COLOURS,
@@ -27,9 +28,10 @@ from leg_wear_monitor.report.figure import (
     draw_life,
     finish,
     opened,
+    plain,
     time_of,
 )
-from leg_wear_monitor.report.leg_picture import PATH_POINTS
+from leg_wear_monitor.report.leg_picture import draw_leg
 from leg_wear_monitor.state import Figure
 
 _COLOURS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, INK)
@@ -118,9 +120,12 @@ def _replay(result: ReplaySummary | ReplayResult, axes: Axes | None = None) -> A
 
 @plot.register
 def _mechanism(result: Mechanism, axes: Axes | None = None) -> Axes:
-    axes = _new() if axes is None else axes
-    draw_drawing(axes, drawing_of(result, points=PATH_POINTS))
-    return _finished(axes, axes.get_xlabel(), axes.get_ylabel())
+    axes, reach = _new() if axes is None else axes, reach_of(result)
+    shown = first_position(reach)
+    draw_leg(axes, reach, shown, result.clearance_joints)
+    title = f"{plain(result.name)}, crank at {np.rad2deg(reach.crank_angle[shown]):.4g}°"
+    axes.set_title("\n".join([title, *map(plain, findings(reach))]), fontsize=SMALL)
+    return _finished(axes, "x [m]", "y [m]")
 
 
 def _new() -> Axes:

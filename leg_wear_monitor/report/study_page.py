@@ -11,9 +11,6 @@ from ruamel.yaml import YAML
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials import lacks_wear
-from leg_wear_monitor.mechanism.position import build_linkage, one_cycle
-from leg_wear_monitor.mechanism.reach import Reach
-from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.report.figure import (
     BLUE,
     BODY_COLOURS,
@@ -25,11 +22,9 @@ from leg_wear_monitor.report.figure import (
     finish,
     new_figure,
     png,
-    worn_bushings,
 )
 from leg_wear_monitor.report.leg_picture import leg_picture
-from leg_wear_monitor.report.leg_slider import leg_data, leg_slider, run_data
-from leg_wear_monitor.report.page import Fragment, Gallery, Page, Part, Picture, Section, Table, Text
+from leg_wear_monitor.report.page import Gallery, Page, Part, Picture, Section, Table, Text
 from leg_wear_monitor.studies.paper import CLAIMS, STANDARD_ERRORS, Responses, responses_of
 from leg_wear_monitor.studies.run import StudyResults
 from leg_wear_monitor.studies.tables import (
@@ -73,7 +68,6 @@ _WEAR = {
 }
 _CHARTS = ("peak_force_n", "p99_force_n", "mean_force_n", DEPTH, ARCHARD)
 _MOST_SHOWN = 6  # points with curves and surfaces; of more points, the first, the middle and the last
-_CLEARANCE_FRACTION = 0.3  # drawn clearance, as a fraction of the bushing's radius
 _FORGET = 3  # first cycles of an exponent, in which the neighbours turn into the fastest growing direction
 _LONGEST, _SAME = 16, 1.0e-3  # longest period searched [cycles]; tolerance for equal points [clearances]
 _KEY = "Shaded: the middle 90 % of all cycles. Blue: one cycle of one run, as an example. Dashed: ideal leg."
@@ -92,23 +86,9 @@ def study_page(results: StudyResults) -> Page:
         shown = found if len(found) <= _MOST_SHOWN else [found[0], found[len(found) // 2], found[-1]]
         parts["Results"] = [_error_table(found), *_sum_table(found), _force_table(found), _wear_table(found)]
         parts["Comparison"] = [_comparison(found)] if len(found) > 1 else []
-        parts["One gait cycle"] = [_slider(results.mechanism, shown)]
         parts["Curves of a cycle"] = _curves(shown)
-        parts["Wear of a million cycles"] = [
-            _worn(results.mechanism, point.label, arrays, 1.0e6 * arrays[DEPTH].mean(axis=0))
-            for point, arrays in shown
-        ]
     if lives:
-        worn = [
-            _worn(
-                results.mechanism,
-                f"{point.label}, end of life",
-                arrays,
-                arrays["depth_m"][:, -1].mean(axis=0),
-            )
-            for point, arrays in lives
-        ]
-        parts["Life with wear"] = [_life_table(lives), _life_gallery(lives), *worn]
+        parts["Life with wear"] = [_life_table(lives), _life_gallery(lives)]
     if exponents:
         parts["Lyapunov exponents"] = [_exponent_table(exponents)]
     parts |= _sections_of_cycles(results)
@@ -435,15 +415,6 @@ def _curve_gallery(
     return Gallery(pictures=pictures, caption=f"{title[0].upper()}{title[1:]}. {_KEY}")
 
 
-def _worn(mechanism: Mechanism, label: str, arrays: Arrays, depth: Floats) -> Picture:
-    """Worn surfaces of the clearance joints, from their mean depth (k, 2, N) [m] over the runs."""
-    joints = clearance_joints_of(arrays)
-    radii = tuple(mechanism.clearances[joint].bushing_radius for joint in joints)
-    image = png(worn_bushings(np.asarray(depth, dtype=float), tuple(joints), radii, label))
-    alt = f"Worn bushings and journals, {label}: sections with exaggerated depth, depth over the angle"
-    return Picture(image=image, alt=alt, wide=len(joints) > 2)
-
-
 def _life_gallery(lives: Found) -> Gallery:
     pictures = []
     for point, arrays in lives:
@@ -458,30 +429,6 @@ def _life_gallery(lives: Found) -> Gallery:
         pictures.append(Picture(image=png(figure), alt=f"Clearances of {point.label} over the life"))
     return Gallery(
         pictures=pictures, caption="Full: mean around the joint. Dashed: largest. One line for each run."
-    )
-
-
-def _slider(mechanism: Mechanism, found: Found) -> Fragment:
-    """The leg over a gait cycle, with the forces of an example run of each point."""
-    linkage, frames = build_linkage(mechanism), len(found[0][1]["example_eccentricity_m"])
-    motion = one_cycle(linkage, frames, 1.0)
-    runs = []
-    for point, arrays in found:
-        places = arrays["example_eccentricity_m"] / point.clearance_m
-        run = run_data(point.label, clearance_joints_of(arrays), arrays["example_contact_force_n"], places)
-        runs.append(run | {"clearance_mm": round(1.0e3 * point.clearance_m, 4)})
-    longest_n = max(run["largest_n"] for run in runs)
-    reach = Reach(linkage, 1, motion.crank_angle, motion.q, turns=True)
-    data = leg_data(reach) | {"digits": 0, "skip": 2, "runs": runs, "longest_n": longest_n}
-    radius = mechanism.clearances[clearance_joints_of(found[0][1])[0]].bushing_radius
-    factor = _CLEARANCE_FRACTION * radius / found[0][0].clearance_m
-    caption = (
-        "One gait cycle of one run, as an example. The leg is to scale. Arrows show the force of the bushing "
-        f"on the pin; their length grows with the root of the force, up to {longest_n:.0f} N. Circles show "
-        f"each pin in its bushing, with the clearance magnified about {factor:.0f} times."
-    )
-    return leg_slider(
-        data, "The leg at the chosen crank angle, with the contact forces in its clearance joints", caption
     )
 
 

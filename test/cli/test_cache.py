@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from leg_wear_monitor.cli import kernels
-from leg_wear_monitor.cli.common import compilation, is_compiled
 from leg_wear_monitor.compiled import kernel
 
 
@@ -40,12 +39,11 @@ def test_nothing_is_removed_where_no_place_is_safe(run, monkeypatch):
     assert result.stderr == "error: no directory is safe for compiled code, so it is not stored\n"
 
 
-def test_what_was_filled_is_not_compiled_again(run, place, monkeypatch):
+def test_a_fill_prints_the_place_and_the_size(run, place, monkeypatch):
     monkeypatch.setattr(kernels, "_CALLS", {"nothing": int})
     result = run("cache", "--fill")
     assert result.exit_code == 0
     assert result.stdout.startswith(f"place: {place}\ntotal: ")
-    assert all(is_compiled(one) for one in kernels.SETS)
     assert run("cache", "--fill", "--clear").exit_code == 2
 
 
@@ -56,9 +54,3 @@ def test_after_a_fill_nothing_is_compiled(run, place):
     before = sorted(file for file in place.rglob("*.nbc"))
     subprocess.run([sys.executable, "-c", line], check=True, cwd=Path(__file__).parents[2])
     assert before and sorted(file for file in place.rglob("*.nbc")) == before
-
-
-def test_a_run_ends_well_while_the_cache_is_cleared(place, run):
-    with compilation("clearance"):
-        run("cache", "--clear")
-    assert list(place.iterdir()) == []

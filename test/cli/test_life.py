@@ -51,34 +51,21 @@ def test_life_tells_regime_limits_and_the_makers_own_life(run, refused, shipped,
     assert rule.exit_code == 0
     assert "B not counted: its pair gives no wear coefficient" in rule.stdout
     assert "nan" not in rule.stdout
-    (rating,) = [one for one in rule.stdout.splitlines() if one.startswith("B: maker's rating life ")]
-    assert "all factors 1; its formula holds from 0.025 MPa m/s" in rating
+    (rating,) = [one for one in rule.stdout.splitlines() if one.startswith("B: the maker's rating life is ")]
     (tmp_path / "beside.yaml").write_text(
         text.replace("wear_coefficient: 1.0e-15", f"{pair}\n    wear_coefficient: 1.0e-15")
     )
     result = run("life", "--mechanism", "beside.yaml", *ONE[3:], "--limit-m", "5.2e-4")
     assert result.exit_code == 0
-    assert (
-        "holds for B, C: a value beside skf-ptfe-composite-on-steel (dry), wear coefficient 1e-15"
-        in result.stdout
-    )
+    assert "B holds for a value beside skf-ptfe-composite-on-steel (dry)\n" in result.stdout
     assert result.stdout.count("maker's rating life") == 2
     assert rating in result.stdout  # the formula knows nothing of a coefficient
 
 
-def test_a_factor_on_the_wear_is_reported_beside_the_coefficient(run):
-    result = run(*ONE, "--limit-m", "5.2e-4", "--wear-factor", "100")
-    assert "wear coefficient 1e-15 1/Pa, times 100\n" in result.stdout
-
-
-def test_life_under_a_duty_tells_hours_days_and_growth_by_load(run):
+def test_life_under_a_duty_tells_hours_and_days(run):
     few = ("--clearances", "A,G", "--legs", "1", "--cycles", "2", "--limit-m", "3.1e-4")
     result = run("life", *few, "--duty", "0:2,600:6", "--json", "life.json")
     assert result.exit_code == 0
-    assert re.search(
-        r"growth when new \[µm a million gait cycles\] +A +G\n0 N, 2 h a day +\S+ +\S+\n", result.stdout
-    )
-    assert "600 N, 6 h a day" in result.stdout
     found = json.loads(Path("life.json").read_text())["duty"]
     assert (found["peak_n"], found["hours_per_day"], found["limit_m"]) == ([0.0, 600.0], [2.0, 6.0], 3.1e-4)
     for name, end in found["end"].items():
@@ -98,7 +85,7 @@ def test_the_table_of_a_life_has_its_first_and_its_last_point(points):
         growth_error_m_per_cycle=nothing, error_m=np.zeros(points), depth=np.zeros((points, 1, 2, 4)),
         rubbing_j_per_cycle=nothing, period_s=1.0, duty=None, part_growth_m_per_cycle=nothing[:, None],
     )  # fmt: skip
-    rows = [int(line.split()[0]) for line in life_lines(life, 1.0, ["A"])[2:-2]]
+    rows = [int(line.split()[0]) for line in life_lines(life, 1.0, {})[1:-2]]
     assert (rows[0], rows[-1], len(set(rows))) == (1, points, min(points, 12))
 
 

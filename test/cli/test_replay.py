@@ -5,13 +5,11 @@ import json
 import random
 import re
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from spoilt_json import spoilt
 
-from leg_wear_monitor.cli import replays
 from leg_wear_monitor.cli.verbs import replay as verb
 from leg_wear_monitor.state import Level, State
 
@@ -175,15 +173,12 @@ def test_an_alarm_asked_for_fails(run, bag, tmp_path):
     ],
 )
 def test_what_counts_as_an_alarm_asked_for(name, level, asked, raised):
-    result = SimpleNamespace(history=SimpleNamespace(worst={name: level}))
-    assert replays.is_raised(result, asked) == raised
+    assert verb.is_raised({name: level}, asked) == raised
 
 
 @pytest.mark.parametrize("state", list(State))
 def test_a_verdict_that_asks_to_act_fails_where_it_is_asked_for(state):
-    report = SimpleNamespace(verdict=SimpleNamespace(state=state))
-    result = SimpleNamespace(monitor=SimpleNamespace(verdict=report))
-    assert replays.asks_to_act(result) == (state.value in ("not_monitored", "inspect", "stop"))
+    assert verb.asks_to_act(state) == (state.value in ("not_monitored", "inspect", "stop"))
 
 
 @pytest.mark.parametrize(
@@ -195,7 +190,7 @@ def test_a_verdict_that_asks_to_act_fails_where_it_is_asked_for(state):
         (["{bag}", "--config", "nowhere.yaml"], "error: nowhere.yaml: "),
         (["{bag}", "--time", "wall"], "error: Invalid value for '--time'"),
         (["{bag}", "--fail-on", "wear"], "error: Invalid value for '--fail-on'"),
-        (["{bag}", "--out", "{bag}"], "error: --out: {bag}: is a file, expected a directory"),
+        (["{bag}", "--out", "{bag}"], "error: --out: {bag}: cannot be written: Not a directory"),
         (["empty.mcap", "--out", "out"], "error: empty.mcap: is empty, expected an MCAP file"),
     ],
 )
@@ -230,7 +225,6 @@ def test_without_a_believable_gait_cycle_there_are_no_forces(
     result = run("replay", str(write(tmp_path / "x.mcap", stamps, angle)), "--out", "out")
     assert result.exit_code == 1
     assert f"warning: no gait cycle fits this leg, so no forces are given: {why}" in complaints(result)
-    assert "pm/cycle" not in result.stdout
     assert "speed" not in result.stdout
     record = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert record["joints"] == {}

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, TypeVar
 import click
 
 from leg_wear_monitor.cli import common
-from leg_wear_monitor.cli.verbs.study import DEFAULT_MODEL
 from leg_wear_monitor.errors import ConfigError, ConfigWarning, LegWearError, extras_hinted
 from leg_wear_monitor.files import json_text, package_version, share_directory
 
@@ -105,8 +104,7 @@ def _kernels() -> str:
     if place is None:
         return "compiled at every start: no place for compiled code is private"
     common.check_directory("NUMBA_CACHE_DIR", place)
-    state = "compiled" if common.is_compiled(DEFAULT_MODEL) else "to be compiled by the first simulation"
-    return f"{state}, in {place}"
+    return f"compiled once, in {place}"
 
 
 def _files(names: tuple[str, ...]) -> Mapping[str, Callable[[], str]]:
@@ -229,7 +227,7 @@ def _mechanism(name: str) -> str:
     from leg_wear_monitor.mechanism.plausible import doubts
 
     leg = load_mechanism(name)
-    with common.compilation("mechanism", how_long="a few seconds"):
+    with common.compilation():
         from leg_wear_monitor.contact.conformity import conformity_doubts
         from leg_wear_monitor.dynamics.simulation import prepare
 
@@ -237,7 +235,8 @@ def _mechanism(name: str) -> str:
     common.warn_of(leg.source, (*doubts(leg), *conformity_doubts(linkage)))
     what = (
         f"{len(leg.bodies)} moving bodies, {len(leg.joints)} joints "
-        f"({common.joints_words(leg.clearance_joints)}), mobility 1, closes, and the crank turns through"
+        f"(clearance joints {', '.join(leg.clearance_joints) or 'none'}), mobility 1, closes, and the crank "
+        "turns through"
     )
     return "\n".join([what, *(f"{'':13} {statement}" for statement in understood(linkage))])
 
@@ -365,7 +364,6 @@ def cache(fill: bool, clear: bool) -> None:
         from leg_wear_monitor.cli import kernels
 
         kernels.compile_all(common.progress_bar("compiling numerical kernels (once per installation)"))
-        common.mark_compiled(kernels.SETS)
     kept = kept_directories(here.parent)
     click.echo(f"place: {here.parent}")
     if clear:

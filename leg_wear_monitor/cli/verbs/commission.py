@@ -106,7 +106,7 @@ def _run(
     from leg_wear_monitor.monitor.config.parameters import load_config
 
     base = load_config(path, node)
-    with common.compilation("commissioning", "monitor"), common.progress_bar("commissioning") as progress:
+    with common.compilation(), common.progress_bar("commissioning") as progress:
         result = propose(recordings, base, **topics, reference=reference, progress=progress)
     for fault in result.faults:
         click.echo(f"warning: {fault}", err=True)
@@ -123,7 +123,7 @@ def _run(
 @click.option(
     "--cadence",
     "cadences",
-    type=common.Number("rpm"),
+    type=float,
     multiple=True,
     metavar="RPM",
     help="Cadence, negative for clockwise; may be given several times.  [default: the commanded one]",
@@ -173,10 +173,7 @@ def reference(
         raise ConfigError(leg.source, "bodies", "no point is called toe, on which --load would act")
     force = read_toe_force(load) if load is not None else None
     began = time.perf_counter()
-    with (
-        common.compilation("monitor", how_long="about a minute"),
-        common.progress_bar("simulating") as progress,
-    ):
+    with common.compilation(), common.progress_bar("simulating") as progress:
         made = simulated_references(leg, cadences, progress, force)
     for cadence, one in zip(cadences, made, strict=True):
         cycles = len(one.torque_nm[-1])

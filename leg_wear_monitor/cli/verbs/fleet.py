@@ -10,7 +10,6 @@ import click
 from leg_wear_monitor.cli import common
 
 if TYPE_CHECKING:
-    from leg_wear_monitor.fleet.description import FleetDescription
     from leg_wear_monitor.fleet.overview import FleetOverview
 
 _OUT = "Directory of the fleet.  [default: out of the description, or fleet beside it]"
@@ -33,7 +32,7 @@ def fleet() -> None:
 @click.argument("description", type=click.Path(path_type=Path), metavar="FLEET.yaml")
 @common.out_option(_OUT)
 @common.workers_option
-@common.scheduler_option("count")
+@common.scheduler_option
 @common.memory_option
 @_fresh_option
 def update(
@@ -57,7 +56,7 @@ def update(
     out = out or legs.out
     common.check_directory("--out", out)
     if not scheduler:
-        _compile(legs)
+        common.compile_monitor(legs.legs[0].config)
     with common.progress_bar("updating the fleet") as progress:
         done = update_fleet(
             legs,
@@ -91,19 +90,6 @@ def report(path: Path, out: Path | None, fresh_days: float) -> None:
     out = out or fleet_directory(path)
     _write_pages(out, load_overview(out), fresh_days)
     click.echo(f"written: {out / common.PAGE}")
-
-
-def _compile(legs: "FleetDescription") -> None:
-    """Compile all that the monitors of these legs need: once, and not in every worker at the same time."""
-    if common.is_compiled("monitor"):
-        return
-    from leg_wear_monitor.dynamics.clearance.stepper import advance_beside
-    from leg_wear_monitor.mechanism.loader import load_mechanism
-    from leg_wear_monitor.monitor.wear_monitor import WearMonitor
-
-    config = legs.legs[0].config
-    with common.compilation("monitor", how_long="about a minute"), advance_beside():
-        WearMonitor(load_mechanism(config.mechanism), config).warm_up()
 
 
 def _write_pages(out: Path, overview: "FleetOverview", fresh_days: float) -> None:

@@ -1,6 +1,5 @@
 """Verbs on lives: ``life``, ``design``."""
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +13,6 @@ if TYPE_CHECKING:
     from leg_wear_monitor.life.design import BushingLife
     from leg_wear_monitor.life.result import Life
     from leg_wear_monitor.mechanism.arrays import Floats
-    from leg_wear_monitor.mechanism.materials import RatingLife
     from leg_wear_monitor.mechanism.spec import Mechanism
 
     Lives = list[tuple[Floats, Life]]  # factors on the joints' wear coefficients, and the life with them
@@ -27,19 +25,22 @@ _TABLE_ROWS = 12  # most rows of the printed table, spread over the life
 
 @click.command(short_help="Simulate the wear of a leg over its life, by cycle jumps.")
 @common.mechanism_option
-@common.clearances_option("A,B")
+@common.clearances_option
 @common.speed_option
 @common.limit_option
-@common.number_option("--horizon-cycles", "N", "Largest number of gait cycles.", above=0.0, default=1.0e9)
-@common.number_option("--wear-factor", "X", "Factor on all wear coefficients.", above=0.0, default=1.0)
+@common.option("--horizon-cycles", "N", "Largest number of gait cycles.", type=common.POSITIVE, default=1.0e9)
+@common.option("--wear-factor", "X", "Factor on all wear coefficients.", type=common.POSITIVE, default=1.0)
 @common.option(
     "--duty",
     "N:H,...",
-    "Hours a day at each peak of the ground's vertical force on the toe [N], such as 0:2,300:5,600:1. "
+    "Hours a day at each peak of the ground's vertical force on the toe [N], such as 0:2,300:5,600:1.  "
     "[default: the mechanism's own loads]",
 )
-@common.number_option(
-    "--max-wear-per-jump-m", "M", "Deepest change of a surface in a jump.  [default: 3e-05]", "m", above=0.0
+@common.option(
+    "--max-wear-per-jump-m",
+    "M",
+    "Deepest change of a surface in a jump [m].  [default: 3e-05]",
+    type=common.POSITIVE,
 )
 @common.option("--legs", "N", "Number of legs averaged.  [default: 2]", type=click.IntRange(min=1))
 @common.option("--cycles", "N", "Gait cycles of each leg averaged.  [default: 4]", type=click.IntRange(min=2))
@@ -60,27 +61,24 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
     the values scatter; the scatter is reported.
     """
     from leg_wear_monitor.mechanism.loader import load_mechanism
-    from leg_wear_monitor.mechanism.materials import lacks_wear
     from leg_wear_monitor.mechanism.plausible import doubts
 
-    names = options.pop("clearances")
+    names, limit_m = options.pop("clearances"), options["limit_m"]
     leg = common.with_clearance_joints(load_mechanism(mechanism), names)
     common.check_outputs(json_file, out)
     with common.options_named():
         lives = _lives(leg, **options)
     # only after success: the message of a failure names the doubts itself
     common.warn_of(leg.source, doubts(leg))
-    result = lives[0][1]
-    text = json_text(_document(leg, lives, options["limit_m"]))
+    result, document = lives[0][1], _document(leg, lives, limit_m)
+    text = json_text(document)
     written = common.write_json(json_file, text)
     if out is not None:
         from leg_wear_monitor.report.figure import life_picture
 
         files = {"life.json": text.encode(), "life.png": life_picture(result)}
         written += common.write_directory(out, files)
-    not_counted = [joint for joint in leg.clearance_joints if lacks_wear(leg.clearances[joint])]
-    printed = life_lines(result, options["limit_m"], not_counted)
-    common.say(json_file, [*printed, *_remarks(leg, result, options["wear_factor"])], written)
+    common.say(json_file, life_lines(result, limit_m, document["validity"]), written)
 
 
 def _lives(
@@ -108,7 +106,7 @@ def _lives(
     sizes = np.array([[joint.radial_clearance, joint.bushing_radius] for joint in joints])
     clearance_m, radius_m = sizes.reshape(-1, 2).T
     check_life(leg.clearance_joints, clearance_m, radius_m, options["limit_m"], settings.jump)
-    with common.compilation("clearance"), common.progress_bar("life") as progress:
+    with common.compilation(), common.progress_bar("life") as progress:
         return list(simulate_lives(leg, settings, ensemble_size, progress=progress, duty=loads, **options))
 
 
@@ -126,84 +124,28 @@ def _document(leg: "Mechanism", lives: "Lives", limit_m: float) -> dict[str, Any
     }
 
 
-def _remarks(leg: "Mechanism", result: "Life", wear_factor: float) -> list[str]:
-    """The wear regime of each joint, and its limits of load and speed, rating life and wide contacts."""
-    from leg_wear_monitor.life.result import contact_doubts, pressure_speed, rating_hours
-    from leg_wear_monitor.mechanism.materials import bushing_of, load_material, regimes
-
-    found = regimes(leg, result.clearance_joints, wear_factor).items()
-    remarks = [f"holds for {', '.join(joints)}: {what}" for what, joints in found]
-    for joint, load in pressure_speed(leg, result).items():
-        settings = leg.clearances[joint]
-        beyond = bushing_of(leg, joint).loaded(0.0, 0.0, 0.0, load).outside_limits
-        remarks += [f"{joint}: {beyond}"] if beyond else []
-        hours = rating_hours(settings, load)
-        if hours is not None:
-            constants = load_material(settings.material).rating_life
-            remarks.append(
-                f"{joint}: maker's rating life {_rating_life(hours, load, result.period_s, constants)}"
-            )
-    return remarks + [f"{joint}: {doubt}" for joint, doubt in contact_doubts(leg, result).items()]
-
-
-def _rating_life(hours: float, load: float, period_s: float, constants: "RatingLife | None") -> str:
-    """The maker's rating life of a bushing at a load p v [Pa m/s], and the range of its formula."""
-    least = constants.least_pressure_speed.si if constants else 0.0
-    largest = constants.largest_pressure_speed if constants else None
-    validity = f"its formula holds from {1e-6 * least:g}"
-    validity += f" to {1e-6 * largest.si:g} MPa m/s" if largest else " MPa m/s"
-    at = f"p v {1e-6 * load:.3g} MPa m/s"
-    if math.isnan(hours):
-        return f"not given at {at}: {validity}"
-    # below its range, the formula is evaluated at the lower end
-    below = f", {1e-6 * least:g} inserted" if load < least else ""
-    cycles = 3600.0 * hours / period_s
-    return f"{hours:.3g} h ({cycles:.3g} gait cycles) at {at}{below}, all factors 1; {validity}"
-
-
-def life_lines(result: "Life", limit_m: float, not_counted: Sequence[str]) -> list[str]:
-    """The life as a table of some of its points, and when each joint reaches the limit."""
+def life_lines(result: "Life", limit_m: float, validity: dict[str, Any]) -> list[str]:
+    """Mean clearances [µm] at some points of the life, when each joint reaches the limit, and what holds."""
     points = len(result.cycles)
     rows = min(_TABLE_ROWS, points)
-    shown = [round(i * (points - 1) / max(1, rows - 1)) for i in range(rows)]
-    head = "".join(f"{joint:>22}" for joint in result.clearance_joints)
-    table = [
-        f"{'cycles':>10}{head}",
-        f"{'':10}" + f"{'mean µm  deg  peak N':>22}" * len(result.clearance_joints),
-    ]
-    for i in shown:
-        cells = "".join(
-            f"{1e6 * result.clearance_m[i, k]:11.1f}{_degrees(result.worst_sector_deg[i, k]):>5}"
-            f"{result.peak_force_n[i, k]:6.0f}"
-            for k in range(len(result.clearance_joints))
-        )
-        table.append(f"{result.cycles[i]:10.3g}{cells}")
-    table.append(f"jumps: {points - 1}; largest error of one: {1e6 * result.error_m.max():.2g} µm")
-    if result.duty:
-        table += _growth_by_load(result)
+    lines = [f"{'cycles':>10}" + "".join(f"{f'{joint} µm':>10}" for joint in result.clearance_joints)]
+    for i in (round(row * (points - 1) / max(1, rows - 1)) for row in range(rows)):
+        cells = "".join(f"{1e6 * each:10.1f}" for each in result.clearance_m[i])
+        lines.append(f"{result.cycles[i]:10.3g}{cells}")
+    lines.append(f"jumps: {points - 1}; largest error of one: {1e6 * result.error_m.max():.2g} µm")
     ends = result.end(limit_m)
     for joint in (*result.clearance_joints, *(["leg"] if result.duty else [])):
-        if joint in not_counted:
-            table.append(f"{joint} not counted: its pair gives no wear coefficient")
+        if joint in validity and not validity[joint]["is_counted"]:
+            lines.append(f"{joint} not counted: its pair gives no wear coefficient")
         else:
-            table.append(f"{joint} {_life_end(result, ends[joint], limit_m)}")
-    return table
-
-
-def _growth_by_load(result: "Life") -> list[str]:
-    """Growth of each joint's clearance in the new leg, under each load of the duty."""
-    table = [
-        "growth when new [µm a million gait cycles]" + "".join(f"{j:>10}" for j in result.clearance_joints)
-    ]
-    for part, (peak_n, hours) in enumerate(result.duty.hours_by_peak.items() if result.duty else ()):
-        growth = 1e12 * result.part_growth_m_per_cycle[0, part]
-        table.append(f"{f'{peak_n:g} N, {hours:g} h a day':42}" + "".join(f"{one:10.3g}" for one in growth))
-    return table
-
-
-def _degrees(sector_deg: float) -> str:
-    """Direction of the deepest wear, for the table; a dash before there is any."""
-    return "-" if math.isnan(sector_deg) else f"{sector_deg:.0f}"
+            lines.append(f"{joint} {_life_end(result, ends[joint], limit_m)}")
+    for joint, known in validity.items():
+        lines.append(f"{joint} holds for {known['holds_for']}")
+        if known["rating_life_h"] is not None:
+            lines.append(f"{joint}: the maker's rating life is {known['rating_life_h']:.3g} h, all factors 1")
+        doubts = filter(None, (known["outside_limits"], known["outside_contact_law"]))
+        lines += [f"{joint}: {doubt}" for doubt in doubts]
+    return lines
 
 
 def _life_end(result: "Life", end: dict[str, float | None], limit_m: float) -> str:
@@ -232,15 +174,19 @@ def _numbers(ctx: click.Context, param: click.Parameter, value: str) -> tuple[fl
 
 @click.command(short_help="Find bushings with which each joint lasts the hours wanted.")
 @click.argument("mechanism", default="bionic_leg")
-@common.clearances_option("A,B")
+@common.clearances_option
 @common.option(
     "--duty",
     "N:H,...",
     "Hours a day at each peak of the ground's vertical force on the toe [N], such as 0:2,300:5.",
     default="0:8",
 )
-@common.number_option(
-    "--hours", "H", "Hours of walking that each joint should last.", "h", above=0.0, default=1000.0
+@common.option(
+    "--hours",
+    "H",
+    "Hours of walking that each joint should last.",
+    type=common.POSITIVE,
+    default=1000.0,
 )
 @common.limit_option
 @common.option("--materials", "NAME,...", "Pairs to try.  [default: all that come with the package]")
@@ -276,7 +222,7 @@ def design(
 
     leg = common.with_clearance_joints(load_mechanism(mechanism), clearances)
     common.check_outputs(json_file, None)
-    with common.options_named(), common.compilation("clearance"), common.progress_bar("design") as progress:
+    with common.options_named(), common.compilation(), common.progress_bar("design") as progress:
         table = of_leg(
             leg,
             Duty.parse(duty),

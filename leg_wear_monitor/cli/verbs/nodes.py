@@ -99,26 +99,19 @@ def demo(out: Path) -> int:
 
 
 def _compile(out: Path) -> None:
-    """Compile what the nodes need: the monitor's kernels here, the motion and the leg in processes beside."""
+    """Compile what the nodes need: the monitor's kernels here, the leg in a process beside."""
+    from leg_wear_monitor.monitor.config.settings import MonitorConfig
     from leg_wear_monitor.workers import python_command  # numba: not for --help
-
-    if common.is_compiled("monitor") and common.is_compiled("gait"):
-        return
-    from leg_wear_monitor.dynamics.clearance.stepper import advance_beside
-    from leg_wear_monitor.mechanism.loader import load_mechanism
-    from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 
     log_path = out / "compilation.log"
     with (
-        common.compilation("monitor", "gait", how_long="about a minute"),
         log_path.open("wb") as log,
         # a group of its own: Ctrl-C reaches it by us, once
         subprocess.Popen(python_command(compile_leg), stdout=log, stderr=log, start_new_session=True) as leg,
         closed_on_interrupt(leg.kill),
-        advance_beside(),
     ):
         try:
-            WearMonitor(load_mechanism()).warm_up()
+            common.compile_monitor(MonitorConfig())
             leg.wait()
         finally:
             leg.kill()

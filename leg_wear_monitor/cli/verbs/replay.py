@@ -11,13 +11,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from leg_wear_monitor.cli import common
-from leg_wear_monitor.cli.replays import is_failed, write_replay
 from leg_wear_monitor.errors import ConfigError, closed_on_interrupt
-from leg_wear_monitor.monitor.alarm_specs import KINDS
+from leg_wear_monitor.files import package_version
+from leg_wear_monitor.monitor.alarm_specs import INPUT_KINDS, KINDS
+from leg_wear_monitor.state import Level, State
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from leg_wear_monitor.monitor.config.settings import MonitorConfig
     from leg_wear_monitor.playback.summary import ReplayResult
 
@@ -35,7 +34,6 @@ TIMES = ("header", "log", "publish")
 @common.config_option
 @click.option(
     "--time",
-    "time_source",
     type=click.Choice(TIMES),
     default="header",
     show_default=True,
@@ -68,6 +66,8 @@ TIMES = ("header", "log", "publish")
 def replay(
     bags: tuple[Path, ...],
     out: Path | None,
+    config: Path | None,
+    crank_joint: str | None,
     json_file: Path | None,
     allow_partial: bool,
     fail_on: tuple[str, ...],
@@ -75,18 +75,29 @@ def replay(
 ) -> int:
     """Replay recordings through the monitor: MCAP, .db3, CSV and Parquet files or bag directories.
 
-    Several paths are one recording. Exits with 1 if parts of it were lost, if
-    no gait cycle in it fits this leg, if all of it is in the ledger already, or if the verdict is or an alarm
-    was one of --fail-on.
+    Several paths are one recording. Exits with 1 if parts of it were lost, if no gait cycle in it fits this
+    leg, if all of it is in the ledger already, or if the verdict is or an alarm was one of --fail-on.
     """
     common.check_outputs(json_file, out)
-    written: list[Path] = []
-
-    def write(result: "ReplayResult", wall_s: float) -> None:
-        written.extend(write_replay(result, wall_s, out, json_file))
-
+    written, began, took = list[Path](), [0.0], [0.0]
     is_report_there = out is not None and (out / common.SUMMARY).exists()
-    result, wall_s = _run(bags, out, write, **options)
+
+    def ready(monitor: Any) -> None:
+        common.warn_of(str(config or "parameters"), monitor.coefficient_doubts)
+        with common.compilation(), closed_on_interrupt(monitor.abandon):
+            monitor.warm_up()
+        began[0] = time.perf_counter()
+
+    def finish(result: "ReplayResult") -> None:
+        took[0] = time.perf_counter() - began[0]
+        written.extend(write_replay(result, took[0], out, json_file))
+
+    from leg_wear_monitor.dynamics.clearance.stepper import advance_beside
+    from leg_wear_monitor.playback.replay import replay as run
+
+    settings = _config(config, crank_joint, options["node"])
+    with common.progress_bar("replaying") as progress, advance_beside():
+        result = run(bags, settings, out=out, ready=ready, progress=progress, finish=finish, **options)
     common.print_findings([finding.line for finding in result.findings])
     if result.is_unusable:
         missing = result.evidence.missing()
@@ -94,52 +105,11 @@ def replay(
     if json_file != common.STDOUT:
         from leg_wear_monitor.cli.tables import print_replay
 
-        print_replay(result, wall_s)
+        print_replay(result, took[0])
     common.say(json_file, (), written)
     if is_report_there and result.monitor.is_all_counted:
         click.echo(f"warning: {out}: nothing was counted, so the earlier report stays as it is", err=True)
     return common.WITH_FINDINGS if is_failed(result, allow_partial, fail_on) else 0
-
-
-def _run(
-    bags: tuple[Path, ...],
-    out: Path | None,
-    write: "Callable[[ReplayResult, float], None]",
-    config: Path | None,
-    time_source: str,
-    crank_joint: str | None,
-    node: str | None,
-    **options: Any,
-) -> tuple["ReplayResult", float]:
-    """The result, and the time [s] it took once all was compiled."""
-    from leg_wear_monitor.dynamics.clearance.stepper import advance_beside
-    from leg_wear_monitor.playback.replay import replay as run
-
-    began, took = [0.0], [0.0]
-
-    def ready(monitor: Any) -> None:
-        common.warn_of(str(config or "parameters"), monitor.coefficient_doubts)
-        with common.compilation("monitor", how_long="about a minute"), closed_on_interrupt(monitor.abandon):
-            monitor.warm_up()
-        began[0] = time.perf_counter()
-
-    def finish(result: "ReplayResult") -> None:
-        took[0] = time.perf_counter() - began[0]
-        write(result, took[0])
-
-    with common.progress_bar("replaying") as progress, advance_beside():
-        result = run(
-            bags,
-            _config(config, crank_joint, node),
-            node=node,
-            out=out,
-            time=time_source,
-            ready=ready,
-            progress=progress,
-            finish=finish,
-            **options,
-        )
-    return result, took[0]
 
 
 def _config(path: Path | None, crank_joint: str | None, node: str | None) -> "MonitorConfig":
@@ -157,6 +127,47 @@ def _config(path: Path | None, crank_joint: str | None, node: str | None) -> "Mo
     common.warn_of(leg.source, doubts(mechanism))
     common.warn_of(source, (*parameter_doubts(config, leg), *life_doubts(config, leg)))
     return config if crank_joint is None else attrs.evolve(config, crank_joint=crank_joint)
+
+
+def is_failed(result: "ReplayResult", allow_partial: bool, fail_on: tuple[str, ...]) -> bool:
+    """Whether the exit code tells of findings."""
+    return (
+        (result.is_partial and not allow_partial)
+        or is_raised(result.history.worst, fail_on)
+        or result.is_unusable
+        or result.monitor.is_all_counted
+        or ("verdict" in fail_on and asks_to_act(result.monitor.state.verdict.state))
+    )
+
+
+def asks_to_act(state: State) -> bool:
+    """Whether the verdict at the end asks a person to do something, or cannot be given."""
+    return state in (State.NOT_MONITORED, State.INSPECT, State.STOP)
+
+
+def is_raised(worst: dict[str, Level], fail_on: tuple[str, ...]) -> bool:
+    """Whether an alarm asked for was raised at any time, by the highest level of each kind."""
+    highest = max(worst.values(), default=Level.OK)
+    if ("alarm" in fail_on and highest is Level.ERROR) or ("warning" in fail_on and highest > Level.OK):
+        return True
+    asked = {*fail_on, *(INPUT_KINDS if "input" in fail_on else ())}
+    return any(level is Level.ERROR and kind in asked for kind, level in worst.items())
+
+
+def write_replay(
+    result: "ReplayResult", wall_s: float, out: Path | None, json_file: Path | None
+) -> list[Path]:
+    """Write what was asked for, and give the files."""
+    if out is None and json_file is None:
+        return []
+    from leg_wear_monitor.playback.replay import REPORTS_FILE
+
+    summary = result.summary(wall_s, made_with={"leg_wear_monitor": package_version()})
+    text, written = summary.to_json(), list[Path]()
+    if out is not None and not (result.monitor.is_all_counted and (out / common.SUMMARY).exists()):
+        files = {common.SUMMARY: text.encode(), common.PAGE: common.page_of(summary)}
+        written = [out / REPORTS_FILE, *common.write_directory(out, files)]
+    return written + common.write_json(json_file, text)
 
 
 # ``leg-wear-monitor report``: the page of a run again, from its data.

@@ -1,6 +1,5 @@
 """Verbs that compute and draw: ``simulate``, ``study``, ``draw``."""
 
-import math
 import time
 import warnings
 from contextlib import nullcontext
@@ -10,14 +9,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from leg_wear_monitor.cli import common
-from leg_wear_monitor.errors import ConfigError, ConfigWarning, LegWearError, printable
-from leg_wear_monitor.files import Stamp, share_directory, stamp_of
+from leg_wear_monitor.errors import ConfigError, ConfigWarning, printable
+from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.mechanism import FRICTION_LAWS, NORMAL_LAWS
 
 if TYPE_CHECKING:
     from leg_wear_monitor.dynamics.result import SimulationResult
     from leg_wear_monitor.mechanism.spec import Mechanism
-    from leg_wear_monitor.report.drawing import Drawing
     from leg_wear_monitor.studies.study import Study
 
 
@@ -40,7 +38,7 @@ NAMES = tuple(sorted(path.stem for path in (share_directory() / "config" / "stud
 @common.option("--mechanism", "FILE", "Use a different leg than the study file.")
 @common.path_option("--out", "DIR", "Data and page.", required=True)
 @common.workers_option
-@common.scheduler_option("compute")
+@common.scheduler_option
 def study(name: str, mechanism: str | None, out: Path, workers: int | None, scheduler: str | None) -> int:
     """Compute a study and write its page; the help above says more."""
     import attrs
@@ -66,7 +64,7 @@ def _compute(settings: "Study", out: Path, workers: int | None, scheduler: str |
     from leg_wear_monitor.studies.run import run_study
 
     leg = load_mechanism(settings.mechanism)
-    with common.compilation("clearance"), motion_beside():  # once, and not in every worker at the same time
+    with common.compilation(), motion_beside():  # once, and not in every worker at the same time
         if leg.clearances:
             simulate(leg, clearances=[next(iter(leg.clearances))], cycles=1.0 / 256.0, skip_cycles=0.0)
     with common.progress_bar(f"study {settings.title}") as progress:
@@ -101,32 +99,18 @@ def write_study_page(path: Path) -> int:
 
 
 _URDF = ".urdf"
-_SUFFIXES = (".html", ".svg", _URDF)
-_OURS = b"leg-wear-monitor draw"  # near the begin of what this verb writes
-_POLL_S = 0.2
+_OURS = b"leg-wear-monitor draw"  # near the start of what this verb writes
 
 
 @click.command(short_help="Draw a mechanism, working or not.")
 @click.argument("mechanism", metavar="MECHANISM")
 @common.path_option(
-    "--out", "FILE", "A file .html, .svg or .urdf.  [default: MECHANISM.html in this directory]"
+    "--out",
+    "FILE",
+    "A page .html, or .urdf for RViz: a tree of the links with the loops cut.  "
+    "[default: MECHANISM.html in this directory]",
 )
-@click.option(
-    "--urdf",
-    is_flag=True,
-    help="Write MECHANISM.urdf in place of a picture: a tree of its links with the loops cut, for RViz.",
-)
-@click.option("--forces", is_flag=True, help="Draw the forces in the joints, without clearance (.html).")
-@common.number_option(
-    "--crank-angle",
-    "DEG",
-    "Position to draw, or to show first.  [default: 0, or the one that shows what is wrong]",
-    "deg",
-)
-@click.option("--watch", is_flag=True, help="Draw again whenever the mechanism file is saved, until Ctrl-C.")
-def draw(
-    mechanism: str, out: Path | None, urdf: bool, forces: bool, crank_angle: float | None, watch: bool
-) -> int:
+def draw(mechanism: str, out: Path | None) -> int:
     """Draw a mechanism file, or a mechanism that comes with the package.
 
     The HTML page moves the mechanism through its cycle; it is one file and needs no network. Where the
@@ -134,120 +118,39 @@ def draw(
     does not turn through, the page shows the range and the bodies in line at its ends. The exit code is then
     1. Replaces a drawing of an earlier run, and no other file.
     """
-    target = Path(f"{Path(mechanism).stem}.{'urdf' if urdf else 'html'}") if out is None else out
+    target = Path(f"{Path(mechanism).stem}.html") if out is None else out
     _check_target(target)
-    if urdf or target.suffix.lower() == _URDF:
-        if forces or watch or crank_angle is not None or target.suffix.lower() != _URDF:
-            fault = f"{target} is a robot description, expected no other option than --out FILE.urdf"
-            raise ConfigError("--urdf", "", fault)
-        return _describe(mechanism, target)
-    if forces and target.suffix.lower() == ".svg":
-        raise ConfigError("--forces", "", f"{target} is a still picture, expected an --out FILE.html")
-    if watch:
-        return _watch(mechanism, target, forces, crank_angle)
-    return _draw(mechanism, target, forces, crank_angle)
+    from leg_wear_monitor.mechanism.loader import load_mechanism
+
+    leg = load_mechanism(mechanism)
+    found: tuple[str, ...] = ()
+    with common.compilation():
+        if target.suffix.lower() == _URDF:
+            from leg_wear_monitor.mechanism.urdf import urdf
+
+            head, _, robot = urdf(leg).partition("\n")
+            text, words = f"{head}\n<!-- made by {_OURS.decode()} -->\n{robot}", leg.name
+        else:
+            from leg_wear_monitor.mechanism.reach import findings, headline, reach_of
+            from leg_wear_monitor.report.drawing import drawing_html
+
+            reach = reach_of(leg)
+            text, words, found = drawing_html(reach), f"{leg.name}: {headline(reach)}", findings(reach)
+    common.write_file(target, text.encode())
+    click.echo(f"written: {target}: {printable(words)}")
+    for finding in found:
+        click.echo(f"warning: {leg.source}: {printable(finding)}", err=True)
+    return common.WITH_FINDINGS if found else 0
 
 
 def _check_target(path: Path) -> None:
     """Make sure that a drawing can be written, and that it replaces none but a drawing."""
-    if path.suffix.lower() not in _SUFFIXES:
-        raise ConfigError("--out", str(path), f"expected a file that ends in {' or '.join(_SUFFIXES)}")
+    if path.suffix.lower() not in (".html", _URDF):
+        raise ConfigError("--out", str(path), "expected a file that ends in .html or .urdf")
     common.check_file("--out", path)
-    if path.is_file():
-        with path.open("rb") as file:
-            is_ours = _OURS in file.read(4096)
-        if not is_ours:
-            raise ConfigError(
-                "--out", str(path), "exists and is no drawing of this command, expected another --out FILE"
-            )
-
-
-def _describe(mechanism: str, target: Path) -> int:
-    """Write a mechanism as URDF."""
-    from leg_wear_monitor.mechanism.loader import load_mechanism
-
-    leg = load_mechanism(mechanism)
-    with common.compilation("mechanism", how_long="a few seconds"):
-        from leg_wear_monitor.mechanism.urdf import urdf
-
-        text = urdf(leg)
-    head, _, robot = text.partition("\n")
-    common.write_file(target, f"{head}\n<!-- made by {_OURS.decode()} -->\n{robot}".encode())
-    click.echo(f"written: {target}: {printable(leg.name)}")
-    return 0
-
-
-def _draw(mechanism: str, target: Path, forces: bool, crank_angle: float | None, watch: bool = False) -> int:
-    """Draw once, and say what was drawn and what is wrong."""
-    from leg_wear_monitor.mechanism.loader import load_mechanism
-
-    leg = load_mechanism(mechanism)
-    angle = None if crank_angle is None else math.radians(crank_angle)
-    with common.compilation("mechanism", how_long="a few seconds"):
-        from leg_wear_monitor.report.drawing import drawing_of
-
-        drawing = drawing_of(leg, angle, forces)
-        content = _content(drawing, target, watch)
-    was_there = target.exists()
-    common.write_file(target, content)
-    how = "replaced" if was_there else "written"
-    click.echo(f"{how}: {target}: {printable(leg.name)}: {printable(drawing.headline)}")
-    for finding in drawing.findings:
-        click.echo(f"warning: {leg.source}: {printable(finding)}", err=True)
-    return common.WITH_FINDINGS if drawing.findings else 0
-
-
-def _content(drawing: "Drawing", target: Path, watch: bool) -> bytes:
-    if target.suffix.lower() == ".svg":
-        from leg_wear_monitor.report.drawing import drawing_svg
-
-        return drawing_svg(drawing)
-    from leg_wear_monitor.report.drawing import drawing_html
-
-    return drawing_html(drawing, is_watched=watch).encode()
-
-
-def _watch(mechanism: str, target: Path, forces: bool, crank_angle: float | None) -> int:
-    """Draw whenever the file has changed, until Ctrl-C; a fault in it is one line, until the next save."""
-    source = _source(mechanism)
-    drawn: Stamp | None = None
-    try:
-        while True:
-            stamp = stamp_of(source)
-            if any(stamp) and stamp != drawn:  # there is none while an editor replaces it
-                drawn = stamp
-                try:
-                    _draw(mechanism, target, forces, crank_angle, watch=True)
-                except LegWearError as error:
-                    click.echo(f"error: {printable(str(error))}", err=True)
-            time.sleep(_POLL_S)
-    except KeyboardInterrupt:
-        _finish(mechanism, target, forces, crank_angle)
-        return 0
-
-
-def _finish(mechanism: str, target: Path, forces: bool, crank_angle: float | None) -> None:
-    """Write the page for the last time, without the script that loads it again."""
-    try:
-        _draw(mechanism, target, forces, crank_angle)
-    except LegWearError:
-        click.echo(f"kept: {target} is of an earlier state of the file", err=True)
-
-
-def _source(mechanism: str) -> Path:
-    """The file to watch.
-
-    Raises
-    ------
-    ConfigError
-        If there is none.
-    """
-    from leg_wear_monitor.mechanism.loader import is_file_name, shipped_mechanisms
-
-    source = Path(mechanism) if is_file_name(mechanism) else shipped_mechanisms().get(mechanism)
-    if source is None or not source.is_file():
-        raise ConfigError(mechanism, "", "there is no such file to watch")
-    return source
+    if path.is_file() and _OURS not in path.read_bytes()[:4096]:
+        fault = "exists and is no drawing of this command, expected another --out FILE"
+        raise ConfigError("--out", str(path), fault)
 
 
 # ``leg-wear-monitor simulate``: the leg offline, ideal or with clearances.
@@ -262,15 +165,23 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
 
 @click.command(short_help="Simulate the leg offline, ideal or with clearances.")
 @common.mechanism_option
-@common.clearances_option("A,B|none")
-@common.number_option(
-    "--clearance-m", "M", "Radial clearance in metres.  [default: the mechanism's own]", "m", above=0.0
+@common.clearances_option
+@common.option(
+    "--clearance-m",
+    "M",
+    "Radial clearance [m].  [default: the mechanism's own]",
+    type=common.POSITIVE,
 )
 @common.speed_option
-@common.number_option("--cycles", "N", "Gait cycles to count.  [default: 5]", above=0.0)
-@common.number_option("--duration", "S", "Time to count, in seconds, instead of cycles.", "s", above=0.0)
-@common.number_option(
-    "--skip-cycles", "N", "Gait cycles before counting.  [default: 1; 0 with --duration]", at_least=0.0
+@common.option("--cycles", "N", "Gait cycles to count.  [default: 5]", type=common.POSITIVE)
+@common.option(
+    "--duration", "S", "Time [s] to count, in place of cycles.", "duration_s", type=common.POSITIVE
+)
+@common.option(
+    "--skip-cycles",
+    "N",
+    "Gait cycles before counting.  [default: 1; 0 with --duration]",
+    type=common.Number(min=0.0),
 )
 @click.option(
     "--model", type=click.Choice(MODELS), help=f"Formulation of the motion.  [default: {DEFAULT_MODEL}]"
@@ -288,8 +199,8 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
     f"Normal contact law of all clearance joints: {', '.join(NORMAL_LAWS)}.",
     type=click.Choice(NORMAL_LAWS),
 )
-@common.number_option(
-    "--restitution", "E", "Coefficient of restitution of all clearance joints.", "", above=0.0
+@common.option(
+    "--restitution", "E", "Coefficient of restitution of all clearance joints.", type=common.POSITIVE
 )
 @common.option(
     "--friction",
@@ -297,8 +208,11 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
     f"Friction law of all clearance joints: {', '.join(FRICTION_LAWS)}.",
     type=click.Choice(FRICTION_LAWS),
 )
-@common.number_option(
-    "--friction-coefficient", "MU", "Friction coefficient of all clearance joints.", "", at_least=0.0
+@common.option(
+    "--friction-coefficient",
+    "MU",
+    "Friction coefficient of all clearance joints.",
+    type=common.Number(min=0.0),
 )
 @common.option("--toe", "BODY.POINT", "Point whose motion is reported.  [default: the point called toe]")
 @click.option(
@@ -319,7 +233,7 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
 @common.out_option("Write result.json and pictures of the leg and its worn bushings.")
 def simulate(mechanism: str, json_file: Path | None, out: Path | None, **options: Any) -> None:
     """Simulate the motion of the leg, ideal or with clearances, and report forces and wear."""
-    if options["cycles"] is not None and options["duration"] is not None:
+    if options["cycles"] is not None and options["duration_s"] is not None:
         raise click.UsageError("--cycles and --duration cannot be combined")
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.mechanism.plausible import doubts, ratio_fault
@@ -341,9 +255,9 @@ def simulate(mechanism: str, json_file: Path | None, out: Path | None, **options
     common.say(json_file, (), written)
 
 
-def _keywords(clearances: str | None, wear: str, duration: float | None, **options: Any) -> dict[str, Any]:
+def _keywords(clearances: str | None, wear: str, **options: Any) -> dict[str, Any]:
     """Arguments of the library's simulate; what was not asked for is left to the library."""
-    keywords = {"wear": wear == "on", "duration_s": duration, **options}
+    keywords = {"wear": wear == "on", **options}
     if clearances is not None:
         names = [] if clearances.strip() == "none" else clearances.split(",")
         keywords["clearances"] = [name.strip() for name in names]
@@ -363,9 +277,8 @@ def _run(leg: "Mechanism", keywords: dict[str, Any]) -> tuple["SimulationResult"
     else:
         short["duration_s"] = _WARM_UP_S
     clearance_joints = keywords.get("clearances", leg.clearance_joints)
-    model = keywords.get("model") or default_model(leg)
-    kernels = model if clearance_joints else "ideal"
-    with common.compilation(kernels), motion_beside() if kernels == "clearance" else nullcontext():
+    is_clearance = clearance_joints and (keywords.get("model") or default_model(leg)) == "clearance"
+    with common.compilation(), motion_beside() if is_clearance else nullcontext():
         simulate(leg, **short)
     with common.progress_bar("simulating") as progress:
         began = time.perf_counter()

@@ -64,7 +64,7 @@ def opened(
     if joint is not None:
         leg.clearance_joint(joint)  # refuses an unknown joint before a ledger is made
     with copy_of(path) if dry_run else nullcontext(path) as place:
-        with common.compilation("monitor", how_long="about a minute"):
+        with common.compilation():
             monitor = open_monitor(load_mechanism(settings.mechanism), _on(settings, place), at_end=True)
         try:
             if config is None:
@@ -240,8 +240,8 @@ def reset(
 
 @click.command(short_help="Enter a measured clearance, which updates the forecast.")
 @click.argument("joint", required=False)
-@click.argument("mm", type=common.Number("mm", above=0.0), required=False)
-@common.number_option("--sigma", "MM", "Standard deviation of the measurement.", "mm", above=0.0)
+@click.argument("mm", type=common.POSITIVE, required=False)
+@common.option("--sigma", "MM", "Standard deviation of the measurement [mm].", type=common.POSITIVE)
 @common.config_option
 @common.ledger_option
 @click.option("--accept", is_flag=True, help="Use it even if it contradicts the model.")

@@ -2,7 +2,6 @@
 
 import os
 import re
-import stat
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack
@@ -15,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
-from ruamel.yaml.events import AliasEvent
 
 from leg_wear_monitor.bags.budget import Budget
 from leg_wear_monitor.bags.findings import (
@@ -23,75 +21,22 @@ from leg_wear_monitor.bags.findings import (
     Finding,
     RecordingError,
     Severity,
-    irregular_kind,
-    open_regular,
+    open_recording,
 )
 from leg_wear_monitor.bags.mcap_file import McapFile
 from leg_wear_monitor.bags.piece import Channel, Due, Piece
 from leg_wear_monitor.bags.table_layout import CSV, PARQUET, REMEDIES
 from leg_wear_monitor.bags.zstd import ZSTD_MAGIC, expand_message, expanded
-from leg_wear_monitor.configuration.strict import events_with_depth
 from leg_wear_monitor.errors import printable, system_asked
 from leg_wear_monitor.messages.streams import Stream, changed_fields, streams_of
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin import TORQUE
 
-# Reader of a bag directory's metadata.yaml (files, topics, compression), with limits on size and nesting.
-
-
-METADATA = "metadata.yaml"
-_LARGEST = 2**20  # bytes; a bag of 200 topics and 1000 files has some 250 kB
-_DEEPEST = 20
-
-
-def read_metadata(path: Path) -> tuple[list[str], dict[str, str]]:
-    """Read metadata.yaml.
-
-    Returns
-    -------
-    names : list of str
-        File names in order, without duplicates.
-    types : dict
-        Message type by topic name.
-
-    Raises
-    ------
-    DamageError
-        If the file is unreliable; the text is a predicate that follows the file name.
-    """
-    try:
-        if not stat.S_ISREG(path.stat().st_mode):
-            raise DamageError("is not a file")
-        if path.stat().st_size > _LARGEST:
-            raise DamageError(f"has {path.stat().st_size} bytes, expected at most {_LARGEST}")
-        with open_regular(path) as file:
-            text = file.read(_LARGEST).decode("utf-8")
-        _check_simple(text)
-        return _structured(YAML(typ="safe", pure=True).load(text)["rosbag2_bagfile_information"])
-    except (OSError, YAMLError, KeyError, TypeError, AttributeError, ValueError) as error:
-        raise DamageError("cannot be read") from error
-
-
-def _check_simple(text: str) -> None:
-    """Refuse YAML that can grow without limit from a few lines: aliases and deep nesting."""
-    for event, depth in events_with_depth(text):
-        if isinstance(event, AliasEvent):
-            raise DamageError("contains aliases, which no bag's metadata has")
-        if depth > _DEEPEST:
-            raise DamageError(f"is nested more than {_DEEPEST} deep")
-
-
-def _structured(information: Any) -> tuple[list[str], dict[str, str]]:
-    names = [Path(name).name for name in information["relative_file_paths"]]
-    topics = [topic["topic_metadata"] for topic in information.get("topics_with_message_count", [])]
-    named = [(topic["name"], topic["type"]) for topic in topics]
-    types = {name: kind for name, kind in named if isinstance(name, str) and isinstance(kind, str)}
-    return list(dict.fromkeys(names)), types
-
-
 # Resolve what a user names to an ordered list of recordings: bags (plain, split, compressed) and tables.
 
 
+METADATA = "metadata.yaml"
+_LARGEST = 2**20  # bytes of metadata; a bag of 200 topics and 1000 files has some 250 kB
 MCAP, IN_MEMORY = ".mcap", ""
 TABLES = (CSV, PARQUET, IN_MEMORY)
 _NAME = re.compile(r".*(\.mcap|\.db3)(\.zstd)?", re.DOTALL)
@@ -125,8 +70,6 @@ class BagFile:
         `MCAP`, `SQLITE`, `CSV`, `PARQUET`, or `IN_MEMORY`.
     compressed : bool
         Whether the whole file is compressed.
-    types : dict
-        Message type by topic name, from metadata.yaml.
     recording : int
         Index of the given path that the file belongs to.
     table : optional
@@ -136,7 +79,6 @@ class BagFile:
     path: Path
     storage: str
     compressed: bool = False
-    types: dict[str, str] = attrs.Factory(dict)
     recording: int = 0
     table: Any = None
 
@@ -169,10 +111,10 @@ def find_files(paths: Iterable[Recordable]) -> tuple[list[BagFile], list[Finding
             files.append(BagFile(name, IN_MEMORY, recording=number, table=given))
             continue
         path = Path(given)
-        mode = _mode(path)
-        if mode is None:
-            raise RecordingError(str(path), "", f"does not exist, expected {_EXPECTED}")
-        found = _directory(path, findings) if stat.S_ISDIR(mode) else [_file(path, mode)]
+        with system_asked(path, "cannot be read", error_of=RecordingError):
+            if not path.exists():
+                raise RecordingError(str(path), "", f"does not exist. Expected {_EXPECTED}")
+            found = _directory(path, findings) if path.is_dir() else [_file(path)]
         files += [attrs.evolve(file, recording=number) for file in found]
     if not files:
         raise RecordingError("", "", f"no recording given, expected {_EXPECTED}")
@@ -195,73 +137,46 @@ def is_bag_directory(path: Path) -> bool:
     )
 
 
-def _mode(path: Path) -> int | None:
-    """File mode of a path, or None if it does not exist; not opened, because a pipe would block forever."""
-    try:
-        return path.stat().st_mode
-    except (FileNotFoundError, NotADirectoryError):
-        return None
-    except (OSError, ValueError) as error:
-        why = error.strerror if isinstance(error, OSError) else error
-        raise RecordingError(str(path), "", f"cannot be read: {why}") from error
-
-
-def _file(path: Path, mode: int, types: dict[str, str] | None = None) -> BagFile:
+def _file(path: Path) -> BagFile:
     match = _NAME.fullmatch(path.name) or _TABLE.fullmatch(path.name)
     if match is None:
         remedy = REMEDIES.get(path.suffix.lower())
         text = remedy.format(path=path) if remedy else f"not a recording by its name. Expected {_EXPECTED}"
         raise RecordingError(str(path), "", text)
-    if what := irregular_kind(mode):
-        raise RecordingError(str(path), "", f"is {what}, expected a file")
-    return BagFile(path, match[1].lower(), match[2] is not None, types or {})
+    if not path.is_file():
+        raise RecordingError(str(path), "", f"not a file. Expected {_EXPECTED}")
+    return BagFile(path, match[1].lower(), match[2] is not None)
 
 
 def _directory(path: Path, findings: list[Finding]) -> list[BagFile]:
     """Files of a bag directory, ordered by its metadata; without metadata, ordered by file number."""
-    recordings = _recordings(path, findings)
-    named, types = _metadata(path / METADATA, findings)
-    if named:
-        missing = [name for name in named if name not in recordings]
-        for name in missing:
+    files = [file for file in path.iterdir() if _NAME.fullmatch(file.name) and file.is_file()]
+    named = _named(path / METADATA, findings)
+    for name in named:
+        if not (path / name).is_file():
             findings.append(Finding(path / METADATA, f"names {name}, which does not exist: it is lost"))
-        for name in recordings:
-            if name not in named:
-                findings.append(Finding(path / name, f"is not named by {METADATA}: it is not read"))
-        recordings = [name for name in named if name not in missing]
-    if not recordings:
+    for file in files:
+        if named and file.name not in named:
+            findings.append(Finding(file, f"is not named by {METADATA}: it is not read"))
+    chosen = [path / name for name in named if (path / name) in files] or sorted(files, key=_by_number)
+    if not chosen:
         raise RecordingError(str(path), "", "contains no .mcap or .db3 file")
-    return [_file(path / name, stat.S_IFREG, types) for name in recordings]
+    return [_file(file) for file in chosen]
 
 
-def _recordings(path: Path, findings: list[Finding]) -> list[str]:
-    """Names of the recording files in a directory (recognized by name), ordered by file number."""
-    with system_asked(path, "cannot be read", error_of=RecordingError):
-        named = sorted((file for file in path.iterdir() if _NAME.fullmatch(file.name)), key=_by_number)
-    names = []
-    for file in named:
-        what = irregular_kind(_mode(file) or 0)
-        if what:
-            findings.append(Finding(file, f"is {what}, expected a file: it is not read", Severity.NOTE))
-        else:
-            names.append(file.name)
-    return names
-
-
-def _metadata(path: Path, findings: list[Finding]) -> tuple[list[str], dict[str, str]]:
-    """File names and types of topics from the metadata; empty if there is no reliable metadata."""
-    if not os.path.lexists(path):
-        return [], {}
+def _named(path: Path, findings: list[Finding]) -> list[str]:
+    """Names of files in a bag's metadata; empty without readable metadata."""
+    if not path.exists():
+        return []
     try:
-        listed, types = read_metadata(path)
-    except DamageError as error:
-        findings.append(Finding(path, f"{error}: the directory's files are taken instead", Severity.NOTE))
-        return [], {}
-    names = [name for name in listed if _NAME.fullmatch(name)]
-    if names != listed:
-        text = "names other files than .mcap and .db3: they are not read"
+        with path.open("rb") as file:
+            text = file.read(_LARGEST).decode()
+        names = YAML(typ="safe", pure=True).load(text)["rosbag2_bagfile_information"]["relative_file_paths"]
+        return list(dict.fromkeys(Path(name).name for name in names))
+    except (OSError, YAMLError, LookupError, TypeError, ValueError):
+        text = "cannot be read: the directory's files are taken instead"
         findings.append(Finding(path, text, Severity.NOTE))
-    return names, types
+        return []
 
 
 def _by_number(path: Path) -> tuple[list[tuple[int, str]], str]:
@@ -323,15 +238,13 @@ def _option(stream: Stream) -> str:
     return "--drive-torque" if of_torque else f"--{stream.topic}".replace("_", "-")
 
 
-def check_channel(stream: Stream, channel: Channel, known_type: str, where: str) -> None:
+def check_channel(stream: Stream, channel: Channel, where: str) -> None:
     """Check that the messages of a channel can be decoded as those of a stream.
 
     Parameters
     ----------
     stream : Stream
     channel : Channel
-    known_type : str
-        Type of the topic from metadata.yaml; empty if unknown.
     where : str
         File name in errors.
 
@@ -340,7 +253,7 @@ def check_channel(stream: Stream, channel: Channel, known_type: str, where: str)
     RecordingError
         If they cannot; the message names the file, the topic and the expected type.
     """
-    kind = channel.type or known_type or stream.type
+    kind = channel.type or stream.type
     if kind != stream.type:
         raise RecordingError(where, channel.topic, f"is of type {kind}, expected {stream.type}")
     if channel.encoding != "cdr":
@@ -388,8 +301,7 @@ class Source:
         """Select the channels of a topic, to be read as a stream."""
         for number, channel in self.file.channels.items():
             if channel.topic == topic:
-                known = self.bag_file.types.get(topic, "")
-                check_channel(stream, channel, known, str(self.bag_file.path))
+                check_channel(stream, channel, str(self.bag_file.path))
                 self.types[number] = stream.code
 
     def pieces(self) -> Iterator[Due]:
@@ -492,12 +404,13 @@ def _open(bag_file: BagFile, config: MonitorConfig, budget: Budget, stack: ExitS
             from leg_wear_monitor.bags.table_file import TableFile  # pyarrow takes a quarter of a second
 
             is_file = bag_file.storage != IN_MEMORY
-            content = stack.enter_context(open_regular(path)) if is_file else bag_file.table
+            content = stack.enter_context(open_recording(path)) if is_file else bag_file.table
             return TableFile(bag_file.path, content, bag_file.storage, config, budget)
         if bag_file.storage == MCAP:
-            return McapFile(bag_file.path, stack.enter_context(open_regular(path)), budget)
+            return McapFile(bag_file.path, stack.enter_context(open_recording(path)), budget)
         from leg_wear_monitor.bags.database import DatabaseFile
 
+        open_recording(path).close()  # SQLite does not say why it cannot open a file
         return DatabaseFile(bag_file.path, path, budget, stack)
     except DamageError as error:
         raise RecordingError(str(bag_file.path), "", str(error)) from error
@@ -508,20 +421,21 @@ def _open(bag_file: BagFile, config: MonitorConfig, budget: Budget, stack: ExitS
 def _expanded_file(bag_file: BagFile, budget: Budget, stack: ExitStack) -> Path:
     """Decompress a file to a temporary file; its size counts as memory, unless it does not fit."""
     reserved = budget.reserved
-    with ExitStack() as failed:
-        directory = Path(failed.enter_context(tempfile.TemporaryDirectory()))
-        failed.callback(setattr, budget, "reserved", reserved)
-        path = directory / f"content{bag_file.storage}"
-        with open_regular(bag_file.path) as file, path.open("wb") as content:
-            if file.read(len(ZSTD_MAGIC)) != ZSTD_MAGIC:
-                raise DamageError("is not a zstd file, although its name says so")
-            file.seek(0)
+    path = Path(stack.enter_context(tempfile.TemporaryDirectory())) / f"content{bag_file.storage}"
+    with open_recording(bag_file.path) as file, path.open("wb") as content:
+        if file.read(len(ZSTD_MAGIC)) != ZSTD_MAGIC:
+            raise DamageError("is not a zstd file, although its name says so")
+        file.seek(0)
+        try:
             for part in expanded(file):
                 budget.reserve(len(part))
                 content.write(part)
-            if not content.tell():
-                raise DamageError("contains nothing that can be decompressed")
-        stack.push(failed.pop_all())  # it stays until the recording is closed
+        except DamageError:
+            budget.reserved = reserved
+            path.unlink()
+            raise
+        if not content.tell():
+            raise DamageError("contains nothing that can be decompressed")
     return path
 
 

@@ -1,11 +1,9 @@
 """Recordings in SQLite (.db3), read by rosbags."""
 
 import errno
-import shutil
 import sqlite3
-import tempfile
 from collections.abc import Iterator
-from contextlib import ExitStack, closing
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +13,13 @@ from rosbags.interfaces import MessageDefinitionFormat
 from rosbags.rosbag2 import Reader, ReaderError
 
 from leg_wear_monitor.bags.budget import Budget
-from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity, open_regular
+from leg_wear_monitor.bags.findings import Finding, RecordingError
 from leg_wear_monitor.bags.piece import Channel, Due, Piece
 from leg_wear_monitor.messages.cdr import MESSAGE
 
 _JOURNALS = ("-wal", "-journal")  # endings of the files of transactions that were not written back
 _UNREADABLE = (ReaderError, apsw.Error, sqlite3.Error, ValueError, KeyError, TypeError, MemoryError)
 _TOGETHER = 4096  # messages of a piece
-_NO_CHECKSUMS = "has no checksums, like all .db3 files: a damaged number would not be detected"
 _ENCODINGS = {MessageDefinitionFormat.MSG: "ros2msg", MessageDefinitionFormat.IDL: "ros2idl"}
 
 
@@ -48,25 +45,20 @@ class DatabaseFile:
     """
 
     def __init__(self, path: Path, file: Path, budget: Budget, stack: ExitStack) -> None:
-        self.path, self._budget = path, budget
-        self.findings = [Finding(path, _NO_CHECKSUMS, Severity.NOTE)]
-        journals = [each for end in _JOURNALS if _size(each := file.with_name(file.name + end))]
-        self.size = sum(map(_size, (file, *journals)))
+        self.path, self._budget, self.size = path, budget, file.stat().st_size
+        self.findings: list[Finding] = []
         try:
-            open_regular(file).close()  # SQLite does not say why it cannot open a file
-            self._reader: Any = stack.enter_context(Reader(_prepared(file, journals, budget, stack)))
+            self._reader: Any = stack.enter_context(Reader(file))
         except apsw.IOError as error:
             raise OSError(errno.EIO, str(error)) from error
         except _UNREADABLE as error:
-            # the message of rosbags names the link, its cause does not
             cause = error.__cause__ or (None if isinstance(error, ReaderError) else error)
             why = _one_line(cause) if cause else "it has no tables of a recording"
-            fault = f"is not a readable .db3 file: {why}"
-            raise RecordingError(str(path), "", fault) from error
-        if journals:
-            names = " and ".join(each.name for each in journals)
-            text = f"was not closed: the content of {names} beside it is read as well"
-            self.findings.append(Finding(path, text, Severity.NOTE))
+            raise RecordingError(str(path), "", f"is not a readable .db3 file: {why}") from error
+        for journal in (file.with_name(file.name + end) for end in _JOURNALS):
+            if journal.exists() and journal.stat().st_size:
+                remedy = f'Run: sqlite3 {file.name} "PRAGMA wal_checkpoint"'
+                self.findings.append(Finding(path, f"was not closed: {journal.name} is not read. {remedy}"))
         self._connections = {one.id: one for one in self._reader.connections}
         self.channels = {
             number: Channel(
@@ -124,31 +116,6 @@ class DatabaseFile:
         data = np.frombuffer(b"".join(row[2] for row in rows), np.uint8)
         piece = Piece(rows[0][0], data, messages, self.size * len(rows) // max(expected, 1))
         return Due(piece.start_ns, lambda: piece)
-
-
-def _prepared(file: Path, journals: list[Path], budget: Budget, stack: ExitStack) -> Path:
-    """A path for rosbags, which takes some names for options: a link to a database, or a copy of one.
-
-    SQLite recovers a database with transactions beside it by writing, so the recovery takes place in a copy.
-    """
-    place = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "content.db3"
-    if not journals:
-        place.symlink_to(file.absolute())
-        return place
-    budget.reserve(sum(map(_size, (file, *journals))))
-    for each in (file, *journals):
-        shutil.copyfile(each, place.with_name(place.name + each.name.removeprefix(file.name)))
-    with closing(sqlite3.connect(place)) as database:
-        database.execute("PRAGMA journal_mode = DELETE").fetchall()
-    return place
-
-
-def _size(file: Path) -> int:
-    """Size of a file [bytes]; 0 if it does not exist."""
-    try:
-        return file.stat().st_size
-    except FileNotFoundError:
-        return 0
 
 
 def _one_line(error: BaseException) -> str:

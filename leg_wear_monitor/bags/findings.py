@@ -1,11 +1,9 @@
-"""What readers of recordings share: findings and errors, safe opening of files, clocks.
+"""What readers of recordings share: findings and errors, opening of files, clocks.
 
-A recording is untrusted: it may be damaged, or made to exhaust memory. A reader reads what is usable and
-lists the faults; only an unusable recording raises an error.
+A recording may be damaged. A reader reads the usable part and lists the faults; only an unusable recording
+raises an error.
 """
 
-import os
-import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from enum import Enum
@@ -92,43 +90,20 @@ class DamageError(Exception):
     """A part of a file is unusable; the reader records a finding and continues."""
 
 
-# Opening of untrusted paths: regular files only, since a pipe or a device could block or never end.
-
-
-_KINDS = {
-    stat.S_IFDIR: "a directory",
-    stat.S_IFIFO: "a pipe",
-    stat.S_IFSOCK: "a socket",
-    stat.S_IFCHR: "a device",
-    stat.S_IFBLK: "a device",
-}
-
-
 _POINTER = b"version https://git-lfs.github.com/spec/"
 
 
-def irregular_kind(mode: int) -> str:
-    """What a path with this `os.stat` mode is, such as "a pipe"; empty for a regular file."""
-    return "" if stat.S_ISREG(mode) else _KINDS.get(stat.S_IFMT(mode), "no file")
-
-
-def open_regular(path: Path) -> IO[bytes]:
-    """Open a regular file for reading.
+def open_recording(path: Path) -> IO[bytes]:
+    """Open a file for reading.
 
     Raises
     ------
     RecordingError
         If it is a pointer of git-LFS.
     OSError
-        If it cannot be opened or is not a regular file (it may have been replaced since an earlier check).
+        If it cannot be opened.
     """
-    # O_NONBLOCK: opening a pipe without a writer would wait forever; it has no effect on regular files
-    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
-    what = irregular_kind(os.fstat(descriptor).st_mode)
-    if what:
-        os.close(descriptor)
-        raise OSError(0, f"is {what}, expected a file", str(path))
-    file = os.fdopen(descriptor, "rb")
+    file = path.open("rb")
     if file.read(len(_POINTER)) == _POINTER:
         file.close()
         raise RecordingError(str(path), "", "a pointer of git-LFS, not the file itself. Run: git lfs pull")

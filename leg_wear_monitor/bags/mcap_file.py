@@ -1,15 +1,14 @@
-"""MCAP files, read by the mcap library: its index where there is one, else its reader of streams.
+"""MCAP files. The records are those of the mcap library; the messages of a chunk are found here.
 
-The messages of a chunk are found here: the library makes an object of each, and takes ten times as long.
+The library makes an object of each message, and takes ten times as long.
 """
 
 import struct
-import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from io import BytesIO
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 import attrs
 import lz4.frame
@@ -18,15 +17,13 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.reader import FOOTER_SIZE, SeekingReader
 from mcap.records import Channel as ChannelRecord
-from mcap.records import Chunk, DataEnd, Footer, Message, Schema
-from mcap.stream_reader import MAGIC_SIZE, StreamReader, get_chunk_data_stream
-from mcap.summary import Summary
+from mcap.records import Chunk, Schema, Statistics
+from mcap.stream_reader import get_chunk_data_stream
 from numpy.typing import NDArray
 
 from leg_wear_monitor.bags.budget import Budget
-from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError, Severity
+from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError
 from leg_wear_monitor.bags.piece import Channel, Due, Piece
 from leg_wear_monitor.messages.cdr import MESSAGE
 
@@ -42,9 +39,9 @@ _HEAD = np.dtype(
     [("channel", "<u2"), ("sequence", "<u4"), ("log_time_ns", "<u8"), ("publish_time_ns", "<u8")]
 )
 _BYTES_PER_MESSAGE = 400  # memory of decoding one message into a sample [bytes]
-_BYTES_PER_INDEX = 16  # memory of the parsed summary per byte of it
 _WINDOW = 2**20  # bytes of messages outside of chunks that are read at once
 _LATEST_NS = 2**63 - 1
+_DEFINITIONS = (Opcode.SCHEMA, Opcode.CHANNEL)
 
 
 @attrs.define
@@ -69,6 +66,8 @@ class _Segment:
 class McapFile:
     """An open MCAP file; its faults are listed in `findings`.
 
+    The heads of all records are read at first. They replace the index, so a file without one is no exception.
+
     Parameters
     ----------
     path : pathlib.Path
@@ -80,31 +79,37 @@ class McapFile:
     Raises
     ------
     RecordingError
-        If the file is empty or is not an MCAP file.
+        If the file is not an MCAP file.
     """
 
     def __init__(self, path: Path, file: IO[bytes], budget: Budget) -> None:
         self.path, self._file, self._budget = path, file, budget
         self.size = file.seek(0, 2)
         self.findings: list[Finding] = []
-        self._read, self._unchecked = 0, 0
+        self._read = 0
         self._counts: dict[int, int] | None = None
         self._segments: list[_Segment] = []
-        self._definitions: dict[tuple[type, int], Any] = {}
+        self._schemas: dict[int, Schema] = {}
+        self._channels: dict[int, ChannelRecord] = {}
         file.seek(0)
-        start = file.read(MAGIC_SIZE)
-        if not self.size:
-            raise RecordingError(str(path), "", "is empty, expected an MCAP file")
-        if start != MAGIC:
-            fault = f"begins with {start!r}, expected {MAGIC!r}: is not an MCAP file"
+        if (start := file.read(len(MAGIC))) != MAGIC:
+            fault = f"not an MCAP file: begins with {start!r}. Expected {MAGIC!r}"
             raise RecordingError(str(path), "", fault)
-        summary = self._summary()
-        if summary is not None and _is_complete(summary):
-            self._take(summary)
-        else:
-            self._scan()
+        self._scan()
+        schemas = {channel.schema_id for channel in self._channels.values()}
+        if not self._channels or not schemas <= {0, *self._schemas}:
+            self._search_chunks()
         self._segments.sort(key=lambda segment: (segment.start_ns, segment.at))
-        self.channels = _channels(self._definitions.values())
+
+    @property
+    def channels(self) -> dict[int, Channel]:
+        """Channels by channel number, with the names and definitions of their schemas."""
+        found = {}
+        for number, one in self._channels.items():
+            schema = self._schemas.get(one.schema_id, Schema(0, b"", "", ""))
+            text = schema.data.decode("utf-8", "replace")
+            found[number] = Channel(one.topic, schema.name, one.message_encoding, text, schema.encoding)
+        return found
 
     def pieces(self, types: dict[int, int]) -> Iterator[Due]:
         """Pieces of the requested channels, for lazy loading; damaged parts are skipped and become findings.
@@ -121,88 +126,57 @@ class McapFile:
         expected = self._read if self._counts is None else sum(self._counts.get(one, 0) for one in types)
         if expected != self._read:
             self._find(f"{self._read} messages could be read of the {expected} that it counts")
-        if self._unchecked:
-            text = f"has no checksum for {self._unchecked} of {len(self._segments)} chunks"
-            self._find(f"{text}: a damaged number in them would not be detected", Severity.NOTE)
-
-    def _summary(self) -> Summary | None:
-        """The index, or None if there is none that can be relied on."""
-        try:
-            self._file.seek(-(FOOTER_SIZE + MAGIC_SIZE), 2)
-            end = self._file.read()
-            opcode, _ = _RECORD.unpack_from(end)
-            if opcode != Opcode.FOOTER or not end.endswith(MAGIC):
-                return None
-            footer = Footer.read(ReadDataStream(BytesIO(end[_RECORD.size :])))
-            length = self.size - footer.summary_start
-            if not footer.summary_start or not 0 < length <= self._budget.part_limit // _BYTES_PER_INDEX:
-                return None
-            self._file.seek(footer.summary_start)
-            checked = self._file.read(length - MAGIC_SIZE - 4)
-            if footer.summary_crc and zlib.crc32(checked) != footer.summary_crc:
-                return None
-            self._file.seek(0)
-            return SeekingReader(self._file, record_size_limit=self.size).get_summary()
-        except (*_UNREADABLE, OSError):
-            return None
-
-    def _take(self, summary: Summary) -> None:
-        """Take what the index says."""
-        self._definitions |= {(Schema, number): one for number, one in summary.schemas.items()}
-        self._definitions |= {(ChannelRecord, number): one for number, one in summary.channels.items()}
-        if summary.statistics is not None:
-            self._counts = dict(summary.statistics.channel_message_counts)
-        for index in summary.chunk_indexes:
-            start_ns = min(index.message_start_time, _LATEST_NS)
-            self._segments.append(_Segment(index.chunk_start_offset, index.chunk_length, True, start_ns))
 
     def _scan(self) -> None:
-        """Read all records from the first one on, as far as they can be read."""
-        self._file.seek(0)
-        reader = StreamReader(
-            self._file, emit_chunks=True, validate_crcs=True, record_size_limit=self._budget.part_limit
-        )
-        at, is_ended = MAGIC_SIZE, False
+        """Find chunks, messages outside of chunks, and definitions, up to the footer or a cut."""
+        at, opcode = len(MAGIC), 0
         try:
-            for record in reader.records:
-                end = self._file.tell()
-                if isinstance(record, Chunk):
-                    self._add_chunk(record, end)
-                elif isinstance(record, Message):
-                    length = _RECORD.size + _HEAD.itemsize + len(record.data)
-                    self._add_message(_Segment(end - length, length, False, min(record.log_time, _LATEST_NS)))
-                elif isinstance(record, Schema | ChannelRecord):
-                    self._definitions.setdefault((type(record), record.id), record)
-                at, is_ended = end, isinstance(record, DataEnd)
-                if is_ended:
-                    break
-        except _UNREADABLE as error:
-            what = _one_line(error)
-            if self._file.tell() >= self.size:
-                what = "the recording was cut off before its closing records"
-            self._find(f"is lost from byte {at} of {self.size} on: {what}")
-            return
-        if not self._definitions:
-            return
-        self._find("has no index, or a damaged one: read from start to end", Severity.NOTE)
+            while opcode != Opcode.FOOTER:
+                self._file.seek(at)
+                opcode, length = _RECORD.unpack(self._file.read(_RECORD.size))
+                end = at + _RECORD.size + length
+                if not opcode or end > self.size:
+                    raise EOFError
+                self._add(opcode, at, end)
+                at = end
+        except _UNREADABLE:
+            self._find(f"is cut off or damaged at byte {at} of {self.size}: the rest is lost")
 
-    def _add_chunk(self, chunk: Chunk, end: int) -> None:
-        """Add a chunk with its definitions and its first log time."""
-        length = len(chunk.data) + len(chunk.compression) + 49
-        segment = _Segment(end - length, length, True, min(chunk.message_start_time, _LATEST_NS))
-        self._segments.append(segment)
-        try:
-            data = self._expanded(chunk)
-        except DamageError:  # the reader of the pieces reports it
-            return
-        opcodes, begins, ends, _ = _records(data)
-        for opcode, kind in ((Opcode.SCHEMA, Schema), (Opcode.CHANNEL, ChannelRecord)):
-            for k in np.flatnonzero(opcodes == opcode).tolist():
-                record: Any = kind.read(ReadDataStream(BytesIO(data[begins[k] : ends[k]])))
-                self._definitions.setdefault((kind, record.id), record)
-        heads = _heads(np.frombuffer(data, np.uint8), begins[opcodes == Opcode.MESSAGE])
-        if len(heads):
-            segment.start_ns = int(min(heads["log_time_ns"].min(), _LATEST_NS))
+    def _add(self, opcode: int, at: int, end: int) -> None:
+        """Add a record, of which the head has just been read."""
+        if opcode == Opcode.CHUNK:
+            (start_ns,) = struct.unpack("<Q", self._file.read(8))
+            self._segments.append(_Segment(at, end - at, True, min(start_ns, _LATEST_NS)))
+        elif opcode == Opcode.MESSAGE:
+            (head,) = np.frombuffer(self._file.read(_HEAD.itemsize), _HEAD)
+            self._add_message(_Segment(at, end - at, False, int(min(head["log_time_ns"], _LATEST_NS))))
+        elif opcode in _DEFINITIONS or opcode == Opcode.STATISTICS:
+            self._budget.check(end - at)
+            self._define(opcode, self._file.read(end - at - _RECORD.size))
+
+    def _define(self, opcode: int, data: bytes) -> None:
+        stream = ReadDataStream(BytesIO(data))
+        if opcode == Opcode.SCHEMA:
+            schema = Schema.read(stream)
+            self._schemas.setdefault(schema.id, schema)
+        elif opcode == Opcode.CHANNEL:
+            channel = ChannelRecord.read(stream)
+            self._channels.setdefault(channel.id, channel)
+        else:
+            self._counts = Statistics.read(stream).channel_message_counts
+
+    def _search_chunks(self) -> None:
+        """Find definitions that are in the chunks only, as in a file without a summary."""
+        for segment in self._segments:
+            if not segment.is_chunk:
+                continue
+            try:
+                data = self._content(segment)
+                opcodes, begins, ends, _ = _records(data)
+                for k in np.flatnonzero(np.isin(opcodes, _DEFINITIONS)).tolist():
+                    self._define(opcodes[k], data[begins[k] : ends[k]])
+            except (DamageError, *_UNREADABLE):  # the reader of the pieces reports it
+                continue
 
     def _add_message(self, one: _Segment) -> None:
         """Add a message outside of chunks to the segment before it, if that is near and small."""
@@ -231,12 +205,7 @@ class McapFile:
         if not segment.is_chunk:
             return self._file.read(segment.stored)
         stored = self._file.read(segment.stored)
-        opcode, length = _RECORD.unpack_from(stored)
-        if opcode != Opcode.CHUNK or length != len(stored) - _RECORD.size:
-            raise DamageError("is not the chunk that the index has")
-        chunk = Chunk.read(ReadDataStream(BytesIO(stored[_RECORD.size :])))
-        self._unchecked += not chunk.uncompressed_crc
-        return self._expanded(chunk)
+        return self._expanded(Chunk.read(ReadDataStream(BytesIO(stored[_RECORD.size :]))))
 
     def _expanded(self, chunk: Chunk) -> bytes:
         """Records of a chunk, whose size and checksum must be right."""
@@ -268,14 +237,8 @@ class McapFile:
             self._find(f"chunk at byte {segment.at} holds {rest} bytes that are not records: they are lost")
         return messages
 
-    def _find(self, text: str, severity: Severity = Severity.LOSS) -> None:
-        self.findings.append(Finding(self.path, text, severity))
-
-
-def _is_complete(summary: Summary) -> bool:
-    """Whether an index has channels, and a chunk for the messages that it counts."""
-    has_messages = summary.statistics is None or summary.statistics.message_count > 0
-    return bool(summary.channels and (summary.chunk_indexes or not has_messages))
+    def _find(self, text: str) -> None:
+        self.findings.append(Finding(self.path, text))
 
 
 _Places = NDArray[np.int64]
@@ -309,21 +272,6 @@ def _declared(chunk: Chunk) -> int:
     if chunk.compression == "lz4":
         return int(lz4.frame.get_frame_info(chunk.data)["content_size"])
     return 0
-
-
-def _channels(records: Iterable[Any]) -> dict[int, Channel]:
-    """Channels by channel number, with the names and definitions of their schemas."""
-    records = list(records)
-    schemas = {record.id: record for record in records if isinstance(record, Schema)}
-    channels = {}
-    for record in records:
-        if isinstance(record, ChannelRecord):
-            schema = schemas.get(record.schema_id, Schema(0, b"", "", ""))
-            text = schema.data.decode("utf-8", "replace")
-            channels[record.id] = Channel(
-                record.topic, schema.name, record.message_encoding, text, schema.encoding
-            )
-    return channels
 
 
 def _one_line(error: BaseException) -> str:

@@ -1,7 +1,6 @@
 """Reads recordings, damaged ones too, as blocks of gait samples in log-time order, in bounded memory."""
 
 import heapq
-import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from itertools import repeat
@@ -26,8 +25,6 @@ from leg_wear_monitor.bags.table_layout import (
     columns_of,
 )
 from leg_wear_monitor.errors import printable
-from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.messages.cdr import Decoder, mark_zero_stamps
 from leg_wear_monitor.messages.names import (
     is_without,
@@ -39,19 +36,15 @@ from leg_wear_monitor.messages.names import (
 from leg_wear_monitor.messages.streams import INTERFACES, JOINT_STATE, WRENCH_STAMPED
 from leg_wear_monitor.messages.wrench_axis import WrenchAxis
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.twin import CRANK, TORQUE
+from leg_wear_monitor.twin import TORQUE
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, MISSING_JOINT, NO_FAULT, NOT_FINITE, ZERO_STAMP, Samples
 
 if TYPE_CHECKING:
     from leg_wear_monitor.bags.table_file import TableFile
 
-# Check that several files record one leg: same topics, and equal crank angles at equal times.
+# Check that several files record one leg: the same topics, and the crank joint in their messages.
 
 
-_KEPT = 8192  # samples per file that are kept for comparison with other files
-_ENOUGH = 20  # smallest number of common samples for a conclusion
-_APART_RAD = 0.1  # exceeds the effect of clock offset and noise in two recordings of one crank
-_LONGEST_NS = 100_000_000  # longest gap between two samples for interpolation
 _ADVICE = "are these two legs? Give one leg at a time, or select its topic with --joint-states"
 
 
@@ -87,85 +80,15 @@ def check_topics(
     return findings
 
 
-@attrs.frozen(eq=False)
-class _Motion:
-    """Crank angles in order of their stamps."""
-
-    stamp_ns: NDArray[np.int64]
-    angle_rad: Floats
-
-    def apart(self, other: "_Motion") -> Floats:
-        """Differences [rad] to the angles of `other`, where this motion can be interpolated."""
-        after = np.searchsorted(self.stamp_ns, other.stamp_ns)
-        inside = (after > 0) & (after < len(self.stamp_ns))
-        after, stamps = after[inside], other.stamp_ns[inside]
-        step = self.stamp_ns[after] - self.stamp_ns[after - 1]
-        close = (step > 0) & (step <= _LONGEST_NS)
-        after, step = after[close], step[close]
-        begin = self.angle_rad[after - 1]
-        part = (stamps[close] - self.stamp_ns[after - 1]) / step
-        expected = begin + part * _wrapped(self.angle_rad[after] - begin)
-        return np.abs(_wrapped(other.angle_rad[inside][close] - expected))
-
-
-class OneLeg:
-    """Compares the crank angles of files that overlap in time."""
-
-    def __init__(self) -> None:
-        self._files: dict[Path, _Motion] = {}
-
-    def add_samples(self, path: Path, samples: Samples) -> None:
-        """Compare samples of a file with those of other files; stamps are those of the headers.
-
-        Raises
-        ------
-        RecordingError
-            If another file has different angles at the same times.
-        """
-        new = _motion(samples)
-        if not len(new.stamp_ns):
-            return
-        for other, motion in self._files.items():
-            if other != path:
-                apart = motion.apart(new)
-                if len(apart) >= _ENOUGH and np.median(apart) > _APART_RAD:
-                    text = f"has other crank angles than {other.name} at the same times: {_ADVICE}"
-                    raise RecordingError(str(path), "joint_states", text)
-        kept = self._files.get(path, new)
-        if kept is not new:
-            new = _Motion(
-                np.concatenate([kept.stamp_ns, new.stamp_ns]), np.concatenate([kept.angle_rad, new.angle_rad])
-            )
-        order = np.argsort(new.stamp_ns, kind="stable")[-_KEPT:]
-        self._files[path] = _Motion(new.stamp_ns[order], new.angle_rad[order])
-
-
-def _motion(samples: Samples) -> _Motion:
-    chosen = samples[(samples["kind"] == CRANK) & (samples["fault"] == NO_FAULT)]
-    return _Motion(chosen["stamp_ns"].astype(np.int64), chosen["crank_angle_rad"].astype(float))
-
-
-def _wrapped(angle: Floats) -> Floats:
-    """Angle wrapped to half a turn around 0 [rad]."""
-    return np.asarray((angle + math.pi) % TURN - math.pi)
-
-
-# Check that a recording's messages contain the crank joint; otherwise report the joints they contain.
-
-
 _MOST = 1000
 _NAMED = (NO_FAULT, NOT_FINITE, ZERO_STAMP)
 
 
 @attrs.define
-class _Counts:
-    """Numbers of a file's messages with and without the crank; joint names of those without it.
+class _Missing:
+    """Messages of a file without the crank, their joints, and a report on the first without an interface."""
 
-    And of its messages of interfaces without the wanted one, with a report on the first of them.
-    """
-
-    found: int = 0
-    missing: int = 0
+    count: int = 0
     names: set[str] = attrs.Factory(set)
     twice: str = ""
     without_interface: int = 0
@@ -173,44 +96,37 @@ class _Counts:
 
 
 class JointNames:
-    """Searches the messages of each file for the crank joint.
+    """Searches the messages for the crank joint and its interfaces.
 
     Parameters
     ----------
     crank_joint : str
     interfaces : mapping of str to str
         As of `wanted_interfaces`.
-    recordings : mapping of Path to int
-        Number of the recording that a file belongs to: a part of one may have no message with the crank.
     """
 
-    def __init__(
-        self, crank_joint: str, interfaces: Mapping[str, str], recordings: Mapping[Path, int]
-    ) -> None:
-        self._crank, self._interfaces, self._recordings = crank_joint, interfaces, recordings
-        self._files: dict[Path, _Counts] = {}
+    def __init__(self, crank_joint: str, interfaces: Mapping[str, str]) -> None:
+        self._crank, self._interfaces = crank_joint, interfaces
+        self._found = 0
+        self._files: dict[Path, _Missing] = {}
 
     def add_samples(
         self, path: Path, data: NDArray[np.uint8], messages: NDArray[np.void], samples: Samples
     ) -> None:
         """Count messages of a file, using the samples decoded from them."""
-        counts = self._files.setdefault(path, _Counts())
+        file = self._files.setdefault(path, _Missing())
         cranks = messages["type"] == JOINT_STATE
-        counts.found += int(np.count_nonzero(cranks & np.isin(samples["fault"], _NAMED)))
-        missing = np.flatnonzero(cranks & (samples["fault"] == MISSING_JOINT))
-        counts.missing += len(missing)
-        of_interfaces = messages["type"] == INTERFACES
-        without = np.flatnonzero(of_interfaces & is_without(samples, self._interfaces))
-        counts.without_interface += len(without)
-        if len(without) and not counts.interfaces:
-            message = messages[without[0]]
-            raw = data[message["begin"] : message["end"]].tobytes()
-            counts.interfaces = without_interface(raw, self._crank, self._interfaces)
-        if len(missing) and len(counts.names) < _MOST:
-            message = messages[missing[0]]
-            names = names_in(data[message["begin"] : message["end"]].tobytes())[:_MOST]
-            counts.names |= set(names)
-            counts.twice = counts.twice or twice(names, self._crank)
+        self._found += int(np.count_nonzero(cranks & np.isin(samples["fault"], _NAMED)))
+        missing = messages[cranks & (samples["fault"] == MISSING_JOINT)]
+        file.count += len(missing)
+        if len(missing) and len(file.names) < _MOST:
+            names = names_in(_raw(data, missing[0]))[:_MOST]
+            file.names |= set(names)
+            file.twice = file.twice or twice(names, self._crank)
+        without = messages[(messages["type"] == INTERFACES) & is_without(samples, self._interfaces)]
+        file.without_interface += len(without)
+        if len(without) and not file.interfaces:
+            file.interfaces = without_interface(_raw(data, without[0]), self._crank, self._interfaces)
 
     def findings(self) -> list[Finding]:
         """Findings after all messages have been read.
@@ -218,30 +134,27 @@ class JointNames:
         Raises
         ------
         RecordingError
-            If messages contain joints but never the crank, or if one recording lacks it and another has it.
+            If messages contain joints but never the crank.
         """
-        found = sum(counts.found for counts in self._files.values())
-        with_crank = {self._recordings[path] for path, counts in self._files.items() if counts.found}
         findings = []
-        for path, counts in self._files.items():
-            if counts.interfaces:
-                text = f"{counts.without_interface} messages of dynamic_joint_states: {counts.interfaces}"
+        for path, file in self._files.items():
+            if file.interfaces:
+                text = f"{file.without_interface} messages of dynamic_joint_states: {file.interfaces}"
                 findings.append(Finding(path, text))
-            if counts.twice:
-                raise RecordingError(str(path), self._crank, counts.twice)
-            if not counts.missing:
-                continue
-            text = (
-                f"is not among the joints of {counts.missing} messages, they have {bag.listed(counts.names)}"
-            )
-            if self._recordings[path] not in with_crank:
-                remedy = "set the crank with --crank-joint (crank_joint in the parameters)"
-                if found:
-                    remedy = "the other files have it: give the recordings of one leg at a time"
-                raise RecordingError(str(path), self._crank, f"{text}; {remedy}")
-            text = f"joint {self._crank} {text}; {counts.found} have it"
-            findings.append(Finding(path, text, Severity.NOTE))
+            if file.twice:
+                raise RecordingError(str(path), self._crank, file.twice)
+            if file.count:
+                text = f"is not among the joints of {file.count} messages, they have {bag.listed(file.names)}"
+                if not self._found:
+                    remedy = "set the crank with --crank-joint (crank_joint in the parameters)"
+                    raise RecordingError(str(path), self._crank, f"{text}; {remedy}")
+                text = f"joint {self._crank} {text}; {self._found} messages have it"
+                findings.append(Finding(path, text, Severity.NOTE))
         return findings
+
+
+def _raw(data: NDArray[np.uint8], message: np.void) -> bytes:
+    return data[message["begin"] : message["end"]].tobytes()
 
 
 # Pauses between recordings that are replayed together: time without recording, not an input fault.
@@ -378,11 +291,9 @@ class Recording:
         self._clocks = Clocks()
         self._decoder = Decoder(config)
         self._budget = Budget(memory_mb)
-        self._one_leg = OneLeg()
         bag_files, self._findings = bag.find_files(paths)
-        recordings = {file.path: file.recording for file in bag_files}
         self._axis = WrenchAxis(config.drive_torque.axis)
-        self._joints = JointNames(config.crank_joint, wanted_interfaces(config), recordings)
+        self._joints = JointNames(config.crank_joint, wanted_interfaces(config))
         with ExitStack() as stack:
             self._sources, lost = bag.open_sources(bag_files, config, self._budget, stack)
             given = {"joint_states": joint_states, "drive_torque": drive_torque, "foot_load": foot_load}
@@ -425,8 +336,7 @@ class Recording:
         Raises
         ------
         RecordingError
-            At the end, if no message contains the crank; immediately, if the files are of two legs, or if
-            the system cannot read them any further.
+            At the end, if no message contains the crank; immediately, if the system cannot read the files.
         """
         with reading(self.files):
             for block in self._joined():
@@ -487,8 +397,6 @@ class Recording:
         )
         some = piece.messages[wrenches[:: max(1, len(wrenches) // _COMPARED)]]
         self._axis.add(piece.data[one["begin"] : one["end"]].tobytes() for one in some)
-        if len(self._sources) > 1:
-            self._one_leg.add_samples(bag_file.path, samples)
         if bag_file.storage not in bag.TABLES:  # which have one clock only
             self._clocks.compare(samples, piece.messages)
         if self.time != "header":

@@ -174,13 +174,11 @@ def _select(
     findings: list[Finding] = []
     for source in sources:
         for number, channel in sorted(source.file.channels.items()):
-            # the type by the metadata of the recording, for a file that does not give it
-            path, listed_type = source.bag_file.path, source.bag_file.types.get(channel.topic, "")
-            stream = _stream(channel, listed_type, joint_states, drive_torque)
+            path, stream = source.bag_file.path, _stream(channel, joint_states, drive_torque)
             if stream is None:
                 continue
             try:
-                check_channel(stream, channel, listed_type, str(path))
+                check_channel(stream, channel, str(path))
             except RecordingError as error:
                 findings.append(Finding(path, f"{error.key} {error.fault}: it is not read", Severity.NOTE))
                 continue
@@ -188,15 +186,13 @@ def _select(
     return list(selected), findings
 
 
-def _stream(
-    channel: Channel, listed_type: str, joint_states: str | None, drive_torque: str | None
-) -> Stream | None:
+def _stream(channel: Channel, joint_states: str | None, drive_torque: str | None) -> Stream | None:
     """Stream of a channel by its message type; None for a channel that is not read."""
     if channel.topic.endswith(_PUBLISHED):
         return None
     for stream in STREAMS:
         # the streams of a foot load have the types of torques, too, and no torque is read as one
-        if stream.type == (channel.type or listed_type) and stream.kind in (CRANK, TORQUE):
+        if stream.type == channel.type and stream.kind in (CRANK, TORQUE):
             wanted = joint_states if stream.kind == CRANK else drive_torque
             return stream if wanted in (None, channel.topic, channel.topic.lstrip("/")) else None
     return None

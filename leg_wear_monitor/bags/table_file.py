@@ -1,5 +1,6 @@
 """Tables as recordings: their rows, counted, as messages of the streams."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import chain
 from pathlib import Path
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from leg_wear_monitor.bags.budget import Budget
-from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
+from leg_wear_monitor.bags.findings import Finding, RecordingError
 from leg_wear_monitor.bags.piece import Channel, Due, Piece
 from leg_wear_monitor.bags.table_layout import (
     CRANK_ANGLE,
@@ -19,7 +20,6 @@ from leg_wear_monitor.bags.table_layout import (
     FOOT_LOAD,
     FOOT_LOAD_ALONG,
     Rows,
-    unit_doubts,
 )
 from leg_wear_monitor.bags.table_rows import TableRows, open_table
 from leg_wear_monitor.mechanism.arrays import Floats
@@ -29,119 +29,47 @@ from leg_wear_monitor.messages.streams import CONTACT, INTERFACES, LOAD_WRENCH, 
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin import CRANK, LOAD, TORQUE
 
-# What is remarkable about the rows of a table: times that go back, gaps, empty cells.
-
-
-_Found = Iterator[tuple[str, Severity]]
-
-
-@attrs.define
-class _Steps:
-    """How often something happened from one row to the next, the line where it did first, its size there."""
-
-    count: int = 0
-    line: int = 0
-    size_s: float = 0.0
-
-    @property
-    def more(self) -> str:
-        """How often it happened, if more than once."""
-        return f" ({self.count} times in all)" if self.count > 1 else ""
-
-    def add(self, which: NDArray[np.bool_], line: NDArray[np.int64], steps_ns: NDArray[np.int64]) -> None:
-        at = np.flatnonzero(which)
-        if len(at) and not self.count:
-            self.line, self.size_s = int(line[at[0]]), float(steps_ns[at[0]]) * 1.0e-9
-        self.count += len(at)
-
 
 @attrs.define
 class Counts:
-    """Counts over all rows so far.
-
-    Parameters
-    ----------
-    config : MonitorConfig
-    is_effort : bool
-        Whether a torque without an angle in its row cannot be used.
-    word : str
-        What a row is called: ``line`` or ``row``.
+    """Counts over the rows of a table so far.
 
     Attributes
     ----------
     rows : int
-    first_ns, last_ns : int or None
+    first_ns, last_ns : int
         Stamps of the first and of the last row [ns].
     measured : dict
         Number of rows with a value, by column.
     least, most : dict
         Range of the values in SI units, by column.
+    unused : int
+        Efforts without an angle in their row.
     """
 
-    config: MonitorConfig
-    is_effort: bool
-    word: str
-    rows: int = attrs.field(init=False, default=0)
-    first_ns: int | None = attrs.field(init=False, default=None)
-    last_ns: int | None = attrs.field(init=False, default=None)
-    measured: dict[str, int] = attrs.field(init=False, factory=dict)
-    least: dict[str, float] = attrs.field(init=False, factory=dict)
-    most: dict[str, float] = attrs.field(init=False, factory=dict)
-    _back: _Steps = attrs.field(init=False, factory=_Steps)
-    _repeated: _Steps = attrs.field(init=False, factory=_Steps)
-    _gaps: _Steps = attrs.field(init=False, factory=_Steps)
-    _zero: int = attrs.field(init=False, default=0)
-    _unused: int = attrs.field(init=False, default=0)
+    rows: int = 0
+    first_ns: int = 0
+    last_ns: int = 0
+    measured: Counter[str] = attrs.Factory(Counter)
+    least: dict[str, float] = attrs.Factory(dict)
+    most: dict[str, float] = attrs.Factory(dict)
+    unused: int = 0
 
     def add(self, rows: Rows) -> None:
         """Add rows, in their order."""
         if not len(rows.line):
             return
-        before = rows.stamp_ns[0] if self.last_ns is None else self.last_ns
-        steps = np.diff(rows.stamp_ns, prepend=before)
-        begin = self.last_ns is None
-        self._back.add(steps < 0, rows.line, steps)
-        self._repeated.add((steps == 0) & (np.arange(len(steps)) >= begin), rows.line, steps)
-        self._gaps.add(steps > 1.0e9 * self.config.tracker.gap_limit_s, rows.line, steps)
-        self.first_ns = int(rows.stamp_ns[0]) if self.first_ns is None else self.first_ns
+        self.first_ns = self.first_ns if self.rows else int(rows.stamp_ns[0])
         self.last_ns, self.rows = int(rows.stamp_ns[-1]), self.rows + len(rows.line)
-        self._zero += int(np.count_nonzero(rows.stamp_ns == 0))
-        if self.is_effort:
-            alone = rows.measured[DRIVE_TORQUE] & ~rows.measured[CRANK_ANGLE]
-            self._unused += int(np.count_nonzero(alone))
         for key, there in rows.measured.items():
-            self.measured[key] = self.measured.get(key, 0) + int(np.count_nonzero(there))
-            self._range(key, rows.values[key])
-
-    def findings(self) -> _Found:
-        """Findings after the last row: text and severity."""
-        note, word = Severity.NOTE, self.word
-        if self._back.count:
-            back = f"the time goes back by {-self._back.size_s:.6g} s at {word} {self._back.line}"
-            yield f"{back}{self._back.more}", note
-        if self._repeated.count:
-            yield f"the time repeats at {word} {self._repeated.line}{self._repeated.more}", note
-        if self._gaps.count:
-            gap = f"the time jumps by {self._gaps.size_s:.6g} s at {word} {self._gaps.line}"
-            yield f"{gap}{self._gaps.more}; the leg was not monitored in between", note
-        if self._zero:
-            text = "a time of 0 is that of a clock that is not set, and counts as faulty; set table.start"
-            yield text, note
-        if self._unused:
-            text = f"{self._unused} torques have no angle in their row; drive_torque.source 'effort' needs it"
-            yield f"{text}, 'wrench' does not", Severity.LOSS
-        for key, number in self.measured.items():
-            if number < self.rows:
-                text = (
-                    f"{key} is empty in {self.rows - number} of {self.rows} rows: nothing was measured there"
-                )
-                yield text, note
-
-    def _range(self, key: str, values: NDArray[np.float64]) -> None:
-        finite = values[np.isfinite(values)]
-        if len(finite):
-            self.least[key] = min(self.least.get(key, np.inf), float(finite.min()))
-            self.most[key] = max(self.most.get(key, -np.inf), float(finite.max()))
+            self.measured[key] += int(np.count_nonzero(there))
+            finite = rows.values[key][np.isfinite(rows.values[key])]
+            if len(finite):
+                self.least[key] = min(self.least.get(key, np.inf), float(finite.min()))
+                self.most[key] = max(self.most.get(key, -np.inf), float(finite.max()))
+        if DRIVE_TORQUE in rows.measured:
+            alone = rows.measured[DRIVE_TORQUE] & ~rows.measured[CRANK_ANGLE]
+            self.unused += int(np.count_nonzero(alone))
 
 
 # Rows of a table as the messages that the monitor's node would have received.
@@ -316,13 +244,12 @@ class TableFile:
         self.findings: list[Finding] = []
         source = open_table(path, content, storage, budget, config.table.columns.crank_angle)
         self.size, self.names = source.size, source.head.names
-        self.counts = Counts(config, self._encoder.is_effort, source.word)
+        self.counts = Counts()
         parts = TableRows(path, source, config, self.findings).parts()
         first = next((rows for rows in parts if len(rows.line)), None)
         if first is None:
             why = next((f"; {finding.text}" for finding in self.findings), "")
             raise RecordingError(str(path), "", f"has no row that can be read{why}")
-        self.findings += [Finding(path, text) for text in unit_doubts(first, config)]
         self._parts, self._start_ns = chain([first], parts), int(first.stamp_ns[0])
 
     @property
@@ -346,14 +273,17 @@ class TableFile:
             if rows is None:
                 is_over = True
                 return None
-            log_time_ns = _order(rows.stamp_ns, last_ns, self.counts.last_ns)
+            log_time_ns = _order(rows.stamp_ns, last_ns, self.counts.last_ns if self.counts.rows else None)
             self.counts.add(rows)
             last_ns = int(log_time_ns[-1]) if len(log_time_ns) else last_ns
             return self._encoder.piece(rows, log_time_ns, types)
 
         while not is_over:
             yield Due(last_ns, load)
-        self.findings += [Finding(self.path, text, severity) for text, severity in self.counts.findings()]
+        if self._encoder.is_effort and self.counts.unused:
+            text = f"{self.counts.unused} torques have no angle in their row"
+            remedy = "drive_torque.source 'effort' needs it, 'wrench' does not"
+            self.findings.append(Finding(self.path, f"{text}: they are lost; {remedy}"))
 
 
 def _order(stamp_ns: NDArray[np.int64], last_ns: int, last_stamp_ns: int | None) -> NDArray[np.int64]:

@@ -1,7 +1,6 @@
-"""Layout of tables: columns, rows, dates, and hints at columns that are likely in a different unit."""
+"""Layout of tables: columns, rows, dates, units."""
 
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -12,7 +11,6 @@ from numpy.typing import NDArray
 from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config import tables
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin.sample import CONTACT, NO_LOAD, WRENCH
@@ -238,111 +236,3 @@ def is_number(text: str) -> bool:
     except ValueError:
         return False
     return "_" not in text
-
-
-# Columns that are likely in another unit: the wrap of the angle, its speed, the cadence.
-
-
-_LEAST_ROWS = 50
-_LEAST_TURNS = 2.0
-_MOST_RADIANS = 360.0 / TURN  # as which fraction of its turns an angle in radians is read in degrees
-_SAME = 1.02  # a wrapped angle reaches its turn within a sample
-_NEAR = 1.5  # a hint fits if it gives the speed within this factor
-_FAR = 2.0  # beyond this factor of the commanded speed no gait cycle counts (`monitor.evaluation`)
-_APART = 1.25  # speed column against the speed of the angle
-
-
-def unit_doubts(rows: Rows, config: MonitorConfig) -> Iterator[str]:
-    """Doubts about units from the first rows of a table."""
-    chosen = rows.measured[CRANK_ANGLE] & np.isfinite(rows.values[CRANK_ANGLE])
-    angle, stamps = rows.values[CRANK_ANGLE][chosen], rows.stamp_ns[chosen]
-    if len(angle) < _LEAST_ROWS:
-        return
-    turn = _other_turn(angle, config)
-    if turn:
-        yield turn
-        return
-    steps_s = np.diff(stamps) * 1.0e-9
-    turned = np.diff(angle)
-    if _wraps(angle):
-        turned = (turned + math.pi) % TURN - math.pi
-    ahead = steps_s > 0.0
-    turns = float(turned[ahead].sum()) / TURN
-    if abs(turns) < _LEAST_TURNS / _MOST_RADIANS:
-        return
-    has_turned = abs(turns) >= _LEAST_TURNS
-    # below that only if it turns all the time, as an angle in radians that is read in degrees
-    if not has_turned and not 0.5 < float(np.median(turned[ahead]) / turned[ahead].mean()) < 2.0:
-        return
-    if hint := _cadence(60.0 * turns / float(steps_s[ahead].sum()), has_turned, config):
-        yield hint
-    if CRANK_SPEED in rows.values:
-        speed = rows.values[CRANK_SPEED][chosen][1:][ahead]
-        known = np.isfinite(speed)
-        if hint := _speed(speed[known], steps_s[ahead][known], turned[ahead][known], config):
-            yield hint
-
-
-def _wraps(angle: Floats) -> int:
-    """How often an angle jumps by more than half of its range: a continuous one never does."""
-    return int(np.count_nonzero(np.abs(np.diff(angle)) > 0.5 * np.ptp(angle)))
-
-
-def _other_turn(angle: Floats, config: MonitorConfig) -> str:
-    """Doubt about the unit of an angle that jumps back by a turn of another unit; empty if there is none."""
-    unit, (factor, divisor) = config.table.units.crank_angle, config.table.angle_scale
-    of_unit = factor / divisor
-    if _wraps(angle) < _LEAST_TURNS:
-        return ""
-    span = float(angle.max() - angle.min())
-    step = float(np.median(np.abs(np.diff(angle))))
-    turns = {one: TURN * over / by for one, (by, over) in tables.ANGLES.items()} | {unit: TURN / of_unit}
-    raw = (span + step) / of_unit
-    for other, turn in turns.items():
-        if other != unit and max(raw / turn, turn / raw) < _SAME:
-            value = f"the angle jumps back by about {raw:.3g} each turn"
-            text = f"{value}, in {unit!r} a turn is {turns[unit]:.4g}: is it in {other!r}"
-            return f"{text} (table.units.crank_angle)?"
-    return ""
-
-
-def _cadence(joint_rpm: float, has_turned: bool, config: MonitorConfig) -> str:
-    """Doubt about the angle, or the time once it has turned, if another unit gives the commanded cadence."""
-    units, found = config.table.units, []
-    rpm, commanded = abs(joint_rpm) / config.crank.gear_ratio, abs(config.cadence.commanded_rpm)
-    if 1.0 / _FAR <= rpm / commanded <= _FAR:
-        return ""
-    if has_turned and units.stamp in tables.STAMPS and not config.table.rate_hz:
-        for other, power in tables.STAMPS.items():
-            found.append((rpm * 10.0 ** (tables.STAMPS[units.stamp] - power), "table.units.stamp", other))
-    factor, divisor = config.table.angle_scale
-    for other, (its_factor, its_divisor) in tables.ANGLES.items():
-        of_other = rpm * (its_factor / its_divisor) / (factor / divisor)
-        found.append((of_other, "table.units.crank_angle", other))
-    sentence = f"the crank turns at {rpm:.3g} rpm, commanded are {commanded:g} rpm"
-    best, key, other = min(found, key=lambda each: abs(math.log(each[0] / commanded)))
-    fits = 1.0 / _NEAR < best / commanded < _NEAR
-    return f"{sentence}; with {key} {other!r} it would turn at {best:.3g} rpm" if fits else ""
-
-
-def _speed(speed: Floats, steps_s: Floats, turned: Floats, config: MonitorConfig) -> str:
-    """Doubt about the column of the speed, if it is not the speed of the angle."""
-    passed_s = float(steps_s.sum())
-    by_speed, by_angle = float((speed * steps_s).sum()), float(turned.sum())
-    if (
-        not passed_s
-        or abs(by_angle) < TURN
-        or (by_speed / by_angle > 1.0 / _APART and by_speed / by_angle < _APART)
-    ):
-        return ""
-    unit = config.table.units.crank_speed
-    of_unit = tables.SPEEDS[unit][0] / tables.SPEEDS[unit][1]
-    text = (
-        f"crank_speed is {by_speed / passed_s / of_unit:.4g} {unit} in the mean, but the angle turns at "
-        f"{by_angle / passed_s / of_unit:.4g} {unit}"
-    )
-    for other, (factor, divisor) in tables.SPEEDS.items():
-        ratio = by_speed / of_unit * (factor / divisor) / by_angle
-        if other != unit and 1.0 / _APART < ratio < _APART:
-            return f"{text}: is it in {other!r} (table.units.crank_speed)?"
-    return f"{text}: one of the two columns or its unit is wrong"

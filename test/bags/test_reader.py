@@ -46,12 +46,6 @@ def test_every_way_to_store_gives_the_same_samples(
     assert recording.topics == {"joint_states": "/joint_states", "drive_torque": "/drive_torque"}
 
 
-def test_a_file_without_checksums_is_told_apart(tmp_path, sent, write_bag, read):
-    for name, crcs in (("with", True), ("without", False)):
-        _, recording = read(write_bag(tmp_path / f"{name}.mcap", sent, enable_crcs=crcs))
-        assert any("no checksum" in str(finding) for finding in recording.findings) == (not crcs)
-
-
 def test_messages_stored_out_of_order_come_in_order(tmp_path, sent, write_bag, expected, read):
     """Topic after topic, as some tools write: the whole file is one overlap."""
     by_topic = sorted(sent, key=lambda each: each.topic)

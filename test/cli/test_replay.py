@@ -70,19 +70,6 @@ def test_a_whole_recording(run, bag, complaints, tmp_path, unpainted):
     assert (tmp_path / "out" / "report.html").read_text() == page
 
 
-def test_empty_cells_are_a_note_where_there_are_any(run, complaints, tmp_path):
-    """Everything else is a warning, so that a program can tell."""
-    rows = [f"{1.0 + 0.005 * k},{0.03 * k % 6.283},{k % 7}" for k in range(50)]
-    for name, last in (("full", "1.0"), ("gappy", "")):
-        (tmp_path / f"{name}.csv").write_text(
-            "\n".join(["time,crank_angle,drive_torque", *rows, f"9,0,{last}"]) + "\n"
-        )
-    full, gappy = (complaints(run("replay", f"{name}.csv")) for name in ("full", "gappy"))
-    note = "note: gappy.csv: drive_torque is empty in 1 of 51 rows: nothing was measured there"
-    assert [line.replace("gappy", "full") for line in gappy if line != note] == full and note in gappy
-    assert all(line.startswith(("note: full.csv: the time jumps", "warning: ")) for line in full)
-
-
 def test_the_same_recording_again_keeps_the_report_and_exits_with_findings(
     run, bag, complaints, tmp_path, unpainted
 ):

@@ -65,7 +65,7 @@ class Figure(_Word):
     @property
     def words(self) -> str:
         """What operators read: a clearance by torque, by encoders or by hand is not meant."""
-        return "counted clearances" if self is Figure.CLEARANCES else super().words
+        return "modelled clearances" if self is Figure.CLEARANCES else super().words
 
 
 def as_plain(text: str) -> str:

@@ -86,7 +86,7 @@ terminal("leg-wear-monitor replay bags/knocking.mcap --config bags/knocking.yaml
 #    The monitor counted the wear of a leg with sound joints, and this leg is no longer that leg.
 #    So the table has no values.
 # 5. **Torque** is the clearance of each joint, estimated from the drive torque, with one standard deviation.
-# 6. **The alarm** ``torque_mismatch`` is the reason for all this: the torque is not that of the counted leg.
+# 6. **The alarm** ``torque_mismatch`` is the reason for all this: the torque does not fit the model of this leg.
 #
 # See it
 # ------

@@ -57,7 +57,7 @@ monitor, counted = replayed.monitor, replayed.summary()
 
 walked = factor * counted.cycles
 modelled_m = counted.clearances["A"].modelled_m
-print(f"after {walked:.3g} gait cycles the counted clearance of A is {1e3 * modelled_m:.3f} mm")
+print(f"after {walked:.3g} gait cycles the modelled clearance of A is {1e3 * modelled_m:.3f} mm")
 
 
 def hours_left(forecast):

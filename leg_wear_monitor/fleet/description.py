@@ -153,20 +153,22 @@ class LegEntry:
         "recordings: a file, a bag directory, a pattern with * or **, or a list of these",
         check=_patterns_fault,
     )
-    config: str = described("parameter file of the monitor; empty: that of the defaults", default="")
+    config: str = described("parameter file of the monitor; if empty, the file of the defaults", default="")
     node: str = described(
-        "full name of the node whose parameters apply; empty: beside the crank's topic", default=""
+        "full name of the node whose parameters apply; if empty, the node in the namespace of the crank's "
+        "topic",
+        default="",
     )
-    joint_states: str = described("topic of the crank; empty: found by its name", default="")
-    drive_torque: str = described("topic of the drive torque; empty: found by its name", default="")
+    joint_states: str = described("topic of the crank; if empty, found by its name", default="")
+    drive_torque: str = described("topic of the drive torque; if empty, found by its name", default="")
 
 
 @attrs.frozen(kw_only=True)
 class FleetFile:
     """All keys of the file."""
 
-    defaults: Defaults = described("values for legs that have none of their own", factory=Defaults)
-    out: str = described("directory of the fleet, unless a command has another one", default="fleet")
+    defaults: Defaults = described("values for legs without their own values", factory=Defaults)
+    out: str = described("directory of the fleet; a command may name its own", default="fleet")
     legs: tuple[LegEntry, ...] = described(
         "the legs", check=lambda legs: None if legs else "is empty, expected at least one leg"
     )

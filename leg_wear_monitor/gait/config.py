@@ -39,7 +39,7 @@ def _rises_from_zero(times: tuple[float, ...]) -> str | None:
 
 @attrs.frozen(kw_only=True)
 class PaceConfig:
-    """How the crank turns: speeds that follow one another, with a ripple."""
+    """Speeds of the crank over time, with a ripple."""
 
     times_s: tuple[float, ...] = quantity(
         "s", "times at which the speeds are set, the first at 0", default=(0.0,), check=_rises_from_zero
@@ -65,10 +65,10 @@ class PaceConfig:
 class EncoderConfig:
     """The crank's encoder."""
 
-    rate_hz: float = quantity("Hz", "messages a second", above=0.0, at_most=10000.0, default=200.0)
+    rate_hz: float = quantity("Hz", "messages per second", above=0.0, at_most=10000.0, default=200.0)
     noise_rad: float = _not_negative("rad", "noise of the angle, standard deviation", 1.0e-3)
     velocity_noise_radps: float = _not_negative("rad/s", "noise of the velocity, standard deviation", 0.05)
-    counts_per_turn: float = _not_negative("", "steps of the angle in a turn, 0 for none", 16384.0)
+    counts_per_turn: float = _not_negative("", "steps of the angle per turn, 0 for none", 16384.0)
     offset_rad: float = quantity("rad", "reading at crank angle 0", default=0.0)
     wrapped: bool = described("wrap the angle to a turn; otherwise it is continuous", default=False)
     restarts_s: tuple[float, ...] = _not_negative(
@@ -109,10 +109,10 @@ class TorqueSensorConfig:
         "message with the torque: WrenchStamped, Float64, or the effort of the crank in joint_states",
         default="wrench",
     )
-    rate_hz: float = quantity("Hz", "messages a second", above=0.0, at_most=10000.0, default=200.0)
+    rate_hz: float = quantity("Hz", "messages per second", above=0.0, at_most=10000.0, default=200.0)
     sampling: str = choice(
         SAMPLINGS,
-        "what a reading is: the average since the one before, or the torque at its instant",
+        "average: a reading is the mean since the previous reading; instant: the torque at its stamp",
         default=AVERAGE,
     )
     noise_nm: float = _not_negative("N m", "noise, standard deviation", 0.05)
@@ -129,13 +129,13 @@ class FootLoadSensorConfig:
         "none, or the message: WrenchStamped, Float64 (the vertical force), or contact, a Bool",
         default=NO_LOAD,
     )
-    rate_hz: float = quantity("Hz", "messages a second", above=0.0, at_most=10000.0, default=200.0)
+    rate_hz: float = quantity("Hz", "messages per second", above=0.0, at_most=10000.0, default=200.0)
     noise_n: float = _not_negative("N", "noise of each component, standard deviation", 1.0)
-    scale: float = quantity("", "reading over force; negative: its sign is reversed", default=1.0)
+    scale: float = quantity("", "reading over force; negative to reverse the sign", default=1.0)
     zero_n: float = quantity("N", "vertical reading without force", default=0.0)
-    zero_drift_n_per_s: float = quantity("N/s", "growth of that", default=0.0)
-    stuck_from_s: float = _not_negative("s", "time from which the reading stays; 0: never")
-    silent_from_s: float = _not_negative("s", "time from which no message comes; 0: never")
+    zero_drift_n_per_s: float = quantity("N/s", "growth of the zero", default=0.0)
+    stuck_from_s: float = _not_negative("s", "time from which the reading is stuck; 0 for never")
+    silent_from_s: float = _not_negative("s", "time from which no message comes; 0 for never")
     is_swapped: bool = described("read the foot of the other leg, half a turn later", default=False)
 
 
@@ -155,35 +155,33 @@ class TransportConfig:
 
 @attrs.frozen(kw_only=True)
 class LoadConfig:
-    """Loads and friction of which the monitor has no message: it has to find them from the torque."""
+    """Loads and friction without a message: the monitor has to estimate them from the torque."""
 
     toe_force_n: float = _not_negative("N", "upward force of the ground on the toe while it moves backwards")
     friction_nm: float = _not_negative("N m", "friction of the drive, against its motion")
     person_kg: float = _not_negative(
-        "kg", "mass of a person one of whose legs hangs on thigh, shank and foot", at_most=300.0
+        "kg", "mass of a person with one leg strapped to thigh, shank and foot", at_most=300.0
     )
     ground_n: float = _not_negative(
         "N", "largest vertical force of the ground on the toe in stance, mean over steps; 0 in the air"
     )
     fore_aft: float = _fraction(
-        "largest fore-aft force of the ground, over the largest vertical one", FORE_AFT
+        "largest fore-aft force of the ground, over the largest vertical force", FORE_AFT
     )
     shape: str = choice(
         GROUND_SHAPES,
-        "shape of the ground's force: the template of stance that a monitor knows, or one on a treadmill",
+        "shape of the ground's force: the monitor's template of stance, or a measured stance on a treadmill",
         default=TEMPLATE,
     )
     vertical_waves: tuple[float, ...] = quantity(
         "",
-        "another vertical shape: coefficients of sin(k pi s), s from 0 to 1 in stance; none if empty",
+        "own vertical shape: coefficients of sin(k pi s), s from 0 to 1 in stance; none if empty",
         default=(),
     )
     fore_aft_waves: tuple[float, ...] = quantity(
-        "", "another fore-aft shape, likewise; it brakes where it is positive", default=()
+        "", "own fore-aft shape, likewise; positive values brake", default=()
     )
-    heel_strike_shift: float = _shift(
-        "delay of the heel strike from the nominal one by the toe's motion, in gait cycles"
-    )
+    heel_strike_shift: float = _shift("delay of the heel strike from its nominal phase, in gait cycles")
     toe_off_shift: float = _shift("delay of the toe-off, likewise")
     amplitude_scatter: float = _fraction(
         "standard deviation of the ground's force from step to step, over its mean", 0.1, at_most=0.3
@@ -198,10 +196,10 @@ class LoadConfig:
 
 @attrs.frozen(kw_only=True)
 class KnockConfig:
-    """A bushing that breaks: the joint's clearance is another one from an instant on."""
+    """A bushing that breaks: the joint's clearance changes at an instant."""
 
     joint: str = described("the clearance joint, none if empty", default="")
-    at_s: float = _not_negative("s", "when", 5.0)
+    at_s: float = _not_negative("s", "time of the break", 5.0)
     clearance_m: float = quantity("m", "radial clearance after the break", above=0.0, default=1.0e-3)
 
 
@@ -221,13 +219,13 @@ class GaitConfig:
         "m", "radial clearances of the clearance joints; the mechanism's own if empty", above=0.0, default=()
     )
     wear_acceleration: float = _not_negative("", "factor on all wear coefficients", 1.0)
-    pace: PaceConfig = described("how the crank turns", factory=PaceConfig)
+    pace: PaceConfig = described("speed of the crank", factory=PaceConfig)
     encoder: EncoderConfig = described("the crank's encoder", factory=EncoderConfig)
     joint_encoders: JointEncodersConfig = described("encoders on further joints", factory=JointEncodersConfig)
     torque_sensor: TorqueSensorConfig = described("the drive's torque sensor", factory=TorqueSensorConfig)
     foot_load_sensor: FootLoadSensorConfig = described(
         "a sensor of the ground's force on the foot", factory=FootLoadSensorConfig
     )
-    transport: TransportConfig = described("what happens to a reading on its way", factory=TransportConfig)
-    load: LoadConfig = described("what a monitor cannot know of", factory=LoadConfig)
+    transport: TransportConfig = described("faults of the transport", factory=TransportConfig)
+    load: LoadConfig = described("loads that the monitor has to estimate", factory=LoadConfig)
     knock: KnockConfig = described("a bushing that breaks", factory=KnockConfig)

@@ -20,13 +20,13 @@ from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
 class Side:
     """One of the two bodies in contact."""
 
-    material: str = described("what it is made of")
+    material: str = described("material of the body")
     youngs_modulus: SourcedValue | None = sourced("pressure", "Young's modulus")
     poissons_ratio: SourcedValue | None = sourced("number", "Poisson's ratio")
-    wear_coefficient: WearCoefficient | None = sourced("wear coefficient", "its own wear")
+    wear_coefficient: WearCoefficient | None = sourced("wear coefficient", "wear coefficient of this body")
     roughness: SourcedValue | None = sourced("roughness", "Ra that the source asks for")
     is_counted: bool = described(
-        "whether its own wear counts; false: the source measures the wear of the other body only",
+        "false if the source measures the wear of the other body only",
         default=True,
     )
 
@@ -46,7 +46,7 @@ class Limits:
     dynamic_pressure: SourcedValue | None = sourced("pressure", "largest pressure while sliding")
     sliding_speed: SourcedValue | None = sourced("speed", "largest sliding speed")
     oscillating_speed: SourcedValue | None = sourced(
-        "speed", "largest sliding speed of a joint that swings; without it, that of any"
+        "speed", "largest sliding speed of a joint that swings; by default sliding_speed"
     )
     pressure_speed: SourcedValue | None = sourced("pressure times speed", "largest pressure times speed")
     lowest_temperature: SourcedValue | None = sourced("temperature", "lowest temperature")
@@ -73,12 +73,12 @@ class Material(SourcedFile):
     title: str = described("the pair, in words")
     bushing: Side = described("the bushing, a mapping of the keys below")
     journal: Side = described("the journal, a mapping of the keys below")
-    lubricant: str = described("none, grease or oil, and which")
+    lubricant: str = described("lubricant: none, or the grease or oil")
     regime: str = described("regime of wear that the numbers hold for")
     friction: SourcedValue | None = sourced("number", "friction coefficient")
     limits: Limits = described("limits, a mapping of the keys below", factory=Limits)
     rating_life: RatingLife | None = described("constants of the maker's formula of life", default=None)
-    notes: str = described("what else a user must know", default="")
+    notes: str = described("further notes for users", default="")
 
     @property
     def wear_coefficients(self) -> tuple[float, float] | None:

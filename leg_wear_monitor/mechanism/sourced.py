@@ -92,9 +92,9 @@ class SourcedValue:
     """A number with its source; a range alone stands for its middle."""
 
     value: float | None = described("the number; without it, the middle of the range", default=None)
-    unit: str = described("its unit, one of those below")
-    source: str = described("where it is from: author, title, year, or page", check=_blank)
-    conditions: str = described("what it was measured on, or holds for", check=_blank)
+    unit: str = described("its unit, from the table below")
+    source: str = described("origin of the value: author, title, year, or page", check=_blank)
+    conditions: str = described("test conditions, or conditions in which the value is valid", check=_blank)
     range: tuple[float, float] | None = described(
         "lowest and highest value that the source gives", default=None, check=_interval
     )
@@ -232,7 +232,7 @@ class Drive(SourcedFile):
     viscous: SourcedValue | None = sourced("friction by speed", "friction by speed")
     stiffness: SourcedValue | None = sourced("stiffness", "stiffness between motor and output")
     torque_constant: SourcedValue | None = sourced("torque constant", "torque for a current")
-    notes: str = described("what else a user must know", default="")
+    notes: str = described("further notes for users", default="")
 
     def __attrs_post_init__(self) -> None:
         if self.shaft == MOTOR and self.gear_ratio is None:

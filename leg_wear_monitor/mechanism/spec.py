@@ -79,14 +79,18 @@ class Clearance:
         default=(0.0, 0.0),
     )
     stiffness: float | None = quantity(
-        "N/m^1.5", "contact stiffness instead of Hertz's", above=0.0, usual=(1.0e6, 1.0e14), default=None
+        "N/m^1.5",
+        "contact stiffness; Hertz's stiffness without it",
+        above=0.0,
+        usual=(1.0e6, 1.0e14),
+        default=None,
     )
     approach_speed_floor: float = quantity(
         "m/s", "least approach speed in the damping of the normal law", above=0.0, default=1.0e-3
     )
     material: str = described(
-        "material pair, which gives Young's moduli, Poisson's ratios, friction and wear coefficient that it "
-        "knows; values beside it come first",
+        "material pair; it gives Young's moduli, Poisson's ratios, friction and wear coefficient, unless the "
+        "joint has its own values",
         default="",
         in_repr=False,
     )
@@ -190,9 +194,7 @@ def _turns(speed: float) -> str | None:
     least, most = 1.0e-3, 1.0e4
     if least <= abs(speed) <= most:
         return None
-    return (
-        f"{speed!r} rad/s does not turn the crank, expected another speed, from {least:g} to {most:g} rad/s"
-    )
+    return f"{speed!r} rad/s does not turn the crank, expected a speed from {least:g} to {most:g} rad/s"
 
 
 def _rises_below_one(phase: tuple[float, ...]) -> str | None:
@@ -208,7 +210,7 @@ class SpeedDrive:
     body: str = described("the crank")
     speed: float = quantity(
         "rad/s",
-        "crank speed, counter-clockwise positive, from 0.001 to 10000 either way",
+        "crank speed, counter-clockwise positive, from 0.001 to 10000 in size",
         check=_turns,
     )
 
@@ -234,7 +236,7 @@ class Track:
     kp_nm_per_rad: float = quantity("N m/rad", "gain on the angle's error", at_least=0.0, default=0.0)
     kd_nm_s_per_rad: float = quantity("N m s/rad", "gain on the speed's error", at_least=0.0, default=0.0)
     feed_forward_nm: Torques = quantity(
-        "N m", "torque added to that of the gains; a number, or one for each phase", default=(0.0,)
+        "N m", "torque in addition to the gains; one number, or one per phase", default=(0.0,)
     )
     feed_forward_phase: tuple[float, ...] = quantity(
         "",
@@ -245,7 +247,7 @@ class Track:
     )
     max_torque_nm: float | None = quantity(
         "N m",
-        "largest torque of the drive, in both directions; none: no limit",
+        "largest torque of the drive, in both directions; no limit without it",
         above=0.0,
         default=None,
     )

@@ -143,8 +143,8 @@ IMPACT: "AlarmSpec[JointReport]" = AlarmSpec(
     unit="N",
     quantity="peak contact force",
     meaning="peak contact force of the gait cycle, N",
-    limit_words="`limits.impact_force_n`, `limits.joint_impact_force_n`; within a wider "
-    "`cadence.tolerance_rpm` times the square of the cadence over the commanded one, from 1.1 on",
+    limit_words="`limits.impact_force_n`, `limits.joint_impact_force_n`; from 1.1 times the commanded "
+    "cadence on, times the square of the ratio",
     value=lambda joint: joint.peak_force_n,
     limit=lambda of: of.by_joint(of.config.limits.joint_impact_force_n, of.config.limits.impact_force_n),
     on_delay=_knock,
@@ -154,7 +154,7 @@ CLEARANCE: "AlarmSpec[JointReport]" = AlarmSpec(
     kind="clearance",
     unit="m",
     quantity="mean radial clearance",
-    meaning="mean radial clearance, counted or, if it is larger, by measurement, m",
+    meaning="mean radial clearance, modelled or, if larger, measured, m",
     limit_words="`limits.clearance_m`, `limits.joint_clearance_m`",
     value=lambda joint: joint.judged_clearance_m,
     limit=lambda of: of.by_joint(of.config.limits.joint_clearance_m, of.config.limits.clearance_m),
@@ -173,7 +173,7 @@ LIFE: "AlarmSpec[JointReport]" = AlarmSpec(
     kind="remaining_life",
     unit="h",
     quantity="p10 of the remaining life",
-    meaning="hours of walking that the joint exceeds with a probability of 90 %, h",
+    meaning="p10 of the remaining life, h",
     **_parameter("remaining_life_h"),
     value=lambda joint: joint.forecast.hours.p10 if joint.forecast and joint.forecast.hours else math.nan,
     is_least=True,
@@ -191,9 +191,9 @@ MATERIAL: "AlarmSpec[JointReport]" = AlarmSpec(
 DEPARTURE: "AlarmSpec[JointReport]" = AlarmSpec(
     kind="clearance_departure",
     unit="m",
-    quantity="difference between the clearance from encoders and the counted clearance",
-    meaning="difference between the clearance from further encoders and the counted one, m; 0 below four "
-    "standard deviations. Only with `encoders.names`",
+    quantity="difference between the clearance from encoders and the modelled clearance",
+    meaning="difference between the clearance from further encoders and the modelled clearance, m; 0 below "
+    "four standard deviations. Only with `encoders.names`",
     **_parameter("clearance_departure_m"),
     value=lambda joint: joint.seen.surely_m if joint.seen else math.nan,
 )
@@ -233,7 +233,7 @@ TORQUE: "tuple[AlarmSpec[Mapping[str, float]], ...]" = (
         kind=BIAS,
         unit="N m",
         quantity="constant drive torque beyond the bounds of friction",
-        meaning="constant drive torque outside the bounds of friction, N m: it drives, or exceeds "
+        meaning="constant drive torque that friction cannot cause, N m: it drives, or exceeds "
         "`drive_torque.max_friction_nm`",
         limit_words="`limits.torque_bias_nm`",
         limit=lambda of: of.bounds.bias_nm,
@@ -306,15 +306,15 @@ FOOT_LOAD: "tuple[AlarmSpec[Mapping[str, float]], ...]" = (
     ),
     _foot_load(
         SCALE,
-        "factor between the foot load and what the drive torque shows of it, or a usual step",
-        "factor by which the foot load is larger or smaller than the drive torque shows, or without a torque "
-        "than a step of 10 to 5000 N; or three times the largest force received over 50 kN, if that is more "
-        "than 3",
+        "factor between the foot load and its estimate from the drive torque, or a usual step",
+        "factor by which the foot load differs from its estimate from the drive torque, or without a torque "
+        "from a step of 10 to 5000 N; or three times the largest force over 50 kN",
     ),
     _foot_load(
         EXCHANGED,
-        "correlation of the foot load with the other foot's stance, less that with this one's",
-        "correlation of the vertical foot load with stance half a turn later, less that with stance",
+        "correlation of the foot load with the stance of the other foot, less with the stance of this foot",
+        "correlation of the vertical foot load with the stance of the other foot, less with the stance of "
+        "this foot",
     ),
     _foot_load(
         SIGN,
@@ -328,14 +328,14 @@ INPUT: "tuple[AlarmSpec[InputHealth], ...]" = (
     AlarmSpec(
         kind="input_samples",
         quantity="fraction of unusable samples",
-        meaning="fraction of samples that could not be used: faulty, repeated, late, stray stamp, far off",
+        meaning="fraction of unusable samples: faulty, repeated, late, wrong stamp, outlier",
         **_parameter("bad_sample_fraction"),
         value=lambda health: health.bad_fraction,
     ),
     AlarmSpec(
         kind="input_gaps",
         quantity="fraction of unmonitored time",
-        meaning="fraction of the time that was not monitored",
+        meaning="fraction of unmonitored time",
         **_parameter("lost_time_fraction"),
         value=lambda health: health.lost_fraction,
         is_latched=False,

@@ -280,24 +280,24 @@ FOOT_LOAD_WORDS = {
 
 FAULT_CODES = {
     NO_FAULT: "nothing is wrong",
-    INPUT_SILENCE: "no samples come; each status that has no current data then has this code",
-    TRACKING_LOST: "the samples of the crank cannot be followed, see `input`",
+    INPUT_SILENCE: "no usable samples arrive; each status without current data has this code",
+    TRACKING_LOST: "the monitor cannot track the crank, see `input`",
     CRANK_ZERO: "the zero of the crank's encoder is not found yet, see `crank zero`",
     ENCODERS: "a further encoder gives no usable angles",
     DIAGNOSIS: "the drive torque shows a change; the code of the verdict names it",
     LEDGER_NOT_WRITTEN: "the ledger cannot be written",
     LEDGER_INTERRUPTED: "an earlier run was interrupted",
     SAMPLES_DROPPED: "the node is overloaded: samples were dropped",
-    SAMPLES_NOT_PUBLISHED: "the node is overloaded: values of samples are not published, or late while it "
-    "records",
-    TOPICS: "an input topic has no publisher, several, another type, not the crank, a torque about another "
-    "axis, or messages are lost",
+    SAMPLES_NOT_PUBLISHED: "the node is overloaded: it does not publish values of samples, or publishes them "
+    "late while it records",
+    TOPICS: "an input topic has no publisher or several, a wrong type, no crank, a torque about a wrong "
+    "axis, or lost messages",
     RECORDING_STOPPED: "the recording of the node has stopped",
-    CLOCK_MISSING: "`use_sim_time` is set and nobody publishes `/clock`",
+    CLOCK_MISSING: "`use_sim_time` is set, and no node publishes `/clock`",
     CLOCK_STOPPED: "`/clock` has stopped",
     CLOCK_SET_BACK: "the clock was set back",
     STAMPS_AHEAD: "the stamps of an input are ahead of the clock of the node",
-    ALREADY_COUNTED: "samples of a time that is in the ledger are skipped",
+    ALREADY_COUNTED: "the monitor skips samples whose time is in the ledger already",
 }
 """Codes that are not the name of an alarm, and their meaning."""
 

@@ -154,7 +154,7 @@ class GaitEvidence:
             return f"the crank turns {turns:.2f} times in {self._passed_s:.3g} s: less than {short}"
         if not _SLOWEST <= rpm / abs(commanded) <= _FASTEST:
             return f"the crank turns at {rpm:.3g} rpm, the commanded cadence is {abs(commanded):.3g} rpm"
-        return f"the crank turns {turns:.3g} times, but its motion cannot be followed over a whole gait cycle"
+        return f"the crank turns {turns:.3g} times, but the monitor cannot track a whole gait cycle"
 
 
 # History of a leg's drive torque: friction at commissioning, lag at other speeds.

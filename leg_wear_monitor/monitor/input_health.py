@@ -151,7 +151,7 @@ _SENTENCES = {
     "empty": "have no name or no position",
     "wrong_length": "have another number of positions, velocities or efforts than of names",
     "not_finite": "have a value that is NaN or infinite ({where})",
-    "undecodable": "cannot be decoded: another type or another encoding",
+    "undecodable": "cannot be decoded: wrong type or encoding",
     "wrong_type": "are of a type that is not read",
     "out_of_range": "have an impossible value or a torque far from the others (units are rad and N m)",
     "duplicates": "repeat a stamp: two publishers, or a header.stamp that is not renewed",

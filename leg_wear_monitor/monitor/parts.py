@@ -248,7 +248,7 @@ class Parts:
         return (
             f"the drive torque ({estimate(change.value, change.sigma, 'm')}) and a measurement "
             f"({estimate(measured.clearance_m, measured.sigma_m, 'm')}) of joint {change.subject} disagree, "
-            "so its counted clearance is not corrected: measure it again"
+            "so its modelled clearance is not corrected: measure it again"
         )
 
     def _counted_bodies(self) -> tuple[Body, ...]:

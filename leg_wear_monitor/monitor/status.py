@@ -311,7 +311,7 @@ def _by_encoders(last: CycleReport | None) -> list[str]:
         if one.observation in (ClearanceObservation.WAITING, ClearanceObservation.COMMISSIONING)
     }
     if not messages and not waiting and len(hidden) < len(seen):
-        messages = ["clearances agree with the counted ones"]
+        messages = ["clearances agree with the modelled ones"]
     return [
         *messages,
         *(f"{joint} {ClearanceObservation.NOT_OBSERVABLE.value}" for joint in hidden),

@@ -178,7 +178,7 @@ def _about_the_ledger(result: ReplayResult) -> list[Finding]:
     """Findings about the ledger after the replay."""
     found = []
     if result.monitor.is_all_counted:
-        text = "everything in this recording is in the ledger already: nothing was counted"
+        text = "everything in this recording is in the ledger already, so no wear was added"
         found.append(Finding(result.files[0], text, Severity.NOTE))
     elif result.monitor.already_counted_s > 0.0:
         text = f"{result.monitor.already_counted_s:.4g} s of it are in the ledger already: not counted again"

@@ -39,12 +39,12 @@ from leg_wear_monitor.twin.sample import (
     ZERO_STAMP,
 )
 
-# Parameters of the gait publisher: those of the synthetic leg, and those of publication.
+# Parameters of the gait publisher, for the synthetic leg and its messages.
 
 
 @attrs.frozen(kw_only=True)
 class TruthConfig:
-    """What is known of the leg."""
+    """True values of the leg."""
 
     path: str = described("JSON file for its true clearances, written at the end; none if empty", default="")
 
@@ -58,13 +58,13 @@ class PublisherConfig(GaitConfig):
         "names of other joints in the message; they stand still", default=()
     )
     frame_id: str = described("frame of the torque", default="pelvis")
-    reliable: bool = described("publish reliably, else with best effort", default=False)
+    reliable: bool = described("publish reliably instead of with best effort", default=False)
     time_scale: float = quantity("", "simulated seconds per second", above=0.0, at_most=1000.0, default=1.0)
     precompute: bool = described("simulate the whole gait before publishing; needs a duration", default=False)
     wait_for_subscribers: int = quantity(
         "", "number of subscribers of each topic to wait for before the start", within=(0, 100), default=0
     )
-    truth: TruthConfig = described("what is known of the leg", factory=TruthConfig)
+    truth: TruthConfig = described("true values of the leg", factory=TruthConfig)
 
 
 # Conversion of the synthetic leg's readings to messages, with injected faults.

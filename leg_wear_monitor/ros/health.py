@@ -236,7 +236,7 @@ class ClockMonitor:
         stands_s = (steady_ns - self._changed_ns) * 1.0e-9
         values = {"stands_s": stands_s, "is_simulated": float(is_simulated), "stamps_ahead_s": ahead_s}
         if is_simulated and not ros_ns:
-            message = "use_sim_time is set and nobody publishes /clock"
+            message = "use_sim_time is set, and no node publishes /clock"
             return Status("clock", Level.ERROR, message, values, alarms.CLOCK_MISSING)
         if stands_s > _STANDS_FROM_S:
             message = "stands still: /clock has stopped"
@@ -371,7 +371,7 @@ def _faults(topic: InputTopic, silent_s: float, running_s: float) -> Iterator[tu
     if silent_s > SILENT_FROM_S:
         yield Level.ERROR, f"has been silent since {utc(topic.heard_wall_ns)}: nothing is monitored"
     elif not topic.publishers.fitting and not topic.publishers.refused:
-        yield Level.ERROR if running_s >= NOTHING_FROM_S else Level.WARN, "nobody publishes it"
+        yield Level.ERROR if running_s >= NOTHING_FROM_S else Level.WARN, "no node publishes it"
     elif math.isnan(silent_s) and running_s >= NOTHING_FROM_S:
         yield Level.ERROR, "has a publisher, but no message has arrived yet"
     if topic.lost > topic.lost_reported:

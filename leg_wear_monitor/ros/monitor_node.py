@@ -453,7 +453,7 @@ class MonitorNode(ClosingNode):
         self._send_state_and_forecast()
         fault = not_stored(self._monitor)
         history = "" if fault else f", history kept; ~/undo_reset/{joint} reverts it"
-        reply = f"joint {joint}: new surfaces{history}; alarms {alarms}; confirm by walking"
+        reply = f"joint {joint}: new surfaces{history}; alarms {alarms}; let the leg walk to confirm it"
         return with_storage(reply, fault)
 
     def _undo_reset(self, joint: str) -> str:

@@ -23,7 +23,7 @@ BROKEN = [
     ("G: [0.420, 0.0]", "G: [0.420, left]", ["bodies.thigh.points.G", "'left'", "number [m]"]),
     ("[0.086, 0.0, -1.740340]", "[0.086, 0.0]", ["assembly.coupler", "3 numbers [m, m, rad]"]),
     ("gravity: [0.0, -9.81]", "gravity: down", ["gravity", "'down'", "2 numbers [m/s^2]"]),
-    ("speed: 6.283185307179586", "speed: 0", ["drive.speed", "0.0 rad/s", "expected another speed"]),
+    ("speed: 6.283185307179586", "speed: 0", ["drive.speed", "0.0 rad/s", "expected a speed"]),
     ("restitution: 0.9", "restitution: 1.9", ["clearances.defaults.restitution", "1.9", "at most 1"]),
     ("restitution: 0.9", "restitution: 0.01", ["clearances.defaults.restitution", "0.01", "at least 0.02"]),
     ("[0.29, 0.29]", "[0.29, 0.79]", ["clearances.defaults.poissons_ratio", "0.79", "at most 0.5"]),

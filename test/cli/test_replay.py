@@ -79,8 +79,8 @@ def test_the_same_recording_again_keeps_the_report_and_exits_with_findings(
     again = run(*arguments, "--json", "again.json")
     assert again.exit_code == 1
     assert complaints(again) == [
-        f"note: {bag}: everything in this recording is in the ledger already: nothing was counted",
-        "warning: out: nothing was counted, so the earlier report stays as it is",
+        f"note: {bag}: everything in this recording is in the ledger already, so no wear was added",
+        "warning: out: no wear was added, so the earlier report stays as it is",
     ]
     assert re.search("^code +ALREADY_COUNTED, see .+node.md$", again.stdout, re.MULTILINE)
     assert "written: out" not in again.stdout

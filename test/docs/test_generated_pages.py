@@ -86,7 +86,7 @@ def monitor_parameters(_name: str) -> str:
         )
         for one in PARAMETERS.values()
     )  # fmt: skip
-    return table("name | type | unit | default | bounds | live | what it is", rows)
+    return table("name | type | unit | default | bounds | live | meaning", rows)
 
 
 def publisher_parameters(_name: str) -> str:
@@ -97,7 +97,7 @@ def publisher_parameters(_name: str) -> str:
         (f"`{one.name}`", one.type, one.unit, value(one.default), one.bounds, one.description)
         for one in parameters_of(PublisherConfig).values()
     )
-    return table("name | type | unit | default | bounds | what it is", rows)
+    return table("name | type | unit | default | bounds | meaning", rows)
 
 
 def mechanism_keys(name: str) -> str:
@@ -117,7 +117,7 @@ def mechanism_keys(name: str) -> str:
 
     fields = attrs.fields(getattr(spec, name.removeprefix("keys of ")))
     keys = [field for field in fields if "doc" in field.metadata and not field.metadata.get("flat")]
-    return table("key | unit | bounds | default | what it is", map(row, keys))
+    return table("key | unit | bounds | default | meaning", map(row, keys))
 
 
 def fleet_keys(name: str) -> str:
@@ -126,7 +126,7 @@ def fleet_keys(name: str) -> str:
 
     fields = attrs.fields(getattr(description, name.removeprefix("keys of ")))
     rows = ((f"`{field.name}`", default(field.default), field.metadata["doc"]) for field in fields)
-    return table("key | default | what it is", rows)
+    return table("key | default | meaning", rows)
 
 
 def sourced_keys(kind: Any) -> str:
@@ -140,7 +140,7 @@ def sourced_keys(kind: Any) -> str:
         for field in attrs.fields(kind)
         if not (kind is sourced.WearCoefficient and field.name in inherited)
     )  # fmt: skip
-    return table("key | measures | required | what it is", rows)
+    return table("key | measures | required | meaning", rows)
 
 
 def units(of_drives: bool) -> str:

@@ -59,7 +59,7 @@ def test_the_first_recording(learnt, capsys):
     assert len(archard) == 5 and max(archard, key=lambda joint: float(archard[joint])) == "A"
     assert (
         "STOP joint G" in said
-        and "not valid  counted clearances" in said
+        and "not valid  modelled clearances" in said
         and "ERROR  torque_mismatch" in said
     )
     assert lesson.healthy.verdict.state.value == "healthy"

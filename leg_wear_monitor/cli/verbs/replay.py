@@ -108,7 +108,7 @@ def replay(
         print_replay(result, took[0])
     common.say(json_file, (), written)
     if is_report_there and result.monitor.is_all_counted:
-        click.echo(f"warning: {out}: nothing was counted, so the earlier report stays as it is", err=True)
+        click.echo(f"warning: {out}: no wear was added, so the earlier report stays as it is", err=True)
     return common.WITH_FINDINGS if is_failed(result, allow_partial, fail_on) else 0
 
 

@@ -229,7 +229,7 @@ def reset(
             lines = [
                 f"new surfaces, {words} are set to 0, history kept; --undo reverts it",
                 f"alarms {alarm_words(*monitor.reset_wear(joint, now_ns, who))}",
-                "confirm by walking: the next gait cycles show whether the repair is good",
+                "let the leg walk: the next gait cycles show whether the repair is good",
             ]
     _say([f"joint {joint}: {lines[0]}", *lines[1:]], dry_run)
     return 0

@@ -42,7 +42,7 @@ def _sign(doc: str) -> Any:
 class Crank:
     """From a joint's position to the mechanism's crank angle: sign * position / gear_ratio + offset."""
 
-    sign: int = _sign("1 if the joint turns in the direction of the mechanism's crank angle, else -1")
+    sign: int = _sign("1 if the joint turns in the direction of the mechanism's crank angle, otherwise -1")
     offset_rad: float = quantity(
         "rad",
         "crank angle at joint position 0",
@@ -53,14 +53,15 @@ class Crank:
     )
     gear_ratio: float = quantity(
         "",
-        "turns of the joint per turn of the crank; if not 1, the position must be continuous, not wrapped",
+        "turns of the joint per turn of the crank; unless it is 1, the position must be continuous, not "
+        "wrapped",
         within=(1.0e-4, 1.0e4),
         default=1.0,
     )
     zero: str = choice(
         ZEROS,
-        "whether crank.offset_rad is known, or the encoder has its zero where it starts, so that the monitor "
-        "finds the offset from the drive torque",
+        "known: crank.offset_rad is the offset; at_start: the encoder starts at zero, and the monitor finds "
+        "the offset from the drive torque",
         default=KNOWN,
     )
 
@@ -89,32 +90,33 @@ class Encoders:
     """Further encoders, in whose angles clearances show (forecast.md); by default there are none."""
 
     names: tuple[str, ...] = described(
-        "names of further encoders in joint_states, in the messages with the crank; empty: none",
+        "names of further encoders in joint_states, in the messages with the crank; empty for none",
         default=(),
         check=_few_and_different,
     )
     joints: tuple[str, ...] = described(
-        "revolute joint of each encoder; its angle is from the bushing's body to the journal's, with "
-        "an offset that is estimated",
+        "revolute joint of each encoder; the angle is from the bushing's body to the journal's body, and the "
+        "monitor estimates its offset",
         default=(),
         check=_few_and_different,
     )
     signs: tuple[float, ...] = quantity(
         "",
-        "1.0 if an encoder turns in the direction of the mechanism's angles, else -1.0; empty: all 1.0",
+        "1.0 if an encoder turns in the direction of the mechanism's angles, otherwise -1.0; empty for all "
+        "1.0",
         within=(-1.0, 1.0),
         default=(),
         check=_signs,
     )
     commissioning_cycles: int = quantity(
         "",
-        "gait cycles for the estimate of a new encoder's offset and scale; then both are fixed",
+        "gait cycles in which the monitor estimates offset and scale of a new encoder",
         within=(20, 10000),
         default=100,
     )
     window_cycles: int = quantity(
         "",
-        "gait cycles from which clearances are estimated; a sudden change shows after half of them",
+        "gait cycles per clearance estimate; a sudden change shows after half of them",
         within=(20, 2000),
         default=60,
     )
@@ -132,26 +134,26 @@ class DriveTorque:
 
     source: str = choice(
         TORQUE_SOURCES,
-        "WrenchStamped or Float64 on drive_torque, the crank's effort in joint_states, or an interface of "
-        "the crank in dynamic_joint_states of ros2_control",
+        "source of the torque: WrenchStamped or Float64 on drive_torque, the crank's effort in joint_states, "
+        "or an interface of the crank in dynamic_joint_states of ros2_control",
         default="wrench",
     )
     interface: str = described(
-        "name of the crank's interface with drive_torque.source interface, such as motor_current; "
-        "drive_torque.scale is then N m per ampere",
+        "name of the crank's interface if drive_torque.source is interface, such as motor_current; the unit "
+        "of drive_torque.scale is then N m per ampere",
         default="effort",
         check=_named,
     )
     sampling: str = choice(
         sample.SAMPLINGS,
-        "what a torque sample is: the average since the one before, or the torque at its instant",
+        "average: a sample is the mean since the previous sample; instant: the torque at its stamp",
         default=sample.AVERAGE,
     )
     axis: str = choice(("x", "y", "z"), "component of the wrench about the drive's axis", default="z")
-    sign: int = _sign("1 if a positive torque drives the crank in its positive direction, else -1")
+    sign: int = _sign("1 if a positive torque drives the crank in its positive direction, otherwise -1")
     scale: float = quantity(
         "",
-        "factor on the torque, for its unit and the gear's efficiency",
+        "factor on the torque for its unit and the efficiency of the gear",
         within=(1.0e-6, 1.0e6),
         default=1.0,
     )
@@ -160,22 +162,22 @@ class DriveTorque:
     )
     max_friction_nm: float = live_quantity(
         "N m",
-        "largest friction of the drive, on the crank; a constant torque beyond is a bias; 0: 0.3 of the "
+        "largest friction of the drive at the crank; a larger constant torque is a bias; 0 means 0.3 of the "
         "predicted RMS",
         within=(0.0, 1.0e6),
         default=0.0,
     )
     max_lag_s: float = live_quantity(
         "s",
-        "largest time by which the measured torque is late or early, beyond what drive.lag_s and "
-        "drive.bandwidth_hz declare; above it, crank.offset_rad may be off",
+        "largest delay of the measured torque, late or early, in addition to drive.lag_s and "
+        "drive.bandwidth_hz; a larger delay may be a wrong crank.offset_rad",
         above=0.0,
         at_most=1.0,
         default=0.005,
     )
     saturation_nm: float = live_quantity(
         "N m",
-        "torque on the crank at which the sensor saturates; 0: unknown",
+        "torque on the crank at which the sensor saturates; 0 if unknown",
         within=(0.0, 1.0e6),
         default=0.0,
     )
@@ -187,15 +189,15 @@ class FootLoad:
 
     source: str = choice(
         sample.LOAD_SOURCES,
-        "none, or what is on foot_load: WrenchStamped, Float64 (the vertical force), or contact, a Bool",
+        "message on foot_load: none, WrenchStamped, Float64 (vertical force), or contact, a Bool",
         default=sample.NO_LOAD,
     )
     frame: str = choice(
         sample.LOAD_FRAMES,
-        "axes of the wrench: x and y of the mechanism (ground), or of the body with the toe (foot)",
+        "axes of the wrench: of the mechanism (ground), or of the body with the toe (foot)",
         default=sample.GROUND_FRAME,
     )
-    sign: int = _sign("1 if a force is positive that pushes the foot along the axis or up, else -1")
+    sign: int = _sign("1 if a positive value pushes the foot up or along the axis, otherwise -1")
     scale: float = quantity(
         "", "factor on the force, for its unit: 1000.0 for kN", within=(1.0e-6, 1.0e6), default=1.0
     )
@@ -212,12 +214,13 @@ class Load:
 
     model: str = choice(
         sample.LOAD_MODELS,
-        "load at the foot: none; ground, estimated as a person's in stance; measured, that of foot_load",
+        "load at the foot: none; ground, estimated from the torque as a person's stance; measured, from "
+        "foot_load",
         default=sample.NONE,
     )
     person_kg: float = quantity(
         "kg",
-        "mass of a person one of whose legs hangs on thigh, shank and foot; 0 for none",
+        "mass of a person with one leg strapped to thigh, shank and foot; 0 for none",
         within=(0.0, 300.0),
         default=0.0,
     )
@@ -229,7 +232,7 @@ class Cadence:
 
     commanded_rpm: float = quantity(
         "rpm",
-        "commanded crank speed, negative for clockwise, at least 0.1 either way",
+        "commanded crank speed, negative for clockwise, at least 0.1 in size",
         within=(-1200.0, 1200.0),
         usual=(10.0, 1200.0),
         doubt=_is_slow,
@@ -238,7 +241,7 @@ class Cadence:
     )
     tolerance_rpm: float = live_quantity(
         "rpm",
-        "largest departure from the commanded speed at which predictions are valid",
+        "predictions are valid within this deviation from the commanded speed",
         above=0.0,
         at_most=1200.0,
         default=6.0,
@@ -259,7 +262,7 @@ class Tracker:
     )
     gap_limit_s: float = quantity(
         "s",
-        "longest gap that is bridged at the tracked speed; longer gaps are not monitored",
+        "longest gap that the monitor bridges at the tracked speed; longer gaps are unmonitored",
         above=0.0,
         at_most=10.0,
         default=0.5,

@@ -30,7 +30,7 @@ def _figure(
         bounds = f"{least:g} to {most:g} {unit}".rstrip()
         return f"{value!r} is not within its bounds, expected {bounds}, or {NOT_DECLARED} if not declared"
 
-    text = f"{doc}; {NOT_DECLARED:g}: that of drive.type, or estimated"
+    text = f"{doc}; {NOT_DECLARED:g} takes the value of drive.type or an estimate"
     words = USUAL if unit else "{value:g}, usual are {usual}"
     number: float = quantity(
         unit,
@@ -49,7 +49,7 @@ class DriveParameters:
     """What is known of the drive beforehand; all else is estimated. The numbers are at the crank."""
 
     type: str = described(
-        "the drive: a name that `leg-wear-monitor drives` lists, or a file; empty: unknown", default=""
+        "drive: a name from `leg-wear-monitor drives`, or a file; empty if unknown", default=""
     )
     gear_ratio: float = quantity(
         "",
@@ -57,23 +57,23 @@ class DriveParameters:
         within=(1.0e-4, 1.0e4),
         default=1.0,
     )
-    lag_s: float = _figure("s", "time by which the measured torque is late", 0.0, 1.0, (0.0, 0.1), "ms for s")
+    lag_s: float = _figure("s", "delay of the measured torque", 0.0, 1.0, (0.0, 0.1), "ms for s")
     bandwidth_hz: float = _figure(
         "Hz",
-        "corner frequency of the low-pass between the crank's torque and the measured one",
+        "corner frequency of the low-pass between crank torque and measured torque",
         0.01,
         1.0e5,
         (1.0, 2.0e4),
         "kHz for Hz",
     )
     load_friction: float = _figure(
-        "", "friction of the drive by load, as a fraction of the torque's size", 0.0, 0.9, (0.0, 0.6)
+        "", "load friction of the drive, as a fraction of the torque", 0.0, 0.9, (0.0, 0.6)
     )
     coulomb_nm: float = _figure(
         "N m", "constant friction of the drive, at the crank", 0.0, 1.0e6, (0.0, 100.0), "N mm for N m"
     )
     viscous_nms: float = _figure(
-        "N m s/rad", "friction of the drive by speed, at the crank", 0.0, 1.0e6, (0.0, 100.0)
+        "N m s/rad", "viscous friction of the drive, at the crank", 0.0, 1.0e6, (0.0, 100.0)
     )
     stiffness_nm_per_rad: float = _figure(
         "N m/rad",
@@ -83,8 +83,8 @@ class DriveParameters:
         (5.0, 1.0e7),
     )
     temperature_interface: str = described(
-        "name of the crank's interface in dynamic_joint_states that is the temperature of the drive [°C], as "
-        "temperature; needs drive_torque.source interface; empty: none",
+        "interface of the crank in dynamic_joint_states with the temperature of the drive [°C]; needs "
+        "drive_torque.source interface; empty for none",
         default="",
     )
 
@@ -155,8 +155,8 @@ class Forecasting:
 
     wear_coefficient_sigma: float = quantity(
         "",
-        "standard deviation of the logarithm of a joint's wear coefficient about the given one; 0: the "
-        "spread of the joint's material pair, or 0.7 where that gives none",
+        "standard deviation of the logarithm of a joint's wear coefficient; 0 takes the spread of the "
+        "joint's material pair, or 0.7 without one",
         within=(0.0, 3.0),
         default=0.0,
         check=_not_next_to_0,

@@ -32,11 +32,11 @@ class Limits:
     """Where alarms begin: ERROR at the limit, WARN at a fraction of it."""
 
     warn_fraction: float = live_quantity(
-        "", "fraction of a limit at which the level WARN begins", above=0.0, at_most=1.0, default=0.8
+        "", "alarm level WARN begins at this fraction of a limit", above=0.0, at_most=1.0, default=0.8
     )
     impact_force_n: float = live_quantity(
         "N",
-        "impact force in a joint, peak of a gait cycle",
+        "limit of the impact force in a joint (peak of a gait cycle)",
         above=0.0,
         at_most=1.0e7,
         usual=(10.0, 1.0e7),
@@ -53,7 +53,7 @@ class Limits:
         default=(),
     )
     clearance_m: float = live_quantity(
-        "m", "mean radial clearance of a joint", above=0.0, at_most=0.1, default=0.0006
+        "m", "limit of a joint's mean radial clearance", above=0.0, at_most=0.1, default=0.0006
     )
     joint_clearance_m: tuple[float, ...] = live_quantity(
         "m",
@@ -64,54 +64,54 @@ class Limits:
     )
     clearance_departure_m: float = live_quantity(
         "m",
-        "difference between the clearance from further encoders and the counted one",
+        "limit of the difference between a clearance from further encoders and the modelled clearance",
         above=0.0,
         at_most=0.1,
         default=0.0001,
     )
     growth_m_per_hour: float = live_quantity(
-        "m/h", "growth of a joint's mean clearance", above=0.0, at_most=1.0, default=1.0e-6
+        "m/h", "limit of the growth of a joint's mean clearance", above=0.0, at_most=1.0, default=1.0e-6
     )
     remaining_life_h: float = live_quantity(
         "h",
-        "least remaining life of a joint (p10 of its forecast); 0: at its end",
+        "alarm threshold for a joint's remaining life (p10); 0 raises the alarm only at the end of life",
         within=(0.0, 1.0e6),
         default=0.0,
     )
     torque_mismatch: float = live_quantity(
         "",
-        "RMS of the drive torque that load, friction and lag do not explain, fraction of the predicted RMS",
+        "limit of the torque that load, friction and lag do not explain, as a fraction of the predicted RMS",
         above=0.0,
         at_most=100.0,
         default=0.1,
     )
     torque_bias_nm: float = live_quantity(
         "N m",
-        "constant drive torque outside 0 to drive_torque.max_friction_nm; 0: a tenth of the predicted RMS",
+        "limit of a constant torque that friction cannot cause; 0 means a tenth of the predicted RMS",
         within=(0.0, 1.0e6),
         default=0.0,
     )
     torque_drift_nm: float = live_quantity(
         "N m",
-        "change of the constant drive torque since this leg was commissioned; 0: 0.15 of the predicted RMS",
+        "limit of the change of the constant torque since commissioning; 0 means 0.15 of the predicted RMS",
         within=(0.0, 1.0e6),
         default=0.0,
     )
     min_rate_hz: float = live_quantity(
-        "Hz", "least rate of crank samples", above=0.0, at_most=1.0e5, default=40.0
+        "Hz", "lowest accepted rate of crank samples", above=0.0, at_most=1.0e5, default=40.0
     )
     bad_sample_fraction: float = live_quantity(
-        "", "fraction of unusable samples", above=0.0, at_most=1.0, default=0.05
+        "", "limit of the fraction of unusable samples", above=0.0, at_most=1.0, default=0.05
     )
     stuck_torque_fraction: float = live_quantity(
         "",
-        "fraction of torque samples that are saturated, or repeat the largest or the smallest",
+        "limit of the fraction of torque samples that are saturated or stuck at an extreme value",
         above=0.0,
         at_most=1.0,
         default=0.3,
     )
     lost_time_fraction: float = live_quantity(
-        "", "fraction of the time that was not monitored", above=0.0, at_most=1.0, default=0.05
+        "", "limit of the fraction of unmonitored time", above=0.0, at_most=1.0, default=0.05
     )
 
     def of_clearances(self, joints: int) -> tuple[str, tuple[float, ...]]:
@@ -130,7 +130,7 @@ class Alarms:
         "", "consecutive gait cycles beyond a limit before the level rises", within=(1, 1000), default=3
     )
     impact_on_delay_cycles: int = live_quantity(
-        "", "on-delay of the alarms of impact forces", within=(1, 1000), default=1
+        "", "the same for alarms of impact forces", within=(1, 1000), default=1
     )
 
 
@@ -147,25 +147,24 @@ class Growth:
 class LedgerFile:
     """Where the wear is kept."""
 
-    path: str = described("file of the ledger; empty: none, wear is lost at the end", default="")
+    path: str = described("file of the ledger; if empty, the wear is lost when the monitor ends", default="")
     checkpoint_s: float = quantity(
         "s",
-        "longest time between two entries while the leg moves, plus an evaluation period of a quarter cycle",
+        "longest time between two ledger entries while the leg moves, plus a quarter of a gait cycle",
         within=(0.01, 600.0),
         default=5.0,
     )
-    skip_counted: bool = described(
-        "skip samples of a time whose wear an earlier run has stored in the ledger", default=True
-    )
+    skip_counted: bool = described("skip samples whose time is in the ledger already", default=True)
 
 
 @attrs.frozen(kw_only=True)
 class Record:
     """A recording of what the node receives and publishes."""
 
-    path: str = described("MCAP file to write; empty: none", default="")
+    path: str = described("MCAP file to write; if empty, the node writes no recording", default="")
     stop_recording_dir: str = described(
-        "directory for MCAP files of the 30 s before and 10 s after each stop verdict; empty: none",
+        "directory for MCAP files of the 30 s before and 10 s after each stop verdict; if empty, none is "
+        "written",
         default="",
     )
 
@@ -183,13 +182,13 @@ class Diagnostics:
 class TorqueDiagnosis:
     """Clearances that the drive torque shows (docs/explanation/diagnosis.md)."""
 
-    enabled: bool = described("whether clearances are estimated from the drive torque", default=True)
+    enabled: bool = described("estimate clearances from the drive torque", default=True)
     apply_corrections: bool = described(
-        "whether a counted clearance is corrected where the drive torque surely shows another one",
+        "replace the modelled clearance if the drive torque surely shows a different one",
         default=True,
     )
     reference: str = described(
-        "file of torque references of this leg, as `reference` and `commission` write it; empty: none",
+        "file of torque references of this leg, written by `reference` or `commission`; empty for none",
         default="",
     )
     # mean time of walking between two false findings [h]: 30 days of 8 hours; longer finds changes later
@@ -201,26 +200,27 @@ class MonitorConfig:
     """All parameters; their dotted names are those of the ROS node and of config/monitor.yaml."""
 
     mechanism: str = described(
-        "the leg: the name of a mechanism that comes with the package, or a file",
+        "mechanism of the leg: a name from the package, or a file",
         default="bionic_leg",
         check=_filled,
     )
     hardware_id: str = described(
-        "name of this leg in diagnostics and the ledger; empty: namespace of the node, or leg",
+        "name of this leg in diagnostics and the ledger; if empty, the namespace of the node, or leg",
         default="",
     )
     clearance_joints: tuple[str, ...] = described(
-        "joints with clearance; empty: those of the mechanism's file", default=()
+        "joints with clearance; if empty, the clearance joints of the mechanism file", default=()
     )
     clearances_m: tuple[float, ...] = quantity(
         "m",
-        "radial clearances when new, one for all clearance joints or one each; empty: those of the file",
+        "radial clearances when new, one value for all joints or one per joint; if empty, from the mechanism "
+        "file",
         within=(1.0e-6, 0.1),
         default=(),
     )
     wear_coefficients_per_pa: tuple[float, ...] = quantity(
         "1/Pa",
-        "K/H of both surfaces, one for all clearance joints or one each; empty: those of the file",
+        "K/H of both surfaces, one value for all joints or one per joint; if empty, from the mechanism file",
         within=(0.0, 1.0e-6),
         usual=USUAL_WEAR,
         doubt=WEAR_SLIP,
@@ -228,7 +228,7 @@ class MonitorConfig:
     )
     wear_acceleration: float = quantity(
         "",
-        "factor on all wear; other than 1 for demonstrations only, above 1000 with a warning",
+        "factor on all wear, for demonstrations only; values above 1000 cause a warning",
         within=(1.0e-9, 1.0e5),
         default=1.0,
     )
@@ -254,7 +254,7 @@ class MonitorConfig:
         "publish the contact forces of every sample", default=True, metadata=LIVE
     )
     publish_scalars: bool = described(
-        "publish values of each joint as numbers of their own, and the measured torque, for plots",
+        "publish each value of a joint on its own topic, and the measured torque, for plots",
         default=False,
     )
     publish_markers: bool = described("publish markers for RViz and Foxglove", default=False, metadata=LIVE)

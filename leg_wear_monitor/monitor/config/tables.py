@@ -52,15 +52,15 @@ class Columns:
     crank_angle: str = described(
         "column of the position of the crank's joint", default="crank_angle", check=_filled
     )
-    crank_speed: str = described("column of the speed of the crank's joint; empty: none", default="")
-    drive_torque: str = described("column of the drive torque; empty: none", default="drive_torque")
+    crank_speed: str = described("column of the speed of the crank's joint; empty for none", default="")
+    drive_torque: str = described("column of the drive torque; empty for none", default="drive_torque")
     foot_load: str = described(
-        "column of the force on the foot, up or, of a wrench, along its y axis, or of the contact; not read "
-        "with foot_load.source none; empty: none",
+        "column of the foot load: vertical force, y axis of a wrench, or contact; unused if foot_load.source "
+        "is none; empty for none",
         default="foot_load",
     )
     foot_load_along: str = described(
-        "column of a wrench's force along its x axis; empty: none, it is 0", default=""
+        "column of a wrench's force along its x axis; if empty, this force is 0", default=""
     )
 
 
@@ -91,7 +91,7 @@ def _date(text: str) -> str | None:
     try:
         datetime.fromisoformat(text)
     except ValueError:
-        return f"{text!r} is no date and time, expected one such as '2026-03-01T09:00:00Z'"
+        return f"{text!r} is not a date and time, expected for example '2026-03-01T09:00:00Z'"
     return None
 
 
@@ -103,8 +103,7 @@ class TableInput:
     units: Units = described("", factory=Units)
     counts_per_turn: float = quantity(
         "",
-        "counts of the encoders in a turn of their joint, for positions in counts, such as 4096 for 12 bits; "
-        "0: positions are in another unit",
+        "encoder counts per turn of the joint, such as 4096 for 12 bits; 0 if positions are not in counts",
         within=(0.0, 1.0e12),
         default=0.0,
     )
@@ -120,7 +119,7 @@ class TableInput:
         default="",
     )
     start: str = described(
-        "date and time at which the time is 0, such as 2026-03-01T09:00:00Z; empty: 1970",
+        "date and time of time 0, such as 2026-03-01T09:00:00Z; if empty, 1970",
         default="",
         check=_date,
     )

@@ -120,7 +120,7 @@ class MeasurementResult:
         now, limit_m, warn_fraction = self.measurement, self.limit_m, self.warn_fraction
         size = f"{_mm(now.clearance_m)} ± {_mm(now.sigma_m)}"
         lines = [f"{now.joint}: {size}, {now.cycles} gait cycles after the part was new"]
-        lines.append(f"{_mm(self.modelled_m)} is counted (limit {_mm(limit_m)}); that stays as it is")
+        lines.append(f"the model has {_mm(self.modelled_m)} (limit {_mm(limit_m)}) and stays as it is")
         if now.clearance_m >= limit_m:
             lines.append(
                 f"{AT_LIMIT}: stop the leg when it is safe; the alarm clearance {now.joint} is raised"

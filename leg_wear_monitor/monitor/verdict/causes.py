@@ -1,4 +1,4 @@
-"""What explains a drive torque, in words: one sentence and one remedy per cause, whoever finds it."""
+"""Causes of a deviating drive torque in words: one sentence and one remedy per cause."""
 
 import math
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ class CauseWords:
         The sentence; the drive torque is *it*. ``{value}`` and ``{size}`` are the value with and without its
         sign, ``{percent}`` is the size in percent, ``{subject}`` the body, ``{way}`` one of `ways`.
     do : str
-        What a person does.
+        Action of the operator.
     ways : tuple of str
         Words for a negative and for a positive value.
     """
@@ -37,18 +37,18 @@ class CauseWords:
 
 
 _OFFSET, _DELAY = "correct crank.offset_rad", "look for a delay of the torque"
-_TIMING = f"turn the crank to a known angle and compare: {_OFFSET} if its angle is wrong, else {_DELAY}"
+_TIMING = f"turn the crank to a known angle and compare: {_OFFSET} if its angle is wrong, otherwise {_DELAY}"
 _DRIVE = "check the zero of the torque sensor, the lubrication and the temperature of the drive"
 _BODY = "look for loose, bent or added parts, and rock each joint"
 
 CAUSES: Mapping[Cause, CauseWords] = {
     Cause.SIGN: CauseWords(
-        "torque_factor", "", "it is {value} times the predicted one", "reverse drive_torque.sign"
+        "torque_factor", "", "it is {value} times the predicted torque", "reverse drive_torque.sign"
     ),
     Cause.SCALE: CauseWords(
         "torque_factor_size",
         "",
-        "its size is {size} times the predicted one",
+        "its size is {size} times the predicted size",
         "correct drive_torque.scale or drive_torque.gear_ratio",
     ),
     Cause.TIMING: CauseWords(
@@ -82,7 +82,7 @@ CAUSES: Mapping[Cause, CauseWords] = {
         "check the zero of the torque sensor, drive_torque.sign, scale and gear_ratio, and the friction of "
         "the drive",
         (
-            "drives the crank, which friction cannot",
+            "drives the crank, but friction cannot drive",
             "acts beyond the largest friction of the drive",
         ),
     ),
@@ -93,7 +93,7 @@ CAUSES: Mapping[Cause, CauseWords] = {
         _DRIVE,
     ),
     Cause.LOAD_FRICTION: CauseWords(
-        "load_friction", "", "the part of the torque that is friction has {way} by {size}, of 1", _DRIVE
+        "load_friction", "", "the friction fraction of the torque has {way} by {size}", _DRIVE
     ),
     Cause.JOINT_FRICTION: CauseWords(
         "joint_friction_fraction",
@@ -127,7 +127,7 @@ _MOST = 3  # alternatives in words
 
 
 def sentence(one: NamedCause, found: Diagnosis | None = None) -> str:
-    """A cause other than a clearance, with its value; with the temperatures of a diagnosis where they matter.
+    """A cause other than a clearance, with its value; with the temperatures of a diagnosis if they matter.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def sentence(one: NamedCause, found: Diagnosis | None = None) -> str:
 
 
 def remedy(one: NamedCause) -> str:
-    """What a person does about a cause."""
+    """Action of the operator for a cause."""
     return CAUSES[one.cause].do.format(subject=one.subject)
 
 
@@ -165,9 +165,9 @@ def evidence_of(one: NamedCause) -> Evidence:
 
 
 def explanation(explained: TorqueExplanation, found: Diagnosis | None = None) -> str:
-    """The alternatives that explain a torque mismatch, with their values, and what stays unexplained."""
+    """Alternatives that explain a torque mismatch, with their values and the unexplained rest."""
     rest = estimate(explained.after, explained.after_sigma, "")
-    left = f"{rest} of the predicted RMS stays unexplained: the mechanism or a clearance may have changed"
+    left = f"{rest} of the predicted RMS remains unexplained: the mechanism or a clearance may have changed"
     if not explained.alternatives:
         return f"no fault of the sensors, load or mass explains half of it; {left}"
     alternatives = [

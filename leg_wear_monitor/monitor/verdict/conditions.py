@@ -55,7 +55,7 @@ Condition = Callable[[Situation], Sequence[Hit]]
 
 
 def noted(code: str) -> Condition:
-    """What observers report for the rule of this code, a sentence each."""
+    """Reports of observers for the rule of this code, one sentence each."""
     return lambda situation: [Hit(words={"cause": text}) for text in situation.notes.get(code, ())]
 
 
@@ -66,11 +66,11 @@ def has_fault(code: str) -> Condition:
     ]
 
 
-# Conditions on alarms. A latched alarm counts like a present one until somebody acknowledges it.
+# Conditions on alarms. A latched alarm counts like a present one until an operator acknowledges it.
 
 
 def raised(*kinds: str, least: Level = Level.WARN, most: Level = Level.ERROR) -> Condition:
-    """Alarms of some kinds (all if none is given) from a level up to another one."""
+    """Alarms of some kinds (all if none is given) between two levels."""
     return lambda situation: [
         hit_of(alarm, situation)
         for alarm in situation.alarms
@@ -82,7 +82,7 @@ _OF_INPUT = ("input_sources", "input_rate", "input_samples", "input_gaps", "inpu
 
 
 def blinding(situation: Situation) -> Sequence[Hit]:
-    """Present faults of the input of the crank; those of torque and foot load stop no counting."""
+    """Present faults of the crank's input; without torque or foot load, the model continues."""
     return [
         hit_of(alarm, situation)
         for alarm in situation.alarms
@@ -128,7 +128,7 @@ def hit_of(alarm: Alarm, situation: Situation) -> Hit:
     each = next((each for each in situation.joints if each.joint == own and alarm.kind == "clearance"), None)
     if each is not None and each.measured is not None and value > each.modelled_m:
         evidence += known_evidence(f"measured clearance {own}", each.measured, each.limit_m)
-        evidence.append(Evidence(f"counted clearance {own}", each.modelled_m, each.limit_m, "m"))
+        evidence.append(Evidence(f"modelled clearance {own}", each.modelled_m, each.limit_m, "m"))
     return Hit(
         words={
             "quantity": f"{noun} of joint {joint}" if own else noun,
@@ -138,7 +138,7 @@ def hit_of(alarm: Alarm, situation: Situation) -> Hit:
             "past": past,
             "acts": f"; {situation.acts}" if situation.acts else "",
             "causes": f": {situation.input_causes[0]}" if situation.input_causes else "",
-            "known": _KNOWN_BY.get(alarm.cause, "counted"),
+            "known": _KNOWN_BY.get(alarm.cause, "modelled"),
         },
         joint=own,
         since_ns=alarm.raised_ns,
@@ -146,10 +146,10 @@ def hit_of(alarm: Alarm, situation: Situation) -> Hit:
     )
 
 
-# Conditions on what explains the drive torque: one code a cause, whoever finds it.
+# Conditions on causes of a deviating drive torque: one code per cause.
 #
 # A torque mismatch is explained while its alarm is raised, further alarms of the torque are limits of single
-# causes, and the diagnosis shows what has changed since the leg was commissioned.
+# causes, and the diagnosis shows changes since the leg was commissioned.
 
 
 def has_cause(code: str) -> Condition:
@@ -209,7 +209,7 @@ def _diagnosed(code: str, situation: Situation) -> list[Hit]:
 
 
 def mismatch(situation: Situation) -> Sequence[Hit]:
-    """The drive torque is not that of the counted leg; with what may cause it, as far as that is known."""
+    """The drive torque does not fit the model; with its possible causes."""
     possible = [sentence(cause, situation.diagnosis) for cause in situation.torque_causes.values()]
     possible += [words_of(change, situation) for change in changes(situation)]
     causes = f"; possible cause: {'; '.join(possible)}" if possible else ""
@@ -220,18 +220,18 @@ def mismatch(situation: Situation) -> Sequence[Hit]:
 
 
 def changes(situation: Situation) -> tuple[Change, ...]:
-    """What the drive torque shows that has changed; empty without an estimator."""
+    """Changes that the drive torque shows; empty without an estimator."""
     if situation.diagnosis.state is not DiagnosisState.CHANGED:
         return ()
     return tuple(change for change in situation.diagnosis.changes if not change.is_corrected)
 
 
 def words_of(change: Change, situation: Situation) -> str:
-    """A change in words, such as ``clearance of 0.62 mm ± 0.03 mm in joint G (0.3 mm is counted)``."""
+    """A change in words, such as ``clearance of 0.62 mm ± 0.03 mm in joint G (0.3 mm is modelled)``."""
     if change.cause is Cause.CLEARANCE:
         value, counted = estimate(change.value, change.sigma, "m"), amount(change.counted, "m")
         verb, joint = "was" if change.is_corrected else "is", situation.joint_words(change.subject)
-        words = f"clearance of {value} in joint {joint} ({counted} {verb} counted)"
+        words = f"clearance of {value} in joint {joint} ({counted} {verb} modelled)"
         if change.value < change.counted:
             words += ", less than before: if its part was replaced, reset the joint"
     else:
@@ -240,18 +240,18 @@ def words_of(change: Change, situation: Situation) -> str:
 
 
 def doubt(situation: Situation) -> str:
-    """Why what the drive torque shows is not sure; empty if it is."""
+    """The reason why the diagnosis is not sure; empty if it is sure."""
     return f"; {situation.diagnosis.reason}" if situation.diagnosis.reason else ""
 
 
-# Conditions on clearances: those that the forecast believes, and those that measurements show.
+# Conditions on clearances: best estimates of the forecast, and estimates by sensors.
 
 
 CONFIRMED_CYCLES = 20  # gait cycles of a new part; another leg is found in fewer
 
 
 def believed_at_limit(situation: Situation) -> Sequence[Hit]:
-    """Joints whose clearance is at its limit by what the forecast believes, measurements included."""
+    """Joints whose best estimate in the forecast, measurements included, is at its limit."""
     return [
         Hit(
             words={
@@ -260,7 +260,7 @@ def believed_at_limit(situation: Situation) -> Sequence[Hit]:
                 "limit": amount(each.limit_m, "m"),
             },
             joint=each.joint,
-            evidence=(Evidence(f"believed clearance {each.joint}", each.best_estimate_m, each.limit_m, "m"),),
+            evidence=(Evidence(f"best estimate {each.joint}", each.best_estimate_m, each.limit_m, "m"),),
         )
         for each in situation.joints
         if each.best_estimate_m >= each.limit_m
@@ -268,7 +268,7 @@ def believed_at_limit(situation: Situation) -> Sequence[Hit]:
 
 
 def counted_at_limit(situation: Situation) -> Sequence[Hit]:
-    """Alarms of clearances that are at their limit as counted or as measured.
+    """Alarms of modelled or measured clearances at their limit.
 
     The forecast is valid only if it has the joint at its limit as well: not beside a measurement that it does
     not use, or believes in part only, nor beside an alarm that is only latched.
@@ -280,14 +280,14 @@ def counted_at_limit(situation: Situation) -> Sequence[Hit]:
 
 
 def _forecast_m(each: JointSituation) -> float:
-    """What the forecast takes for a joint's clearance; by counting alone, it only follows a minute later."""
+    """Clearance of a joint in the forecast; without measurements, it is the modelled one a minute later."""
     return each.best_estimate_m if each.is_used or each.is_measurement_used else each.modelled_m
 
 
 def seen_at_limit(situation: Situation) -> Sequence[Hit]:
-    """Joints whose clearance is surely at its limit by what encoders or the drive torque show, or showed.
+    """Joints whose clearance estimate by encoders or the drive torque is or was surely at the limit.
 
-    What they showed stays until somebody acknowledges it, or a measurement contradicts it.
+    The estimate stays until an operator acknowledges it, or a measurement contradicts it.
     """
     hits = []
     for each in situation.joints:
@@ -300,7 +300,7 @@ def seen_at_limit(situation: Situation) -> Sequence[Hit]:
             continue
         past, unsure = doubt(situation) if seen.by == "torque" else "", ""
         if seen not in each.seen:
-            past = f" (since {time_words(raised_ns)}; not shown now)"
+            past = f" (since {time_words(raised_ns)}; not estimated now)"
         if each.measured is not None:
             unsure = f"; {each.measured.words} was measured"
         words = {
@@ -335,7 +335,7 @@ def replaced(situation: Situation) -> Sequence[Hit]:
 
 
 def departing(situation: Situation) -> Sequence[Hit]:
-    """Joints whose clearance by encoders differs from the counted one; the forecast may use it."""
+    """Joints whose clearance by encoders differs from the modelled one; the forecast may use it."""
     used = {each.joint for each in situation.joints if each.is_used}
     return [
         hit if hit.joint in used else attrs.evolve(hit, not_valid=(Figure.FORECAST,))
@@ -344,19 +344,19 @@ def departing(situation: Situation) -> Sequence[Hit]:
 
 
 def diagnosed(situation: Situation) -> Sequence[Hit]:
-    """Clearances that have changed by the drive torque, and that are not corrected."""
+    """Clearances that changed according to the drive torque, without a correction."""
     found = [change for change in changes(situation) if change.cause is Cause.CLEARANCE]
     return [_clearance_hit(change, situation, doubt(situation)) for change in found]
 
 
 def corrected(situation: Situation) -> Sequence[Hit]:
-    """Changes by which counted clearances were corrected."""
+    """Changes by which modelled clearances were corrected."""
     found = (change for change in situation.diagnosis.changes if change.is_corrected)
     return [_clearance_hit(change, situation) for change in found]
 
 
 def _clearance_hit(change: Change, situation: Situation, addition: str = "") -> Hit:
-    """A changed clearance in words, with an addition and with what somebody measured at that joint."""
+    """A changed clearance in words, with an addition and the measurement of that joint."""
     own = (each.measured for each in situation.joints if each.joint == change.subject)
     measured = next(own, None)
     if measured is not None and measured.words not in addition:
@@ -369,7 +369,7 @@ def _clearance_hit(change: Change, situation: Situation, addition: str = "") -> 
     )
 
 
-# Conditions on the motion, and on what is observed of the joints.
+# Conditions on the motion and on the observation of the joints.
 
 
 def no_cycle(situation: Situation) -> Sequence[Hit]:
@@ -390,9 +390,9 @@ def other_cadence(situation: Situation) -> Sequence[Hit]:
 def no_torque(situation: Situation) -> Sequence[Hit]:
     """Neither the drive torque nor encoders show the joints.
 
-    The state is `WATCH`: wear is counted from the motion alone, so the leg is monitored, and its alarms of
-    clearance, growth and forces hold for the counted leg. But no measurement can contradict the counting: a
-    bushing that breaks changes nothing that is received. So nobody may be told that the leg is healthy.
+    The state is `WATCH`: the monitor models the wear from the motion, so its alarms of clearance, growth and
+    forces are valid for the model. No measurement can contradict the model, because a broken bushing does
+    not change the received data. Therefore the verdict must not be healthy.
     """
     is_known = situation.has_torque or situation.input_faults
     if not situation.has_cycle or not situation.unobserved or is_known:
@@ -412,11 +412,11 @@ def not_compared(situation: Situation) -> Sequence[Hit]:
 
 
 def not_observed(situation: Situation) -> Sequence[Hit]:
-    """The diagnosis does not show some joints yet, or not at all, and no encoder does.
+    """Neither the diagnosis nor an encoder shows some joints, or not yet.
 
     The mismatch of the torque shows broken hip and knee joints, but not those of the foot
-    (monitor.md), so a leg without a mismatch is not known to be healthy. A diagnosis that is off is the
-    choice of somebody, and does not raise this.
+    (monitor.md), so a leg without a mismatch is not known to be healthy. If the user switched the
+    diagnosis off, this does not hold.
     """
     found = situation.diagnosis
     blind = [each.joint for each in situation.joints if not each.seen]
@@ -442,12 +442,12 @@ _LEAST_REST = 0.01  # of the drive torque: below it, noise and tolerances of the
 
 
 def nothing_found(situation: Situation) -> Sequence[Hit]:
-    """Always holds; it counts where no other rule does."""
+    """Always holds; it decides if no other rule holds."""
     if not situation.has_torque or math.isnan(situation.mismatch):
-        return [Hit(words={"observed": "the encoders show the counted clearances"})]
+        return [Hit(words={"observed": "the encoders agree with the modelled clearances"})]
     rest, limit, found = situation.mismatch, situation.mismatch_limit, situation.diagnosis
     observed = [
-        "the drive torque agrees with the counted leg: "
+        "the drive torque agrees with the model of this leg: "
         + (f"{100.0 * rest:.2g} %" if rest >= _LEAST_REST else "less than 1 %")
         + f" of its RMS is not explained (limit {100.0 * limit:.3g} %)"
     ]

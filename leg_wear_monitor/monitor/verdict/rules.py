@@ -94,7 +94,7 @@ _REPLACE = (
 
 
 def _cause(code: str, meaning: str, state: State = State.INSPECT, not_valid: tuple[Figure, ...] = ()) -> Rule:
-    """Rule of what explains a drive torque that is not as predicted."""
+    """Rule of a cause that explains a deviation of the drive torque."""
     return Rule(
         code=code,
         state=state,
@@ -160,7 +160,8 @@ RULES = (
     _stop(
         code="CLEARANCE_ESTIMATED",
         hits=conditions.believed_at_limit,
-        why="counting and measurements together give a clearance of {value} in joint {joint} (limit {limit})",
+        why="wear model and measurements together give a clearance of {value} in joint {joint} (limit "
+        "{limit})",
         do=_REPLACE,
     ),
     _cause("TORQUE_SIGN", "its sign is reversed", not_valid=EVERYTHING),
@@ -177,25 +178,25 @@ RULES = (
     _inspect(
         code="CLEARANCE_CORRECTED",
         hits=conditions.corrected,
-        why="the drive torque showed a {change}; the counted clearance is corrected",
+        why="the drive torque showed a {change}; the model uses it from now on",
         do=_ROCK,
     ),
     _inspect(
         code="CLEARANCE_DEPARTURE",
         hits=conditions.departing,
-        why="the encoders show a clearance of joint {joint} that differs from the counted one by {value} "
+        why="the encoders show a clearance of joint {joint} that differs from the modelled one by {value} "
         "(limit {limit}){past}",
         do=f"{_ROCK}; {_ACKNOWLEDGE}",
         not_valid=(Figure.CLEARANCES, *OF_THE_GAIT),
     ),
-    _cause("TORQUE_MASS", "a body has another mass", not_valid=EVERYTHING),
-    _cause("MECHANISM_CHANGED", "it does not fit the counted leg", not_valid=EVERYTHING),
+    _cause("TORQUE_MASS", "a body has a different mass", not_valid=EVERYTHING),
+    _cause("MECHANISM_CHANGED", "it does not fit the model of this leg", not_valid=EVERYTHING),
     _cause("TORQUE_LOAD", "a load acts at the foot", State.WATCH, OF_THE_MODEL),
     _inspect(
         code="TORQUE_MISMATCH",
         hits=conditions.mismatch,
-        why="the drive torque does not fit the counted leg, so the forecast is not valid: {value} of the "
-        "predicted RMS is not explained (limit {limit}){past}{causes}",
+        why="the drive torque does not fit the model of this leg, so the forecast is not valid: {value} of "
+        "the predicted RMS is not explained (limit {limit}){past}{causes}",
         do="stop when it is safe, block the drive and rock each joint; measure the joint with play and enter "
         "it: `leg-wear-monitor measure JOINT MM --sigma MM --config FILE --ledger FILE`, or `--node NAME`; "
         f"if none has play, check the load at the foot and the torque sensor; {_ACKNOWLEDGE}",
@@ -203,7 +204,7 @@ RULES = (
         rests_on=(TORQUE,),
     ),
     _cause("TORQUE_NOISE", "it has more or less noise than before", State.WATCH),
-    _cause("TORQUE_BIAS", "it has a constant part that friction cannot be"),
+    _cause("TORQUE_BIAS", "it has a constant part that friction cannot cause"),
     _cause("FRICTION_CHANGED", "the friction has changed", State.WATCH),
     _inspect(
         code="IMPACT_FORCE",
@@ -227,7 +228,7 @@ RULES = (
     _not_monitored(
         code=alarms.ALREADY_COUNTED,
         hits=noted(alarms.ALREADY_COUNTED),
-        why="everything that was received is in the ledger already: nothing was counted",
+        why="all received samples are in the ledger already, so no wear was added",
         do="nothing, if a recording was replayed again; for its report, replay it without a ledger; "
         "on a live leg, check the clock of the samples",
         not_valid=OF_THE_GAIT,
@@ -281,7 +282,7 @@ RULES = (
         code="MATERIAL_LIMIT",
         hits=raised("material_limit", least=Level.ERROR),
         why="joint {joint} is loaded {value} times the limits of its material{past}; its wear coefficient "
-        "does not hold",
+        "is not valid",
         do="compare the material of the mechanism file with the part, and load and cadence with its limits; "
         f"until then, measure the clearance of joint {{joints}} regularly; {_ACKNOWLEDGE}",
         not_valid=(Figure.GROWTH, Figure.FORECAST),
@@ -290,7 +291,7 @@ RULES = (
         code="PART_REPLACED",
         hits=conditions.replaced,
         why="joint {joint} was replaced on {when}, {cycles} gait cycles ago",
-        do="confirm by walking: let the leg walk on at the commanded cadence, and see the verdict then",
+        do="let the leg walk on at the commanded cadence; the verdict then confirms the repair",
     ),
     _watch(
         code="NO_DRIVE_TORQUE",

@@ -86,7 +86,7 @@ def estimate(value: float, sigma: float, unit: str) -> str:
 _STATES = {
     DiagnosisState.OFF: "off",
     DiagnosisState.WAITING: "waiting",
-    DiagnosisState.AS_MODELLED: "the drive torque shows the counted clearances",
+    DiagnosisState.AS_MODELLED: "the drive torque agrees with the modelled clearances",
     DiagnosisState.CHANGED: "the drive torque shows a change",
 }
 

@@ -198,7 +198,7 @@ def joint_section(summary: ReplaySummary) -> Section:
 
 def _table(summary: ReplaySummary) -> Table:
     has_growth = Figure.GROWTH not in summary.verdict.not_valid
-    head = ["joint", "counted clearance [mm]", "opened [nm]"]
+    head = ["joint", "modelled clearance [mm]", "opened [nm]"]
     rows = []
     for name, joint in summary.joints.items():
         row = [summary.leg.joint_words(name), counted_mm(summary, name), value(1.0e9, joint.opened_m)]
@@ -239,7 +239,7 @@ def _loads(summary: ReplaySummary) -> list[Part]:
         head=("joint", "p mean [MPa]", "p p99 [MPa]", "limit", "v [m/s]", "limit", "p v [MPa m/s]", "limit"),
         rows=rows,
         note="p: force over diameter times width. v: mean sliding speed under load. A dash: the material has "
-        "no such limit. Beyond a limit, the wear coefficient does not hold.",
+        "no such limit. Beyond a limit, the wear coefficient is not valid.",
     )
     texts = (f"{name}: {one.outside_limits}." for name, one in loads.items() if one and one.outside_limits)
     return [table, *(Text(text, is_not_valid=True) for text in texts)]

@@ -270,7 +270,7 @@ def test_a_mismatch_without_a_diagnosis_is_reported_as_what_it_is() -> None:
         alarms=(alarm("torque_mismatch", value=0.35, limit=0.1),),
         torque_causes={"torque_bias": NamedCause(Cause.BIAS, -3.0, 0.1)},
     )
-    assert "the drive torque does not fit the counted leg, so the forecast is not valid" in verdict.why
+    assert "the drive torque does not fit the model of this leg, so the forecast is not valid" in verdict.why
     assert "0.35 of the predicted RMS is not explained (limit 0.1)" in verdict.why
     assert "possible cause: a constant torque of 3 N m ± 0.1 N m drives the crank" in verdict.why
     assert "rock each joint" in verdict.do and "leg-wear-monitor measure JOINT MM" in verdict.do
@@ -282,11 +282,11 @@ def test_a_mismatch_that_is_explained_says_by_what_and_by_how_much() -> None:
     found = explained(Cause.SIGN, Cause.TIMING)
     verdict = judged(alarms=(alarm("torque_mismatch"),), explained=found)
     assert (verdict.fault_code, verdict.since_ns) == ("TORQUE_SIGN", 77)
-    assert "it is -0.5 ± 0.01 times the predicted one and the crank is 500 mrad ± 10 mrad" in verdict.why
+    assert "it is -0.5 ± 0.01 times the predicted torque and the crank is 500 mrad ± 10 mrad" in verdict.why
     assert verdict.do.startswith("reverse drive_torque.sign and turn the crank to a known angle")
     assert verdict.evidence[0].name == "torque_factor" and verdict.evidence[1].unit == "rad"
     partly = judged(alarms=(alarm("torque_mismatch"),), explained=attrs.evolve(found, after=0.2))
-    assert partly.fault_code == "TORQUE_SIGN" and "0.2 ± 0.01 of the predicted RMS stays" in partly.why
+    assert partly.fault_code == "TORQUE_SIGN" and "0.2 ± 0.01 of the predicted RMS remains" in partly.why
 
 
 def test_a_cause_of_an_input_comes_before_what_the_torque_shows_of_the_leg() -> None:
@@ -322,7 +322,7 @@ def test_a_diagnosis_names_the_joint_that_a_mismatch_does_not() -> None:
     verdict = judged(**raised("torque_mismatch"), diagnosis=diagnosis(found))
     assert (verdict.fault_code, verdict.joints, verdict.since_ns) == ("CLEARANCE_CHANGED_G", ("G",), 55)
     assert (
-        "shows a clearance of 0.62 mm ± 0.03 mm in joint G (0.3 mm is counted) (or B 0.5 mm)" in verdict.why
+        "shows a clearance of 0.62 mm ± 0.03 mm in joint G (0.3 mm is modelled) (or B 0.5 mm)" in verdict.why
     )
     assert "rock joint G" in verdict.do and "leg-wear-monitor measure G MM --sigma MM" in verdict.do
 
@@ -388,7 +388,7 @@ def test_an_alarm_is_reported_in_words_with_the_label_of_its_joint() -> None:
     warning = judged(
         alarms=(alarm("clearance G", Level.WARN, value=5e-4, worst=5e-4, limit=6e-4),), joints=labelled
     )
-    assert warning.why == "the counted clearance of joint G (knee) is 0.5 mm, near its limit of 0.6 mm"
+    assert warning.why == "the modelled clearance of joint G (knee) is 0.5 mm, near its limit of 0.6 mm"
     samples = judged(alarms=(alarm("input_samples", value=0.0972, limit=0.05),), input_causes=("x",))
     assert samples.why == "the fraction of unusable samples is 0.0972 (limit 0.05): x"
 
@@ -425,7 +425,11 @@ WAITING = Diagnosis(state=DiagnosisState.WAITING, reason="gait cycles: 2 of 5")
 @pytest.mark.parametrize(
     ("missing", "estimated_by", "why"),
     [
-        ({"has_torque": False}, "the encoders show", "joints G cannot be observed: there is no drive torque"),
+        (
+            {"has_torque": False},
+            "the encoders agree",
+            "joints G cannot be observed: there is no drive torque",
+        ),
         ({"diagnosis": WAITING}, "the drive torque agrees", "of joints G yet; gait cycles: 2 of 5"),
     ],
     ids=["torque", "diagnosis"],
@@ -513,7 +517,7 @@ def test_a_verdict_is_plain_data() -> None:
 def test_a_name_that_is_not_sure_is_said_to_be_so() -> None:
     reason = "the leg is not that of its mechanism file"
     unsure = attrs.evolve(diagnosis(change(Cause.CLEARANCE, "G")), reason=reason)
-    assert f"(0.3 mm is counted); {reason}" in judged(diagnosis=unsure).why
+    assert f"(0.3 mm is modelled); {reason}" in judged(diagnosis=unsure).why
     at_limit = judged(diagnosis=unsure, joints=seen("torque", 6.7e-4, 3.0e-5))
     assert f"(limit 0.6 mm); {reason}" in at_limit.why
     assert reason not in judged(diagnosis=unsure, joints=seen("encoders", 6.7e-4, 3.0e-5)).why

@@ -189,14 +189,13 @@ def _parameters(path: str, node: str | None = None) -> str:
     if config.diagnosis.reference:
         from leg_wear_monitor.mechanism.person import upwards
         from leg_wear_monitor.monitor.diagnosis.reference_file import read_references
-        from leg_wear_monitor.twin.sample import NONE
 
         known = read_references(Path(config.diagnosis.reference), leg)
         text += f", references at {', '.join(f'{one.profile.cadence_rpm:.3g}' for one in known)} rpm"
         up = upwards(leg)
         loads = [f"{(one.parameters.load @ up).max():.3g}" for one in known if one.parameters.load.size]
         if loads:
-            unused = ", not used with load.model none" if config.load.model == NONE else ""
+            unused = ", not used with load.model none" if config.load.model == "none" else ""
             text += f", {len(loads)} of {len(known)} under {', '.join(loads)} N on the foot{unused}"
     return text + _drive(config.drive, path)
 

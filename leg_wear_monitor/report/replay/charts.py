@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate.cause import SURE_SIGMAS
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.materials import BushingLoad
 from leg_wear_monitor.playback.result import ReplaySummary
@@ -22,7 +21,7 @@ from leg_wear_monitor.report.page import (
     not_valid,
     value,
 )
-from leg_wear_monitor.report.replay.joints import counted_mm
+from leg_wear_monitor.report.replay.joints import SIGMAS, counted_mm
 from leg_wear_monitor.state import Figure
 
 _STEADY = 0.1  # of the commanded cadence to either side, less does not fill the picture
@@ -145,7 +144,7 @@ def _clearance_panel(summary: ReplaySummary, joint: str) -> Panel:
     series: list[Series] = []
     seen_mm = 1.0e3 * history.estimated_m.get(joint, np.array([]))
     if _is_known(seen_mm):
-        reach = SURE_SIGMAS * 1.0e3 * history.estimated_sigma_m.get(joint, np.full_like(seen_mm, np.nan))
+        reach = SIGMAS * 1.0e3 * history.estimated_sigma_m.get(joint, np.full_like(seen_mm, np.nan))
         high, low = seen_mm + reach, np.maximum(seen_mm - reach, 0.0)
         series += [
             Series("estimate, high", "mm", high, style="edge"),

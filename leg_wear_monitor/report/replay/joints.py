@@ -140,7 +140,7 @@ def _look(summary: ReplaySummary, joint: str, clearance: JointClearance | None, 
 # A row a joint: clearance against limit, remaining life and alarms, on common axes.
 
 
-_SIGMAS = 2.0  # drawn to either side of a seen clearance
+SIGMAS = 2.0  # drawn to either side of a seen clearance
 _MOST_LIMITS = 4.0  # length of the clearance axis, in the greatest limit
 _WIDTH = 100.0  # of a bar
 
@@ -210,7 +210,7 @@ def _most_m(views: Sequence[JointView]) -> float:
     known = [view for view in views if view.clearance]
     greatest = max((view.clearance.limit_m for view in known if view.clearance), default=1.0e-3)
     ends = [view.modelled_m or 0.0 for view in known]
-    ends += [view.mark[0] + _SIGMAS * view.mark[1] for view in known if view.mark]
+    ends += [view.mark[0] + SIGMAS * view.mark[1] for view in known if view.mark]
     return min(max(1.1 * greatest, 1.02 * max(ends, default=0.0)), _MOST_LIMITS * greatest)
 
 
@@ -222,7 +222,7 @@ def _clearance(view: JointView, most_m: float) -> dict[str, Span] | None:
     if view.modelled_m is not None:
         bar["counted"] = _span(0.0, view.modelled_m, most_m)
     if view.mark is not None:
-        mark_m, reach = view.mark[0], _SIGMAS * view.mark[1]
+        mark_m, reach = view.mark[0], SIGMAS * view.mark[1]
         bar["seen"] = _span(mark_m, mark_m, most_m)
         bar["sure"] = _span(mark_m - reach, mark_m + reach, most_m)
     return bar

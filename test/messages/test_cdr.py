@@ -57,7 +57,7 @@ def expected_crank(message, crank):
         return EMPTY, *nothing
     if len(message.position) != count or {len(message.velocity), len(message.effort)} - {0, count}:
         return WRONG_LENGTH, *nothing
-    if crank not in message.name:
+    if list(message.name).count(crank) != 1:  # twice: nothing says which of them is the crank
         return MISSING_JOINT, *nothing
     index = list(message.name).index(crank)
     position, velocity, effort = (
@@ -139,18 +139,18 @@ def expected_interface(message):
         return EMPTY, math.nan, math.nan
     if len(names) != len(values):
         return WRONG_LENGTH, math.nan, math.nan
-    if CRANK_NAME not in names:
+    if names.count(CRANK_NAME) != 1:
         return MISSING_JOINT, math.nan, math.nan
     there = values[names.index(CRANK_NAME)]
-    if INTERFACE not in there.interface_names:
+    if list(there.interface_names).count(INTERFACE) != 1:
         return MISSING_JOINT, math.nan, math.nan
     if len(there.interface_names) != len(there.values):
         return WRONG_LENGTH, math.nan, math.nan
-    of = dict(
-        zip(reversed(there.interface_names), reversed(there.values), strict=True)
-    )  # the first one counts
-    value = float(of[INTERFACE])
-    return (NO_FAULT if math.isfinite(value) else NOT_FINITE), value, float(of.get(WARMTH, math.nan))
+    of = dict(zip(there.interface_names, there.values, strict=True))
+    value, warmth = float(of[INTERFACE]), math.nan
+    if list(there.interface_names).count(WARMTH) == 1:
+        warmth = float(of[WARMTH])
+    return (NO_FAULT if math.isfinite(value) else NOT_FINITE), value, warmth
 
 
 @given(

@@ -9,8 +9,7 @@ import numpy as np
 from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.files import or_nan
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
-from leg_wear_monitor.messages.encode import LegDrawing
-from leg_wear_monitor.messages.leg_markers import LegMarkers
+from leg_wear_monitor.messages.leg_markers import LegDrawing, LegMarkers
 from leg_wear_monitor.messages.outputs import ALARMS, DIAGNOSTICS, FORECAST, STATE, VERDICT, Messages
 from leg_wear_monitor.messages.streams import ForecastTimes, topic_of
 from leg_wear_monitor.monitor.alarms import Alarm, has_changed

@@ -26,8 +26,7 @@ from std_msgs.msg import Float64, String
 from visualization_msgs.msg import MarkerArray
 
 from leg_wear_monitor.errors import LegWearError
-from leg_wear_monitor.messages.encode import LegDrawing
-from leg_wear_monitor.messages.leg_markers import LINKAGE, MARKERS, SILENT_NS, LegMarkers
+from leg_wear_monitor.messages.leg_markers import LINKAGE, MARKERS, SILENT_NS, LegDrawing, LegMarkers
 from leg_wear_monitor.messages.qos import Qos
 from leg_wear_monitor.messages.streams import Outgoing, Output
 from leg_wear_monitor.monitor.reports import Reports

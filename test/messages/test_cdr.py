@@ -7,6 +7,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from leg_wear_monitor.messages import encode
 from leg_wear_monitor.messages.cdr import MESSAGE, Decoder
 from leg_wear_monitor.messages.streams import (
     CONTACT,
@@ -280,7 +281,7 @@ def test_further_encoders_are_read_with_the_crank(store, joint_state, parts, lit
     names, angles = list(message.name), sample["encoder_rad"]
     assert np.isnan(angles[2:]).all()
     for angle, name, sign in zip(angles[:2], ("hip", "a"), (1.0, -1.0), strict=True):
-        if expected_crank(message, CRANK_NAME)[0] != NO_FAULT or name not in names:
+        if expected_crank(message, CRANK_NAME)[0] != NO_FAULT or names.count(name) != 1:
             assert math.isnan(angle)
             continue
         position = float(message.position[names.index(name)])
@@ -317,3 +318,32 @@ def test_a_vertical_force_and_a_contact_are_read(store, little):
         )
         ours = Decoder(config).one(raw + bytes(3), CONTACT, 7)[0]
         assert (ours["stamp_ns"], ours["fault"], *ours["foot_force_n"]) == (7, NO_FAULT, 0.0, float(stands))
+
+
+def test_markers_are_messages_of_the_library(store):
+    markers = [
+        encode.Marker(
+            namespace="joints",
+            id=3,
+            type=encode.SPHERE,
+            scale=(0.1, 0.2, 0.3),
+            colour=(0.0, 0.5, 1.0),
+            position=np.array([1.0, 2.0, 3.0]),
+        ),
+        encode.Marker(
+            namespace="bodies",
+            type=encode.LINE_LIST,
+            scale=(0.1, 0.0, 0.0),
+            colour=(1.0, 1.0, 1.0),
+            points=np.arange(6.0).reshape(2, 3),
+            text="A: OK",
+        ),
+    ]
+    raw = encode.marker_array(1_700_000_000_000_000_005, markers, "pelvis")
+    found = store.deserialize_cdr(raw, encode.MARKER_ARRAY)
+    sphere, lines = found.markers
+    assert (sphere.ns, sphere.id, sphere.type, sphere.pose.position.z) == ("joints", 3, encode.SPHERE, 3.0)
+    assert (sphere.scale.y, sphere.color.b, sphere.color.a, sphere.lifetime.sec) == (0.2, 1.0, 1.0, 2)
+    assert [(one.x, one.y, one.z) for one in lines.points] == [(0.0, 1.0, 2.0), (3.0, 4.0, 5.0)]
+    assert (lines.header.frame_id, lines.header.stamp.nanosec, lines.text) == ("pelvis", 5, "A: OK")
+    assert bytes(store.serialize_cdr(found, encode.MARKER_ARRAY)) == raw

@@ -27,6 +27,10 @@ PAGE = ROOT / "docs" / "reference" / "json.md"
 TABLE = re.compile(r"(<!-- fields of (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
+UNIT_IN_NAME = re.compile(
+    r"_(?:m|s|h|n|nm|nms|j|pa|hz|rpm|deg|rad|mps|mps2|radps|ns|c)(?:_per_\w+)?(?=$|[.\[])"
+)
+SHORT = {"whole number": "integer", "true or false": "boolean", "list of numbers": "numbers", " or null": "?"}
 STATE_IN = {"replay": "", "fleet": "legs[].state."}  # documents that contain the state of a leg, and its path
 
 
@@ -61,7 +65,10 @@ def renewed(page: str) -> str:
         lines = ["| field | type, unit | meaning |", "|---|---|---|"]
         for path, kind, unit, text in rows(name):
             words = re.sub(r"\bNone\b", "null", text.replace("``", "`")).replace("|", r"\|")
-            quantity = f"{kind}, {unit}" if unit else kind
+            quantity = f"{kind}, {unit}" if unit and not UNIT_IN_NAME.search(path) else kind
+            for long, short in SHORT.items():
+                quantity = quantity.replace(long, short)
+            words = re.sub(r" \[[^\]\d]+\](?=[.,:;)])", "", words)  # units that the name has
             lines.append(f"| `{path}` | {quantity} | {words} |")
         return "\n".join([*lines, ""])
 

@@ -113,5 +113,5 @@ def test_the_pages_have_the_numbers_and_units_of_the_code() -> None:
     numbers = {"depth": DEPTH, "at most": monitor_node._AT_ONCE, "At": monitor_node._HELD}
     for words, number in numbers.items():
         assert f"{words} {number:,}".replace(",", " ") in reference
-    assert f"{1.0 / TAKE_S:g} times a second the node takes" in reference
+    assert f"{1.0 / TAKE_S:g} times per second the node takes" in reference
     assert f"`table.units.foot_load` is {' or '.join(f'`{unit}`' for unit in FORCES)}" in tables

@@ -6,15 +6,21 @@ the ends of evaluation periods, which do not depend on how samples are cut into 
 """
 
 import math
+from collections.abc import Mapping, Sequence
 
 import attrs
 import numpy as np
 
 from leg_wear_monitor.compiled.kernel import Record, entry, kernel, new_records, record_of
 from leg_wear_monitor.estimate.torque_model import TorqueModel
+from leg_wear_monitor.monitor.alarms import CRANK_ZERO
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.crank_walk import LEAST_TURNS, MOST_TURNS, Walk, Zero, last_walk, zero_of
 from leg_wear_monitor.monitor.inputs import begin, distance, extend, guess_speed
+from leg_wear_monitor.monitor.observer import Observer
+from leg_wear_monitor.monitor.reports import Status
+from leg_wear_monitor.monitor.verdict.verdict import estimate
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, NO_FAULT, Samples, TrackerSettings
 from leg_wear_monitor.twin.tracker import LARGEST_ANGLE
@@ -179,7 +185,7 @@ class CrankZeroState:
     before_s: float = 0.0
 
 
-class CrankZero:
+class CrankZero(Observer):
     """Finds the zero of the crank's encoder.
 
     Parameters
@@ -244,6 +250,28 @@ class CrankZero:
         state = self.state
         last_s = _duration_s(state.waiting[-1:], self._gap_s)
         return state.before_s + state.dropped_s + state.waiting_s + last_s
+
+    @property
+    def notes(self) -> Mapping[str, Sequence[str]]:
+        """Why nothing is monitored at present."""
+        return {CRANK_ZERO: (self.cause,)} if self.cause else {}
+
+    @property
+    def statuses(self) -> Sequence[Status]:
+        """The zero of the crank's encoder and its runner-up, or why it is not known."""
+        state, zero = self.state, self.state.zero
+        found = ("offset_rad", "sigma_rad", "mismatch", "other_rad", "other_mismatch")
+        values = {
+            **{name: getattr(zero, name, math.nan) for name in found},
+            "turns": float(zero.turns if zero else state.turns),
+            "least_turns": float(LEAST_TURNS),
+            "times_found": float(state.times_found),
+            "not_monitored_s": self.unmonitored_s,
+        }
+        if zero is None:
+            return (Status("crank zero", Level.WARN, self.cause, values, CRANK_ZERO),)
+        offset = estimate(zero.offset_rad, zero.sigma_rad, "rad")
+        return (Status("crank zero", Level.OK, f"crank angle at joint position 0: {offset}", values),)
 
     def _add(self, samples: Samples, out: list[Samples]) -> None:
         """Add samples without an event."""

@@ -9,20 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from leg_wear_monitor.compiled.kernel import Records, entry, new_records
-from leg_wear_monitor.estimate.cause import NamedCause
-from leg_wear_monitor.estimate.mismatch import Allowed
 from leg_wear_monitor.monitor import alarm_specs
 from leg_wear_monitor.monitor.alarm_specs import AlarmSpec, LimitSource
 from leg_wear_monitor.monitor.alarms import Alarm, Limit, acknowledged, cleared, evaluated, has_changed
 from leg_wear_monitor.monitor.config.fitting import largest_lag_s
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.gait_evidence import (
-    TorqueBounds,
-    TorqueRecord,
-    torque_bounds,
-    torque_causes,
-    torque_values,
-)
+from leg_wear_monitor.monitor.gait_evidence import torque_bounds
 from leg_wear_monitor.monitor.input_health import (
     InputHealth,
     TorqueRange,
@@ -37,7 +29,7 @@ from leg_wear_monitor.monitor.verdict.situation import is_observed
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import NO_LOAD, Samples
-from leg_wear_monitor.twin.statistics import CycleStatistics, Intake, NotCompared, Tracking
+from leg_wear_monitor.twin.statistics import Intake, Tracking
 
 # All alarms of a monitor, and the limits that its parameters set for them.
 
@@ -384,85 +376,34 @@ class AlarmEvaluation:
         state, withheld = self.state, self._withheld - self.state.withheld
         return tuple(causes(state.before, self._twin.intake, withheld, self.config, state.not_finite))
 
-    @property
-    def torque_bounds(self) -> TorqueBounds:
-        """Bounds of the drive torque."""
-        return torque_bounds(self.config, self._twin.torque_size_nm, largest_lag_s(self.config))
-
-    def is_torque_sound(self, report: CycleReport) -> bool:
-        """Whether a gait cycle's torque is as predicted, so that its friction is that of this leg."""
-        return report.torque_mismatch < self.allowed_torque.unexplained
-
-    @property
-    def allowed_torque(self) -> Allowed:
-        """Which torque a leg without a fault may have."""
-        limits, bounds = self.config.limits, self.torque_bounds
-        return Allowed(
-            lag_s=bounds.max_lag_s,
-            loads_n=self._twin.settings.loads_n,
-            friction_nm=bounds.max_friction_nm,
-            unexplained=limits.warn_fraction * limits.torque_mismatch,
-        )
-
-    def present_causes(self, report: CycleReport, record: TorqueRecord) -> dict[str, NamedCause]:
-        """Causes of the torque's alarms whose values are beyond their limits now, by the alarm."""
-        names = {spec.name() for spec in alarm_specs.TORQUE}
-        raised = {name for name in names if self.board.alarms[name].present is not Level.OK}
-        return torque_causes(raised, report, record, self.torque_bounds)
-
-    def why_not_compared(self, statistics: CycleStatistics) -> NotCompared | None:
-        """Why the torque of a gait cycle is not compared with the predicted one; None if it is."""
-        is_allowed = self.config.cadence.allows(statistics.cadence_rpm)
-        return statistics.not_compared if is_allowed else NotCompared.CADENCE
-
     def end_cycle(
-        self,
-        report: CycleReport,
-        record: TorqueRecord,
-        foot_load: Mapping[str, float] | None = None,
-        is_refused: bool = False,
+        self, report: CycleReport, observed: Mapping[str, float], is_refused: bool = False
     ) -> tuple[AlarmList, ...]:
-        """Evaluate a whole gait cycle, with its torque and the record; returns all alarms if one changed.
+        """Evaluate a whole gait cycle; returns all alarms if one changed.
 
-        ``foot_load`` are values of the alarms of the foot load's sensor; None without one. ``is_refused``:
-        whether the crank's input has a fault, so that its forces are not those of the leg.
+        Parameters
+        ----------
+        report : CycleReport
+        observed : mapping of str to float
+            Values of the observers, by the names of their alarms.
+        is_refused : bool
+            Whether the crank's input has a fault: cadence and forces are then not those of the leg.
         """
         self.state.cycles += 1
-        sensor = (
-            {}
-            if foot_load is None
-            else {spec.name(): spec.value(foot_load) for spec in alarm_specs.FOOT_LOAD}
-        )
-        factor = 1.0
+        values, factor = dict(observed), 1.0
         if is_refused:
-            values = self._of_refused(report)
+            clearance = alarm_specs.CLEARANCE
+            values |= {clearance.name(joint.joint): clearance.value(joint) for joint in report.joints}
         else:
-            values = self._of_cycle(report, record)
+            cycle = {alarm_specs.CADENCE.kind: abs(report.cadence_rpm - self.config.cadence.commanded_rpm)}
+            values |= {spec.name(): spec.value(cycle) for spec in alarm_specs.GAIT}
+            for joint in report.joints:
+                values |= {spec.name(joint.joint): spec.value(joint) for spec in joint_specs(self.config)}
             factor = self._impact_factor(report.cadence_rpm)
             self.state.cadence_rpm = report.cadence_rpm
-        values |= sensor
         for name in self.board.observed:  # it is evaluated with all that is known, at the period's end
             values.pop(name, None)
         return self.board.evaluate(values, report.stamp_ns, impact_factor=factor)
-
-    def _of_cycle(self, report: CycleReport, record: TorqueRecord) -> dict[str, float]:
-        """Values of a gait cycle, by the names of their alarms."""
-        cycle = {
-            **torque_values(report, record, self.torque_bounds),
-            alarm_specs.MISMATCH.kind: report.torque_mismatch,
-            alarm_specs.CADENCE.kind: abs(report.cadence_rpm - self.config.cadence.commanded_rpm),
-        }
-        values = {spec.name(): spec.value(cycle) for spec in (*alarm_specs.TORQUE, *alarm_specs.GAIT)}
-        if not self.config.cadence.allows(report.cadence_rpm):
-            del values[alarm_specs.MISMATCH.name()]
-        for joint in report.joints:
-            values |= {spec.name(joint.joint): spec.value(joint) for spec in joint_specs(self.config)}
-        return values
-
-    def _of_refused(self, report: CycleReport) -> dict[str, float]:
-        """Values of a cycle whose crank has an input fault: cadence, forces and torque are not known."""
-        clearance = alarm_specs.CLEARANCE
-        return {clearance.name(joint.joint): clearance.value(joint) for joint in report.joints}
 
     def _impact_factor(self, rpm: float) -> float:
         """Factor on the limits of impact forces, which are those of the commanded cadence, at another one.

@@ -5,18 +5,34 @@ which a load at the foot needs by virtual work.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import attrs
 import numpy as np
 
+from leg_wear_monitor.files import or_nan
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.person import USUAL_PEAK_N, nominal_stance
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle, point_motion
-from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.alarms import EXCHANGED, FOOT_LOAD_LIMITS, GAPS, SCALE, SIGN, STUCK, ZERO
-from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.state import FootLoad
+from leg_wear_monitor.monitor import alarm_specs
+from leg_wear_monitor.monitor.alarms import (
+    EXCHANGED,
+    FOOT_LOAD_LIMITS,
+    FOOT_LOAD_WORDS,
+    GAPS,
+    SCALE,
+    SIGN,
+    STUCK,
+    ZERO,
+    worst_code,
+)
+from leg_wear_monitor.monitor.counted_leg import CountedLeg
+from leg_wear_monitor.monitor.evaluation import AlarmBoard
+from leg_wear_monitor.monitor.observer import Observer
+from leg_wear_monitor.monitor.reports import CycleReport, Status
+from leg_wear_monitor.monitor.verdict.situation import ACTS
+from leg_wear_monitor.state import FootLoad, Level
 from leg_wear_monitor.twin import KINDS, LOAD
 from leg_wear_monitor.twin.follower_state import FINE_PHASES
 from leg_wear_monitor.twin.sample import CONTACT, MEASURED, NO_FAULT, Samples
@@ -63,14 +79,13 @@ class FootLoadState:
     is_noise: bool = False  # whether the load of the last gait cycles is not above the sensor's noise
 
 
-class FootLoadCheck:
+class FootLoadCheck(Observer):
     """Averages the measured foot load over gait cycles, and checks its sensor.
 
     Parameters
     ----------
-    mechanism : Mechanism
-        With the commanded speed.
-    config : MonitorConfig
+    leg : CountedLeg
+    board : AlarmBoard
 
     Raises
     ------
@@ -78,7 +93,9 @@ class FootLoadCheck:
         For a mechanism whose toe does not walk.
     """
 
-    def __init__(self, mechanism: Mechanism, config: MonitorConfig) -> None:
+    def __init__(self, leg: CountedLeg, board: AlarmBoard) -> None:
+        self._twin, self._board = leg.twin, board
+        mechanism, config = leg.mechanism, leg.config
         linkage = build_linkage(mechanism)
         self.is_contact = config.foot_load.source == CONTACT
         self._stance = stance = nominal_stance(linkage)
@@ -101,6 +118,7 @@ class FootLoadCheck:
         )
         self._load_acts = float(config.load.model == MEASURED)
         self.state = FootLoadState(acts=self._load_acts)
+        self.values: dict[str, float] = {}
 
     def add_samples(self, piece: Samples) -> None:
         """Add received samples."""
@@ -109,7 +127,18 @@ class FootLoadCheck:
             largest = float(np.nan_to_num(np.abs(force)).max())
             self.state.largest_n = max(self.state.largest_n, largest)
 
-    def ended(self, statistics: CycleStatistics) -> dict[str, float]:
+    def end_cycle(self, statistics: CycleStatistics, is_refused: bool) -> None:
+        """Check the load of a gait cycle; a wrong one does not act on the twin."""
+        del is_refused
+        self.values = self._checked(statistics)
+        self.state.has_mean = self._twin.freeze_load(*self._freezes(self.values))
+
+    def alarm_values(self, report: CycleReport) -> Mapping[str, float]:
+        """Values of the sensor's alarms by their names."""
+        del report
+        return {spec.name(): spec.value(self.values) for spec in alarm_specs.FOOT_LOAD}
+
+    def _checked(self, statistics: CycleStatistics) -> dict[str, float]:
         """Add a gait cycle; returns the values of the alarms that can be evaluated."""
         state, load = self.state, statistics.load
         # scaled so that a force at the end of its valid range has the limit of the alarm
@@ -128,7 +157,7 @@ class FootLoadCheck:
             values |= self._comparisons()
         return values | ({SCALE: beyond} if beyond > FOOT_LOAD_LIMITS[SCALE] else {})
 
-    def freezes(self, values: Mapping[str, float]) -> tuple[bool, bool]:
+    def _freezes(self, values: Mapping[str, float]) -> tuple[bool, bool]:
         """Whether the last gait cycle shows a wrong load or none, and whether it has always been wrong.
 
         A sensor that got stuck, lost its zero or went silent was right before; any other fault, and noise
@@ -182,6 +211,36 @@ class FootLoadCheck:
         """Mean force (FINE_PHASES, 2) by phase along the axes of the mechanism [N]; None before the first."""
         cycles = self.state.cycles
         return np.mean([each.force_n for each in cycles], axis=0).T if cycles else None
+
+    @property
+    def notes(self) -> Mapping[str, Sequence[str]]:
+        """What acts while the sensor is wrong."""
+        return {ACTS: (self.acts,)}
+
+    @property
+    def leg_fields(self) -> Mapping[str, Any]:
+        """The measured load."""
+        return {"load": self.load} if self.state.cycles else {}
+
+    @property
+    def statuses(self) -> Sequence[Status]:
+        """The measured foot load, faults of its sensor, and outliers among its samples."""
+        load, outliers = self.load, self._twin.intake.load_outliers
+        alarms = [self._board.alarms[spec.name()] for spec in alarm_specs.OF_FOOT_LOAD]
+        raised = [alarm for alarm in alarms if alarm.level is not Level.OK]
+        level = max((alarm.level for alarm in raised), default=Level.OK)
+        fields = attrs.asdict(load).items()
+        values = {name: or_nan(value) for name, value in fields if not isinstance(value, str)}
+        values["outliers"] = float(outliers)
+        messages = [FOOT_LOAD_WORDS.get(alarm.kind, f"see: {alarm.name}") for alarm in raised]
+        if messages:
+            messages.append(self.acts)
+        else:
+            messages = ["measured" if load.cycles else "no whole gait cycle with samples yet"]
+        if outliers:
+            noun = "sample is an outlier" if outliers == 1 else "samples are outliers"
+            messages.append(f"{outliers} {noun}, far from the samples before and after, and not used")
+        return (Status(KINDS[LOAD].name, level, "; ".join(messages), values, worst_code(raised)),)
 
     def _stance_phases(self, up: Floats) -> Floats:
         """Phases (2,) [turns] at which a vertical force rises and falls, around the middle of stance."""

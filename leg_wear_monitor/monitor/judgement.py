@@ -6,17 +6,14 @@ from typing import Any
 
 import attrs
 
-from leg_wear_monitor.estimate.cause import Cause, NamedCause, TorqueExplanation
 from leg_wear_monitor.files import finite_or_none
 from leg_wear_monitor.monitor import alarm_specs
 from leg_wear_monitor.monitor.alarms import ALREADY_COUNTED, CRANK_ZERO, TRACKING_LOST, Alarm, state_of
-from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
-from leg_wear_monitor.monitor.encoders import faults
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast, Quantiles
 from leg_wear_monitor.monitor.gait_evidence import doubts
 from leg_wear_monitor.monitor.ledger.entry import Measurement, VerdictEvent
 from leg_wear_monitor.monitor.parts import Parts
-from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, VerdictReport, shown_by_torque
+from leg_wear_monitor.monitor.reports import AlarmList, VerdictReport
 from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.situation import (
     JointSituation,
@@ -30,16 +27,12 @@ from leg_wear_monitor.monitor.verdict.situation import (
 )
 from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, dated, has_changed, verdict_of
 from leg_wear_monitor.state import (
-    Drive,
-    Estimate,
     Figure,
-    FootLoad,
     JointClearance,
     LegAlarm,
     LegAlarms,
     LegState,
     LifeHours,
-    TorqueDiagnosis,
     Verdict,
 )
 from leg_wear_monitor.twin.statistics import Tracking
@@ -49,7 +42,7 @@ def verdict_report(parts: Parts, situation: Situation | None = None) -> VerdictR
     """The verdict now; the situation is made if it is not given."""
     stamp_ns = parts.twin.intake.stamp_ns
     found = findings(situation or situation_of(parts))
-    return VerdictReport(stamp_ns, dated(found, parts.state.findings, stamp_ns))
+    return VerdictReport(stamp_ns, dated(found, parts.findings, stamp_ns))
 
 
 def update_verdict(parts: Parts, situation: Situation | None = None) -> tuple[VerdictReport, ...]:
@@ -58,9 +51,9 @@ def update_verdict(parts: Parts, situation: Situation | None = None) -> tuple[Ve
     To be called where the state does not depend on how the samples are cut into blocks: at the end of an
     evaluation period.
     """
-    before = verdict_of(parts.state.findings) if parts.state.findings else None
+    before = verdict_of(parts.findings) if parts.findings else None
     report = verdict_report(parts, situation)
-    parts.state.findings, now = report.findings, report.verdict
+    parts.findings, now = report.findings, report.verdict
     if not has_changed(before, now):
         return ()
     if before and (Figure.FORECAST in before.not_valid) != (Figure.FORECAST in now.not_valid):
@@ -99,35 +92,34 @@ def shown(parts: Parts, joint: JointSituation) -> KnownClearance | None:
 def situation_of(parts: Parts) -> Situation:
     """What the verdict depends on, at the end of an evaluation period."""
     evaluation, config = parts.evaluation, parts.config
-    last, explained = parts.state.last, parts.explanation
-    alarms, diagnosis = evaluation.board.alarms, parts.diagnosis
+    last, torque = parts.last, parts.torque
+    alarms, explained = evaluation.board.alarms, torque.explained
     return Situation(
-        joints=_joint_situations(parts, diagnosis),
+        joints=_joint_situations(parts),
         alarms=tuple(alarms.values()),
         quantities=alarm_specs.QUANTITIES,
         has_cycle=last is not None,
         has_torque=last is not None and last.torque_samples > 0,
         mismatch=last.torque_mismatch if last else math.nan,
         mismatch_limit=config.limits.torque_mismatch,
-        acts=parts.foot_load.acts if parts.foot_load else "",
-        torque_causes=evaluation.present_causes(last, parts.state.torque) if last else {},
+        torque_causes=torque.causes,
         notes=_notes(parts),
         input_causes=tuple(evaluation.causes),
         input_faults=parts.judge.faults,
         trusted_before_ns=parts.judge.trusted_before_ns,
-        diagnosis=diagnosis,
+        diagnosis=torque.diagnosis,
         explained=explained if evaluation.board.level(alarm_specs.MISMATCH.name()) else None,
     )
 
 
-def _joint_situations(parts: Parts, diagnosis: Diagnosis) -> tuple[JointSituation, ...]:
+def _joint_situations(parts: Parts) -> tuple[JointSituation, ...]:
     """What is known of each joint's clearance now."""
-    last, measured, joints = parts.state.last, parts.measured, parts.clearance_joints
+    estimates = parts.encoders.estimates if parts.encoders else None
+    last, measured, joints = parts.last, parts.measured, parts.clearance_joints
     modelled_m, limits_m = parts.twin.clearance_mean_m.tolist(), parts.evaluation.board.clearance_limits_m
     walked, found = parts.accounting.state, []
     for k, (joint, part) in enumerate(zip(joints, walked.parts, strict=True)):
         report = last.joints[k] if last else None
-        by_encoders, by_torque = report.by_encoders if report else None, shown_by_torque(k, diagnosis)
         one = JointSituation(
             joint=joint,
             modelled_m=modelled_m[k],
@@ -137,8 +129,8 @@ def _joint_situations(parts: Parts, diagnosis: Diagnosis) -> tuple[JointSituatio
                 if report and report.forecast
                 else parts.forecaster.best_estimate_m(k, modelled_m[k])
             ),
-            seen=tuple(one for one in (by_encoders, by_torque) if one),
-            is_used=bool(report and by_encoders and report.seen and report.seen.believed),
+            seen=tuple(one for each in parts.observers if (one := each.seen(k)) is not None),
+            is_used=bool(estimates and estimates[k].believed),
             label=parts.mechanism.joints[joint].label,
             replaced_ns=part.replaced_ns,
             part_cycles=walked.cycles - part.cycles,
@@ -155,23 +147,25 @@ def with_measured(joint: JointSituation, measured: Measurement | None) -> JointS
     return attrs.evolve(joint, measured=by, is_measurement_used=measured.counts)
 
 
-def _notes(parts: Parts) -> dict[str, tuple[str, ...]]:
-    """What the parts of the monitor report for rules of the verdict, by the rule's code."""
-    wrong_zero = "" if parts.guard.cause else parts.without_zero
-    notes = {
+def _notes(parts: Parts) -> dict[str, Sequence[str]]:
+    """What the monitor and its observers report for rules of the verdict, by the rule's code."""
+    unfollowed = _unfollowed(parts)
+    notes: dict[str, Sequence[str]] = {
         ALREADY_COUNTED: ("",) if parts.accounting.is_all_counted else (),
-        CRANK_ZERO: (wrong_zero,) if wrong_zero else (),
-        TRACKING_LOST: tuple(filter(None, (_unfollowed(parts),))),
+        TRACKING_LOST: (unfollowed,) if unfollowed else (),
         "NOT_THIS_LEG": _doubts(parts),
         "CADENCE": _other_cadence(parts),
-        "ENCODER": tuple(faults(parts.config.encoders.names, parts.encoders.state)) if parts.encoders else (),
     }
-    return {code: texts for code, texts in notes.items() if texts}
+    for each in parts.observers:
+        notes |= each.notes
+    if parts.guard.cause:
+        notes.pop(CRANK_ZERO, None)  # without samples that are believed, nobody can find it
+    return notes
 
 
 def _other_cadence(parts: Parts) -> tuple[str, ...]:
     """That the leg walks at another cadence: not where it only starts or stops, after a right one."""
-    last, cadence = parts.state.last, parts.config.cadence
+    last, cadence = parts.last, parts.config.cadence
     was_right = last is not None and cadence.allows(last.cadence_rpm)
     if parts.twin.tracking is not Tracking.OUT_OF_STEP or was_right:
         return ()
@@ -181,10 +175,10 @@ def _other_cadence(parts: Parts) -> tuple[str, ...]:
 
 def _doubts(parts: Parts) -> tuple[str, ...]:
     """Why the last gait cycle is unlikely to be one of this leg; a torque that is explained is no reason."""
-    last = parts.state.last
+    last = parts.last
     if last is None:
         return ()
-    if parts.is_torque_wrong or parts.judge.faults:
+    if parts.torque.is_wrong or parts.judge.faults:
         last = attrs.evolve(last, torque_samples=0)
     found = doubts(last, parts.config)
     return ("; ".join(found),) if found else ()
@@ -201,14 +195,10 @@ def _unfollowed(parts: Parts) -> str:
 # The state of the leg, made of what the monitor holds.
 
 
-_FACTORS = (Cause.SCALE, Cause.SIGN)
-_TURN = 2.0 * math.pi
-
-
 def leg_state(parts: Parts, findings: Sequence[Verdict], situation: Situation) -> LegState:
     """State of the leg now, with the verdict of some findings."""
-    last, verdict, diagnosis = parts.state.last, verdict_of(findings), situation.diagnosis
-    explained, alarms = parts.explanation, parts.evaluation.board.alarms
+    last, verdict, alarms = parts.last, verdict_of(findings), parts.evaluation.board.alarms
+    observed = {name: field for each in parts.observers for name, field in each.leg_fields.items()}
     return LegState(
         stamp_ns=parts.twin.intake.stamp_ns,
         life_cycles=parts.accounting.state.cycles,
@@ -222,10 +212,8 @@ def leg_state(parts: Parts, findings: Sequence[Verdict], situation: Situation) -
             )
             for joint in situation.joints
         },
-        drive=_drive(last, diagnosis, explained),
-        load=_load(parts.foot_load.load if parts.foot_load else FootLoad(), diagnosis),
-        diagnosis=_diagnosis(last, diagnosis, explained),
         alarms=LegAlarms(now=tuple(map(leg_alarm, alarms.values()))),
+        **observed,
         **(life_of({one.joint: one.forecast for one in last.joints}, last.forecast, verdict) if last else {}),
     )
 
@@ -296,54 +284,3 @@ def life_of(
 def life_hours(hours: Quantiles | None) -> LifeHours | None:
     """Quantiles of a remaining life; None if it is not known."""
     return None if hours is None else LifeHours(p10_h=hours.p10, p50_h=hours.p50, p90_h=hours.p90)
-
-
-def _drive(last: CycleReport | None, diagnosis: Diagnosis, explained: TorqueExplanation | None) -> Drive:
-    """The drive by the last gait cycle, by what explains a torque mismatch, and by the diagnosis."""
-    named = explained.named if explained else ()
-    factor = next((one for one in named if one.cause in _FACTORS), None)
-    bandwidth_hz = diagnosis.channel.bandwidth_hz
-    return Drive(
-        scale=_estimate(factor.value, factor.sigma) if factor else None,
-        lag_s=_estimate(last.torque_lag_s, last.torque_lag_sigma_s) if last else None,
-        coulomb_nm=_estimate(last.friction_nm, last.friction_sigma_nm) if last else None,
-        load_friction=_estimate(last.load_friction, last.load_friction_sigma) if last else None,
-        bandwidth_hz=Estimate(value=bandwidth_hz) if math.isfinite(bandwidth_hz) else None,
-        temperature_c=None if diagnosis.temperature_c is None else Estimate(value=diagnosis.temperature_c),
-    )
-
-
-def _estimate(value: float, sigma: float) -> Estimate | None:
-    return Estimate(value=value, sigma=sigma) if math.isfinite(value) else None
-
-
-def _load(measured: FootLoad, diagnosis: Diagnosis) -> FootLoad:
-    """The measured load, or else the one that the drive torque shows."""
-    if measured.source != "none" or diagnosis.load is None:
-        return measured
-    return attrs.evolve(diagnosis.load, cycles=diagnosis.cycles)
-
-
-def _diagnosis(
-    last: CycleReport | None, diagnosis: Diagnosis, explained: TorqueExplanation | None
-) -> TorqueDiagnosis:
-    cause = _cause(diagnosis, explained)
-    return TorqueDiagnosis(
-        state=diagnosis.state.value,
-        reason=diagnosis.reason,
-        cycles_used=diagnosis.cycles,
-        cycles_not_used=dict(diagnosis.cycles_not_used),
-        misfit=last.torque_mismatch if last else None,
-        cause=cause.cause.name.lower() if cause else None,
-        cause_subject=cause.subject if cause else "",
-        cause_value=cause.value if cause else None,
-        cause_sigma=cause.sigma if cause else None,
-    )
-
-
-def _cause(diagnosis: Diagnosis, explained: TorqueExplanation | None) -> NamedCause | None:
-    """What explains the torque: an unsettled change of the leg, or else the one cause of a mismatch."""
-    if diagnosis.state is DiagnosisState.CHANGED and diagnosis.changes:
-        return diagnosis.changes[-1]
-    named = explained.named if explained else ()
-    return named[0] if len(named) == 1 else None

@@ -60,7 +60,7 @@ def acknowledge(parts: Parts, stamp_ns: int) -> Cleared:
     """See `WearMonitor.acknowledge`."""
     cleared, kept = parts.evaluation.board.acknowledge(parts.unmeasured)
     if alarm_specs.MISMATCH.name() in parts.unmeasured:
-        parts.state.mismatch = NO_MISMATCH
+        parts.torque.mismatch = NO_MISMATCH
     ledger = parts.accounting.ledger
     has_lost = ledger is not None and ledger.acknowledge_loss()
     _note_alarms(parts, stamp_ns)
@@ -72,13 +72,13 @@ def acknowledge(parts: Parts, stamp_ns: int) -> Cleared:
 
 def reset_wear(parts: Parts, joint: str, stamp_ns: int, who: str) -> Cleared:
     """See `WearMonitor.reset_wear`."""
-    board, state = parts.evaluation.board, parts.state
+    board = parts.evaluation.board
     was = parts.accounting.replace(joint, stamp_ns)
     gone = _rested_on(board.alarms.values(), joint, _named_for_clearance(parts))
     cleared = tuple(board.alarms[name] for name in gone)
     board.clear(gone)
     if alarm_specs.MISMATCH.name() in gone:
-        state.mismatch = NO_MISMATCH
+        parts.torque.mismatch = NO_MISMATCH
     _part_changed(parts, joint, stamp_ns)
     parts.accounting.note(Audit(stamp_ns, who, "reset_wear", was, cleared))
     _note_alarms(parts, stamp_ns)
@@ -146,8 +146,8 @@ def measure(
             found, shown_m=best.clearance_m, shown_sigma_m=best.sigma_m, shown_by=SOURCES[best.by]
         )
     accounting.note(found.measurement)
-    if parts.encoders:
-        parts.encoders.state.updated_ns = 0  # the next estimate updates the forecast again
+    for each in parts.observers:
+        each.renewed()
     renew_forecast(parts)
     before, board = parts.evaluation.board.alarms, parts.evaluation.board
     is_ended = _compare(parts, joint, stamp_ns)
@@ -200,7 +200,7 @@ def _eased(was: Alarm, now: Alarm) -> str:
 
 def renew_forecast(parts: Parts) -> CycleReport | None:
     """See `WearMonitor.renew_forecast`."""
-    last = parts.state.last
+    last = parts.last
     if last is None:
         return None
     forecast = parts.forecaster.renewed(
@@ -209,8 +209,8 @@ def renew_forecast(parts: Parts) -> CycleReport | None:
         is_forecast_valid(parts, verdict_report(parts).findings),
         parts.model_error,
     )
-    parts.state.last = with_forecast(last, forecast, parts.measured)
-    return parts.state.last
+    parts.last = with_forecast(last, forecast, parts.measured)
+    return parts.last
 
 
 def _situation(parts: Parts, joint: str) -> JointSituation:
@@ -245,7 +245,7 @@ def _named_for_clearance(parts: Parts) -> frozenset[str]:
     """Joints that the last verdict named for their clearance: of this run, or else of the ledger."""
     ledger = parts.accounting.ledger
     last = ledger.verdict if ledger else None
-    found = parts.state.findings or ((last,) if last else ())
+    found = parts.findings or ((last,) if last else ())
     of_clearance = (one for one in found if one.fault_code.startswith("CLEARANCE"))
     return frozenset(joint for one in of_clearance for joint in one.joints)
 
@@ -257,7 +257,7 @@ def note_verdict(parts: Parts, stamp_ns: int, milder: bool = True) -> None:
     and clearances, because it knows nothing of the drive torque until the leg walks again. With ``milder``
     False, it keeps a more severe verdict.
     """
-    if parts.state.findings or parts.accounting.ledger is None:
+    if parts.findings or parts.accounting.ledger is None:
         update_verdict(parts)
         return
     now = situation_of(parts)
@@ -273,7 +273,7 @@ def _note_clearance_verdict(
     """Bring the verdict up to date after a measurement, if the alarm of the clearance is or was raised."""
     name = alarm_specs.CLEARANCE.name(joint)
     levels = {alarms[name].level for alarms in (before, parts.evaluation.board.alarms)}
-    if parts.state.findings or levels != {Level.OK}:
+    if parts.findings or levels != {Level.OK}:
         note_verdict(parts, stamp_ns, milder=is_ended)
 
 
@@ -303,16 +303,14 @@ def _part_changed(parts: Parts, joint: str, replaced_ns: int) -> None:
     """Discard the growth and the estimates of the former part, and renew the forecast."""
     parts.grows_anew([joint])
     parts.forecaster.replaced(joint, replaced_ns)
-    last = parts.state.last
+    last = parts.last
     if last:  # what was estimated is of the former part
         joints = [
             attrs.evolve(each, seen=None, shown=None) if each.joint == joint else each for each in last.joints
         ]
-        parts.state.last = attrs.evolve(last, joints=tuple(joints))
-    if parts.encoders:
-        parts.encoders.replaced()
-    if parts.torque:
-        parts.torque.replaced(parts.twin.clearance_mean_m)
+        parts.last = attrs.evolve(last, joints=tuple(joints))
+    for observer in parts.observers:
+        observer.replaced(parts.clearance_joints.index(joint))
     renew_forecast(parts)
 
 

@@ -8,7 +8,6 @@ import attrs
 from leg_wear_monitor.mechanism.materials import BushingLoad
 from leg_wear_monitor.monitor.alarms import NO_FAULT, Alarm
 from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate, ClearanceObservation
-from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
 from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointForecast, LegForecast
 from leg_wear_monitor.monitor.forecast.measurement import judged_clearance_m
 from leg_wear_monitor.monitor.ledger.entry import Measurement
@@ -320,9 +319,3 @@ def with_forecast(
     joints = zip(report.joints, forecast.joints, measured, strict=True)
     renewed = tuple(attrs.evolve(joint, forecast=new, measured=by) for joint, new, by in joints)
     return attrs.evolve(report, joints=renewed, forecast=forecast.leg)
-
-
-def shown_by_torque(k: int, diagnosis: Diagnosis) -> KnownClearance | None:
-    """The clearance of joint k that the drive torque shows."""
-    found = diagnosis.of_joint(k)
-    return KnownClearance("torque", *found, diagnosis.least_m[k]) if found else None

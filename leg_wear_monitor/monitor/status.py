@@ -12,8 +12,6 @@ from leg_wear_monitor.monitor.accounting import Accounting
 from leg_wear_monitor.monitor.alarms import (
     ADVICE,
     CRANK_ZERO,
-    ENCODERS,
-    FOOT_LOAD_WORDS,
     LEDGER_INTERRUPTED,
     LEDGER_NOT_WRITTEN,
     TRACKING_LOST,
@@ -22,18 +20,12 @@ from leg_wear_monitor.monitor.alarms import (
     code_of,
     worst_code,
 )
-from leg_wear_monitor.monitor.angle_regression import ClearanceObservation
-from leg_wear_monitor.monitor.crank_walk import LEAST_TURNS
-from leg_wear_monitor.monitor.crank_zero import CrankZero
-from leg_wear_monitor.monitor.encoders import EncoderObserver, faults
 from leg_wear_monitor.monitor.evaluation import AlarmEvaluation
-from leg_wear_monitor.monitor.foot_load import FootLoadCheck
 from leg_wear_monitor.monitor.forecast.forecast import UNKNOWN, answer_words, lifetime_values
 from leg_wear_monitor.monitor.input_health import InputHealth
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.parts import Parts
-from leg_wear_monitor.monitor.reports import CycleReport, Status, VerdictReport
-from leg_wear_monitor.monitor.torque_status import diagnosis_status, torque_status
+from leg_wear_monitor.monitor.reports import Status, VerdictReport
 from leg_wear_monitor.monitor.verdict.situation import believed_words
 from leg_wear_monitor.monitor.verdict.verdict import (
     estimate,
@@ -41,28 +33,8 @@ from leg_wear_monitor.monitor.verdict.verdict import (
     with_unit,
 )
 from leg_wear_monitor.state import JointClearance, Level, State, Verdict
-from leg_wear_monitor.twin import CRANK, KINDS, LOAD
+from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin.statistics import Tracking
-
-# Status of the crank's zero.
-
-
-def zero_status(crank_zero: CrankZero) -> Status:
-    """The zero of the crank's encoder and its runner-up, or why it is not known."""
-    state, zero = crank_zero.state, crank_zero.state.zero
-    found = ("offset_rad", "sigma_rad", "mismatch", "other_rad", "other_mismatch")
-    values = {
-        **{name: getattr(zero, name, math.nan) for name in found},
-        "turns": float(zero.turns if zero else state.turns),
-        "least_turns": float(LEAST_TURNS),
-        "times_found": float(state.times_found),
-        "not_monitored_s": crank_zero.unmonitored_s,
-    }
-    if zero is None:
-        return Status("crank zero", Level.WARN, crank_zero.cause, values, CRANK_ZERO)
-    offset = estimate(zero.offset_rad, zero.sigma_rad, "rad")
-    return Status("crank zero", Level.OK, f"crank angle at joint position 0: {offset}", values)
-
 
 # All statuses, each from the part of the monitor that it is about.
 
@@ -72,7 +44,7 @@ _INPUT = tuple(spec.name() for spec in alarm_specs.OF_INPUT)
 
 
 def statuses(parts: Parts, report: VerdictReport) -> tuple[Status, ...]:
-    """All statuses, verdict first, then gait, inputs, joints, alarms and ledger.
+    """All statuses, verdict first, then gait, input, observers, joints, alarms and ledger.
 
     Parameters
     ----------
@@ -88,13 +60,9 @@ def statuses(parts: Parts, report: VerdictReport) -> tuple[Status, ...]:
     return (
         verdict_status(report.verdict),
         _gait(parts),
-        *((zero_status(parts.crank_zero),) if parts.crank_zero else ()),
         _input(parts),
-        torque_status(parts),
-        *((_foot_load(parts.foot_load, parts),) if parts.foot_load else ()),
-        diagnosis_status(parts.clearance_joints, parts.diagnosis),
+        *(status for each in parts.observers for status in each.statuses),
         *joints,
-        *((_encoders(parts.encoders, parts),) if parts.encoders else ()),
         alarms_status(parts.evaluation.board.alarms.values()),
         _ledger(parts.accounting),
     )
@@ -114,12 +82,12 @@ def verdict_status(verdict: Verdict) -> Status:
 
 def _gait(parts: Parts) -> Status:
     """Whether the crank is followed, the cadence, and the totals of all walking."""
-    tracking, event, last = parts.twin.tracking, parts.state.happened, parts.state.last
+    tracking, event, last = parts.twin.tracking, parts.happened, parts.last
     cadence = parts.evaluation.board.alarms[alarm_specs.CADENCE.name()]
     message, level, code = tracking.name.lower().replace("_", " "), cadence.level, code_of(cadence)
     if parts.guard.cause:
         message, level, code = "not monitored: see input", Level.ERROR, TRACKING_LOST
-    elif parts.without_zero:
+    elif any(CRANK_ZERO in each.notes for each in parts.observers):
         message, level, code = "not monitored: see crank zero", max(level, Level.WARN), CRANK_ZERO
     elif event and tracking in (Tracking.STARTING, Tracking.OUT_OF_STEP):
         message += f", last {event.what.value.replace('_', ' ')}"
@@ -176,7 +144,7 @@ def _health_values(health: InputHealth) -> dict[str, float]:
 
 def _joint(parts: Parts, k: int, name: str) -> Status:
     """Counted clearance, growth, forces and forecast of clearance joint k, with the level of its alarms."""
-    twin, evaluation, last = parts.twin, parts.evaluation, parts.state.last
+    twin, evaluation, last = parts.twin, parts.evaluation, parts.last
     names = [spec.name(name) for spec in alarm_specs.JOINT]
     level, code = evaluation.board.level(*names), _code(evaluation, names)
     values = {
@@ -244,79 +212,6 @@ def _load_values(load: BushingLoad) -> dict[str, float]:
     """Pressure and sliding speed, and the limits that the material gives."""
     values = attrs.asdict(load)
     return {name: value for name, value in values.items() if isinstance(value, float)}
-
-
-def _encoders(encoders: EncoderObserver, parts: Parts) -> Status:
-    """Further encoders: their faults, their errors, and the clearances estimated from them."""
-    settings, state, last = parts.config.encoders, encoders.state, parts.state.last
-    kinds = {spec.kind for spec in alarm_specs.ENCODERS}
-    departures = [alarm for alarm in parts.evaluation.board.alarms.values() if alarm.kind in kinds]
-    level, code = max(alarm.level for alarm in departures), worst_code(departures)
-    values = {"cycles": float(encoders.cycles)}
-    for i, name in enumerate(settings.names):
-        kept = state.samples
-        for what, count in (("samples", kept.samples), ("absent", kept.absent), ("no_angle", kept.no_angle)):
-            values[f"{name}_{what}"] = float(count[i])
-        if state.errors.known[i]:  # mean: offset of the crank's encoder, then offsets, then scale errors
-            values[f"{name}_offset_rad"] = float(state.errors.centre_rad[i] + state.errors.mean[1 + i])
-            values[f"{name}_scale_error"] = float(state.errors.mean[1 + len(settings.names) + i])
-    for joint in last.joints if last else ():
-        if joint.seen:
-            values[f"{joint.joint}_estimated_m"] = joint.seen.clearance_m
-            values[f"{joint.joint}_sigma_m"] = joint.seen.sigma_m
-            values[f"{joint.joint}_departure_m"] = joint.seen.departure_m
-    wrong = faults(settings.names, state)
-    if encoders.has_failed:
-        wrong.append("no reference: the leg could not be simulated with its clearances")
-    messages = [*wrong, *_by_encoders(last)]
-    if wrong and level is Level.OK:
-        level, code = Level.WARN, ENCODERS
-    return Status("encoders", level, "; ".join(messages), values, code)
-
-
-def _foot_load(check: FootLoadCheck, parts: Parts) -> Status:
-    """The measured foot load, faults of its sensor, and outliers among its samples."""
-    load, alarms, outliers = check.load, parts.evaluation.board.alarms, parts.twin.intake.load_outliers
-    raised = [
-        alarms[spec.name()] for spec in alarm_specs.OF_FOOT_LOAD if alarms[spec.name()].level is not Level.OK
-    ]
-    level = max((alarm.level for alarm in raised), default=Level.OK)
-    values = {name: or_nan(value) for name, value in attrs.asdict(load).items() if not isinstance(value, str)}
-    values["outliers"] = float(outliers)
-    messages = [FOOT_LOAD_WORDS.get(alarm.kind, f"see: {alarm.name}") for alarm in raised]
-    if messages:
-        messages.append(check.acts)
-    else:
-        messages = ["measured" if load.cycles else "no whole gait cycle with samples yet"]
-    if outliers:
-        noun = "sample is an outlier" if outliers == 1 else "samples are outliers"
-        messages.append(f"{outliers} {noun}, far from the samples before and after, and not used")
-    return Status(KINDS[LOAD].name, level, "; ".join(messages), values, worst_code(raised))
-
-
-def _by_encoders(last: CycleReport | None) -> list[str]:
-    """Result of the encoders in words: joints that differ from the counted ones, or why there is none."""
-    seen = [(joint.joint, joint.seen) for joint in last.joints if joint.seen] if last else []
-    if not seen:
-        return ["no whole gait cycle yet"]
-    messages = [
-        f"joint {joint} is {'wider' if one.departure_m > 0.0 else 'narrower'} than counted"
-        for joint, one in seen
-        if one.is_other
-    ]
-    hidden = [joint for joint, one in seen if one.observation is ClearanceObservation.NOT_OBSERVABLE]
-    waiting = {
-        one.observation.value
-        for _, one in seen
-        if one.observation in (ClearanceObservation.WAITING, ClearanceObservation.COMMISSIONING)
-    }
-    if not messages and not waiting and len(hidden) < len(seen):
-        messages = ["clearances agree with the modelled ones"]
-    return [
-        *messages,
-        *(f"{joint} {ClearanceObservation.NOT_OBSERVABLE.value}" for joint in hidden),
-        *waiting,
-    ]
 
 
 def alarms_status(alarms: Iterable[Alarm]) -> Status:

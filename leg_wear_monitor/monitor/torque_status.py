@@ -1,17 +1,17 @@
 """Statuses of the drive torque and of the diagnosis."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-from leg_wear_monitor.estimate.cause import TorqueExplanation
+from leg_wear_monitor.estimate.cause import NamedCause, TorqueExplanation
 from leg_wear_monitor.estimate.drive import DIRECT
 from leg_wear_monitor.files import or_nan
 from leg_wear_monitor.monitor import alarm_specs
 from leg_wear_monitor.monitor.alarms import CAUSES_OF_ALARMS, DIAGNOSIS, worst_code
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState, NotUsed
-from leg_wear_monitor.monitor.gait_evidence import offset_error_rad
-from leg_wear_monitor.monitor.parts import Parts
-from leg_wear_monitor.monitor.reports import Status
+from leg_wear_monitor.monitor.evaluation import AlarmBoard
+from leg_wear_monitor.monitor.gait_evidence import TorqueRecord, offset_error_rad
+from leg_wear_monitor.monitor.reports import CycleReport, Status
 from leg_wear_monitor.monitor.verdict.causes import CAUSES, explanation, sentence
 from leg_wear_monitor.monitor.verdict.verdict import diagnosis_words, with_unit
 from leg_wear_monitor.state import Level
@@ -21,12 +21,29 @@ _TORQUE = tuple(spec.name() for spec in alarm_specs.TORQUE)
 _CODES = {name.upper(): cause.fault_code for name, cause in CAUSES_OF_ALARMS.items()}
 
 
-def torque_status(parts: Parts) -> Status:
-    """Comparison of measured and predicted torque, and what explains a mismatch."""
-    evaluation, last, record = parts.evaluation, parts.state.last, parts.state.torque
-    explained = parts.explanation
-    level = evaluation.board.level(*_TORQUE)
-    code = worst_code(evaluation.board.alarms[name] for name in _TORQUE)
+def torque_status(
+    board: AlarmBoard,
+    last: CycleReport | None,
+    record: TorqueRecord,
+    explained: TorqueExplanation | None,
+    causes: Mapping[str, NamedCause] | None,
+    diagnosis: Diagnosis,
+) -> Status:
+    """Comparison of measured and predicted torque, and what explains a mismatch.
+
+    Parameters
+    ----------
+    board : AlarmBoard
+    last : CycleReport or None
+        The last gait cycle.
+    record : TorqueRecord
+    explained : TorqueExplanation or None
+    causes : mapping of str to NamedCause or None
+        Causes of the alarms that are present, by the alarm; None where the torque is wrong as received.
+    diagnosis : Diagnosis
+    """
+    alarms = board.alarms
+    level, code = board.level(*_TORQUE), worst_code(alarms[name] for name in _TORQUE)
     code = _CODES.get(code, code)
     if last is None or not last.torque_samples:
         return Status("torque", level, "not compared: no drive torque in the last gait cycle", {}, code)
@@ -50,17 +67,16 @@ def torque_status(parts: Parts) -> Status:
     }
     for why in NotCompared:
         values[f"not_compared_{why.value}_cycles"] = float(record.not_compared.get(why.value, 0))
-    raised = {name for name in _TORQUE if evaluation.board.alarms[name].level is not Level.OK}
-    messages, diagnosis = [], parts.diagnosis
+    raised = {name for name in _TORQUE if alarms[name].level is not Level.OK}
+    messages = []
     if alarm_specs.MISMATCH.name() in raised:
-        causes = f": {explanation(explained, diagnosis)}" if explained else ""
-        messages = [f"the measured torque differs from the predicted one{causes}"]
+        by = f": {explanation(explained, diagnosis)}" if explained else ""
+        messages = [f"the measured torque differs from the predicted one{by}"]
         values |= _explained_values(explained) if explained else {}
         code = explained.named[0].cause.fault_code if explained and explained.named else code
-    if not parts.is_torque_wrong:  # those are estimates for the torque as received
-        present = evaluation.present_causes(last, record)
-        messages += [sentence(one, diagnosis) for one in present.values()]
-        past = [name for name in CAUSES_OF_ALARMS if name in raised and name not in present]
+    if causes is not None:  # those are estimates for the torque as received
+        messages += [sentence(one, diagnosis) for one in causes.values()]
+        past = [name for name in CAUSES_OF_ALARMS if name in raised and name not in causes]
         messages += [f"the {alarm_specs.QUANTITIES[name]} was beyond its limit" for name in past]
     if not messages and math.isnan(last.torque_mismatch):
         messages = ["not enough gait cycles yet for a comparison"]

@@ -14,12 +14,7 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.fitting import check_limits
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.cycle_report import (
-    clearance_estimates,
-    cycle_report,
-    explain_mismatch,
-    observe_torque,
-)
+from leg_wear_monitor.monitor.cycle_report import cycle_report
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
 from leg_wear_monitor.monitor.evaluation import EvaluationPeriods
 from leg_wear_monitor.monitor.forecast.growth import all_extended
@@ -134,20 +129,20 @@ class WearMonitor:
 
     def warm_up(self) -> None:
         """Compile all kernels that `update` needs, before the first sample; takes about a minute once."""
-        parts = self._parts
         list(EvaluationPeriods(1).pieces(np.zeros(1, GAIT_SAMPLE)))
-        for part in (parts.guard, parts.crank_zero, parts.twin, parts.torque):
-            if part:
-                part.warm_up()
+        self._parts.guard.warm_up()
+        self._twin.warm_up()
+        for observer in self._parts.observers:
+            observer.warm_up()
+        _ = self._parts.model_error  # takes a quarter of a second
 
     def go_live(self) -> None:
         """Keep up with samples as they are taken: never wait for a reference that threads simulate.
 
         On a machine that is too busy a reference comes into force later than in a replay.
         """
-        for observer in (self._parts.torque, self._parts.encoders):
-            if observer:
-                observer.go_live()
+        for observer in self._parts.observers:
+            observer.go_live()
 
     def note_late(self, is_late: bool) -> None:
         """Note whether samples may be missing because this program was late: their rate is then unknown."""
@@ -173,108 +168,92 @@ class WearMonitor:
         verdicts: list[VerdictReport] = []
         states: list[VerdictReport] = []
         for piece, ends_period in parts.evaluation_periods.pieces(samples):
-            # the twin follows the samples; each gait cycle that ends is reported and its alarms evaluated
-            followed, ended = self._follow(self._received(piece, ends_period))
+            # guard: what is believed; twin and observers follow it
+            followed, ended = self._follow(self._believed(piece, ends_period))
             sampled.append(followed)
+            # observers, alarms: each gait cycle that ends is reported, and its alarms are evaluated
             for statistics in ended:
                 cycles.append(self._end_cycle(statistics, changes))
-            # the verdict, and what measurements of the gait say of the leg, at the ends of periods alone
+            # verdict, report: at the ends of evaluation periods
             if ends_period:
                 before = len(changes)
                 situation = self._end_period(changes)
                 changed = update_verdict(parts, situation)
                 verdicts += changed
-                is_new = bool(changed) or parts.state.has_ended or len(changes) > before
-                parts.state.has_ended = False
+                is_new = bool(changed) or parts.has_ended or len(changes) > before
+                parts.has_ended = False
                 if is_new and self.reports_states:
-                    states.append(self._state_report(parts.state.findings, situation))
+                    states.append(self._state_report(parts.findings, situation))
             self._accounting.keep_if_due(self._board.alarms.values())
         samples_ = joined(sampled, len(self.clearance_joints))
         return Reports(samples_, tuple(cycles), tuple(changes), self.lost, tuple(verdicts), tuple(states))
 
-    def _received(self, piece: Samples, ends_period: bool) -> Samples:
+    def _believed(self, piece: Samples, ends_period: bool) -> Samples:
         """Samples that are believed: not counted before, of one source, with a known zero of the crank."""
-        parts = self._parts
-        piece = parts.guard.checked(self._accounting.not_counted(piece))
-        if parts.crank_zero:
-            piece = parts.crank_zero.passed(piece, ends_period)
-            self._accounting.state.without_zero_s = parts.crank_zero.unmonitored_s
+        piece = self._parts.guard.checked(self._accounting.not_counted(piece))
+        for observer in self._parts.observers:
+            piece = observer.passed(piece, ends_period)
+        self._accounting.state.without_zero_s = sum(each.unmonitored_s for each in self._parts.observers)
         return piece
 
     def _follow(self, piece: Samples) -> tuple[SampleReports, tuple[CycleStatistics, ...]]:
         """Pass samples to the twin and to the observers; what was followed, and the cycles that ended."""
         parts = self._parts
         update = self._twin.update(piece)
-        for observer in (parts.judge, parts.evaluation, parts.encoders, parts.torque, parts.foot_load):
-            if observer:
-                observer.add_samples(piece)
+        parts.judge.add_samples(piece)
+        parts.evaluation.add_samples(piece)
+        for observer in parts.observers:
+            observer.add_samples(piece)
         self._accounting.followed(update.samples)
         if update.events:
-            parts.state.happened = update.events[-1]
+            parts.happened = update.events[-1]
         return update.samples, update.cycles
 
     def _end_cycle(self, statistics: CycleStatistics, changes: list[AlarmList]) -> CycleReport:
-        """Report a gait cycle, and evaluate its alarms and its torque."""
+        """Report a gait cycle, and evaluate its alarms."""
         parts = self._parts
         refused = parts.judge.end_cycle(statistics)
         if refused:
             statistics = statistics.without_torque
-        if parts.encoders:
-            parts.encoders.ended(statistics)
-        if parts.torque:
-            parts.torque.ended(statistics, parts.is_torque_wrong or bool(refused), statistics.load_peak_n)
-        report = self._report(statistics)
-        parts.state.has_ended = True
-        sensor = parts.foot_load.ended(statistics) if parts.foot_load else None
-        if parts.foot_load and sensor is not None:
-            known = self._twin.freeze_load(*parts.foot_load.freezes(sensor))
-            parts.foot_load.state.has_mean = known
-        changed = parts.evaluation.end_cycle(report, parts.state.torque, sensor, CRANK in refused)
-        self._take_changes(changed, changes)
-        explain_mismatch(parts, statistics)
-        self._keep_torque(statistics, report)
+        self._accounting.ended(statistics)
+        parts.growth = all_extended(parts.growth, statistics, self.config.growth.window_cycles)
+        for observer in parts.observers:
+            observer.end_cycle(statistics, bool(refused))
+        parts.last = report = self._report(statistics)
+        self._accounting.note_clearances(report)
+        parts.has_ended = True
+        values = {name: one for each in parts.observers for name, one in each.alarm_values(report).items()}
+        self._take_changes(parts.evaluation.end_cycle(report, values, CRANK in refused), changes)
+        for observer in parts.observers:
+            observer.judge(statistics, report)
         return report
 
     def _report(self, statistics: CycleStatistics) -> CycleReport:
         """Report of a gait cycle, with growth, estimates and forecast."""
-        parts, state = self._parts, self._parts.state
-        self._accounting.ended(statistics)
-        state.growth = all_extended(state.growth, statistics, self.config.growth.window_cycles)
-        estimates = clearance_estimates(parts, statistics)
+        parts = self._parts
         forecast = parts.forecaster.after(
             statistics,
             parts.worn_m(statistics.clearance_mean_m),  # the twin itself may be ahead
             self.clearance_limits_m,
-            lambda: is_forecast_valid(parts, state.findings),
+            lambda: is_forecast_valid(parts, parts.findings),
             parts.model_error,
         )
-        state.last = cycle_report(parts, statistics, forecast, estimates)
-        self._accounting.note_clearances(state.last)
-        return state.last
-
-    def _keep_torque(self, statistics: CycleStatistics, report: CycleReport) -> None:
-        """Record the torque of a gait cycle if it is as predicted."""
-        evaluation, state = self._parts.evaluation, self._parts.state
-        is_sound, why = evaluation.is_torque_sound(report), evaluation.why_not_compared(statistics)
-        state.torque = state.torque.with_cycle(statistics, report, is_sound, why)
-        self._accounting.state.commissioned = state.torque.totals
+        seen = parts.encoders.estimates if parts.encoders else None
+        shown = [parts.torque.seen(k) for k in range(len(self.clearance_joints))]
+        return cycle_report(parts, statistics, forecast, seen, shown)
 
     def _end_period(self, changes: list[AlarmList]) -> Situation:
-        """Evaluate the input, and what encoders and torque show; what the verdict then depends on."""
+        """Evaluate the input, and what observers show; what the verdict then depends on."""
         parts = self._parts
         if parts.judge.end_period(parts.guard.torque_outliers, bool(parts.guard.cause)):
             # later gait cycles must not be compared with this torque; only periods end alike in all blocks
             self._twin.forget_torque()
         is_refused = CRANK in parts.judge.trusted_before_ns
         self._take_changes(parts.evaluation.end_period(self._accounting.state.skipped, is_refused), changes)
-        if parts.encoders:
-            new = parts.encoders.end_period(self._twin.clearance_mean_m, self._twin.depth)
-            if new:
-                self._accounting.note(new)
-        observe_torque(parts)
+        for observer in parts.observers:
+            observer.end_period()
         situation = situation_of(parts)
-        stamp_ns = self._twin.intake.stamp_ns
-        self._take_changes(evaluate_clearances(parts, situation.joints, stamp_ns), changes)
+        self._take_changes(evaluate_clearances(parts, situation.joints, self._twin.intake.stamp_ns), changes)
         return attrs.evolve(situation, alarms=tuple(self._board.alarms.values()))
 
     def _take_changes(self, changed: tuple[AlarmList, ...], changes: list[AlarmList]) -> None:
@@ -342,7 +321,7 @@ class WearMonitor:
     @property
     def diagnosis(self) -> Diagnosis:
         """Clearances that the drive torque shows; empty while the received torque is wrong."""
-        return self._parts.diagnosis
+        return self._parts.torque.diagnosis
 
     @property
     def lost(self) -> Lost:
@@ -367,7 +346,7 @@ class WearMonitor:
     @property
     def last_cycle(self) -> CycleReport | None:
         """Report of the last gait cycle; None before the first."""
-        return self._parts.state.last
+        return self._parts.last
 
     @property
     def wear_depth_m(self) -> Floats:
@@ -393,8 +372,8 @@ class WearMonitor:
     def begin_epoch(self, stamp_ns: int, who: str) -> None:
         """Begin an epoch: the clock of the samples has restarted, and the following samples are counted."""
         self._accounting.begin_epoch()
-        if self._parts.torque:
-            self._parts.torque.begin_epoch()
+        for observer in self._parts.observers:
+            observer.begin_epoch()
         self._accounting.note(Audit(int(stamp_ns), who, "new_epoch"))
         self._parts.keep()
 
@@ -413,9 +392,9 @@ class WearMonitor:
         check_limits(config, self.mechanism)
         self._parts.config = config
         self._parts.evaluation.configure(config)
-        for observer in (self._parts.judge, self._parts.encoders, self._parts.torque):
-            if observer:
-                observer.config = config
+        self._parts.judge.config = config
+        for observer in self._parts.observers:
+            observer.configure(config)
 
     def acknowledge(self, stamp_ns: int) -> Cleared:
         """Acknowledge all alarms, and the interruption of the previous run.
@@ -547,18 +526,21 @@ class WearMonitor:
         try:
             self._close_ledger()
         finally:
-            self._parts.leave()
+            for observer in self._parts.observers:
+                observer.leave()
 
     def _close_ledger(self) -> None:
         ledger = self._accounting.ledger
         if ledger is None:
             return
-        if self._parts.state.findings:
+        if self._parts.findings:
             is_noted = bool(update_verdict(self._parts))
             if not is_noted and any(is_observed(alarm, SEEN) for alarm in self.alarms.alarms):
                 # the ledger's verdict names the last estimate
                 last = self.verdict
                 self._accounting.note(VerdictEvent(last.stamp_ns, last.verdict))
+        for observer in self._parts.observers:
+            observer.close()
         kept = self._parts.keep(closed=True)
         ledger.close()
         if not kept:

@@ -10,6 +10,7 @@ from leg_wear_monitor.monitor.alarms import CAUSES_OF_ALARMS, Alarm, amount, joi
 from leg_wear_monitor.monitor.diagnosis.state import DiagnosisState
 from leg_wear_monitor.monitor.verdict.causes import CAUSES, evidence_of, explanation, remedy, sentence
 from leg_wear_monitor.monitor.verdict.situation import (
+    ACTS,
     BOTH,
     MEASURED,
     SEEN,
@@ -136,7 +137,7 @@ def hit_of(alarm: Alarm, situation: Situation) -> Hit:
             "value": amount(value, alarm.unit),
             "limit": amount(alarm.limit, alarm.unit),
             "past": past,
-            "acts": f"; {situation.acts}" if situation.acts else "",
+            "acts": "".join(f"; {text}" for text in situation.notes.get(ACTS, ())),
             "causes": f": {situation.input_causes[0]}" if situation.input_causes else "",
             "known": _KNOWN_BY.get(alarm.cause, "modelled"),
         },

@@ -16,6 +16,10 @@ from leg_wear_monitor.state import JointClearance, Level, State, Verdict
 # What a verdict depends on, and nothing else; the defaults are those of a leg without a fault.
 
 
+ACTS = "FOOT_LOAD"
+"""Key of the note on what acts as a foot load."""
+
+
 @attrs.frozen
 class KnownClearance:
     """A clearance, and who says so.
@@ -103,8 +107,6 @@ class Situation:
     mismatch, mismatch_limit : float
         Part of the drive torque that is not explained, as a fraction of the predicted RMS; NaN if it is not
         known.
-    acts : str
-        What acts as a foot load; empty without its sensor, and for a ledger.
     torque_causes : mapping of str to NamedCause
         Causes of an impossible bias, drift or lag of the torque, by the alarm.
     notes : mapping of str to sequence of str
@@ -128,7 +130,6 @@ class Situation:
     has_torque: bool = True
     mismatch: float = 0.0
     mismatch_limit: float = math.nan
-    acts: str = ""
     torque_causes: Mapping[str, NamedCause] = attrs.field(factory=dict)
     notes: Mapping[str, Sequence[str]] = attrs.field(factory=dict)
     input_causes: tuple[str, ...] = ()

@@ -1,0 +1,405 @@
+"""The drive torque in the monitor: compared with the predicted one, explained, and followed by the twin."""
+
+import logging
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from leg_wear_monitor.estimate.cause import Cause, Change, NamedCause, TorqueExplanation
+from leg_wear_monitor.estimate.least_squares import DATA_ERRORS
+from leg_wear_monitor.estimate.mismatch import Allowed, explanation
+from leg_wear_monitor.files import or_nan
+from leg_wear_monitor.monitor.alarm_specs import MISMATCH, TORQUE
+from leg_wear_monitor.monitor.config.fitting import largest_lag_s
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.counted_leg import CountedLeg
+from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
+from leg_wear_monitor.monitor.diagnosis.reference_file import read_references
+from leg_wear_monitor.monitor.diagnosis.state import Body, Diagnosis, DiagnosisState, TorqueState
+from leg_wear_monitor.monitor.evaluation import AlarmBoard
+from leg_wear_monitor.monitor.gait_evidence import (
+    NO_MISMATCH,
+    TorqueBounds,
+    TorqueRecord,
+    torque_bounds,
+    torque_causes,
+    torque_values,
+)
+from leg_wear_monitor.monitor.ledger.entry import SimulatedReference
+from leg_wear_monitor.monitor.observer import Observer
+from leg_wear_monitor.monitor.reports import CycleReport, Status
+from leg_wear_monitor.monitor.torque_status import diagnosis_status, torque_status
+from leg_wear_monitor.monitor.verdict.situation import KnownClearance
+from leg_wear_monitor.monitor.verdict.verdict import estimate
+from leg_wear_monitor.state import Drive, Estimate, Level, TorqueDiagnosis
+from leg_wear_monitor.twin.reference import LegParameters
+from leg_wear_monitor.twin.sample import Samples
+from leg_wear_monitor.twin.statistics import CycleStatistics, NotCompared
+
+_LOG = logging.getLogger(__name__)
+
+WRONG_TORQUE = "the received drive torque is wrong; see the status `torque`"
+ACCELERATED = "wear is accelerated: clearances grow within the gait cycles that are compared"
+_CONTRADICTS = 3.0  # standard deviations between what the torque shows and what a person measured
+# of a part, since it was measured, that wear it by little: at ten times the wear that is counted for joint A
+# of the example in the air, 17 pm a gait cycle, 17 um; a correction is 90 um at least (diagnosis.md)
+_LATELY_CYCLES = 100_000
+_LEAST_BEFORE = 3  # kept gait cycles that show a leg without a change
+_FACTORS = (Cause.SCALE, Cause.SIGN)
+
+
+class TorqueWatch(Observer):
+    """Compares the drive torque with the predicted one, and corrects what is surely counted wrong.
+
+    Parameters
+    ----------
+    leg : CountedLeg
+    board : AlarmBoard
+
+    Attributes
+    ----------
+    observer : TorqueObserver or None
+        Estimates clearances; None where that is disabled.
+    record : TorqueRecord
+    mismatch : MismatchWindow
+    unexplained : str
+        Why a torque mismatch has no explanation; empty if it has one or there is none.
+    """
+
+    def __init__(self, leg: CountedLeg, board: AlarmBoard) -> None:
+        self._leg, self._board = leg, board
+        self.record = TorqueRecord.of(leg.accounting.state.commissioned)
+        self.mismatch = NO_MISMATCH
+        self.unexplained = ""
+        is_diagnosed = leg.config.diagnosis.enabled and leg.config.wear_acceleration == 1.0
+        self.observer = self._new_observer() if is_diagnosed else None
+        if self.observer and self.observer.state.parameters and leg.config.diagnosis.apply_corrections:
+            leg.twin.set_parameters(self.observer.state.parameters)
+
+    def _new_observer(self) -> TorqueObserver:
+        """The estimator, with what files and the ledger know of this leg."""
+        leg, ledger, path = self._leg, self._leg.ledger, self._leg.config.diagnosis.reference
+        known = ledger.parameters if ledger else None
+        kept = ledger.references if ledger else ()
+        return TorqueObserver(
+            leg.mechanism,
+            leg.config,
+            leg.twin.torque_size_nm,
+            leg.twin.clearance_mean_m,
+            ledger.commissioned_torques if ledger else (),
+            known.parameters.of_bodies(known.bodies, leg.mechanism) if known else None,
+            (
+                *(read_references(Path(path), leg.mechanism) if path else ()),
+                *(one.reference.in_order_of(leg.mechanism, one.bodies) for one in kept),
+            ),
+        )
+
+    def configure(self, config: MonitorConfig) -> None:
+        """Use other parameters from now on."""
+        if self.observer:
+            self.observer.config = config
+
+    def warm_up(self) -> None:
+        """Compile, before the first sample."""
+        if self.observer:
+            self.observer.warm_up()
+
+    def go_live(self) -> None:
+        """Never wait for what is simulated."""
+        if self.observer:
+            self.observer.go_live()
+
+    def close(self) -> None:
+        """Keep what is simulated of a reference: recordings are often shorter than its simulation."""
+        part = self.observer.part_of_reference if self.observer else None
+        if part is not None:
+            stamp_ns = self._leg.twin.intake.followed_stamp_ns
+            self._leg.accounting.note(SimulatedReference(stamp_ns, tuple(self._leg.mechanism.bodies), part))
+
+    def leave(self) -> None:
+        """Leave what is simulated ahead: the process is about to end."""
+        if self.observer:
+            self.observer.leave()
+
+    def begin_epoch(self) -> None:
+        """The stamps start again."""
+        if self.observer:
+            self.observer.begin_epoch()
+
+    def add_samples(self, piece: Samples) -> None:
+        """Add samples that the twin follows."""
+        if self.observer:
+            self.observer.add_samples(piece)
+
+    def end_cycle(self, statistics: CycleStatistics, is_refused: bool) -> None:
+        """Note a gait cycle that ended."""
+        if self.observer:
+            self.observer.ended(statistics, self.is_wrong or is_refused, statistics.load_peak_n)
+
+    def alarm_values(self, report: CycleReport) -> Mapping[str, float]:
+        """Mismatch, bias, drift and lag of a gait cycle, by the names of their alarms."""
+        values = torque_values(report, self.record, self._bounds)
+        if self._leg.config.cadence.allows(report.cadence_rpm):
+            values[MISMATCH.kind] = report.torque_mismatch
+        return {spec.name(): spec.value(values) for spec in TORQUE}
+
+    def judge(self, statistics: CycleStatistics, report: CycleReport) -> None:
+        """Look for causes of a torque mismatch, and record a torque that is as predicted."""
+        self._explain(statistics)
+        is_allowed = self._leg.config.cadence.allows(statistics.cadence_rpm)
+        why = statistics.not_compared if is_allowed else NotCompared.CADENCE
+        is_sound = report.torque_mismatch < self._allowed.unexplained
+        self.record = self.record.with_cycle(statistics, report, is_sound, why)
+        self._leg.accounting.state.commissioned = self.record.totals
+
+    def _explain(self, statistics: CycleStatistics) -> None:
+        """Look for causes of a torque mismatch; a wrong torque says nothing of the leg."""
+        was_wrong = self.is_wrong
+        self.mismatch = self.mismatch.with_cycle(
+            statistics,
+            self._board.alarms[MISMATCH.name()],
+            self._explanation,
+        )
+        if not self.mismatch.cycles:
+            self.unexplained = ""
+        if self.observer and self.is_wrong and not was_wrong:
+            # the alarm rose some gait cycles after the torque became wrong
+            before = self._leg.config.alarms.on_delay_cycles + 1
+            first = self.mismatch.cycles[0]
+            self.observer.withdraw(first.begin_ns - before * (first.stamp_ns - first.begin_ns))
+
+    def _explanation(self, cycles: Sequence[CycleStatistics]) -> TorqueExplanation | None:
+        """What explains a torque mismatch; None if the data lead to no explanation, see `unexplained`."""
+        before, self.unexplained = self.unexplained, ""
+        try:
+            return explanation(self._leg.mechanism, cycles, self._allowed)
+        except DATA_ERRORS as error:
+            self.unexplained = f"the torque mismatch has no explanation ({error or type(error).__name__})"
+            if self.unexplained != before:
+                _LOG.warning("%s", self.unexplained, exc_info=error)
+            return None
+
+    def end_period(self) -> None:
+        """Compare the torque with that of the counted leg, and correct what is surely counted wrong."""
+        torque, leg = self.observer, self._leg
+        if torque is None:
+            return
+        before = attrs.evolve(torque.state)
+        hidden = before.corrected
+        if hidden is not None and hidden.is_unknown.any():  # a measurement since then need not be asked for
+            stamps_ns = [one.stamp_ns if one is not None else 0 for one in leg.measured]
+            torque.state.measured = tuple(stamp_ns >= hidden.stamp_ns for stamp_ns in stamps_ns)
+        correction = torque.end_period(leg.twin.clearance_mean_m, leg.twin.depth)
+        measured = leg.measured[leg.clearance_joints.index(correction.subject)] if correction else None
+        if correction is not None and measured is not None and self._contradiction(correction):
+            torque.contradicted(correction, measured.clearance_m, measured.sigma_m)
+            correction = None
+        is_new, found = False, torque.parameters
+        if not self.is_wrong:
+            if found is not None and found != leg.twin.parameters and leg.config.diagnosis.apply_corrections:
+                leg.take_parameters(found)
+                is_new = True
+            if correction is not None:
+                leg.correct(correction)
+                torque.corrected(correction, leg.twin.clearance_mean_m)
+                is_new = True
+        if self._note_new(torque, before) or is_new:
+            leg.accounting.keep(self._board.alarms.values())
+
+    def _note_new(self, torque: TorqueObserver, before: TorqueState) -> bool:
+        """Store new baselines and references of the leg; return whether there is a new reference.
+
+        To simulate a reference again takes a minute of walking.
+        """
+        leg, state = self._leg, torque.state
+        known = (*before.all_commissioned, *(one.baseline for one in before.all_interims))
+        found = state.all_commissioned if not state.is_load_new else ()
+        # a baseline that follows ends the interim
+        is_over = len(state.all_interims) < len(before.all_interims)
+        # a load is known from the twin's motion alone
+        interims = (
+            each for each in state.all_interims if all(one.cause is not Cause.LOAD for one in each.changes)
+        )
+        for baseline in (*found, *(each.baseline for each in interims)):
+            if is_over or all(baseline is not other for other in known):
+                leg.accounting.note(baseline)
+        made = [one.reference for one in before.known]
+        new = [one for one in torque.simulated_references if all(one is not other for other in made)]
+        for reference in new:
+            names, stamp_ns = tuple(leg.mechanism.bodies), leg.twin.intake.followed_stamp_ns
+            leg.accounting.note(SimulatedReference(stamp_ns, names, reference))
+        return bool(new)
+
+    def replaced(self, k: int) -> None:
+        """Commission the leg with a new part again."""
+        del k
+        if self.observer:
+            self.observer.replaced(self._leg.twin.clearance_mean_m)
+
+    def seen(self, k: int) -> KnownClearance | None:
+        """The clearance that the drive torque shows of joint k."""
+        diagnosis = self.diagnosis
+        found = diagnosis.of_joint(k)
+        return KnownClearance("torque", *found, diagnosis.least_m[k]) if found else None
+
+    @property
+    def shows(self) -> str:
+        """Source of the clearances that are seen now."""
+        return "" if self.observer is None or self.is_wrong else "torque"
+
+    # What the torque shows now.
+
+    @property
+    def diagnosis(self) -> Diagnosis:
+        """Clearances that the drive torque shows; empty while the received torque is wrong."""
+        if self.observer is None:
+            is_on = self._leg.config.diagnosis.enabled
+            return Diagnosis(reason=ACCELERATED if is_on else "diagnosis.enabled is false")
+        found = self.observer.diagnosis
+        if self.is_wrong:
+            return Diagnosis(
+                state=DiagnosisState.WAITING,
+                reason=WRONG_TORQUE,
+                changes=tuple(change for change in found.changes if change.is_corrected),
+                cycles_not_used=found.cycles_not_used,
+            )
+        own, contradictions = self._leg.twin.parameters, map(self._contradiction, found.changes)
+        return attrs.evolve(
+            found,
+            reason="; ".join(filter(None, (found.reason, self.unexplained, *contradictions))),
+            bodies=self._counted_bodies(),
+            friction=own.friction,
+            compliance=own.compliance,
+        )
+
+    def _contradiction(self, change: Change) -> str:
+        """A measurement of the changed leg that contradicts the change of a clearance; empty without one.
+
+        One from before the change says nothing of it. Before this run, another clock may have stamped it: it
+        is of the changed leg unless kept gait cycles of this run show the leg before the change, or the part
+        had walked many since.
+        """
+        if change.is_corrected or change.cause is not Cause.CLEARANCE:
+            return ""
+        k = self._leg.clearance_joints.index(change.subject)
+        measured, own = self._leg.measured[k], self._leg.accounting
+        if measured is None:
+            return ""
+        begun = own.cycles_before - own.state.parts[k].cycles
+        if measured.cycles > begun:
+            is_since = measured.stamp_ns >= change.since_ns
+        else:
+            kept = self.observer.state.cycles if self.observer else ()
+            before = sum(one.begin_ns < change.since_ns for one in kept)
+            is_since = begun - measured.cycles <= _LATELY_CYCLES and before < _LEAST_BEFORE
+        apart_m = abs(measured.clearance_m - change.value)
+        if not is_since or apart_m <= _CONTRADICTS * math.hypot(measured.sigma_m, change.sigma):
+            return ""
+        return (
+            f"the drive torque ({estimate(change.value, change.sigma, 'm')}) and a measurement "
+            f"({estimate(measured.clearance_m, measured.sigma_m, 'm')}) of joint {change.subject} disagree, "
+            "so its modelled clearance is not corrected: measure it again"
+        )
+
+    def _counted_bodies(self) -> tuple[Body, ...]:
+        """Bodies of the twin; none where its parameters are those of the mechanism file."""
+        own, mechanism = self._leg.twin.parameters, self._leg.mechanism
+        if attrs.evolve(own.in_air, compliance=0.0) == LegParameters.none(mechanism):
+            return ()
+        factors = zip(mechanism.bodies, own.mass.tolist(), own.length.tolist(), strict=True)
+        return tuple(Body(*one) for one in factors)
+
+    @property
+    def is_wrong(self) -> bool:
+        """Whether drive torque or crank angle are wrong as received, by what explains a mismatch."""
+        explained = self.mismatch.explanation
+        return explained is not None and explained.is_input_fault
+
+    @property
+    def explained(self) -> TorqueExplanation | None:
+        """What explains a mismatch of the torque; None where the diagnosis names another cause."""
+        explained = self.mismatch.explanation
+        return None if explained and self.diagnosis.contradicts(explained) else explained
+
+    @property
+    def _bounds(self) -> TorqueBounds:
+        config = self._leg.config
+        return torque_bounds(config, self._leg.twin.torque_size_nm, largest_lag_s(config))
+
+    @property
+    def _allowed(self) -> Allowed:
+        """Which torque a leg without a fault may have."""
+        limits, bounds = self._leg.config.limits, self._bounds
+        return Allowed(
+            lag_s=bounds.max_lag_s,
+            loads_n=self._leg.twin.settings.loads_n,
+            friction_nm=bounds.max_friction_nm,
+            unexplained=limits.warn_fraction * limits.torque_mismatch,
+        )
+
+    @property
+    def causes(self) -> dict[str, NamedCause]:
+        """Causes of the torque's alarms whose values are beyond their limits now, by the alarm."""
+        alarms, last = self._board.alarms, self._leg.last
+        names = {spec.name() for spec in TORQUE}
+        present = {name for name in names if alarms[name].present is not Level.OK}
+        return torque_causes(present, last, self.record, self._bounds) if last else {}
+
+    @property
+    def leg_fields(self) -> Mapping[str, Any]:
+        """Drive and diagnosis, and the load that the torque shows."""
+        diagnosis, load = self.diagnosis, {}
+        if diagnosis.load is not None:
+            load = {"load": attrs.evolve(diagnosis.load, cycles=diagnosis.cycles)}
+        return {"drive": self._drive(diagnosis), "diagnosis": self._shown(diagnosis), **load}
+
+    def _drive(self, diagnosis: Diagnosis) -> Drive:
+        """The drive by the last gait cycle, by what explains a torque mismatch, and by the diagnosis."""
+        last, explained = self._leg.last, self.explained
+        named = explained.named if explained else ()
+        factor = next((one for one in named if one.cause in _FACTORS), None)
+        bandwidth_hz = diagnosis.channel.bandwidth_hz
+        return Drive(
+            scale=_estimate(factor.value, factor.sigma) if factor else None,
+            lag_s=_estimate(last.torque_lag_s, last.torque_lag_sigma_s) if last else None,
+            coulomb_nm=_estimate(last.friction_nm, last.friction_sigma_nm) if last else None,
+            load_friction=_estimate(last.load_friction, last.load_friction_sigma) if last else None,
+            bandwidth_hz=Estimate(value=bandwidth_hz) if math.isfinite(bandwidth_hz) else None,
+            temperature_c=_estimate(or_nan(diagnosis.temperature_c), math.nan),
+        )
+
+    def _shown(self, diagnosis: Diagnosis) -> TorqueDiagnosis:
+        cause = self._cause(diagnosis)
+        return TorqueDiagnosis(
+            state=diagnosis.state.value,
+            reason=diagnosis.reason,
+            cycles_used=diagnosis.cycles,
+            cycles_not_used=dict(diagnosis.cycles_not_used),
+            misfit=self._leg.last.torque_mismatch if self._leg.last else None,
+            cause=cause.cause.name.lower() if cause else None,
+            cause_subject=cause.subject if cause else "",
+            cause_value=cause.value if cause else None,
+            cause_sigma=cause.sigma if cause else None,
+        )
+
+    def _cause(self, diagnosis: Diagnosis) -> NamedCause | None:
+        """What explains the torque: an unsettled change of the leg, or else the one cause of a mismatch."""
+        if diagnosis.state is DiagnosisState.CHANGED and diagnosis.changes:
+            return diagnosis.changes[-1]
+        explained = self.explained
+        named = explained.named if explained else ()
+        return named[0] if len(named) == 1 else None
+
+    @property
+    def statuses(self) -> Sequence[Status]:
+        """Comparison of measured and predicted torque, and what the torque shows of the clearances."""
+        diagnosis, causes = self.diagnosis, None if self.is_wrong else self.causes
+        torque = torque_status(self._board, self._leg.last, self.record, self.explained, causes, diagnosis)
+        return torque, diagnosis_status(self._leg.clearance_joints, diagnosis)
+
+
+def _estimate(value: float, sigma: float) -> Estimate | None:
+    return Estimate(value=value, sigma=sigma) if math.isfinite(value) else None

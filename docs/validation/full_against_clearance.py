@@ -10,11 +10,9 @@ from concurrent.futures import ThreadPoolExecutor
 from itertools import product
 from typing import NamedTuple
 
-import attrs
 import numpy as np
 
 from leg_wear_monitor import Mechanism, SimulationResult, load_mechanism, simulate
-from leg_wear_monitor.dynamics.batch import Leg, simulate_batch
 from leg_wear_monitor.mechanism.person import with_ground_reaction
 
 LEGS = ("bionic_leg", "jansen_leg")
@@ -37,7 +35,7 @@ ZONE = "90 % of the wear, from and to [deg]"
 
 class Samples(NamedTuple):
     """Of n runs: ``joints`` (n, k, 5) `FIGURES`, ``zone`` (n, k, 2) of wear [deg], ``torque`` (n,) RMS [N m],
-    and, but for a batch, ``loss`` (n,) of energy in contacts and friction [J/cycle], and ``residual`` (n,) of
+    and ``loss`` (n,) of energy in contacts and friction [J/cycle], and ``residual`` (n,) of
     the balance over it.
     """
 
@@ -85,25 +83,13 @@ class Case(NamedTuple):
         with ThreadPoolExecutor(WORKERS) as pool:
             return self._samples(list(pool.map(run, range(runs))))
 
-    def clearance(self, runs: int, cycles: int) -> Samples:
-        """Runs whose journals start elsewhere by up to a micrometre."""
-        leg = Leg(
-            mechanism=self.mechanism,
-            clearances=tuple(self.clearance_joints),
-            clearance_m=self.clearance_m,
-            speed_rpm=self.rpm,
-            perturb_m=1.0e-6,
-        )
-        legs = [attrs.evolve(leg, seed=i) for i in range(runs)]
-        return self._samples(simulate_batch(legs, cycles=cycles, skip_cycles=SKIPPED, workers=WORKERS))
-
     def _samples(self, results: list[SimulationResult]) -> Samples:
         joints = [
             [[getattr(result.joints[name], key) for key in FIGURES] for name in self.clearance_joints]
             for result in results
         ]
         zones = [[result.joints[name].wear_zone_deg for name in self.clearance_joints] for result in results]
-        energy = [r.energy_j for r in results if r.energy_j]  # a batch counts none
+        energy = [r.energy_j for r in results if r.energy_j]
         loss = np.array([each.friction_loss + each.contact_loss for each in energy])
         return Samples(
             np.array(joints),
@@ -160,7 +146,7 @@ def sets_of(name: str, runs: int, cycles: int) -> Iterator[Comparison]:
     table("clearance_joints", "rpm", "joint", *FIGURES.values(), ZONE)
     for clearance_joints, rpm in product(SETS, SPEEDS_RPM):
         case = Case(mechanism, clearance_joints, rpm)
-        full, other = case.simulated(runs, cycles), case.clearance(runs, cycles)
+        full, other = case.simulated(runs, cycles), case.simulated(runs, cycles, "clearance")
         torques[clearance_joints, rpm] = compare(full.torque, other.torque)
         for k, joint in enumerate(clearance_joints):
             figures = [compare(full.joints[:, k, i], other.joints[:, k, i]) for i in range(len(FIGURES))]
@@ -218,7 +204,7 @@ def by_clearance(runs: int, cycles: int) -> None:
     table("clearance [mm]", "joint", *FIGURES.values())
     for clearance_m in (1.0e-4, 2.0e-4, 2.9e-4, 3.0e-4, 3.1e-4, 4.0e-4):
         case = Case(load_mechanism("jansen_leg"), "IJ", 30.0, clearance_m)
-        full, other = case.simulated(runs, cycles), case.clearance(runs, cycles)
+        full, other = case.simulated(runs, cycles), case.simulated(runs, cycles, "clearance")
         for k, joint in enumerate("IJ"):
             figures = [compare(full.joints[:, k, i], other.joints[:, k, i]) for i in range(len(FIGURES))]
             row(f"{1e3 * clearance_m:g}", joint, *map(cell, figures, (2, 2, 0, 3, 4)))

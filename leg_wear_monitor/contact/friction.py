@@ -1,12 +1,19 @@
-"""Coulomb friction with a ramp around zero slip speed (physics.md section 4)."""
+"""Coulomb friction with a ramp around zero slip speed (physics.md section 4).
+
+To add a law, add its kernel here, an entry of `RAMPS`, and its name to `FRICTION_LAWS` of `mechanism`.
+"""
 
 import math
 
 from leg_wear_monitor.compiled.kernel import kernel
 from leg_wear_monitor.compiled.vectors import LEAST_DIVISOR, largest, where
+from leg_wear_monitor.contact.by_number import by_number
 
-NONE, AMBROSIO, THRELFALL = 0, 1, 2
-FRICTION_CODES = {"none": NONE, "ambrosio": AMBROSIO, "threlfall": THRELFALL}
+
+@kernel
+def no_ramp(speed, v0, v1):
+    """No friction."""
+    return 0.0
 
 
 @kernel
@@ -19,22 +26,26 @@ def ambrosio_ramp(speed, v0, v1):
 
 
 @kernel
-def threlfall_ramp(speed, v1):
+def threlfall_ramp(speed, v0, v1):
     """Fraction [-] of Coulomb's friction, 1 - exp(-3 |v| / v1): 95 % at v1 [m/s] (Threlfall 1978)."""
     return 1.0 - math.exp(-3.0 * speed / v1)
+
+
+RAMPS = {"none": no_ramp, "ambrosio": ambrosio_ramp, "threlfall": threlfall_ramp}
+"""Kernel of each law: fraction of Coulomb's friction from slip speed and both speeds of the ramp [m/s]."""
+
+FRICTION_CODES = {name: number for number, name in enumerate(RAMPS)}
+NONE = FRICTION_CODES["none"]
+VECTOR_LAWS = (NONE, FRICTION_CODES["ambrosio"])
+"""Laws that vectors of joints compute; every other law is computed joint by joint."""
+
+_fraction = by_number(RAMPS.values())
 
 
 @kernel
 def friction_force(law, coefficient, v0, v1, f_n, slip):
     """Tangential force [N] on the journal, opposite to the slip speed [m/s]; f_n the normal force [N]."""
-    speed = abs(slip)
-    if law == AMBROSIO:
-        fraction = ambrosio_ramp(speed, v0, v1)
-    elif law == THRELFALL:
-        fraction = threlfall_ramp(speed, v1)
-    else:
-        fraction = 0.0
-    return against(slip, coefficient * fraction * f_n)
+    return against(slip, coefficient * _fraction(law, abs(slip), v0, v1) * f_n)
 
 
 @kernel

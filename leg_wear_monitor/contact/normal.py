@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from leg_wear_monitor.compiled.kernel import kernel
 from leg_wear_monitor.compiled.vectors import LEAST_DIVISOR, largest, root, where
+from leg_wear_monitor.contact.by_number import by_number
 
 # Interface of a normal contact law to the equations of motion (physics.md section 4).
 
@@ -305,41 +306,7 @@ LAWS: dict[str, NormalLaw] = {
 _FORMS = tuple(dict.fromkeys(law.form for law in LAWS.values()))
 
 
-def _only(this: Callable[..., Any]) -> Callable[..., Any]:
-    """Kernel that calls ``this`` for any form's number."""
-
-    @kernel
-    def only(form, *arguments):
-        return this(*arguments)
-
-    return only
-
-
-def _either(number: int, this: Callable[..., Any], others: Callable[..., Any]) -> Callable[..., Any]:
-    """Kernel that calls ``this`` for one form's number, and ``others`` for any other."""
-
-    @kernel
-    def either(form, *arguments):
-        if form == number:
-            return this(*arguments)
-        return others(form, *arguments)
-
-    return either
-
-
-def _of_form(part: str) -> Callable[..., Any]:
-    """Kernel that takes the number of a form, then the arguments of the form's kernel named ``part``.
-
-    It is a chain of branches, built once: compiled code cannot cheaply call a function that is an argument.
-    """
-    *others, last = (getattr(form, part) for form in _FORMS)
-    chain = _only(last)
-    for number, this in reversed(list(enumerate(others))):
-        chain = _either(number, this, chain)
-    return chain
-
-
-law_coefficient = _of_form("coefficient")
-normal_force = _of_form("force")
-elastic_energy = _of_form("energy")
-softening = _of_form("softening")
+law_coefficient = by_number(form.coefficient for form in _FORMS)
+normal_force = by_number(form.force for form in _FORMS)
+elastic_energy = by_number(form.energy for form in _FORMS)
+softening = by_number(form.softening for form in _FORMS)

@@ -13,6 +13,7 @@ from leg_wear_monitor.dynamics.joint import (
     EX,
     EY,
     F_N,
+    F_T,
     SAMPLE,
     VX,
     VY,
@@ -184,7 +185,7 @@ def add_contacts(model, surfaces, approach, q, v, scratch, out_rate):
         )
         sample = scratch.contact
         sample[EX, k], sample[EY, k], sample[VX, k], sample[VY, k] = ex, ey, vx, vy
-        sample[F_N, k], sample[DELTA, k], sample[DELTA_DOT, k] = f_n, delta, delta_dot
+        sample[F_N, k], sample[F_T, k], sample[DELTA, k], sample[DELTA_DOT, k] = f_n, f_t, delta, delta_dot
         rate = out_rate[contacts.joint[k]]
         rate[:] = 0.0
         if f_n > 0.0:

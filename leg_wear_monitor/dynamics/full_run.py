@@ -58,6 +58,7 @@ from leg_wear_monitor.dynamics.run import (
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import assemble, ideal_motion, rotated
 from leg_wear_monitor.mechanism.spec import SpeedDrive, TorqueDrive
+from leg_wear_monitor.wear import BUSHING
 
 # Time integration in full coordinates: adaptive steps and contact events (physics.md section 2).
 #
@@ -341,13 +342,24 @@ class FullRun:
 
     def sample(self) -> Sample:
         """The present state of the leg."""
-        crank_angle = float(self.q[self.model.arrays.drive_body, 2])
-        toe = None
+        work, toe = self._work, np.zeros((3, 2))
         if self.toe.body >= 0:
             x, y, angle = self.q[self.toe.body]
-            toe = rotated(self.toe.point, angle) + np.array([x, y])
-        force = self._work.rates[0, :, FORCE].copy()
-        return Sample(crank_angle, toe, float(self._work.drive_rates[0, TORQUE]), force)
+            turning, slope = self.v[self.toe.body], work.slope[0].reshape(2, -1, 3)[1, self.toe.body]
+            lever = rotated(self.toe.point, angle)
+            across = np.array([-lever[1], lever[0]])
+            toe[0] = x + lever[0], y + lever[1]
+            toe[1] = turning[:2] + turning[2] * across
+            toe[2] = slope[:2] + slope[2] * across - turning[2] ** 2 * lever
+        return Sample(
+            float(self.q[self.model.arrays.drive_body, 2]),
+            toe,
+            float(work.drive_rates[0, TORQUE]),
+            work.rates[0, :, FORCE].copy(),
+            work.start.copy(),
+            self.state.approach > 0.0,
+            self._setup.surfaces.depth[:, BUSHING].max(axis=1),
+        )
 
 
 def _start(setup: Setup) -> FullState:

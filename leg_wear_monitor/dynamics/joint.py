@@ -16,9 +16,10 @@ from leg_wear_monitor.wear import deposit_wear, local_surfaces
 # The contact begins where the penetration of physics.md section 3 becomes positive.
 
 
-# rows of a sample: eccentricity [m], its rate [m/s], normal force [N], penetration [m], its rate [m/s]
-EX, EY, VX, VY, F_N, DELTA, DELTA_DOT = 0, 1, 2, 3, 4, 5, 6
-SAMPLE = 7
+# rows of a sample: eccentricity [m], its rate [m/s], normal force [N], penetration [m], its rate [m/s],
+# friction force [N]
+EX, EY, VX, VY, F_N, DELTA, DELTA_DOT, F_T = 0, 1, 2, 3, 4, 5, 6, 7
+SAMPLE = 8
 
 CONTACT_EVENT = 1.0e-11  # penetration [m] at which a contact counts as just begun
 NEVER = 2.0

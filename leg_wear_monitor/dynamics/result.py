@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Any
 
 import attrs
 
+from leg_wear_monitor.configuration import part_document
 from leg_wear_monitor.files import data_frame, json_text
-from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.arrays import Flags, Floats
 from leg_wear_monitor.wear import Surfaces
 
 if TYPE_CHECKING:
@@ -228,29 +229,71 @@ class Impact:
     peak_n: float
 
 
-@attrs.frozen(eq=False, repr=False)
+@attrs.frozen(eq=False, kw_only=True, repr=False)
+class JointTrace:
+    """A clearance joint at the n samples of a trace, in the frame of the ground.
+
+    Attributes
+    ----------
+    eccentricity_m : (n, 2) array
+        Centre of the journal in its bushing.
+    eccentricity_rate_mps : (n, 2) array
+        Rate of the eccentricity.
+    penetration_m : (n,) array
+        Penetration of journal and bushing; negative where they are apart.
+    in_contact : (n,) array of bool
+        Whether they touch.
+    normal_force_n : (n,) array
+        Normal force.
+    tangential_force_n : (n,) array
+        Friction force on the journal, positive in the direction of the normal turned by 90 degrees.
+    worn_depth_m : (n,) array
+        Wear depth of the deepest sector of the bushing since the start of the simulation.
+    """
+
+    eccentricity_m: Floats
+    eccentricity_rate_mps: Floats
+    penetration_m: Floats
+    in_contact: Flags
+    normal_force_n: Floats
+    tangential_force_n: Floats
+    worn_depth_m: Floats
+
+
+@attrs.frozen(eq=False, kw_only=True, repr=False)
 class Trace:
-    """n samples at equal time steps.
+    """n samples at equal time steps; vectors are to the right and upwards.
 
     Attributes
     ----------
     crank_angle_rad : (n,) array
         Crank angle, continuous over the turns.
-    toe_x_m : (n,) array or None
-        Toe, to the right; None for a mechanism without a point called ``toe``.
-    toe_y_m : (n,) array or None
-        Toe, upwards.
     drive_torque_nm : (n,) array
         Torque of the drive on the crank.
     force_n : dict of str to (n,) array
         Magnitude of the force in each joint [N].
+    joints : dict of str to JointTrace
+        Motion, contact and wear of each clearance joint.
+    toe_x_m, toe_y_m : (n,) array or None
+        Position of the toe; None for a mechanism without a point called ``toe``.
+    toe_velocity_mps, toe_acceleration_mps2 : (n, 2) array or None
+        Motion of the toe.
+    toe_error_m, toe_error_mps, toe_error_mps2 : (n, 2) array or None
+        Deviation of the toe's position, velocity and acceleration from the ideal linkage at the same crank
+        angle; None without an ideal motion to compare with.
     """
 
     crank_angle_rad: Floats
-    toe_x_m: Floats | None
-    toe_y_m: Floats | None
     drive_torque_nm: Floats
     force_n: dict[str, Floats]
+    joints: dict[str, JointTrace] = attrs.Factory(dict)
+    toe_x_m: Floats | None = None
+    toe_y_m: Floats | None = None
+    toe_velocity_mps: Floats | None = None
+    toe_acceleration_mps2: Floats | None = None
+    toe_error_m: Floats | None = None
+    toe_error_mps: Floats | None = None
+    toe_error_mps2: Floats | None = None
 
     def __repr__(self) -> str:
         return f"<Trace: {len(self.crank_angle_rad)} samples, joints {', '.join(self.force_n)}>"
@@ -264,11 +307,6 @@ JsonObject = dict[str, Any]
 _OF_EVERY_JOINT = ("mean_force_n", "rms_force_n", "p99_force_n", "max_force_n")
 
 
-def part_document(part: TorqueResult | EnergyBalance | ToeResult | Impact | None) -> JsonObject | None:
-    """Fields of a part; null for a part without data."""
-    return None if part is None else attrs.asdict(part)
-
-
 def joint_document(joint: JointResult) -> JsonObject:
     """Fields of a joint; contact and wear are present for clearance joints only."""
     record = attrs.asdict(joint)
@@ -276,13 +314,8 @@ def joint_document(joint: JointResult) -> JsonObject:
 
 
 def trace_document(trace: Trace) -> JsonObject:
-    """Columns of a trace as lists; without toe columns for a mechanism without a toe."""
-    columns = {"crank_angle_rad": trace.crank_angle_rad}
-    if trace.toe_x_m is not None and trace.toe_y_m is not None:
-        columns |= {"toe_x_m": trace.toe_x_m, "toe_y_m": trace.toe_y_m}
-    columns["drive_torque_nm"] = trace.drive_torque_nm
-    force = {name: force.tolist() for name, force in trace.force_n.items()}
-    return {name: column.tolist() for name, column in columns.items()} | {"force_n": force}
+    """Fields of a trace with lists as columns; without the fields that a mechanism without a toe lacks."""
+    return {name: value for name, value in part_document(trace).items() if value is not None}
 
 
 # Tables of a simulation's result; a column's name is the path of the value, joined by dots.
@@ -313,14 +346,24 @@ def impact_columns(impacts: Mapping[str, Sequence[Impact]]) -> Columns:
 
 
 def trace_columns(trace: Trace) -> Columns:
-    """Columns with a row for each sample."""
-    toe = {"toe_x_m": trace.toe_x_m, "toe_y_m": trace.toe_y_m}
-    return {
-        "crank_angle_rad": trace.crank_angle_rad,
-        **{name: column for name, column in toe.items() if column is not None},
-        "drive_torque_nm": trace.drive_torque_nm,
-        **{f"force_n.{name}": force for name, force in trace.force_n.items()},
-    }
+    """Columns with a row for each sample; x and y of a vector, and a joint's name, after a dot."""
+    columns: Columns = {}
+    for name, value in attrs.asdict(trace, recurse=False).items():
+        if name == "joints":
+            for joint, part in value.items():
+                for key, column in attrs.asdict(part).items():
+                    columns |= _parts_of(f"{name}.{joint}.{key}", column)
+        elif isinstance(value, dict):
+            columns |= {f"{name}.{joint}": column for joint, column in value.items()}
+        elif value is not None:
+            columns |= _parts_of(name, value)
+    return columns
+
+
+def _parts_of(name: str, column: Floats) -> Columns:
+    if column.ndim == 1:
+        return {name: column}
+    return {f"{name}.{axis}": column[:, i] for i, axis in enumerate("xy")}
 
 
 def _cells(joint: JointResult) -> dict[str, float | str | None]:
@@ -364,7 +407,7 @@ class SimulationResult:
     drive_torque_nm : TorqueResult
         Torque of the drive on the crank.
     energy_j : EnergyBalance or None
-        Energy balance; None for an ideal leg and for a leg of a batch.
+        Energy balance; None for an ideal leg.
     toe : ToeResult or None
         Deviations of the toe; None without a point called ``toe`` or without an ideal motion to compare with.
     joints : dict of str to JointResult
@@ -376,7 +419,7 @@ class SimulationResult:
     standard_error : dict of str to float, or None
         Standard error of a value by its path, such as ``joints.A.mean_force_n``: the standard deviation
         between gait cycles, divided by the root of their number, as if successive cycles were independent.
-        None below two whole cycles, for an ideal leg and for a leg of a batch.
+        None below two whole cycles, for an ideal leg.
     clearance_joints : tuple of str
         Joints with clearance, in the order of ``surfaces``.
     surfaces : Surfaces or None

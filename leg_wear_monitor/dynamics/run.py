@@ -10,7 +10,7 @@ from leg_wear_monitor.compiled.kernel import kernel
 from leg_wear_monitor.compiled.vectors import bits_of
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.errors import SimulationError
-from leg_wear_monitor.mechanism.arrays import Floats, Ints
+from leg_wear_monitor.mechanism.arrays import Flags, Floats, Ints
 from leg_wear_monitor.mechanism.materials import Bushing
 from leg_wear_monitor.mechanism.position import Linkage
 from leg_wear_monitor.wear import Surfaces
@@ -312,12 +312,21 @@ class Setup:
 
 
 class Sample(NamedTuple):
-    """One instant: crank angle [rad], toe (2,) [m] or None, drive torque [N m], joint forces (j,) [N]."""
+    """One instant of a run.
+
+    ``toe`` (3, 2): position [m], velocity [m/s] and acceleration [m/s^2], in clearance coordinates their
+    deviation from the ideal linkage; zeros without a toe. ``force`` (j,) [N]: in all joints. For k clearance
+    joints: ``contact`` (rows, k): rows as in `dynamics.joint`; ``touching`` (k,); ``worn`` (k,) [m]: depth of
+    the deepest sector of the bushing.
+    """
 
     crank_angle: float
-    toe: Floats | None
+    toe: Floats
     drive_torque: float
     force: Floats
+    contact: Floats
+    touching: Flags
+    worn: Floats
 
 
 class Run(Protocol):

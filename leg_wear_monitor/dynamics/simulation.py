@@ -23,6 +23,7 @@ from leg_wear_monitor.dynamics.statistics import (
     joint_statistics,
     open_balance,
     toe_errors,
+    toe_parts,
     trace_of,
 )
 from leg_wear_monitor.errors import AssemblyError, ConfigError, ConfigWarning, SimulationError, did_you_mean
@@ -175,13 +176,15 @@ def _trace(setup: Setup, motion: IdealMotion, cycles: float, begin: float) -> Tr
     turns = _passed(cycles, begin, setup.speed, points)
     pick = turns % points
     force = np.linalg.norm(motion.joint_force, axis=2)[pick]
-    toe = None if mechanism.toe is None else point_motion(motion, setup.linkage, *mechanism.toe)[0][pick]
+    toe: dict[str, Any] = {}
+    if mechanism.toe is not None:
+        path = np.stack(point_motion(motion, setup.linkage, *mechanism.toe), axis=1)[pick]
+        toe = toe_parts(path, np.zeros_like(path))
     return Trace(
         crank_angle_rad=np.asarray(turns * (TURN / points), float),
-        toe_x_m=None if toe is None else toe[:, 0],
-        toe_y_m=None if toe is None else toe[:, 1],
         drive_torque_nm=motion.drive_torque[pick],
         force_n={name: force[:, i] for i, name in enumerate(mechanism.joints)},
+        **toe,
     )
 
 
@@ -471,7 +474,7 @@ def _run(
         toe=toe_errors(statistics) if mechanism.toe and is_steady else None,
         joints=joint_statistics(setup, statistics, setup.surfaces.depth - depth, counted_cycles),
         impacts=first_impacts(setup, statistics),
-        trace=trace_of(setup, tracer.samples) if trace else None,
+        trace=trace_of(setup, tracer.samples, model) if trace else None,
         standard_error=scatter.standard_errors(counted_cycles),
         clearance_joints=setup.clearance_joints,
         surfaces=setup.surfaces,

@@ -9,11 +9,13 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.contact.conformity import contact_doubt, half_angle_under_load, is_winkler_form
+from leg_wear_monitor.dynamics.joint import DELTA, EX, EY, F_N, F_T, VX, VY
 from leg_wear_monitor.dynamics.result import (
     ClearanceResult,
     EnergyBalance,
     Impact,
     JointResult,
+    JointTrace,
     SimulationResult,
     ToeResult,
     TorqueResult,
@@ -39,7 +41,8 @@ from leg_wear_monitor.dynamics.run import (
 )
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials import regime_of
-from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.mechanism.position import TURN, ideal_motion, point_motion
+from leg_wear_monitor.mechanism.spec import SpeedDrive
 from leg_wear_monitor.wear import BUSHING, JOURNAL, wear_zone
 
 
@@ -292,15 +295,49 @@ def first_impacts(setup: Setup, statistics: RunStatistics) -> dict[str, tuple[Im
     return result
 
 
-def trace_of(setup: Setup, samples: list[Sample]) -> Trace:
+def trace_of(setup: Setup, samples: list[Sample], model: str) -> Trace:
     """Trace from samples; the crank angle is continuous and starts in [0, 2 pi)."""
-    angles = np.array([sample.crank_angle for sample in samples])
+    linkage, angles = setup.linkage, np.array([sample.crank_angle for sample in samples])
+    parts: dict[str, Any] = {}
+    if linkage.mechanism.toe is not None:
+        parts = toe_parts(np.array([sample.toe for sample in samples]))
+        if isinstance(linkage.mechanism.drive, SpeedDrive):
+            # equal crank angles of all cycles have the same ideal motion
+            turns, each = np.unique(np.round(angles / TURN % 1.0, 12), return_inverse=True)
+            motion = ideal_motion(linkage, TURN * turns, setup.speed)
+            ideal = np.stack(point_motion(motion, linkage, *linkage.mechanism.toe), axis=1)[each]
+            toe = np.array([sample.toe for sample in samples])
+            error = toe if model == "clearance" else toe - ideal
+            parts = toe_parts(error + ideal, error)
     forces = np.array([sample.force for sample in samples])
-    toe = None if samples[0].toe is None else np.array([sample.toe for sample in samples])
+    contacts = np.array([sample.contact for sample in samples])
+    touching = np.array([sample.touching for sample in samples])
+    worn = np.array([sample.worn for sample in samples])
     return Trace(
         crank_angle_rad=angles - TURN * np.floor(angles[0] / TURN + 1.0e-9),
-        toe_x_m=None if toe is None else toe[:, 0],
-        toe_y_m=None if toe is None else toe[:, 1],
         drive_torque_nm=np.array([sample.drive_torque for sample in samples]),
-        force_n={name: forces[:, i] for i, name in enumerate(setup.linkage.mechanism.joints)},
+        force_n={name: forces[:, i] for i, name in enumerate(linkage.mechanism.joints)},
+        joints={
+            name: JointTrace(
+                eccentricity_m=contacts[:, [EX, EY], k],
+                eccentricity_rate_mps=contacts[:, [VX, VY], k],
+                penetration_m=contacts[:, DELTA, k],
+                in_contact=touching[:, k],
+                normal_force_n=contacts[:, F_N, k],
+                tangential_force_n=contacts[:, F_T, k],
+                worn_depth_m=worn[:, k],
+            )
+            for k, name in enumerate(setup.clearance_joints)
+        },
+        **parts,
     )
+
+
+def toe_parts(toe: Floats, error: Floats | None = None) -> dict[str, Floats]:
+    """Fields of a trace from the toe's motion (n, 3, 2), and from its deviation from the ideal linkage."""
+    found = {"toe_x_m": toe[:, 0, 0], "toe_y_m": toe[:, 0, 1]}
+    found |= {"toe_velocity_mps": toe[:, 1], "toe_acceleration_mps2": toe[:, 2]}
+    if error is None:
+        return found
+    names = ("toe_error_m", "toe_error_mps", "toe_error_mps2")
+    return found | {name: error[:, i] for i, name in enumerate(names)}

@@ -21,8 +21,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from leg_wear_monitor.configuration import described, quantity
-from leg_wear_monitor.dynamics.batch import Leg, advance_batch, prepare_legs, share_tables
+from leg_wear_monitor.dynamics.batch import Leg, advance_batch, prepare_legs
 from leg_wear_monitor.dynamics.clearance.stepper import STATISTICS_INTERVALS, ClearanceStepper, length_of
+from leg_wear_monitor.dynamics.clearance.tables import build_tables
 from leg_wear_monitor.dynamics.run import (
     ARCHARD,
     DONE,
@@ -193,9 +194,13 @@ class LifeRun:
         first = self._setups[0]
         self.clearance_joints, self.fresh_m = first.clearance_joints, first.contacts.clearance
         self.radius_m = first.contacts.bushing_radius
+        # legs under the same load share their tables, which are large
+        tables = [build_tables(each.linkage, each.contacts) for each in self._setups[:: self.settings.legs]]
         self._steppers = [
-            ClearanceStepper(setup, length_of(setup, STATISTICS_INTERVALS), tables=tables.get())
-            for _, setup, tables in share_tables(self._setups)
+            ClearanceStepper(
+                setup, length_of(setup, STATISTICS_INTERVALS), tables=tables[i // self.settings.legs]
+            )
+            for i, setup in enumerate(self._setups)
         ]
         self._polynomials = []
         perturb_m = self.settings.perturb_fraction * float(self.fresh_m.min())

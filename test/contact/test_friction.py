@@ -7,10 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor.contact.friction import (
-    AMBROSIO,
     FRICTION_CODES,
-    NONE,
-    THRELFALL,
+    RAMPS,
     ambrosio_ramp,
     friction_force,
     threlfall_ramp,
@@ -19,7 +17,7 @@ from leg_wear_monitor.mechanism import FRICTION_LAWS
 
 V0, V1 = 1.0e-3, 1.0e-2
 
-laws = st.sampled_from([NONE, AMBROSIO, THRELFALL])
+laws = st.sampled_from(list(FRICTION_CODES.values()))
 slips = st.floats(-1.0, 1.0)
 loads = st.floats(0.0, 1.0e4)
 
@@ -52,9 +50,9 @@ def test_published_points_of_the_ramps():
     """Ambrosio's is 0 up to v0, 1 from v1, half way half; Threlfall's reaches 95 % at v1."""
     fractions = [ambrosio_ramp(v, V0, V1) for v in (0.0, V0, 0.5 * (V0 + V1), V1, 1.0)]
     assert fractions == pytest.approx([0.0, 0.0, 0.5, 1.0, 1.0])
-    assert threlfall_ramp(V1, V1) == pytest.approx(1.0 - math.exp(-3.0))
-    assert threlfall_ramp(0.0, V1) == 0.0
+    assert threlfall_ramp(V1, V0, V1) == pytest.approx(1.0 - math.exp(-3.0))
+    assert threlfall_ramp(0.0, V0, V1) == 0.0
 
 
 def test_a_file_can_choose_every_law_and_no_other():
-    assert set(FRICTION_LAWS) == set(FRICTION_CODES)
+    assert set(FRICTION_LAWS) == set(RAMPS)

@@ -28,7 +28,6 @@ from leg_wear_monitor.dynamics.clearance.contact import (
     CAM,
     DV,
     E0,
-    F_T,
     LIFT,
     RUB,
     V0,
@@ -61,6 +60,7 @@ from leg_wear_monitor.dynamics.clearance.step import (
 )
 from leg_wear_monitor.dynamics.joint import (
     F_N,
+    F_T,
     NEVER,
     contact_energy,
     first_contact_event,

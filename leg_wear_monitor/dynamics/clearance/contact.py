@@ -29,7 +29,7 @@ from leg_wear_monitor.compiled.vectors import (
     zip_last,
 )
 from leg_wear_monitor.contact.arrays import ContactArrays
-from leg_wear_monitor.contact.friction import NONE, THRELFALL, against, ambrosio_ramp, friction_force
+from leg_wear_monitor.contact.friction import NONE, VECTOR_LAWS, against, ambrosio_ramp, friction_force
 from leg_wear_monitor.contact.geometry import journal_contact
 from leg_wear_monitor.contact.normal import (
     LAWS,
@@ -44,6 +44,7 @@ from leg_wear_monitor.dynamics.joint import (
     EX,
     EY,
     F_N,
+    F_T,
     SAMPLE,
     VX,
     VY,
@@ -84,8 +85,9 @@ def contact_laws(contacts: ContactArrays) -> Floats:
 
 
 def have_usual_laws(contacts: ContactArrays) -> bool:
-    """Whether all joints have Hertz's form and a friction without an exponential: vectors of joints."""
-    return bool((contacts.normal_form == _HERTZ).all() and (contacts.friction_law != THRELFALL).all())
+    """Whether vectors of joints compute all laws: Hertz's form, and a friction law of `VECTOR_LAWS`."""
+    is_hertz = (contacts.normal_form == _HERTZ).all()
+    return bool(is_hertz and np.isin(contacts.friction_law, VECTOR_LAWS).all())
 
 
 @entry
@@ -217,13 +219,13 @@ def _of_bodies(line, k):
     return evens(first, second), odds(first, second)
 
 
-# further rows of a sample: normal, friction force [N], slip speed [m/s], derivatives of the normal force by
+# further rows of a sample: normal, slip speed [m/s], derivatives of the normal force by
 # the penetration [N/m] and by its rate [N s/m], its elastic part [N], derivative of the penetration by the
 # crank angle through the rotation of worn bodies [m/rad], the normal law's coefficient for the local radii
 # (unit of the law), and the local clearance [m]
-NX, NY, F_T, SLIP, STIFFNESS = range(SAMPLE, SAMPLE + 5)
-DAMPING, ELASTIC, CAM, COEFFICIENT, CLEARANCE = range(SAMPLE + 5, SAMPLE + 10)
-SAMPLE_ROWS = SAMPLE + 10
+NX, NY, SLIP, STIFFNESS = range(SAMPLE, SAMPLE + 4)
+DAMPING, ELASTIC, CAM, COEFFICIENT, CLEARANCE = range(SAMPLE + 4, SAMPLE + 9)
+SAMPLE_ROWS = SAMPLE + 9
 
 # integrals of a joint in a step beyond those of the run statistics: friction force [N s]; moment about the
 # crank of the normal force on rotating worn walls [N m s]

@@ -29,7 +29,6 @@ from leg_wear_monitor.dynamics.clearance.contact import (
     E1,
     ELASTIC,
     EM,
-    F_T,
     K1E,
     K1V,
     K2E,
@@ -58,7 +57,7 @@ from leg_wear_monitor.dynamics.clearance.model import (
     hold_eccentricities,
     take_tables,
 )
-from leg_wear_monitor.dynamics.joint import DELTA, DELTA_DOT, EX, EY, F_N, begin_contact, wear_joint
+from leg_wear_monitor.dynamics.joint import DELTA, DELTA_DOT, EX, EY, F_N, F_T, begin_contact, wear_joint
 from leg_wear_monitor.dynamics.run import (
     ARCHARD,
     CONTACT,

@@ -24,7 +24,6 @@ from leg_wear_monitor.dynamics.clearance.basis import (
 from leg_wear_monitor.dynamics.clearance.contact import (
     A0,
     E0,
-    F_T,
     NX,
     NY,
     V0,
@@ -48,7 +47,7 @@ from leg_wear_monitor.dynamics.clearance.tables import (
     build_basis,
     build_tables,
 )
-from leg_wear_monitor.dynamics.joint import F_N
+from leg_wear_monitor.dynamics.joint import F_N, F_T, SAMPLE
 from leg_wear_monitor.dynamics.run import (
     DONE,
     RunStatistics,
@@ -62,6 +61,7 @@ from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.arrays import Flags, Floats, Ints, Singles
 from leg_wear_monitor.mechanism.position import TURN, Linkage, build_linkage
 from leg_wear_monitor.mechanism.spec import ConstantLoad, Mechanism, SpeedDrive, TorqueDrive
+from leg_wear_monitor.wear import BUSHING
 from leg_wear_monitor.workers import compiled_beside
 
 INTERVALS = 2048  # intervals per turn at the setup's speed
@@ -185,6 +185,11 @@ class ClearanceStepper:
         sample = self._sample()
         nx, ny = sample[NX], sample[NY]
         return np.stack([-sample[F_N] * nx - sample[F_T] * ny, -sample[F_N] * ny + sample[F_T] * nx], axis=1)
+
+    @property
+    def contact(self) -> Floats:
+        """A copy of the last sample before that time: rows of `dynamics.joint` (SAMPLE, k)."""
+        return self._sample()[:SAMPLE].copy()
 
     def _sample(self) -> Floats:
         """The last sample before that time (SAMPLE_ROWS, k)."""
@@ -370,8 +375,16 @@ class ClearanceRun:
         np.add.at(force, tables.reaction_joint[1:], moment.reaction[1:] ** 2)
         ideal = tables.reaction_joint[1::2]
         force[ideal] = np.sqrt(force[ideal])
-        toe = moment.toe if self._setup.linkage.mechanism.toe else None
-        return Sample(self.stepper.crank_angle, toe, moment.torque, force)
+        stepper = self.stepper
+        return Sample(
+            stepper.crank_angle,
+            moment.deviation,
+            moment.torque,
+            force,
+            stepper.contact,
+            stepper.state.approach > 0.0,
+            stepper.state.depth[:, BUSHING].max(axis=1),
+        )
 
     def branch(self) -> "ClearanceRun":
         """An independent copy of the run in its present state."""

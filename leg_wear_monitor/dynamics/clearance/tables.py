@@ -30,7 +30,6 @@ from leg_wear_monitor.dynamics.clearance.basis import (
     derivative,
     motion_shapes,
     project,
-    start_of,
     views,
 )
 from leg_wear_monitor.mechanism.arrays import Floats, Ints, Singles, body_names, point_from_com
@@ -94,7 +93,6 @@ def build_tables(
     contacts: ContactArrays,
     points: int = POINTS,
     basis: Basis | None = None,
-    like: ClearanceTables | None = None,
 ) -> ClearanceTables:
     """Tables of a linkage with the clearance joints of ``contacts``.
 
@@ -106,8 +104,6 @@ def build_tables(
         Crank steps per turn.
     basis : Basis, optional
         That of the same linkage and clearance joints, with any radii; ``points`` is then not used.
-    like : ClearanceTables, optional
-        Tables of this basis with any radii: those that do not depend on the radii are shared, not copied.
 
     Returns
     -------
@@ -119,8 +115,6 @@ def build_tables(
         If the linkage does not close or has a dead point.
     """
     basis = basis.with_contacts(linkage, contacts) if basis else build_basis(linkage, contacts, points)
-    if like is not None:
-        return _with_levers(like, linkage, basis)
     return ClearanceTables(
         motion=_motion(linkage, contacts, basis),
         reaction=_reaction(linkage, contacts, basis),
@@ -156,24 +150,6 @@ def _motion(linkage: Linkage, contacts: ContactArrays, basis: Basis) -> Floats:
     turns = np.round(motion.v[:, bodies, 2].mean(axis=0))
     views(rows[-1], shapes)["angle"][:] += TURN * turns
     return rows
-
-
-def _with_levers(tables: ClearanceTables, linkage: Linkage, basis: Basis) -> ClearanceTables:
-    """Tables of the same linkage and clearance joints with the levers of friction of a basis."""
-    k = basis.friction.shape[2]
-    motion, reaction, by_e = tables.motion.copy(), tables.reaction.copy(), tables.by_e.copy()
-    shapes = motion_shapes(k, bool(basis.drag.any()))
-    for name, part in _levers(basis).items():
-        first, columns = start_of(name, shapes), part.reshape(len(part), -1)
-        motion[:-1, first : first + columns.shape[1]] = columns
-        motion[-1, first : first + columns.shape[1]] = columns[0]
-    ideal, _ = _ideal_rows(linkage, basis)
-    reaction[:-1, -k:, : len(ideal)] = _friction_reactions(basis, ideal)
-    reaction[-1] = reaction[0]
-    slopes, first = _lever_slopes(basis)[_coarse(len(basis.s))], start_of("lever_drive", changing_shapes(k))
-    for i in range(k):
-        by_e[:, (first + i) // WIDTH, :, (first + i) % WIDTH] = slopes[:, :, i]
-    return tables._replace(motion=motion, reaction=reaction, by_e=by_e)
 
 
 def _levers(basis: Basis) -> dict[str, Floats]:

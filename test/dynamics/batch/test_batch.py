@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from leg_wear_monitor import AssemblyError, ConfigError, SimulationError, load_mechanism, simulate
-from leg_wear_monitor.dynamics.batch import Leg, advance_batch, prepare_legs, simulate_batch
+from leg_wear_monitor import load_mechanism
+from leg_wear_monitor.dynamics.batch import Leg, advance_batch, prepare_legs
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
 from leg_wear_monitor.dynamics.clearance.tables import build_basis, build_tables
 from leg_wear_monitor.dynamics.run import DONE, INVALID_DRIVE, new_run_statistics, steady_drive
@@ -24,94 +24,6 @@ def with_joint(leg, name, **changes):
     )
 
 
-@pytest.fixture(scope="module")
-def various(leg):
-    """Legs that differ in what a study varies."""
-    return [
-        Leg(mechanism=leg),
-        Leg(mechanism=leg, speed_rpm=-90.0, wear=True),
-        Leg(mechanism=leg, clearances=("G",), clearance_m=2.0e-4),
-        Leg(mechanism=with_joint(leg, "A", restitution=0.75, wear_coefficient=(1.0e-14, 0.0))),
-        Leg(mechanism=leg, crank_angle_rad=2.0, perturb_m=1.0e-4, seed=5),
-        Leg(mechanism=leg, clearances=()),
-        Leg(mechanism=load_mechanism("jansen_leg"), normal_law="flores"),
-    ]
-
-
-def figures(results):
-    """All that results say, to be compared."""
-    return [
-        (result.to_dict(), None if result.surfaces is None else result.surfaces.depth.tolist())
-        for result in results
-    ]
-
-
-@pytest.fixture(scope="module")
-def by_one_worker(various):
-    return figures(simulate_batch(various, workers=1, **SHORT))
-
-
-@pytest.mark.parametrize("workers", [pytest.param(2, marks=pytest.mark.slow), 5])
-def test_results_do_not_depend_on_the_number_of_workers(various, by_one_worker, workers):
-    """Bit for bit."""
-    assert figures(simulate_batch(various, workers=workers, **SHORT)) == by_one_worker
-
-
-def test_results_do_not_depend_on_the_others(various, by_one_worker):
-    """Nor on the order, with as many workers as there are processors."""
-    backwards = figures(simulate_batch(various[::-1], **SHORT))
-    assert backwards[::-1] == by_one_worker
-    assert figures(simulate_batch(various[3:4], **SHORT)) == by_one_worker[3:4]
-
-
-def test_a_leg_of_a_batch_is_the_leg_of_simulate(leg):
-    """But for what a batch does not keep."""
-    alone = simulate(leg, speed_rpm=80.0, cycles=1.5, skip_cycles=0.5, wear=True).to_dict()
-    (result,) = simulate_batch([Leg(mechanism=leg, speed_rpm=80.0, wear=True)], cycles=1.5, skip_cycles=0.5)
-    for key in ("drive_torque_nm", "toe", "joints", "mechanism", "model"):
-        assert result.to_dict()[key] == alone[key]
-    for key in ("cycles", "simulated_s", "speed_rpm"):
-        assert result.to_dict()[key] == pytest.approx(alone[key])
-
-
-def test_the_error_of_a_leg_stands_in_its_place(leg, document, various, by_one_worker):
-    """One whose journal is pushed through, and one that cannot turn; the others as without them."""
-    weak = with_joint(leg, "G", stiffness=1.0e3)
-    four_bar = load_mechanism("four_bar")
-    crank = attrs.evolve(
-        four_bar.bodies["crank"], points={**four_bar.bodies["crank"].points, "B": (0.3, 0.0)}
-    )
-    stuck = attrs.evolve(four_bar, bodies={**four_bar.bodies, "crank": crank})
-    legs = [Leg(mechanism=weak, clearances=("A", "G")), various[0], Leg(mechanism=stuck), various[1]]
-    pushed, first, jammed, second = simulate_batch(legs, cycles=0.2, skip_cycles=0.1)
-    assert isinstance(pushed, SimulationError)
-    assert str(pushed).startswith("bionic_leg.yaml: joint G at t = 0.")
-    assert isinstance(jammed, AssemblyError)
-    assert figures([first, second]) == by_one_worker[:2]
-
-
-@pytest.mark.parametrize(
-    ("options", "how", "fault"),
-    [
-        ({"perturb_m": 4.0e-4}, {}, "perturb_m: 0.0004 m is not from 0 to the smallest clearance, 0.0003 m"),
-        ({"perturb_m": float("nan")}, {}, "perturb_m: nan m"),
-        ({"clearances": ("X",)}, {}, "'X'"),
-        ({}, {"cycles": 0.0}, "cycles: 0 is not above 0"),
-        ({}, {"skip_cycles": -1.0}, "skip-cycles: -1 is below 0"),
-    ],
-)
-def test_what_cannot_be_stops_the_batch_before_it_starts(leg, options, how, fault):
-    with pytest.raises(ConfigError, match=fault):
-        simulate_batch([Leg(mechanism=leg, **options)], **how)
-
-
-def test_a_leg_that_a_torque_drives_is_refused():
-    with pytest.raises(ConfigError, match=r"andrews\.yaml: drive\.torque"):
-        simulate_batch(
-            [Leg(mechanism=load_mechanism("slider_crank")), Leg(mechanism=load_mechanism("andrews"))]
-        )
-
-
 @pytest.mark.parametrize("name, joints", [("bionic_leg", ("A", "G")), ("jansen_leg", None)])
 def test_tables_of_a_shared_basis_are_those_of_the_leg_alone(name, joints):
     """Bit for bit: the radii change the friction's levers, which are not in the basis of other legs."""
@@ -122,29 +34,7 @@ def test_tables_of_a_shared_basis_are_those_of_the_leg_alone(name, joints):
     shared = build_tables(other.linkage, other.contacts, basis=basis)
     alone, former = (build_tables(setup.linkage, setup.contacts) for setup in (other, first))
     assert all(map(np.array_equal, shared, alone))
-    assert all(
-        map(np.array_equal, build_tables(other.linkage, other.contacts, basis=basis, like=former), alone)
-    )
     assert not all(map(np.array_equal, shared, former))
-
-
-def test_progress_is_the_share_of_the_legs_that_are_done(leg):
-    fractions = []
-    legs = [Leg(mechanism=leg, clearances=("G",), seed=i) for i in range(4)]
-    simulate_batch(legs, cycles=0.01, skip_cycles=0.0, progress=fractions.append)
-    assert fractions == [0.25, 0.5, 0.75, 1.0]
-
-
-def test_an_interrupt_ends_the_whole_batch(leg):
-    """A hundred thousand cycles would take a quarter of an hour: those that run stop at their next one."""
-
-    def interrupt(fraction):
-        raise KeyboardInterrupt
-
-    short = Leg(mechanism=leg, clearances=())
-    long = [Leg(mechanism=leg, clearances=("G",), seed=i) for i in range(3)]
-    with pytest.raises(KeyboardInterrupt):
-        simulate_batch([short, *long], cycles=1.0e5, progress=interrupt)
 
 
 @pytest.fixture(scope="module")
@@ -177,24 +67,6 @@ def test_starts_fill_the_disc_evenly(leg, new_stepper):
     e = np.concatenate(starts)
     assert (np.linalg.norm(e, axis=1) < 2.0e-4 / np.sqrt(2.0)).mean() == pytest.approx(0.5, abs=0.06)
     assert ((e[:, 0] > 0.0) & (e[:, 1] > 0.0)).mean() == pytest.approx(0.25, abs=0.05)
-
-
-@pytest.mark.chaotic
-def test_other_seeds_are_other_motions_of_the_same_leg(leg):
-    legs = [Leg(mechanism=leg, perturb_m=1.0e-6, seed=i) for i in range(4)]
-    forces = [result.joints["A"].mean_force_n for result in simulate_batch(legs, cycles=3)]
-    assert len(set(forces)) == 4
-    assert np.ptp(forces) < 0.03 * np.mean(forces)
-
-
-@pytest.mark.chaotic
-def test_the_starting_phase_is_forgotten(leg):
-    """Means of five cycles from four crank angles; their sigmas are 0.15 % and less (32 runs, 2026-11-23)."""
-    legs = [Leg(mechanism=leg, crank_angle_rad=angle, perturb_m=1.0e-4) for angle in (0.0, 1.5, 3.0, 4.5)]
-    forces = np.array([
-        [result.joints[name].mean_force_n for name in "ABG"] for result in simulate_batch(legs, cycles=5)
-    ])  # fmt: skip
-    np.testing.assert_allclose(forces, np.tile(forces.mean(axis=0), (4, 1)), rtol=0.03)
 
 
 def test_legs_that_differ_in_their_material_alone_keep_it(leg):

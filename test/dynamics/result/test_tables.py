@@ -33,7 +33,11 @@ def result():
         toe=None,
         joints={"A": JointResult(1.0, 1.0, 1.0, 1.0), "B": worn},
         impacts={"B": (Impact(0.1, 0.01, 0.2, 30.0), Impact(0.5, 0.02, None, 40.0))},
-        trace=Trace(np.arange(3.0), None, None, np.arange(3.0), {"A": np.ones(3), "B": np.zeros(3)}),
+        trace=Trace(
+            crank_angle_rad=np.arange(3.0),
+            drive_torque_nm=np.arange(3.0),
+            force_n={"A": np.ones(3), "B": np.zeros(3)},
+        ),
         clearance_joints=("B",),
     )
 

@@ -1,11 +1,12 @@
 """Listeners to a running monitor: of the dashboard, and of the demo."""
 
+import json
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import ParameterValue
 from rcl_interfaces.srv import GetParameters
 from rclpy.context import Context
@@ -19,7 +20,6 @@ from rclpy.utilities import try_shutdown
 from rclpy.validate_full_topic_name import validate_full_topic_name
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
-from std_srvs.srv import Trigger
 
 from leg_wear_monitor.dashboard.leg_page import LegSetup, leg_setup
 from leg_wear_monitor.dashboard.live_leg import MOST, LiveLeg, received_status
@@ -184,14 +184,11 @@ def _peaks_n(message: JointState) -> dict[str, float]:
     return dict(zip(names, message.effort, strict=False))
 
 
-# Listener of the demo: reports what the monitor publishes, and acknowledges its alarms.
-
-
-_MONITOR = "leg_wear_monitor"
+# Listener of the demo: prints the state of the leg after each gait cycle.
 
 
 class DemoListener:
-    """Subscribes to the monitor in a namespace.
+    """Subscribes to the state of the leg that a monitor in a namespace publishes.
 
     Parameters
     ----------
@@ -199,34 +196,19 @@ class DemoListener:
     domain : int
         ROS domain.
     report : callable
-        Called with a stamp [ns] and a line of text.
-
-    Attributes
-    ----------
-    clearances_m : dict
-        Last received clearance of each joint [m].
-    stamp_ns : int
-        Stamp of these clearances [ns].
-    raised, acknowledged : list of str
-        Alarms that were raised, and those that were cleared by an acknowledgement.
+        Called with the stamp of a state [ns] and the JSON object of the state.
     """
 
-    def __init__(self, namespace: str, domain: int, report: Callable[[int, str], None]) -> None:
+    def __init__(self, namespace: str, domain: int, report: Callable[[int, dict[str, Any]], None]) -> None:
         self._report = report
         self._context = Context()
         self._context.init(args=[], domain_id=domain)
         self._node = Node("witness", context=self._context, namespace=namespace)
         self._executor = executor_for(self._node)
         self._executor.add_node(self._node)
-        self.clearances_m: dict[str, float] = {}
-        self.stamp_ns = 0
-        self.raised: list[str] = []
-        self.acknowledged: list[str] = []
-        self._asked: Future | None = None
-        self._service = self._node.create_client(Trigger, f"{_MONITOR}/acknowledge_alarms")
-        self._node.create_subscription(JointState, f"{_MONITOR}/clearance_states", self._take_cycle, 10)
-        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self._node.create_subscription(DiagnosticArray, f"{_MONITOR}/alarms", self._take_alarms, latched)
+        self._node.create_subscription(
+            String, topic_of(outputs.STATE, "leg_wear_monitor"), self._take_state, _profile(outputs.STATE.qos)
+        )
 
     def attend(self, going_on: Callable[[], bool]) -> None:
         """Process messages while `going_on` returns true."""
@@ -239,34 +221,6 @@ class DemoListener:
         self._node.destroy_node()
         try_shutdown(context=self._context)
 
-    def _take_cycle(self, message: JointState) -> None:
-        self.stamp_ns = stamp_ns_of(message.header.stamp)
-        names = [name.removesuffix("_clearance") for name in message.name]
-        self.clearances_m = dict(zip(names, message.position, strict=True))
-        clearances = "  ".join(f"{name} {1e6 * c:.3f}" for name, c in self.clearances_m.items())
-        self._report(
-            self.stamp_ns, f"clearance [um]  {clearances}   hardest impact {max(message.effort):.0f} N"
-        )
-
-    def _take_alarms(self, message: DiagnosticArray) -> None:
-        alarms = {status.name.split(": ", 1)[-1]: status for status in message.status}
-        up = {name: status for name, status in alarms.items() if status.level != DiagnosticStatus.OK}
-        for name, status in up.items():
-            if name not in self.raised:
-                self.raised.append(name)
-                self._report(stamp_ns_of(message.header.stamp), f"ALARM {name}: {_alarm_text(status)}")
-        if up and all(status.message.startswith("latched") for status in up.values()) and not self._asked:
-            self._asked = self._service.call_async(Trigger.Request())
-            self._asked.add_done_callback(lambda future: self._take_answer(future, list(up)))
-
-    def _take_answer(self, future: Future, names: list[str]) -> None:
-        self._asked = None
-        self.acknowledged += names
-        self._report(self.stamp_ns, f"alarms acknowledged: {future.result().message}")
-
-
-def _alarm_text(status: DiagnosticStatus) -> str:
-    values = {value.key: value.value for value in status.values}
-    unit = next((key.removeprefix("value_") for key in values if key.startswith("value_")), "")
-    suffix = f"_{unit}" if unit else ""
-    return f"{float(values[f'value{suffix}']):.5g} {unit.upper()}, limit {values[f'limit{suffix}']}"
+    def _take_state(self, message: String) -> None:
+        state = json.loads(message.data)
+        self._report(state["stamp_ns"], state)

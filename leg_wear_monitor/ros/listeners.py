@@ -196,10 +196,10 @@ class DemoListener:
     domain : int
         ROS domain.
     report : callable
-        Called with the stamp of a state [ns] and the JSON object of the state.
+        Called with the JSON object of each state.
     """
 
-    def __init__(self, namespace: str, domain: int, report: Callable[[int, dict[str, Any]], None]) -> None:
+    def __init__(self, namespace: str, domain: int, report: Callable[[dict[str, Any]], None]) -> None:
         self._report = report
         self._context = Context()
         self._context.init(args=[], domain_id=domain)
@@ -222,5 +222,4 @@ class DemoListener:
         try_shutdown(context=self._context)
 
     def _take_state(self, message: String) -> None:
-        state = json.loads(message.data)
-        self._report(state["stamp_ns"], state)
+        self._report(json.loads(message.data))

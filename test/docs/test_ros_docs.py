@@ -29,13 +29,9 @@ def test_the_demo_s_parameters_fit_both_nodes() -> None:
     document = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
     monitor = parse_config(document, path.name, "/demo/leg_wear_monitor")
     leg = structured(PublisherConfig, flat(document["/**/gait_publisher"]["ros__parameters"]), path.name)
-    assert monitor.wear_acceleration == leg.wear_acceleration == 1.0e3
-    # faster than commanded: within a tolerance of more than a tenth, limits of impact forces would grow
-    own = monitor.cadence
-    fastest = max(abs(speed) for speed in leg.pace.speeds_rpm)
-    assert fastest > own.commanded_rpm + own.tolerance_rpm
-    assert own.tolerance_rpm <= 0.1 * own.commanded_rpm
-    assert min(abs(speed) for speed in leg.pace.speeds_rpm) == own.commanded_rpm
+    assert monitor.wear_acceleration == leg.wear_acceleration
+    assert set(leg.pace.speeds_rpm) == {monitor.cadence.commanded_rpm}
+    assert 0.0 < leg.knock.at_s < leg.duration_s
 
 
 def test_launch_files_start_what_is_installed() -> None:

@@ -18,7 +18,7 @@ from leg_wear_monitor.fleet import description
 from leg_wear_monitor.mechanism import materials, sourced, spec
 from leg_wear_monitor.monitor import alarm_specs
 from leg_wear_monitor.monitor.alarms import FAULT_CODES, guide_of
-from leg_wear_monitor.monitor.config.parameters import PARAMETERS, parameters_of
+from leg_wear_monitor.monitor.config.parameters import PARAMETERS
 from leg_wear_monitor.monitor.ledger.rows import FORMAT, TABLES, create_tables
 from leg_wear_monitor.monitor.verdict.decision import measured_figures
 from leg_wear_monitor.monitor.verdict.rules import RULES
@@ -87,17 +87,6 @@ def monitor_parameters(_name: str) -> str:
         for one in PARAMETERS.values()
     )  # fmt: skip
     return table("name | type | unit | default | bounds | live | meaning", rows)
-
-
-def publisher_parameters(_name: str) -> str:
-    pytest.importorskip("rclpy")
-    from leg_wear_monitor.ros.gait_publisher import PublisherConfig
-
-    rows = (
-        (f"`{one.name}`", one.type, one.unit, value(one.default), one.bounds, one.description)
-        for one in parameters_of(PublisherConfig).values()
-    )
-    return table("name | type | unit | default | bounds | meaning", rows)
 
 
 def mechanism_keys(name: str) -> str:
@@ -243,8 +232,11 @@ def meanings() -> Iterator[tuple[str, str]]:
     """Each code with a line for each place that reports it."""
     for rule in RULES:
         yield rule.code, f"- Verdict *{rule.state.words}*: {in_words(rule.why)}."
+    with_a_rule = {rule.code for rule in RULES}
     for alarm in (*OF_A_JOINT, *OF_THE_LEG):
         code = alarm.name("").strip().upper().replace(" ", "_")
+        if code in with_a_rule:
+            continue
         name = alarm.name("<joint>") if alarm in OF_A_JOINT else alarm.name()
         yield code, f"- Alarm `{name}`: [value and limit](monitor.md#alarms)."
     for code, meaning in FAULT_CODES.items():
@@ -273,7 +265,6 @@ PAGES: dict[str, Callable[[str], str]] = {
     "reference/mechanism_file.md": mechanism_keys,
     "reference/monitor.md": of_monitor,
     "reference/parameters.md": monitor_parameters,
-    "reference/ros.md": publisher_parameters,
 }
 
 

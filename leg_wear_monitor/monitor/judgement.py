@@ -1,4 +1,4 @@
-"""The verdict of a monitor and the state of its leg, made of what the monitor's parts hold."""
+"""The verdict of a monitor and the state of its leg, by the leg as it is counted and observed."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -12,7 +12,7 @@ from leg_wear_monitor.monitor.alarms import ALREADY_COUNTED, CRANK_ZERO, TRACKIN
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast, Quantiles
 from leg_wear_monitor.monitor.gait_evidence import doubts
 from leg_wear_monitor.monitor.ledger.entry import Measurement, VerdictEvent
-from leg_wear_monitor.monitor.parts import Parts
+from leg_wear_monitor.monitor.monitored_leg import MonitoredLeg
 from leg_wear_monitor.monitor.reports import AlarmList, VerdictReport
 from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.situation import (
@@ -38,64 +38,64 @@ from leg_wear_monitor.state import (
 from leg_wear_monitor.twin.statistics import Tracking
 
 
-def verdict_report(parts: Parts, situation: Situation | None = None) -> VerdictReport:
+def verdict_report(leg: MonitoredLeg, situation: Situation | None = None) -> VerdictReport:
     """The verdict now; the situation is made if it is not given."""
-    stamp_ns = parts.twin.intake.stamp_ns
-    found = findings(situation or situation_of(parts))
-    return VerdictReport(stamp_ns, dated(found, parts.findings, stamp_ns))
+    stamp_ns = leg.twin.intake.stamp_ns
+    found = findings(situation or situation_of(leg))
+    return VerdictReport(stamp_ns, dated(found, leg.findings, stamp_ns))
 
 
-def update_verdict(parts: Parts, situation: Situation | None = None) -> tuple[VerdictReport, ...]:
+def update_verdict(leg: MonitoredLeg, situation: Situation | None = None) -> tuple[VerdictReport, ...]:
     """The verdict if it has changed since the last call; it is then an event, too.
 
     To be called where the state does not depend on how the samples are cut into blocks: at the end of an
     evaluation period.
     """
-    before = verdict_of(parts.findings) if parts.findings else None
-    report = verdict_report(parts, situation)
-    parts.findings, now = report.findings, report.verdict
+    before = verdict_of(leg.findings) if leg.findings else None
+    report = verdict_report(leg, situation)
+    leg.findings, now = report.findings, report.verdict
     if not has_changed(before, now):
         return ()
     if before and (Figure.FORECAST in before.not_valid) != (Figure.FORECAST in now.not_valid):
-        parts.forecaster.expire()
+        leg.forecaster.expire()
     if before or now.fault_code != NO_GAIT_CYCLE:  # a run that monitored nothing has no verdict to store
-        parts.accounting.note(VerdictEvent(report.stamp_ns, now))
+        leg.accounting.note(VerdictEvent(report.stamp_ns, now))
     return (report,)
 
 
-def is_forecast_valid(parts: Parts, found: Sequence[Verdict]) -> bool:
+def is_forecast_valid(leg: MonitoredLeg, found: Sequence[Verdict]) -> bool:
     """Whether the leg is in the range of the model, and is the counted one by some findings."""
     invalid = any(Figure.FORECAST in finding.not_valid for finding in found)
-    return parts.evaluation.is_model_valid() and not invalid
+    return leg.evaluation.is_model_valid() and not invalid
 
 
 def evaluate_clearances(
-    parts: Parts, joints: Sequence[JointSituation], stamp_ns: int
+    leg: MonitoredLeg, joints: Sequence[JointSituation], stamp_ns: int
 ) -> tuple[AlarmList, ...]:
     """Compare clearances by measurement and by estimate with their limits: at once, for none scatters."""
-    board, values, sources = parts.evaluation.board, {}, {}
+    board, values, sources = leg.evaluation.board, {}, {}
     for joint in joints:
         name = alarm_specs.CLEARANCE.name(joint.joint)
         known = alarm_value(joint, board.alarms[name])
         if known is not None:
             values[name], sources[name] = known.clearance_m, (known.sigma_m, known.by)
-    cycles = parts.config.alarms.on_delay_cycles
+    cycles = leg.config.alarms.on_delay_cycles
     return board.evaluate(values, stamp_ns, cycles, sources) if values else ()
 
 
-def shown(parts: Parts, joint: JointSituation) -> KnownClearance | None:
+def shown(leg: MonitoredLeg, joint: JointSituation) -> KnownClearance | None:
     """What encoders or the drive torque show of a joint best, or showed when its alarm was raised."""
-    alarm = parts.evaluation.board.alarms[alarm_specs.CLEARANCE.name(joint.joint)]
+    alarm = leg.evaluation.board.alarms[alarm_specs.CLEARANCE.name(joint.joint)]
     return at_limit_by_estimate(joint, alarm) or surest(joint.seen)
 
 
-def situation_of(parts: Parts) -> Situation:
+def situation_of(leg: MonitoredLeg) -> Situation:
     """What the verdict depends on, at the end of an evaluation period."""
-    evaluation, config = parts.evaluation, parts.config
-    last, torque = parts.last, parts.torque
+    evaluation, config = leg.evaluation, leg.config
+    last, torque = leg.last, leg.torque
     alarms, explained = evaluation.board.alarms, torque.explained
     return Situation(
-        joints=_joint_situations(parts),
+        joints=_joint_situations(leg),
         alarms=tuple(alarms.values()),
         quantities=alarm_specs.QUANTITIES,
         has_cycle=last is not None,
@@ -103,21 +103,21 @@ def situation_of(parts: Parts) -> Situation:
         mismatch=last.torque_mismatch if last else math.nan,
         mismatch_limit=config.limits.torque_mismatch,
         torque_causes=torque.causes,
-        notes=_notes(parts),
+        notes=_notes(leg),
         input_causes=tuple(evaluation.causes),
-        input_faults=parts.judge.faults,
-        trusted_before_ns=parts.judge.trusted_before_ns,
+        input_faults=leg.judge.faults,
+        trusted_before_ns=leg.judge.trusted_before_ns,
         diagnosis=torque.diagnosis,
         explained=explained if evaluation.board.level(alarm_specs.MISMATCH.name()) else None,
     )
 
 
-def _joint_situations(parts: Parts) -> tuple[JointSituation, ...]:
+def _joint_situations(leg: MonitoredLeg) -> tuple[JointSituation, ...]:
     """What is known of each joint's clearance now."""
-    estimates = parts.encoders.estimates if parts.encoders else None
-    last, measured, joints = parts.last, parts.measured, parts.clearance_joints
-    modelled_m, limits_m = parts.twin.clearance_mean_m.tolist(), parts.evaluation.board.clearance_limits_m
-    walked, found = parts.accounting.state, []
+    estimates = leg.encoders.estimates if leg.encoders else None
+    last, measured, joints = leg.last, leg.measured, leg.clearance_joints
+    modelled_m, limits_m = leg.twin.clearance_mean_m.tolist(), leg.evaluation.board.clearance_limits_m
+    walked, found = leg.accounting.state, []
     for k, (joint, part) in enumerate(zip(joints, walked.parts, strict=True)):
         report = last.joints[k] if last else None
         one = JointSituation(
@@ -127,11 +127,11 @@ def _joint_situations(parts: Parts) -> tuple[JointSituation, ...]:
             best_estimate_m=(
                 report.forecast.now_m
                 if report and report.forecast
-                else parts.forecaster.best_estimate_m(k, modelled_m[k])
+                else leg.forecaster.best_estimate_m(k, modelled_m[k])
             ),
-            seen=tuple(one for each in parts.observers if (one := each.seen(k)) is not None),
+            seen=tuple(one for each in leg.observers if (one := each.seen(k)) is not None),
             is_used=bool(estimates and estimates[k].believed),
-            label=parts.mechanism.joints[joint].label,
+            label=leg.mechanism.joints[joint].label,
             replaced_ns=part.replaced_ns,
             part_cycles=walked.cycles - part.cycles,
         )
@@ -147,68 +147,68 @@ def with_measured(joint: JointSituation, measured: Measurement | None) -> JointS
     return attrs.evolve(joint, measured=by, is_measurement_used=measured.counts)
 
 
-def _notes(parts: Parts) -> dict[str, Sequence[str]]:
+def _notes(leg: MonitoredLeg) -> dict[str, Sequence[str]]:
     """What the monitor and its observers report for rules of the verdict, by the rule's code."""
-    unfollowed = _unfollowed(parts)
+    unfollowed = _unfollowed(leg)
     notes: dict[str, Sequence[str]] = {
-        ALREADY_COUNTED: ("",) if parts.accounting.is_all_counted else (),
+        ALREADY_COUNTED: ("",) if leg.accounting.is_all_counted else (),
         TRACKING_LOST: (unfollowed,) if unfollowed else (),
-        "NOT_THIS_LEG": _doubts(parts),
-        "CADENCE": _other_cadence(parts),
+        "NOT_THIS_LEG": _doubts(leg),
+        "CADENCE": _other_cadence(leg),
     }
-    for each in parts.observers:
+    for each in leg.observers:
         notes |= each.notes
-    if parts.guard.cause:
+    if leg.guard.cause:
         notes.pop(CRANK_ZERO, None)  # without samples that are believed, nobody can find it
     return notes
 
 
-def _other_cadence(parts: Parts) -> tuple[str, ...]:
+def _other_cadence(leg: MonitoredLeg) -> tuple[str, ...]:
     """That the leg walks at another cadence: not where it only starts or stops, after a right one."""
-    last, cadence = parts.last, parts.config.cadence
+    last, cadence = leg.last, leg.config.cadence
     was_right = last is not None and cadence.allows(last.cadence_rpm)
-    if parts.twin.tracking is not Tracking.OUT_OF_STEP or was_right:
+    if leg.twin.tracking is not Tracking.OUT_OF_STEP or was_right:
         return ()
-    rpm, commanded = parts.twin.speed_radps * 30.0 / math.pi, cadence.commanded_rpm
+    rpm, commanded = leg.twin.speed_radps * 30.0 / math.pi, cadence.commanded_rpm
     return (f"it walks at {rpm:.3g} rpm, expected {commanded:g} ± {cadence.tolerance_rpm:g} rpm",)
 
 
-def _doubts(parts: Parts) -> tuple[str, ...]:
+def _doubts(leg: MonitoredLeg) -> tuple[str, ...]:
     """Why the last gait cycle is unlikely to be one of this leg; a torque that is explained is no reason."""
-    last = parts.last
+    last = leg.last
     if last is None:
         return ()
-    if parts.torque.is_wrong or parts.judge.faults:
+    if leg.torque.is_wrong or leg.judge.faults:
         last = attrs.evolve(last, torque_samples=0)
-    found = doubts(last, parts.config)
+    found = doubts(last, leg.config)
     return ("; ".join(found),) if found else ()
 
 
-def _unfollowed(parts: Parts) -> str:
+def _unfollowed(leg: MonitoredLeg) -> str:
     """Why the crank is not followed; a loss shorter than a commanded gait cycle is reported by its alarm."""
-    if parts.guard.cause:
-        return parts.guard.cause
-    out_s, cycle_s = parts.twin.intake.out_s, 60.0 / abs(parts.config.cadence.commanded_rpm)
+    if leg.guard.cause:
+        return leg.guard.cause
+    out_s, cycle_s = leg.twin.intake.out_s, 60.0 / abs(leg.config.cadence.commanded_rpm)
     return f"the crank has not been followed for {out_s:.3g} s" if out_s >= cycle_s else ""
 
 
 # The state of the leg, made of what the monitor holds.
 
 
-def leg_state(parts: Parts, findings: Sequence[Verdict], situation: Situation) -> LegState:
+def leg_state(leg: MonitoredLeg, findings: Sequence[Verdict], situation: Situation) -> LegState:
     """State of the leg now, with the verdict of some findings."""
-    last, verdict, alarms = parts.last, verdict_of(findings), parts.evaluation.board.alarms
-    observed = {name: field for each in parts.observers for name, field in each.leg_fields.items()}
+    last, verdict, alarms = leg.last, verdict_of(findings), leg.evaluation.board.alarms
+    observed = {name: field for each in leg.observers for name, field in each.leg_fields.items()}
     return LegState(
-        stamp_ns=parts.twin.intake.stamp_ns,
-        life_cycles=parts.accounting.state.cycles,
+        stamp_ns=leg.twin.intake.stamp_ns,
+        life_cycles=leg.accounting.state.cycles,
         verdict=verdict,
         clearances={
             joint.joint: joint_clearance(
                 joint,
                 alarms[alarm_specs.CLEARANCE.name(joint.joint)],
                 findings,
-                parts.mechanism.clearances[joint.joint].radial_clearance,
+                leg.mechanism.clearances[joint.joint].radial_clearance,
             )
             for joint in situation.joints
         },

@@ -31,7 +31,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
     Measurement,
     VerdictEvent,
 )
-from leg_wear_monitor.monitor.parts import Parts
+from leg_wear_monitor.monitor.monitored_leg import MonitoredLeg
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, with_forecast
 from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.situation import (
@@ -56,48 +56,48 @@ def alarm_words(cleared: Iterable[Alarm], kept: Iterable[Alarm]) -> str:
     return f"cleared: {names[0]}; still present: {names[1]}"
 
 
-def acknowledge(parts: Parts, stamp_ns: int) -> Cleared:
+def acknowledge(leg: MonitoredLeg, stamp_ns: int) -> Cleared:
     """See `WearMonitor.acknowledge`."""
-    cleared, kept = parts.evaluation.board.acknowledge(parts.unmeasured)
-    if alarm_specs.MISMATCH.name() in parts.unmeasured:
-        parts.torque.mismatch = NO_MISMATCH
-    ledger = parts.accounting.ledger
+    cleared, kept = leg.evaluation.board.acknowledge(leg.unmeasured)
+    if alarm_specs.MISMATCH.name() in leg.unmeasured:
+        leg.torque.mismatch = NO_MISMATCH
+    ledger = leg.accounting.ledger
     has_lost = ledger is not None and ledger.acknowledge_loss()
-    _note_alarms(parts, stamp_ns)
-    note_verdict(parts, stamp_ns)
+    _note_alarms(leg, stamp_ns)
+    note_verdict(leg, stamp_ns)
     if cleared or kept or has_lost:
-        parts.keep()
+        leg.keep()
     return cleared, kept
 
 
-def reset_wear(parts: Parts, joint: str, stamp_ns: int, who: str) -> Cleared:
+def reset_wear(leg: MonitoredLeg, joint: str, stamp_ns: int, who: str) -> Cleared:
     """See `WearMonitor.reset_wear`."""
-    board = parts.evaluation.board
-    was = parts.accounting.replace(joint, stamp_ns)
-    gone = _rested_on(board.alarms.values(), joint, _named_for_clearance(parts))
+    board = leg.evaluation.board
+    was = leg.accounting.replace(joint, stamp_ns)
+    gone = _rested_on(board.alarms.values(), joint, _named_for_clearance(leg))
     cleared = tuple(board.alarms[name] for name in gone)
     board.clear(gone)
     if alarm_specs.MISMATCH.name() in gone:
-        parts.torque.mismatch = NO_MISMATCH
-    _part_changed(parts, joint, stamp_ns)
-    parts.accounting.note(Audit(stamp_ns, who, "reset_wear", was, cleared))
-    _note_alarms(parts, stamp_ns)
-    note_verdict(parts, stamp_ns)
-    parts.keep()
+        leg.torque.mismatch = NO_MISMATCH
+    _part_changed(leg, joint, stamp_ns)
+    leg.accounting.note(Audit(stamp_ns, who, "reset_wear", was, cleared))
+    _note_alarms(leg, stamp_ns)
+    note_verdict(leg, stamp_ns)
+    leg.keep()
     return cleared, tuple(alarm for alarm in board.alarms.values() if alarm.level is not Level.OK)
 
 
-def undo_reset(parts: Parts, joint: str, stamp_ns: int, who: str) -> JointWear:
+def undo_reset(leg: MonitoredLeg, joint: str, stamp_ns: int, who: str) -> JointWear:
     """See `WearMonitor.undo_reset`."""
-    accounting, board = parts.accounting, parts.evaluation.board
+    accounting, board = leg.accounting, leg.evaluation.board
     reset, before = _last_reset(accounting, joint)
     since = accounting.put_back(joint, before)
     _raise_again(board, reset.alarms)
-    _part_changed(parts, joint, before.replaced_ns)
+    _part_changed(leg, joint, before.replaced_ns)
     accounting.note(Audit(stamp_ns, who, "undo_reset", since))
-    _note_alarms(parts, stamp_ns)
-    note_verdict(parts, stamp_ns)
-    parts.keep()
+    _note_alarms(leg, stamp_ns)
+    note_verdict(leg, stamp_ns)
+    leg.keep()
     return accounting.wear_of(joint)
 
 
@@ -120,13 +120,13 @@ def _raise_again(board: AlarmBoard, alarms: Iterable[Alarm]) -> None:
 
 
 def measure(
-    parts: Parts, joint: str, clearance_m: float, sigma_m: float, stamp_ns: int, who: str, accept: bool
+    leg: MonitoredLeg, joint: str, clearance_m: float, sigma_m: float, stamp_ns: int, who: str, accept: bool
 ) -> MeasurementResult:
     """See `WearMonitor.measure`."""
-    accounting, joint = parts.accounting, parts.mechanism.clearance_joint(joint)
-    wear, best = accounting.wear_of(joint), shown(parts, _situation(parts, joint))
-    earlier = parts.forecaster.measurements
-    found = parts.forecaster.measured(
+    accounting, joint = leg.accounting, leg.mechanism.clearance_joint(joint)
+    wear, best = accounting.wear_of(joint), shown(leg, _situation(leg, joint))
+    earlier = leg.forecaster.measurements
+    found = leg.forecaster.measured(
         wear,
         clearance_m=clearance_m,
         sigma_m=sigma_m,
@@ -137,8 +137,8 @@ def measure(
     )
     found = attrs.evolve(
         found,
-        limit_m=parts.evaluation.board.clearance_limits_m[parts.clearance_joints.index(joint)],
-        warn_fraction=parts.config.limits.warn_fraction,
+        limit_m=leg.evaluation.board.clearance_limits_m[leg.clearance_joints.index(joint)],
+        warn_fraction=leg.config.limits.warn_fraction,
         earlier=earlier,
     )
     if best:
@@ -146,43 +146,43 @@ def measure(
             found, shown_m=best.clearance_m, shown_sigma_m=best.sigma_m, shown_by=SOURCES[best.by]
         )
     accounting.note(found.measurement)
-    for each in parts.observers:
+    for each in leg.observers:
         each.renewed()
-    renew_forecast(parts)
-    before, board = parts.evaluation.board.alarms, parts.evaluation.board
-    is_ended = _compare(parts, joint, stamp_ns)
+    renew_forecast(leg)
+    before, board = leg.evaluation.board.alarms, leg.evaluation.board
+    is_ended = _compare(leg, joint, stamp_ns)
     was, now = (alarms[alarm_specs.CLEARANCE.name(joint)] for alarms in (before, board.alarms))
     if now.level < was.level or (now.acknowledged and not was.acknowledged):
         accounting.note(Audit(stamp_ns, who, "measure", alarms=(was,)))  # a withdrawal raises it again
         found = attrs.evolve(found, eased=_eased(was, now))
-    _note_clearance_verdict(parts, before, joint, stamp_ns, is_ended)
-    renew_forecast(parts)  # without a remaining life, if the verdict rests on what it does not use
-    parts.keep()
+    _note_clearance_verdict(leg, before, joint, stamp_ns, is_ended)
+    renew_forecast(leg)  # without a remaining life, if the verdict rests on what it does not use
+    leg.keep()
     return found
 
 
-def withdraw(parts: Parts, number: int, stamp_ns: int, who: str) -> Measurement:
+def withdraw(leg: MonitoredLeg, number: int, stamp_ns: int, who: str) -> Measurement:
     """See `WearMonitor.withdraw`."""
-    accounting, board = parts.accounting, parts.evaluation.board
-    found = parts.forecaster.withdrawn(number, stamp_ns, who)
+    accounting, board = leg.accounting, leg.evaluation.board
+    found = leg.forecaster.withdrawn(number, stamp_ns, who)
     accounting.note(found)
     if found.replaced_ns == accounting.wear_of(found.joint).replaced_ns:
-        parts.forecaster.replaced(found.joint, found.replaced_ns)
-        before, joint = board.alarms, _situation(parts, found.joint)
-        for alarm in _eased_by_withdrawn(parts, found):
+        leg.forecaster.replaced(found.joint, found.replaced_ns)
+        before, joint = board.alarms, _situation(leg, found.joint)
+        for alarm in _eased_by_withdrawn(leg, found):
             if not _ends(joint, alarm):  # a different measurement may end it as well
                 _raise_again(board, [alarm])
-        is_ended = _compare(parts, found.joint, stamp_ns)
-        _note_alarms(parts, stamp_ns)
-        _note_clearance_verdict(parts, before, found.joint, stamp_ns, is_ended)
-    parts.keep()
+        is_ended = _compare(leg, found.joint, stamp_ns)
+        _note_alarms(leg, stamp_ns)
+        _note_clearance_verdict(leg, before, found.joint, stamp_ns, is_ended)
+    leg.keep()
     return found
 
 
-def _eased_by_withdrawn(parts: Parts, like: Measurement) -> tuple[Alarm, ...]:
+def _eased_by_withdrawn(leg: MonitoredLeg, like: Measurement) -> tuple[Alarm, ...]:
     """The alarm that the first of the withdrawn measurements of a part eased, as it was before."""
-    part, ledger = (like.joint, like.replaced_ns), parts.accounting.ledger
-    withdrawn = [one for one in parts.forecaster.measurements if one.is_withdrawn]
+    part, ledger = (like.joint, like.replaced_ns), leg.accounting.ledger
+    withdrawn = [one for one in leg.forecaster.measurements if one.is_withdrawn]
     stamps = {one.stamp_ns for one in withdrawn if (one.joint, one.replaced_ns) == part}
     audits = [one for one in ledger.audits if one.what == "measure"] if ledger else []
     eased = (alarm for one in audits if one.stamp_ns in stamps for alarm in one.alarms)
@@ -198,27 +198,27 @@ def _eased(was: Alarm, now: Alarm) -> str:
     return "is acknowledged"
 
 
-def renew_forecast(parts: Parts) -> CycleReport | None:
+def renew_forecast(leg: MonitoredLeg) -> CycleReport | None:
     """See `WearMonitor.renew_forecast`."""
-    last = parts.last
+    last = leg.last
     if last is None:
         return None
-    forecast = parts.forecaster.renewed(
-        parts.worn_m(parts.twin.clearance_mean_m),
-        parts.evaluation.board.clearance_limits_m,
-        is_forecast_valid(parts, verdict_report(parts).findings),
-        parts.model_error,
+    forecast = leg.forecaster.renewed(
+        leg.worn_m(leg.twin.clearance_mean_m),
+        leg.evaluation.board.clearance_limits_m,
+        is_forecast_valid(leg, verdict_report(leg).findings),
+        leg.model_error,
     )
-    parts.last = with_forecast(last, forecast, parts.measured)
-    return parts.last
+    leg.last = with_forecast(last, forecast, leg.measured)
+    return leg.last
 
 
-def _situation(parts: Parts, joint: str) -> JointSituation:
-    return next(each for each in situation_of(parts).joints if each.joint == joint)
+def _situation(leg: MonitoredLeg, joint: str) -> JointSituation:
+    return next(each for each in situation_of(leg).joints if each.joint == joint)
 
 
-def _note_alarms(parts: Parts, stamp_ns: int) -> None:
-    parts.accounting.note_alarms(AlarmList(stamp_ns, tuple(parts.evaluation.board.alarms.values())))
+def _note_alarms(leg: MonitoredLeg, stamp_ns: int) -> None:
+    leg.accounting.note_alarms(AlarmList(stamp_ns, tuple(leg.evaluation.board.alarms.values())))
 
 
 def _rested_on(alarms: Iterable[Alarm], joint: str, named: Iterable[str]) -> tuple[str, ...]:
@@ -241,52 +241,52 @@ def _rested_on(alarms: Iterable[Alarm], joint: str, named: Iterable[str]) -> tup
     return tuple(alarm.name for alarm in (*own, *mismatch))
 
 
-def _named_for_clearance(parts: Parts) -> frozenset[str]:
+def _named_for_clearance(leg: MonitoredLeg) -> frozenset[str]:
     """Joints that the last verdict named for their clearance: of this run, or else of the ledger."""
-    ledger = parts.accounting.ledger
+    ledger = leg.accounting.ledger
     last = ledger.verdict if ledger else None
-    found = parts.findings or ((last,) if last else ())
+    found = leg.findings or ((last,) if last else ())
     of_clearance = (one for one in found if one.fault_code.startswith("CLEARANCE"))
     return frozenset(joint for one in of_clearance for joint in one.joints)
 
 
-def note_verdict(parts: Parts, stamp_ns: int, milder: bool = True) -> None:
+def note_verdict(leg: MonitoredLeg, stamp_ns: int, milder: bool = True) -> None:
     """Bring the verdict up to date.
 
     A run that has not evaluated its input yet has no verdict: the ledger then gets the verdict of its alarms
     and clearances, because it knows nothing of the drive torque until the leg walks again. With ``milder``
     False, it keeps a more severe verdict.
     """
-    if parts.findings or parts.accounting.ledger is None:
-        update_verdict(parts)
+    if leg.findings or leg.accounting.ledger is None:
+        update_verdict(leg)
         return
-    now = situation_of(parts)
+    now = situation_of(leg)
     known = Situation(joints=now.joints, alarms=now.alarms, quantities=now.quantities, mismatch=math.nan)
-    verdict, last = verdict_of(dated(findings(known), (), stamp_ns)), parts.accounting.ledger.verdict
+    verdict, last = verdict_of(dated(findings(known), (), stamp_ns)), leg.accounting.ledger.verdict
     if milder or last is None or verdict.state.severity >= last.state.severity:
-        parts.accounting.note(VerdictEvent(stamp_ns, verdict))
+        leg.accounting.note(VerdictEvent(stamp_ns, verdict))
 
 
 def _note_clearance_verdict(
-    parts: Parts, before: Mapping[str, Alarm], joint: str, stamp_ns: int, is_ended: bool
+    leg: MonitoredLeg, before: Mapping[str, Alarm], joint: str, stamp_ns: int, is_ended: bool
 ) -> None:
     """Bring the verdict up to date after a measurement, if the alarm of the clearance is or was raised."""
     name = alarm_specs.CLEARANCE.name(joint)
-    levels = {alarms[name].level for alarms in (before, parts.evaluation.board.alarms)}
-    if parts.findings or levels != {Level.OK}:
-        note_verdict(parts, stamp_ns, milder=is_ended)
+    levels = {alarms[name].level for alarms in (before, leg.evaluation.board.alarms)}
+    if leg.findings or levels != {Level.OK}:
+        note_verdict(leg, stamp_ns, milder=is_ended)
 
 
-def _compare(parts: Parts, joint: str, stamp_ns: int) -> bool:
+def _compare(leg: MonitoredLeg, joint: str, stamp_ns: int) -> bool:
     """Compare a new measurement with the limit; return whether it ends an alarm that it contradicts."""
-    joints = situation_of(parts).joints
-    board, name = parts.evaluation.board, alarm_specs.CLEARANCE.name(joint)
+    joints = situation_of(leg).joints
+    board, name = leg.evaluation.board, alarm_specs.CLEARANCE.name(joint)
     is_ended = any(each.joint == joint and _ends(each, board.alarms[name]) for each in joints)
-    for change in evaluate_clearances(parts, joints, stamp_ns):
-        parts.accounting.note_alarms(change)
+    for change in evaluate_clearances(leg, joints, stamp_ns):
+        leg.accounting.note_alarms(change)
     if is_ended:
         board.acknowledge_one(name)
-        _note_alarms(parts, stamp_ns)
+        _note_alarms(leg, stamp_ns)
     return is_ended
 
 
@@ -299,19 +299,19 @@ def _ends(joint: JointSituation, alarm: Alarm) -> bool:
     return is_surely_below(joint.limit_m, joint.measured.clearance_m, joint.measured.sigma_m)
 
 
-def _part_changed(parts: Parts, joint: str, replaced_ns: int) -> None:
+def _part_changed(leg: MonitoredLeg, joint: str, replaced_ns: int) -> None:
     """Discard the growth and the estimates of the former part, and renew the forecast."""
-    parts.grows_anew([joint])
-    parts.forecaster.replaced(joint, replaced_ns)
-    last = parts.last
+    leg.grows_anew([joint])
+    leg.forecaster.replaced(joint, replaced_ns)
+    last = leg.last
     if last:  # what was estimated is of the former part
         joints = [
             attrs.evolve(each, seen=None, shown=None) if each.joint == joint else each for each in last.joints
         ]
-        parts.last = attrs.evolve(last, joints=tuple(joints))
-    for observer in parts.observers:
-        observer.replaced(parts.clearance_joints.index(joint))
-    renew_forecast(parts)
+        leg.last = attrs.evolve(last, joints=tuple(joints))
+    for observer in leg.observers:
+        observer.replaced(leg.clearance_joints.index(joint))
+    renew_forecast(leg)
 
 
 def wear_words(wear: JointWear) -> str:

@@ -24,7 +24,7 @@ from leg_wear_monitor.monitor.evaluation import AlarmEvaluation
 from leg_wear_monitor.monitor.forecast.forecast import UNKNOWN, answer_words, lifetime_values
 from leg_wear_monitor.monitor.input_health import InputHealth
 from leg_wear_monitor.monitor.ledger.entry import Measurement
-from leg_wear_monitor.monitor.parts import Parts
+from leg_wear_monitor.monitor.monitored_leg import MonitoredLeg
 from leg_wear_monitor.monitor.reports import Status, VerdictReport
 from leg_wear_monitor.monitor.verdict.situation import believed_words
 from leg_wear_monitor.monitor.verdict.verdict import (
@@ -43,28 +43,28 @@ _INPUT = tuple(spec.name() for spec in alarm_specs.OF_INPUT)
 """Names of the alarms of the input."""
 
 
-def statuses(parts: Parts, report: VerdictReport) -> tuple[Status, ...]:
+def statuses(leg: MonitoredLeg, report: VerdictReport) -> tuple[Status, ...]:
     """All statuses, verdict first, then gait, input, observers, joints, alarms and ledger.
 
     Parameters
     ----------
-    parts : Parts
+    parts : MonitoredLeg
     report : VerdictReport
         The verdict now, with the state of the leg.
     """
     clearances = report.state.clearances
     joints = []
-    for k, name in enumerate(parts.clearance_joints):
-        joint = _with_measured(_joint(parts, k, name), parts.measured[k])
+    for k, name in enumerate(leg.clearance_joints):
+        joint = _with_measured(_joint(leg, k, name), leg.measured[k])
         joints.append(_as_judged(joint, clearances[name], [f for f in report.findings if name in f.joints]))
     return (
         verdict_status(report.verdict),
-        _gait(parts),
-        _input(parts),
-        *(status for each in parts.observers for status in each.statuses),
+        _gait(leg),
+        _input(leg),
+        *(status for each in leg.observers for status in each.statuses),
         *joints,
-        alarms_status(parts.evaluation.board.alarms.values()),
-        _ledger(parts.accounting),
+        alarms_status(leg.evaluation.board.alarms.values()),
+        _ledger(leg.accounting),
     )
 
 
@@ -80,45 +80,45 @@ def verdict_status(verdict: Verdict) -> Status:
     return Status("verdict", level_of(verdict), verdict.words, values, verdict.fault_code)
 
 
-def _gait(parts: Parts) -> Status:
+def _gait(leg: MonitoredLeg) -> Status:
     """Whether the crank is followed, the cadence, and the totals of all walking."""
-    tracking, event, last = parts.twin.tracking, parts.happened, parts.last
-    cadence = parts.evaluation.board.alarms[alarm_specs.CADENCE.name()]
+    tracking, event, last = leg.twin.tracking, leg.happened, leg.last
+    cadence = leg.evaluation.board.alarms[alarm_specs.CADENCE.name()]
     message, level, code = tracking.name.lower().replace("_", " "), cadence.level, code_of(cadence)
-    if parts.guard.cause:
+    if leg.guard.cause:
         message, level, code = "not monitored: see input", Level.ERROR, TRACKING_LOST
-    elif any(CRANK_ZERO in each.notes for each in parts.observers):
+    elif any(CRANK_ZERO in each.notes for each in leg.observers):
         message, level, code = "not monitored: see crank zero", max(level, Level.WARN), CRANK_ZERO
     elif event and tracking in (Tracking.STARTING, Tracking.OUT_OF_STEP):
         message += f", last {event.what.value.replace('_', ' ')}"
-    if parts.config.wear_acceleration != 1.0:
+    if leg.config.wear_acceleration != 1.0:
         message += "; wear is accelerated, this is a demonstration"
     values = {
-        "cadence_rpm": parts.twin.speed_radps * 30.0 / math.pi,
-        "commanded_rpm": parts.config.cadence.commanded_rpm,
-        "wear_acceleration": parts.config.wear_acceleration,
-        **parts.accounting.totals,
+        "cadence_rpm": leg.twin.speed_radps * 30.0 / math.pi,
+        "commanded_rpm": leg.config.cadence.commanded_rpm,
+        "wear_acceleration": leg.config.wear_acceleration,
+        **leg.accounting.totals,
         "cycle_moving_s": last.moving_s if last else math.nan,
     }
     return Status("gait", level, message, values, code)
 
 
-def _input(parts: Parts) -> Status:
+def _input(leg: MonitoredLeg) -> Status:
     """Samples that were received, used and refused, by reason; rates of the last evaluation period."""
-    evaluation, guard = parts.evaluation, parts.guard
-    counts = attrs.asdict(parts.twin.intake)
+    evaluation, guard = leg.evaluation, leg.guard
+    counts = attrs.asdict(leg.twin.intake)
     faulty, used = counts.pop("faulty"), counts.pop("used")
     for stamp in ("newest_stamp_ns", "followed_stamp_ns"):
         counts.pop(stamp)
     values = _health_values(evaluation.state.health) if evaluation.state.health else {}
     values |= {"received": counts.pop("received")} | {f"{name}_used": count for name, count in used.items()}
     # the other counters of the intake by their names, such as duplicates and gaps_lost
-    values |= counts | {"already_counted": parts.accounting.state.skipped}
+    values |= counts | {"already_counted": leg.accounting.state.skipped}
     values |= {name: getattr(guard, name) for name in ("conflicting", "implausible", "torque_outliers")}
     values |= {f"faulty_{name}": count for name, count in faulty.items()}
     level, code = evaluation.board.level(*_INPUT), _code(evaluation, _INPUT)
     bad = [name for name in _INPUT if evaluation.board.alarms[name].level is not Level.OK]
-    faults = parts.judge.faults
+    faults = leg.judge.faults
     sentences = [one.sentence for one in faults]
     messages = [*sentences, *evaluation.causes, *([f"see: {', '.join(bad)}"] if bad else [])]
     message = "; ".join(messages) or "in order"
@@ -142,9 +142,9 @@ def _health_values(health: InputHealth) -> dict[str, float]:
     return {"duration_s": values.pop("duration_s"), **rates, **values}
 
 
-def _joint(parts: Parts, k: int, name: str) -> Status:
+def _joint(leg: MonitoredLeg, k: int, name: str) -> Status:
     """Counted clearance, growth, forces and forecast of clearance joint k, with the level of its alarms."""
-    twin, evaluation, last = parts.twin, parts.evaluation, parts.last
+    twin, evaluation, last = leg.twin, leg.evaluation, leg.last
     names = [spec.name(name) for spec in alarm_specs.JOINT]
     level, code = evaluation.board.level(*names), _code(evaluation, names)
     values = {

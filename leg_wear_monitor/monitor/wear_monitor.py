@@ -38,6 +38,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
 )
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import Ledger, open_ledger
+from leg_wear_monitor.monitor.monitored_leg import MonitoredLeg
 from leg_wear_monitor.monitor.operators import (
     Cleared,
     acknowledge,
@@ -47,7 +48,6 @@ from leg_wear_monitor.monitor.operators import (
     undo_reset,
     withdraw,
 )
-from leg_wear_monitor.monitor.parts import Parts
 from leg_wear_monitor.monitor.reports import (
     AlarmList,
     CycleReport,
@@ -117,36 +117,36 @@ class WearMonitor:
             if not isinstance(given, kind):
                 fault = f"{shown(given)} is not a {kind.__name__}, expected what load_{name} gives"
                 raise ConfigError(name, "", fault)
-        self._parts = parts = Parts(mechanism, config, ledger)
-        self.mechanism, self.clearance_joints = parts.mechanism, parts.clearance_joints
-        self._twin, self._accounting, self._board = parts.twin, parts.accounting, parts.evaluation.board
+        self._leg = leg = MonitoredLeg(mechanism, config, ledger)
+        self.mechanism, self.clearance_joints = leg.mechanism, leg.clearance_joints
+        self._twin, self._accounting, self._board = leg.twin, leg.accounting, leg.evaluation.board
         self.reports_states = True
 
     @property
     def config(self) -> MonitorConfig:
         """The present parameters."""
-        return self._parts.config
+        return self._leg.config
 
     def warm_up(self) -> None:
         """Compile all kernels that `update` needs, before the first sample; takes about a minute once."""
         list(EvaluationPeriods(1).pieces(np.zeros(1, GAIT_SAMPLE)))
-        self._parts.guard.warm_up()
+        self._leg.guard.warm_up()
         self._twin.warm_up()
-        for observer in self._parts.observers:
+        for observer in self._leg.observers:
             observer.warm_up()
-        _ = self._parts.model_error  # takes a quarter of a second
+        _ = self._leg.model_error  # takes a quarter of a second
 
     def go_live(self) -> None:
         """Keep up with samples as they are taken: never wait for a reference that threads simulate.
 
         On a machine that is too busy a reference comes into force later than in a replay.
         """
-        for observer in self._parts.observers:
+        for observer in self._leg.observers:
             observer.go_live()
 
     def note_late(self, is_late: bool) -> None:
         """Note whether samples may be missing because this program was late: their rate is then unknown."""
-        self._parts.evaluation.is_late = is_late
+        self._leg.evaluation.is_late = is_late
 
     def update(self, samples: Samples) -> Reports:
         """Process a block of samples.
@@ -161,99 +161,101 @@ class WearMonitor:
         Reports
             They end before the newest sample by the tracker's lag.
         """
-        parts = self._parts
+        leg = self._leg
         sampled: list[SampleReports] = []
         cycles: list[CycleReport] = []
         changes: list[AlarmList] = []
         verdicts: list[VerdictReport] = []
         states: list[VerdictReport] = []
-        for piece, ends_period in parts.evaluation_periods.pieces(samples):
-            # guard: what is believed; twin and observers follow it
-            followed, ended = self._follow(self._believed(piece, ends_period))
+        for piece, ends_period in leg.evaluation_periods.pieces(samples):
+            # guard: only samples that are believed go on
+            believed = self._believed(piece, ends_period)
+            # twin: motion, forces and wear of the leg; the observers get the same samples
+            followed, ended = self._follow(believed)
             sampled.append(followed)
-            # observers, alarms: each gait cycle that ends is reported, and its alarms are evaluated
+            # observers, alarms, report of each gait cycle that ended
             for statistics in ended:
                 cycles.append(self._end_cycle(statistics, changes))
-            # verdict, report: at the ends of evaluation periods
+            # observers, alarms, verdict, and the state of the leg at the end of an evaluation period
             if ends_period:
                 before = len(changes)
                 situation = self._end_period(changes)
-                changed = update_verdict(parts, situation)
+                changed = update_verdict(leg, situation)
                 verdicts += changed
-                is_new = bool(changed) or parts.has_ended or len(changes) > before
-                parts.has_ended = False
+                is_new = bool(changed) or leg.has_ended or len(changes) > before
+                leg.has_ended = False
                 if is_new and self.reports_states:
-                    states.append(self._state_report(parts.findings, situation))
+                    states.append(self._state_report(leg.findings, situation))
             self._accounting.keep_if_due(self._board.alarms.values())
         samples_ = joined(sampled, len(self.clearance_joints))
         return Reports(samples_, tuple(cycles), tuple(changes), self.lost, tuple(verdicts), tuple(states))
 
     def _believed(self, piece: Samples, ends_period: bool) -> Samples:
         """Samples that are believed: not counted before, of one source, with a known zero of the crank."""
-        piece = self._parts.guard.checked(self._accounting.not_counted(piece))
-        for observer in self._parts.observers:
+        piece = self._leg.guard.checked(self._accounting.not_counted(piece))
+        for observer in self._leg.observers:
             piece = observer.passed(piece, ends_period)
-        self._accounting.state.without_zero_s = sum(each.unmonitored_s for each in self._parts.observers)
+        self._accounting.state.without_zero_s = sum(each.unmonitored_s for each in self._leg.observers)
         return piece
 
     def _follow(self, piece: Samples) -> tuple[SampleReports, tuple[CycleStatistics, ...]]:
         """Pass samples to the twin and to the observers; what was followed, and the cycles that ended."""
-        parts = self._parts
+        leg = self._leg
         update = self._twin.update(piece)
-        parts.judge.add_samples(piece)
-        parts.evaluation.add_samples(piece)
-        for observer in parts.observers:
+        leg.judge.add_samples(piece)
+        leg.evaluation.add_samples(piece)
+        for observer in leg.observers:
             observer.add_samples(piece)
         self._accounting.followed(update.samples)
         if update.events:
-            parts.happened = update.events[-1]
+            leg.happened = update.events[-1]
         return update.samples, update.cycles
 
     def _end_cycle(self, statistics: CycleStatistics, changes: list[AlarmList]) -> CycleReport:
         """Report a gait cycle, and evaluate its alarms."""
-        parts = self._parts
-        refused = parts.judge.end_cycle(statistics)
+        leg = self._leg
+        refused = leg.judge.end_cycle(statistics)
         if refused:
             statistics = statistics.without_torque
         self._accounting.ended(statistics)
-        parts.growth = all_extended(parts.growth, statistics, self.config.growth.window_cycles)
-        for observer in parts.observers:
+        leg.growth = all_extended(leg.growth, statistics, self.config.growth.window_cycles)
+        for observer in leg.observers:
             observer.end_cycle(statistics, bool(refused))
-        parts.last = report = self._report(statistics)
+        leg.last = report = self._report(statistics)
         self._accounting.note_clearances(report)
-        parts.has_ended = True
-        values = {name: one for each in parts.observers for name, one in each.alarm_values(report).items()}
-        self._take_changes(parts.evaluation.end_cycle(report, values, CRANK in refused), changes)
-        for observer in parts.observers:
+        leg.has_ended = True
+        values = {name: one for each in leg.observers for name, one in each.alarm_values(report).items()}
+        self._take_changes(leg.evaluation.end_cycle(report, values, CRANK in refused), changes)
+        for observer in leg.observers:
             observer.judge(statistics, report)
         return report
 
     def _report(self, statistics: CycleStatistics) -> CycleReport:
         """Report of a gait cycle, with growth, estimates and forecast."""
-        parts = self._parts
-        forecast = parts.forecaster.after(
+        leg = self._leg
+        forecast = leg.forecaster.after(
             statistics,
-            parts.worn_m(statistics.clearance_mean_m),  # the twin itself may be ahead
+            leg.worn_m(statistics.clearance_mean_m),  # the twin itself may be ahead
             self.clearance_limits_m,
-            lambda: is_forecast_valid(parts, parts.findings),
-            parts.model_error,
+            lambda: is_forecast_valid(leg, leg.findings),
+            leg.model_error,
         )
-        seen = parts.encoders.estimates if parts.encoders else None
-        shown = [parts.torque.seen(k) for k in range(len(self.clearance_joints))]
-        return cycle_report(parts, statistics, forecast, seen, shown)
+        seen = leg.encoders.estimates if leg.encoders else None
+        shown = [leg.torque.seen(k) for k in range(len(self.clearance_joints))]
+        return cycle_report(leg, statistics, forecast, seen, shown)
 
     def _end_period(self, changes: list[AlarmList]) -> Situation:
         """Evaluate the input, and what observers show; what the verdict then depends on."""
-        parts = self._parts
-        if parts.judge.end_period(parts.guard.torque_outliers, bool(parts.guard.cause)):
+        leg = self._leg
+        if leg.judge.end_period(leg.guard.torque_outliers, bool(leg.guard.cause)):
             # later gait cycles must not be compared with this torque; only periods end alike in all blocks
             self._twin.forget_torque()
-        is_refused = CRANK in parts.judge.trusted_before_ns
-        self._take_changes(parts.evaluation.end_period(self._accounting.state.skipped, is_refused), changes)
-        for observer in parts.observers:
+        is_refused = CRANK in leg.judge.trusted_before_ns
+        self._take_changes(leg.evaluation.end_period(self._accounting.state.skipped, is_refused), changes)
+        for observer in leg.observers:
             observer.end_period()
-        situation = situation_of(parts)
-        self._take_changes(evaluate_clearances(parts, situation.joints, self._twin.intake.stamp_ns), changes)
+        situation = situation_of(leg)
+        self._take_changes(evaluate_clearances(leg, situation.joints, self._twin.intake.stamp_ns), changes)
         return attrs.evolve(situation, alarms=tuple(self._board.alarms.values()))
 
     def _take_changes(self, changed: tuple[AlarmList, ...], changes: list[AlarmList]) -> None:
@@ -270,7 +272,7 @@ class WearMonitor:
         pause_s : float
             From the newest stamp to the next.
         """
-        self._parts.evaluation.pause()
+        self._leg.evaluation.pause()
         self._accounting.pause(pause_s)
 
     @property
@@ -286,17 +288,17 @@ class WearMonitor:
     @property
     def verdict(self) -> VerdictReport:
         """The verdict now; `update` reports its changes at the ends of evaluation periods."""
-        return verdict_report(self._parts)
+        return verdict_report(self._leg)
 
     @property
     def state_report(self) -> VerdictReport:
         """The verdict now, with the state of the leg."""
-        situation = situation_of(self._parts)
-        return self._state_report(verdict_report(self._parts, situation).findings, situation)
+        situation = situation_of(self._leg)
+        return self._state_report(verdict_report(self._leg, situation).findings, situation)
 
     def _state_report(self, findings: tuple[Verdict, ...], situation: Situation) -> VerdictReport:
-        leg = leg_state(self._parts, findings, situation)
-        return VerdictReport(leg.stamp_ns, findings, leg)
+        state = leg_state(self._leg, findings, situation)
+        return VerdictReport(state.stamp_ns, findings, state)
 
     @property
     def state(self) -> LegState:
@@ -321,12 +323,12 @@ class WearMonitor:
     @property
     def diagnosis(self) -> Diagnosis:
         """Clearances that the drive torque shows; empty while the received torque is wrong."""
-        return self._parts.torque.diagnosis
+        return self._leg.torque.diagnosis
 
     @property
     def lost(self) -> Lost:
         """Samples and time that were not integrated so far."""
-        return self._accounting.lost(self._parts.guard)
+        return self._accounting.lost(self._leg.guard)
 
     @property
     def used(self) -> dict[str, int]:
@@ -336,7 +338,7 @@ class WearMonitor:
     @property
     def measurements(self) -> tuple[Measurement, ...]:
         """Measured clearances, those of the ledger first."""
-        return self._parts.forecaster.measurements
+        return self._leg.forecaster.measurements
 
     @property
     def walked(self) -> tuple[WalkedLoad, ...]:
@@ -346,7 +348,7 @@ class WearMonitor:
     @property
     def last_cycle(self) -> CycleReport | None:
         """Report of the last gait cycle; None before the first."""
-        return self._parts.last
+        return self._leg.last
 
     @property
     def wear_depth_m(self) -> Floats:
@@ -372,14 +374,14 @@ class WearMonitor:
     def begin_epoch(self, stamp_ns: int, who: str) -> None:
         """Begin an epoch: the clock of the samples has restarted, and the following samples are counted."""
         self._accounting.begin_epoch()
-        for observer in self._parts.observers:
+        for observer in self._leg.observers:
             observer.begin_epoch()
         self._accounting.note(Audit(int(stamp_ns), who, "new_epoch"))
-        self._parts.keep()
+        self._leg.keep()
 
     def status(self) -> tuple[Status, ...]:
         """Statuses for /diagnostics; their names and order are constant."""
-        return statuses(self._parts, self.state_report)
+        return statuses(self._leg, self.state_report)
 
     def configure(self, config: MonitorConfig) -> None:
         """Apply parameters that may change while the monitor runs; see `parameters.changed`.
@@ -390,10 +392,10 @@ class WearMonitor:
             For limits that do not fit the mechanism; then nothing changes.
         """
         check_limits(config, self.mechanism)
-        self._parts.config = config
-        self._parts.evaluation.configure(config)
-        self._parts.judge.config = config
-        for observer in self._parts.observers:
+        self._leg.config = config
+        self._leg.evaluation.configure(config)
+        self._leg.judge.config = config
+        for observer in self._leg.observers:
             observer.configure(config)
 
     def acknowledge(self, stamp_ns: int) -> Cleared:
@@ -404,7 +406,7 @@ class WearMonitor:
         cleared, kept : tuple of Alarm
             Alarms that had returned to normal, and alarms that stay until they do.
         """
-        return acknowledge(self._parts, int(stamp_ns))
+        return acknowledge(self._leg, int(stamp_ns))
 
     def note_alarms(self, stamp_ns: int, alarms: Iterable[Alarm]) -> None:
         """Store changed alarms that are not of this monitor in the ledger, such as those of its node."""
@@ -413,7 +415,7 @@ class WearMonitor:
         for event in changed:
             self._accounting.note(event)
         if changed:
-            self._parts.keep()
+            self._leg.keep()
 
     def reset_wear(self, joint: str, stamp_ns: int, who: str) -> Cleared:
         """Reset the wear of a joint whose part was replaced; its history stays in the ledger.
@@ -430,7 +432,7 @@ class WearMonitor:
         LegWearError
             For a joint without clearance.
         """
-        return reset_wear(self._parts, joint, int(stamp_ns), who)
+        return reset_wear(self._leg, joint, int(stamp_ns), who)
 
     def undo_reset(self, joint: str, stamp_ns: int, who: str) -> JointWear:
         """Undo the last `reset_wear` of a joint whose part was not replaced.
@@ -445,7 +447,7 @@ class WearMonitor:
         LegWearError
             For a joint without clearance, or if the ledger has no reset to undo.
         """
-        return undo_reset(self._parts, joint, int(stamp_ns), who)
+        return undo_reset(self._leg, joint, int(stamp_ns), who)
 
     def measure(
         self, joint: str, clearance_m: float, sigma_m: float, stamp_ns: int, who: str, accept: bool = False
@@ -470,7 +472,7 @@ class WearMonitor:
         LegWearError
             For a joint without clearance, or impossible values.
         """
-        return measure(self._parts, joint, float(clearance_m), float(sigma_m), int(stamp_ns), who, accept)
+        return measure(self._leg, joint, float(clearance_m), float(sigma_m), int(stamp_ns), who, accept)
 
     def withdraw(self, measurement: int, stamp_ns: int, who: str) -> Measurement:
         """Withdraw a measurement: it stays in the ledger unused, and a stop that it ended returns.
@@ -488,7 +490,7 @@ class WearMonitor:
         LegWearError
             If the ledger has no such measurement, or it is withdrawn already.
         """
-        return withdraw(self._parts, measurement, int(stamp_ns), who)
+        return withdraw(self._leg, measurement, int(stamp_ns), who)
 
     def renew_forecast(self) -> CycleReport | None:
         """Renew the forecast now; otherwise it may be a minute old.
@@ -498,7 +500,7 @@ class WearMonitor:
         CycleReport or None
             The last gait cycle with the new forecast; None before the first.
         """
-        return renew_forecast(self._parts)
+        return renew_forecast(self._leg)
 
     def save(self) -> None:
         """Write an entry into the ledger now.
@@ -511,7 +513,7 @@ class WearMonitor:
         ledger = self._accounting.ledger
         if ledger is None:
             raise LegWearError("no ledger is kept; set ledger.path")
-        if not self._parts.keep():
+        if not self._leg.keep():
             raise LegWearError(ledger.fault or "the ledger is written at the end of the recording")
 
     def close(self) -> None:
@@ -526,22 +528,22 @@ class WearMonitor:
         try:
             self._close_ledger()
         finally:
-            for observer in self._parts.observers:
+            for observer in self._leg.observers:
                 observer.leave()
 
     def _close_ledger(self) -> None:
         ledger = self._accounting.ledger
         if ledger is None:
             return
-        if self._parts.findings:
-            is_noted = bool(update_verdict(self._parts))
+        if self._leg.findings:
+            is_noted = bool(update_verdict(self._leg))
             if not is_noted and any(is_observed(alarm, SEEN) for alarm in self.alarms.alarms):
                 # the ledger's verdict names the last estimate
                 last = self.verdict
                 self._accounting.note(VerdictEvent(last.stamp_ns, last.verdict))
-        for observer in self._parts.observers:
+        for observer in self._leg.observers:
             observer.close()
-        kept = self._parts.keep(closed=True)
+        kept = self._leg.keep(closed=True)
         ledger.close()
         if not kept:
             missing = "this run" if ledger.at_end else "what came after its last entry"

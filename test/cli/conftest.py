@@ -19,8 +19,8 @@ from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.ledger.entry import AlarmEvent, Entry, JointWear
 from leg_wear_monitor.monitor.ledger.ledger import open_ledger
+from leg_wear_monitor.monitor.monitored_leg import MonitoredLeg
 from leg_wear_monitor.monitor.operators import note_verdict
-from leg_wear_monitor.monitor.parts import Parts
 
 Run = Callable[..., Result]
 
@@ -91,7 +91,7 @@ def worn_ledger(tmp_path: Path) -> Callable[..., Path]:
         kept.keep(entry, closed=True)
         kept.close()
         kept = open_ledger(leg, config)
-        note_verdict(Parts(leg, config, kept), 10**9)
+        note_verdict(MonitoredLeg(leg, config, kept), 10**9)
         kept.keep(entry, closed=True)
         kept.close()
         return path

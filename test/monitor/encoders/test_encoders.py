@@ -60,7 +60,7 @@ def read(leg, gait, reference):
 
 def quick(monitor):
     """With the reference that encoders obey: of so few cycles, any other is not like it."""
-    run = monitor._parts.encoders.encoders._reference
+    run = monitor._leg.encoders.encoders._reference
     run._cycles, begin = REFERENCE_CYCLES, run.begin
     run.begin = lambda *_: begin(FRESH, np.zeros((5, 2, 720)))
     return monitor
@@ -172,7 +172,7 @@ def test_an_encoder_that_says_nothing_is_reported_and_the_others_go_on(new_watch
     assert status_of(monitor, "encoders").message.startswith(f"knee {words}")
     counted = {status_of(monitor, "encoders").values[f"knee_{what}"] for what in ("absent", "no_angle")}
     assert counted == {0.0, float(len(samples))}
-    assert monitor._parts.encoders.encoders.state.present == (True, False, True)
+    assert monitor._leg.encoders.encoders.state.present == (True, False, True)
     assert len(monitor.status()[1].values) > 0 and monitor.lost.unmonitored_s < 0.2
 
 

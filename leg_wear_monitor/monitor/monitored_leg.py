@@ -1,4 +1,4 @@
-"""The parts of a monitor, and what it knows at the end of an evaluation period."""
+"""The leg that a monitor watches: as it is counted, with all that looks at it."""
 
 from leg_wear_monitor.estimate.torque_model import torque_model
 from leg_wear_monitor.mechanism.spec import Mechanism
@@ -22,7 +22,7 @@ from leg_wear_monitor.twin.sample import NO_LOAD
 from leg_wear_monitor.twin.statistics import Event
 
 
-class Parts(CountedLeg):
+class MonitoredLeg(CountedLeg):
     """The counted leg with all that looks at it.
 
     Parameters

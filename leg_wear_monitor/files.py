@@ -152,19 +152,6 @@ def with_same_fields(kind: type[_Record], *of: object, **own: Any) -> _Record:
     )
 
 
-Stamp = tuple[int, int, int]
-"""Time [ns], size and inode of a file."""
-
-
-def stamp_of(path: Path) -> Stamp:
-    """What changes when a file is written or replaced; zeros where there is none."""
-    try:
-        stat = path.stat()
-    except OSError:
-        return 0, 0, 0
-    return stat.st_mtime_ns, stat.st_size, stat.st_ino
-
-
 # Where the files that come with the package are: config/, launch/, bags/.
 
 

@@ -43,11 +43,6 @@ class Hub:
         self._sent: dict[tuple[tuple[str, int], ...], str] = {}  # messages of this tick, by what is given
         self.is_closing = False
 
-    @property
-    def viewers(self) -> int:
-        """How many look."""
-        return len(self._viewers)
-
     def join(self) -> Viewer | None:
         """A viewer more; None if there are too many."""
         if len(self._viewers) >= MOST_VIEWERS or self.is_closing:

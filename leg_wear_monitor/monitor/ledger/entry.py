@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -213,17 +212,6 @@ class JointWear:
     def mean_m(self) -> float:
         """Mean depth of bushing and journal together, which is what the mean clearance has grown by [m]."""
         return float(self.depth.sum(axis=0).mean())
-
-    @property
-    def surface_means_m(self) -> tuple[float, float]:
-        """Mean depth of bushing and of journal, the same on every machine [m]."""
-        bushing, journal = (math.fsum(surface) / len(surface) for surface in self.depth)
-        return bushing, journal
-
-
-def new_part(name: str) -> JointWear:
-    """A joint whose part is new."""
-    return JointWear(name, np.zeros((2, SECTORS)))
 
 
 def one_part(before: JointWear, since: JointWear) -> JointWear:

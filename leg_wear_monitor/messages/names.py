@@ -14,22 +14,44 @@ from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, Samples
 _MOST_NAMED = 20
 
 
+class _Fields:
+    """Reads the fields of a message one after the other, from the frame of its header on."""
+
+    def __init__(self, raw: bytes) -> None:
+        self._raw, self._order = raw, "<" if raw[1] else ">"
+        self._at = ENCAPSULATION + 8
+        self.text()
+
+    def count(self) -> int:
+        self._at += -self._at % 4 + 4
+        return int(struct.unpack_from(f"{self._order}I", self._raw, self._at - 4)[0])
+
+    def text(self) -> str:
+        size = self.count()
+        self._at += size
+        return self._raw[self._at - size : self._at].rstrip(b"\0").decode("utf-8", "replace")
+
+    def texts(self) -> list[str]:
+        return [self.text() for _ in range(self.count())]
+
+    def skip_numbers(self) -> None:
+        if number := self.count():
+            self._at += (ENCAPSULATION - self._at) % 8 + 8 * number
+
+
 def names_in(raw: bytes) -> list[str]:
     """Joint names in a sensor_msgs/JointState message that has been decoded successfully."""
-    return _texts(raw, *_after_header(raw))[0]
+    return _Fields(raw).texts()
 
 
 def interfaces_in(raw: bytes) -> dict[str, list[str]]:
     """Interfaces of each joint in a control_msgs/DynamicJointState message, decoded successfully."""
-    at, order = _after_header(raw)
-    joints, at = _texts(raw, at, order)
-    _, at = _count(raw, at, order)
-    found: dict[str, list[str]] = {}
+    fields, found = _Fields(raw), dict[str, list[str]]()
+    joints = fields.texts()
+    fields.count()
     for joint in joints:
-        names, at = _texts(raw, at, order)
-        found.setdefault(joint, names)
-        number, at = _count(raw, at, order)
-        at += (ENCAPSULATION - at) % 8 + 8 * number if number else 0
+        found.setdefault(joint, fields.texts())
+        fields.skip_numbers()
     return found
 
 
@@ -80,28 +102,3 @@ def without_interface(raw: bytes, joint: str, interfaces: Mapping[str, str]) -> 
 def _listed(names: list[str]) -> str:
     shown = ", ".join(printable(name, 100) for name in sorted(set(names))[:_MOST_NAMED]) or "none"
     return f"{shown} and more" if len(set(names)) > _MOST_NAMED else shown
-
-
-def _after_header(raw: bytes) -> tuple[int, str]:
-    """Position behind a message's std_msgs/Header, and its byte order."""
-    order = "<" if raw[1] else ">"
-    return _text(raw, ENCAPSULATION + 8, order)[1], order
-
-
-def _texts(raw: bytes, at: int, order: str) -> tuple[list[str], int]:
-    count, at = _count(raw, at, order)
-    found = []
-    for _ in range(count):
-        content, at = _text(raw, at, order)
-        found.append(content.rstrip(b"\0").decode("utf-8", "replace"))
-    return found, at
-
-
-def _count(raw: bytes, at: int, order: str) -> tuple[int, int]:
-    at += -at % 4
-    return struct.unpack_from(f"{order}I", raw, at)[0], at + 4
-
-
-def _text(raw: bytes, at: int, order: str) -> tuple[bytes, int]:
-    size, at = _count(raw, at, order)
-    return raw[at : at + size], at + size

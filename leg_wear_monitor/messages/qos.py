@@ -2,7 +2,16 @@
 
 import attrs
 
-_FOREVER = {"sec": 9223372036, "nsec": 854775807}
+_PROFILE = """- history: keep_last
+  depth: {depth}
+  reliability: {reliability}
+  durability: {durability}
+  deadline: {forever}
+  lifespan: {forever}
+  liveliness: automatic
+  liveliness_lease_duration: {forever}
+  avoid_ros_namespace_conventions: false"""
+_FOREVER = "{sec: 9223372036, nsec: 854775807}"
 
 
 @attrs.frozen
@@ -13,29 +22,9 @@ class Qos:
     durability: str = "volatile"
     depth: int = 10
 
-    def profile(self) -> dict[str, object]:
-        """Mapping as in metadata.yaml."""
-        return {
-            "history": "keep_last",
-            "depth": self.depth,
-            "reliability": self.reliability,
-            "durability": self.durability,
-            "deadline": dict(_FOREVER),
-            "lifespan": dict(_FOREVER),
-            "liveliness": "automatic",
-            "liveliness_lease_duration": dict(_FOREVER),
-            "avoid_ros_namespace_conventions": False,
-        }
-
     def text(self) -> str:
         """YAML text for a channel's metadata."""
-        lines = []
-        for key, value in self.profile().items():
-            if isinstance(value, dict):
-                lines += [f"{key}:", *(f"  {part}: {number}" for part, number in value.items())]
-            else:
-                lines.append(f"{key}: {str(value).lower()}")
-        return "- " + "\n  ".join(lines)
+        return _PROFILE.format(forever=_FOREVER, **attrs.asdict(self))
 
 
 RELIABLE = Qos()

@@ -148,6 +148,10 @@ def _file(name: str) -> str:
     from leg_wear_monitor.mechanism.loader import is_file_name, read_yaml
     from leg_wear_monitor.monitor.config.parameters import is_parameter_file, monitors_of
 
+    if name.endswith((".mcap", ".db3")):
+        raise ConfigError(
+            name, "", f"a recording. Expected a configuration. Run: leg-wear-monitor replay {name}"
+        )
     document = read_yaml(Path(name), name) if is_file_name(name) else None
     if is_parameter_file(document):
         nodes = monitors_of(document)

@@ -18,7 +18,7 @@ def cycle_report(
     statistics: CycleStatistics,
     forecast: Forecast,
     seen: Sequence[ClearanceEstimate] | None,
-    shown: Sequence[KnownClearance | None],
+    estimates: Sequence[KnownClearance | None],
 ) -> CycleReport:
     """Report of a gait cycle.
 
@@ -29,8 +29,8 @@ def cycle_report(
     forecast : Forecast
     seen : sequence of ClearanceEstimate or None
         Clearances by encoders; None without encoders.
-    shown : sequence of (KnownClearance or None)
-        Clearances by the drive torque.
+    estimates : sequence of (KnownClearance or None)
+        The surest estimate of each clearance.
     """
     torque, joints = statistics.torque, range(len(leg.clearance_joints))
     return with_same_fields(
@@ -38,7 +38,7 @@ def cycle_report(
         torque,
         statistics,
         cycle=leg.accounting.state.cycles,
-        joints=tuple(_joint_report(leg, k, statistics, forecast, seen, shown[k]) for k in joints),
+        joints=tuple(_joint_report(leg, k, statistics, forecast, seen, estimates[k]) for k in joints),
         torque_samples=torque.samples,
         measured_torque_rms_nm=float(torque.measured_rms_nm),
         predicted_torque_rms_nm=float(torque.predicted_rms_nm),
@@ -60,7 +60,7 @@ def _joint_report(
     statistics: CycleStatistics,
     forecast: Forecast,
     seen: Sequence[ClearanceEstimate] | None,
-    shown: KnownClearance | None,
+    estimate: KnownClearance | None,
 ) -> JointReport:
     joint, rate = leg.clearance_joints[k], growth_rate(leg.growth[k])
     mean_n, p99_n = float(statistics.mean_force_n[k]), float(statistics.p99_force_n[k])
@@ -81,5 +81,6 @@ def _joint_report(
         mean_force_n=mean_n,
         impacts=int(statistics.impacts[k]),
         load=leg.bushings[joint].load(mean_n, p99_n, rubbing_w),
-        shown=shown,
+        estimated_m=estimate.clearance_m if estimate else None,
+        estimated_sigma_m=estimate.sigma_m if estimate else None,
     )

@@ -8,7 +8,6 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.estimate.cause import Cause, NamedCause, TorqueExplanation, beyond_friction
-from leg_wear_monitor.estimate.mismatch import TimingBySpeed
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.alarms import BIAS, DRIFT, LAG, Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -157,14 +156,11 @@ class GaitEvidence:
         return f"the crank turns {turns:.3g} times, but the monitor cannot track a whole gait cycle"
 
 
-# History of a leg's drive torque: friction at commissioning, lag at other speeds.
+# History of a leg's drive torque: its friction at commissioning.
 
 
 COMMISSIONING_CYCLES = 20  # in a row with the torque as predicted, to store their friction as this leg's
 FRICTION_KEY, SIGMA_KEY = "friction_commissioned_nm", "friction_commissioned_sigma_nm"
-
-_FORGETTING = 0.99  # per gait cycle
-_RESOLVED_RAD = 0.005  # largest standard deviation of a known offset
 
 
 @attrs.frozen
@@ -177,7 +173,6 @@ class TorqueRecord:
         Gait cycles in a row with the torque as predicted, before commissioning.
     friction_nm, sigma_nm : float
         Constant torque at the commissioning of this leg, and its standard deviation; NaN before.
-    timing : TimingBySpeed
     not_compared : mapping of str to int
         Gait cycles whose torque was not compared in this run, by the values of `NotCompared`.
     """
@@ -185,14 +180,7 @@ class TorqueRecord:
     cycles: int = 0
     friction_nm: float = math.nan
     sigma_nm: float = math.nan
-    timing: TimingBySpeed = TimingBySpeed()
     not_compared: Mapping[str, int] = attrs.field(factory=dict)
-
-    @property
-    def lag_and_offset(self) -> tuple[NamedCause, NamedCause] | None:
-        """Lag, and offset of the crank; None while the speeds are too similar to separate them."""
-        found = self.timing.split
-        return found if found and found[1].sigma < _RESOLVED_RAD else None
 
     @classmethod
     def of(cls, totals: dict[str, float]) -> "TorqueRecord":
@@ -207,17 +195,12 @@ class TorqueRecord:
         return {FRICTION_KEY: self.friction_nm, SIGMA_KEY: self.sigma_nm}
 
     def with_cycle(
-        self,
-        statistics: CycleStatistics,
-        report: CycleReport,
-        is_sound: bool,
-        not_compared: NotCompared | None = None,
+        self, report: CycleReport, is_sound: bool, not_compared: NotCompared | None = None
     ) -> "TorqueRecord":
         """Record with one more gait cycle.
 
         Parameters
         ----------
-        statistics : CycleStatistics
         report : CycleReport
         is_sound : bool
             Whether its torque was as predicted.
@@ -226,25 +209,16 @@ class TorqueRecord:
         """
         if not report.torque_samples:
             return self
-        record = attrs.evolve(self, timing=self._timing_with(statistics))
         if not_compared is not None:
             number = self.not_compared.get(not_compared.value, 0) + 1
-            return attrs.evolve(record, not_compared={**self.not_compared, not_compared.value: number})
+            return attrs.evolve(self, not_compared={**self.not_compared, not_compared.value: number})
         if not math.isnan(self.friction_nm):
-            return record
+            return self
         cycles = self.cycles + 1 if is_sound else 0
         if cycles < COMMISSIONING_CYCLES:
-            return attrs.evolve(record, cycles=cycles)
+            return attrs.evolve(self, cycles=cycles)
         friction_nm, sigma_nm = report.friction_nm, report.friction_sigma_nm
-        return attrs.evolve(record, cycles=cycles, friction_nm=friction_nm, sigma_nm=sigma_nm)
-
-    def _timing_with(self, statistics: CycleStatistics) -> TimingBySpeed:
-        """The lag by speed with one more gait cycle; unchanged if the cycle has none."""
-        lag_s, sigma_s = statistics.torque.cycle_lag_s, statistics.torque.cycle_lag_sigma_s
-        if not (math.isfinite(lag_s) and sigma_s > 0.0):
-            return self.timing
-        speed = statistics.direction * TURN / statistics.moving_s
-        return self.timing.with_cycle(-lag_s * speed, speed, sigma_s * abs(speed), _FORGETTING)
+        return attrs.evolve(self, cycles=cycles, friction_nm=friction_nm, sigma_nm=sigma_nm)
 
 
 # The gait cycles since the torque is not as predicted, and what explains them.
@@ -363,7 +337,7 @@ def torque_causes(
     causes = {
         BIAS: _bias(report, bounds),
         DRIFT: _drift(report, record),
-        LAG: _timing(report, record, bounds),
+        LAG: _timing(report),
     }
     return {name: one for name, one in causes.items() if name in raised}
 
@@ -383,16 +357,12 @@ def _drift(report: CycleReport, record: TorqueRecord) -> NamedCause:
     return NamedCause(Cause.FRICTION, report.friction_nm - record.friction_nm, sigma)
 
 
-def _timing(report: CycleReport, record: TorqueRecord, bounds: TorqueBounds) -> NamedCause:
-    """A lag or an offset of the crank, where the speed tells them apart."""
-    split, speed = record.lag_and_offset, report.cadence_rpm * math.pi / 30.0
-    if split is None:
-        return NamedCause(Cause.TIMING, -report.torque_lag_s * speed, report.torque_lag_sigma_s * abs(speed))
-    lag, offset = split
-    return lag if abs(lag.value) > bounds.max_lag_s else offset
+def _timing(report: CycleReport) -> NamedCause:
+    """A lag, or an offset of the crank: at one speed they look alike."""
+    speed = report.cadence_rpm * math.pi / 30.0
+    return NamedCause(Cause.TIMING, -report.torque_lag_s * speed, report.torque_lag_sigma_s * abs(speed))
 
 
-def offset_error_rad(report: CycleReport, record: TorqueRecord) -> float:
-    """Error of crank.offset_rad [rad], if it causes all of the lag that is not known to be a time lag."""
-    split = record.lag_and_offset
-    return -split[1].value if split else report.torque_lag_s * report.cadence_rpm * math.pi / 30.0
+def offset_error_rad(report: CycleReport) -> float:
+    """Error of crank.offset_rad [rad], if it causes all of the lag."""
+    return -_timing(report).value

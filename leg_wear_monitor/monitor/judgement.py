@@ -129,7 +129,7 @@ def _joint_situations(leg: MonitoredLeg) -> tuple[JointSituation, ...]:
                 if report and report.forecast
                 else leg.forecaster.best_estimate_m(k, modelled_m[k])
             ),
-            seen=tuple(one for each in leg.observers if (one := each.seen(k)) is not None),
+            seen=leg.seen(k),
             is_used=bool(estimates and estimates[k].believed),
             label=leg.mechanism.joints[joint].label,
             replaced_ns=part.replaced_ns,

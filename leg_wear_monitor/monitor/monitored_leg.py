@@ -16,7 +16,7 @@ from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.observer import Observer
 from leg_wear_monitor.monitor.reports import AlarmList
 from leg_wear_monitor.monitor.torque_watch import TorqueWatch
-from leg_wear_monitor.monitor.verdict.situation import SEEN
+from leg_wear_monitor.monitor.verdict.situation import SEEN, KnownClearance
 from leg_wear_monitor.state import Verdict
 from leg_wear_monitor.twin.sample import NO_LOAD
 from leg_wear_monitor.twin.statistics import Event
@@ -66,6 +66,10 @@ class MonitoredLeg(CountedLeg):
         self.findings: tuple[Verdict, ...] = ()
         self.happened: Event | None = None
         self.has_ended = False
+
+    def seen(self, k: int) -> tuple[KnownClearance, ...]:
+        """Clearances that observers see of joint k."""
+        return tuple(one for each in self.observers if (one := each.seen(k)) is not None)
 
     @property
     def unmeasured(self) -> frozenset[str]:

@@ -306,7 +306,10 @@ def _part_changed(leg: MonitoredLeg, joint: str, replaced_ns: int) -> None:
     last = leg.last
     if last:  # what was estimated is of the former part
         joints = [
-            attrs.evolve(each, seen=None, shown=None) if each.joint == joint else each for each in last.joints
+            attrs.evolve(each, seen=None, estimated_m=None, estimated_sigma_m=None)
+            if each.joint == joint
+            else each
+            for each in last.joints
         ]
         leg.last = attrs.evolve(last, joints=tuple(joints))
     for observer in leg.observers:

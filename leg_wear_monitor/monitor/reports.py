@@ -7,11 +7,11 @@ import attrs
 
 from leg_wear_monitor.mechanism.materials import BushingLoad
 from leg_wear_monitor.monitor.alarms import NO_FAULT, Alarm
-from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate, ClearanceObservation
+from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate
 from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointForecast, LegForecast
 from leg_wear_monitor.monitor.forecast.measurement import judged_clearance_m
 from leg_wear_monitor.monitor.ledger.entry import Measurement
-from leg_wear_monitor.monitor.verdict.situation import KnownClearance, joint_status, surest
+from leg_wear_monitor.monitor.verdict.situation import joint_status
 from leg_wear_monitor.monitor.verdict.verdict import verdict_of
 from leg_wear_monitor.state import LegState, Level, Verdict
 from leg_wear_monitor.twin.statistics import SampleStatistics
@@ -45,8 +45,8 @@ class JointReport:
         The last clearance of this part that somebody measured.
     load : BushingLoad or None
         Pressure and sliding speed in this cycle, against the limits of the joint's material.
-    shown : KnownClearance or None
-        The clearance that the drive torque shows; None if it shows none.
+    estimated_m, estimated_sigma_m : float or None
+        Clearance that encoders or the drive torque show, the surer one; None if neither shows it.
     """
 
     joint: str
@@ -63,28 +63,8 @@ class JointReport:
     seen: ClearanceEstimate | None = None
     measured: Measurement | None = None
     load: BushingLoad | None = None
-    shown: KnownClearance | None = None
-
-    @property
-    def by_encoders(self) -> KnownClearance | None:
-        """Clearance that encoders show; None if they show none."""
-        if self.seen is None or self.seen.observation is not ClearanceObservation.SEEN:
-            return None
-        return KnownClearance("encoders", self.seen.clearance_m, self.seen.sigma_m)
-
-    @property
-    def estimated_m(self) -> float | None:
-        """Clearance that encoders or the drive torque show, the surer one; None if neither shows it."""
-        return self._surest.clearance_m if self._surest else None
-
-    @property
-    def estimated_sigma_m(self) -> float | None:
-        """Standard deviation of this clearance; None without one."""
-        return self._surest.sigma_m if self._surest else None
-
-    @property
-    def _surest(self) -> KnownClearance | None:
-        return surest(one for one in (self.by_encoders, self.shown) if one)
+    estimated_m: float | None = None
+    estimated_sigma_m: float | None = None
 
     @property
     def judged_clearance_m(self) -> float:

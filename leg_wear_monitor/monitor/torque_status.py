@@ -63,7 +63,7 @@ def torque_status(
         "torque_lag_sigma_s": last.torque_lag_sigma_s,
         "load_friction": last.load_friction,
         "load_friction_sigma": last.load_friction_sigma,
-        "crank_offset_error_rad": offset_error_rad(last, record),
+        "crank_offset_error_rad": offset_error_rad(last),
     }
     for why in NotCompared:
         values[f"not_compared_{why.value}_cycles"] = float(record.not_compared.get(why.value, 0))

@@ -152,7 +152,7 @@ class TorqueWatch(Observer):
         is_allowed = self._leg.config.cadence.allows(statistics.cadence_rpm)
         why = statistics.not_compared if is_allowed else NotCompared.CADENCE
         is_sound = report.torque_mismatch < self._allowed.unexplained
-        self.record = self.record.with_cycle(statistics, report, is_sound, why)
+        self.record = self.record.with_cycle(report, is_sound, why)
         self._leg.accounting.state.commissioned = self.record.totals
 
     def _explain(self, statistics: CycleStatistics) -> None:

@@ -58,7 +58,7 @@ from leg_wear_monitor.monitor.reports import (
     VerdictReport,
 )
 from leg_wear_monitor.monitor.status import statuses
-from leg_wear_monitor.monitor.verdict.situation import SEEN, Situation, is_observed
+from leg_wear_monitor.monitor.verdict.situation import SEEN, Situation, is_observed, surest
 from leg_wear_monitor.state import LegState, Verdict
 from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples
@@ -241,8 +241,8 @@ class WearMonitor:
             leg.model_error,
         )
         seen = leg.encoders.estimates if leg.encoders else None
-        shown = [leg.torque.seen(k) for k in range(len(self.clearance_joints))]
-        return cycle_report(leg, statistics, forecast, seen, shown)
+        estimates = [surest(leg.seen(k)) for k in range(len(self.clearance_joints))]
+        return cycle_report(leg, statistics, forecast, seen, estimates)
 
     def _end_period(self, changes: list[AlarmList]) -> Situation:
         """Evaluate the input, and what observers show; what the verdict then depends on."""

@@ -239,8 +239,6 @@ def torque_statistics(
         load_friction_sigma=float(settled.sigma[LOAD_FRICTION]),
         friction_sigma_nm=float(settled.sigma[FRICTION]),
         torque_lag_sigma_s=float(settled.sigma[LAG]),
-        cycle_lag_s=float(found.values[LAG]) if found else np.nan,
-        cycle_lag_sigma_s=float(found.sigma[LAG]) if found else np.nan,
     )
 
 

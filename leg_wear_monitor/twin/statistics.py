@@ -115,8 +115,6 @@ class TorqueStatistics:
         Friction of the drive over the size of the torque that it transmits.
     friction_sigma_nm, torque_lag_sigma_s, load_friction_sigma : float
         Standard deviations of these three.
-    cycle_lag_s, cycle_lag_sigma_s : float
-        The delay estimated from this cycle alone, and its standard deviation.
     """
 
     samples: int
@@ -134,8 +132,6 @@ class TorqueStatistics:
     friction_sigma_nm: float
     torque_lag_sigma_s: float
     load_friction_sigma: float
-    cycle_lag_s: float
-    cycle_lag_sigma_s: float
 
 
 @attrs.frozen(eq=False)

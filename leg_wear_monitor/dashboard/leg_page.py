@@ -11,9 +11,8 @@ from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms import ADVICE
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.ledger_state import NO_VERDICT
 from leg_wear_monitor.monitor.reports import Lost
-from leg_wear_monitor.monitor.verdict.verdict import guide_to
+from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, guide_to
 from leg_wear_monitor.playback.result import (
     ReplayGait,
     ReplayHistory,
@@ -40,13 +39,23 @@ from leg_wear_monitor.report.page import (
 from leg_wear_monitor.report.replay.charts import health_chart, joint_trends
 from leg_wear_monitor.report.replay.joints import joints_and_leg
 from leg_wear_monitor.report.replay.page import belief, raised_alarms
-from leg_wear_monitor.state import LegState
+from leg_wear_monitor.state import LegState, State, Verdict
 
 _STYLES = ("uplot/uPlot.min.css", "replay/replay.css", "guide.css", "dashboard/dashboard.css")
 _LIBRARIES = (
     "uplot/uPlot.iife.min.js", "replay/charts.js", "dashboard/dashboard.js", "dashboard/trends.js",
 )  # fmt: skip
-NOTHING_KNOWN = LegState(verdict=NO_VERDICT, clearances={})
+_NO_VERDICT = Verdict(
+    state=State.NOT_MONITORED,
+    joints=(),
+    why="there is no verdict on the leg yet",
+    since_ns=0,
+    do="let the leg walk with the monitor running",
+    evidence=(),
+    not_valid=(),
+    fault_code=NO_GAIT_CYCLE,
+)
+NOTHING_KNOWN = LegState(verdict=_NO_VERDICT, clearances={})
 
 # Nothing is recorded: the page shows times of the day, not times since the start of a recording.
 _NOT_RECORDED = ReplayRecording(

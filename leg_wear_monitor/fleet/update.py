@@ -37,12 +37,12 @@ from leg_wear_monitor.fleet.recordings import (
 )
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.config.fitting import fitted
-from leg_wear_monitor.monitor.ledger.ledger import LedgerContent
-from leg_wear_monitor.monitor.ledger_state import content_of, state_in_ledger
-from leg_wear_monitor.playback.replay import replay
+from leg_wear_monitor.monitor.ledger.entry import binding_of
+from leg_wear_monitor.monitor.ledger.ledger import LedgerContent, read_ledger
+from leg_wear_monitor.playback.replay import replay, state_in_ledger
 from leg_wear_monitor.playback.result import ReplaySummary, summary_of
 from leg_wear_monitor.playback.summary import ReplayResult
-from leg_wear_monitor.state import LegState, Level
+from leg_wear_monitor.state import LegState
 from leg_wear_monitor.workers import results
 
 LEDGER, SUMMARY = "ledger", "summary.json"
@@ -178,7 +178,8 @@ def _content(leg: FleetLeg, directory: Path) -> LedgerContent | None:
     path = directory / LEDGER
     if not path.exists():
         return None
-    return content_of(path, fitted(load_mechanism(leg.config.mechanism), leg.config), leg.config)
+    mechanism = fitted(load_mechanism(leg.config.mechanism), leg.config)
+    return read_ledger(path, binding_of(mechanism, leg.config))
 
 
 def _new_recordings(leg: FleetLeg, directory: Path) -> list[Path]:
@@ -281,10 +282,15 @@ def leg_state(leg: FleetLeg, directory: Path) -> LegState | None:
     if content is None or content.entry is None:
         return None
     summary = _summary(directory / SUMMARY)
-    now = state_in_ledger(content, fitted(load_mechanism(leg.config.mechanism), leg.config), leg.config)
-    if summary is None or not _is_same(now, summary, content):
+    if summary is not None and content.runs[-1].spans:  # an operator's run counts no time
+        return with_same_fields(LegState, summary, alarms=attrs.evolve(summary.alarms, changes=()))
+    ledger = attrs.evolve(leg.config.ledger, path=str(directory / LEDGER))
+    now = state_in_ledger(load_mechanism(leg.config.mechanism), attrs.evolve(leg.config, ledger=ledger))
+    if summary is None or content.measurements != summary.measurements or not _is_same_wear(now, summary):
         return now
-    return with_same_fields(LegState, summary, alarms=attrs.evolve(summary.alarms, changes=()))
+    return with_same_fields(
+        LegState, summary, verdict=now.verdict, clearances=now.clearances, alarms=now.alarms
+    )
 
 
 def _summary(path: Path) -> ReplaySummary | None:
@@ -298,20 +304,9 @@ def _summary(path: Path) -> ReplaySummary | None:
 _SAME_M = 1e-12  # well below any wear, and above the rounding of JSON
 
 
-def _is_same(now: LegState, summary: ReplaySummary, content: LedgerContent) -> bool:
-    """Whether a summary has the wear, alarms, verdict and measurements that the ledger has now."""
-
-    def told(state: LegState | ReplaySummary) -> object:
-        alarms = {(one.name, one.level, one.state) for one in state.alarms.now if one.level is not Level.OK}
-        verdict = state.verdict
-        return alarms, verdict.state, verdict.fault_code, verdict.joints, state.life_cycles
-
-    return (
-        told(now) == told(summary)
-        and content.measurements == summary.measurements
-        and now.clearances.keys() == summary.clearances.keys()
-        and all(
-            abs(one.modelled_m - summary.clearances[joint].modelled_m) < _SAME_M
-            for joint, one in now.clearances.items()
-        )
+def _is_same_wear(now: LegState, summary: ReplaySummary) -> bool:
+    """Whether the parts are those of a summary, so that its forecast holds."""
+    then = summary.clearances
+    return now.clearances.keys() == then.keys() and all(
+        abs(one.modelled_m - then[joint].modelled_m) < _SAME_M for joint, one in now.clearances.items()
     )

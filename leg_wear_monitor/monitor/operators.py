@@ -13,9 +13,7 @@ from leg_wear_monitor.monitor import alarm_specs
 from leg_wear_monitor.monitor.accounting import Accounting
 from leg_wear_monitor.monitor.alarms import Alarm, joint_of
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
-from leg_wear_monitor.monitor.forecast.measurement import (
-    MeasurementResult,
-)
+from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult
 from leg_wear_monitor.monitor.gait_evidence import NO_MISMATCH
 from leg_wear_monitor.monitor.judgement import (
     evaluate_clearances,
@@ -25,12 +23,7 @@ from leg_wear_monitor.monitor.judgement import (
     update_verdict,
     verdict_report,
 )
-from leg_wear_monitor.monitor.ledger.entry import (
-    Audit,
-    JointWear,
-    Measurement,
-    VerdictEvent,
-)
+from leg_wear_monitor.monitor.ledger.entry import Audit, JointWear, Measurement, VerdictEvent
 from leg_wear_monitor.monitor.monitored_leg import MonitoredLeg
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, with_forecast
 from leg_wear_monitor.monitor.verdict.rules import findings

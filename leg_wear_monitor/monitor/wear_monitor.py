@@ -306,6 +306,15 @@ class WearMonitor:
         return self.state_report.state
 
     @property
+    def stored_state(self) -> LegState:
+        """The state of a leg that did not walk in this run, with the verdict of its ledger."""
+        ledger = self._accounting.ledger
+        if ledger is None or ledger.verdict is None:
+            return self.state
+        state = leg_state(self._leg, (ledger.verdict,), situation_of(self._leg))
+        return attrs.evolve(state, stamp_ns=ledger.kept_ns)
+
+    @property
     def predicted_torque_nm(self) -> float:
         """RMS of the drive torque that is predicted for the commanded gait."""
         return float(self._twin.torque_size_nm)

@@ -14,12 +14,15 @@ from leg_wear_monitor.bags.reader import Block, Recording
 from leg_wear_monitor.errors import printable, system_asked
 from leg_wear_monitor.files import unfinished
 from leg_wear_monitor.mechanism.loader import load_mechanism
+from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.parameters import NODE, load_config
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.gait_evidence import GaitEvidence
+from leg_wear_monitor.monitor.ledger.file import copy_of
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor, open_monitor
 from leg_wear_monitor.playback.history import History, Sink
 from leg_wear_monitor.playback.summary import ReplayResult
+from leg_wear_monitor.state import LegState
 from leg_wear_monitor.twin.sample import Samples
 
 REPORTS_FILE = "reports.mcap"
@@ -172,6 +175,24 @@ def _stamps_apart_s(result: ReplayResult, block: Block) -> float:
     """Time from the last stamp so far to the first stamp of a block [s]; 0 if stamps do not increase."""
     stamps = block.samples["stamp_ns"][block.samples["fault"] == 0]
     return max(0.0, (int(stamps[0]) - result.end_ns) * 1.0e-9) if len(stamps) and result.end_ns else 0.0
+
+
+def state_in_ledger(mechanism: Mechanism, config: MonitorConfig) -> LegState:
+    """State of a leg by its ledger alone: wear, alarms, measurements and last verdict.
+
+    A ledger has no drive, load, diagnosis or forecast. It is read from a copy, because a running monitor has
+    it locked.
+
+    Raises
+    ------
+    ConfigError, LedgerError
+        For parameters or a ledger that cannot be used.
+    """
+    with copy_of(config.ledger.path) as copy:
+        ledger = attrs.evolve(config.ledger, path=str(copy))
+        monitor = open_monitor(mechanism, attrs.evolve(config, ledger=ledger), at_end=True)
+        monitor.abandon()
+    return monitor.stored_state
 
 
 def _about_the_ledger(result: ReplayResult) -> list[Finding]:

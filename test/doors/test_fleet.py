@@ -244,7 +244,7 @@ def test_a_repair_and_a_measurement_show_at_the_next_update(run, fleet, tmp_path
     assert run(*update).code == 0
     leg = lw.Fleet(out).overview.leg("knocking")
     assert leg.state.verdict.fault_code == "CLEARANCE_B"
-    assert (leg.state.clearances["B"].best_estimate_m, leg.state.life["B"]) == (0.00063, None)
+    assert (leg.state.clearances["B"].best_estimate_m, leg.state.life.get("B")) == (0.00063, None)
     assert "CLEARANCE_B" in (out / "report.html").read_text()
 
 

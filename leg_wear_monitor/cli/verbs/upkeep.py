@@ -96,11 +96,13 @@ def _need_wear(monitor: "WearMonitor") -> None:
 
 def list_measurements(joint: str | None, config: Path | None, ledger: Path | None, node: str | None) -> None:
     """Print the measurements of a ledger, or of a joint, a line each; the ledger is left as it is."""
-    from leg_wear_monitor.monitor.ledger_state import content_of
+    from leg_wear_monitor.monitor.ledger.entry import binding_of
+    from leg_wear_monitor.monitor.ledger.ledger import read_ledger
 
     settings, leg = leg_of(config, ledger, node)
     name = leg.clearance_joint(joint) if joint else None
-    own = _of_joint(content_of(Path(settings.ledger.path), leg, settings).measurements, name)
+    content = read_ledger(Path(settings.ledger.path), binding_of(leg, settings))
+    own = _of_joint(content.measurements, name)
     for each in own:
         click.echo(_line(each))
     if not own:

@@ -334,5 +334,7 @@ class InputGuard:
             return ""
         text = f"the crank's angle runs {ratio:.2g} times as fast as commanded, nothing is monitored: "
         if _DEGREES / _NEAR < ratio < _DEGREES * _NEAR:
-            return text + "it seems to be in degrees; radians are expected"
+            return (
+                text + "it seems to be in degrees; publish radians, or set table.units.crank_angle of a table"
+            )
         return text + "check its unit (radians), crank.gear_ratio and cadence.commanded_rpm"

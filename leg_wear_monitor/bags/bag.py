@@ -2,7 +2,6 @@
 
 import os
 import re
-import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack
 from functools import partial
@@ -10,7 +9,6 @@ from pathlib import Path
 from typing import Any, Protocol, TypeAlias, cast
 
 import attrs
-import numpy as np
 from numpy.typing import ArrayLike
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
@@ -26,7 +24,6 @@ from leg_wear_monitor.bags.findings import (
 from leg_wear_monitor.bags.mcap_file import McapFile
 from leg_wear_monitor.bags.piece import Channel, Due, Piece
 from leg_wear_monitor.bags.table_layout import CSV, PARQUET, REMEDIES
-from leg_wear_monitor.bags.zstd import ZSTD_MAGIC, expand_message, expanded
 from leg_wear_monitor.errors import printable, system_asked
 from leg_wear_monitor.messages.streams import Stream, changed_fields, streams_of
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -39,8 +36,9 @@ METADATA = "metadata.yaml"
 _LARGEST = 2**20  # bytes of metadata; a bag of 200 topics and 1000 files has some 250 kB
 MCAP, IN_MEMORY = ".mcap", ""
 TABLES = (CSV, PARQUET, IN_MEMORY)
-_NAME = re.compile(r".*(\.mcap|\.db3)(\.zstd)?", re.DOTALL)
-_TABLE = re.compile(r".*(\.csv|\.parquet)(\.zstd)?", re.DOTALL | re.IGNORECASE)
+_NAME = re.compile(r".*(\.mcap|\.db3)", re.DOTALL)
+_TABLE = re.compile(r".*(\.csv|\.parquet)", re.DOTALL | re.IGNORECASE)
+_ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 _EXPECTED = "a bag directory, .mcap, .db3, .csv or .parquet"
 
 
@@ -68,8 +66,6 @@ class BagFile:
     path : pathlib.Path
     storage : str
         `MCAP`, `SQLITE`, `CSV`, `PARQUET`, or `IN_MEMORY`.
-    compressed : bool
-        Whether the whole file is compressed.
     recording : int
         Index of the given path that the file belongs to.
     table : optional
@@ -78,7 +74,6 @@ class BagFile:
 
     path: Path
     storage: str
-    compressed: bool = False
     recording: int = 0
     table: Any = None
 
@@ -145,7 +140,7 @@ def _file(path: Path) -> BagFile:
         raise RecordingError(str(path), "", text)
     if not path.is_file():
         raise RecordingError(str(path), "", f"not a file. Expected {_EXPECTED}")
-    return BagFile(path, match[1].lower(), match[2] is not None)
+    return BagFile(path, match[1].lower())
 
 
 def _directory(path: Path, findings: list[Finding]) -> list[BagFile]:
@@ -160,6 +155,8 @@ def _directory(path: Path, findings: list[Finding]) -> list[BagFile]:
             findings.append(Finding(file, f"is not named by {METADATA}: it is not read"))
     chosen = [path / name for name in named if (path / name) in files] or sorted(files, key=_by_number)
     if not chosen:
+        for packed in path.glob("*.zstd"):
+            return [_file(packed)]  # it is refused with the remedy
         raise RecordingError(str(path), "", "contains no .mcap or .db3 file")
     return [_file(file) for file in chosen]
 
@@ -172,7 +169,7 @@ def _named(path: Path, findings: list[Finding]) -> list[str]:
         with path.open("rb") as file:
             text = file.read(_LARGEST).decode()
         names = YAML(typ="safe", pure=True).load(text)["rosbag2_bagfile_information"]["relative_file_paths"]
-        return list(dict.fromkeys(Path(name).name for name in names))
+        return list(dict.fromkeys(Path(name).name.removesuffix(".zstd") for name in names))
     except (OSError, YAMLError, LookupError, TypeError, ValueError):
         text = "cannot be read: the directory's files are taken instead"
         findings.append(Finding(path, text, Severity.NOTE))
@@ -294,7 +291,6 @@ class Source:
 
     bag_file: BagFile
     file: OpenFile
-    budget: Budget
     types: dict[int, int] = attrs.Factory(dict)
 
     def select(self, stream: Stream, topic: str) -> None:
@@ -307,18 +303,16 @@ class Source:
     def pieces(self) -> Iterator[Due]:
         """Pieces of the selected channels, in order of log time."""
         for due in self.file.pieces(self.types):
-            is_table = self.bag_file.storage in TABLES
-            yield due if is_table else attrs.evolve(due, load=partial(self._expanded, due))
+            yield attrs.evolve(due, load=partial(self._loaded, due))
 
-    def _expanded(self, due: Due) -> Piece | None:
-        """Load a piece and decompress those of its messages that are compressed one by one.
-
-        Metadata would show it, but they are written last, and a file may be given without them.
-        """
+    def _loaded(self, due: Due) -> Piece | None:
         piece = due.load()
-        if piece is None or not _has_compressed(piece):
-            return piece
-        return _expanded(piece, self.budget.part_limit // 2)
+        if piece is not None and len(piece.messages):
+            begin = piece.messages["begin"][0]
+            if piece.data[begin : begin + len(_ZSTD_MAGIC)].tobytes() == _ZSTD_MAGIC:
+                text = "has messages that are compressed one by one. Convert it with ros2 bag convert"
+                raise RecordingError(str(self.bag_file.path), "", text)
+        return piece
 
 
 def open_sources(
@@ -344,7 +338,7 @@ def open_sources(
     failed: list[RecordingError] = []
     for bag_file in bag_files:
         try:
-            sources.append(Source(bag_file, _open(bag_file, config, budget, stack), budget))
+            sources.append(Source(bag_file, _open(bag_file, config, budget, stack)))
         except RecordingError as error:
             failed.append(error)
     if not sources:
@@ -398,61 +392,19 @@ def assign(
 def _open(bag_file: BagFile, config: MonitorConfig, budget: Budget, stack: ExitStack) -> OpenFile:
     path = bag_file.path
     try:
-        if bag_file.compressed:
-            path = _expanded_file(bag_file, budget, stack)
         if bag_file.storage in TABLES:
             from leg_wear_monitor.bags.table_file import TableFile  # pyarrow takes a quarter of a second
 
             is_file = bag_file.storage != IN_MEMORY
             content = stack.enter_context(open_recording(path)) if is_file else bag_file.table
-            return TableFile(bag_file.path, content, bag_file.storage, config, budget)
+            return TableFile(path, content, bag_file.storage, config, budget)
         if bag_file.storage == MCAP:
-            return McapFile(bag_file.path, stack.enter_context(open_recording(path)), budget)
+            return McapFile(path, stack.enter_context(open_recording(path)), budget)
         from leg_wear_monitor.bags.database import DatabaseFile
 
         open_recording(path).close()  # SQLite does not say why it cannot open a file
-        return DatabaseFile(bag_file.path, path, budget, stack)
+        return DatabaseFile(path, budget, stack)
     except DamageError as error:
         raise RecordingError(str(bag_file.path), "", str(error)) from error
     except OSError as error:
         raise RecordingError(str(bag_file.path), "", f"cannot be read: {error.strerror}") from error
-
-
-def _expanded_file(bag_file: BagFile, budget: Budget, stack: ExitStack) -> Path:
-    """Decompress a file to a temporary file; its size counts as memory, unless it does not fit."""
-    reserved = budget.reserved
-    path = Path(stack.enter_context(tempfile.TemporaryDirectory())) / f"content{bag_file.storage}"
-    with open_recording(bag_file.path) as file, path.open("wb") as content:
-        if file.read(len(ZSTD_MAGIC)) != ZSTD_MAGIC:
-            raise DamageError("is not a zstd file, although its name says so")
-        file.seek(0)
-        try:
-            for part in expanded(file):
-                budget.reserve(len(part))
-                content.write(part)
-        except DamageError:
-            budget.reserved = reserved
-            path.unlink()
-            raise
-        if not content.tell():
-            raise DamageError("contains nothing that can be decompressed")
-    return path
-
-
-def _has_compressed(piece: Piece) -> bool:
-    """Whether a message of a piece begins as zstd does, and no CDR message."""
-    chosen = piece.messages[piece.messages["end"] - piece.messages["begin"] >= len(ZSTD_MAGIC)]
-    begins = piece.data[chosen["begin"][:, None] + np.arange(len(ZSTD_MAGIC))]
-    return bool((begins == np.frombuffer(ZSTD_MAGIC, np.uint8)).all(axis=1).any())
-
-
-def _expanded(piece: Piece, most: int) -> Piece:
-    """Decompress each message of a piece, up to `most` bytes in total."""
-    contents = []
-    for begin, end in zip(piece.messages["begin"].tolist(), piece.messages["end"].tolist(), strict=True):
-        contents.append(expand_message(piece.data[begin:end].tobytes(), most))
-        most -= len(contents[-1])
-    messages = piece.messages.copy()
-    messages["end"] = np.cumsum([len(content) for content in contents])
-    messages["begin"] = messages["end"] - [len(content) for content in contents]
-    return attrs.evolve(piece, data=np.frombuffer(b"".join(contents), np.uint8), messages=messages)

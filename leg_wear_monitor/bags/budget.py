@@ -1,4 +1,4 @@
-"""Memory limit of a reader: independent of the sizes that a file declares, and with temporary files."""
+"""Memory limit of a reader, independent of the sizes that a file declares."""
 
 import attrs
 
@@ -12,7 +12,7 @@ _MB = 1_000_000
 
 @attrs.define
 class Budget:
-    """Memory limit of a reader, and the bytes reserved until the recording is closed.
+    """Memory limit of a reader.
 
     Parameters
     ----------
@@ -26,7 +26,6 @@ class Budget:
     """
 
     megabytes: float = DEFAULT_MB
-    reserved: int = attrs.field(init=False, default=0)
 
     def __attrs_post_init__(self) -> None:
         if not self.megabytes >= _MIN_MB:
@@ -35,9 +34,8 @@ class Budget:
 
     @property
     def available(self) -> int:
-        """Bytes that are not reserved yet."""
-        most = min(self.megabytes, 1.0e12)  # infinity, which means no limit, has no integer
-        return max(0, int(most * _MB) - self.reserved)
+        """Bytes of the limit."""
+        return int(min(self.megabytes, 1.0e12) * _MB)  # infinity, which means no limit, has no integer
 
     @property
     def part_limit(self) -> int:
@@ -57,14 +55,3 @@ class Budget:
                 f"needs {needed / _MB:.0f} MB to be read, more than the {self.part_limit / _MB:.0f} MB that "
                 f"--memory-mb {self.megabytes:g} leaves for it"
             )
-
-    def reserve(self, needed: int) -> None:
-        """Reserve bytes until the recording is closed, for example for a temporary file.
-
-        Raises
-        ------
-        DamageError
-        """
-        if needed > self.available:
-            raise DamageError(f"needs larger temporary files than --memory-mb {self.megabytes:g} allows")
-        self.reserved += needed

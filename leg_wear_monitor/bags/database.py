@@ -29,9 +29,7 @@ class DatabaseFile:
     Parameters
     ----------
     path : pathlib.Path
-        Name of the file in findings and errors.
-    file : pathlib.Path
-        File that is opened; nothing is written to it.
+        Nothing is written to it.
     budget : Budget
     stack : contextlib.ExitStack
         Closes the file.
@@ -44,20 +42,20 @@ class DatabaseFile:
         If the system cannot read it.
     """
 
-    def __init__(self, path: Path, file: Path, budget: Budget, stack: ExitStack) -> None:
-        self.path, self._budget, self.size = path, budget, file.stat().st_size
+    def __init__(self, path: Path, budget: Budget, stack: ExitStack) -> None:
+        self.path, self._budget, self.size = path, budget, path.stat().st_size
         self.findings: list[Finding] = []
         try:
-            self._reader: Any = stack.enter_context(Reader(file))
+            self._reader: Any = stack.enter_context(Reader(path))
         except apsw.IOError as error:
             raise OSError(errno.EIO, str(error)) from error
         except _UNREADABLE as error:
             cause = error.__cause__ or (None if isinstance(error, ReaderError) else error)
             why = _one_line(cause) if cause else "it has no tables of a recording"
             raise RecordingError(str(path), "", f"is not a readable .db3 file: {why}") from error
-        for journal in (file.with_name(file.name + end) for end in _JOURNALS):
+        for journal in (path.with_name(path.name + end) for end in _JOURNALS):
             if journal.exists() and journal.stat().st_size:
-                remedy = f'Run: sqlite3 {file.name} "PRAGMA wal_checkpoint"'
+                remedy = f'Run: sqlite3 {path.name} "PRAGMA wal_checkpoint"'
                 self.findings.append(Finding(path, f"was not closed: {journal.name} is not read. {remedy}"))
         self._connections = {one.id: one for one in self._reader.connections}
         self.channels = {

@@ -253,7 +253,7 @@ class Recording:
     Parameters
     ----------
     paths : iterable
-        MCAP, .db3, CSV and Parquet files, zstd-compressed or not; bag directories; tables in memory.
+        MCAP, .db3, CSV and Parquet files; bag directories; tables in memory.
     config : MonitorConfig
         Provides the name of the crank joint and the source of the torque.
     joint_states, drive_torque, foot_load : str, optional
@@ -261,7 +261,7 @@ class Recording:
     time : str
         Time that stamps the samples, one of `TIMES`. Float64 messages have no header and use the log time.
     memory_mb : float
-        Memory limit for reading, including temporary files [10⁶ bytes].
+        Memory limit for reading [10⁶ bytes].
 
     Attributes
     ----------

@@ -23,6 +23,7 @@ _RENAME = "not read under this name. Rename it to {path.stem}.csv if it is a tab
 _EXPORT = "a spreadsheet. Save it as CSV (UTF-8)"
 REMEDIES = dict.fromkeys((".txt", ".tsv", ".dat", ".log"), _RENAME)
 REMEDIES |= dict.fromkeys((".xlsx", ".xls", ".ods"), _EXPORT)
+REMEDIES |= dict.fromkeys((".zstd", ".zst"), "compressed as a whole. Run: zstd -d {path} -o {path.stem}")
 REMEDIES[".bag"] = "a ROS 1 bag. Convert it: rosbags-convert --src {path} --dst {path.stem}"
 """What to do with a file that is not read, by the end of its name."""
 STAMP, CRANK_ANGLE, CRANK_SPEED, DRIVE_TORQUE = "stamp", "crank_angle", "crank_speed", "drive_torque"

@@ -130,7 +130,7 @@ wait_option: Option = option(
 memory_option: Option = option(
     "--memory-mb",
     "MB",
-    "Memory limit of reading, temporary files included.",
+    "Memory limit of reading.",
     type=Number(min=16.0),
     default=512.0,
 )

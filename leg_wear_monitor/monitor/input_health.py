@@ -459,8 +459,8 @@ INPUT_RULES = (
         words=_unit,
         needs_motion=False,
         why="the crank's angle turns at {size} of the commanded cadence, as an angle in turns does",
-        do="publish radians, or set table.units.crank_angle of a table; for a continuous position in turns, set "
-        "crank.gear_ratio to {ratio}",
+        do="publish radians, or set table.units.crank_angle of a table; for a continuous position in turns, "
+        "set crank.gear_ratio to {ratio}",
     ),
     InputRule(
         code="CRANK_STAMPS",

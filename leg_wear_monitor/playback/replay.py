@@ -72,7 +72,7 @@ def replay(
         Full name of the node whose parameters, names and messages are used; by default the node in the
         namespace of the crank topic, such as ``/left/leg_wear_monitor`` for ``/left/joint_states``.
     memory_mb : float
-        Memory limit for reading the recording, including temporary files [10⁶ bytes].
+        Memory limit for reading the recording [10⁶ bytes].
     ready : callable, optional
         Called with the monitor before the first sample.
     progress : callable, optional

@@ -170,6 +170,10 @@ class JointClearance:
         Its standard deviation.
     estimated_by : tuple of str
         What shows it, such as ``encoders``.
+    change_m : float or None
+        Change since the baseline that the drive torque shows; None without a baseline.
+    change_sigma_m : float or None
+        Its standard deviation, without the error of the clearance in the baseline.
     measured_m : float or None
         Clearance that somebody measured last on this part.
     measured_sigma_m : float or None
@@ -189,6 +193,8 @@ class JointClearance:
     estimated_m: float | None = None
     estimated_sigma_m: float | None = None
     estimated_by: tuple[str, ...] = ()
+    change_m: float | None = None
+    change_sigma_m: float | None = None
     measured_m: float | None = None
     measured_sigma_m: float | None = None
     new_m: float

@@ -163,10 +163,12 @@ def print_state(console: Console, state: "LegState", joint_words: Callable[[str]
 
 
 def _joints(state: "LegState", joint_words: Callable[[str], str]) -> Table:
-    """Best estimate of each clearance with its source, its limit, and the remaining life."""
+    """Best estimate of each clearance, its change since the baseline, its limit, and the remaining life."""
     columns = (
         "\njoint",
         "clearance\nmm",
+        "±\nmm",
+        "change\nmm",
         "±\nmm",
         "limit\nmm",
         "life\np10 h",
@@ -174,7 +176,7 @@ def _joints(state: "LegState", joint_words: Callable[[str], str]) -> Table:
         "\np90 h",
         "\nsource",
     )
-    table = plain_table(columns, 1, 8)
+    table = plain_table(columns, 1, 10)
     for joint, one in state.clearances.items():
         life = state.life.get(joint)
         hours = (None, None, None) if life is None else (life.p10_h, life.p50_h, life.p90_h)
@@ -182,7 +184,7 @@ def _joints(state: "LegState", joint_words: Callable[[str], str]) -> Table:
             joint_words(joint),
             *(
                 "-" if each is None else f"{1.0e3 * each:.3f}"
-                for each in (one.best_estimate_m, one.best_estimate_sigma_m)
+                for each in (one.best_estimate_m, one.best_estimate_sigma_m, one.change_m, one.change_sigma_m)
             ),
             f"{1.0e3 * one.limit_m:.3g}",
             *map(figure, hours),

@@ -33,6 +33,7 @@ class Cause(Enum):
         return member
 
     CLEARANCE = "clearance", "CLEARANCE_CHANGED"
+    SEVERAL = "clearances of several joints", "CLEARANCE_CHANGED"
     SIGN = "sign of the torque sensor", "TORQUE_SIGN"
     SCALE = "scale of the torque sensor", "TORQUE_SCALE"
     TIMING = "crank offset or lag of the torque", "TORQUE_TIMING"  # at one speed the two look alike
@@ -61,7 +62,8 @@ class NamedCause:
     ----------
     cause : Cause
     value, sigma : float
-        Clearance [m]; measured over predicted torque (SIGN, SCALE); angle by which the crank is ahead of its
+        Clearance [m], the widest of several joints;
+        measured over predicted torque (SIGN, SCALE); angle by which the crank is ahead of its
         measured angle (TIMING, CRANK_OFFSET) [rad]; lag [s]; standard deviation of a sample (NOISE) [N m];
         constant torque beyond the bounds of friction,
         negative where it drives (BIAS) [N m]; change of the friction [N m], or of the fraction of the
@@ -69,12 +71,15 @@ class NamedCause:
         the friction in all joints (JOINT_FRICTION) is larger.
     subject : str
         The joint, or the body, concerned; empty where there is none.
+    joints : tuple of NamedCause
+        The clearance of each of several joints; empty otherwise.
     """
 
     cause: Cause
     value: float
     sigma: float
     subject: str = ""
+    joints: tuple["NamedCause", ...] = ()
 
 
 @attrs.frozen(kw_only=True)

@@ -136,6 +136,8 @@ def with_rivals(
 
 def start_of(change: Change | None, joints: Sequence[str], modelled_m: Floats) -> Floats:
     """Clearances (k,) [m] after a change."""
-    if change is None or change.cause is not Cause.CLEARANCE:
+    if change is None or change.cause not in (Cause.CLEARANCE, Cause.SEVERAL):
         return modelled_m
-    return opened(modelled_m, joints.index(change.subject), change.value)
+    for one in change.joints or (change,):
+        modelled_m = opened(modelled_m, joints.index(one.subject), one.value)
+    return modelled_m

@@ -16,7 +16,7 @@ from leg_wear_monitor.estimate.cause import (
     NamedCause,
 )
 from leg_wear_monitor.estimate.signature import Changes, SignatureModel
-from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
 
 # of what a clearance changes, and of an opening: legs with masses 4 % off show 10 to 27 % less (2026-11-23)
 MODEL_ERROR = 0.2
@@ -38,6 +38,10 @@ _NOISE_SIGMA = 0.08  # of the noise: half of the step between those that are tri
 _QUIETEST = 0.01  # of the square of the roughness
 _QUIETER = 0.25  # of less noise than known: what an opening beside it may hide of its decrease
 _ROUNDS = 2  # of the search for a clearance and a noise
+# The search for two open joints tries seven sizes of each joint, a fifth apart; those of the second joint lie
+# about 1.5 times its modelled clearance. A second round tries finer steps about the best sizes.
+_LEAST_SECOND = 1.2  # of the modelled clearance: a smaller second opening may be an error of the model
+_PAIR_SIZES, _PAIR_ROUNDS, _PAIR_STEP, _PAIR_MIDDLE = 3, 2, 0.2, 1.5
 # mean square up to which it is noise alone: up to 1.4 of a healthy leg, a real motor's stick-slip too; where
 # two joints opened as well, which no single one explains, it would explain most of it (2026-11-27)
 _NOISE_ALONE = 2.0
@@ -324,7 +328,69 @@ class Explainer:
         factors += [_Quantity(Cause.JOINT_FRICTION, "", model.friction, i, 1.0) for i in friction]
         for one in factors:
             found += _changed_by(self._best(seen, one, _FACTORS[one.cause]), nothing.square)
+        best = min(found, key=lambda one: one.misfit)
+        if best.cause is Cause.CLEARANCE:
+            found.append(self._with_second(seen, best, modelled_m))
         return sorted(found, key=lambda one: one.misfit)
+
+    def _with_second(self, seen: _Seen, first: Explanation, modelled_m: Floats) -> Explanation:
+        """The best explanation by two open joints, one of which is the joint that explains most alone.
+
+        Of two open joints, the wider change nearly always has the right name, but a wrong size.
+        """
+        k, found = self.joints.index(first.subject), []
+        for other in range(len(modelled_m)):
+            if other == k:
+                continue
+            pair, step = np.array([k, other]), _PAIR_STEP
+            middle = np.log([0.5 * (first.value + modelled_m[k]), _PAIR_MIDDLE * modelled_m[other]])
+            for _ in range(_PAIR_ROUNDS):
+                offsets = step * np.arange(-_PAIR_SIZES, _PAIR_SIZES + 1)
+                sizes = np.exp(middle + np.stack(np.meshgrid(offsets, offsets), axis=-1).reshape(-1, 2))
+                least = modelled_m[pair] * (1.0, _LEAST_SECOND)
+                sizes = np.clip(sizes, least, np.maximum(self.model.joints.grid[pair, -1], least))
+                misfits = self._misfits_of_pair(seen, pair, sizes, modelled_m)
+                best = int(misfits.value.argmin())
+                middle, step = np.log(sizes[best]), step / _PAIR_SIZES
+            found.append((float(misfits.value[best]), other, sizes, misfits))
+        _, other, sizes, misfits = min(found, key=lambda one: one[0])
+        best = int(misfits.value.argmin())
+        square = float(misfits.square[best]) / len(seen.mean)
+        likely = np.exp(-0.5 * (misfits.value - misfits.value[best]) / max(1.0, square))
+        mean_m = likely @ sizes / likely.sum()
+        own_m = np.sqrt(likely @ np.square(sizes - mean_m) / likely.sum())
+        joints = tuple(
+            NamedCause(
+                Cause.CLEARANCE,
+                float(mean_m[i]),
+                float(np.hypot(own_m[i], MODEL_ERROR * (mean_m[i] - modelled_m[joint]))),
+                self.joints[joint],
+            )
+            for i, joint in enumerate((k, other))
+        )
+        widest = max(joints, key=lambda one: one.value)
+        return Explanation(
+            cause=Cause.SEVERAL,
+            subject=" and ".join(sorted(one.subject for one in joints)),
+            value=widest.value,
+            sigma=widest.sigma,
+            joints=tuple(sorted(joints, key=lambda one: one.subject)),
+            counted=float(modelled_m[self.joints.index(widest.subject)]),
+            misfit=float(misfits.value[best]) + 2.0 * SURE_LOG_ODDS * max(1.0, square),
+            square=square,
+        )
+
+    def _misfits_of_pair(self, seen: _Seen, pair: Ints, sizes: Floats, modelled_m: Floats) -> "Misfits":
+        """How well some clearances (n, 2) [m] of two joints explain."""
+        changes, which = self.model.joints, np.tile(pair, len(sizes))
+        change = changes.at(sizes.ravel(), which)[0].reshape(len(sizes), 2, -1)
+        before = changes.at(modelled_m[pair], pair)[0]
+        change = (change - before).sum(axis=1)
+        variance = changes.scatter_at(sizes.ravel(), which).reshape(-1, 2).sum(axis=1)
+        scatter = seen.scatter + variance - changes.scatter_at(modelled_m[pair], pair).sum()
+        error = _diagonal(MODEL_ERROR * _nearby(change))
+        own = seen.covariance + scatter[:, None, None] * self.model.covariance
+        return Misfits(seen.rest - change, own + error)
 
     def _late(self, seen: _Seen) -> list[Explanation]:
         """The best of the other channels; none where none explains.
@@ -477,7 +543,7 @@ class Misfits:
     def explanation(self, i: int, one: NamedCause, counted: float = 0.0) -> Explanation:
         """How well the cause (i,) explains."""
         return Explanation(
-            **attrs.asdict(one),
+            **attrs.asdict(one, recurse=False),
             counted=counted,
             misfit=float(self.value[i]),
             square=float(self.square[i]) / self._size,
@@ -551,12 +617,12 @@ def change_of(explanations: Sequence[Explanation], since_ns: int) -> Change | No
         return Change(
             cause=Cause.UNKNOWN, since_ns=since_ns, value=0.0, sigma=0.0, counted=0.0, log_odds=log_odds
         )
-    fact = (best.cause.fault_code, best.subject)
-    second = next(one for one in explanations if (one.cause.fault_code, one.subject) != fact)
+    second = next(one for one in explanations if _is_rival(one, best))
     runner_up = f"{second.cause.value} {second.subject}".strip()
     return Change(
         cause=best.cause,
         subject=best.subject,
+        joints=best.joints,
         since_ns=since_ns,
         value=best.value,
         sigma=best.sigma,
@@ -565,6 +631,13 @@ def change_of(explanations: Sequence[Explanation], since_ns: int) -> Change | No
         runner_up="as counted" if second is nothing else runner_up,
         runner_up_log_odds=0.5 * (second.misfit - best.misfit) / max(1.0, best.square),
     )
+
+
+def _is_rival(one: Explanation, best: Explanation) -> bool:
+    """Whether an explanation says something else than the best one; a second open joint adds to the first."""
+    if one.cause is Cause.SEVERAL and best.cause is Cause.CLEARANCE:
+        return False
+    return (one.cause.fault_code, one.subject) != (best.cause.fault_code, best.subject)
 
 
 def with_doubt(change: Change, explanations: Sequence[Explanation]) -> Change:

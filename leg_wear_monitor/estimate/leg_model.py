@@ -245,18 +245,25 @@ def explainer_of(
     """
     model = signature_model(reference, sensor)
     found, joints = nuisances(mechanism, reference, sensor), mechanism.clearance_joints
-    if commissioned is None:
-        baseline = unknown_baseline(found, sensor, model.own * model.covariance + model.places)
-    else:
-        expected = model.at(commissioned.clearance_m)[0]
-        left_out = parts_left_out(model.covariance, commissioned.signatures)
-        covariance = with_scatter_of(model.covariance, commissioned.signatures)
-        model = attrs.evolve(model, covariance=covariance)
-        baseline = commissioned_baseline(commissioned, expected, covariance, left_out, model.places)
-        if corrected_m is not None:
-            error = MODEL_ERROR * (model.at(corrected_m)[0] - expected)
-            covariance = baseline.covariance + np.diag(np.square(error))
-            baseline = attrs.evolve(baseline, offset=commissioned.mean, covariance=covariance)
+    baseline = unknown_baseline(found, sensor, model.own * model.covariance + model.places)
     fresh_m = np.array([mechanism.clearances[joint].radial_clearance for joint in joints])
     channels, noises = other_channels(reference, sensor), other_noises(reference, sensor)
-    return Explainer(model, joints, baseline, found, channels, noises, fresh_m)
+    own = Explainer(model, joints, baseline, found, channels, noises, fresh_m)
+    return own if commissioned is None else compared_with(own, commissioned, corrected_m)
+
+
+def compared_with(
+    own: Explainer, commissioned: CommissionedTorque, corrected_m: Floats | None = None
+) -> Explainer:
+    """The same explainer of changes since a baseline, as of `explainer_of`; its own one knew no baseline."""
+    model = own.model
+    expected = model.at(commissioned.clearance_m)[0]
+    left_out = parts_left_out(model.covariance, commissioned.signatures)
+    covariance = with_scatter_of(model.covariance, commissioned.signatures)
+    model = attrs.evolve(model, covariance=covariance)
+    baseline = commissioned_baseline(commissioned, expected, covariance, left_out, model.places)
+    if corrected_m is not None:
+        error = MODEL_ERROR * (model.at(corrected_m)[0] - expected)
+        covariance = baseline.covariance + np.diag(np.square(error))
+        baseline = attrs.evolve(baseline, offset=commissioned.mean, covariance=covariance)
+    return Explainer(model, own.joints, baseline, own.nuisances, own.channels, own.noises, own.fresh_m)

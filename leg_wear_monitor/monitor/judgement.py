@@ -16,6 +16,7 @@ from leg_wear_monitor.monitor.monitored_leg import MonitoredLeg
 from leg_wear_monitor.monitor.reports import AlarmList, VerdictReport
 from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.situation import (
+    COUNTED,
     JointSituation,
     KnownClearance,
     Situation,
@@ -115,11 +116,14 @@ def situation_of(leg: MonitoredLeg) -> Situation:
 def _joint_situations(leg: MonitoredLeg) -> tuple[JointSituation, ...]:
     """What is known of each joint's clearance now."""
     estimates = leg.encoders.estimates if leg.encoders else None
+    diagnosis = leg.torque.diagnosis
     last, measured, joints = leg.last, leg.measured, leg.clearance_joints
     modelled_m, limits_m = leg.twin.clearance_mean_m.tolist(), leg.evaluation.board.clearance_limits_m
     walked, found = leg.accounting.state, []
     for k, (joint, part) in enumerate(zip(joints, walked.parts, strict=True)):
         report = last.joints[k] if last else None
+        seen = leg.seen(k)
+        by_torque = next((each.sigma_m for each in seen if each.by == "torque"), None)
         one = JointSituation(
             joint=joint,
             modelled_m=modelled_m[k],
@@ -129,7 +133,9 @@ def _joint_situations(leg: MonitoredLeg) -> tuple[JointSituation, ...]:
                 if report and report.forecast
                 else leg.forecaster.best_estimate_m(k, modelled_m[k])
             ),
-            seen=leg.seen(k),
+            seen=seen,
+            change=diagnosis.change_of_joint(k),
+            sigma_m=diagnosis.tolerance_of_joint(k) if by_torque is None else by_torque,
             is_used=bool(estimates and estimates[k].believed),
             label=leg.mechanism.joints[joint].label,
             replaced_ns=part.replaced_ns,
@@ -249,6 +255,8 @@ def joint_clearance(
     """
     not_valid = {figure for finding in findings for figure in finding.not_valid}
     one = believed(joint, alarm, Figure.CLEARANCES not in not_valid)
+    if one is not None and one.by == COUNTED:
+        one = attrs.evolve(one, sigma_m=joint.sigma_m)
     best = surest(joint.seen)
     return JointClearance(
         best_estimate_m=one.clearance_m if one else None,
@@ -257,6 +265,8 @@ def joint_clearance(
         modelled_m=joint.modelled_m,
         estimated_m=best.clearance_m if best else None,
         estimated_sigma_m=best.sigma_m if best else None,
+        change_m=joint.change[0] if joint.change else None,
+        change_sigma_m=joint.change[1] if joint.change else None,
         estimated_by=(best.by,) if best else (),
         measured_m=joint.measured.clearance_m if joint.measured else None,
         measured_sigma_m=joint.measured.sigma_m if joint.measured else None,

@@ -89,9 +89,10 @@ def diagnosis_status(joints: Sequence[str], diagnosis: Diagnosis) -> Status:
     for reason in NotUsed:
         values[f"not_used_{reason.value}"] = float(diagnosis.cycles_not_used.get(reason.value, 0))
     for k, joint in enumerate(joints):
-        known = bool(diagnosis.clearance_m)
-        values[f"{joint}_clearance_m"] = diagnosis.clearance_m[k] if known else math.nan
-        values[f"{joint}_sigma_m"] = diagnosis.sigma_m[k] if known else math.nan
+        unknown = (math.nan, math.nan)
+        values[f"{joint}_clearance_m"], values[f"{joint}_sigma_m"] = diagnosis.of_joint(k) or unknown
+        change = diagnosis.change_of_joint(k) or unknown
+        values[f"{joint}_change_m"], values[f"{joint}_change_sigma_m"] = change
     for body in diagnosis.bodies:
         values[f"{body.name}_mass_factor"] = body.mass
         values[f"{body.name}_length_factor"] = body.length

@@ -47,6 +47,8 @@ _CONTRADICTS = 3.0  # standard deviations between what the torque shows and what
 # of a part, since it was measured, that wear it by little: at ten times the wear that is counted for joint A
 # of the example in the air, 17 pm a gait cycle, 17 um; a correction is 90 um at least (diagnosis.md)
 _LATELY_CYCLES = 100_000
+# standard deviation of a new clearance, as a fraction: the limits of a running fit are 20 % about its mean
+_FIT_TOLERANCE = 0.1
 _LEAST_BEFORE = 3  # kept gait cycles that show a leg without a change
 _FACTORS = (Cause.SCALE, Cause.SIGN)
 
@@ -243,7 +245,7 @@ class TorqueWatch(Observer):
         """The clearance that the drive torque shows of joint k."""
         diagnosis = self.diagnosis
         found = diagnosis.of_joint(k)
-        return KnownClearance("torque", *found, diagnosis.least_m[k]) if found else None
+        return KnownClearance("torque", *found, diagnosis.least_of_joint(k)) if found else None
 
     @property
     def shows(self) -> str:
@@ -269,10 +271,21 @@ class TorqueWatch(Observer):
         own, contradictions = self._leg.twin.parameters, map(self._contradiction, found.changes)
         return attrs.evolve(
             found,
+            tolerance_m=self._tolerance_m,
             reason="; ".join(filter(None, (found.reason, self.unexplained, *contradictions))),
             bodies=self._counted_bodies(),
             friction=own.friction,
             compliance=own.compliance,
+        )
+
+    @property
+    def _tolerance_m(self) -> tuple[float, ...]:
+        """Standard deviation of each modelled clearance: by the fit of the part, or by its measurement."""
+        joints, clearances = self._leg.clearance_joints, self._leg.mechanism.clearances
+        sigma_m = [_FIT_TOLERANCE * clearances[joint].radial_clearance for joint in joints]
+        return tuple(
+            min(known.sigma_m, by_fit) if known else by_fit
+            for known, by_fit in zip(self._leg.measured, sigma_m, strict=True)
         )
 
     def _contradiction(self, change: Change) -> str:
@@ -295,8 +308,10 @@ class TorqueWatch(Observer):
             kept = self.observer.state.cycles if self.observer else ()
             before = sum(one.begin_ns < change.since_ns for one in kept)
             is_since = begun - measured.cycles <= _LATELY_CYCLES and before < _LEAST_BEFORE
+        new_m = self._leg.mechanism.clearances[change.subject].radial_clearance
         apart_m = abs(measured.clearance_m - change.value)
-        if not is_since or apart_m <= _CONTRADICTS * math.hypot(measured.sigma_m, change.sigma):
+        sigma_m = math.hypot(measured.sigma_m, change.sigma, _FIT_TOLERANCE * new_m)
+        if not is_since or apart_m <= _CONTRADICTS * sigma_m:
             return ""
         return (
             f"the drive torque ({estimate(change.value, change.sigma, 'm')}) and a measurement "

@@ -10,6 +10,7 @@ import leg_wear_monitor as lw
 RATE_HZ = 200
 OPENED_M = 1.0e-3
 HEALTHY, OPENED = 4, 10  # gait cycles
+TAKEN = 21  # gait cycles before and after a change within a baseline; the table loses the first
 
 pytestmark = pytest.mark.chaotic
 
@@ -61,6 +62,32 @@ def test_a_healthy_leg_is_healthy(healthy, change, coulomb_nm: float) -> None:
     for clearance in summary.clearances.values():
         assert clearance.status.value == "healthy"
         assert clearance.best_estimate_m == pytest.approx(3.0e-4, abs=2.0e-5)
+        assert clearance.best_estimate_sigma_m >= 3.0e-5  # of a leg whose clearances nobody has measured
+
+
+@pytest.mark.parametrize(("joint", "opened_m"), [("A", 3.6e-4), ("B", 3.8e-4)])
+def test_a_joint_that_opens_while_the_baseline_is_taken_is_reported(
+    torque_of, table, joint: str, opened_m: float
+) -> None:
+    """The change lies within the fifty gait cycles of a baseline, which would hide it."""
+    walk = table(torque_of(TAKEN), torque_of(TAKEN, **{joint: opened_m}))
+    summary = lw.replay(walk).summary()
+    assert (summary.verdict.state.value, summary.verdict.joints) == ("inspect", (joint,))
+    clearance = summary.clearances[joint]
+    assert clearance.estimated_by == ("torque",)
+    assert clearance.change_m == pytest.approx(opened_m - 3.0e-4, abs=3.0 * clearance.change_sigma_m)
+    assert (
+        clearance.estimated_sigma_m > clearance.change_sigma_m
+    )  # the clearance in the baseline is not exact
+
+
+def test_two_joints_that_open_at_once_are_named_together(torque_of, table) -> None:
+    walk = table(torque_of(TAKEN), torque_of(TAKEN, A=4.0e-4, G=4.2e-4))
+    summary = lw.replay(walk).summary()
+    assert (summary.verdict.state.value, summary.verdict.fault_code) == ("inspect", "CLEARANCE_CHANGED_A_G")
+    assert summary.diagnosis.cause == "several"
+    for joint in ("A", "G"):
+        assert summary.clearances[joint].change_m > 5.0e-5
 
 
 def test_before_a_joint_opens_nothing_is_reported(healthy) -> None:

@@ -259,7 +259,7 @@ class Evidence:
             return
         change, known = state.changes[-1], state.commissioned
         since = tuple(cycle for cycle in state.cycles if cycle.begin_ns >= change.since_ns)
-        if change.cause in (Cause.CLEARANCE, Cause.NOISE) or len(since) < COMMISSIONING_CYCLES:
+        if change.cause in (Cause.CLEARANCE, Cause.SEVERAL, Cause.NOISE) or len(since) < COMMISSIONING_CYCLES:
             return
         baseline = state.baseline(
             since, state.modelled_m, sigma_m=known.sigma_m, channel=known.channel, is_interim=True
@@ -355,7 +355,7 @@ class Evidence:
             change = attrs.evolve(change, runner_up=Cause.LOAD.value, runner_up_log_odds=0.0)
         if state.commissioned is None and not (change and change.is_sure and change.is_wide):
             return None
-        if change is None or change.cause is not Cause.CLEARANCE:
+        if change is None or change.cause not in (Cause.CLEARANCE, Cause.SEVERAL):
             return change
         explainer = self._models.explainer(state)
         changed_m = start_of(change, explainer.joints, state.modelled_m)

@@ -30,6 +30,7 @@ from leg_wear_monitor.monitor.diagnosis.reasons import doubt, missing, next_step
 from leg_wear_monitor.monitor.diagnosis.references import (
     COMMISSIONING_CYCLES,
     LOAD_ROUNDS,
+    PART_CYCLES,
     UNLIKE_CYCLES,
     LegModels,
     References,
@@ -41,6 +42,7 @@ from leg_wear_monitor.monitor.diagnosis.state import (
     Diagnosis,
     DiagnosisState,
     NotUsed,
+    SignedCycle,
     TorqueSamples,
     TorqueState,
 )
@@ -346,6 +348,7 @@ class TorqueObserver(KeepsSamples):
             clearance_m=tuple(clearance_m.tolist()),
             sigma_m=tuple(sigma_m.tolist()),
             least_m=state.surely_m(self.config.alarms.on_delay_cycles),
+            baseline_m=tuple(known.clearance_m.tolist()) if known else (),
             changes=state.all_changes,
         )
 
@@ -371,10 +374,11 @@ class TorqueObserver(KeepsSamples):
             np.where(observable, each, math.nan) for each in (fit.clearance_m, fit.sigma_m)
         )
         for change in self.state.not_corrected:
-            if change.cause is Cause.CLEARANCE:
-                k = self._joints.index(change.subject)
-                if not observable[k] or change in self.state.settled:
-                    clearance_m[k], sigma_m[k] = change.value, change.sigma
+            opened = (change,) if change.cause is Cause.CLEARANCE else change.joints
+            for one in opened:
+                k = self._joints.index(one.subject)
+                if not observable[k] or change.joints or change in self.state.settled:
+                    clearance_m[k], sigma_m[k] = one.value, one.sigma
         return clearance_m, sigma_m
 
     def snapshot(self) -> TorqueObserverSnapshot:
@@ -422,11 +426,32 @@ class TorqueObserver(KeepsSamples):
         self._commission()
 
     def _commission(self) -> None:
-        """Keep the mean signature of a leg that is as counted."""
+        """Keep the signatures of a leg that is as counted, and stays so while they are taken.
+
+        A change within them ends the baseline, and is reported. A change in the first cycles, or one that no
+        cause explains, moves its start.
+        """
         state = self.state
-        if state.commissioned is not None or state.changes or len(state.cycles) < COMMISSIONING_CYCLES:
+        if state.commissioned is not None:
             return
-        known = state.baseline(state.cycles, state.modelled_m)
+        since_ns = state.changes[-1].since_ns if state.changes else 0
+        if not since_ns and not len(state.cycles) % PART_CYCLES:
+            since_ns = self.models.changed_within(state, state.cycles, self.config)
+        if not since_ns:
+            if len(state.cycles) >= COMMISSIONING_CYCLES:
+                self._take_baseline(state.cycles)
+            return
+        before = tuple(cycle for cycle in state.cycles if cycle.begin_ns < since_ns)
+        if len(before) >= PART_CYCLES:
+            self._take_baseline(before)
+        if not state.changes:  # neither of the leg as it was, nor with this baseline
+            state.commissioned, state.cycles = None, state.cycles[len(before) :]
+            self._evidence.review(state, self.config)
+
+    def _take_baseline(self, cycles: Sequence[SignedCycle]) -> None:
+        """Compare with some gait cycles from now on."""
+        state = self.state
+        known = state.baseline(cycles, state.modelled_m)
         # what a correction left unknown is not known better at another cadence
         corrected = state.corrected
         if corrected is not None:

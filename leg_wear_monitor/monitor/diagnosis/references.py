@@ -20,13 +20,13 @@ from leg_wear_monitor.estimate.drive import DIRECT, UNDECLARED, DriveFigures
 from leg_wear_monitor.estimate.explanations import Explainer
 from leg_wear_monitor.estimate.ground_load import GroundLoad, ground_load
 from leg_wear_monitor.estimate.identification import misfit
-from leg_wear_monitor.estimate.leg_model import explainer_of, nuisances
+from leg_wear_monitor.estimate.leg_model import compared_with, explainer_of, nuisances
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
-from leg_wear_monitor.monitor.diagnosis.state import FIRST_CYCLES, TorqueState
+from leg_wear_monitor.monitor.diagnosis.state import FIRST_CYCLES, SignedCycle, TorqueState
 from leg_wear_monitor.twin.reference import CrankProfile, LegParameters, mean_profile
 from leg_wear_monitor.twin.torque_reference import (
     LEAST_CLEARANCE_M,
@@ -42,6 +42,7 @@ from leg_wear_monitor.twin.torque_reference import (
 
 
 COMMISSIONING_CYCLES = 50  # gait cycles of a baseline: a recording of a minute at 60 rpm has them
+PART_CYCLES = 10  # gait cycles of a baseline that a change ends: a mean and a scatter, in a sixth of a minute
 
 # Misfit above which the name of a joint is not sure: names are right up to a misfit of 3 in the air, partly
 # wrong at 23 with load friction of 20 %, and from 40 on the ground (docs/explanation/diagnosis.md).
@@ -115,10 +116,31 @@ class LegModels:
         """Tests for a change of the counted clearances."""
         own = self._of(state)
         if own.detector is None or own.modelled_m is not state.modelled_m:
-            cycles = 60.0 * abs(config.cadence.commanded_rpm) * config.diagnosis.false_alarm_hours
-            own.detector = ChangeDetector(own.explainer, state.modelled_m, cycles)
+            own.detector = self._detector(own.explainer, state, config)
             own.modelled_m = state.modelled_m
         return own.detector
+
+    def _detector(self, explainer: Explainer, state: TorqueState, config: MonitorConfig) -> ChangeDetector:
+        cycles = 60.0 * abs(config.cadence.commanded_rpm) * config.diagnosis.false_alarm_hours
+        return ChangeDetector(explainer, state.modelled_m, cycles)
+
+    def changed_within(self, state: TorqueState, cycles: Sequence[SignedCycle], config: MonitorConfig) -> int:
+        """Stamp since when some gait cycles are not like those before them; 0 where all are alike.
+
+        Each number of first gait cycles is a baseline for the rest, with the tests that are used later: a
+        joint that opens while the leg is commissioned would otherwise become part of the baseline.
+        """
+        own, most, since_ns = self.explainer(state), 0.0, 0
+        for number in range(PART_CYCLES, len(cycles), PART_CYCLES):
+            known = state.baseline(cycles[:number], state.modelled_m)
+            detector = self._detector(compared_with(own, known), state, config)
+            found = detector.fresh()
+            for cycle in cycles[number:]:
+                found = detector.with_cycle(found, cycle.signature, cycle.begin_ns)
+                beyond = float(found.sums.max()) - detector.threshold
+                if beyond > most:
+                    most, since_ns = beyond, detector.detected_ns(found)
+        return since_ns
 
     def misfit(self, state: TorqueState) -> float:
         """Misfit between the commissioned leg and the reference; 0 if it is not known.

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate.cause import Cause, Change, TorqueExplanation
+from leg_wear_monitor.estimate.cause import SURE_SIGMAS, Cause, Change, TorqueExplanation
 from leg_wear_monitor.estimate.change_detector import DetectorState
 from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
 from leg_wear_monitor.estimate.drive import DIRECT, Channel
@@ -117,6 +117,11 @@ class Diagnosis:
     least_m : tuple of float
         Clearance that each joint surely has: the least by `SURE_SIGMAS` in the last estimates, as many in a
         row as an alarm waits for; minus infinity before.
+    baseline_m : tuple of float
+        Modelled clearances when the baseline was taken; empty without a baseline.
+    tolerance_m : tuple of float
+        Standard deviations of the modelled clearances. The torque shows the change since the baseline, so an
+        estimated clearance contains this error in addition to its own.
     changes : tuple of Change
         Significant departures, the oldest first: those by which counted clearances were corrected, and, where
         the state is CHANGED, those of the interim, and the one that is not settled yet.
@@ -144,6 +149,8 @@ class Diagnosis:
     clearance_m: tuple[float, ...] = ()
     sigma_m: tuple[float, ...] = ()
     least_m: tuple[float, ...] = ()
+    baseline_m: tuple[float, ...] = ()
+    tolerance_m: tuple[float, ...] = ()
     changes: tuple[Change, ...] = ()
     channel: Channel = DIRECT
     bodies: tuple[Body, ...] = ()
@@ -157,7 +164,29 @@ class Diagnosis:
         """Clearance of joint k, and its standard deviation; None where it is not observable."""
         if not self.clearance_m or not math.isfinite(self.clearance_m[k]):
             return None
-        return self.clearance_m[k], self.sigma_m[k]
+        return self.clearance_m[k], self.with_tolerance(k, self.sigma_m[k])
+
+    def least_of_joint(self, k: int) -> float:
+        """Clearance that joint k surely has, if the modelled one was too large in the baseline."""
+        reach_m = max(self.clearance_m[k] - self.least_m[k], 0.0)
+        return self.clearance_m[k] - self.with_tolerance(k, reach_m, SURE_SIGMAS)
+
+    def change_of_joint(self, k: int) -> tuple[float, float] | None:
+        """Change of joint k since the baseline, and its standard deviation; None where it is not observable.
+
+        It does not contain the error of the modelled clearance.
+        """
+        if self.of_joint(k) is None or not self.baseline_m:
+            return None
+        return self.clearance_m[k] - self.baseline_m[k], self.sigma_m[k]
+
+    def tolerance_of_joint(self, k: int) -> float:
+        """Standard deviation of the modelled clearance of joint k; NaN where the torque is not compared."""
+        return self.tolerance_m[k] if self.tolerance_m else math.nan
+
+    def with_tolerance(self, k: int, error_m: float, sigmas: float = 1.0) -> float:
+        """An error of joint k together with the error of its modelled clearance."""
+        return math.hypot(error_m, sigmas * self.tolerance_m[k]) if self.tolerance_m else error_m
 
     def contradicts(self, explained: TorqueExplanation) -> bool:
         """Whether it names another cause of a torque mismatch.

@@ -117,6 +117,7 @@ CAUSES: Mapping[Cause, CauseWords] = {
     Cause.LENGTH: CauseWords(
         "length_fraction", "", "body {subject} is {percent} {way}", _BODY, ("shorter", "longer")
     ),
+    Cause.SEVERAL: CauseWords("clearance", "m", "{subject} have opened together", "rock each joint"),
     Cause.UNKNOWN: CauseWords("unknown_change", "", "no single cause explains the change", _BODY),
 }
 

@@ -228,13 +228,20 @@ def changes(situation: Situation) -> tuple[Change, ...]:
 
 
 def words_of(change: Change, situation: Situation) -> str:
-    """A change in words, such as ``clearance of 0.62 mm ± 0.03 mm in joint G (0.3 mm is modelled)``."""
+    """A change in words, such as ``clearance of 0.62 mm in joint G``, with the change since the baseline."""
     if change.cause is Cause.CLEARANCE:
-        value, counted = estimate(change.value, change.sigma, "m"), amount(change.counted, "m")
+        opened = estimate(change.value - change.counted, change.sigma, "m")
+        value, counted = amount(change.value, "m"), amount(change.counted, "m")
         verb, joint = "was" if change.is_corrected else "is", situation.joint_words(change.subject)
-        words = f"clearance of {value} in joint {joint} ({counted} {verb} modelled)"
+        words = f"clearance of {value} in joint {joint} ({counted} {verb} modelled; the change is {opened})"
         if change.value < change.counted:
             words += ", less than before: if its part was replaced, reset the joint"
+    elif change.cause is Cause.SEVERAL:
+        joints = (
+            f"{situation.joint_words(one.subject)} {estimate(one.value, one.sigma, 'm')}"
+            for one in change.joints
+        )
+        words = f"change of several joints: {' and '.join(joints)}"
     else:
         words = sentence(change, situation.diagnosis)
     return f"{words} (or {change.runner_up})" if change.runner_up and not change.is_named else words
@@ -347,13 +354,31 @@ def departing(situation: Situation) -> Sequence[Hit]:
 def diagnosed(situation: Situation) -> Sequence[Hit]:
     """Clearances that changed according to the drive torque, without a correction."""
     found = [change for change in changes(situation) if change.cause is Cause.CLEARANCE]
-    return [_clearance_hit(change, situation, doubt(situation)) for change in found]
+    several = (change for change in changes(situation) if change.cause is Cause.SEVERAL)
+    return [
+        *(_clearance_hit(change, situation, doubt(situation)) for change in found),
+        *(hit for change in several for hit in _hits_of_several(change, situation)),
+    ]
 
 
 def corrected(situation: Situation) -> Sequence[Hit]:
     """Changes by which modelled clearances were corrected."""
     found = (change for change in situation.diagnosis.changes if change.is_corrected)
     return [_clearance_hit(change, situation) for change in found]
+
+
+def _hits_of_several(change: Change, situation: Situation) -> list[Hit]:
+    """Joints that explain a change together, in the same words."""
+    words = {"change": f"{words_of(change, situation)}{doubt(situation)}"}
+    return [
+        Hit(
+            words=words,
+            joint=one.subject,
+            since_ns=change.since_ns,
+            evidence=(Evidence(f"clearance {one.subject} by torque", one.value, math.nan, "m"),),
+        )
+        for one in change.joints
+    ]
 
 
 def _clearance_hit(change: Change, situation: Situation, addition: str = "") -> Hit:
@@ -456,7 +481,8 @@ def nothing_found(situation: Situation) -> Sequence[Hit]:
     if found.state is DiagnosisState.OFF and found.reason:
         observed.append(f"the torque is not compared with wider joints: {found.reason}")
     elif known:
-        observed.append(f"{found.cycles} gait cycles show clearances to ± {amount(max(known), 'm')}")
+        since = "changes since the baseline" if found.baseline_m else "changes from the modelled clearances"
+        observed.append(f"{found.cycles} gait cycles show {since} to ± {amount(max(known), 'm')}")
     observed += filter(None, (found.next_step,))
     evidence = (Evidence("torque_mismatch", rest, limit, ""),)
     return [Hit(words={"observed": "; ".join(observed)}, evidence=evidence)]

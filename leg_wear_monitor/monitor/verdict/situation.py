@@ -69,6 +69,10 @@ class JointSituation:
         What a person measured last on the present part.
     seen : tuple of KnownClearance
         Estimates from measurements, as far as there are any.
+    change : (float, float) or None
+        Change since the baseline by the drive torque [m], and its standard deviation.
+    sigma_m : float
+        Standard deviation of the modelled clearance; NaN where the torque is not compared.
     is_used : bool
         Whether the forecast rests on what encoders show of this joint.
     is_measurement_used : bool
@@ -83,6 +87,8 @@ class JointSituation:
     best_estimate_m: float = math.nan
     measured: KnownClearance | None = None
     seen: tuple[KnownClearance, ...] = ()
+    change: tuple[float, float] | None = None
+    sigma_m: float = math.nan
     is_used: bool = False
     is_measurement_used: bool = False
     replaced_ns: int = 0

@@ -243,6 +243,9 @@ def _clearance_words(summary: ReplaySummary, view: JointView) -> list[tuple[str,
         digits = 2 if sigma >= 0.1 else 3
         around = f"{1.0e3 * estimated_m:.{digits}f} ± {sigma:.{digits}f}"
         seen.append(("", f"estimated {around} mm by {view.seen[2]}"))
+    if view.clearance.change_m is not None:
+        change, sigma = 1.0e3 * view.clearance.change_m, 1.0e3 * (view.clearance.change_sigma_m or 0.0)
+        seen.append(("", f"changed by {change:+.3f} ± {sigma:.3f} mm since the baseline"))
     if view.clearance.measured_m is not None:
         sigma = 1.0e3 * (view.clearance.measured_sigma_m or 0.0)
         seen.append(("", f"measured {1.0e3 * view.clearance.measured_m:.3f} ± {sigma:.3f} mm by hand"))

@@ -111,7 +111,7 @@ def test_what_another_user_owns_is_refused(shared):
         (shared / name).mkdir() if name == "theirs" else (shared / name).symlink_to("/root")
         os.chown(shared / name, NOBODY, NOBODY, follow_symlinks=False)
         fault = make_private(shared / name / "leaf")
-        assert fault == f"{shared / name} belongs to another user (uid {NOBODY})"
+        assert fault == f"{shared / name} belongs to a different user (uid {NOBODY})"
     assert list((shared / "theirs").iterdir()) == []
 
 
@@ -127,7 +127,7 @@ def test_a_directory_laid_in_advance_by_another_user_is_not_used(shared, tmp_pat
     assert not any(laid.iterdir())
     assert Path(place).parents[1].parent == shared
     assert not Path(place).is_relative_to(laid.parent)
-    assert f"{laid.parent} belongs to another user (uid {NOBODY})" in output
+    assert f"{laid.parent} belongs to a different user (uid {NOBODY})" in output
     assert "compiled code is not stored" in output
     assert not Path(place).exists()  # gone with the process
 

@@ -135,7 +135,7 @@ def _load(load: Load | None) -> str:
         return ""
     return (
         f"a foot load of {load.force_n:.3g} N ± {load.sigma_n:.2g} N explains {100.0 * load.explained:.0f} % "
-        "of what does not fit; the proposal allows for it, but record with the foot in the air"
+        f"of the unexplained torque; the proposal allows for it, but record with the foot in the air"
     )
 
 
@@ -165,7 +165,8 @@ def _anew(found: proposal.Found) -> str:
         return ""
     each = ", ".join(f"{offset:.3f}" for offset in offsets)
     return (
-        f"the encoder starts at another zero in each recording: the torque's phase gives the offsets {each} "
+        f"the encoder starts at a different zero in each recording: the torque's phase gives the offsets "
+        f"{each} "
         "rad; the proposed offset is that of the last recording and is valid until the next boot"
     )
 

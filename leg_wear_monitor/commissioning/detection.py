@@ -206,7 +206,7 @@ def joint_detections(walk: Walk, reference: TorqueReference) -> tuple[JointDetec
     found = _found(walk, explainer)
     if off >= NAMED_TO:
         why = (
-            f"it is not that of this leg in the air (mean square {off:.2g}, names are sure up to "
+            f"it does not fit this leg in the air (mean square {off:.2g}, names are sure up to "
             f"{NAMED_TO:g}): a load, other masses or lengths, or a drive that rubs or gives way"
         )
         return tuple(attrs.evolve(each, is_good=False, reason=why) for each in found)
@@ -311,7 +311,7 @@ def _reasons(walk: Walk, reference: TorqueReference, sensor: TorqueSensor, bad: 
 def _better(sensor: TorqueSensor) -> Iterator[tuple[str, TorqueSensor]]:
     """Sensors that are better in one respect, then in all, with what is wrong with the present one."""
     yield (
-        "the torque varies from step to step by more than that of a leg that walks steadily in the air",
+        "the torque varies from step to step by more than for a leg that walks steadily in the air",
         sensor,
     )
     rate, fast = 1.0 / sensor.period_s, SAMPLES / sensor.cycle_s

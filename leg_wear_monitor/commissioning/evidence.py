@@ -166,7 +166,7 @@ def does_not_fit(one: Fit, mechanism: Mechanism) -> str:
     if rest < _NOTABLE:
         return ""
     sentence = (
-        f"{100.0 * rest:.0f} % of the torque repeats with each turn and is not that of {mechanism.name}: "
+        f"{100.0 * rest:.0f} % of the torque repeats with each turn and does not fit {mechanism.name}: "
         "other masses or lengths, a spring, a load, or impacts that a sensor of instants does not average"
     )
     body, change, explained = _heavier(one, mechanism)

@@ -49,7 +49,7 @@ def exact_ratio(measured: float, error: float) -> float | None:
         None if no simple fraction lies within the error, or if one would by chance.
     """
     if not measured > 0.0:
-        raise LegWearError(f"{measured!r} is no gear ratio, expected one above 0")
+        raise LegWearError(f"{measured!r} is not a gear ratio. Expected a number above 0")
     if measured < 1.0:
         inverse = exact_ratio(1.0 / measured, error)
         return None if inverse is None else 1.0 / inverse
@@ -95,9 +95,7 @@ class Found:
         mismatch = self.fit.mismatch
         if mismatch < UNEXPLAINED:
             return self.choice.doubts
-        sentence = (
-            f"the torque: {100.0 * mismatch:.0f} % of its RMS is not that of this leg, whatever is chosen"
-        )
+        sentence = f"the torque: {100.0 * mismatch:.0f} % of its RMS does not fit this leg, with any choice"
         return (*self.choice.doubts, sentence)
 
     @property

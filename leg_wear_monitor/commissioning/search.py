@@ -216,8 +216,8 @@ class Choice:
         sentences = [f"{name}: {rival.doubt}" for name, rival in self.rivals.items() if rival.doubt]
         if rest > ANOTHER_LEG:
             sentences.append(
-                f"another leg: {100.0 * rest:.0f} % of the torque repeats with each turn and is not that of "
-                "this mechanism, however it is turned"
+                f"a different leg: {100.0 * rest:.0f} % of the torque repeats with each turn and does not "
+                f"fit this mechanism at any crank angle"
             )
         return tuple(sentences)
 
@@ -278,7 +278,7 @@ def _is_the_same(name: str, best: Candidate, rival: Candidate) -> bool:
 
 def _also(name: str, rival: Candidate) -> str:
     if name == "crank_joint":
-        return f"{rival.joint.joint} turns with the crank, too, at {rival.fit.gear_ratio:.6g} turns a turn"
+        return f"{rival.joint.joint} also turns with the crank, at {rival.fit.gear_ratio:.6g} turns a turn"
     return f"{rival.torque.label} is the same torque"
 
 

@@ -53,7 +53,7 @@ def fault_of(path: Path) -> str | None:
         except OSError as error:
             return f"{here} cannot be read: {error.strerror}"
         if found.st_uid not in (0, os.geteuid()):
-            return f"{here} belongs to another user (uid {found.st_uid})"
+            return f"{here} belongs to a different user (uid {found.st_uid})"
         if stat.S_ISLNK(found.st_mode):
             links += 1
             if links > _MOST_LINKS:

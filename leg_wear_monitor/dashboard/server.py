@@ -76,7 +76,8 @@ def listen(host: str, port: int) -> Place:
     except OSError as error:
         reason = " ".join(str(error.strerror or error).split())
         raise LegWearError(
-            f"--port: {printable(host)}:{port} cannot be used: {reason}; expected another one, or 0 for any"
+            f"--port: {printable(host)}:{port} cannot be used: {reason}. Expected a different port, or 0 for "
+            f"any free port"
         ) from error
     except UnicodeError as error:
         raise LegWearError(f"--host: {printable(host)!r} is not a host") from error

@@ -486,7 +486,7 @@ def _turned(source: str, angles: Floats) -> float:
     turned, path = float(angles[-1] - angles[0]), float(np.abs(np.diff(angles)).sum())
     if path > _MOST_PATH * abs(turned) + _ROUNDING:
         fault = f"the crank swings, {path:.3g} turns to and fro for {abs(turned):.3g} turns in all"
-        text = f"{source}: {fault}; values per gait cycle are those of no gait"
+        text = f"{source}: {fault}; values per gait cycle have no meaning"
         warnings.warn(text, ConfigWarning, stacklevel=4)
     return turned
 

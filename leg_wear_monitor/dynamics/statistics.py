@@ -104,7 +104,7 @@ def open_balance(result: SimulationResult) -> str | None:
     if abs(energy.residual) <= most:
         return None
     return (
-        f"the energy does not close, with a residual of {energy.residual:.3g} J beside losses of {lost:.3g} "
+        f"the energy does not close, with a residual of {energy.residual:.3g} J and losses of {lost:.3g} "
         "J; forces and wear of model clearance may be off, try --model full"
     )
 

@@ -120,7 +120,7 @@ def _name_fault(name: str) -> str | None:
     """Why a leg cannot have this name; None if it can."""
     if _NAME.fullmatch(name):
         return None
-    return f"{name!r} is no name for a directory, expected up to 100 letters, digits, '.', '_' or '-'"
+    return f"{name!r} is not a name for a directory. Expected up to 100 letters, digits, '.', '_' or '-'"
 
 
 def _patterns_fault(patterns: Patterns) -> str | None:

@@ -241,7 +241,7 @@ def read_toe_force(path: Path) -> Floats:
         fault = f"{peak_n:.3g} N at most and {up.min():.3g} N at least, expected a ground that pushes up"
         raise ConfigError(str(path), _OF_FORCE[1], fault)
     if not least_n <= peak_n <= most_n:
-        fault = f"{peak_n:.3g} N at most, usual are {least_n:g} to {most_n:g} N; another unit than N?"
+        fault = f"{peak_n:.3g} N at most, usual are {least_n:g} to {most_n:g} N; a unit other than N?"
         warnings.warn(f"{path}: {_OF_FORCE[1]}: {fault}", ConfigWarning, stacklevel=2)
     at = np.arange(PHASES) * (TURN / PHASES)
     return np.stack([np.interp(at, angle, force, period=TURN) for force in (along, up)], axis=1)
@@ -252,7 +252,7 @@ def _column(path: Path, rows: Sequence[Mapping[str, str]], name: str) -> Floats:
     if rows and name not in rows[0]:
         if name == _OF_FORCE[-1]:
             return np.zeros(len(rows))
-        raise ConfigError(str(path), name, f"there is no such column, the file has {', '.join(rows[0])}")
+        raise ConfigError(str(path), name, f"unknown column. The file has {', '.join(rows[0])}")
     found = np.array([number_of(row[name]) for row in rows], float)
     for i in np.flatnonzero(~np.isfinite(found)).tolist():
         raise ConfigError(str(path), name, f"row {i + 1}: {rows[i][name]!r} is not a finite number")

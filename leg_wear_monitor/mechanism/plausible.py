@@ -133,7 +133,7 @@ def _clearance(c: spec.Clearance) -> Iterator[Doubt]:
     if fault := ratio_fault(c.radial_clearance, c.bushing_radius):
         yield Doubt("radial_clearance", fault)
     if lacks_wear(c):
-        fault = "gives no wear coefficient, so wear is not counted; expected wear_coefficient beside it"
+        fault = "gives no wear coefficient, so the joint does not wear. Expected wear_coefficient next to it"
         yield Doubt("material", f"{c.material} {fault}")
     spread = spread_of(c, math.inf)
     if spread is not None and spread < _LEAST_SPREAD:
@@ -148,7 +148,7 @@ def ratio_fault(clearance_m: float, radius_m: float) -> str | None:
         return None
     return (
         f"{clearance_m:g} m is {100.0 * ratio:.3g} % of the bushing's radius of {radius_m:g} m, "
-        "usual are 0.01 to 5 %; another unit than the radius?"
+        "usual are 0.01 to 5 %; a unit other than the radius?"
     )
 
 

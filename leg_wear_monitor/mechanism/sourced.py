@@ -221,7 +221,7 @@ class Drive(SourcedFile):
         default=OUTPUT,
     )
     gear_ratio: SourcedValue | None = sourced("number", "turns of the motor per turn of the output")
-    lag: SourcedValue | None = sourced("time", "time by which the reported torque is late")
+    lag: SourcedValue | None = sourced("time", "delay of the reported torque")
     bandwidth: SourcedValue | None = sourced(
         "frequency", "corner frequency of a first-order low-pass between torque and reported torque"
     )

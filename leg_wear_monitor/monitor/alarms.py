@@ -271,9 +271,9 @@ FOOT_LOAD_WORDS = {
     STUCK: "the foot load does not change between stance and swing: its sensor is stuck, or the leg walks in "
     "the air",
     ZERO: "the foot load is not 0 in swing: the zero of its sensor has drifted",
-    SCALE: "the foot load has another size than the drive torque shows, or a step has: its unit or scale is "
-    "wrong",
-    EXCHANGED: "the foot load is there while this foot is in the air: it is that of the other leg",
+    SCALE: "the foot load does not agree with the drive torque or with a step of a leg: its unit or "
+    "scale is wrong",
+    EXCHANGED: "the foot load is present while this foot is in the air: it belongs to the other leg",
     SIGN: "the foot load pulls: its sign is reversed",
 }
 """What is wrong, by the kind of the alarm."""

@@ -180,7 +180,7 @@ def zero_of(walk: Walk, model: TorqueModel, sampling: str) -> Zero | str:
         return "the drive torque does not change"
     fits = _fits(pair, walk.turns, model, 0.5 * pair.interval_s if sampling == AVERAGE else 0.0)
     if not fits:
-        return "the drive torque is not that of this leg at any crank angle: see drive_torque.sign"
+        return "the drive torque does not fit this leg at any crank angle: see drive_torque.sign"
     best = fits[0]
     apart = [abs(math.remainder(_angle(one) - _angle(best), TURN)) for one in fits]
     rivals = [one for one, angle in zip(fits, apart, strict=True) if angle > _APART_RAD]
@@ -230,8 +230,8 @@ def _doubt(best: torque_fit.Fit, rivals: list[torque_fit.Fit]) -> str:
     """Why the best fit need not be the truth; empty if it is."""
     if best.mismatch > _UNLIKE or torque_fit.repeating(best) > _ANOTHER_LEG:
         return (
-            f"the drive torque is not that of this leg at any crank angle, {100.0 * best.mismatch:.0f} % of "
-            "its RMS stay unexplained"
+            f"the drive torque does not fit this leg at any crank angle, {100.0 * best.mismatch:.0f} % of "
+            f"its RMS remain unexplained"
         )
     if rivals and torque_fit.too_alike(best, rivals[0]):
         return (

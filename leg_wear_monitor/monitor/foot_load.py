@@ -176,7 +176,7 @@ class FootLoadCheck(Observer):
         if not self._load_acts:
             return "the load by the drive torque acts, if there is one"
         if not self.state.has_mean:
-            return "no load acts: wear on the ground is counted too small"
+            return "no load acts: the modelled wear on the ground is too small"
         if self.state.is_frozen:
             return "the mean load of earlier gait cycles acts"
         return "the samples themselves act"

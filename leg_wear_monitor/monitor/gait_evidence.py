@@ -136,7 +136,7 @@ class GaitEvidence:
             return "; ".join(self._doubts)
         if not self._sound:
             faults = ", ".join(f"{number} {name}" for name, number in self._faults.items())
-            return f"no crank sample can be used ({faults})" if faults else "there is no crank sample"
+            return f"no crank sample can be used ({faults})" if faults else "no crank sample arrived"
         return self._why_none()
 
     def _why_none(self) -> str:

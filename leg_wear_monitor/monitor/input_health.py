@@ -149,7 +149,7 @@ _SENTENCES = {
     "missing_joint": "do not name the crank {crank!r} exactly once: set crank_joint to its name in "
     "joint_states",
     "empty": "have no name or no position",
-    "wrong_length": "have another number of positions, velocities or efforts than of names",
+    "wrong_length": "have different numbers of positions, velocities or efforts and names",
     "not_finite": "have a value that is NaN or infinite ({where})",
     "undecodable": "cannot be decoded: wrong type or encoding",
     "wrong_type": "are of a type that is not read",

@@ -202,7 +202,7 @@ def _about_the_ledger(result: ReplayResult) -> list[Finding]:
         text = "everything in this recording is in the ledger already, so no wear was added"
         found.append(Finding(result.files[0], text, Severity.NOTE))
     elif result.monitor.already_counted_s > 0.0:
-        text = f"{result.monitor.already_counted_s:.4g} s of it are in the ledger already: not counted again"
+        text = f"{result.monitor.already_counted_s:.4g} s of it are in the ledger already and were skipped"
         found.append(Finding(result.files[0], text, Severity.NOTE))
     if result.monitor.config.ledger.path and result.is_unusable:
         path = Path(result.monitor.config.ledger.path)
@@ -232,7 +232,7 @@ def _part(directory: Path, files: list[Path]) -> Iterator[Path]:
     """File to write reports into: beside those of an earlier replay, which may have to stay."""
     path = directory / REPORTS_FILE
     if any(path.resolve() == file.resolve() for file in files):
-        raise RecordingError(str(path), "", "is to be read and written, expected another directory")
+        raise RecordingError(str(path), "", "is both read and written. Expected a different directory")
     with system_asked(directory, "cannot be made", error_of=RecordingError):
         directory.mkdir(parents=True, exist_ok=True)
     with ExitStack() as stack:

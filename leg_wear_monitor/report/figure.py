@@ -136,7 +136,7 @@ def force_traces(trace: Trace, joints: Sequence[str]) -> Figure:
     for axes, name in zip(panels[1:], joints, strict=True):
         _draw(axes, turns, np.maximum(trace.force_n[name], LEAST_N), f"{name}\n[N]", BLUE)
         axes.set_yscale("log")
-    panels[-1].set_xlabel("turns of the crank, from the first one counted", fontsize=SMALL)
+    panels[-1].set_xlabel("turns of the crank, from the first used turn", fontsize=SMALL)
     panels[0].set_xlim(turns.min(), turns.max())
     title = f"Drive torque and joint forces; at {LEAST_N} N the journal is free"
     figure.suptitle(title, fontsize=USUAL, fontweight="bold", color=INK)

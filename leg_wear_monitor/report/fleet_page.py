@@ -48,7 +48,7 @@ def fleet_page(
 def _doubt(leg: LegOverview, now_ns: int, fresh_days: float) -> str:
     """Why the verdict of a leg does not tell its state today; empty if it does."""
     if leg.state is None:
-        return "no recording of it is counted"
+        return "the ledger has no recording of it"
     age_days = (now_ns - leg.last_ns) / DAY_NS
     if age_days < -1.0:  # clocks of two machines may differ by a time zone
         return "its last recording is dated in the future"

@@ -170,7 +170,9 @@ def _error_table(found: Found) -> Table:
         + [f"{number(100.0 * fraction_of_range(arrays, name))} %" for name, *_ in known]
         for point, arrays in found
     ]
-    note = "Mean and standard deviation over the cycles of all runs. The range is that of the ideal curve."
+    note = (
+        "Mean and standard deviation over the cycles of all runs. The range is the range of the ideal curve."
+    )
     if axis and len(found) > 3 and min(axis[1]) > 0.0:
         laws = [
             power_law(axis[1], [largest_error(arrays, name).mean for _, arrays in found])

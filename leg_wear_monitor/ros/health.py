@@ -246,8 +246,8 @@ class ClockMonitor:
             return Status("clock", Level.WARN, message, values, alarms.CLOCK_SET_BACK)
         if ahead_s >= AHEAD_FROM_S:
             message = (
-                "the stamps of the samples are ahead of the node's clock: set the clocks of both computers; "
-                "samples of a time that was counted ahead are skipped later"
+                "the stamps of the samples are ahead of the node's clock: synchronise the clocks of both "
+                "computers; the monitor skips samples of this time later"
             )
             return Status("clock", Level.WARN, message, values, alarms.STAMPS_AHEAD)
         return Status("clock", Level.OK, "goes on", values)
@@ -322,7 +322,7 @@ def load_status(load: Load, inbox: Inbox, is_recorded: bool = False) -> Status:
     dropped = inbox.shed + load.lost
     level, message, code = Level.OK, "keeps up", alarms.NO_FAULT
     if dropped > load.dropped_reported:
-        level, message = Level.ERROR, "overloaded: samples were dropped and their wear is not counted"
+        level, message = Level.ERROR, "overloaded: samples were dropped, and the model has no wear for them"
         code = alarms.SAMPLES_DROPPED
     elif load.worst_delay_s > COARSE_FROM_S:
         left = "published late" if is_recorded else "not published"

@@ -59,7 +59,7 @@ UNDECIDED = (
     "if their clock restarts with each start, set ledger.skip_counted: false; "
     "if they are from a recording, use replay, or no ledger"
 )
-BEGUN = "the clock of the samples has restarted: they are counted as a new epoch"
+BEGUN = "the clock of the samples has restarted: they begin a new epoch"
 
 _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 
@@ -157,7 +157,7 @@ def audit_time(now_ns: int) -> int:
     """
     if now_ns <= 0:
         raise LegWearError(
-            "there is no time for the ledger: use_sim_time is set and no message came on /clock; "
+            "the ledger has no time: use_sim_time is set and no message came on /clock; "
             "publish /clock or start the node without use_sim_time"
         )
     return now_ns

@@ -215,7 +215,7 @@ def _type_fault(parameter: ParameterMessage) -> str:
     if parameter.value.type in _TYPES:
         return ""
     name = printable(parameter.name, 100)
-    return f"{name}: {parameter.value.type} is no type of a parameter, expected 0 to {max(_TYPES)}"
+    return f"{name}: {parameter.value.type} is not a type of a parameter. Expected 0 to {max(_TYPES)}"
 
 
 def _each_of_a_type(

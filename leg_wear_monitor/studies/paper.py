@@ -193,15 +193,17 @@ def _more_than_alone(name: str) -> Measure:
     return _above(name, *((ALL, "", place, "") for place in PLACES))
 
 
-_REPEATS_LESS = "the forces of I and J repeat less than those of A, B and G, on the mean"
-_ZONES_WIDEN = "half of B's wear lies in a narrower zone than that of G, half of G's than that of I"
+_REPEATS_LESS = "the mean repetition of the forces is smaller for I and J than for A, B and G"
+_ZONES_WIDEN = "the zone with half of the wear is narrower for B than for G, and narrower for G than for I"
 _BY_DERIVATIVE = "velocity is disturbed more than displacement, acceleration more than velocity"
 _P99 = "p99_force_n"
 
 CLAIMS = (
     Claim("hip", "A wears less deep than B", _in_one(DEPTH, HIP, "BA")),
     Claim("hip", "impacts are denser at A than at B", _in_one("impacts", HIP, "AB")),
-    Claim("hip", "half of B's wear lies in a narrower zone than that of A", _in_one("zone_deg", HIP, "AB")),
+    Claim(
+        "hip", "the zone with half of the wear is narrower for B than for A", _in_one("zone_deg", HIP, "AB")
+    ),
     Claim("hip", "B's force repeats less than A's", _repeats(HIP, "A", "B")),
     Claim("knee", "most of the variance of G's force repeats", _regular),
     Claim("foot", "J wears deeper than I", _in_one(DEPTH, FOOT, "JI")),
@@ -230,7 +232,9 @@ CLAIMS = (
     Claim("each", _ZONES_WIDEN, _above("zone_deg", (KNEE, "G", HIP, "B"), (FOOT, "I", KNEE, "G"))),
     Claim("all five", "B's zone stays where it is with the hip alone", _stays),
     Claim("foot", "the zones of I and J have nothing in common", _differ),
-    Claim("all five", "half of A's wear lies in a wider zone than that of B", _in_one("zone_deg", ALL, "AB")),
+    Claim(
+        "all five", "the zone with half of the wear is wider for A than for B", _in_one("zone_deg", ALL, "AB")
+    ),
     Claim("all five", "A is hit harder than with the hip alone", _with_all(_P99, "A", HIP)),
     Claim("all five", "B is hit harder than with the hip alone", _with_all(_P99, "B", HIP)),
     Claim("all five", "G is hit harder than with the knee alone", _with_all(_P99, "G", KNEE)),

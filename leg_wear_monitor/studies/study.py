@@ -54,10 +54,10 @@ class Ensemble:
     """The runs whose statistics a point gives: motion with clearance is chaotic, so one run says little."""
 
     runs: int = _count("runs with different initial conditions", within=(2, _MOST), default=12)
-    cycles: int = _count("gait cycles counted in each run", within=(2, _MOST), default=20)
+    cycles: int = _count("gait cycles of each run that the results use", within=(2, _MOST), default=20)
     skip_cycles: int = _count("gait cycles before them", within=(0, _MOST), default=3)
     traced_cycles: int = _count(
-        "counted cycles of each run whose curves are kept", within=(1, _MOST), default=5
+        "gait cycles of each run whose curves are stored", within=(1, _MOST), default=5
     )
     perturb_fraction: float = _count(
         "journals start up to this fraction of the clearance from the centre",

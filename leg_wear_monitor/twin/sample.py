@@ -109,7 +109,7 @@ def gait_samples(
     """
     stamps = np.atleast_1d(np.asarray(stamp_ns))
     if stamps.dtype.kind not in "iu":
-        raise LegWearError(f"stamp_ns: {stamps.dtype} is no integer type, expected nanoseconds as int64")
+        raise LegWearError(f"stamp_ns: {stamps.dtype} is not an integer type. Expected nanoseconds as int64")
     block = np.empty(len(stamps), GAIT_SAMPLE)
     kinds = {code: each.name for code, each in KINDS.items()}
     for name, value, known in (("kind", kind, kinds), ("fault", fault, FAULTS)):

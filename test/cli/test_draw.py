@@ -42,7 +42,7 @@ def test_a_drawing_is_replaced_and_nothing_else_is(run, tmp_path, complaints):
         (tmp_path / name).write_text("mine")
         result = run("draw", "four_bar", "--out", name)
         assert (result.exit_code, (tmp_path / name).read_text()) == (2, "mine")
-        fault = "exists and is no drawing of this command, expected another --out FILE"
+        fault = "exists and is not a drawing of this command. Expected a different --out FILE"
         assert complaints(result) == [f"error: --out: {name}: {fault}"]
 
 

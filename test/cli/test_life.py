@@ -49,7 +49,7 @@ def test_life_tells_regime_limits_and_the_makers_own_life(run, refused, shipped,
     (tmp_path / "rule.yaml").write_text(text.replace("wear_coefficient: 1.0e-15", pair))
     rule = run("life", "--mechanism", "rule.yaml", *ONE[3:])
     assert rule.exit_code == 0
-    assert "B not counted: its pair gives no wear coefficient" in rule.stdout
+    assert "B no modelled wear: its pair gives no wear coefficient" in rule.stdout
     assert "nan" not in rule.stdout
     (rating,) = [one for one in rule.stdout.splitlines() if one.startswith("B: the maker's rating life is ")]
     (tmp_path / "beside.yaml").write_text(

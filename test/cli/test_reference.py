@@ -32,7 +32,7 @@ def test_references_of_two_cadences_are_written_and_named(run, tmp_path: Path, m
     )
     result = run("check", "jansen.yaml")
     assert result.exit_code == 2
-    assert "leg.npz: has torque references of another leg (bionic_leg)" in result.stderr
+    assert "leg.npz: has torque references of a different leg (bionic_leg)" in result.stderr
 
 
 TABLE = "crank_angle,foot_load,foot_load_along\n"
@@ -65,7 +65,7 @@ def test_a_reference_under_a_load_is_of_a_leg_that_carries_it(run, tmp_path: Pat
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ("crank_angle,load\n0.1,2\n", "foot_load: there is no such column, the file has crank_angle, load"),
+        ("crank_angle,load\n0.1,2\n", "foot_load: unknown column. The file has crank_angle, load"),
         (TABLE + "0.1,2,3\n0.2,two,3\n", "stance.csv: foot_load: row 2: 'two' is not a finite number"),
         (TABLE + "0.1,2\n", "stance.csv: foot_load_along: row 1: None is not a finite number"),
         (TABLE + "0.1,2,3\n" * 20, "at least 12 rows of one gait cycle, in the order of their angles"),
@@ -95,7 +95,7 @@ def test_a_load_in_another_unit_is_warned_of(tmp_path: Path, peak: str, shown: s
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always")
         read_toe_force(tmp_path / "stance.csv")
-    usual = f"foot_load: {shown} at most, usual are 10 to 5000 N; another unit than N?"
+    usual = f"foot_load: {shown} at most, usual are 10 to 5000 N; a unit other than N?"
     assert [str(each.message).split(": ", 1)[1] for each in found] == ([usual] if shown else [])
 
 

@@ -212,7 +212,7 @@ def test_an_encoder_that_starts_anew_is_found_again_and_reported(
     assert result.config.crank.gear_ratio == 20.0
     assert result.config.crank.offset_rad == pytest.approx(-1.9 + TURN * 0.0025, abs=2.0e-3)
     (text,) = result.findings
-    assert "starts at another zero in each recording" in text
+    assert "starts at a different zero in each recording" in text
     assert "0.316" in text
 
 
@@ -279,7 +279,7 @@ def test_a_torque_that_looks_the_same_mirrored_and_noise_are_not_enough_to_tell(
     noise = np.random.default_rng(1).standard_normal(len(walk.time_s))
     noisy = proposed(signals_of(Robot(), attrs.evolve(walk, torque_nm=noise)))
     assert noisy.config is None
-    assert any("whatever is chosen" in text for text in noisy.not_told)
+    assert any("with any choice" in text for text in noisy.not_told)
     assert noisy.findings == ()  # neither zeros nor friction of a leg that is not seen
 
 

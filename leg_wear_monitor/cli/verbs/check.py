@@ -287,7 +287,7 @@ def _drive_listed(drive: "Drive") -> list[str]:
 
 def _drive_in_full(drive: "Drive") -> list[str]:
     """A drive with every number, its conditions and its source."""
-    head = [f"{drive.name}: {drive.title}", f"torques and speeds are those of the {drive.shaft} shaft"]
+    head = [f"{drive.name}: {drive.title}", f"torques and speeds at the {drive.shaft} shaft"]
     return [*head, *_in_lines(drive.values()), *([f"note: {drive.notes}"] if drive.notes else [])]
 
 
@@ -330,7 +330,7 @@ def _in_full(pair: "Material") -> list[str]:
     ]
     if pair.wear_coefficients is None:
         lines.append(
-            "wear coefficient of the pair: not known; a life needs a wear_coefficient beside the material"
+            "wear coefficient of the pair: not known; a life needs a wear_coefficient next to the material"
         )
     else:
         bushing, journal = pair.wear_coefficients
@@ -345,7 +345,9 @@ _MOST = 20  # directories that are listed: one version has about ten
 
 
 @click.command(short_help="List, fill or remove the compiled code on this machine.")
-@click.option("--fill", is_flag=True, help="Compile now what the first start would: about two minutes.")
+@click.option(
+    "--fill", is_flag=True, help="Compile the kernels now instead of at the first start: about two minutes."
+)
 @click.option("--clear", is_flag=True, help="Remove it; the next start compiles again.")
 def cache(fill: bool, clear: bool) -> None:
     """Print the place and the size of the compiled code, by version; or remove it, or compile it ahead.

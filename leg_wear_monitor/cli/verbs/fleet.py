@@ -12,7 +12,7 @@ from leg_wear_monitor.cli import common
 if TYPE_CHECKING:
     from leg_wear_monitor.fleet.overview import FleetOverview
 
-_OUT = "Directory of the fleet.  [default: out of the description, or fleet beside it]"
+_OUT = "Directory of the fleet.  [default: out of the description, or fleet next to it]"
 
 _fresh_option = common.option(
     "--fresh-days",
@@ -28,7 +28,7 @@ def fleet() -> None:
     """Keep the ledgers of many legs, with one table and one page."""
 
 
-@fleet.command(short_help="Count the recordings that are not counted yet.")
+@fleet.command(short_help="Replay the new recordings into the ledgers of their legs.")
 @click.argument("description", type=click.Path(path_type=Path), metavar="FLEET.yaml")
 @common.out_option(_OUT)
 @common.workers_option

@@ -136,7 +136,7 @@ def life_lines(result: "Life", limit_m: float, validity: dict[str, Any]) -> list
     ends = result.end(limit_m)
     for joint in (*result.clearance_joints, *(["leg"] if result.duty else [])):
         if joint in validity and not validity[joint]["is_counted"]:
-            lines.append(f"{joint} not counted: its pair gives no wear coefficient")
+            lines.append(f"{joint} no modelled wear: its pair gives no wear coefficient")
         else:
             lines.append(f"{joint} {_life_end(result, ends[joint], limit_m)}")
     for joint, known in validity.items():
@@ -172,7 +172,7 @@ def _numbers(ctx: click.Context, param: click.Parameter, value: str) -> tuple[fl
     return found
 
 
-@click.command(short_help="Find bushings with which each joint lasts the hours wanted.")
+@click.command(short_help="Find bushings so that each joint lasts the wanted hours.")
 @click.argument("mechanism", default="bionic_leg")
 @common.clearances_option
 @common.option(

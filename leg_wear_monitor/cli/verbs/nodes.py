@@ -95,7 +95,7 @@ def demo(out: Path) -> int:
     page = (out / "report.html").resolve()
     click.echo(f"report: {page}")
     if not same or not _headline(live["verdict"]) == _headline(again) == "stop G":
-        click.echo("error: the demo failed; see the logs beside the report", err=True)
+        click.echo("error: the demo failed; see the logs next to the report", err=True)
         return common.WITH_FINDINGS
     if os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"):
         webbrowser.open(page.as_uri())
@@ -313,8 +313,8 @@ def _serve(leg: "LiveLeg", place: "Place") -> None:
             loop.add_signal_handler(number, ended.set)
         if not is_local(place.host):
             click.echo(
-                f"warning: whoever reaches {place.host}:{place.port} can read this page: it has no password "
-                "and no encryption",
+                f"warning: anyone who reaches {place.host}:{place.port} can read this page: it has no "
+                f"password and no encryption",
                 err=True,
             )
         waits = leg.freshness()

@@ -45,7 +45,7 @@ TIMES = ("header", "log", "publish")
 @common.option(
     "--node",
     "NAME",
-    "Full name of the node to replace.  [default: leg_wear_monitor beside the crank's topic]",
+    "Full name of the node to replace.  [default: leg_wear_monitor in the namespace of the crank's topic]",
 )
 @common.option("--crank-joint", "NAME", "The crank's name.  [default: crank_joint of the parameters]")
 @common.memory_option

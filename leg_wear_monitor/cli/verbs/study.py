@@ -149,7 +149,7 @@ def _check_target(path: Path) -> None:
         raise ConfigError("--out", str(path), "expected a file that ends in .html or .urdf")
     common.check_file("--out", path)
     if path.is_file() and _OURS not in path.read_bytes()[:4096]:
-        fault = "exists and is no drawing of this command, expected another --out FILE"
+        fault = "exists and is not a drawing of this command. Expected a different --out FILE"
         raise ConfigError("--out", str(path), fault)
 
 
@@ -191,7 +191,7 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
     type=click.Choice(("on", "off")),
     default="off",
     show_default=True,
-    help="Whether wear opens the clearances during the run; it is counted either way.",
+    help="Whether wear opens the clearances during the run; the results have the wear in both cases.",
 )
 @common.option(
     "--normal-law",

@@ -213,7 +213,7 @@ def acceleration_doubts(config: MonitorConfig, most: float = MOST_ACCELERATION) 
     factor = config.wear_acceleration
     if 1.0 / most <= factor <= most:
         return ()
-    text = f"multiplies all wear by {factor:g}: a demonstration, whose clearances and lives are no leg's"
+    text = f"multiplies all wear by {factor:g}: only for demonstrations, because no real leg wears so fast"
     if factor > MOST_ACCELERATION:
         text += f"; above {MOST_ACCELERATION:g}, the walls get notches and impacts become too strong"
     return (Doubt("wear_acceleration", text),)

@@ -24,8 +24,8 @@ from leg_wear_monitor.monitor.diagnosis.state import (
 )
 
 _IRREGULAR = (
-    "the stamps of the drive torque are too irregular, or have another rate than before: a step between two "
-    "samples has no known time"
+    "the stamps of the drive torque are too irregular, or their rate has changed: the time of a step between "
+    "two samples is not known"
 )
 _CHANGING_CYCLES, _ALIKE_CYCLES = 5, 3  # in a ramp of 30 rpm a minute, two or three in a row are alike
 
@@ -56,7 +56,7 @@ def missing(state: TorqueState, references: References, config: MonitorConfig) -
         return _other_cadence(state, references)
     if len(state.cycles) < FIRST_CYCLES:
         return f"gait cycles: {len(state.cycles)} of {FIRST_CYCLES}"
-    return "the drive torque is not that of the mechanism file (late, filtered, loaded, or of another leg)"
+    return "the drive torque does not fit the mechanism file (late, filtered, loaded, or of a different leg)"
 
 
 def doubt(state: TorqueState, references: References, models: LegModels) -> str:
@@ -69,8 +69,8 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
         return f"changes at this cadence are not observed yet; at {_cadences(state.set_aside)} they are"
     if state.is_load_other:
         return (
-            "the foot carries another load than in the reference: no clearance is observable, and names of "
-            "joints are not sure, until there is a reference under this load"
+            "the load at the foot differs from the reference: no clearance is observable, and names of "
+            "joints are not sure, until a reference under this load is ready"
         )
     if state.is_load_new and state.changes:
         names = ", ".join(one.subject for one in state.changes)
@@ -87,8 +87,8 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
         if state.fit.explains:
             return ""
         return (
-            "the drive torque is not that of the commissioned leg, and no clearances explain it; they are "
-            "estimated again when its noise, scale and lost samples are as they were. If the sensor was "
+            "the drive torque does not fit the commissioned leg, and no clearance explains it; the estimate "
+            "returns when noise, scale and lost samples are as before. If the sensor was "
             "changed, reset a joint and undo it: the leg is commissioned again"
         )
     if state.sensor and state.is_narrow:
@@ -138,7 +138,7 @@ def other_sensor(state: TorqueState) -> str:
         return ""
     now = _sampled(sensor, sensor.phases)
     then = "unknown" if math.isnan(other.period_s) else _sampled(other, other.signatures.shape[1] // 2)
-    return f"the baseline is of another torque sensor ({then}; now {now}): the leg is commissioned again"
+    return f"the baseline has a different torque sensor ({then}; now {now}): the leg is commissioned again"
 
 
 def _sampled(one: TorqueSensor | CommissionedTorque, phases: int) -> str:
@@ -166,7 +166,7 @@ def _other_cadence(state: TorqueState, references: References) -> str:
         return f"the cadence changes, {now}; gait cycles are compared at {_cadences(state.known)}"
     known = f"the crank turns otherwise than in the references ({_cadences(state.known)})"
     if state.waiting and references.is_for(state.waiting[-1].profile):
-        return f"{known}; another one is being simulated: {references.percent} %"
+        return f"{known}; a new one is being simulated: {references.percent} %"
     return known
 
 
@@ -192,7 +192,7 @@ def next_step(state: TorqueState, references: References, config: MonitorConfig)
         return "" if _is_changing(state) else f"a reference for it is begun in {_cycles(left, cycle_s)}"
     if state.commissioned is None and not state.changes:
         left = COMMISSIONING_CYCLES - len(state.cycles)
-        return f"the baseline, with which smaller changes are found, is complete in {_cycles(left, cycle_s)}"
+        return f"the baseline, which shows smaller changes, is complete in {_cycles(left, cycle_s)}"
     return ""
 
 

@@ -140,7 +140,7 @@ def read_references(path: Path, mechanism: Mechanism) -> tuple[TorqueReference, 
         raise ConfigError(
             str(path),
             "",
-            f"has torque references of another leg ({printable(name, 60)}), expected those of "
+            f"has torque references of a different leg ({printable(name, 60)}), expected those of "
             f"{mechanism.name} with its bodies, lengths, clearance joints and clearances",
         )
     return found
@@ -150,7 +150,7 @@ def _references(path: Path, mechanism: Mechanism) -> tuple[tuple[TorqueReference
     """References in a file, none if it is of another leg, and the name of its mechanism."""
     try:
         if path.stat().st_size and not zipfile.is_zipfile(path):
-            raise ValueError("it is no archive of numpy")
+            raise ValueError("it is not an archive of numpy")
         with np.load(path, allow_pickle=False) as parts:
             number = int(parts["format"])
             if number != FORMAT:
@@ -211,5 +211,5 @@ def _checked(parts: Any, name: str, shape: tuple[int | None, ...]) -> Any:
         for own, wanted in zip(found.shape, shape, strict=True)
     )
     if found.dtype.kind != "f" or not fits or not np.isfinite(found).all():
-        raise ValueError(f"{name} is of another shape, or not finite")
+        raise ValueError(f"{name} has a wrong shape, or is not finite")
     return found

@@ -92,7 +92,7 @@ def life_doubts(config: MonitorConfig, leg: Mechanism) -> tuple[Doubt, ...]:
     lives = f"the lives of {given}" if given else "the lives of this leg that come with the package"
     text = (
         f"{lives} end at {1e3 * ends_m:.3g} mm, below the limit of joint {joint}, "
-        f"{1e3 * limits[joint]:g} mm; the forecast takes growth for constant beyond, expected those of "
+        f"{1e3 * limits[joint]:g} mm; the forecast takes growth for constant beyond, expected lives from "
         f"`leg-wear-monitor life --limit-m {limits[joint]:g}`"
     )
     return (Doubt("forecast.growth_law_file", text),)

@@ -133,7 +133,7 @@ class MeasurementResult:
         lines += self._compared()
         if self.agrees and self.contradicts:  # the counting is wrong, not the measurement
             used = "uses" if now.counts else "does not use"
-            lines.append(f"the joint has opened otherwise than counted; the forecast {used} the measurement")
+            lines.append(f"the joint has opened otherwise than modelled; the forecast {used} the measurement")
             lines += self.words[-1:] if now.counts else []
             return (*lines, validity([*self.earlier, now]))
         return (*lines, *self.words, validity([*self.earlier, now]))

@@ -80,7 +80,7 @@ def damage_refused(path: Path) -> Iterator[None]:
     except _DAMAGE as error:
         code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF
         if code == sqlite3.SQLITE_BUSY:
-            fault = "is in use by another monitor; end that one, or set another ledger.path"
+            fault = "is in use by another monitor. End that monitor, or set a different ledger.path"
         elif code in _NOT_WRITABLE:
             fault = f"cannot be written: {one_line(error)}; expected a writable disk"
         else:
@@ -197,5 +197,6 @@ def _check_binding(db: sqlite3.Connection, path: Path, binding: Binding) -> None
             if key == "hardware_id":
                 what += f"if it is this leg's, set {key}: {found.get(key)}, else "
             raise LedgerError(
-                what + "set ledger.path to another file for this leg, or the parameters back to that one"
+                what
+                + "set ledger.path to a different file for this leg, or the parameters back to the former leg"
             )

@@ -328,7 +328,7 @@ def read_ledger(path: Path, binding: Binding) -> LedgerContent:
     """
     with copy_of(path) as copy:
         if not copy.is_file():
-            raise LedgerError(f"{path}: cannot be read: there is no such file")
+            raise LedgerError(f"{path}: cannot be read: the file does not exist")
         with closing(connect(copy, binding)) as db, damage_refused(path):
             return LedgerContent.of(db)
 

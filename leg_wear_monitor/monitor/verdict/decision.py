@@ -106,7 +106,7 @@ def measured_figures() -> Mapping[str, MeasuredFigure]:
 
 
 HOW_SURE = "How sure"
-NOT_MEASURED = "Not known: nobody has measured how often such a verdict is right on a leg like this."
+NOT_MEASURED = "Not known: the accuracy of such a verdict has not been measured on a leg like this."
 _KNOWN = "Sure: the monitor knows this from its input or its ledger."
 _ENTERED = "Sure: an operator entered it."
 _AS_MEASURED = "As sure as the measured clearance."

@@ -77,7 +77,7 @@ _ACKNOWLEDGE = (
     "then acknowledge the alarms: `leg-wear-monitor acknowledge --config FILE --ledger FILE`, or "
     "`--node NAME`"
 )
-_COUNTED = "its faults are counted in the status `input` of /diagnostics, and in `lost` of `replay --json`"
+_COUNTED = "the status `input` of /diagnostics and `lost` of `replay --json` count its faults"
 _MEASURE = "`leg-wear-monitor measure {joint} MM --sigma MM --config FILE --ledger FILE`, or `--node NAME`"
 _ROCK = (
     "stop when it is safe, block the drive and rock joint {joints}; measure its radial clearance and enter "

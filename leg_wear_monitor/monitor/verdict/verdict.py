@@ -102,7 +102,7 @@ def diagnosis_words(diagnosis: Diagnosis, joints: Sequence[str]) -> str:
     if diagnosis.clearance_m and hidden:
         sentences.append(f"not observable: {', '.join(hidden)}")
     if diagnosis.bodies:
-        sentences.append("wear is counted with the masses, lengths and friction that the drive torque shows")
+        sentences.append("the model uses the masses, lengths and friction that the drive torque shows")
     return "; ".join(sentences)
 
 

@@ -208,8 +208,8 @@ def _table(summary: ReplaySummary) -> Table:
         caption="Clearances at the end",
         head=[*head, "growth [pm/cycle]", "± [pm/cycle]"],
         rows=rows,
-        note="Counted: the clearance when new plus the wear counted by the model since, in its "
-        "significant digits. ± is one standard deviation of the growth: gait cycles of a chaotic "
+        note="Modelled: the clearance when new plus the modelled wear since, in its significant digits. ± is "
+        "one standard deviation of the growth: gait cycles of a chaotic "
         "motion scatter, and the leg may be built with other masses than its file has.",
     )
 

@@ -283,8 +283,8 @@ def _note(views: Sequence[JointView], most_m: float, life: tuple[int, int] | Non
     if not any(view.clearance for view in views):
         return ""
     note = (
-        f"Clearances are radial, all bars from 0 to {1.0e3 * most_m:.3g} mm: blue bar counted, mark the "
-        "estimate or the measurement with two standard deviations, red line limit."
+        f"Clearances are radial, all bars from 0 to {1.0e3 * most_m:.3g} mm: blue bar modelled, mark the "
+        f"estimate or the measurement with two standard deviations, red line limit."
     )
     if life:
         note += (

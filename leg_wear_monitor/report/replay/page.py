@@ -318,8 +318,8 @@ def _entered(summary: ReplaySummary) -> list[Part]:
     """That the verdict is later than what was recorded; nothing if it is not."""
     if is_of_recording(summary):
         return []
-    words = "The verdict rests on what was entered or measured after this recording"
-    return [Text(f"{words}; input, torque, cadence, growth and forces are those of the recording.")]
+    words = "The verdict uses entries or measurements after this recording"
+    return [Text(f"{words}; input, torque, cadence, growth and forces are from the recording.")]
 
 
 def replay_page(summary: ReplaySummary) -> Page:

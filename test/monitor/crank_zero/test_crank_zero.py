@@ -84,10 +84,10 @@ UNTOLD = {
     "noise": (
         lambda one: with_torque(one, lambda t: np.random.default_rng(2).standard_normal(len(t))),
         60.0,
-        "not that of this leg",
+        "does not fit this leg",
     ),
-    "wrong sign": (lambda one: with_torque(one, np.negative), 60.0, "not that of this leg"),
-    "symmetric": (symmetric, 60.0, "not that of this leg|explain the drive torque nearly alike"),
+    "wrong sign": (lambda one: with_torque(one, np.negative), 60.0, "does not fit this leg"),
+    "symmetric": (symmetric, 60.0, "does not fit this leg|explain the drive torque nearly alike"),
     "few": (lambda one: np.delete(one, np.flatnonzero(one["kind"] != CRANK)[::10].repeat(9) + 2 * np.tile(
         np.arange(1, 10), len(one) // 20)), 60.0, "samples in 4 turns, expected 25 a turn"),
     "standing": (standing, 60.0, "the leg stands"),

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from leg_wear_monitor.playback.result import ReplayJoint, ReplaySummary
     from leg_wear_monitor.playback.summary import ReplayResult
     from leg_wear_monitor.report.plot import plot
+    from leg_wear_monitor.studies.run import load_study
     from leg_wear_monitor.twin.sample import gait_samples
 
 _HOME = {
@@ -78,6 +79,7 @@ _HOME = {
     "load_drive": "mechanism.sourced",
     "load_material": "mechanism.materials",
     "load_mechanism": "mechanism.loader",
+    "load_study": "studies.run",
     "materials": "mechanism.materials",
     "with_ground_reaction": "mechanism.person",
     "open_ledger": "monitor.ledger.ledger",
@@ -128,6 +130,7 @@ __all__ = [
     "load_drive",
     "load_material",
     "load_mechanism",
+    "load_study",
     "materials",
     "open_ledger",
     "plot",

@@ -5,8 +5,11 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.projections.polar import PolarAxes
+from matplotlib.ticker import MaxNLocator
 
-from leg_wear_monitor.dynamics.result import SimulationResult
+from leg_wear_monitor.dynamics.result import SimulationResult, Trace
+from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.reach import findings, reach_of
@@ -27,12 +30,14 @@ from leg_wear_monitor.report.figure import (
     VERMILION,
     draw_life,
     finish,
+    length_unit,
     opened,
     plain,
     time_of,
 )
 from leg_wear_monitor.report.leg_picture import draw_leg
 from leg_wear_monitor.state import Figure
+from leg_wear_monitor.wear import BUSHING, JOURNAL
 
 _COLOURS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, INK)
 
@@ -40,8 +45,8 @@ _COLOURS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, INK)
 
 
 @singledispatch
-def plot(result: Any, axes: Axes | None = None) -> Axes:
-    """Draw a result, or a mechanism.
+def plot(result: Any, axes: Axes | None = None, **of_simulation: str) -> Axes:
+    """Draw a result, or a mechanism, at the width of a column.
 
     Parameters
     ----------
@@ -53,11 +58,24 @@ def plot(result: Any, axes: Axes | None = None) -> Axes:
         angle 0, to scale, and the path of its toe [m]; where it does not close or turn, the bodies apart, or
         at the dead point.
     axes : matplotlib.axes.Axes, optional
-        Where to draw; new axes of pyplot without.
+        Where to draw; default: new axes of pyplot.
+    kind : str, optional
+        What to draw of a simulation: ``force``, or ``portrait`` (place of a journal in its bushing against
+        its rate), ``poincare`` (the same once per gait cycle), ``wear`` (depth around bushing and journal),
+        ``torque``, or the deviation of the toe from the ideal leg: ``displacement``, ``velocity``,
+        ``acceleration``. All but ``wear`` need a trace.
+    joint : str, optional
+        Clearance joint of a portrait, a Poincaré section or the wear; default: the first.
 
     Returns
     -------
     matplotlib.axes.Axes
+        Its figure saves as PDF or SVG: ``axes.figure.savefig("portrait.pdf")``.
+
+    Raises
+    ------
+    ConfigError
+        If the result lacks the trace or the joint, or there is no such kind.
 
     Examples
     --------
@@ -71,19 +89,96 @@ def plot(result: Any, axes: Axes | None = None) -> Axes:
     )
 
 
+_TURNS = "turns of the crank"
+# kinds of a trace's column: field, factor, label
+_OF_TRACE = {
+    "torque": ("drive_torque_nm", 1.0, "drive torque [N m]"),
+    "displacement": ("toe_error_m", 1.0e3, "toe displacement error [mm]"),
+    "velocity": ("toe_error_mps", 1.0, "toe velocity error [m/s]"),
+    "acceleration": ("toe_error_mps2", 1.0, "toe acceleration error [m/s²]"),
+}
+
+
 @plot.register
-def _simulation(result: SimulationResult, axes: Axes | None = None) -> Axes:
-    axes, across = _new() if axes is None else axes, ""
+def _simulation(
+    result: SimulationResult, axes: Axes | None = None, kind: str = "force", joint: str = ""
+) -> Axes:
+    if kind == "force":
+        return _force(result, _new() if axes is None else axes)
+    if kind not in (*_OF_TRACE, "portrait", "poincare", "wear"):
+        known = ", ".join(("force", "portrait", "poincare", "wear", *_OF_TRACE))
+        raise ConfigError("kind", "", f"{kind!r} is not one of {known}")
+    if kind in _OF_TRACE:
+        return _column(_trace(result), kind, _new() if axes is None else axes)
+    name = joint or next(iter(result.clearance_joints), "")
+    if name not in result.clearance_joints:
+        known = ", ".join(result.clearance_joints) or "none, the leg is ideal"
+        raise ConfigError("joint", "", f"{name!r} has no clearance, expected one of: {known}")
+    if kind == "wear":
+        return _wear(result, name, _new(projection="polar") if axes is None else axes)
+    return _plane(_trace(result), name, kind, _new() if axes is None else axes)
+
+
+def _trace(result: SimulationResult) -> Trace:
+    if result.trace is None:
+        raise ConfigError("trace", "", "the result has no trace, expected a simulation with trace=N")
+    return result.trace
+
+
+def _force(result: SimulationResult, axes: Axes) -> Axes:
     if result.trace is None:
         _bars(axes, result)
-    else:
-        for k, name in enumerate(result.clearance_joints or tuple(result.joints)):
-            force = np.maximum(result.trace.force_n[name], LEAST_N)
-            colour = BODY_COLOURS[k % len(BODY_COLOURS)]
-            axes.plot(result.trace.crank_angle_rad / TURN, force, color=colour, linewidth=0.7, label=name)
-        axes.set_yscale("log")
-        across = "turns of the crank"
-    return _finished(axes, across, "force [N]")
+        return _finished(axes, "", "force [N]")
+    for k, name in enumerate(result.clearance_joints or tuple(result.joints)):
+        force = np.maximum(result.trace.force_n[name], LEAST_N)
+        colour = BODY_COLOURS[k % len(BODY_COLOURS)]
+        axes.plot(result.trace.crank_angle_rad / TURN, force, color=colour, linewidth=0.7, label=name)
+    axes.set_yscale("log")
+    return _finished(axes, _TURNS, "force [N]")
+
+
+def _column(trace: Trace, kind: str, axes: Axes) -> Axes:
+    """The drive torque, or the size of a deviation of the toe, over the turns of the crank."""
+    field, factor, label = _OF_TRACE[kind]
+    values = getattr(trace, field)
+    if values is None:
+        raise ConfigError("kind", "", f"the result has no {kind} error, expected a toe and a steady crank")
+    size = values if values.ndim == 1 else np.linalg.norm(values, axis=1)
+    axes.plot(trace.crank_angle_rad / TURN, factor * size, color=BLUE, linewidth=0.7)
+    return _finished(axes, _TURNS, label)
+
+
+def _plane(trace: Trace, name: str, kind: str, axes: Axes) -> Axes:
+    """Place of a journal against its rate: a line, or one point per gait cycle."""
+    joint, step = trace.joints[name], 1
+    look: dict[str, Any] = {"linewidth": 0.5}
+    if kind == "poincare":
+        look = {"linestyle": "", "marker": ".", "ms": 3.0}
+        step = max(1, round(TURN / abs(float(np.diff(trace.crank_angle_rad[:2])[0]))))
+    for i, (axis, colour) in enumerate((("x", BLUE), ("y", VERMILION))):
+        place, rate = joint.eccentricity_m[::step, i], joint.eccentricity_rate_mps[::step, i]
+        axes.plot(1.0e3 * place, 1.0e3 * rate, color=colour, label=f"{name}, {axis}", **look)
+    return _finished(axes, "place in the bushing [mm]", "rate [mm/s]")
+
+
+def _wear(result: SimulationResult, name: str, axes: Axes) -> Axes:
+    """Depth around bushing and journal, on polar axes or over the angle."""
+    depth = result.surfaces.depth[result.clearance_joints.index(name)]  # type: ignore[union-attr]
+    scale, unit = length_unit(float(depth.max()))
+    angle = (np.arange(depth.shape[1]) + 0.5) * (TURN / depth.shape[1])
+    is_polar = isinstance(axes, PolarAxes)
+    for surface, label, colour in ((BUSHING, "bushing", BLUE), (JOURNAL, "journal", ORANGE)):
+        around = np.append(depth[surface], depth[surface, 0]) if is_polar else depth[surface]
+        at = np.append(angle, angle[0] + TURN) if is_polar else np.rad2deg(angle)
+        axes.plot(at, scale * around, color=colour, linewidth=0.9, label=f"{name}, {label}")
+    if isinstance(axes, PolarAxes):  # has no left and bottom frame line to format
+        axes.set_title(f"wear depth [{unit}], angle in the body's frame", fontsize=SMALL)
+        axes.tick_params(labelsize=SMALL)
+        axes.yaxis.set_major_locator(MaxNLocator(3))
+        axes.set_rlabel_position(135.0)
+        axes.legend(fontsize=SMALL, frameon=False, loc="lower left", bbox_to_anchor=(0.9, 0.85))
+        return axes
+    return _finished(axes, "angle in the body's frame [°]", f"wear depth [{unit}]")
 
 
 def _bars(axes: Axes, result: SimulationResult) -> None:
@@ -128,11 +223,16 @@ def _mechanism(result: Mechanism, axes: Axes | None = None) -> Axes:
     return _finished(axes, "x [m]", "y [m]")
 
 
-def _new() -> Axes:
+_COLUMN_INCH = 3.6, 2.7  # column width of a paper: the fonts are as large in print as they are here
+_SCREEN_DPI = 150.0
+
+
+def _new(projection: str | None = None) -> Axes:
     """Axes of pyplot, which a notebook shows by itself and ``pyplot.show()`` in a window."""
     from matplotlib import pyplot
 
-    axes: Axes = pyplot.subplots(layout="constrained")[1]
+    figure = pyplot.figure(figsize=_COLUMN_INCH, dpi=_SCREEN_DPI, layout="constrained")
+    axes: Axes = figure.add_subplot(projection=projection)
     return axes
 
 

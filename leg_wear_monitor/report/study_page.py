@@ -30,6 +30,7 @@ from leg_wear_monitor.studies.run import StudyResults
 from leg_wear_monitor.studies.tables import (
     ARCHARD,
     DEPTH,
+    FORGET,
     TITLES,
     Found,
     Spread,
@@ -68,7 +69,6 @@ _WEAR = {
 }
 _CHARTS = ("peak_force_n", "p99_force_n", "mean_force_n", DEPTH, ARCHARD)
 _MOST_SHOWN = 6  # points with curves and surfaces; of more points, the first, the middle and the last
-_FORGET = 3  # first cycles of an exponent, in which the neighbours turn into the fastest growing direction
 _LONGEST, _SAME = 16, 1.0e-3  # longest period searched [cycles]; tolerance for equal points [clearances]
 _KEY = "Shaded: the middle 90 % of all cycles. Blue: one cycle of one run, as an example. Dashed: ideal leg."
 
@@ -284,13 +284,11 @@ def _exponent_table(exponents: Found) -> Table:
     rows = []
     for point, arrays in exponents:
         one, (runs, cycles) = (
-            exponent(arrays["stretch_per_cycle"], 1.0, _FORGET),
+            exponent(arrays["stretch_per_cycle"], 1.0, FORGET),
             arrays["stretch_per_cycle"].shape,
         )
         grows = number(math.log(1000.0) / one.value) if one.value > 0.0 else "–"
-        rows.append(
-            [point.label, f"{one.value:.2f} ± {one.error:.2f}", grows, f"{runs} × {cycles - _FORGET}"]
-        )
+        rows.append([point.label, f"{one.value:.2f} ± {one.error:.2f}", grows, f"{runs} × {cycles - FORGET}"])
     head = ("", "exponent [1/cycle]", "cycles in which an error grows a thousandfold", "pairs × cycles")
     note = "Mean and standard error over pairs of neighbours (Benettin and others 1980). Above 0: chaotic."
     return Table(caption="Largest Lyapunov exponent", head=head, rows=rows, note=note)

@@ -23,7 +23,7 @@ from leg_wear_monitor.mechanism.loader import (
 )
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.studies.study import Point, Study, parse_study
-from leg_wear_monitor.studies.tables import Found, joint_columns, point_columns
+from leg_wear_monitor.studies.tables import TABLES, Found
 from leg_wear_monitor.studies.tasks import Arrays, check_points, code_digest, compute
 from leg_wear_monitor.workers import results
 
@@ -164,23 +164,6 @@ class StudyResults:
         """Labels of the points that have no result yet."""
         return [point.label for point, arrays in zip(self.points, self.arrays, strict=True) if not arrays]
 
-    def to_pandas(self) -> "dict[str, pd.DataFrame]":
-        """Tables ``points`` and ``joints`` of the points with a response; requires pandas.
-
-        One row per point, and one row per point and clearance joint. A statistic has its mean and its
-        standard deviation over the ensemble, after a dot: ``peak_force_n.mean``.
-
-        Raises
-        ------
-        LegWearError
-            If pandas is not installed.
-        """
-        found = self.of("response")
-        return {
-            "points": data_frame(point_columns(found), index="point"),
-            "joints": data_frame(joint_columns(found), index=["point", "joint"]),
-        }
-
 
 def load_results(directory: Path) -> StudyResults:
     """Read a study's directory.
@@ -213,3 +196,29 @@ def _read_point(path: Path) -> Arrays:
     except _UNREADABLE as error:
         fault = f"cannot be read ({' '.join(str(error).split())}); remove it and run the study again"
         raise ConfigError(str(path), "", fault) from error
+
+
+def load_study(path: str | Path) -> "dict[str, pd.DataFrame]":
+    """Read the results of a study as tables; requires pandas.
+
+    Parameters
+    ----------
+    path : str or pathlib.Path
+        Directory that the study was written to.
+
+    Returns
+    -------
+    dict of str to pandas.DataFrame
+        ``points`` and ``joints`` (responses), ``lives``, ``exponents``, ``sections``: one row per point, with
+        the settings of the point, and per joint or gait cycle. A mean has its standard deviation beside it,
+        after a dot: ``peak_force_n.mean``, ``peak_force_n.deviation``.
+
+    Raises
+    ------
+    ConfigError
+        If it is not the directory of a study, or a file in it cannot be read.
+    LegWearError
+        If pandas is not installed.
+    """
+    results = load_results(Path(path))
+    return {name: data_frame(columns_of(results.of(task))) for name, (task, columns_of) in TABLES.items()}

@@ -153,7 +153,7 @@ class Point:
         return hashlib.sha256("\n".join((plain, leg, code_digest())).encode()).hexdigest()[:20]
 
 
-_LABELS: dict[str, Callable[[Any], str]] = {
+VARIED: dict[str, Callable[[Any], str]] = {
     "clearances": ", ".join,
     "clearance_m": lambda value: f"{1.0e3 * value:g} mm",
     "speed_rpm": lambda value: f"{value:g} rpm",
@@ -190,7 +190,7 @@ class Sweep:
     @property
     def varied(self) -> list[str]:
         """The setting that varies; empty without one."""
-        return [name for name in _LABELS if getattr(self, name)]
+        return [name for name in VARIED if getattr(self, name)]
 
 
 @attrs.frozen(kw_only=True)
@@ -227,7 +227,7 @@ class Study:
             for varied in sweep.varied or ["clearances"]:
                 for value in getattr(sweep, varied) or (self.clearances,):
                     run = base | {varied: value}
-                    points += [self._point(_LABELS[varied](value), task, run) for task in sweep.keep]
+                    points += [self._point(VARIED[varied](value), task, run) for task in sweep.keep]
         return points
 
     def _point(self, label: str, task: str, run: dict[str, Any]) -> Point:

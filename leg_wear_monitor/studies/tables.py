@@ -1,7 +1,7 @@
 """Statistics of a study's points, and its tables."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import attrs
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.studies.study import Point
+from leg_wear_monitor.studies.study import VARIED, Point
 from leg_wear_monitor.studies.tasks import ERRORS, Arrays
 from leg_wear_monitor.wear import BUSHING, wear_zone
 
@@ -20,6 +20,7 @@ TITLES = ("toe displacement", "toe velocity", "toe acceleration", "drive torque"
 """The quantities in `ERRORS` in words."""
 # wear depth, and normal force times sliding distance: by Archard's law the worn volume is proportional to it
 DEPTH, ARCHARD = "wear_depth_m_per_cycle", "archard_integral_j_per_cycle"
+FORGET = 3  # first cycles of an exponent, in which the neighbours turn into the fastest growing direction
 _OF_ALL_JOINTS = ("peak_force_n", "mean_force_n", "rms_force_n", "p99_force_n")  # others: of clearance joints
 
 
@@ -190,35 +191,84 @@ _OF_JOINTS = (
 
 
 def point_columns(found: Found) -> Columns:
-    """One row a point: largest errors of toe and drive in a cycle against the ideal leg, and the torque.
+    """One row per point: largest errors of toe and drive in a cycle against the ideal leg, and the torque.
 
     None for the errors of a toe that the leg does not have.
     """
-    columns: Columns = {
-        "point": [point.label for point, _ in found],
-        "clearance_joints": [", ".join(clearance_joints_of(arrays)) for _, arrays in found],
-        "clearance_m": [point.clearance_m for point, _ in found],
-        "speed_rpm": [point.settings["speed_rpm"] for point, _ in found],
-    }
+    columns = _settings([point for point, _ in found])
     for name in ERRORS:
-        is_known = f"ideal_{name}"
-        errors = [largest_error(arrays, name) if is_known in arrays else None for _, arrays in found]
+        errors = [largest_error(arrays, name) if f"ideal_{name}" in arrays else None for _, arrays in found]
         columns |= _means(name, errors)
     return columns | _means("rms_torque_nm", [spread(arrays["rms_torque_nm"]) for _, arrays in found])
 
 
 def joint_columns(found: Found) -> Columns:
-    """One row a point and clearance joint: forces, impacts, contact, and wear of the bushing."""
+    """One row per point and clearance joint: forces, impacts, contact, and wear of the bushing."""
     rows = [(point, arrays, joint) for point, arrays in found for joint in clearance_joints_of(arrays)]
-    columns: Columns = {
-        "point": [point.label for point, _, _ in rows],
-        "joint": [joint for _, _, joint in rows],
-        "clearance_m": [point.clearance_m for point, _, _ in rows],
-        "speed_rpm": [point.settings["speed_rpm"] for point, _, _ in rows],
-    }
+    columns = _settings([point for point, *_ in rows]) | {"joint": [joint for *_, joint in rows]}
     for name in _OF_JOINTS:
         columns |= _means(name, [of_joint(arrays, name, joint) for _, arrays, joint in rows])
     return columns
+
+
+def life_columns(found: Found) -> Columns:
+    """One row per point, clearance joint and life."""
+    rows = [
+        (point, arrays, k, run)
+        for point, arrays in found
+        for k in range(len(clearance_joints_of(arrays)))
+        for run in range(len(arrays["cycles"]))
+    ]
+    return _settings([point for point, *_ in rows]) | {
+        "joint": [clearance_joints_of(arrays)[k] for _, arrays, k, _ in rows],
+        "cycles": [float(arrays["cycles"][run, -1]) for _, arrays, _, run in rows],
+        "clearance_mean_m": [float(arrays["clearance_mean_m"][run, -1, k]) for _, arrays, k, run in rows],
+        "clearance_max_m": [float(arrays["clearance_max_m"][run, -1, k]) for _, arrays, k, run in rows],
+    }
+
+
+def exponent_columns(found: Found) -> Columns:
+    """One row per point: the largest Lyapunov exponent per gait cycle, and its standard error."""
+    estimates = [exponent(arrays["stretch_per_cycle"], 1.0, FORGET) for _, arrays in found]
+    return _settings([point for point, _ in found]) | {
+        "exponent_per_cycle": [estimate.value for estimate in estimates],
+        "error_per_cycle": [estimate.error for estimate in estimates],
+    }
+
+
+def section_columns(found: Found) -> Columns:
+    """One row per point, clearance joint and gait cycle: the journal at one crank angle."""
+    rows = [
+        (point, joint, arrays["section_eccentricity_m"][cycle, k], arrays["section_rate_mps"][cycle, k])
+        for point, arrays in found
+        for k, joint in enumerate(clearance_joints_of(arrays))
+        for cycle in range(len(arrays["section_rate_mps"]))
+    ]
+    columns = _settings([point for point, *_ in rows]) | {"joint": [joint for _, joint, *_ in rows]}
+    for i, axis in enumerate("xy"):
+        columns[f"eccentricity_m.{axis}"] = [float(place[i]) for *_, place, _ in rows]
+        columns[f"rate_mps.{axis}"] = [float(rate[i]) for *_, rate in rows]
+    return columns
+
+
+TABLES: dict[str, tuple[str, Callable[[Found], Columns]]] = {
+    "points": ("response", point_columns),
+    "joints": ("response", joint_columns),
+    "lives": ("life", life_columns),
+    "exponents": ("exponent", exponent_columns),
+    "sections": ("section", section_columns),
+    "portraits": ("portrait", section_columns),
+}
+"""Tables of a study: the task whose points they have, and their columns."""
+
+
+def _settings(points: Sequence[Point]) -> Columns:
+    """Label and settings of each row's point; None where a point keeps the mechanism's own value."""
+    return {
+        "point": [point.label for point in points],
+        "clearances": [", ".join(point.settings["clearances"]) for point in points],
+        **{name: [point.settings.get(name) for point in points] for name in VARIED if name != "clearances"},
+    }
 
 
 def _means(name: str, values: Sequence[Spread | None]) -> Columns:

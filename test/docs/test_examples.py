@@ -82,6 +82,26 @@ def test_the_linkage_of_examples_own_linkage_walks(monkeypatch, capsys):
     assert ideal.startswith("clearance in none: ") and loose.startswith("clearance in B, C: ")
 
 
+def test_the_figures_of_examples_paper_are_drawn(monkeypatch, tmp_path):
+    pytest.importorskip("matplotlib")
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda _figure, path: Path(path).touch())
+    monkeypatch.setattr(lw, "simulate", shortened(lw.simulate))
+    run_script(EXAMPLES / "paper" / "figures.py", monkeypatch, str(tmp_path), "2")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["all.pdf", "foot.pdf", "hip.pdf", "knee.pdf"]
+
+
+def shortened(simulate):
+    """A simulation of a sixteenth of the gait cycles, without skipped ones, and with few samples."""
+
+    def short(mechanism, *, cycles, trace, skip_cycles, **how):
+        assert skip_cycles >= 1.0
+        return simulate(
+            mechanism, cycles=cycles / 16.0, trace=max(64, min(trace, 128)), skip_cycles=0.0, **how
+        )
+
+    return short
+
+
 def test_every_example_is_in_the_table_and_no_file_of_it_is_lost():
     page = (EXAMPLES / "README.md").read_text()
     directories = sorted(path.name for path in EXAMPLES.iterdir() if path.is_dir())

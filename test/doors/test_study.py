@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+import leg_wear_monitor as lw
+
 KEPT = Path(__file__).parent / "kept" / "location.json"
 STUDY = """title: location
 question: where?
@@ -74,6 +76,20 @@ def test_a_point_that_is_damaged_is_refused_and_computed_again_to_the_bit(study:
     done = run(*line(study, 1), "--out", study / "out")
     assert done.code == 0 and done.out.startswith("points: 3, 1 computed now\n")
     assert {path.name: path.read_bytes() for path in (study / "out").rglob("*") if path.is_file()} == before
+
+
+def test_the_tables_of_a_study_have_the_documented_columns(study: Path) -> None:
+    pytest.importorskip("pandas")
+    tables = lw.load_study(study / "out")
+    page = (lw.share_directory() / "docs" / "appendix" / "study.md").read_text(encoding="utf-8")
+    for name, table in tables.items():
+        assert f"`{name}`" in page
+        assert all(f"`{column.split('.')[0]}" in page for column in table.columns), name
+    assert list(tables["points"]["clearances"]) == ["A, B", "G", "I, J"]
+    assert list(tables["joints"]["joint"]) == ["A", "B", "G", "I", "J"]
+    assert (tables["points"]["toe_position_m.mean"] > 0.0).all() and tables["lives"].empty
+    with pytest.raises(lw.ConfigError):
+        lw.load_study(study)
 
 
 @pytest.mark.parametrize(

@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-from leg_wear_monitor.mechanism.loader import load_mechanism
-from leg_wear_monitor.studies.run import StudyResults
 from leg_wear_monitor.studies.study import Point
 from leg_wear_monitor.studies.tables import joint_columns, point_columns
 
@@ -52,7 +50,7 @@ def test_a_row_a_point(found):
     columns = point_columns(found)
     assert {len(column) for column in columns.values()} == {2}
     assert columns["point"] == ["small", "large"]
-    assert columns["clearance_joints"] == ["G, J", "G"]
+    assert columns["clearances"] == ["G, J", "G"]
     assert columns["clearance_m"] == [1e-4, 2e-4]
     assert columns["drive_torque_nm.mean"] == [2.0, 4.0]
     assert columns["rms_torque_nm.deviation"] == [1.0, 2.0]
@@ -76,15 +74,3 @@ def test_a_row_a_point_and_clearance_joint(found):
 def test_without_a_result_the_columns_are_the_same(found):
     for table in (point_columns, joint_columns):
         assert {name: [] for name in table(found)} == table([])
-
-
-def test_with_pandas_they_are_frames(found):
-    pytest.importorskip("pandas")
-    points, arrays = zip(*found, strict=True)
-    results = StudyResults(
-        settings=None, mechanism=load_mechanism(), points=(*points, point("late", ["G"], 3e-4)),
-        arrays=(*arrays, {}), versions={},
-    )  # fmt: skip
-    frames = results.to_pandas()
-    assert list(frames["points"].index) == ["small", "large"]
-    assert frames["joints"].loc[("large", "G"), "clearance_m"] == 2e-4

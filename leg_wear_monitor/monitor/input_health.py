@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 
 import attrs
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.position import TURN
@@ -325,6 +326,7 @@ _SCATTERED, _SCATTERED_RAD = 0.12, 3.0e-3  # of stamps: of the period, and times
 _HELD, _HELD_RAD = 2.5, 0.05  # samples that repeat a value, and the angle that the crank turns meanwhile
 _NO_VARIATION, _SWINGS = 1.0e-3, 0.5  # standard deviation of a torque, of the predicted RMS
 _FROZEN = 0.2  # of a gait cycle, in which a torque that freezes has the same value
+_STEADY = 0.5  # by which speeds in two halves of a stretch may differ, of their mean
 _IN_TURNS = 0.1  # by which a speed may differ from the commanded one in turns instead of radians
 _AT_END, _BESIDE = 0.05, 4  # fraction of torques at the ends of a range; times as often as the next value
 _SPIKES = 0.02  # fraction of torque samples that are outliers: fewer are counted and left out
@@ -337,12 +339,14 @@ Words = Mapping[str, str]
 
 def _unit(one: Stretch) -> Words | None:
     """An angle in turns, continuous or wrapped to a turn."""
-    turns = np.unwrap(one.angle, period=1.0)
-    passed_s = one.period_s * (len(turns) - 1)
-    if passed_s <= 0.0:
+    turns, middle = np.unwrap(one.angle, period=1.0), len(one.angle) // 2
+    passed_s = 1.0e-9 * np.diff(one.crank_ns[[0, middle, -1]])
+    if not (passed_s > 0.0).all():
         return None
-    ratio = float(abs(turns[-1] - turns[0])) / passed_s / one.commanded
-    if abs(ratio * TURN - 1.0) > _IN_TURNS:
+    halves = np.abs(np.diff(turns[[0, middle, -1]])) / passed_s / one.commanded
+    ratio = float(np.mean(halves))
+    # a leg that starts or stops has this speed on average at times, but never in both halves
+    if abs(ratio * TURN - 1.0) > _IN_TURNS or np.ptp(halves) > _STEADY * ratio:
         return None
     return {"size": f"{ratio:.3g}", "ratio": f"{one.config.crank.gear_ratio / TURN:.6g}"}
 
@@ -612,10 +616,11 @@ def _likeness(one: Floats, other: Floats) -> float:
 
 _JUMP_RAD = 0.3  # by which an angle departs from a steady motion
 _JUMP_STEP_RAD = 0.2  # largest step of a crank between two samples over which a jump is known
+_AMONG = 5  # samples, of which two may be outliers
 _PERIODS = 4  # evaluation periods of a stretch
 _KEPT_PERIODS = 12  # of which samples are kept: a gait cycle may be slower than commanded
 _AFTER = 3  # commanded gait cycles without a fault, after which it is over
-_SEEN_TWICE = (NOT_OF_GAIT,)  # one strange step is no fault of the input
+_SEEN_TWICE = (JUMP, NOT_OF_GAIT)  # outliers may come back a period later; one strange step is no fault
 
 
 @attrs.define
@@ -632,8 +637,8 @@ class JudgeState:
         Samples of the present one.
     faults : mapping of str to InputFault
         By their codes.
-    last_ns, last_rad : int, float
-        Last crank sample.
+    last : Samples
+        Last crank samples.
     jumped_rad : float
         Sum of the jumps of the crank's angle, less whole turns.
     before : (n,) array or None
@@ -646,8 +651,7 @@ class JudgeState:
     spikes: tuple[int, ...] = ()
     now: tuple[Samples, ...] = ()
     faults: Mapping[str, InputFault] = attrs.field(factory=dict)
-    last_ns: int = 0
-    last_rad: float = math.nan
+    last: Samples = attrs.field(factory=lambda: np.zeros(0, GAIT_SAMPLE))
     jumped_rad: float = 0.0
     before: Floats | None = None
     has_refused: bool = False
@@ -711,7 +715,11 @@ class InputJudge:
         state.pieces = (*state.pieces, joined)[-_KEPT_PERIODS:]
         state.spikes = (*state.spikes, spikes)[-_PERIODS - 1 :]
         state.now = ()
-        self._look_for_jumps(of_crank(joined))
+        cranks = of_crank(joined)
+        self._look_for_jumps(cranks)
+        if state.jumped_rad and len(cranks):
+            words, stamps = {"size": amount(state.jumped_rad, "rad")}, cranks["stamp_ns"]
+            self._note(JUMP, words, int(stamps[0]), int(stamps[-1]))
         last = np.concatenate(state.pieces[-_PERIODS:])
         self._take(Stretch.of(last, spikes - state.spikes[0], self._size_nm, self.config))
         if is_withheld:
@@ -751,8 +759,6 @@ class InputJudge:
         first_ns = int(one.crank_ns[0]) if len(one.crank_ns) else newest_ns
         for code, words in judged(one).items():
             self._note(code, words, first_ns, newest_ns)
-        if abs(self.state.jumped_rad) > _JUMP_RAD:
-            self._note(JUMP, {"size": amount(self.state.jumped_rad, "rad")}, first_ns, newest_ns)
         kept = self.state.faults.values()
         self.state.faults = {
             one.code: one for one in kept if abs(newest_ns - one.last_ns) <= self._after_ns or not newest_ns
@@ -766,16 +772,19 @@ class InputJudge:
         self.state.faults = {**self.state.faults, code: now}
 
     def _look_for_jumps(self, cranks: Samples) -> None:
-        """Add up the steps of the crank's angle that no motion makes: an outlier comes back, a jump stays."""
-        state = self.state
-        stamp_ns = np.append(np.int64(state.last_ns), cranks["stamp_ns"])
-        angle = np.append(state.last_rad, cranks["crank_angle_rad"])
-        passed_s = 1.0e-9 * np.diff(stamp_ns)
+        """Add up the steps of the crank's angle that no motion makes: outliers come back, a jump stays."""
+        last = np.append(self.state.last, cranks)
+        self.state.last = last[-_AMONG - 1 :]
+        step = (np.diff(last["crank_angle_rad"]) + math.pi) % TURN - math.pi
+        passed_s = 1.0e-9 * np.diff(last["stamp_ns"])
         known = (passed_s > 0.0) & (passed_s * self._commanded <= _JUMP_STEP_RAD)
-        step = ((np.diff(angle) + math.pi) % TURN - math.pi)[known]
-        step = step[np.isfinite(step)]
-        if len(step):
-            off = step - np.median(step)
-            jumps = float(off[np.abs(off) > _JUMP_RAD].sum())
-            state.jumped_rad = (state.jumped_rad + jumps + math.pi) % TURN - math.pi
-        state.last_ns, state.last_rad = int(stamp_ns[-1]), float(angle[-1])
+        if len(step) <= _AMONG or not known.any():
+            return
+        # a median of neighbours leaves outliers out; beside a gap, only one of their two steps is known
+        off = np.cumsum(np.where(known, step - np.median(step[known]), 0.0))
+        change = np.diff(np.median(sliding_window_view(off, _AMONG), axis=1))
+        change = (change + math.pi) % TURN - math.pi
+        is_known = sliding_window_view(known, _AMONG + 1).all(axis=1)
+        jumps = float(change[is_known & (np.abs(change) > _JUMP_RAD)].sum())
+        jumped_rad = (self.state.jumped_rad + jumps + math.pi) % TURN - math.pi
+        self.state.jumped_rad = jumped_rad if abs(jumped_rad) > _JUMP_RAD else 0.0

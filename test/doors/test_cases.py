@@ -89,6 +89,11 @@ def held(walk: Walk) -> Walk:
     return attrs.evolve(walk, angle=walk.angle[first])
 
 
+def jumps(walk: Walk) -> Walk:
+    """The encoder loses a quarter of a turn at half of the walk."""
+    return attrs.evolve(walk, angle=walk.angle + from_half(0.0 * walk.angle, 0.25 * TURN))
+
+
 CASES: dict[str, tuple[Callable[[Walk], Walk], str]] = {
     "zero": (torques(lambda torque: 0.0 * torque), "TORQUE_CONSTANT"),
     "constant": (torques(lambda torque: 0.0 * torque + 3.7), "TORQUE_CONSTANT"),
@@ -107,11 +112,57 @@ CASES: dict[str, tuple[Callable[[Walk], Walk], str]] = {
     "arrival 2 ms": (arrival(2.0), "CRANK_STAMPS"),
     "arrival 4 ms": (arrival(4.0), "CRANK_STAMPS"),
     "held": (held, "CRANK_HELD"),
+    "jump": (jumps, "CRANK_JUMP"),
     "turns": (angles(lambda angle: angle / TURN), "CRANK_UNIT"),
     "wrapped turns": (angles(lambda angle: angle / TURN % 1.0), "CRANK_UNIT"),
     "wrapped degrees": (angles(lambda angle: np.degrees(angle) % 360.0), "TRACKING_LOST"),
     "none": (lambda walk: walk, "NONE"),
 }
+
+
+def starts(standing_s: float) -> Callable[[Walk], Walk]:
+    """A function that lets the leg stand before it walks."""
+
+    def change(walk: Walk) -> Walk:
+        before = np.arange(-round(200.0 * standing_s), 0)
+        crank_ns, torque_ns = (all_ns[0] + 5_000_000 * before for all_ns in (walk.crank_ns, walk.torque_ns))
+        torque = walk.torque[0] + 0.1 * np.random.default_rng(1).standard_normal(len(before))
+        return Walk(
+            np.append(crank_ns, walk.crank_ns),
+            np.append(np.full(len(before), walk.angle[0]), walk.angle),
+            np.append(torque_ns, walk.torque_ns),
+            np.append(torque, walk.torque),
+        )
+
+    return change
+
+
+def strayed(walk: Walk) -> Walk:
+    """One of fifty crank angles is anywhere."""
+    random = np.random.default_rng(5)
+    is_stray = random.random(len(walk.angle)) < 0.02
+    return attrs.evolve(walk, angle=np.where(is_stray, random.uniform(-3.0, 3.0, len(is_stray)), walk.angle))
+
+
+FAULTS = {code for _, code in CASES.values()} - {"NONE"}
+SOUND = {
+    "outliers of the angle": strayed,
+    **{f"stands for {s} s": starts(s) for s in (3.1, 3.2, 3.3, 3.4)},
+    "torque in steps of 2 N m": torques(lambda torque: 2.0 * np.round(torque / 2.0)),
+}
+
+
+@pytest.mark.parametrize("case", SOUND)
+def test_a_sound_input_is_never_named(leg: lw.Mechanism, walk: Walk, case: str) -> None:
+    config = lw.load_config(BAG.with_suffix(".yaml"))
+    monitor = lw.WearMonitor(
+        leg, attrs.evolve(config, diagnosis=attrs.evolve(config.diagnosis, enabled=False))
+    )
+    found: set[str] = set()
+    for part in np.array_split(SOUND[case](walk).samples(), 30):
+        monitor.update(part)
+        found.add(monitor.verdict.verdict.fault_code)
+    assert not found & FAULTS
 
 
 @pytest.mark.parametrize("case", CASES)

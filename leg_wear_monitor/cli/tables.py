@@ -1,13 +1,15 @@
 """Results as text on a terminal, at most 80 columns wide in a pipe."""
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
 
 from leg_wear_monitor.files import share_directory
+from leg_wear_monitor.monitor.alarm_specs import QUANTITIES
 from leg_wear_monitor.monitor.alarms import ADVICE, raised_values, time_words
 from leg_wear_monitor.monitor.forecast.forecast import three_digits
 from leg_wear_monitor.monitor.ledger.entry import walked_words
@@ -46,6 +48,13 @@ def figure(value: float | None) -> str:
     if not 1.0e-4 <= size < 1.0e7:
         return f"{value:.2e}"
     return f"{value:.{max(0, 2 - math.floor(math.log10(size)))}f}"
+
+
+def duration(seconds: float) -> str:
+    """A time in a unit that suits it."""
+    if seconds < 120.0:
+        return f"{seconds:.3g} s"
+    return f"{seconds / 60.0:.3g} min" if seconds < 7200.0 else f"{seconds / 3600.0:.3g} h"
 
 
 # The statistics of a simulation.
@@ -117,10 +126,10 @@ def _wear(joint: "JointResult") -> list[str]:
 # The state of a leg, and the replay that gave it.
 
 
-def print_replay(result: "ReplayResult", wall_s: float) -> None:
-    """Print the result of a replay that took ``wall_s``."""
+def print_replay(result: "ReplayResult", wall_s: float, files: Mapping[str, Path | None]) -> None:
+    """Print the result of a replay that took ``wall_s``; ``files`` are the options that name its files."""
     console, monitor = Console(highlight=False), result.monitor
-    print_state(console, monitor.state, monitor.mechanism.joint_words)
+    print_state(console, monitor.state, monitor.mechanism.joint_words, files)
     console.print(
         f"\n[bold]{monitor.config.hardware}[/bold]: {monitor.mechanism.name}; {result.crank_samples} crank "
         f"and {result.torque_samples} torque samples, {len(result.history)} gait cycles, "
@@ -130,17 +139,22 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
         console.print(words, soft_wrap=True)
     if result.is_believable:
         factor = figure(result.duration_s / wall_s)
-        console.print(f"speed  {result.duration_s:.4g} s in {wall_s:.3g} s: {factor} times real time")
+        console.print(f"speed  {duration(result.duration_s)} in {duration(wall_s)}: {factor} times real time")
     console.print(ADVICE, soft_wrap=True)
 
 
-def print_state(console: Console, state: "LegState", joint_words: Callable[[str], str]) -> None:
-    """Print the verdict, a row per joint and the raised alarms."""
+def print_state(
+    console: Console, state: "LegState", joint_words: Callable[[str], str], files: Mapping[str, Path | None]
+) -> None:
+    """Print the verdict, a row per joint and the raised alarms; commands name the files that are known."""
     verdict = state.verdict
     whose = f" joint {', '.join(map(joint_words, verdict.joints))}" if verdict.joints else ""
     head = f"{verdict.state.words.upper()}{whose}"
     console.print(f"\n[bold]{head}[/bold]: {as_plain(verdict.why)}", soft_wrap=True)
-    rows = [("to do", verdict.do), *decision_of(state)]
+    to_do = verdict.do
+    for option, path in files.items():
+        to_do = to_do.replace(f"{option} FILE", f"{option} {path}") if path else to_do
+    rows = [("to do", to_do), *decision_of(state)]
     rows.append(("code", f"{verdict.fault_code}, see {share_directory() / guide_to(verdict)}"))
     if verdict.not_valid:
         rows.append(("not valid", ", ".join(figure.words for figure in verdict.not_valid)))
@@ -157,7 +171,10 @@ def print_state(console: Console, state: "LegState", joint_words: Callable[[str]
     for alarm in raised:
         values = raised_values(alarm.state, alarm.worst, alarm.limit, alarm.unit)
         since = time_words(alarm.raised_ns)
-        console.print(f"{alarm.level.name:<6} {alarm.name}: {values}, since {since}", soft_wrap=True)
+        quantity = QUANTITIES.get(alarm.name, QUANTITIES.get(alarm.name.partition(" ")[0], ""))
+        console.print(
+            f"{alarm.level.name:<6} {alarm.name}: {quantity}: {values}, since {since}", soft_wrap=True
+        )
     if not raised:
         console.print("no alarm is raised at the end")
 

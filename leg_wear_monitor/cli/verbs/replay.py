@@ -105,7 +105,7 @@ def replay(
     if json_file != common.STDOUT:
         from leg_wear_monitor.cli.tables import print_replay
 
-        print_replay(result, took[0])
+        print_replay(result, took[0], {"--config": config, "--ledger": options["ledger"]})
     common.say(json_file, (), written)
     if is_report_there and result.monitor.is_all_counted:
         click.echo(f"warning: {out}: no wear was added, so the earlier report stays as it is", err=True)

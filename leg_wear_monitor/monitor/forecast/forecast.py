@@ -512,8 +512,6 @@ UNKNOWN = {
 }
 """What `lifetime_values` gives, not known."""
 
-_SIGMAS_APART = 2.5631  # p10 and p90 of a normal distribution
-
 
 def lifetime_values(forecast: JointForecast | LegForecast) -> dict[str, float]:
     """Quantiles of cycles, hours and days of duty by keys such as ``p50_hours``; none if not known."""
@@ -553,17 +551,3 @@ def three_digits(value: float) -> str:
         return f"{value:.2e}"
     rounded = float(f"{value:.2e}")
     return f"{rounded:.{max(0, 2 - math.floor(math.log10(abs(rounded))))}f}"
-
-
-def clearance_mm(value_m: float, p10_m: float, p90_m: float) -> str:
-    """A counted clearance [mm] in two to six digits: the last is the first one of its standard deviation.
-
-    Parameters
-    ----------
-    value_m : float
-    p10_m, p90_m : float
-        Quantiles of what it may be.
-    """
-    sigma_mm = 1.0e3 * (p90_m - p10_m) / _SIGMAS_APART
-    digits = -math.floor(math.log10(sigma_mm)) if sigma_mm > 0.0 else 6
-    return f"{1.0e3 * value_m:.{min(max(digits, 2), 6)}f}"

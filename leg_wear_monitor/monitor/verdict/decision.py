@@ -274,7 +274,7 @@ ADVICE: Mapping[str, Advice] = {
     },
     "NONE": Advice(
         if_wrong="A loosening joint stays undetected until the torque or the encoders show it.",
-        check=f"{_ROCK_ALL} None has play that you feel.",
+        check=f"{_ROCK_ALL} No joint has more play than when it was new: twice its radial clearance.",
         measured=("opened_found", "opened_found_on_ground"),
     ),
 }

@@ -260,7 +260,8 @@ RULES = (
         code="NOT_THIS_LEG",
         hits=noted("NOT_THIS_LEG"),
         why="the gait does not fit this leg: {cause}",
-        do="compare the parameters with the leg: mechanism, cadence, crank and drive_torque",
+        do="compare the parameters with the leg: mechanism, cadence, crank and drive_torque; "
+        "`leg-wear-monitor commission RECORDING` proposes them from a recording of the healthy leg",
         not_valid=EVERYTHING,
     ),
     _not_monitored(

@@ -21,7 +21,7 @@ from leg_wear_monitor.report.page import (
     not_valid,
     value,
 )
-from leg_wear_monitor.report.replay.joints import SIGMAS, counted_mm
+from leg_wear_monitor.report.replay.joints import SIGMAS
 from leg_wear_monitor.state import Figure
 
 _STEADY = 0.1  # of the commanded cadence to either side, less does not fill the picture
@@ -197,20 +197,22 @@ def joint_section(summary: ReplaySummary) -> Section:
 
 def _table(summary: ReplaySummary) -> Table:
     has_growth = Figure.GROWTH not in summary.verdict.not_valid
-    head = ["joint", "modelled clearance [mm]", "opened [nm]"]
     rows = []
     for name, joint in summary.joints.items():
-        row = [summary.leg.joint_words(name), counted_mm(summary, name), value(1.0e9, joint.opened_m)]
+        known = summary.clearances[name]
+        clearances_m = (known.best_estimate_m, known.modelled_m, known.estimated_m, known.measured_m)
+        row = [summary.leg.joint_words(name), *(value(1.0e3, each) for each in clearances_m)]
         for growth in (joint.growth_m_per_cycle, joint.growth_error_m_per_cycle):
             row.append(value(1.0e12, growth) if has_growth else NOT_VALID)
         rows.append(tuple(row))
+    head = ("joint", "best estimate [mm]", "modelled [mm]", "estimated [mm]", "measured [mm]")
     return Table(
         caption="Clearances at the end",
-        head=[*head, "growth [pm/cycle]", "± [pm/cycle]"],
+        head=(*head, "growth [pm/cycle]", "± [pm/cycle]"),
         rows=rows,
-        note="Modelled: the clearance when new plus the modelled wear since, in its significant digits. ± is "
-        "one standard deviation of the growth: gait cycles of a chaotic "
-        "motion scatter, and the leg may be built with other masses than its file has.",
+        note="Modelled: the clearance when new plus the modelled wear. Estimated: from the drive torque or "
+        "the encoders. Measured: by hand. ± is one standard deviation of the growth: gait cycles of a "
+        "chaotic motion scatter, and the leg may have other masses than its file.",
     )
 
 

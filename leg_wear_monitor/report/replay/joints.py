@@ -8,13 +8,13 @@ from typing import Any
 import attrs
 
 from leg_wear_monitor.monitor.alarms import joint_of
-from leg_wear_monitor.monitor.forecast.forecast import clearance_mm, three_digits
-from leg_wear_monitor.monitor.verdict.situation import MEASURED, SEEN, SOURCES
+from leg_wear_monitor.monitor.forecast.forecast import three_digits
+from leg_wear_monitor.monitor.verdict.situation import SOURCES
 from leg_wear_monitor.playback.result import Place, ReplaySummary
 from leg_wear_monitor.report.page import LEVEL_LOOKS, NOT_VALID, STATE_LOOKS, not_valid, render
 from leg_wear_monitor.state import Figure, JointClearance, LegAlarm, Level, LifeHours, State
 
-# A clearance joint as the first screen shows it: only values that are valid.
+# A clearance joint as the first screen shows it: its best estimate, and no other clearance.
 
 
 _NEAR = 0.5  # used fraction of the wear allowance from which on a joint is drawn as near its limit
@@ -27,58 +27,23 @@ class JointView:
     Attributes
     ----------
     joint, label : str
-        Name, and what people call it; that may be empty.
+        Name, and the name that people use; the label may be empty.
     clearance : JointClearance or None
         None if it is not known.
-    doubt : str
-        Why the counted clearance is not given; empty if it is.
     used : float or None
         Fraction of the wear allowance, from the clearance when new to its limit, that is used.
     look : str
         ``fine``, ``near``, ``over`` or ``unknown``.
     alarms : tuple of LegAlarm
-        Those that are raised.
+        The raised alarms of the joint.
     """
 
     joint: str
     label: str
     clearance: JointClearance | None
-    doubt: str
     used: float | None
     look: str
     alarms: tuple[LegAlarm, ...]
-
-    @property
-    def modelled_m(self) -> float | None:
-        """As counted; None while that is not valid."""
-        return self.clearance.modelled_m if self.clearance and not self.doubt else None
-
-    @property
-    def seen(self) -> tuple[float, float, str] | None:
-        """Clearance that encoders or the drive torque show, its standard deviation, and which of them.
-
-        Or that they showed when a latched alarm was raised. An estimate by torque does not rest on the
-        counted clearance, so it is shown while that is not valid.
-        """
-        known = self.clearance
-        if known is None:
-            return None
-        if known.best_estimate_source in SEEN and known.best_estimate_m is not None:
-            return (
-                known.best_estimate_m,
-                known.best_estimate_sigma_m or 0.0,
-                SOURCES[str(known.best_estimate_source)],
-            )
-        by = " and ".join(SOURCES.get(one, one) for one in known.estimated_by)
-        return None if known.estimated_m is None else (known.estimated_m, known.estimated_sigma_m or 0.0, by)
-
-    @property
-    def mark(self) -> tuple[float, float] | None:
-        """The clearance that was measured by hand, or else is seen, and its standard deviation [m]."""
-        known = self.clearance
-        if known is not None and known.best_estimate_m is not None and known.best_estimate_source == MEASURED:
-            return known.best_estimate_m, known.best_estimate_sigma_m or 0.0
-        return self.seen[:2] if self.seen else None
 
 
 def joint_views(summary: ReplaySummary) -> tuple[JointView, ...]:
@@ -87,7 +52,7 @@ def joint_views(summary: ReplaySummary) -> tuple[JointView, ...]:
 
 
 def _view(summary: ReplaySummary, joint: str) -> JointView:
-    clearance, doubt = summary.clearances.get(joint), not_valid(summary.verdict, Figure.CLEARANCES)
+    clearance = summary.clearances.get(joint)
     used = _used(clearance) if clearance else None
     if summary.verdict.state is State.NOT_MONITORED and (used or 0.0) < 1.0:
         used = None  # a joint that nobody watches is not shown as one that is all right
@@ -97,21 +62,10 @@ def _view(summary: ReplaySummary, joint: str) -> JointView:
         joint=joint,
         label=drawn.label if drawn else "",
         clearance=clearance,
-        doubt=doubt or ("" if clearance else "not known: no gait cycle of this leg"),
         used=used,
         look=_look(summary, joint, clearance, used),
         alarms=tuple(raised),
     )
-
-
-def counted_mm(summary: ReplaySummary, joint: str) -> str:
-    """A joint's counted clearance [mm] in the digits that are known of it."""
-    found = summary.joints.get(joint)
-    counted = summary.clearances[joint].modelled_m
-    if found is None or found.forecast is None or found.forecast.clearance_m is None:
-        return f"{1.0e3 * counted:.3f}"
-    may_be = found.forecast.clearance_m
-    return clearance_mm(counted, may_be.p10, may_be.p90)
 
 
 def _used(clearance: JointClearance) -> float | None:
@@ -140,8 +94,8 @@ def _look(summary: ReplaySummary, joint: str, clearance: JointClearance | None, 
 # A row a joint: clearance against limit, remaining life and alarms, on common axes.
 
 
-SIGMAS = 2.0  # drawn to either side of a seen clearance
-_MOST_LIMITS = 4.0  # length of the clearance axis, in the greatest limit
+SIGMAS = 2.0  # drawn to either side of an estimate
+_MOST_ALLOWANCES = 4.0  # longest axis of the bars
 _WIDTH = 100.0  # of a bar
 
 Span = tuple[float, float]  # where a part of a bar begins, and how long it is [% of the bar]
@@ -159,20 +113,20 @@ def joint_rows(summary: ReplaySummary, views: Sequence[JointView]) -> str:
     views = sorted(views, key=lambda view: (view.joint not in summary.verdict.joints, not view.alarms))
     doubt = not_valid(summary.verdict, Figure.FORECAST)
     lives = {} if doubt else summary.life
-    leg, most_m = lives.get("leg"), _most_m(views)
+    leg, most = lives.get("leg"), _most(views)
     axis = _life_axis([*(lives.get(view.joint) for view in views), leg])
     rows = [
         {
             "view": view,
-            "clearance": _clearance(view, most_m),
-            "words": _clearance_words(summary, view),
+            "bar": _bar(view, most),
+            "words": _clearance_words(view, not_valid(summary.verdict, Figure.CLEARANCES)),
             "life": _life(lives.get(view.joint), axis)
             or {"words": doubt or summary.life_answers.get(view.joint, "not known")},
             "findings": _findings(summary, view),
         }
         for view in views
     ]
-    note = " ".join([_note(views, most_m, axis), *(_holds_for(summary) if axis else [])]).strip()
+    note = " ".join([_note(views, axis), *(_holds_for(summary) if axis else [])]).strip()
     values = {"leg": _life(leg, axis), "first": _first(summary), "note": note, "doubt": doubt}
     return render("replay/joints.html", rows=rows, **values)
 
@@ -205,26 +159,30 @@ def _findings(summary: ReplaySummary, view: JointView) -> list[tuple[str, str, s
     return found
 
 
-def _most_m(views: Sequence[JointView]) -> float:
-    """End of the clearance axis [m]: all limits and marks, unless that is far beyond them."""
-    known = [view for view in views if view.clearance]
-    greatest = max((view.clearance.limit_m for view in known if view.clearance), default=1.0e-3)
-    ends = [view.modelled_m or 0.0 for view in known]
-    ends += [view.mark[0] + SIGMAS * view.mark[1] for view in known if view.mark]
-    return min(max(1.1 * greatest, 1.02 * max(ends, default=0.0)), _MOST_LIMITS * greatest)
+def _most(views: Sequence[JointView]) -> float:
+    """End of the axis of all bars, in wear allowances: all joints and limits, up to a length."""
+    ends = [end for view in views if (ends := _ends(view)) for end in ends]
+    return min(max([1.1, *ends]), _MOST_ALLOWANCES)
 
 
-def _clearance(view: JointView, most_m: float) -> dict[str, Span] | None:
-    """Limit, counted clearance, and the one that is seen with what is sure of it; none where not known."""
-    if view.clearance is None:
+def _ends(view: JointView) -> tuple[float, float] | None:
+    """Best estimate minus and plus two standard deviations, in wear allowances; None if it is not known."""
+    known = view.clearance
+    if known is None or known.best_estimate_m is None or known.limit_m <= known.new_m:
         return None
-    bar = {"limit": _span(view.clearance.limit_m, view.clearance.limit_m, most_m)}
-    if view.modelled_m is not None:
-        bar["counted"] = _span(0.0, view.modelled_m, most_m)
-    if view.mark is not None:
-        mark_m, reach = view.mark[0], SIGMAS * view.mark[1]
-        bar["seen"] = _span(mark_m, mark_m, most_m)
-        bar["sure"] = _span(mark_m - reach, mark_m + reach, most_m)
+    reach, allowance_m = SIGMAS * (known.best_estimate_sigma_m or 0.0), known.limit_m - known.new_m
+    from_new_m = known.best_estimate_m - known.new_m
+    return (from_new_m - reach) / allowance_m, (from_new_m + reach) / allowance_m
+
+
+def _bar(view: JointView, most: float) -> dict[str, Span] | None:
+    """Best estimate and limit, from the clearance when new on; None if the clearance is not known."""
+    ends = _ends(view)
+    if ends is None:
+        return None
+    bar = {"limit": _span(1.0, 1.0, most), "best": _span(0.0, 0.5 * sum(ends), most)}
+    if ends[1] > ends[0]:
+        bar["sure"] = _span(*ends, most)
     return bar
 
 
@@ -233,26 +191,22 @@ def _span(low: float, high: float, most: float) -> Span:
     return round(begin, 2), round(end - begin, 2)
 
 
-def _clearance_words(summary: ReplaySummary, view: JointView) -> list[tuple[str, str]]:
-    """What is counted and what is seen, each with the class of its words."""
-    if view.clearance is None:
-        return [("not-valid", f"counted {view.doubt}")]
-    seen = []
-    if view.seen:
-        estimated_m, sigma = view.seen[0], 1.0e3 * view.seen[1]
-        digits = 2 if sigma >= 0.1 else 3
-        around = f"{1.0e3 * estimated_m:.{digits}f} ± {sigma:.{digits}f}"
-        seen.append(("", f"estimated {around} mm by {view.seen[2]}"))
-    if view.clearance.change_m is not None:
-        change, sigma = 1.0e3 * view.clearance.change_m, 1.0e3 * (view.clearance.change_sigma_m or 0.0)
-        seen.append(("", f"changed by {change:+.3f} ± {sigma:.3f} mm since the baseline"))
-    if view.clearance.measured_m is not None:
-        sigma = 1.0e3 * (view.clearance.measured_sigma_m or 0.0)
-        seen.append(("", f"measured {1.0e3 * view.clearance.measured_m:.3f} ± {sigma:.3f} mm by hand"))
-    limit = ("", f"limit {1.0e3 * view.clearance.limit_m:.3g} mm")
-    if view.doubt:
-        return [*seen, ("not-valid", f"counted {view.doubt}"), limit]
-    return [("", f"counted {counted_mm(summary, view.joint)} mm"), *seen, limit]
+def _clearance_words(view: JointView, doubt: str) -> list[tuple[str, str]]:
+    """Best estimate with its source, and limit, each with the class of its words."""
+    known = view.clearance
+    if known is None:
+        return [("not-valid", "not known: no gait cycle of this leg")]
+    others = [("", f"limit {1.0e3 * known.limit_m:.3g} mm")]
+    if known.change_m is not None:
+        change, sigma = 1.0e3 * known.change_m, 1.0e3 * (known.change_sigma_m or 0.0)
+        others.append(("", f"changed by {change:+.3f} ± {sigma:.3f} mm since the baseline"))
+    if known.best_estimate_m is None or known.best_estimate_source is None:
+        return [("not-valid", doubt or NOT_VALID), *others]
+    sigma_mm = 1.0e3 * (known.best_estimate_sigma_m or 0.0)
+    digits = 2 if sigma_mm >= 0.1 else 3
+    around = f" ± {sigma_mm:.{digits}f}" if sigma_mm else ""
+    source = SOURCES[known.best_estimate_source]
+    return [("", f"{1.0e3 * known.best_estimate_m:.{digits}f}{around} mm according to {source}"), *others]
 
 
 def _life_axis(lives: Sequence[LifeHours | None]) -> tuple[int, int] | None:
@@ -278,14 +232,13 @@ def _life(hours: LifeHours | None, axis: tuple[int, int] | None) -> dict[str, An
     }
 
 
-def _note(views: Sequence[JointView], most_m: float, life: tuple[int, int] | None) -> str:
+def _note(views: Sequence[JointView], life: tuple[int, int] | None) -> str:
     """How to read the bars."""
     if not any(view.clearance for view in views):
         return ""
-    note = (
-        f"Clearances are radial, all bars from 0 to {1.0e3 * most_m:.3g} mm: blue bar modelled, mark the "
-        f"estimate or the measurement with two standard deviations, red line limit."
-    )
+    note = "Clearances are radial. Each bar starts at the clearance when new; the red line is the limit."
+    if any((ends := _ends(view)) and ends[1] > ends[0] for view in views):
+        note += " The black line is two standard deviations to both sides."
     if life:
         note += (
             " Remaining life in hours of walking, p50 and p10 to p90, on a logarithmic axis from "

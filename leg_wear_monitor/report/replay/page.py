@@ -5,7 +5,7 @@ import math
 import attrs
 
 from leg_wear_monitor.files import or_nan, share_directory
-from leg_wear_monitor.monitor.alarm_specs import KINDS
+from leg_wear_monitor.monitor.alarm_specs import KINDS, QUANTITIES
 from leg_wear_monitor.monitor.alarms import amount, joint_of, raised_values, time_words
 from leg_wear_monitor.monitor.verdict.decision import figures_of, how_sure
 from leg_wear_monitor.monitor.verdict.situation import COUNTED
@@ -68,6 +68,7 @@ def _raised(summary: ReplaySummary, alarm: LegAlarm) -> dict[str, str]:
         "symbol": symbol,
         "look": look,
         "title": f"{alarm.level.name} {name}",
+        "quantity": QUANTITIES.get(alarm.name, QUANTITIES.get(alarm.name.partition(" ")[0], "")),
         "words": alarm.state if doubt else values,
         "doubt": doubt,
         "since": f"since {since_words(summary, alarm.raised_ns)}",
@@ -261,9 +262,11 @@ def _cadence(summary: ReplaySummary) -> _Card:
         return "Cadence", Level.ERROR, ["unknown"]
     is_other = summary.verdict.fault_code == "CADENCE"
     level = max(status.level, Level.WARN if is_other else Level.OK)
+    why = [f"{cadence:.3g} rpm, commanded {commanded:.3g} rpm"]
     if not summary.gait.believable_cycles:
         level = Level.ERROR
-    return "Cadence", level, [f"{cadence:.3g} rpm, commanded {commanded:.3g} rpm"]
+        why.append(summary.gait.missing)
+    return "Cadence", level, why
 
 
 def _foot_load(summary: ReplaySummary) -> list[_Card]:

@@ -564,11 +564,6 @@ class WearMonitor:
             self._accounting.ledger.close()
 
     @property
-    def ledger_loss(self) -> str:
-        """What the ledger had lost when it was opened; empty if nothing was lost."""
-        return self._accounting.ledger.loss if self._accounting.ledger else ""
-
-    @property
     def coefficient_doubts(self) -> tuple[Doubt, ...]:
         """Joints whose wear the ledger has counted with another wear coefficient, when it was opened."""
         ledger = self._accounting.ledger

@@ -21,12 +21,10 @@ from leg_wear_monitor.monitor.ledger import rows
 from leg_wear_monitor.monitor.ledger.entry import (
     Audit,
     Binding,
-    ClearancePoint,
     Commissioned,
     CorrectedClearance,
     Entry,
     Event,
-    ForecastPoint,
     IdentifiedLeg,
     Measurement,
     Recount,
@@ -48,8 +46,6 @@ from leg_wear_monitor.monitor.ledger.file import (
 )
 from leg_wear_monitor.state import Verdict
 
-INTERRUPTED = "an earlier run was interrupted, the wear of its last seconds is lost"
-
 
 @attrs.frozen(kw_only=True, eq=False)
 class LedgerContent:
@@ -62,10 +58,6 @@ class LedgerContent:
         The last entry; None in a new ledger.
     verdict : Verdict or None
         Since its last change.
-    clearances : tuple of ClearancePoint
-        In the order in which they were written.
-    forecasts : dict of str to ForecastPoint
-        The last forecast of each joint.
     measurements : tuple of Measurement
         Manually measured clearances, including withdrawn ones.
     audits : tuple of Audit
@@ -74,8 +66,6 @@ class LedgerContent:
     runs: tuple[Run, ...]
     entry: Entry | None
     verdict: Verdict | None
-    clearances: tuple[ClearancePoint, ...]
-    forecasts: dict[str, ForecastPoint]
     measurements: tuple[Measurement, ...]
     audits: tuple[Audit, ...]
 
@@ -87,16 +77,9 @@ class LedgerContent:
             runs=runs,
             entry=rows.read_entry(db, runs),
             verdict=verdicts[-1].verdict if verdicts else None,
-            clearances=rows.read(db, ClearancePoint),
-            forecasts={point.joint: point for point in rows.read(db, ForecastPoint)},
             measurements=rows.read(db, Measurement),
             audits=rows.read(db, Audit),
         )
-
-    @property
-    def cycles(self) -> int:
-        """Gait cycles over the leg's whole life."""
-        return int(self.entry.totals.get("cycles", 0.0)) if self.entry else 0
 
     @property
     def loads(self) -> tuple[WalkedLoad, ...]:
@@ -160,8 +143,6 @@ class Ledger:
         Begin and end [ns] of the time spans counted in earlier runs, in all epochs.
     kept_ns : int
         Stamp of the last entry on the disk, 0 before.
-    loss : str
-        What was lost before the opening; empty if nothing was.
     fault : str
         Reason of the last failed write; empty if it succeeded.
 
@@ -196,7 +177,6 @@ class Ledger:
         self.last_run = content.runs[-1] if content.runs else Run()
         self.epoch, self.boot_id = self.last_run.epoch, self.last_run.boot_id
         self.cut_off_s = None if self.last_run.closed else self.last_run.interval_s
-        self.loss = "" if self.last_run.closed else INTERRUPTED
         self.kept_ns = self.entry.stamp_ns if self.entry else 0
         self._kept_moving_s = self.entry.moving_s if self.entry else 0.0
         self.corrections: tuple[Recount, ...] = rows.read(db, CorrectedClearance)

@@ -81,53 +81,6 @@ class PartLife:
     replaced_ns: int = 0
 
 
-@attrs.define
-class AccountingState:
-    """What changes.
-
-    Attributes
-    ----------
-    cycles : int
-        Over all runs.
-    parts : tuple of PartLife
-    spans : Spans
-        Time that this run has counted, by the present epoch of the clock.
-    past : tuple of (int, int, int)
-        Begin, end and epoch of what it counted by earlier ones.
-    anew : bool
-        Whether the clock began anew in this run, so that nothing that comes is counted already.
-    point_due_s : float
-        Time in motion over all runs at which the history wants its next point.
-    skipped, skipped_s, skipped_ns : int, float, int
-        Samples left out since they are counted, their time, and the stamp of the last.
-    shown : mapping of str to (Level, bool)
-        Of the alarms, what the history has last.
-    pauses : Pauses
-        Times in which nobody recorded.
-    without_zero_s : float
-        Time of samples that did not reach the twin, because the crank's zero is not known.
-    commissioned : dict of str to float
-        What the ledger keeps of this leg's torque, by names that end in their unit.
-    loads : tuple of WalkedLoad
-        Foot loads that acted in this run.
-    """
-
-    cycles: int
-    parts: tuple[PartLife, ...]
-    spans: Spans = ()
-    past: tuple[tuple[int, int, int], ...] = ()
-    anew: bool = False
-    point_due_s: float = 0.0
-    skipped: int = 0
-    skipped_s: float = 0.0
-    skipped_ns: int = 0
-    shown: Mapping[str, tuple[Level, bool]] = attrs.field(factory=dict)
-    pauses: Pauses = Pauses()
-    without_zero_s: float = 0.0
-    commissioned: dict[str, float] = attrs.field(factory=dict)
-    loads: tuple[WalkedLoad, ...] = ()
-
-
 def next_point_s(moving_s: float) -> float:
     """Time in motion over all runs [s] of the history's next point after one at ``moving_s``."""
     return moving_s + max(POINT_S, POINT_FRACTION * moving_s)
@@ -142,6 +95,20 @@ class Accounting:
         Its wear is set to that of the ledger.
     ledger : Ledger or None
     settings : LedgerFile
+
+    Attributes
+    ----------
+    cycles : int
+        Gait cycles over all runs.
+    parts : tuple of PartLife
+    spans : Spans
+        Time that this run has counted, by the present epoch of the clock.
+    skipped, skipped_s : int, float
+        Samples left out since they are counted, and their time.
+    without_zero_s : float
+        Time of samples that did not reach the twin, because the crank's zero is not known.
+    commissioned : dict of str to float
+        What the ledger keeps of this leg's torque, by names that end in their unit.
     """
 
     def __init__(self, twin: DigitalTwin, ledger: Ledger | None, settings: LedgerFile) -> None:
@@ -153,23 +120,30 @@ class Accounting:
         entry = ledger.entry if ledger else None
         self._before = entry.totals if entry else {}
         self._kept_s = self._before.get("moving_s", 0.0)
-        self.state = AccountingState(
-            self.cycles_before,
-            (PartLife(),) * len(twin.clearance_joints),
-            point_due_s=self._before.get(_DUE_KEY, 0.0),
-        )
+        self.cycles, self.parts = self.cycles_before, (PartLife(),) * len(twin.clearance_joints)
+        self.spans: Spans = ()
+        # begin, end and epoch of what this run counted before its clock began anew
+        self._past: tuple[tuple[int, int, int], ...] = ()
+        self._is_anew = False
+        self._point_due_s = self._before.get(_DUE_KEY, 0.0)  # of moving_s over all runs, for the history
+        self.skipped, self.skipped_s, self._skipped_ns = 0, 0.0, 0
+        self._shown: Mapping[str, tuple[Level, bool]] = {}  # of the alarms, what the history has last
+        self._pauses = Pauses()
+        self.without_zero_s = 0.0
+        self.commissioned: dict[str, float] = {}
+        self._loads: tuple[WalkedLoad, ...] = ()
         if entry:
-            self.state.commissioned = {
+            self.commissioned = {
                 name: entry.totals[name] for name in (FRICTION_KEY, SIGMA_KEY) if name in entry.totals
             }
-            self.state.shown = {a.name: (a.level, a.acknowledged) for a in entry.alarms}
+            self._shown = {a.name: (a.level, a.acknowledged) for a in entry.alarms}
             self._take_over({joint.name: joint for joint in entry.joints})
             self._note_coefficients(entry)
 
     def _take_over(self, joints: dict[str, JointWear]) -> None:
         own = [joints[name] for name in self._twin.clearance_joints]
         self._twin.set_depth(np.stack([joint.depth for joint in own]))
-        self.state.parts = tuple(self._part(k, joint) for k, joint in enumerate(own))
+        self.parts = tuple(self._part(k, joint) for k, joint in enumerate(own))
 
     def _note_coefficients(self, entry: Entry) -> None:
         """Take down how far the parts were worn with another wear coefficient."""
@@ -181,7 +155,7 @@ class Accounting:
     def _part(self, k: int, wear: JointWear) -> PartLife:
         """A part of joint k that has walked so much until now."""
         return PartLife(
-            self.state.cycles - wear.cycles,
+            self.cycles - wear.cycles,
             self.totals["moving_s"] - wear.moving_s,
             wear.replaced_ns,
         )
@@ -206,18 +180,18 @@ class Accounting:
         What earlier runs have counted is not in it, nor are pauses between recordings.
         """
         unmonitored_s = self._twin.intake.unmonitored_s
-        others_s = self.state.skipped_s + self.state.pauses.passed_s(unmonitored_s)
-        return max(0.0, unmonitored_s - others_s) + self.state.without_zero_s
+        others_s = self.skipped_s + self._pauses.passed_s(unmonitored_s)
+        return max(0.0, unmonitored_s - others_s) + self.without_zero_s
 
     def lost(self, guard: InputGuard) -> Lost:
         """Samples and time that were not integrated so far, with those that a guard has withheld."""
-        intake, pauses = self._twin.intake, self.state.pauses
+        intake, pauses = self._twin.intake, self._pauses
         return with_same_fields(
             Lost,
             intake,
             guard,
             unmonitored_s=self.unmonitored_s,
-            already_counted=self.state.skipped,
+            already_counted=self.skipped,
             outliers=intake.outliers + intake.load_outliers,
             gaps_lost=max(0, intake.lost - pauses.number),
             paused_s=pauses.total_s,
@@ -225,12 +199,12 @@ class Accounting:
 
     def pause(self, pause_s: float) -> None:
         """Nobody records for a time [s], from the newest sample on."""
-        self.state.pauses = self.state.pauses.with_pause(pause_s, self._twin.intake.unmonitored_s)
+        self._pauses = self._pauses.with_pause(pause_s, self._twin.intake.unmonitored_s)
 
     @property
     def replaced_ns(self) -> list[int]:
         """When each joint's part was replaced, 0 if it never was."""
-        return [part.replaced_ns for part in self.state.parts]
+        return [part.replaced_ns for part in self.parts]
 
     @property
     def totals(self) -> dict[str, float]:
@@ -238,37 +212,36 @@ class Accounting:
         intake, before = self._twin.intake, self._before
         now = {name: getattr(intake, name) for name in _SUMS} | {"unmonitored_s": self.unmonitored_s}
         sums = {name: before.get(name, 0.0) + value for name, value in now.items()}
-        return {"cycles": float(self.state.cycles), **sums}
+        return {"cycles": float(self.cycles), **sums}
 
     def not_counted(self, samples: Samples) -> Samples:
         """Samples but those of a time whose wear is in the ledger from an earlier run."""
         known = self.counted(samples)
         if not known.any():
             return samples
-        stamps = np.concatenate([[self.state.skipped_ns], samples["stamp_ns"][known]])
+        stamps = np.concatenate([[self._skipped_ns], samples["stamp_ns"][known]])
         steps = np.diff(stamps)
-        self.state.skipped += len(steps)
-        self.state.skipped_s += 1.0e-9 * float(steps[(steps > 0) & (steps <= NEIGHBOURS_NS)].sum())
-        self.state.skipped_ns = int(stamps[-1])
+        self.skipped += len(steps)
+        self.skipped_s += 1.0e-9 * float(steps[(steps > 0) & (steps <= NEIGHBOURS_NS)].sum())
+        self._skipped_ns = int(stamps[-1])
         return np.asarray(samples[~known])
 
     def counted(self, samples: Samples) -> NDArray[np.bool_]:
         """Which samples are of a time whose wear is in the ledger from an earlier run."""
-        if self.state.anew or not len(self._counted):
+        if self._is_anew or not len(self._counted):
             return np.zeros(len(samples), bool)
         return is_within(samples["stamp_ns"], self._counted)
 
     @property
     def is_all_counted(self) -> bool:
         """Whether there were samples, and the ledger already contained the wear of all of them."""
-        state = self.state
-        return state.skipped > 0 and not (state.spans or state.past or state.anew)
+        return self.skipped > 0 and not (self.spans or self._past or self._is_anew)
 
     def begin_epoch(self) -> None:
         """The clock has begun anew: stamps from now on are of another time than those before."""
         epoch = self.ledger.epoch if self.ledger else 0
-        self.state.past = (*self.state.past, *((*span, epoch) for span in self.state.spans))
-        self.state.spans, self.state.anew = (), True
+        self._past = (*self._past, *((*span, epoch) for span in self.spans))
+        self.spans, self._is_anew = (), True
         if self.ledger:
             self.ledger.epoch += 1
 
@@ -279,11 +252,11 @@ class Accounting:
 
     def joint_wear(self, k: int, depth: Floats) -> JointWear:
         """Present wear of joint k; depth (clearance joints, 2, N) of the twin."""
-        part, totals = self.state.parts[k], self.totals
+        part, totals = self.parts[k], self.totals
         return JointWear(
             self._twin.clearance_joints[k],
             depth[k],
-            self.state.cycles - part.cycles,
+            self.cycles - part.cycles,
             totals["moving_s"] - part.moving_s,
             part.replaced_ns,
             float(self._twin.wear_coefficient_per_pa[k]),
@@ -305,7 +278,7 @@ class Accounting:
         k = self._index(joint)
         was = self.joint_wear(k, self._twin.depth)
         self._twin.reset_wear(joint)
-        self._set_part(k, PartLife(self.state.cycles, self.totals["moving_s"], stamp_ns))
+        self._set_part(k, PartLife(self.cycles, self.totals["moving_s"], stamp_ns))
         return was
 
     def correct(self, joint: str, clearance_m: float) -> JointWear:
@@ -328,18 +301,18 @@ class Accounting:
         return since
 
     def _set_part(self, k: int, part: PartLife) -> None:
-        self.state.parts = (*self.state.parts[:k], part, *self.state.parts[k + 1 :])
+        self.parts = (*self.parts[:k], part, *self.parts[k + 1 :])
 
     def ended(self, statistics: CycleStatistics) -> None:
         """Count a gait cycle, and the load that acted in it."""
-        self.state.cycles += 1
+        self.cycles += 1
         load = WalkedLoad.of_cycle(statistics.load_peak_n, statistics.moving_s)
-        self.state.loads = together((*self.state.loads, load))
+        self._loads = together((*self._loads, load))
 
     @property
     def loads(self) -> tuple[WalkedLoad, ...]:
         """Foot loads over all runs."""
-        return together((*(self.ledger.loads if self.ledger else ()), *self.state.loads))
+        return together((*(self.ledger.loads if self.ledger else ()), *self._loads))
 
     def followed(self, samples: SampleStatistics) -> None:
         """Take down the time in which the leg was followed."""
@@ -348,7 +321,7 @@ class Accounting:
             step_ns = np.diff(stamp)
             is_apart = (step_ns < 0) | (step_ns > NEIGHBOURS_NS)
             for part in np.split(stamp, np.flatnonzero(is_apart) + 1):
-                self.state.spans = with_span(self.state.spans, int(part[0]), int(part[-1]))
+                self.spans = with_span(self.spans, int(part[0]), int(part[-1]))
 
     def note(self, event: Event) -> None:
         """Take an event down for the ledger."""
@@ -359,16 +332,16 @@ class Accounting:
         """Take down which alarms are shown otherwise than they were."""
         shown = {alarm.name: (alarm.level, alarm.acknowledged) for alarm in change.alarms}
         for alarm in change.alarms:
-            if shown[alarm.name] != self.state.shown.get(alarm.name, (Level.OK, False)):
+            if shown[alarm.name] != self._shown.get(alarm.name, (Level.OK, False)):
                 self.note(AlarmEvent(change.stamp_ns, alarm))
-        self.state.shown = shown
+        self._shown = shown
 
     def note_clearances(self, report: CycleReport) -> None:
         """Take the clearances down, now and then."""
         moving_s = self.totals["moving_s"]
-        if moving_s < self.state.point_due_s:
+        if moving_s < self._point_due_s:
             return
-        self.state.point_due_s = next_point_s(moving_s)
+        self._point_due_s = next_point_s(moving_s)
         for joint in report.joints:
             if joint.forecast and joint.forecast.cycles:
                 quantiles = attrs.astuple(joint.forecast.cycles)
@@ -406,14 +379,14 @@ class Accounting:
             stamp_ns=self._twin.intake.followed_stamp_ns or (self.ledger.kept_ns if self.ledger else 0),
             joints=tuple(self.joint_wear(k, depth) for k in range(len(self._twin.clearance_joints))),
             totals=self.totals
-            | self.state.commissioned
-            | {_DUE_KEY: self.state.point_due_s}
+            | self.commissioned
+            | {_DUE_KEY: self._point_due_s}
             | {
                 clearance_limit_key(alarm.subject): alarm.limit
                 for alarm in alarms
                 if alarm.kind == CLEARANCE.kind and not math.isnan(alarm.limit)
             },
             alarms=tuple(alarm for alarm in alarms if alarm.level is not Level.OK),
-            spans=(*self.state.past, *((*span, epoch) for span in self.state.spans)),
-            loads=self.state.loads,
+            spans=(*self._past, *((*span, epoch) for span in self.spans)),
+            loads=self._loads,
         )

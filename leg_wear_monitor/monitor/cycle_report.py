@@ -37,7 +37,7 @@ def cycle_report(
         CycleReport,
         torque,
         statistics,
-        cycle=leg.accounting.state.cycles,
+        cycle=leg.accounting.cycles,
         joints=tuple(_joint_report(leg, k, statistics, forecast, seen, estimates[k]) for k in joints),
         torque_samples=torque.samples,
         measured_torque_rms_nm=float(torque.measured_rms_nm),

@@ -41,7 +41,7 @@ class EncoderWatch(Observer):
         self.encoders = EncoderObserver(
             leg.mechanism,
             leg.config,
-            [one.prior.sigma for one in leg.forecaster.state.coefficient_estimates],
+            [one.prior.sigma for one in leg.forecaster.coefficient_estimates],
             leg.ledger.commissioned if leg.ledger else None,
         )
         self.estimates: tuple[ClearanceEstimate, ...] | None = None

@@ -66,19 +66,6 @@ class _Cycle:
     acted: float
 
 
-@attrs.define
-class FootLoadState:
-    """State of the checks; every value is immutable."""
-
-    cycles: tuple[_Cycle, ...] = ()
-    acts: float = 0.0  # `_Cycle.acted` of the present gait cycle
-    largest_n: float = 0.0  # largest force received since the last gait cycle, unusable values included
-    is_missing: bool = False  # whether the last gait cycle had no sample
-    is_frozen: bool = False  # whether the samples do not act
-    has_mean: bool = False  # whether the twin knows a mean load of gait cycles
-    is_noise: bool = False  # whether the load of the last gait cycles is not above the sensor's noise
-
-
 class FootLoadCheck(Observer):
     """Averages the measured foot load over gait cycles, and checks its sensor.
 
@@ -117,7 +104,13 @@ class FootLoadCheck(Observer):
             [stance.heel_strike, stance.toe_off]
         )
         self._load_acts = float(config.load.model == MEASURED)
-        self.state = FootLoadState(acts=self._load_acts)
+        self._cycles: tuple[_Cycle, ...] = ()
+        self._acted = self._load_acts  # `_Cycle.acted` of the present gait cycle
+        self._largest_n = 0.0  # largest force received since the last gait cycle, unusable values included
+        self._is_missing = False  # whether the last gait cycle had no sample
+        self._is_frozen = False  # whether the samples do not act
+        self._has_mean = False  # whether the twin knows a mean load of gait cycles
+        self._is_noise = False  # whether the load of the last gait cycles is not above the sensor's noise
         self.values: dict[str, float] = {}
 
     def add_samples(self, piece: Samples) -> None:
@@ -125,13 +118,13 @@ class FootLoadCheck(Observer):
         force = piece["foot_force_n"][(piece["kind"] == LOAD) & (piece["fault"] == NO_FAULT)]
         if len(force):
             largest = float(np.nan_to_num(np.abs(force)).max())
-            self.state.largest_n = max(self.state.largest_n, largest)
+            self._largest_n = max(self._largest_n, largest)
 
     def end_cycle(self, statistics: CycleStatistics, is_refused: bool) -> None:
         """Check the load of a gait cycle; a wrong one does not act on the twin."""
         del is_refused
         self.values = self._checked(statistics)
-        self.state.has_mean = self._twin.freeze_load(*self._freezes(self.values))
+        self._has_mean = self._twin.freeze_load(*self._freezes(self.values))
 
     def alarm_values(self, report: CycleReport) -> Mapping[str, float]:
         """Values of the sensor's alarms by their names."""
@@ -140,18 +133,18 @@ class FootLoadCheck(Observer):
 
     def _checked(self, statistics: CycleStatistics) -> dict[str, float]:
         """Add a gait cycle; returns the values of the alarms that can be evaluated."""
-        state, load = self.state, statistics.load
+        load = statistics.load
         # scaled so that a force at the end of its valid range has the limit of the alarm
-        beyond = FOOT_LOAD_LIMITS[SCALE] * state.largest_n / KINDS[LOAD].largest
-        state.largest_n, state.is_missing = 0.0, load is None
+        beyond = FOOT_LOAD_LIMITS[SCALE] * self._largest_n / KINDS[LOAD].largest
+        self._largest_n, self._is_missing = 0.0, load is None
         if load is None:
             return {SCALE: beyond} if beyond > FOOT_LOAD_LIMITS[SCALE] else {}
         force = _means_by_phase(load.number, load.force_n)
-        cycle = _Cycle(load, force, _unexplained(statistics.torque_profile), state.acts)
-        state.cycles = (*state.cycles, cycle)[-_CYCLES:]
+        cycle = _Cycle(load, force, _unexplained(statistics.torque_profile), self._acted)
+        self._cycles = (*self._cycles, cycle)[-_CYCLES:]
         stuck = _stuck_fraction(load)
-        state.is_noise = stuck < FOOT_LOAD_LIMITS[STUCK] and self._is_noise()
-        stuck = 1.0 if state.is_noise else stuck
+        self._is_noise = stuck < FOOT_LOAD_LIMITS[STUCK] and self._is_only_noise()
+        stuck = 1.0 if self._is_noise else stuck
         values = {GAPS: load.gap_s / statistics.duration_s, STUCK: stuck}
         if stuck < FOOT_LOAD_LIMITS[STUCK]:
             values |= self._comparisons()
@@ -164,10 +157,10 @@ class FootLoadCheck(Observer):
         without a load, holds for earlier cycles, too.
         """
         wrong = {kind for kind, limit in FOOT_LOAD_LIMITS.items() if values.get(kind, 0.0) >= limit}
-        is_frozen = self.state.is_missing or bool(wrong - {GAPS})
-        clears = self.state.is_noise or bool(wrong - {GAPS, STUCK, ZERO})
-        self.state.acts = 0.0 if clears else self._load_acts
-        self.state.is_frozen = is_frozen
+        is_frozen = self._is_missing or bool(wrong - {GAPS})
+        clears = self._is_noise or bool(wrong - {GAPS, STUCK, ZERO})
+        self._acted = 0.0 if clears else self._load_acts
+        self._is_frozen = is_frozen
         return is_frozen, clears
 
     @property
@@ -175,16 +168,16 @@ class FootLoadCheck(Observer):
         """What acts on the leg as a foot load, in words."""
         if not self._load_acts:
             return "the load by the drive torque acts, if there is one"
-        if not self.state.has_mean:
+        if not self._has_mean:
             return "no load acts: the modelled wear on the ground is too small"
-        if self.state.is_frozen:
+        if self._is_frozen:
             return "the mean load of earlier gait cycles acts"
         return "the samples themselves act"
 
     @property
     def load(self) -> FootLoad:
         """The load over the last gait cycles."""
-        cycles = self.state.cycles
+        cycles = self._cycles
         if not cycles:
             return FootLoad()
         up = np.array([self._stance.up @ each.force_n for each in cycles])
@@ -209,7 +202,7 @@ class FootLoadCheck(Observer):
     @property
     def mean_force_n(self) -> Floats | None:
         """Mean force (FINE_PHASES, 2) by phase along the axes of the mechanism [N]; None before the first."""
-        cycles = self.state.cycles
+        cycles = self._cycles
         return np.mean([each.force_n for each in cycles], axis=0).T if cycles else None
 
     @property
@@ -220,7 +213,7 @@ class FootLoadCheck(Observer):
     @property
     def leg_fields(self) -> Mapping[str, Any]:
         """The measured load."""
-        return {"load": self.load} if self.state.cycles else {}
+        return {"load": self.load} if self._cycles else {}
 
     @property
     def statuses(self) -> Sequence[Status]:
@@ -253,7 +246,7 @@ class FootLoadCheck(Observer):
 
     def _comparisons(self) -> dict[str, float]:
         """Values of the alarms that compare the load with stance and with the drive torque or usual steps."""
-        cycles = self.state.cycles
+        cycles = self._cycles
         force = np.mean([each.force_n for each in cycles], axis=0)
         up = self._stance.up @ force
         largest = float(np.abs(up).max())
@@ -275,17 +268,17 @@ class FootLoadCheck(Observer):
 
     def _is_above_noise(self, up: Floats) -> bool:
         """Whether the mean vertical force (n,) changes within a gait cycle by more than its noise."""
-        cycles = np.array([self._stance.up @ each.force_n for each in self.state.cycles])
+        cycles = np.array([self._stance.up @ each.force_n for each in self._cycles])
         noise = float(cycles.std(axis=0, ddof=1).mean()) / math.sqrt(len(cycles))
         return float(up.std()) > _NOISE_SIGMAS * noise
 
-    def _is_noise(self) -> bool:
+    def _is_only_noise(self) -> bool:
         """Whether the mean vertical force changes within a gait cycle by less than by the noise in swing.
 
         Unlike in `_is_above_noise`, steps that differ or are missed are a load, and one cycle in which the
         sensor failed does not count: most phases are in swing, and most cycles are sound.
         """
-        cycles = np.array([self._stance.up @ each.force_n for each in self.state.cycles])
+        cycles = np.array([self._stance.up @ each.force_n for each in self._cycles])
         if len(cycles) < _LEAST_CYCLES:
             return False
         noise = _OF_MEDIAN * float(np.median(np.abs(cycles - np.median(cycles, axis=0))))
@@ -293,7 +286,7 @@ class FootLoadCheck(Observer):
 
     def _scale_factor(self, force: Floats) -> float:
         """Factor between the load and what the drive torque shows of it, at least 1; NaN if not shown."""
-        unexplained = np.mean([each.unexplained_nm for each in self.state.cycles], axis=0)
+        unexplained = np.mean([each.unexplained_nm for each in self._cycles], axis=0)
         if not np.isfinite(unexplained).all():
             return math.nan
         needed = -np.einsum("cn,cn->n", force, self._toe_per_turn)
@@ -306,7 +299,7 @@ class FootLoadCheck(Observer):
         variance = float(np.mean((residual - shown * of_load) ** 2)) + self._model_nm**2
         sigma = math.sqrt(variance * FINE_PHASES / square / _INDEPENDENT_PHASES)
         # the part that the twin explains already
-        shown += float(np.mean([each.acted for each in self.state.cycles]))
+        shown += float(np.mean([each.acted for each in self._cycles]))
         if shown > 1.0:
             return shown if shown > _SURE_SIGMAS * sigma else math.nan
         return min(1.0 / shown, 1.0e3) if 0.0 < shown < 1.0 - 2.0 * sigma else 1.0

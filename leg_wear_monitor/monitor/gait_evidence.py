@@ -163,62 +163,54 @@ COMMISSIONING_CYCLES = 20  # in a row with the torque as predicted, to store the
 FRICTION_KEY, SIGMA_KEY = "friction_commissioned_nm", "friction_commissioned_sigma_nm"
 
 
-@attrs.frozen
 class TorqueRecord:
-    """Stored properties of a leg's drive torque.
+    """History of a leg's drive torque.
+
+    Parameters
+    ----------
+    totals : dict of str to float
+        Of the ledger.
 
     Attributes
     ----------
-    cycles : int
-        Gait cycles in a row with the torque as predicted, before commissioning.
-    friction_nm, sigma_nm : float
-        Constant torque at the commissioning of this leg, and its standard deviation; NaN before.
-    not_compared : mapping of str to int
+    commissioned : NamedCause
+        Constant torque at the commissioning of this leg; NaN before.
+    not_compared : Counter of str
         Gait cycles whose torque was not compared in this run, by the values of `NotCompared`.
     """
 
-    cycles: int = 0
-    friction_nm: float = math.nan
-    sigma_nm: float = math.nan
-    not_compared: Mapping[str, int] = attrs.field(factory=dict)
-
-    @classmethod
-    def of(cls, totals: dict[str, float]) -> "TorqueRecord":
-        """Record from the totals in a ledger."""
-        return cls(0, totals.get(FRICTION_KEY, math.nan), totals.get(SIGMA_KEY, math.nan))
+    def __init__(self, totals: Mapping[str, float]) -> None:
+        value, sigma = (totals.get(key, math.nan) for key in (FRICTION_KEY, SIGMA_KEY))
+        self.commissioned = NamedCause(Cause.FRICTION, value, sigma)
+        self.not_compared = Counter[str]()
+        self._sound = 0  # gait cycles in a row with the torque as predicted, before commissioning
 
     @property
     def totals(self) -> dict[str, float]:
         """Totals for the ledger; empty before commissioning."""
-        if math.isnan(self.friction_nm):
-            return {}
-        return {FRICTION_KEY: self.friction_nm, SIGMA_KEY: self.sigma_nm}
+        known = self.commissioned
+        return {} if math.isnan(known.value) else {FRICTION_KEY: known.value, SIGMA_KEY: known.sigma}
 
-    def with_cycle(
-        self, report: CycleReport, is_sound: bool, not_compared: NotCompared | None = None
-    ) -> "TorqueRecord":
-        """Record with one more gait cycle.
+    def add_cycle(self, report: CycleReport, is_sound: bool, not_compared: NotCompared | None) -> None:
+        """Add a gait cycle.
 
         Parameters
         ----------
         report : CycleReport
         is_sound : bool
             Whether its torque was as predicted.
-        not_compared : NotCompared, optional
+        not_compared : NotCompared or None
             Why it was not compared.
         """
         if not report.torque_samples:
-            return self
+            return
         if not_compared is not None:
-            number = self.not_compared.get(not_compared.value, 0) + 1
-            return attrs.evolve(self, not_compared={**self.not_compared, not_compared.value: number})
-        if not math.isnan(self.friction_nm):
-            return self
-        cycles = self.cycles + 1 if is_sound else 0
-        if cycles < COMMISSIONING_CYCLES:
-            return attrs.evolve(self, cycles=cycles)
-        friction_nm, sigma_nm = report.friction_nm, report.friction_sigma_nm
-        return attrs.evolve(self, cycles=cycles, friction_nm=friction_nm, sigma_nm=sigma_nm)
+            self.not_compared[not_compared.value] += 1
+        elif math.isnan(self.commissioned.value):
+            self._sound = self._sound + 1 if is_sound else 0
+            if self._sound >= COMMISSIONING_CYCLES:
+                friction = NamedCause(Cause.FRICTION, report.friction_nm, report.friction_sigma_nm)
+                self.commissioned = friction
 
 
 # The gait cycles since the torque is not as predicted, and what explains them.
@@ -229,7 +221,6 @@ _RISES = 2  # gait cycles of a new mismatch before it is found in the mean of th
 _FIRST, _EVERY = (3, 5, 10), 20  # gait cycles after which they are explained, then each so many
 
 
-@attrs.frozen(eq=False)
 class MismatchWindow:
     """Gait cycles whose torque is not as predicted.
 
@@ -237,26 +228,22 @@ class MismatchWindow:
     ----------
     cycles : tuple of CycleStatistics
         The last ones; while the torque is as predicted, the last few that were compared.
-    number : int
-        How many there were.
-    is_open : bool
-        Whether the alarm was present in the last gait cycle.
     explanation : TorqueExplanation or None
         As of the last time that one was found; kept while the alarm is latched.
     """
 
-    cycles: tuple[CycleStatistics, ...] = ()
-    number: int = 0
-    is_open: bool = False
-    explanation: TorqueExplanation | None = None
+    def __init__(self) -> None:
+        self.cycles: tuple[CycleStatistics, ...] = ()
+        self.explanation: TorqueExplanation | None = None
+        self._number, self._is_open = 0, False  # cycles in all; whether the alarm was present in the last one
 
-    def with_cycle(
+    def add_cycle(
         self,
         statistics: CycleStatistics,
         alarm: Alarm,
         explain: Callable[[Sequence[CycleStatistics]], TorqueExplanation | None],
-    ) -> "MismatchWindow":
-        """Window after one more gait cycle.
+    ) -> None:
+        """Add a gait cycle.
 
         Parameters
         ----------
@@ -267,29 +254,21 @@ class MismatchWindow:
             Explanation of some gait cycles.
         """
         is_compared = statistics.not_compared is None
-        if alarm.level is Level.OK:
-            if not is_compared:
-                return self
-            return MismatchWindow((*self.cycles, statistics)[-_FIRST[0] :], self.number + 1)
-        if alarm.present is Level.OK:
-            return attrs.evolve(self, cycles=(), number=_FIRST[0], is_open=False)
-        if not is_compared:
-            return self
-        before = self if self.is_open else self._before()
-        cycles, number = (*before.cycles, statistics)[-_LONGEST:], before.number + 1
-        explanation = before.explanation
-        if number in _FIRST or number % _EVERY == 0:
-            explanation = explain(cycles) or explanation  # a cause stays if the mismatch becomes less
-        return MismatchWindow(cycles, number, True, explanation)
-
-    def _before(self) -> "MismatchWindow":
-        """Window before the first gait cycle with the alarm: those in which it was found."""
-        since = self.number if self.number < _FIRST[0] else _RISES - 1
-        cycles = self.cycles[-since:] if since else ()
-        return MismatchWindow(cycles, len(cycles), explanation=self.explanation)
-
-
-NO_MISMATCH = MismatchWindow()
+        if alarm.level is not Level.OK and alarm.present is Level.OK:
+            self.cycles, self._number, self._is_open = (), _FIRST[0], False
+        elif alarm.level is Level.OK and is_compared:
+            self.cycles = (*self.cycles, statistics)[-_FIRST[0] :]
+            self._number, self._is_open, self.explanation = self._number + 1, False, None
+        elif alarm.level is not Level.OK and is_compared:
+            if not self._is_open:  # the cycles in which the mismatch was found belong to it
+                since = self._number if self._number < _FIRST[0] else _RISES - 1
+                self.cycles = self.cycles[-since:] if since else ()
+                self._number, self._is_open = len(self.cycles), True
+            self.cycles, self._number = (*self.cycles, statistics)[-_LONGEST:], self._number + 1
+            if self._number in _FIRST or self._number % _EVERY == 0:
+                self.explanation = (
+                    explain(self.cycles) or self.explanation
+                )  # it stays if the rest becomes less
 
 
 # Checks of the measured torque for an impossible bias, drift or lag: bounds, values, causes.
@@ -353,8 +332,9 @@ def _bias(report: CycleReport, bounds: TorqueBounds) -> NamedCause:
 
 
 def _drift(report: CycleReport, record: TorqueRecord) -> NamedCause:
-    sigma = math.hypot(report.friction_sigma_nm, record.sigma_nm)
-    return NamedCause(Cause.FRICTION, report.friction_nm - record.friction_nm, sigma)
+    known = record.commissioned
+    sigma = math.hypot(report.friction_sigma_nm, known.sigma)
+    return NamedCause(Cause.FRICTION, report.friction_nm - known.value, sigma)
 
 
 def _timing(report: CycleReport) -> NamedCause:

@@ -119,7 +119,7 @@ def _joint_situations(leg: MonitoredLeg) -> tuple[JointSituation, ...]:
     diagnosis = leg.torque.diagnosis
     last, measured, joints = leg.last, leg.measured, leg.clearance_joints
     modelled_m, limits_m = leg.twin.clearance_mean_m.tolist(), leg.evaluation.board.clearance_limits_m
-    walked, found = leg.accounting.state, []
+    walked, found = leg.accounting, []
     for k, (joint, part) in enumerate(zip(joints, walked.parts, strict=True)):
         report = last.joints[k] if last else None
         seen = leg.seen(k)
@@ -207,7 +207,7 @@ def leg_state(leg: MonitoredLeg, findings: Sequence[Verdict], situation: Situati
     observed = {name: field for each in leg.observers for name, field in each.leg_fields.items()}
     return LegState(
         stamp_ns=leg.twin.intake.stamp_ns,
-        life_cycles=leg.accounting.state.cycles,
+        life_cycles=leg.accounting.cycles,
         verdict=verdict,
         clearances={
             joint.joint: joint_clearance(

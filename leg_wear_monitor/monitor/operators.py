@@ -14,7 +14,7 @@ from leg_wear_monitor.monitor.accounting import Accounting
 from leg_wear_monitor.monitor.alarms import Alarm, joint_of
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult
-from leg_wear_monitor.monitor.gait_evidence import NO_MISMATCH
+from leg_wear_monitor.monitor.gait_evidence import MismatchWindow
 from leg_wear_monitor.monitor.judgement import (
     evaluate_clearances,
     is_forecast_valid,
@@ -53,7 +53,7 @@ def acknowledge(leg: MonitoredLeg, stamp_ns: int) -> Cleared:
     """See `WearMonitor.acknowledge`."""
     cleared, kept = leg.evaluation.board.acknowledge(leg.unmeasured)
     if alarm_specs.MISMATCH.name() in leg.unmeasured:
-        leg.torque.mismatch = NO_MISMATCH
+        leg.torque.mismatch = MismatchWindow()
     ledger = leg.accounting.ledger
     has_lost = ledger is not None and ledger.acknowledge_loss()
     _note_alarms(leg, stamp_ns)
@@ -71,7 +71,7 @@ def reset_wear(leg: MonitoredLeg, joint: str, stamp_ns: int, who: str) -> Cleare
     cleared = tuple(board.alarms[name] for name in gone)
     board.clear(gone)
     if alarm_specs.MISMATCH.name() in gone:
-        leg.torque.mismatch = NO_MISMATCH
+        leg.torque.mismatch = MismatchWindow()
     _part_changed(leg, joint, stamp_ns)
     leg.accounting.note(Audit(stamp_ns, who, "reset_wear", was, cleared))
     _note_alarms(leg, stamp_ns)

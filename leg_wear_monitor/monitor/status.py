@@ -113,7 +113,7 @@ def _input(leg: MonitoredLeg) -> Status:
     values = _health_values(evaluation.state.health) if evaluation.state.health else {}
     values |= {"received": counts.pop("received")} | {f"{name}_used": count for name, count in used.items()}
     # the other counters of the intake by their names, such as duplicates and gaps_lost
-    values |= counts | {"already_counted": leg.accounting.state.skipped}
+    values |= counts | {"already_counted": leg.accounting.skipped}
     values |= {name: getattr(guard, name) for name in ("conflicting", "implausible", "torque_outliers")}
     values |= {f"faulty_{name}": count for name, count in faulty.items()}
     level, code = evaluation.board.level(*_INPUT), _code(evaluation, _INPUT)

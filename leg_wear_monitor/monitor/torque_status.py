@@ -59,14 +59,14 @@ def torque_status(
         "torque_lag_s": last.torque_lag_s,
         "samples": float(last.torque_samples),
         "friction_sigma_nm": last.friction_sigma_nm,
-        "friction_commissioned_nm": record.friction_nm,
+        "friction_commissioned_nm": record.commissioned.value,
         "torque_lag_sigma_s": last.torque_lag_sigma_s,
         "load_friction": last.load_friction,
         "load_friction_sigma": last.load_friction_sigma,
         "crank_offset_error_rad": offset_error_rad(last),
     }
     for why in NotCompared:
-        values[f"not_compared_{why.value}_cycles"] = float(record.not_compared.get(why.value, 0))
+        values[f"not_compared_{why.value}_cycles"] = float(record.not_compared[why.value])
     raised = {name for name in _TORQUE if alarms[name].level is not Level.OK}
     messages = []
     if alarm_specs.MISMATCH.name() in raised:

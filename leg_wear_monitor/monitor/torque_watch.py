@@ -21,7 +21,7 @@ from leg_wear_monitor.monitor.diagnosis.reference_file import read_references
 from leg_wear_monitor.monitor.diagnosis.state import Body, Diagnosis, DiagnosisState, TorqueState
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.gait_evidence import (
-    NO_MISMATCH,
+    MismatchWindow,
     TorqueBounds,
     TorqueRecord,
     torque_bounds,
@@ -73,8 +73,8 @@ class TorqueWatch(Observer):
 
     def __init__(self, leg: CountedLeg, board: AlarmBoard) -> None:
         self._leg, self._board = leg, board
-        self.record = TorqueRecord.of(leg.accounting.state.commissioned)
-        self.mismatch = NO_MISMATCH
+        self.record = TorqueRecord(leg.accounting.commissioned)
+        self.mismatch = MismatchWindow()
         self.unexplained = ""
         is_diagnosed = leg.config.diagnosis.enabled and leg.config.wear_acceleration == 1.0
         self.observer = self._new_observer() if is_diagnosed else None
@@ -154,13 +154,13 @@ class TorqueWatch(Observer):
         is_allowed = self._leg.config.cadence.allows(statistics.cadence_rpm)
         why = statistics.not_compared if is_allowed else NotCompared.CADENCE
         is_sound = report.torque_mismatch < self._allowed.unexplained
-        self.record = self.record.with_cycle(report, is_sound, why)
-        self._leg.accounting.state.commissioned = self.record.totals
+        self.record.add_cycle(report, is_sound, why)
+        self._leg.accounting.commissioned = self.record.totals
 
     def _explain(self, statistics: CycleStatistics) -> None:
         """Look for causes of a torque mismatch; a wrong torque says nothing of the leg."""
         was_wrong = self.is_wrong
-        self.mismatch = self.mismatch.with_cycle(
+        self.mismatch.add_cycle(
             statistics,
             self._board.alarms[MISMATCH.name()],
             self._explanation,
@@ -301,7 +301,7 @@ class TorqueWatch(Observer):
         measured, own = self._leg.measured[k], self._leg.accounting
         if measured is None:
             return ""
-        begun = own.cycles_before - own.state.parts[k].cycles
+        begun = own.cycles_before - own.parts[k].cycles
         if measured.cycles > begun:
             is_since = measured.stamp_ns >= change.since_ns
         else:

@@ -195,7 +195,7 @@ class WearMonitor:
         piece = self._leg.guard.checked(self._accounting.not_counted(piece))
         for observer in self._leg.observers:
             piece = observer.passed(piece, ends_period)
-        self._accounting.state.without_zero_s = sum(each.unmonitored_s for each in self._leg.observers)
+        self._accounting.without_zero_s = sum(each.unmonitored_s for each in self._leg.observers)
         return piece
 
     def _follow(self, piece: Samples) -> tuple[SampleReports, tuple[CycleStatistics, ...]]:
@@ -251,7 +251,7 @@ class WearMonitor:
             # later gait cycles must not be compared with this torque; only periods end alike in all blocks
             self._twin.forget_torque()
         is_refused = CRANK in leg.judge.trusted_before_ns
-        self._take_changes(leg.evaluation.end_period(self._accounting.state.skipped, is_refused), changes)
+        self._take_changes(leg.evaluation.end_period(self._accounting.skipped, is_refused), changes)
         for observer in leg.observers:
             observer.end_period()
         situation = situation_of(leg)
@@ -597,7 +597,7 @@ class WearMonitor:
     @property
     def already_counted_s(self) -> float:
         """Time of the samples that the ledger already contained the wear of [s]."""
-        return self._accounting.state.skipped_s
+        return self._accounting.skipped_s
 
 
 # A monitor with the ledger that its parameters name, from the one to the other without a gap.

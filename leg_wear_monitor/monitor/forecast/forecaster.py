@@ -189,33 +189,6 @@ def _can_be(life: SimulatedLife) -> bool:
 RENEWED_NS = 60_000_000_000
 
 
-@attrs.define
-class ForecastState:
-    """What changes.
-
-    Attributes
-    ----------
-    growth : tuple of GrowthWindow
-    coefficient_estimates : tuple of CoefficientEstimate
-    last : Forecast or None
-        None before the first, and when something is new.
-    stamp_ns : int
-        Of the last.
-    known : int
-        Joints whose growth was known then.
-    measurements, corrections : tuples of Measurement, of CorrectedClearance and CoefficientSpan
-        Of the ledger, and since.
-    """
-
-    growth: tuple[GrowthWindow, ...]
-    coefficient_estimates: tuple[CoefficientEstimate, ...]
-    last: Forecast | None = None
-    stamp_ns: int = 0
-    known: int = 0
-    measurements: tuple[Measurement, ...] = ()
-    corrections: tuple[Recount, ...] = ()
-
-
 class Forecaster:
     """Forecasts all clearance joints, and the leg.
 
@@ -230,6 +203,13 @@ class Forecaster:
         When each joint's part was replaced, 0 if it never was.
     corrections : sequence of CorrectedClearance and CoefficientSpan
         Of the ledger.
+
+    Attributes
+    ----------
+    growth : tuple of GrowthWindow
+    coefficient_estimates : tuple of CoefficientEstimate
+    measurements, corrections : tuples of Measurement, of CorrectedClearance and CoefficientSpan
+        Of the ledger, and since.
 
     Raises
     ------
@@ -249,13 +229,11 @@ class Forecaster:
         self._clearances = [mechanism.clearances[joint] for joint in mechanism.clearance_joints]
         self._fresh_m = [clearance.radial_clearance for clearance in self._clearances]
         self._law = law_of(mechanism, settings.growth_law_file, settings.model_sigma)
-        self.state = ForecastState(
-            growth=tuple(GrowthWindow() for _ in self._clearance_joints),
-            coefficient_estimates=(),
-            measurements=tuple(measurements),
-            corrections=tuple(corrections),
-        )
-        self.state.coefficient_estimates = tuple(
+        self.growth = tuple(GrowthWindow() for _ in self._clearance_joints)
+        self.measurements, self.corrections = tuple(measurements), tuple(corrections)
+        self._last: Forecast | None = None  # None before the first, and when something is new
+        self._stamp_ns, self._known = 0, 0  # of the last; joints whose growth was known then
+        self.coefficient_estimates = tuple(
             self._estimate(k, when) for k, when in zip(range(len(self._fresh_m)), replaced_ns, strict=True)
         )
 
@@ -281,14 +259,13 @@ class Forecaster:
         model : ModelError
             What the growth may be off by the load.
         """
-        state = self.state
-        state.growth = all_extended(state.growth, statistics, self._settings.window_cycles)
-        is_recent = 0 <= statistics.stamp_ns - state.stamp_ns < RENEWED_NS
-        rates = [growth_rate(window) for window in state.growth]
-        if state.last is None or not is_recent or _known(rates) > state.known:
-            state.stamp_ns = statistics.stamp_ns
+        self.growth = all_extended(self.growth, statistics, self._settings.window_cycles)
+        is_recent = 0 <= statistics.stamp_ns - self._stamp_ns < RENEWED_NS
+        rates = [growth_rate(window) for window in self.growth]
+        if self._last is None or not is_recent or _known(rates) > self._known:
+            self._stamp_ns = statistics.stamp_ns
             return self.renewed(wear_m, limits_m, is_valid(), model)
-        return state.last
+        return self._last
 
     def renewed(
         self,
@@ -298,9 +275,8 @@ class Forecaster:
         model: ModelError,
     ) -> Forecast:
         """A new forecast from the present state; parameters as in `after`."""
-        state = self.state
-        rates = [growth_rate(window) for window in state.growth]
-        state.known = _known(rates)
+        rates = [growth_rate(window) for window in self.growth]
+        self._known = _known(rates)
         now = [
             JointCondition(
                 joint=joint,
@@ -314,40 +290,35 @@ class Forecaster:
             for k, (joint, rate) in enumerate(zip(self._clearance_joints, rates, strict=True))
         ]
         # a new part's window is shorter than the others'
-        walked = max((window.moving_s for window in state.growth), key=len)
-        state.last = forecast(
+        walked = max((window.moving_s for window in self.growth), key=len)
+        self._last = forecast(
             now,
-            state.coefficient_estimates,
+            self.coefficient_estimates,
             self._settings,
             self._law,
             cycle_s=float(np.mean(walked)),
             valid=is_valid,
         )
-        return state.last
+        return self._last
 
     def expire(self) -> None:
         """Make a new forecast after the next gait cycle: what it rests on has changed."""
-        self.state.last = None
-
-    @property
-    def measurements(self) -> tuple[Measurement, ...]:
-        """Of the ledger, and since."""
-        return self.state.measurements
+        self._last = None
 
     def last_measured(self, replaced_ns: Sequence[int]) -> tuple[Measurement | None, ...]:
         """Last measurement of each joint's present part, None without one."""
         parts = zip(self._clearance_joints, replaced_ns, strict=True)
-        return tuple(measurement.last_measured(self.state.measurements, joint, when) for joint, when in parts)
+        return tuple(measurement.last_measured(self.measurements, joint, when) for joint, when in parts)
 
     def replaced(self, joint: str, replaced_ns: int) -> None:
         """Reset the estimate of a joint whose part changed to what is known of this part."""
-        k, state = self._clearance_joints.index(joint), self.state
-        state.growth = _with(state.growth, k, GrowthWindow())
+        k = self._clearance_joints.index(joint)
+        self.growth = _with(self.growth, k, GrowthWindow())
         self._update_coefficients(k, self._estimate(k, replaced_ns))
 
     def corrected(self, correction: CorrectedClearance) -> None:
         """Count the wear of a joint from a corrected clearance on."""
-        self.state.corrections += (correction,)
+        self.corrections += (correction,)
         self.replaced(correction.joint, correction.replaced_ns)
 
     def measured(
@@ -367,7 +338,7 @@ class Forecaster:
             self._settings,
             self._clearances[k],
             wear,
-            self.state.measurements,
+            self.measurements,
             clearance_m=clearance_m,
             sigma_m=sigma_m,
             stamp_ns=stamp_ns,
@@ -375,26 +346,26 @@ class Forecaster:
             kept_ns=kept_ns,
             accept=accept,
             prior=usual_prior(self._settings, self._clearances[k]),
-            corrections=self.state.corrections,
+            corrections=self.corrections,
         )
-        self.state.measurements += (found.measurement,)
+        self.measurements += (found.measurement,)
         self._update_coefficients(k, found.after)
         return found
 
     def withdrawn(self, number: int, stamp_ns: int, who: str) -> Measurement:
         """Withdraw the measurement with an `id`; the estimate of its joint is renewed by `replaced`."""
-        found = {one.id: one for one in self.state.measurements if one.id}
+        found = {one.id: one for one in self.measurements if one.id}
         if number not in found or found[number].is_withdrawn:
             fault = "is withdrawn already" if number in found else "is not in the ledger"
             raise LegWearError(f"measurement {number}: {fault}")
         now = attrs.evolve(found[number], withdrawn_ns=stamp_ns, withdrawn_by=who)
-        measurements = self.state.measurements
-        self.state.measurements = tuple(now if one.id == number else one for one in measurements)
+        measurements = self.measurements
+        self.measurements = tuple(now if one.id == number else one for one in measurements)
         return now
 
     def best_estimate_m(self, k: int, modelled_m: float) -> float:
         """Median of the clearance of joint k by counting and measurements; NaN without a measurement."""
-        estimate = self.state.coefficient_estimates[k]
+        estimate = self.coefficient_estimates[k]
         return estimate.clearance_m(modelled_m - self._fresh_m[k]) if estimate.observations else math.nan
 
     def use_estimate(self, k: int, observation: ClearanceAtWear, replaced_ns: int) -> bool:
@@ -425,19 +396,18 @@ class Forecaster:
     def _estimate(self, k: int, replaced_ns: int, *further: ClearanceAtWear) -> CoefficientEstimate:
         """Estimate for a part, from its prior, the measurements that count, and further ones."""
         joint = self._clearance_joints[k]
-        observations = measurement.observations_of(self.state.measurements, joint, replaced_ns)
+        observations = measurement.observations_of(self.measurements, joint, replaced_ns)
         return estimate_coefficient(
             self._settings,
             self._fresh_m[k],
             [*observations, *further],
             usual_prior(self._settings, self._clearances[k]),
-            corrections_of(self.state.corrections, joint, replaced_ns),
+            corrections_of(self.corrections, joint, replaced_ns),
         )
 
     def _update_coefficients(self, k: int, coefficient_estimate: CoefficientEstimate) -> None:
-        state = self.state
-        state.coefficient_estimates = _with(state.coefficient_estimates, k, coefficient_estimate)
-        state.last = None
+        self.coefficient_estimates = _with(self.coefficient_estimates, k, coefficient_estimate)
+        self._last = None
 
 
 def _known(rates: Sequence[GrowthRate | None]) -> int:

@@ -103,12 +103,15 @@ class EncoderWatch(Observer):
         """The forecast wants the next estimate."""
         self.encoders.state.updated_ns = 0
 
-    def seen(self, k: int) -> KnownClearance | None:
-        """The clearance that is seen of joint k; None if it is not."""
-        one = self.estimates[k] if self.estimates else None
-        if one is None or one.observation is not ClearanceObservation.SEEN:
-            return None
-        return KnownClearance("encoders", one.clearance_m, one.sigma_m)
+    @property
+    def seen(self) -> Sequence[KnownClearance | None]:
+        """Clearance that is seen of each joint, None where it is not."""
+        return [
+            KnownClearance("encoders", one.clearance_m, one.sigma_m)
+            if one.observation is ClearanceObservation.SEEN
+            else None
+            for one in self.estimates or ()
+        ]
 
     @property
     def shows(self) -> str:

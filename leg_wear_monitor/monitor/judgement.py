@@ -119,11 +119,10 @@ def _joint_situations(leg: MonitoredLeg) -> tuple[JointSituation, ...]:
     diagnosis = leg.torque.diagnosis
     last, measured, joints = leg.last, leg.measured, leg.clearance_joints
     modelled_m, limits_m = leg.twin.clearance_mean_m.tolist(), leg.evaluation.board.clearance_limits_m
-    walked, found = leg.accounting, []
+    walked, seen, found = leg.accounting, leg.seen, []
     for k, (joint, part) in enumerate(zip(joints, walked.parts, strict=True)):
         report = last.joints[k] if last else None
-        seen = leg.seen(k)
-        by_torque = next((each.sigma_m for each in seen if each.by == "torque"), None)
+        by_torque = next((each.sigma_m for each in seen[k] if each.by == "torque"), None)
         one = JointSituation(
             joint=joint,
             modelled_m=modelled_m[k],
@@ -133,7 +132,7 @@ def _joint_situations(leg: MonitoredLeg) -> tuple[JointSituation, ...]:
                 if report and report.forecast
                 else leg.forecaster.best_estimate_m(k, modelled_m[k])
             ),
-            seen=seen,
+            seen=seen[k],
             change=diagnosis.change_of_joint(k),
             sigma_m=diagnosis.tolerance_of_joint(k) if by_torque is None else by_torque,
             is_used=bool(estimates and estimates[k].believed),

@@ -67,9 +67,14 @@ class MonitoredLeg(CountedLeg):
         self.happened: Event | None = None
         self.has_ended = False
 
-    def seen(self, k: int) -> tuple[KnownClearance, ...]:
-        """Clearances that observers see of joint k."""
-        return tuple(one for each in self.observers if (one := each.seen(k)) is not None)
+    @property
+    def seen(self) -> list[tuple[KnownClearance, ...]]:
+        """Clearances that observers see, of each joint."""
+        found = [seen for each in self.observers if (seen := each.seen)]
+        return [
+            tuple(one for seen in found if (one := seen[k]) is not None)
+            for k in range(len(self.clearance_joints))
+        ]
 
     @property
     def unmeasured(self) -> frozenset[str]:

@@ -68,10 +68,10 @@ class Observer:
     def renewed(self) -> None:
         """A counted clearance was corrected, or one was measured: the forecast wants the next estimate."""
 
-    def seen(self, k: int) -> KnownClearance | None:
-        """The clearance that is seen of joint k; None if it is not."""
-        del k
-        return None
+    @property
+    def seen(self) -> Sequence[KnownClearance | None]:
+        """Clearance that is seen of each joint, None where it is not; empty without any."""
+        return ()
 
     @property
     def shows(self) -> str:

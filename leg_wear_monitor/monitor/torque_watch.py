@@ -241,11 +241,14 @@ class TorqueWatch(Observer):
         if self.observer:
             self.observer.replaced(self._leg.twin.clearance_mean_m)
 
-    def seen(self, k: int) -> KnownClearance | None:
-        """The clearance that the drive torque shows of joint k."""
-        diagnosis = self.diagnosis
-        found = diagnosis.of_joint(k)
-        return KnownClearance("torque", *found, diagnosis.least_of_joint(k)) if found else None
+    @property
+    def seen(self) -> Sequence[KnownClearance | None]:
+        """Clearance that the drive torque shows of each joint, None where it shows none."""
+        found = self.diagnosis
+        return [
+            KnownClearance("torque", *one, found.least_of_joint(k)) if (one := found.of_joint(k)) else None
+            for k in range(len(found.clearance_m))
+        ]
 
     @property
     def shows(self) -> str:

@@ -241,8 +241,7 @@ class WearMonitor:
             leg.model_error,
         )
         seen = leg.encoders.estimates if leg.encoders else None
-        estimates = [surest(leg.seen(k)) for k in range(len(self.clearance_joints))]
-        return cycle_report(leg, statistics, forecast, seen, estimates)
+        return cycle_report(leg, statistics, forecast, seen, list(map(surest, leg.seen)))
 
     def _end_period(self, changes: list[AlarmList]) -> Situation:
         """Evaluate the input, and what observers show; what the verdict then depends on."""

@@ -19,7 +19,7 @@ from leg_wear_monitor.dynamics.clearance.stepper import (
 )
 from leg_wear_monitor.dynamics.run import RunStatistics, Setup
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.errors import AssemblyError, ConfigError
+from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
@@ -94,8 +94,8 @@ class Leg:
         stepper.set_eccentricities(np.stack([away * np.cos(direction), away * np.sin(direction)], axis=1))
 
 
-def prepare_legs(legs: Sequence[Leg]) -> list[Setup | AssemblyError]:
-    """Setups of the legs; an AssemblyError in place of the setup if a linkage does not close or turn.
+def prepare_legs(legs: Sequence[Leg]) -> list[Setup]:
+    """Setups of the legs.
 
     Legs that differ only in their initial state are prepared once; each setup has its own surfaces.
 
@@ -103,21 +103,18 @@ def prepare_legs(legs: Sequence[Leg]) -> list[Setup | AssemblyError]:
     ------
     ConfigError
         For invalid values.
+    AssemblyError
+        If a linkage does not close or has a dead point.
     """
-    known: dict[str, Setup | AssemblyError] = {}
+    known: dict[str, Setup] = {}
     setups = []
     for leg in legs:
         # as a dict, for the text of a mechanism leaves out materials and labels, which results name
         key = repr(attrs.asdict(attrs.evolve(leg, crank_angle_rad=0.0, seed=0)))
         if key not in known:
-            try:
-                known[key] = leg.prepare()
-            except AssemblyError as error:
-                known[key] = error
+            known[key] = leg.prepare()
         setup = known[key]
-        if isinstance(setup, Setup):
-            setup = attrs.evolve(setup, surfaces=fresh_surfaces(setup.contacts, leg.wear))
-        setups.append(setup)
+        setups.append(attrs.evolve(setup, surfaces=fresh_surfaces(setup.contacts, leg.wear)))
     return setups
 
 

@@ -369,8 +369,6 @@ def _spread_out(leg: Leg, settings: LifeSettings) -> list[Leg]:
 def _setups(legs: Sequence[Leg], wear_factor: ArrayLike) -> list[Setup]:
     setups = []
     for setup in prepare_legs(legs):
-        if not isinstance(setup, Setup):
-            raise setup
         factor = np.broadcast_to(np.asarray(wear_factor, dtype=float), len(setup.clearance_joints))
         coefficient = setup.contacts.wear_coefficient * factor[:, None]
         setups.append(attrs.evolve(setup, contacts=setup.contacts._replace(wear_coefficient=coefficient)))

@@ -18,7 +18,6 @@ from leg_wear_monitor.report.figure import (
     LEAST_N,
     SKY,
     SMALL,
-    draw_clearances,
     finish,
     new_figure,
     png,
@@ -41,7 +40,6 @@ from leg_wear_monitor.studies.tables import (
     of_joint,
     period_of,
     power_law,
-    spread,
     worst_zone,
 )
 from leg_wear_monitor.studies.tasks import ERRORS, Arrays
@@ -75,7 +73,7 @@ _KEY = "Shaded: the middle 90 % of all cycles. Blue: one cycle of one run, as an
 
 def study_page(results: StudyResults) -> Page:
     """The page of a study; a study without any result has a page that lists the missing points."""
-    found, lives, exponents = (results.of(task) for task in ("response", "life", "exponent"))
+    found, exponents = results.of("response"), results.of("exponent")
     lines = [f"{label}: {fault}." for label, fault in results.faults]
     lines += [f"Not computed yet: {', '.join(results.missing)}."] if results.missing else []
     parts: dict[str, Sequence[Part]] = {"Missing points": [Text(line) for line in lines]}
@@ -87,8 +85,6 @@ def study_page(results: StudyResults) -> Page:
         parts["Results"] = [_error_table(found), *_sum_table(found), _force_table(found), _wear_table(found)]
         parts["Comparison"] = [_comparison(found)] if len(found) > 1 else []
         parts["Curves of a cycle"] = _curves(shown)
-    if lives:
-        parts["Life with wear"] = [_life_table(lives), _life_gallery(lives)]
     if exponents:
         parts["Lyapunov exponents"] = [_exponent_table(exponents)]
     parts |= _sections_of_cycles(results)
@@ -258,28 +254,6 @@ def _wear_table(found: Found) -> Table:
     return Table(caption="Wear of the bushings", head=head, rows=rows, note=note)
 
 
-def _life_table(lives: Found) -> Table:
-    rows = []
-    for point, arrays in lives:
-        mean, cycles = arrays["clearance_mean_m"], spread(arrays["cycles"][:, -1])
-        rates = arrays["rate_m_per_cycle"].mean(axis=(3, 4), dtype=float)  # of bushing and journal
-        for k, joint in enumerate(clearance_joints_of(arrays)):
-            opened, new, end = (
-                spread(each) for each in (mean[:, -1, k] - mean[:, 0, k], rates[:, 0, k], rates[:, 1, k])
-            )
-            texts = with_spread(opened, 1.0e3), with_spread(new, 1.0e12), with_spread(end, 1.0e12)
-            rows.append([f"{point.label}: {joint}", with_spread(cycles, 1.0e-6), *texts])
-    head = (
-        "joint",
-        "life [million cycles]",
-        "opened by then [mm]",
-        "wear when new [pm/cycle]",
-        "at the end [pm/cycle]",
-    )
-    note = "Mean and standard deviation over runs. A life ends when the first joint has opened as configured."
-    return Table(caption="Lives with wear feedback", head=head, rows=rows, note=note)
-
-
 def _exponent_table(exponents: Found) -> Table:
     rows = []
     for point, arrays in exponents:
@@ -413,23 +387,6 @@ def _curve_gallery(
         every[-1].set_xlabel("crank angle [°]", fontsize=SMALL)
         pictures.append(Picture(image=png(figure), alt=f"{title} over the crank angle, {point.label}"))
     return Gallery(pictures=pictures, caption=f"{title[0].upper()}{title[1:]}. {_KEY}")
-
-
-def _life_gallery(lives: Found) -> Gallery:
-    pictures = []
-    for point, arrays in lives:
-        figure, joints = new_figure(4.6, 3.0), clearance_joints_of(arrays)
-        axes = figure.subplots()
-        mean, largest = 1.0e3 * arrays["clearance_mean_m"], 1.0e3 * arrays["clearance_max_m"]
-        for run, cycles in enumerate(1.0e-6 * arrays["cycles"]):
-            draw_clearances(
-                axes, cycles, mean[run], largest[run], joints if run == 0 else [None] * len(joints)
-            )
-        finish(axes, point.label, x="gait cycles [millions]", y="radial clearance [mm]", columns=5)
-        pictures.append(Picture(image=png(figure), alt=f"Clearances of {point.label} over the life"))
-    return Gallery(
-        pictures=pictures, caption="Full: mean around the joint. Dashed: largest. One line for each run."
-    )
 
 
 # Poincaré maps, phase portraits and bifurcation diagrams.

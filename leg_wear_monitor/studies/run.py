@@ -209,9 +209,9 @@ def load_study(path: str | Path) -> "dict[str, pd.DataFrame]":
     Returns
     -------
     dict of str to pandas.DataFrame
-        ``points`` and ``joints`` (responses), ``lives``, ``exponents``, ``sections``: one row per point, with
-        the settings of the point, and per joint or gait cycle. A mean has its standard deviation beside it,
-        after a dot: ``peak_force_n.mean``, ``peak_force_n.deviation``.
+        ``points`` and ``joints`` (responses), ``exponents``, ``sections``, ``portraits``: one row per point,
+        with the settings of the point, and per joint or gait cycle. A mean and its standard deviation end in
+        different names: ``peak_force_n.mean``, ``peak_force_n.deviation``.
 
     Raises
     ------

@@ -74,23 +74,6 @@ class Ensemble:
 
 
 @attrs.frozen(kw_only=True)
-class LifeSettings:
-    """How far wear is followed, and by what jumps, as in `leg_wear_monitor.simulate_life`."""
-
-    max_wear_per_jump_m: float = quantity(
-        "m",
-        "opening of the mean clearance of the joint that wears fastest",
-        within=(1.0e-7, 0.1),
-        default=1.0e-4,
-    )
-    jump_m: float = quantity(
-        "m", "deepest change of a surface that a jump may make", within=(1.0e-9, 0.1), default=1.0e-5
-    )
-    cycles: int = _count("gait cycles simulated and averaged before each jump", within=(2, _MOST), default=6)
-    runs: int = _count("lives with different initial conditions", within=(2, _MOST), default=4)
-
-
-@attrs.frozen(kw_only=True)
 class ExponentSettings:
     """How the largest Lyapunov exponent is measured."""
 
@@ -214,7 +197,6 @@ class Study:
     )
     sweeps: tuple[Sweep, ...] = described("settings that vary, one after the other")
     ensemble: Ensemble = described("the runs of each point", factory=Ensemble)
-    life: LifeSettings = described("how far wear is followed", factory=LifeSettings)
     exponent: ExponentSettings = described("the Lyapunov exponent", factory=ExponentSettings)
     section: SectionSettings = described("Poincaré section of each value", factory=SectionSettings)
     portrait: SectionSettings = described("Poincaré map and phase portrait", factory=SectionSettings)

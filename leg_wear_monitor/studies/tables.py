@@ -211,22 +211,6 @@ def joint_columns(found: Found) -> Columns:
     return columns
 
 
-def life_columns(found: Found) -> Columns:
-    """One row per point, clearance joint and life."""
-    rows = [
-        (point, arrays, k, run)
-        for point, arrays in found
-        for k in range(len(clearance_joints_of(arrays)))
-        for run in range(len(arrays["cycles"]))
-    ]
-    return _settings([point for point, *_ in rows]) | {
-        "joint": [clearance_joints_of(arrays)[k] for _, arrays, k, _ in rows],
-        "cycles": [float(arrays["cycles"][run, -1]) for _, arrays, _, run in rows],
-        "clearance_mean_m": [float(arrays["clearance_mean_m"][run, -1, k]) for _, arrays, k, run in rows],
-        "clearance_max_m": [float(arrays["clearance_max_m"][run, -1, k]) for _, arrays, k, run in rows],
-    }
-
-
 def exponent_columns(found: Found) -> Columns:
     """One row per point: the largest Lyapunov exponent per gait cycle, and its standard error."""
     estimates = [exponent(arrays["stretch_per_cycle"], 1.0, FORGET) for _, arrays in found]
@@ -254,7 +238,6 @@ def section_columns(found: Found) -> Columns:
 TABLES: dict[str, tuple[str, Callable[[Found], Columns]]] = {
     "points": ("response", point_columns),
     "joints": ("response", joint_columns),
-    "lives": ("life", life_columns),
     "exponents": ("exponent", exponent_columns),
     "sections": ("section", section_columns),
     "portraits": ("portrait", section_columns),

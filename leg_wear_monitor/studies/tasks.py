@@ -1,4 +1,4 @@
-"""Tasks of a study's points: response to clearance, wear life, Lyapunov exponent, Poincaré section."""
+"""Tasks of a study's points: response to clearance, Lyapunov exponent, Poincaré section."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator
@@ -24,8 +24,6 @@ from leg_wear_monitor.dynamics.run import (
 )
 from leg_wear_monitor.dynamics.statistics import drive_torque, joint_statistics
 from leg_wear_monitor.errors import ConfigError, SimulationError
-from leg_wear_monitor.life.jumps import JumpControl
-from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
 from leg_wear_monitor.mechanism import position
 from leg_wear_monitor.mechanism.arrays import Flags, Floats
 from leg_wear_monitor.mechanism.person import with_ground_reaction
@@ -170,11 +168,7 @@ def observed_legs(legs: list[Leg], tolerance_m: float | None = None) -> list[Obs
     AssemblyError
         If the linkage of a leg does not close or has a dead point.
     """
-    setups: list[Setup] = []
-    for setup in prepare_legs(legs):
-        if not isinstance(setup, Setup):
-            raise setup
-        setups.append(setup)
+    setups = prepare_legs(legs)
     tables = build_tables(setups[0].linkage, setups[0].contacts)
     return [ObservedLeg(leg, setup, tables, tolerance_m) for leg, setup in zip(legs, setups, strict=True)]
 
@@ -223,9 +217,8 @@ def run_ensemble(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
         ``wear_depth_m_per_cycle`` (r, k, 2, N): of bushing and journal;
         ``band_<name>`` (3, s, ...): quantiles `BAND` of the curves; ``example_<name>`` (s, ...): first cycle
         of the first run; ``ideal_<name>`` (s, ...): curve of the ideal linkage;
-        ``repeats_contact_force`` (k,), ``repeats_eccentricity`` (k, 2): fraction of the variance of the
-        force, and of the eccentricity along the ground's x and y, that the mean cycle explains; with
-        ``_by_run`` (r, ...) appended their jackknife pseudo-values, for their scatter over runs.
+        ``repeats_contact_force`` (k,): fraction of the variance of the force that the mean cycle explains;
+        ``repeats_contact_force_by_run`` (r, k): their jackknife pseudo-values, for their scatter over runs.
 
     Raises
     ------
@@ -302,7 +295,6 @@ def _curves(moments: list[Moment], shift: int, turns_forwards: bool) -> dict[str
         "toe_acceleration_mps2": deviation[:, 2],
         "drive_torque_nm": np.array([moment.torque for moment in moments]),
         "eccentricity_m": np.array([moment.e for moment in moments]),
-        "eccentricity_rate_mps": np.array([moment.rate for moment in moments]),
         "contact_force_n": np.array([moment.force for moment in moments]),
     }
     if not turns_forwards:  # angles descend
@@ -318,9 +310,8 @@ def _bands(curves: dict[str, Floats], runs: int) -> Arrays:
     bands["contact_force_n"] = magnitude
     for name, curve in bands.items():
         result[f"band_{name}"] = np.quantile(curve, BAND, axis=0).astype(np.float32)
-    for name, curve in (("contact_force", magnitude), ("eccentricity", curves["eccentricity_m"])):
-        result[f"repeats_{name}"] = _repeats(curve)
-        result[f"repeats_{name}_by_run"] = _by_run(curve, runs)
+    result["repeats_contact_force"] = _repeats(magnitude)
+    result["repeats_contact_force_by_run"] = _by_run(magnitude, runs)
     return result
 
 
@@ -350,80 +341,6 @@ def _ideal(linkage: position.Linkage, speed: float) -> Arrays:
         path = position.point_motion(motion, linkage, *linkage.mechanism.toe)
         result |= {f"ideal_{name}": part for name, part in zip(ERRORS, path, strict=False)}
     return result
-
-
-# Wear lives with wear feedback, by cycle jumps, sampled at equal increases of the largest clearance.
-
-
-STATES = 41  # states of a life at equal increases of clearance, new and end included; odd: one is halfway
-
-
-def wear_life(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
-    """Wear lives of an ensemble.
-
-    Returns
-    -------
-    dict of arrays
-        For runs r, states of wear w (the first is new), clearance joints k and sectors N:
-        ``cycles`` (r, w): gait cycles since new;
-        ``clearance_mean_m``, ``clearance_max_m`` (r, w, k): radial clearance;
-        ``depth_m`` (r, 2, k, 2, N): wear depth of bushing and journal, halfway and at the end;
-        ``rate_m_per_cycle`` (r, 2, k, 2, N): wear depth per cycle, when new and at the end;
-        ``peak_force_n`` (r, w, k), ``toe_position_m`` (r, w): largest contact force and toe error of a cycle.
-
-    Raises
-    ------
-    SimulationError
-        If the motion diverges, or no joint wears.
-    """
-    mechanism = changed(mechanism, settings)
-    lives = [_life(mechanism, settings, run) for run in range(settings["runs"])]
-    result = {name: np.array([life[name] for life in lives]) for name in lives[0]}
-    return result | {"clearance_joints": np.array(settings["clearances"])}
-
-
-def _life(mechanism: Mechanism, settings: dict[str, Any], member: int) -> dict[str, Floats]:
-    run = LifeRun(
-        mechanism,
-        LifeSettings(
-            legs=1,
-            cycles=settings["cycles"],
-            perturb_fraction=settings["perturb_fraction"],
-            jump=JumpControl.of(settings["jump_m"]),
-            seed=settings["seed"] + member,
-        ),
-        clearances=settings["clearances"],
-        clearance_m=settings["clearance_m"],
-        speed_rpm=speed_rpm_of(mechanism, settings),
-    )
-    life = simulate_life(run, limit_m=run.fresh_m + settings["max_wear_per_jump_m"], horizon_cycles=np.inf)
-    opened = (life.clearance_m - run.fresh_m).max(axis=1)
-    if opened[-1] < settings["max_wear_per_jump_m"]:
-        raise SimulationError(
-            f"none of {', '.join(run.clearance_joints)} wears, look at their wear_coefficient"
-        )
-    cycles = np.interp(np.linspace(0.0, settings["max_wear_per_jump_m"], STATES), opened, life.cycles)
-    depth = between(life.cycles, life.depth, cycles)
-    rate = between(life.cycles, np.array([point.rate.depth for point in run.points]), cycles[[0, -1]])
-    toe = np.array([point.toe_position_m for point in run.points])
-    profile = depth.sum(axis=2)  # of both surfaces, each in its own frame
-    return {
-        "cycles": cycles,
-        "clearance_mean_m": run.fresh_m + profile.mean(axis=2),
-        "clearance_max_m": run.fresh_m + profile.max(axis=2),
-        "depth_m": depth[[STATES // 2, -1]].astype(np.float32),
-        "rate_m_per_cycle": rate.astype(np.float32),
-        "peak_force_n": between(life.cycles, life.peak_force_n, cycles),
-        "toe_position_m": between(life.cycles, toe, cycles),
-    }
-
-
-def between(cycles: Floats, values: Floats, at: Floats) -> Floats:
-    """Values (p, ...) at cycles (p,), interpolated linearly at the cycles ``at`` (w,); shape (w, ...)."""
-    left = np.clip(np.searchsorted(cycles, at) - 1, 0, len(cycles) - 2)
-    fraction = (at - cycles[left]) / np.diff(cycles)[left]
-    fraction = fraction.reshape(-1, *[1] * (values.ndim - 1))
-    return np.asarray(values[left] + fraction * (values[left + 1] - values[left]))
 
 
 # The largest Lyapunov exponent from two neighbouring trajectories (Benettin et al., Meccanica 15, 1980).
@@ -602,7 +519,6 @@ def poincare_section(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
 
 TASKS: dict[str, Callable[[Mechanism, dict[str, Any]], Arrays]] = {
     "response": run_ensemble,
-    "life": wear_life,
     "exponent": lyapunov_exponent,
     "section": poincare_section,
     "portrait": poincare_section,
@@ -611,7 +527,7 @@ TASKS: dict[str, Callable[[Mechanism, dict[str, Any]], Arrays]] = {
 
 def code_digest() -> str:
     """Digest of the sources that produce results: the physics, and these tasks."""
-    folders = ("configuration", "mechanism", "contact", "dynamics", "life")
+    folders = ("configuration", "mechanism", "contact", "dynamics")
     return package_digest(*folders, "wear.py", "studies/tasks.py")
 
 

@@ -87,7 +87,7 @@ def test_the_tables_of_a_study_have_the_documented_columns(study: Path) -> None:
         assert all(f"`{column.split('.')[0]}" in page for column in table.columns), name
     assert list(tables["points"]["clearances"]) == ["A, B", "G", "I, J"]
     assert list(tables["joints"]["joint"]) == ["A", "B", "G", "I", "J"]
-    assert (tables["points"]["toe_position_m.mean"] > 0.0).all() and tables["lives"].empty
+    assert (tables["points"]["toe_position_m.mean"] > 0.0).all() and tables["exponents"].empty
     with pytest.raises(lw.ConfigError):
         lw.load_study(study)
 
@@ -97,7 +97,7 @@ def test_the_tables_of_a_study_have_the_documented_columns(study: Path) -> None:
     [
         ("sweeps: []\nspeed: 60", "study.yaml: speed: unknown key"),
         ("sweeps: [{speed_rpm: [60], clearance_m: [0.0003]}]", "varies clearance_m and speed_rpm"),
-        ("sweeps: [{keep: [forces]}]", "'forces' is not one of response, life"),
+        ("sweeps: [{keep: [forces]}]", "'forces' is not one of response, exponent"),
         ("sweeps: [{clearances: [[Z]]}]", "'Z' has no clearance settings"),
         ("sweeps: [{speed_rpm: [60]}]", "has no clearance joint"),
     ],

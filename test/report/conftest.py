@@ -13,7 +13,6 @@ from leg_wear_monitor.studies.study import parse_study
 
 SMALL = {
     "ensemble": {"runs": 2, "cycles": 2, "skip_cycles": 1, "traced_cycles": 1},
-    "life": {"max_wear_per_jump_m": 5.0e-6, "jump_m": 1.0e-5, "cycles": 2, "runs": 2},
     "exponent": {"runs": 2, "cycles": 10, "renewals": 16},
     "section": {"cycles": 4, "skip_cycles": 1},
     "portrait": {"cycles": 6, "skip_cycles": 1, "portrait_cycles": 2},
@@ -26,8 +25,8 @@ TINY = {
         {"clearances": [["A", "B"], ["G"], ["I", "J"], ["A", "B", "I", "J"], ["A", "B", "G", "I", "J"]]}
     ],
     "laws": [{"normal_law": ["hertz", "flores"]}, {"friction": ["none"]}, {"friction_coefficient": [0.1]}],
-    "load": [{"ground_n": [0, 300], "keep": ["response", "life", "exponent"]}],
-    "wear": [{"clearances": [["I", "J"]], "keep": ["response", "life"]}],
+    "load": [{"ground_n": [0, 300], "keep": ["response", "exponent"]}],
+    "wear": [{"clearances": [["I", "J"]]}],
     "chaos": [
         {"keep": ["response", "portrait"]},
         {"clearances": [["A", "B"], ["G"]], "keep": ["exponent"]},

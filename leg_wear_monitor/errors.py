@@ -144,7 +144,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     return f"; did you mean {near}?" if near else ""
 
 
-# What an interrupt does, also where an exception would be lost: in imports and in the compiler.
+# Effect of an interrupt, also if an exception would be lost: in imports and in the compiler.
 #
 # A signal handler usually raises KeyboardInterrupt. But numba compiles in callbacks and finalisers, which
 # print an exception or swallow it, and an import that is cut short ends in a traceback or leaves half a

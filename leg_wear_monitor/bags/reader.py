@@ -417,7 +417,7 @@ def _merged(block: Block, new: Block) -> Block:
     return Block(samples, times, new.fraction, source)
 
 
-# What is understood of a table: its rows, its time, its columns with their ranges in SI units.
+# A table as the reader understands it: rows, time, columns with their ranges in SI units.
 
 
 _SI = {CRANK_SPEED: "rad/s", DRIVE_TORQUE: "N m", FOOT_LOAD: "N", FOOT_LOAD_ALONG: "N"}

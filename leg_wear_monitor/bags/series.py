@@ -26,7 +26,7 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, ZERO_STAMP, Samples
 
-# What identifies a series: each joint is a candidate for the crank, each torque one for the drive torque.
+# Identity of a series: each joint is a candidate for the crank, each torque for the drive torque.
 
 
 @attrs.frozen
@@ -89,7 +89,7 @@ class Signals:
 _PUBLISHED = tuple(each.name.lstrip("~") for each in (outputs.CLEARANCES, outputs.IMPACTS, outputs.TORQUE))
 # Interfaces of a joint that are no candidates: three are no torques, and joint_states has the effort, too.
 _NO_CANDIDATES = ("position", "velocity", "acceleration", "effort")
-_MOST_JOINTS = 200  # of a topic, to bound the work: each joint is decoded by itself
+_MOST_JOINTS = 200  # joints per topic: each joint is decoded separately, so this bounds the work
 _NAMING_MESSAGES = 20  # first messages of a piece, whose joint names are read
 _NO_JOINT = "(no joint)"  # name of a crank joint that no message has
 

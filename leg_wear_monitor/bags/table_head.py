@@ -8,7 +8,7 @@ import attrs
 
 from leg_wear_monitor.bags.table_layout import dates, is_number, units_named
 
-_SEPARATORS = "\t;|, "  # of several that fit alike the first counts: a comma may be a decimal mark
+_SEPARATORS = "\t;|, "  # if several fit, the first one wins: a comma may be a decimal mark
 _SAMPLE = 200  # lines
 
 

@@ -246,7 +246,7 @@ class TableRows:
             within = np.asarray((times <= MOST_NS // scale) & (times >= -(MOST_NS // scale)))
         times = np.where(within, times, 0)
         whole = times.astype(np.int64)
-        # of integers there is no rest, and a double could not hold them
+        # integers have no rest, and a double could not hold them
         rest = np.rint((times - whole) * scale).astype(np.int64) if times.dtype.kind == "f" else 0
         stamps = whole * scale + rest + self._table.start_ns
         return stamps, within & (np.abs(stamps) <= MOST_NS)

@@ -233,7 +233,7 @@ SUMMARY, PAGE = "summary.json", "report.html"
 
 STDOUT = Path("-")
 
-_MOST_LINES = 20  # of findings on stderr
+_MOST_LINES = 20  # lines of findings on stderr
 
 
 def check_file(option: str, path: Path | None) -> None:

@@ -61,7 +61,7 @@ _ROUGH_SCALE = 0.05
 _ROUGH_REST = 0.15  # a repeating rest that may shift the scale by more than twice what clearances do
 _DECLARED_ERROR = 0.3  # by which a drive differs from another one of its kind, and when it is warm
 _AT_ZERO_RAD = 0.02
-_AS_WELL = 1.02  # of the mismatch of another fit
+_AS_WELL = 1.02  # a fit is as good as the best one up to this ratio of mismatches
 
 
 def not_told(found: proposal.Found) -> tuple[str, ...]:
@@ -92,7 +92,7 @@ def not_told(found: proposal.Found) -> tuple[str, ...]:
 def findings(found: proposal.Found, load: Load | None, mechanism: Mechanism) -> tuple[str, ...]:
     """What does not fit, or cannot be used as it is."""
     sentences = [_load(load)]
-    if not found.doubts:  # of a leg that is not known, neither friction nor phases tell anything
+    if not found.doubts:  # friction and phases say nothing about an unknown leg
         sentences += [does_not_fit(found.fit, mechanism), _drives(found), _late(found), _anew(found)]
     return tuple(filter(None, [*sentences, _position(found)]))
 
@@ -281,7 +281,7 @@ def commission(
         joint_states or best.joint.topic,
         drive_torque or (None if best.torque.source == EFFORT else best.torque.topic),
     )
-    try:  # by the last recording, as is the offset
+    try:  # the last recording gives the phase, as it gives the offset
         walk = walk_of(recordings[-1:], result.config, *topics)
     except RecordingError as error:
         return attrs.evolve(result, notes=(*result.notes, f"{LIMIT} stays as it is: {error}"))

@@ -117,7 +117,7 @@ def expected_leg(walk: Walk) -> TorqueReference | None:
     return TorqueReference(walk.profile, new_m[None], (leg.torque.astype(np.float16),), own)
 
 
-# What repeats with each turn and is not the ideal leg's torque: a foot load, other masses, another leg.
+# Torque that repeats with each turn and does not fit the ideal leg: foot load, other masses, a different leg.
 
 
 # Clearances of 0.3 mm in five joints of the default leg repeat with 0.03 to 0.17 of the torque, the most at
@@ -125,7 +125,7 @@ def expected_leg(walk: Walk) -> TorqueReference | None:
 _NOTABLE = 0.2
 # repeating rest below which a load is not looked for: sensors that average have up to 0.05
 _LEAST_LOAD = 0.06
-_EXPLAINS = 0.5  # of the energy of the repeating rest, from which on a cause is named
+_EXPLAINS = 0.5  # a cause is named if it explains this fraction of the energy of the repeating rest
 _SURE_CAUSE = 5.0  # standard deviations
 
 
@@ -262,7 +262,7 @@ def scatter(one: Fit) -> float:
     return math.sqrt(max(energy, 0.0))
 
 
-# What speeds show: a lag of the torque from an offset of the crank; and the cadence.
+# Several speeds separate a lag of the torque from an offset of the crank; also the cadence.
 
 
 _SPEED_SPREAD = 0.15  # relative spread of the speed from which on a lag is separated from the offset
@@ -322,7 +322,7 @@ class Timing:
     def lag_sigma_s(self) -> float:
         """Standard deviation of the lag to allow for [s]."""
         sigma = self._drive[1]
-        # where the whole lag is measured, errors of its parts are those of the drive's part, too
+        # if only the whole lag is measured, its parts have the error of the drive's part
         if self.is_lag_separated:
             return sigma
         return math.hypot(sigma, self.low_pass_sigma_s, self.sampling_sigma_s)
@@ -400,14 +400,14 @@ def cadences_rpm(one: Fit) -> list[float]:
     return [float(value) for value in values[counts > 0.1 * len(speed)]]
 
 
-# Whether a torque sample is the mean since the one before, or the torque at its instant.
+# Decide between averages (mean since the previous sample) and instants (torque at the stamp).
 #
 # Joints with clearance let go and hit again. The bodies' momenta are bounded, so what the torque lacks during
 # a flight is in the impact after it: means cancel over a part of a turn. Of impacts that last a millisecond,
 # instants meet some and miss others: their errors add up as independent ones do.
 
 
-_WINDOW = 0.125  # of a turn, half of the window's width: some flights with their impacts
+_WINDOW = 0.125  # turns, half of the window's width: it contains some flights with their impacts
 # Of a turn: what repeats with it is of a load or of other masses, and does not cancel either. Not more, or
 # impacts that repeat would be taken out with it, and what is left of means would cancel no longer
 _HARMONICS = 8

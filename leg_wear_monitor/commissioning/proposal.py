@@ -64,7 +64,7 @@ def exact_ratio(measured: float, error: float) -> float | None:
     return None
 
 
-# What the proposed parameters are made of: the chosen fit, and what follows from it.
+# The chosen fit and the parameters that follow from it.
 
 
 _SURE = 3.0  # standard deviations

@@ -15,7 +15,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.inputs import EFFORT, INTERFACE
 
-# Where to start: every gear ratio, direction, offset and torque sign at once, judged by the leg's model.
+# Search of start values: every gear ratio, direction, offset and torque sign at once, by the leg's model.
 #
 # Over the joint's angle, the torque is periodic with the crank's turn. One spectrum holds its harmonics for
 # every gear ratio; their correlation with those of the model, over all offsets, is a further Fourier

@@ -294,7 +294,7 @@ _Function = TypeVar("_Function", bound=Callable[..., object])
 _ENTRY: dict[str, object] = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
 _KERNEL = {**_ENTRY, "forceinline": True}
 
-_HOME = Path(__file__).parents[1]  # of the package
+_HOME = Path(__file__).parents[1]  # directory of the package
 _PLAIN = (int, float, complex, str, bytes, slice, np.generic, EllipsisType, type(None))
 
 at_compilation: list[Callable[[], None]] = []  # called when an entry is compiled, and not loaded

@@ -284,7 +284,7 @@ _converter.register_structure_hook(int, _integer)
 _converter.register_structure_hook(bool, _flag)
 _converter.register_structure_hook(str, _text)
 _converter.register_structure_hook(Enum, _member)
-_converter.register_structure_hook(IntEnum, _member)  # by itself, for it is an int as well
+_converter.register_structure_hook(IntEnum, _member)  # needs its own hook, because it is an int as well
 _converter.register_structure_hook(float | None, _optional_number)
 _converter.register_structure_hook_factory(attrs.has, _strict_class)
 _converter.register_structure_hook_factory(_generic(dict), _strict_mapping)

@@ -108,7 +108,7 @@ def _refuse_stiffness(source: str, name: str, settings: Clearance) -> None:
 
 def _warn_of_restitution(source: str, settings: dict[str, Clearance]) -> None:
     """Warn of laws for nearly elastic impacts with a small restitution: impacts then return more than set."""
-    joints: dict[tuple[str, float], list[str]] = {}  # by law and restitution, for one warning each
+    joints: dict[tuple[str, float], list[str]] = {}  # joints by law and restitution, for one warning per pair
     for name, c in settings.items():
         if c.normal_law in NEARLY_ELASTIC and c.restitution < LEAST_RESTITUTION:
             joints.setdefault((c.normal_law, c.restitution), []).append(name)

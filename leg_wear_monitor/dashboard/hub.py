@@ -13,7 +13,7 @@ from leg_wear_monitor.dashboard.live_leg import LiveLeg
 
 MOST_VIEWERS = 100
 
-_TICK_S = 0.5  # a human does not see more; each tick is one rendering, however many look
+_TICK_S = 0.5  # no viewer sees more; each tick is one rendering for all viewers
 _TICKS_A_WORD = 2  # a word every second, also if nothing has changed: so a viewer knows that it is connected
 
 
@@ -36,7 +36,7 @@ class Hub:
     def __init__(self, leg: LiveLeg) -> None:
         self._leg = leg
         self._content: Content | None = None
-        self._numbers: dict[str, int] = {}  # of each region: counts up when it changes
+        self._numbers: dict[str, int] = {}  # counter per region, increased when the region changes
         self._lock = asyncio.Lock()
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="dashboard")
         self._viewers: set[Viewer] = set()

@@ -34,7 +34,7 @@ from leg_wear_monitor.state import SCHEMA_VERSION, LegState, Level
 MOST = 200
 """Statuses in a message, values in a status, entries of a list: a monitor sends fewer."""
 
-_MOST_CHARACTERS = 10**6  # of a state; a leg with five joints has 10 000
+_MOST_CHARACTERS = 10**6  # characters of a state; a leg with five joints has 10 000
 _HUGE = 2.0**63  # no stamp, no count and no value in SI units is that large
 _CODE, _NO_DATA = "fault_code", "no_data_s"
 
@@ -94,7 +94,7 @@ def _clean(part: Any) -> Any:
     return None if is_huge else part
 
 
-_ROWS = 1200  # of the trends: twenty minutes at one report per second
+_ROWS = 1200  # rows of the trends: twenty minutes at one report per second
 OLD_AFTER_S = 5.0  # the monitor reports every second, whether the leg walks or not
 _REPORTS = 3.0  # or this many of its reports did not come
 _TRENDS_S = 5.0  # charts are many kilobytes, so the page does not send them with each message

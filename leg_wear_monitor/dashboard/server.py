@@ -16,7 +16,7 @@ from leg_wear_monitor.dashboard.hosts import is_allowed, own_names
 from leg_wear_monitor.dashboard.hub import Hub
 from leg_wear_monitor.errors import LegWearError, printable
 
-MOST_CONNECTIONS = 300  # of the viewers of a hub, and what their browsers keep open beside
+MOST_CONNECTIONS = 300  # connections: the viewers of a hub, and further connections of their browsers
 
 _WRITE_S = 20.0  # a viewer that takes nothing for so long is sent away
 _IDLE_S = 20.0  # so is a connection without a whole request for so long; a browser just makes a new one

@@ -96,7 +96,7 @@ _FIRST_OCTAVE, _OCTAVES, _IN_OCTAVE = -20, 50, 128
 _BINS = _OCTAVES * _IN_OCTAVE
 # least ratio of two successive steps for a parabola through their ends; steps shrink to 0.2 at a time
 _MOST_UNEQUAL = 0.1
-# of the 52 binary digits of a number, 7 tell 128 bins; its exponent is stored plus 1023
+# 7 of the 52 binary digits of a number give 128 bins; its exponent is stored plus 1023
 _DIGITS_AFTER_BIN, _BITS_OF_FIRST = 52 - 7, (1023 + _FIRST_OCTAVE) * _IN_OCTAVE
 
 

@@ -19,9 +19,9 @@ from leg_wear_monitor.mechanism.position import (
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.reference import LegParameters
 
-_POINTS = 240  # of a gait cycle: three in each of 80 phases
+_POINTS = 240  # points per gait cycle: three in each of 80 phases
 _LONGER = 0.002  # step of the difference by a body's length
-_NEWTON_ROUNDS = 4  # of Newton's method: from lengths that are 0.2 % off, the third is at rounding
+_NEWTON_ROUNDS = 4  # rounds of Newton's method: from lengths that are 0.2 % off, the third is at rounding
 
 
 @attrs.frozen(eq=False)

@@ -12,7 +12,7 @@ SURE_LOG_ODDS = 5.0  # 150 to 1
 SURE_OF_NAME = 10.0
 # of the counted clearance: smaller openings are named wrongly where masses are 5 % off (diagnosis.md)
 CORRECTED_FROM = 1.3
-SURE_SIGMAS = 2.0  # by which a clearance must be beyond its limit, or below it
+SURE_SIGMAS = 2.0  # a clearance is surely beyond or below its limit by so many standard deviations
 
 
 class Cause(Enum):

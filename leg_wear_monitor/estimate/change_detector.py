@@ -16,8 +16,8 @@ from leg_wear_monitor.mechanism.arrays import Floats, Ints
 # on the counted clearance of one joint; two further tests are for a new part in a worn joint
 FACTORS = (1.08, 1.2, 1.35, 1.5, 2.0, 2.5, 3.3, 5.0, 8.0)
 
-_LEAST_INFORMATION = 1.0e-6  # of one gait cycle, by which a test can show anything
-_SIGMAS = 4.0  # by which the baseline may be off
+_LEAST_INFORMATION = 1.0e-6  # information per gait cycle below which a test shows nothing
+_SIGMAS = 4.0  # possible error of the baseline in standard deviations
 # of the threshold: what one gait cycle counts at most, so that two alone raise nothing. One of 260 healthy
 # cycles on the ground looked like a wider joint: two in a row come each twenty hours by chance (2026-11-25)
 _MOST = 0.4

@@ -137,7 +137,7 @@ def channel_of(
     """
     variance = np.repeat([_MEAN_SIGMA * sensor.size_nm, _ROUGHNESS_SIGMA], sensor.phases) ** 2
     is_alone = len(reference.torque_nm) == 1
-    if is_alone:  # what clearances change is not simulated: mostly, they shift phases
+    if is_alone:  # the effect of clearances, mostly a shift of phases, is not simulated
         variance += np.square(PHASE_ERROR_RAD * _slopes(measured, sensor))
     tolerances = [
         max(_SPREADS[one.cause], _SPREAD_FACTOR * one.spread) * one.column
@@ -221,7 +221,7 @@ class _Hypothesis:
         sigma = math.hypot(self._sigma * float(covariance[-1, -1]) ** 0.5, _FRICTION_ERROR)
         if not 0.0 <= friction <= _MOST_FRICTION:
             friction = min(max(friction, 0.0), _MOST_FRICTION)
-            # the clearances that are best with the friction at its bound
+            # the best clearances with the friction at its bound
             x += covariance[-1] * ((friction - self._friction) / self._sigma - x[-1]) / covariance[-1, -1]
         rest = np.concatenate([residual - x @ columns, x])
         square = float(rest @ rest)
@@ -289,7 +289,7 @@ def _best_channel(
     is_declared, near = 0.0 not in time_constants_s, least(others).channel
     free = ("delay_s",) if is_declared or not near.time_constant_s else ("delay_s", "time_constant_s")
     other = _refined(fit_of, near, *free)
-    if len(free) == 2 and not first_order:  # of second order, or a mean, if that is clearly better
+    if len(free) == 2 and not first_order:  # second order, or a mean, only if it is clearly better
         late_s = other.channel.lateness_s
         second = attrs.evolve(other.channel, second_order=_SECOND_ORDER)
         means = [Channel(delay_s=late_s - 0.5 * one, mean_s=one) for one in _MEANS_S]

@@ -10,9 +10,9 @@ from leg_wear_monitor.estimate.explanations import MODEL_ERROR, Explainer, Expla
 from leg_wear_monitor.estimate.least_squares import Point, gauss_newton
 from leg_wear_monitor.mechanism.arrays import Floats
 
-_LEAST_FACTOR = 0.7  # of the expected clearance
-_FLAT = 1.0  # prior standard deviation of a clearance's logarithm: what shows nothing keeps its prior
-_NARROWER = 0.03  # that of a new part's on the narrow side: wear only opens
+_LEAST_FACTOR = 0.7  # smallest clearance over the expected one
+_FLAT = 1.0  # prior standard deviation of a clearance's logarithm: an unobservable clearance keeps its prior
+_NARROWER = 0.03  # the same on the narrow side for a new part, because wear only opens
 # mean square up to which clearances explain: one joint that opened leaves 0.4 to 1.3, two at once do not add
 # up. A and G at 0.45 mm left 2.1 to 2.4, and G was 0.33 ± 0.01 mm, B 0.35 ± 0.02 (2026-11-26)
 _EXPLAINED = 1.75
@@ -75,7 +75,7 @@ def fit_clearances(
     low, high = np.log(_LEAST_FACTOR * model.joints.grid[:, 0]), np.log(model.joints.grid[:, -1])
     new, flat = np.log(np.minimum(modelled_m, explainer.fresh_m)), np.eye(len(modelled_m)) / _FLAT
     clearance: Floats = start_m
-    for _ in range(_FIT_ROUNDS):  # what the model may be off depends on the clearances
+    for _ in range(_FIT_ROUNDS):  # the error of the model depends on the clearances
         change = model.at(clearance)[0] - model.at(modelled_m)[0]
         scatter = model.scatter_at(clearance) + float(explainer.error(change[None])[0])
         whiten, log_size = explainer.whitening(cycles, scatter)
@@ -90,7 +90,7 @@ def fit_clearances(
         clearance = np.asarray(np.exp(found.x), dtype=np.float64)
     # what a clearance changes is known to a fraction, and so is a clearance that is far from the counted one
     uncertain = np.hypot(_MODEL_M, MODEL_ERROR * (clearance - modelled_m))
-    # a baseline after a correction hides what that is off
+    # a baseline after a correction hides the error of the correction
     covariance = found.covariance * np.outer(clearance, clearance) + np.diag(uncertain**2 + known_sigma_m**2)
     square = float(np.square(found.point.rest[: len(mean)]).mean())
     fit = ClearanceFit(

@@ -87,7 +87,7 @@ DIRECT = Channel()
 """A drive that adds nothing."""
 
 
-# What is declared of a drive, before anything was measured: prior knowledge of an estimate.
+# Declared values of a drive: prior knowledge of the estimate.
 
 
 @attrs.frozen(kw_only=True)

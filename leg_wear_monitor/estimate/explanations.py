@@ -128,7 +128,7 @@ class OtherNoise:
 
     def shown(self, signature: Floats) -> Floats:
         """Signatures (..., F) with this noise instead of the sensor's."""
-        # of less noise than there is, no more can be left out
+        # with less noise than the measured noise, nothing more can be left out
         more = np.maximum(self.power * np.exp(-2.0 * signature), _QUIETEST - 1.0)
         return np.asarray(signature + 0.5 * np.log1p(np.where(self.power == 0.0, 0.0, more)))
 
@@ -274,7 +274,7 @@ class Explainer:
         self.channels, self.noises = tuple(channels), tuple(noises)
         self.fresh_m = model.joints.grid[:, 0] if fresh_m is None else fresh_m
         usual = (one.spread**2 * np.outer(one.column, one.column) for one in nuisances)
-        self._constant = sum(usual, baseline.covariance)  # what does not become less over several cycles
+        self._constant = sum(usual, baseline.covariance)  # errors that averaging over cycles does not reduce
         # combinations of a signature's entries that are independent under both covariances: variances of 1
         # in a gait cycle, and these in what stays
         apart = np.linalg.inv(np.linalg.cholesky(model.covariance))
@@ -463,7 +463,7 @@ class Explainer:
             value=value,
             sigma=float(np.hypot(own, MODEL_ERROR * (value - one.counted))),
             counted=one.counted,
-            misfit=float(misfits[best]) + (2.0 * SURE_OF_NAME if noise else 0.0),  # of a second cause
+            misfit=float(misfits[best]) + (2.0 * SURE_OF_NAME if noise else 0.0),  # penalty of a second cause
             square=square,
         )
 
@@ -494,7 +494,7 @@ class Explainer:
         weighted = np.linalg.solve(covariance, columns.T).T
         information = (weighted * columns).sum(axis=1)
         values = weighted @ rest / information
-        # by Sherman and Morrison: without what the covariance contains of the nuisance itself
+        # Sherman-Morrison formula: removes the part of the nuisance itself from the covariance
         sigmas = np.sqrt(1.0 / information - spread**2)
         more = np.sqrt(np.maximum(0.0, values**2 - sigmas**2 - spread**2))[:, None] * columns
         error = _diagonal(MODEL_ERROR * values[:, None] * columns)

@@ -39,7 +39,7 @@ _HARMONICS = 12  # sin(k pi s) over stance, in each component
 # model's torque is off became a ripple of the force, and the heel wore 1.3 times as fast under 100 N
 _TIMING, _FORE_AFT = 0.03, 0.03
 _SHAPES = np.outer([0.06, 0.03], np.minimum(1.0, (6.0 / np.arange(1, _HARMONICS + 1)) ** 2))
-# by how much steps usually differ from the template: half as much as those on a treadmill do
+# usual difference of steps from the template: half of the difference on a treadmill
 _USUAL = np.zeros((2, _HARMONICS))
 _USUAL[0, :9] = -0.012, 0.013, 0.0, 0.003, -0.035, 0.012, 0.008, 0.005, -0.007
 _USUAL[1, 1:3] = 0.007, -0.007
@@ -51,7 +51,7 @@ _SURE, _WORSE = 2.0, 3.0  # standard deviations of a load, and a factor on what 
 # hardly change the wear, but keep the leg from being identified
 _LEAST_N = 25.0
 _UNIT_N = 100.0
-_IN_STANCE = 0.05  # of the peak of a force, above which the foot is on the ground
+_IN_STANCE = 0.05  # the foot is on the ground above this fraction of the peak force
 # of the fit, which has several minima: 69 N and a toe-off later by 0.04 left over 2.5, 100 N left over
 # 2.2 (2026-11-25). Sizes, and toe-offs in standard deviations, where it begins
 _STARTS_N, _TOE_OFFS, _ROUNDS = (50.0, 200.0, 600.0), (-2.0, 0.0, 2.0), 4
@@ -160,7 +160,7 @@ class _Leg:
         self._own = own - (self._lever * at_points(former)).sum(axis=1) if former.size else own
         self._torques = functools.lru_cache(maxsize=3)(self._torques_of)
         self._direction = math.copysign(1.0, profile.speed)
-        # of the torque after its friction, all that the sensor shows is linear: (points, phases)
+        # after the friction, the sensor is linear in the torque: (points, phases)
         shown = [signature_of_torque(one, sensor, profile.speed) for one in np.eye(POINTS)]
         self._seen = np.array(shown)[:, : sensor.phases]
 
@@ -267,7 +267,7 @@ def ground_load(
     without = at(np.zeros(number)).square
     minima = _minima(leg, at, low, high)
     best, least = minima[0], minima[0].square
-    # by as much as the model is off, differences between minima say less: the square of Birge's ratio
+    # an error of the model weakens differences between minima: the square of Birge's ratio
     worse = np.array([one.square - least for one in minima]) / max(1.0, least / phases)
     likely = np.exp(-0.5 * worse) / np.exp(-0.5 * worse).sum()
     apart = np.array([one.x[0] - best.x[0] for one in minima])

@@ -56,7 +56,7 @@ def series(stamp_ns: NDArray[np.int64], value: Floats, recording: NDArray[np.int
 # Motion of a joint that turns on and on: position, speed and acceleration, and noise of its encoder.
 
 
-_WINDOW_S = 0.12  # of a local fit: a twelfth of a turn at 40 rpm, which keeps a ripple of two periods a turn
+_WINDOW_S = 0.12  # local fit: a twelfth of a turn at 40 rpm, which keeps a ripple of two periods per turn
 _LEAST_WINDOW = 7  # samples: three more than a cubic has coefficients
 _GAP_SAMPLES = 4.0  # a longer gap between samples, in sampling intervals, is not bridged
 _LEAST_TRAVEL_RAD = 1.0  # a joint that moves by less in all does not turn
@@ -119,7 +119,7 @@ def motion_of(joint: Series) -> JointMotion:
 
     Each recording is smoothed by itself; one that is too short is left out.
     """
-    parts = []  # of each recording: its index, its first reading, and the six results of `_smoothed`
+    parts = []  # per recording: its index, its first reading, and the six results of `_smoothed`
     for index in _long_enough(joint):
         chosen = joint.recording == index
         value = _unwrapped_values(joint.value[chosen])
@@ -225,7 +225,7 @@ def _smoothed(
 # A torque and the motion of a joint at the torque's times, while the joint turns.
 
 
-_MOVING = 0.2  # of the median speed: below, the leg stands or starts
+_MOVING = 0.2  # below this fraction of the median speed, the leg stands or starts
 _WAVES = 8  # harmonics of a turn of the crank, in the ripple of the speed that repeats
 _SLOW_S = 1.0  # averaging time for a speed without its ripple
 _STEADY = 0.08  # relative difference up to which two speeds count as the same

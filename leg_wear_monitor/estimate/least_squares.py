@@ -84,7 +84,7 @@ def gauss_newton(
     point = model(x)
     slopes = point.slopes()
     for _ in range(_ROUNDS):
-        # what is at its bound and would go beyond stays there, or the others would move as if it had gone
+        # a parameter at its bound stays there; otherwise the others would move as if it had crossed the bound
         downhill = -slopes.T @ point.rest
         free = ~((x <= low) & (downhill < 0.0) | (x >= high) & (downhill > 0.0))
         if not free.any():
@@ -92,7 +92,7 @@ def gauss_newton(
         step = np.zeros_like(x)
         step[free] = solved(slopes[:, free], -point.rest)
         gain = slopes @ step
-        if float(gain @ gain) < _LESS * point.square:  # by so much the square would become less
+        if float(gain @ gain) < _LESS * point.square:  # predicted decrease of the square
             break
         step /= max(1.0, float(np.max(np.abs(step) / longest)))
         length, moved = 1.0, np.clip(x + step, low, high)

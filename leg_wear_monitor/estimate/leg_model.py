@@ -38,9 +38,9 @@ _LOAD_FRICTION = 0.03  # a gear that warms up
 # of the ground's peak: its mean over some steps, and the harmonics of its vertical and fore-aft shape
 _LOAD_FRACTION, _VERTICAL, _FORE_AFT_CHANGE, _LOAD_HARMONICS = 0.05, 0.01, 0.005, 8
 
-# of a leg that was never commissioned: tolerances of bodies, and what else the model may have wrong
+# leg without a commissioning: tolerances of bodies and further errors of the model
 _TOLERANCES = {Cause.MASS: MASS_TOLERANCE, Cause.LENGTH: 0.005}
-_MEAN_ERROR = 0.05  # of the torque's size, in each phase
+_MEAN_ERROR = 0.05  # fraction of the torque's size, in each phase
 _ROUGHNESS_ERROR = 0.15
 _SENSOR_TOLERANCE = 5.0  # times the usual changes of friction, scale and lag
 
@@ -49,14 +49,14 @@ _MASS_STEP, _LENGTH_STEP = 0.05, 0.005
 
 _LATER_S = 0.0025 * np.array([*range(-8, 0), *range(1, 13)])
 _SLOWER_S = tuple(1.0 / (TURN * hz) for hz in (70.0, 35.0, 20.0, 10.0))
-_NOISE_STEP = 0.16  # of its logarithm
-_NOISE = 0.001 * np.exp(_NOISE_STEP * np.arange(40))  # of the torque's size
+_NOISE_STEP = 0.16  # step of the noise's logarithm
+_NOISE = 0.001 * np.exp(_NOISE_STEP * np.arange(40))  # fractions of the torque's size
 _SENSOR_CYCLES = 20
 
 # gait cycles that the expected covariance counts as: a tenth to 0.45 of the weight is that of 50 measured
 # cycles where the others are most probable by it, in the air and on the ground (2026-11-25)
 _EXPECTED_CYCLES = 120
-_PARTS = 5  # of the commissioned cycles, each of which is seen by the others
+_PARTS = 5  # parts of the commissioned cycles; each part is tested against the others
 _LEAST_PARTED = 4  # gait cycles: each part leaves a mean and a scatter
 
 
@@ -74,7 +74,7 @@ def nuisances(mechanism: Mechanism, reference: TorqueReference, sensor: TorqueSe
         Nuisance(Cause.TIMING, "", -shifted, _OFFSET_RAD),
         Nuisance(Cause.LOAD_FRICTION, "", rubbing, _LOAD_FRICTION),
     ]
-    # torques that are added: behind a low-pass they change the roughness, too
+    # added torques, because behind a low-pass they change the roughness as well
     simulated = SimulatedSensor(reference, len(reference.torque_nm[0]), sensor)
     if mechanism.toe is not None:
         linkage = build_linkage(reference.parameters.in_air.applied(mechanism))
@@ -134,7 +134,7 @@ def other_noises(reference: TorqueReference, sensor: TorqueSensor) -> list[Other
         each = simulated.signatures_of(torque + noise_nm * noise)
         power = np.exp(2.0 * each.mean(axis=0)) - np.exp(2.0 * own.mean(axis=0))
         power[:phases] = 0.0
-        # of 20 gait cycles a phase has hardly a variance; all of them have one
+        # 20 gait cycles hardly give a variance per phase, but all phases together do
         more = (each.var(axis=0, ddof=1) - own.var(axis=0, ddof=1)).reshape(2, phases).mean(axis=1)
         found.append(OtherNoise(float(noise_nm), power, np.repeat(np.maximum(more, 0.0), phases)))
     return found

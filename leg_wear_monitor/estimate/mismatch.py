@@ -384,7 +384,7 @@ def _sureness(one: NamedCause) -> float:
 
 
 _MOST_CAUSES = 3
-_LEAST_FACTOR = 1.0e-5  # of the predicted RMS: far below the torque of a leg in a wrong unit
+_LEAST_FACTOR = 1.0e-5  # fraction of the predicted RMS: far below the torque of a leg in a wrong unit
 _LARGEST_REMAINDER = 0.5  # more causes may leave at most this fraction of what fewer leave unexplained
 # alternatives to the best hypothesis may leave so many times as much unexplained, plus an error of the model
 _ALTERNATIVE_FACTOR, _MODEL_ERROR = 3.0, 0.02

@@ -172,7 +172,7 @@ def quiet_phases(signature: Floats) -> Floats:
 # The drive torque of the leg with ideal joints, and what it makes of a signature.
 
 
-_POINTS = 240  # of a gait cycle: three in each of 80 phases
+_POINTS = 240  # points per gait cycle: three in each of 80 phases
 
 
 def ideal_torque(mechanism: Mechanism, speed: float) -> Floats:
@@ -204,8 +204,8 @@ _SEED = 20261122
 # of that noise, for the mean signature of a leg: it is three quarters of the scatter of simulated cycles, and
 # drawing it again costs no simulation
 _DRAWS = 4
-_PART_OF_SAMPLE = 0.618  # by which samples move in each simulated gait cycle
-_PLACES = 8  # of samples within their period, that are tried
+_PART_OF_SAMPLE = 0.618  # fraction of a sampling period by which samples move in each simulated gait cycle
+_PLACES = 8  # tried places of samples within their period
 
 
 class SimulatedSensor:
@@ -314,8 +314,8 @@ def _received_until(torque: Floats, place: Floats) -> Floats:
 # Expected signatures over clearances, for a torque sensor, from simulated torque references.
 
 
-_WEAKEST_NOISE, _STRONGEST_NOISE = 1.0e-4, 1.0  # of the torque's size
-_HALVINGS = 12  # of that range: the noise is found to 0.2 %
+_WEAKEST_NOISE, _STRONGEST_NOISE = 1.0e-4, 1.0  # fractions of the torque's size
+_HALVINGS = 12  # halvings of that range: the noise is found to 0.2 %
 
 
 @attrs.frozen(eq=False)
@@ -365,7 +365,7 @@ class Changes:
     @_slopes.default
     def _derivatives(self) -> Floats:
         """Derivatives (n, s - 1, F) by the logarithm of a value between points of the grid."""
-        with np.errstate(invalid="ignore", divide="ignore"):  # where a clearance can be no wider
+        with np.errstate(invalid="ignore", divide="ignore"):  # a clearance that cannot be wider
             return np.asarray(np.diff(self.change, axis=1) / np.diff(self._log_grid, axis=1)[:, :, None])
 
 
@@ -487,7 +487,7 @@ _STEEPNESS = np.geomspace(1.0e-4, 1.0e4, 81)
 # of what it is at 1.35 and 1.5 times its clearance, with 4 it is 0.88 to 0.95; with 2, three times as much of
 # mere scatter is left of a joint that the torque does not show (2026-11-26)
 _ALIKE = 4.0
-_LEAST_VARIANCE = 1.0e-12  # of the largest: rounding, where fewer cycles than entries were simulated
+_LEAST_VARIANCE = 1.0e-12  # over the largest: rounding, if fewer cycles than entries were simulated
 
 
 def without_scatter(

@@ -14,7 +14,7 @@ from leg_wear_monitor.estimate.torque_model import ModelError, TorqueModel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 
-# Where a fit starts.
+# Start values of a fit.
 
 
 @attrs.frozen
@@ -54,7 +54,7 @@ class Start:
 # itself; such means by a tenth of it or less.
 
 
-BINS = 48  # of a turn
+BINS = 48  # bins per turn
 # A flight and the impact after it cancel within a twelfth of a turn; with fewer bins or sharp edges, impacts
 # at the same angle in every turn would turn up as a slow torque
 _WEIGHTS = np.array([1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0]) / 16.0
@@ -117,7 +117,7 @@ def blocks_of(pair: Pair, ratio: float) -> Blocks:
 # Regression of measured on predicted torque: its terms, its parameters under way, and its columns.
 
 
-PHASES = 128  # offsets tried where a start does not give one
+PHASES = 128  # tried offsets, if a start does not give an offset
 
 
 @attrs.frozen
@@ -229,8 +229,8 @@ def columns(
 # Least squares (Gauss-Newton) of gear ratio, offset, lag, scale, friction, bias and foot load.
 
 
-_LONGEST_STEP_RAD = 0.2  # of the phase in one step, half a radian of the torque's third harmonic
-_DONE_RAD = 1.0e-3  # a twentieth of what clearances shift the phase by
+_LONGEST_STEP_RAD = 0.2  # largest change of the phase per step: half a radian of the torque's third harmonic
+_DONE_RAD = 1.0e-3  # a twentieth of the phase shift by clearances
 _EXACT_RAD = 1.0e-6
 _CHUNKS = 12  # stretches of time, each left out once
 _NO_TERMS = Terms()

@@ -15,7 +15,7 @@ import numpy as np
 from leg_wear_monitor.configuration import quantity
 from leg_wear_monitor.mechanism.arrays import Floats
 
-# of step-size control: largest growth and shrinkage of a jump, and safety factor, as for ODE solvers
+# step-size control as for ODE solvers: largest growth and shrinkage of a jump, safety factor
 _GROWS, _SHRINKS, _SAFETY = 2.0, 0.3, 0.8
 _TOLERATED = 0.1  # tolerated error of a jump as a fraction of its deepest change
 

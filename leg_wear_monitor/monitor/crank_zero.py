@@ -32,8 +32,8 @@ _TURN = 2.0 * math.pi
 
 SETTINGS = np.dtype(
     [
-        ("gate", "f8"),  # of an angle [rad]
-        ("largest", "f8"),  # speed that is believed [rad/s]
+        ("gate", "f8"),  # largest difference of an angle from its series [rad]
+        ("largest", "f8"),  # largest accepted speed [rad/s]
         ("gap", "f8"),  # longest within a series [s]
         ("commanded", "f8"),  # speed [rad/s]
     ]
@@ -42,7 +42,7 @@ STATE = np.dtype(
     [
         # of the crank's series, and of another one that may take its place
         ("number", "i8", (2,)),  # samples
-        ("stamp", "i8", (2,)),  # of the last one [ns]
+        ("stamp", "i8", (2,)),  # stamp of the last sample [ns]
         ("angle", "f8", (2,)),  # [rad]
         ("speed", "f8", (2,)),  # [rad/s]
         ("first_stamp", "i8"),  # of the other one [ns]

@@ -211,8 +211,8 @@ IDLE_LIMIT, LIMIT = 50, 50_000  # samples without time, samples in all
 
 PERIOD_STATE = np.dtype(
     [
-        ("begin", "i8"),  # of the period [ns]
-        ("newest", "i8"),  # stamp in it [ns]
+        ("begin", "i8"),  # begin of the period [ns]
+        ("newest", "i8"),  # newest stamp in the period [ns]
         ("idle", "i8"),  # samples since the newest
         ("outside", "i8"),  # 1 where the last sample lay outside
         ("count", "i8"),  # samples
@@ -235,7 +235,7 @@ def find_period_end(stamp, first, length, states):  # type: ignore[no-untyped-de
         if at > 0:
             if state.begin == 0:
                 state.begin, state.newest = at, at
-            since = at - state.begin  # of two stamps above 0: it cannot overflow
+            since = at - state.begin  # stamps above 0 cannot overflow
             outside = since >= length or since < -length
             if at > state.newest and not outside:
                 state.newest, state.idle = at, 0

@@ -614,11 +614,11 @@ def _likeness(one: Floats, other: Floats) -> float:
     return max(abs(_correlation(one, np.roll(other, k))) for k in range(-most, most + 1))
 
 
-_JUMP_RAD = 0.3  # by which an angle departs from a steady motion
+_JUMP_RAD = 0.3  # deviation of an angle from a steady motion
 _JUMP_STEP_RAD = 0.2  # largest step of a crank between two samples over which a jump is known
 _AMONG = 5  # samples, of which two may be outliers
-_PERIODS = 4  # evaluation periods of a stretch
-_KEPT_PERIODS = 12  # of which samples are kept: a gait cycle may be slower than commanded
+_PERIODS = 4  # evaluation periods per stretch
+_KEPT_PERIODS = 12  # periods of kept samples: a gait cycle may be slower than commanded
 _AFTER = 3  # commanded gait cycles without a fault, after which it is over
 _SEEN_TWICE = (JUMP, NOT_OF_GAIT)  # outliers may come back a period later; one strange step is no fault
 

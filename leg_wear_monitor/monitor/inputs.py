@@ -53,7 +53,7 @@ def distance(settings, state, k, stamp, angle):
     if abs(h) > settings.gap:
         return math.inf
     off = abs(wrapped(angle - state.angle[k] - state.speed[k] * h))
-    # by how much the crank's greatest acceleration may have moved it
+    # possible motion of the crank by its greatest acceleration
     widest = min(WIDEST, settings.gate + 0.5 * (settings.largest * h) ** 2)
     return off if off <= widest else math.inf
 
@@ -89,10 +89,10 @@ def begin(state, k, stamp, angle):
 
 SETTINGS = np.dtype(
     [
-        ("gate", "f8"),  # of an angle [rad]
-        ("largest", "f8"),  # speed that is believed [rad/s]
+        ("gate", "f8"),  # largest difference of an angle from its series [rad]
+        ("largest", "f8"),  # largest accepted speed [rad/s]
         ("gap", "f8"),  # longest within a series [s]
-        ("alone", "f8"),  # for how long one series must be alone before the other is forgotten [s]
+        ("alone", "f8"),  # time after which a missing series is forgotten [s]
         ("commanded", "f8"),  # speed [rad/s]
         ("torque", "f8"),  # RMS of the predicted drive torque [N m]
     ]
@@ -102,28 +102,28 @@ STATE = np.dtype(
     [
         # of both series
         ("number", "i8", (2,)),  # samples
-        ("stamp", "i8", (2,)),  # of the last one [ns]
+        ("stamp", "i8", (2,)),  # stamp of the last sample [ns]
         ("angle", "f8", (2,)),  # [rad]
         ("speed", "f8", (2,)),  # [rad/s]
         ("last", "i8"),  # which of them had the last sample
-        ("switches", "i8"),  # how often that has changed since the younger one began
+        ("switches", "i8"),  # changes of `last` since the younger series began
         ("since", "i8"),  # stamp of the last such change [ns]
-        ("two", "i8"),  # 1 where two sources send
+        ("two", "i8"),  # 1 if two sources send
         # of the unit
         ("anchor", "i8"),  # stamp of the last step's end [ns]
         ("anchor_angle", "f8"),  # [rad]
-        ("step_speed", "f8"),  # of the last step [rad/s]
+        ("step_speed", "f8"),  # speed of the last step [rad/s]
         ("fast", "i8"),  # fast steps in a row
-        ("fast_speed", "f8"),  # of fast steps, averaged [rad/s]
-        ("plausible", "f8"),  # for how long the angle has moved as a leg's does [s]
-        ("other_unit", "i8"),  # 1 where the unit is another
+        ("fast_speed", "f8"),  # mean speed of fast steps [rad/s]
+        ("plausible", "f8"),  # time for which the angle has moved like a leg [s]
+        ("other_unit", "i8"),  # 1 if the unit is wrong
         # samples withheld
-        ("conflicting", "i8"),  # since two sources send
-        ("implausible", "i8"),  # since the unit is another
+        ("conflicting", "i8"),  # samples withheld since two sources send
+        ("implausible", "i8"),  # samples withheld since the unit is wrong
         ("torque_outliers", "i8"),
         # of the drive torque
-        ("recent", "f8", (_RECENT,)),  # sizes of the last ones [N m]
-        ("torques", "i8"),  # how many there were
+        ("recent", "f8", (_RECENT,)),  # sizes of the last torques [N m]
+        ("torques", "i8"),  # number of torques
     ]
 )
 

@@ -288,7 +288,7 @@ def _ends(joint: JointSituation, alarm: Alarm) -> bool:
     if joint.measured is None or alarm.cause in ("", COUNTED) or alarm.level is Level.OK:
         return False
     if alarm.cause in (MEASURED, BOTH) and not joint.is_measurement_used:
-        return False  # what does not count does not end what another measurement has raised
+        return False  # an unused measurement does not end an alarm of an earlier measurement
     return is_surely_below(joint.limit_m, joint.measured.clearance_m, joint.measured.sigma_m)
 
 
@@ -297,7 +297,7 @@ def _part_changed(leg: MonitoredLeg, joint: str, replaced_ns: int) -> None:
     leg.grows_anew([joint])
     leg.forecaster.replaced(joint, replaced_ns)
     last = leg.last
-    if last:  # what was estimated is of the former part
+    if last:  # the estimate belongs to the former part
         joints = [
             attrs.evolve(each, seen=None, estimated_m=None, estimated_sigma_m=None)
             if each.joint == joint

@@ -255,7 +255,7 @@ class TorqueWatch(Observer):
         """Source of the clearances that are seen now."""
         return "" if self.observer is None or self.is_wrong else "torque"
 
-    # What the torque shows now.
+    # Present state of the torque.
 
     @property
     def diagnosis(self) -> Diagnosis:

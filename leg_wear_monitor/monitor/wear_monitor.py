@@ -134,7 +134,7 @@ class WearMonitor:
         self._twin.warm_up()
         for observer in self._leg.observers:
             observer.warm_up()
-        _ = self._leg.model_error  # takes a quarter of a second
+        _ = self._leg.model_error  # this takes a quarter of a second
 
     def go_live(self) -> None:
         """Keep up with samples as they are taken: never wait for a reference that threads simulate.

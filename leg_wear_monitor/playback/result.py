@@ -187,7 +187,7 @@ class WornDepth:
     journal: Floats
 
 
-# What was replayed: the recording, the settings of the monitor, and whether both fit together.
+# Input of a replay: the recording, the settings of the monitor, and whether both fit together.
 
 
 @attrs.frozen(kw_only=True)
@@ -405,7 +405,7 @@ class ReplayHistory:
         return data_frame(self.columns(), index="stamp_ns")
 
 
-# What a replay found as columns of tables: a value's name is its path, parts after a dot.
+# Results of a replay as columns of tables: a value's name is its path, parts after a dot.
 
 
 _Path = tuple[str, ...]
@@ -434,7 +434,7 @@ def _value(part: Any, path: _Path) -> Any:
     return part.value if isinstance(part, Enum) else part
 
 
-# What a replay found, how it goes out as JSON and as tables, and how it comes back from a file.
+# Results of a replay, their JSON and tables, and their reading from a file.
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -291,7 +291,7 @@ def _history(history: History) -> ReplayHistory:
         columns[shown] = {joint: thinned[:, k] for k, joint in enumerate(history.clearance_joints)}
     if len(history) > len(last):
         begins = _begins(last)
-        for name, reduced in (("lowest", np.fmin), ("highest", np.fmax)):  # of those that are known
+        for name, reduced in (("lowest", np.fmin), ("highest", np.fmax)):  # of known values
             columns[name] = {each: reduced.reduceat(history.column(each), begins) for each in _RANGED}
     return ReplayHistory(stamp_ns=history.stamp_ns[last], **columns)
 

@@ -132,7 +132,7 @@ class _Listener(Node):
 
     def _answered(self, future: Future) -> None:
         values = future.result().values if future.result() else []
-        if len(values) != len(self._names):  # that is another node of this name, or one of another version
+        if len(values) != len(self._names):  # a different node or version
             self._leg.take_setup(None, "The monitor's parameters cannot be read; give them by --config FILE.")
             return
         given = {name: _plain(value) for name, value in zip(self._names, values, strict=True)}

@@ -223,7 +223,7 @@ class MonitorNode(ClosingNode):
         try:
             self._get_ready(parameters)
         except BaseException:  # signals included: the next start must not consider the ledger truncated
-            with self._in_order:  # whatever the ledger says
+            with self._in_order:  # in any state of the ledger
                 self._monitor.close()
             raise
 
@@ -235,7 +235,7 @@ class MonitorNode(ClosingNode):
         self._load = Load()
         self._epochs = Epochs(self._monitor, boot_id(), self._ros_now_ns, self._report)
         self._messages = Messages(config, self._monitor.clearance_joints, self.get_fully_qualified_name())
-        self._is_stop = self._monitor.verdict.verdict.state is State.STOP  # of the ledger: not a new one
+        self._is_stop = self._monitor.verdict.verdict.state is State.STOP  # not a new stop
         report = self.get_logger().info
         self._black_box = BlackBox(
             config.record.path, config.record.stop_recording_dir, config.hardware, report
@@ -286,7 +286,7 @@ class MonitorNode(ClosingNode):
             while len(self._inbox):
                 self._work()
         finally:
-            with closing(self._black_box), self._in_order:  # whatever the ledger says
+            with closing(self._black_box), self._in_order:  # in any state of the ledger
                 self._monitor.close()
 
     def _compile(self, decoder: Decoder) -> None:

@@ -42,7 +42,7 @@ _TYPES = frozenset(one.value for one in RosParameter.Type)
 
 _CLOCK = "use_sim_time"
 _QOS_OVERRIDES = "qos_overrides."
-_MOST_DEPTH = 2**31 - 1  # of DDS
+_MOST_DEPTH = 2**31 - 1  # limit of DDS
 _NO_DOT = re.compile(r"[+-]?\d+e[+-]?\d+")  # YAML 1.1 reads it as text; Python prints 0.000001 like this
 
 
@@ -259,7 +259,7 @@ def plain(parameter: RosParameter) -> Any:
 
 Config = TypeVar("Config")
 
-_LARGEST = 2**63 - 1  # of an integer parameter
+_LARGEST = 2**63 - 1  # largest integer parameter
 _OF_ROS = (_CLOCK, "start_type_description_service")
 
 

@@ -182,7 +182,7 @@ class Supervision:
         """Record by how much the stamps of each kind are ahead of the clock, at most since the last check."""
         now_ns, before_ns = self._now_ns(), self._noted_ns
         self._noted_ns = now_ns
-        if now_ns < before_ns:  # set back, after these samples had come
+        if now_ns < before_ns:  # the clock was set back after these samples had arrived
             return
         for code, kind in KINDS.items():
             stamps = samples["stamp_ns"][(samples["kind"] == code) & (samples["fault"] == NO_FAULT)]

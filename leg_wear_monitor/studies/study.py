@@ -20,7 +20,7 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.studies.tasks import SAMPLES, TASKS, code_digest
 
 Names = tuple[str, ...]
-_MOST = 1_000_000  # of anything that is counted
+_MOST = 1_000_000  # largest number of runs, cycles or points
 
 
 def _rising(values: tuple[float, ...]) -> str | None:

@@ -91,15 +91,15 @@ WAITING_INSTANT = np.dtype(
         ("variance", "f8"),  # of that torque [N^2 m^2]
         ("regressor", "f8", (REGRESSORS,)),  # torque per load, friction, lag, load friction
         ("time", "f8"),  # since the previous instant [s], 0 if none is stored
-        ("angle", "f8"),  # of the crank [rad]
+        ("angle", "f8"),  # crank angle [rad]
     ]
 )
 """An instant that is stored until the next one."""
 
 TORQUE_SUMS = np.dtype(
     [
-        ("number", "f8"),  # of compared torques
-        ("weight", "f8"),  # by which the following sums are weighed, in samples
+        ("number", "f8"),  # number of compared torques
+        ("weight", "f8"),  # weight of the following sums, in samples
         ("residual_squares", "f8"),  # [N^2 m^2]
         ("measured_squares", "f8"),  # [N^2 m^2]
         ("predicted_squares", "f8"),  # [N^2 m^2]
@@ -152,20 +152,20 @@ LEG_STATE = np.dtype(
 
 TORQUE_SENSOR = np.dtype(
     [
-        ("cutoff", "f8"),  # of the low-pass filter [rad/s]
+        ("cutoff", "f8"),  # cutoff of the low-pass filter [rad/s]
         ("usual", "f8"),  # RMS of the ideal torque [N m]
         ("instants", "i8"),  # 1 if it samples instants instead of averages
-        # of the drive, as estimated up to the last gait cycle
+        # drive, as estimated up to the last gait cycle
         ("friction", "f8"),  # constant [N m]
-        ("load_friction", "f8"),  # over the size of the torque
+        ("load_friction", "f8"),  # friction over the size of the torque
     ]
 )
 
 EVALUATED = np.dtype(
     [
-        ("stamp_ns", "i8"),  # of the sample
-        ("kind", "i8"),  # of `twin.sample`
-        ("angle", "f8"),  # of the crank [rad], NaN while the leg does not run
+        ("stamp_ns", "i8"),  # stamp of the sample
+        ("kind", "i8"),  # kind of `twin.sample`
+        ("angle", "f8"),  # crank angle [rad], NaN while the leg does not run
         # mean drive torque since the previous sample, with the drive's friction [N m]; NaN while at rest
         ("torque", "f8"),
         ("measured", "f8"),  # drive torque of the sample [N m], NaN without one

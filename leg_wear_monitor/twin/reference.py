@@ -135,7 +135,7 @@ UNLIKE = 0.015
 _COARSE = 0.01
 _LOST = 1.5  # steps: in a longer time between two samples, some were lost
 
-HARMONICS = 8  # of a turn; what is faster is noise of the encoder more than motion of the crank
+HARMONICS = 8  # harmonics of a turn; faster parts are mostly noise of the encoder
 
 
 @attrs.frozen(eq=False)
@@ -263,10 +263,10 @@ def mean_profile(profiles: Sequence[CrankProfile]) -> CrankProfile:
     )
 
 
-# Simulation of such a leg without wear, from gait cycle to gait cycle alike.
+# Simulation of this leg without wear, the same in each gait cycle.
 
 
-POINTS = INTERVALS // 4  # of a gait cycle: whole intervals of the stepper
+POINTS = INTERVALS // 4  # points per gait cycle: whole intervals of the stepper
 
 # scatter of the ground's force from step to step, of its size and of its time in a gait cycle
 _SIZE, _TIMING, _SEED = 0.1, 0.02, 20261125
@@ -409,7 +409,7 @@ class LegSimulation:
             )  # fmt: skip
             if status != DONE or not wanted():
                 return None
-        if not np.abs(torque).max() < np.finfo(np.float16).max:  # as it is kept; also where it is no number
+        if not np.abs(torque).max() < np.finfo(np.float16).max:  # the stored value; it may be NaN
             return None
         return SimulatedLeg(torque[settling:], eccentricity.reshape(POINTS, -1, 2) / cycles)
 

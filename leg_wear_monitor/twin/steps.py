@@ -16,7 +16,7 @@ STOPPED, MOVING, REVERSED = range(4, 7)
 
 STEP = np.dtype(
     [
-        ("code", "i8"),  # of the above
+        ("code", "i8"),  # one of the codes above
         ("begin_ns", "i8"),  # stamp at which it begins
         ("end_ns", "i8"),  # stamp at which it ends
         ("detail", "i8"),  # EVALUATE: kind of the sample; LEAVE: reason; REPORT: event
@@ -32,9 +32,9 @@ STEP = np.dtype(
 
 SPLINE_NODE = np.dtype(
     [
-        ("angle", "f8"),  # of the crank [rad]
-        ("speed", "f8"),  # of the crank [rad/s]
-        ("acceleration", "f8"),  # of the crank [rad/s^2]
+        ("angle", "f8"),  # crank angle [rad]
+        ("speed", "f8"),  # crank speed [rad/s]
+        ("acceleration", "f8"),  # crank acceleration [rad/s^2]
     ]
 )
 

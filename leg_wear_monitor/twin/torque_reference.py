@@ -34,7 +34,7 @@ from leg_wear_monitor.twin.reference import (
     even_angles,
 )
 
-CADENCES = 6  # of which the references of a leg are kept
+CADENCES = 6  # cadences whose references of a leg are kept
 
 CYCLES = 20  # simulated for each wider leg, and twice as many for each other one
 

@@ -98,32 +98,32 @@ TRACKER_CLOCK = np.dtype(
 )
 
 _ESTIMATE = [
-    ("angle", "f8"),  # of the crank [rad]
+    ("angle", "f8"),  # crank angle [rad]
     ("speed", "f8"),  # [rad/s]
     ("acceleration", "f8"),  # [rad/s^2]
     # covariances of the three
-    ("p00", "f8"),  # of the angle [rad^2]
-    ("p01", "f8"),  # of angle and speed [rad^2/s]
-    ("p02", "f8"),  # of angle and acceleration [rad^2/s^2]
-    ("p11", "f8"),  # of the speed [rad^2/s^2]
-    ("p12", "f8"),  # of speed and acceleration [rad^2/s^3]
-    ("p22", "f8"),  # of the acceleration [rad^2/s^4]
+    ("p00", "f8"),  # angle [rad^2]
+    ("p01", "f8"),  # angle and speed [rad^2/s]
+    ("p02", "f8"),  # angle and acceleration [rad^2/s^2]
+    ("p11", "f8"),  # speed [rad^2/s^2]
+    ("p12", "f8"),  # speed and acceleration [rad^2/s^3]
+    ("p22", "f8"),  # acceleration [rad^2/s^4]
 ]
 CRANK_ESTIMATE = np.dtype(_ESTIMATE)
 
 QUEUED = np.dtype(
     [
-        ("stamp_ns", "i8"),  # of its header
-        ("kind", "i8"),  # of `twin.sample`
-        ("torque", "f8"),  # of the drive [N m], NaN where absent
-        ("foot_force", "f8", (2,)),  # of samples of the foot load only [N]
-        # of crank samples only; pairs are of angle and velocity
+        ("stamp_ns", "i8"),  # stamp of its header
+        ("kind", "i8"),  # kind of `twin.sample`
+        ("torque", "f8"),  # drive torque [N m], NaN if absent
+        ("foot_force", "f8", (2,)),  # foot load [N], only in its samples
+        # crank samples only; pairs are angle and velocity
         ("step", "f8"),  # time since the previous crank sample [s]
         ("bridged", "i8"),  # 1 if that is a bridged gap
         *_ESTIMATE,  # predicted from the previous samples
         ("innovation_variance", "f8", (2,)),  # [rad^2, rad^2/s^2]; 0 for an unused value
         ("innovation", "f8", (2,)),  # measured minus predicted [rad, rad/s]
-        ("gain", "f8", (2, 3)),  # of angle, speed and acceleration, in their units per that of the innovation
+        ("gain", "f8", (2, 3)),  # angle, speed and acceleration per innovation
     ]
 )
 """A sample that waits for the leg, with the smoother's data."""

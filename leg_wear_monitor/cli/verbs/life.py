@@ -238,7 +238,7 @@ def design(
     common.say(json_file, design_lines(table, options["hours"]), written)
 
 
-_PAIRS = 5  # of each joint in the printed table
+_PAIRS = 5  # pairs per joint in the printed table
 
 
 def design_lines(table: "Sequence[BushingLife]", hours: float) -> list[str]:

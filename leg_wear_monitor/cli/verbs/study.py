@@ -75,7 +75,7 @@ def _compute(settings: "Study", out: Path, workers: int | None, scheduler: str |
             scheduler=scheduler,
             progress=progress,
         )
-    common.warn_of(leg.source, doubts(leg))  # what fails names them itself, in its one line
+    common.warn_of(leg.source, doubts(leg))  # an error names its doubts in its own line
     return computed, len(settings.points())
 
 
@@ -242,7 +242,7 @@ def simulate(mechanism: str, json_file: Path | None, out: Path | None, **options
     common.check_outputs(json_file, out)
     with common.options_named():
         result, wall_s = _run(leg, _keywords(**options))
-    common.warn_of(leg.source, doubts(leg))  # what fails names them itself, in its one line
+    common.warn_of(leg.source, doubts(leg))  # an error names its doubts in its own line
     if (given := options["clearance_m"]) is not None:
         for radius in sorted({leg.clearances[name].bushing_radius for name in result.clearance_joints}):
             if fault := ratio_fault(given, radius):

@@ -192,8 +192,8 @@ _CUBE_ROOT_GUESS = 0x553EF0FF289DD796  # bits of 1 times 4/3, less what makes th
 # A rest that is one step but for rounding is one step: a step of half a rest leaves as much, and which of the
 # two is longer would depend on the last bit.
 _NEARLY = 1.0 + 1.0e-6
-_FASTEST_GROWTH = 3.0  # of a step over the one before; none after a trial with too large an error
-# of the drive at one end of a step: torque [N m], its smooth part [N m], power of loads [W]
+_FASTEST_GROWTH = 3.0  # of a step over the previous one: no growth after a trial with too large an error
+# drive at one end of a step: torque [N m], its smooth part [N m], power of loads [W]
 WHOLE, SMOOTH, OUTSIDE = 0, 1, 2
 
 _FURTHEST = 1.0  # rad: largest turn of a crank behind a coupling in half a part of an interval

@@ -135,7 +135,7 @@ class Basis:
         flat = momenta @ curvature.reshape(len(q), -1, d * d)[::COARSER]
         self.gamma = flat.reshape(-1, d, d, d)
         swing = np.empty_like(self.b_e)
-        for j in range(d):  # of all at once, the series would take four times the memory of the curvature
+        for j in range(d):  # one at a time: all series need four times the memory
             swing[..., j] = np.einsum("nr,nri->ni", momentum, derivative(curvature[..., j]))
         self.c_ee = 2.0 * (project(self.s_t, mass * self.s_t) + swing)
         return curvature

@@ -24,10 +24,10 @@ from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables
 from leg_wear_monitor.dynamics.run import JOINT_RATES
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 
-# What is between the drive and the crank: nothing, or a coupling or a belt (physics.md section 7).
+# Connection of drive and crank: rigid, or a coupling or a belt (physics.md section 7).
 
 
-STIFFNESS, DAMPING, PARTS = 0, 1, 2  # of a coupling's law
+STIFFNESS, DAMPING, PARTS = 0, 1, 2  # indices of a coupling's law
 
 # rad: longest part of an interval in the oscillation on its coupling of a crank whose joints are open, and
 # fewest parts. The mean torque of the default leg is then within 0.6 % of its RMS of full coordinates, on 200

@@ -332,7 +332,7 @@ def turn_crank(law, whole, steeper, length, torque, impulse, state, statistics, 
     integral[POWER] += torque * motor * length - needed * now.speed[0]
     state.drive[ANGLE], state.drive[SPEED] = crank[ANGLE] + turned, crank[SPEED] + gained
     state.drive[ACCELERATION] = gained / length
-    # that of the last sample, for the reactions of the ideal joints: an impact changes it as it changes e''
+    # value of the last sample, for the reactions of the ideal joints: an impact changes it as it changes e''
     now.speed[1] = (torque - work.drive_start[0] - steeper * gained) / whole
 
 

@@ -376,7 +376,7 @@ class Evidence:
         known_sigma_m = state.commissioned.sigma_m if state.commissioned else 0.0
         found = best_fit(explainer, mean, cycles, modelled_m, starts, known_sigma_m)
         found = with_rivals(found, explanations, explainer.joints)
-        if change is not None and change.cause is Cause.CLEARANCE:  # it hides another one that opened with it
+        if change is not None and change.cause is Cause.CLEARANCE:  # it may hide a second joint
             others = np.array([joint != change.subject for joint in explainer.joints])
             hidden = np.diag(np.where(others, found.clearance_m, 0.0) ** 2)
             found = attrs.evolve(found, covariance=found.covariance + hidden)

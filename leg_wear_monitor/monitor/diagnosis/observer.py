@@ -119,7 +119,7 @@ class TorqueObserver(KeepsSamples):
             made = (one.parameters for one in references if not one.is_of_parameters)
             known = (one for one in made if self._is_on_ground or not one.load.size)
             parameters = next((one for one in known if one != own), None)
-        if parameters is not None and not self._is_on_ground:  # another load.model than when it was found
+        if parameters is not None and not self._is_on_ground:  # load.model has changed
             parameters = parameters.in_air
         if is_drive_known:
             whole_leg = parameters or LegParameters.none(mechanism)
@@ -421,7 +421,7 @@ class TorqueObserver(KeepsSamples):
         state.cycles = (*state.cycles, cycle)[-WINDOW_CYCLES:]
         if state.sensor and state.sensor.noise_nm:
             self._evidence.add(state, cycle, self.config)
-        elif len(state.cycles) >= FIRST_CYCLES:  # of a sensor whose noise is not known yet
+        elif len(state.cycles) >= FIRST_CYCLES:  # the noise of the sensor is not known yet
             self._evidence.review(state, self.config)
         self._commission()
 
@@ -452,7 +452,7 @@ class TorqueObserver(KeepsSamples):
         """Compare with some gait cycles from now on."""
         state = self.state
         known = state.baseline(cycles, state.modelled_m)
-        # what a correction left unknown is not known better at another cadence
+        # a clearance that a correction left unknown is unknown at other cadences as well
         corrected = state.corrected
         if corrected is not None:
             sigma_m = np.where(corrected.is_unknown, state.modelled_m, corrected.sigma_m)

@@ -21,11 +21,11 @@ from leg_wear_monitor.wear import SECTORS
 
 FORMAT = 2  # 1, without a number, had one reference of a leg as its file is
 
-_LOAD_SIGMA = 0.05  # of a given force: a mean over some steps, by a sensor
+_LOAD_SIGMA = 0.05  # relative error of a given force: a sensor's mean over some steps
 
-BEFOREHAND_CYCLES = 40  # of each leg: beforehand, there is time for twice as many as while the leg walks
+BEFOREHAND_CYCLES = 40  # gait cycles per leg: twice as many as while the leg walks
 
-# what reading a damaged archive raises, as a damaged byte may be anywhere in it
+# exceptions from a damaged archive, because a damaged byte may be anywhere in it
 _DAMAGES = (
     EOFError, KeyError, MemoryError, NotImplementedError, RuntimeError, TypeError, ValueError,
     zipfile.BadZipFile, zlib.error,

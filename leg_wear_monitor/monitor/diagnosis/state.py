@@ -62,7 +62,7 @@ def mean_of(values: Floats) -> float:
     return float(known.mean()) if len(known) else math.nan
 
 
-# What the measured drive torque shows of the clearances, compared with those that the monitor counts.
+# Clearances that the measured drive torque shows, compared with the modelled ones.
 
 
 class DiagnosisState(Enum):
@@ -202,8 +202,8 @@ class Diagnosis:
         return bool(codes) and codes.isdisjoint(one.cause.fault_code for one in explained.named)
 
 
-WINDOW_CYCLES = 60  # that are kept at a cadence, and that clearances are estimated from
-LAST_CYCLES = 10  # whose mean temperature is that of the drive now
+WINDOW_CYCLES = 60  # gait cycles that are kept per cadence and used for the estimate of clearances
+LAST_CYCLES = 10  # gait cycles whose mean temperature is the present temperature of the drive
 # of a gait cycle: where a drive passed 11 and 13, I was taken for J; 17 and more: none
 _LEAST_HARMONICS = 15.0
 FIRST_CYCLES = 5  # gait cycles before the first reference is chosen

@@ -63,10 +63,10 @@ def even_normals(dimensions: int) -> Floats:
 # law. What the lives are off a law that does not know them is its sigma.
 
 
-PRIOR_SIGMA = 1.0  # of B beforehand: growth may double or halve where a clearance doubles
-_SCATTER = 0.1  # of ln growth, by which the prior is weighed against the lives
-LEAST_LIVES = 4  # with coefficients that differ, for the law to be judged
-_STEPS = 12  # from new to the limit
+PRIOR_SIGMA = 1.0  # prior of B: growth may double or halve if a clearance doubles
+_SCATTER = 0.1  # scatter of ln growth, which weighs the prior against the lives
+LEAST_LIVES = 4  # lives with different coefficients, for an error of the law
+_STEPS = 12  # steps from new to the limit
 
 
 @attrs.frozen(eq=False)

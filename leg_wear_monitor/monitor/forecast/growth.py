@@ -10,9 +10,9 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
 LEAST_CYCLES = 10
-LARGEST_ERROR = 0.5  # of the mean: beyond it the scatter says more than the mean
+LARGEST_ERROR = 0.5  # fraction of the mean: beyond it, the mean says nothing
 
-_BATCHES = 5  # of six cycles each in a window of thirty: longer than neighbours hang together
+_BATCHES = 5  # batches of six cycles in a window of thirty: longer than the correlation of neighbours
 # five means leave four degrees of freedom: Student's t, not a normal distribution. So wide is the normal one
 # whose interval from p10 to p90 is that of t: 1.533 standard errors, not 1.282
 _WIDER = 1.533 / 1.282

@@ -51,7 +51,7 @@ AGREES = "this agrees with what"
 AT_LIMIT = "the measured clearance is at its limit"
 NOT_STORED = "it is not stored"
 
-_SAYS_SOMETHING = 0.9  # of the spread before: what is left after a measurement that says something
+_SAYS_SOMETHING = 0.9  # a measurement is informative if it leaves at most this fraction of the spread
 
 
 @attrs.frozen(eq=False)

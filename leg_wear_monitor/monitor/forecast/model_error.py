@@ -22,7 +22,7 @@ _OF_IMPACTS = 1.6
 # what a load changes in the part of the growth that impacts make, of what it changes in the other one: least
 # squares over five joints under 300 and 600 N (docs/appendix/forecast.md, lives under a load of the ground)
 _LOAD_OF_IMPACTS = 0.3
-_POINTS = 160  # of a gait cycle
+_POINTS = 160  # points per gait cycle
 _MASS_STEP = 0.01
 
 

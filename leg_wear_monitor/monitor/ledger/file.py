@@ -15,7 +15,7 @@ from leg_wear_monitor.monitor.ledger.rows import FORMAT, create_tables
 
 REMEDY = "move it away to begin with new parts, or put a copy of it back"  # ends messages about damage
 
-_MODE = 0o640  # of new files, reduced by the umask
+_MODE = 0o640  # mode of new files, reduced by the umask
 # Damage shows as an error of SQLite, or as a value that cannot be read.
 _DAMAGE = (sqlite3.Error, ValueError, TypeError, LookupError, EOFError)
 _NOT_WRITABLE = (

@@ -158,7 +158,7 @@ class Ledger:
         self._db = connect(self.path, binding)
         self._place = _place(self.path)
         self._interval_s = interval_s
-        self._spans: tuple[tuple[int, int, int], ...] = ()  # of this run, as the loads
+        self._spans: tuple[tuple[int, int, int], ...] = ()  # spans of this run, as the loads
         self._loads: tuple[WalkedLoad, ...] = ()
         try:
             with damage_refused(self.path):

@@ -119,7 +119,7 @@ def hit_of(alarm: Alarm, situation: Situation) -> Hit:
     value, past = alarm.worst, ""
     if math.isnan(alarm.worst) or (is_known and (alarm.worst >= alarm.limit) is (alarm.value >= alarm.limit)):
         value = alarm.value
-    elif is_known:  # within the limit, but not by the deadband
+    elif is_known:  # the value is within the limit, but not by the deadband
         past = f", {amount(alarm.value, alarm.unit)} now"
     if not is_present:
         past = f" (since {time_words(alarm.raised_ns)}; now within its limit)"
@@ -464,7 +464,7 @@ def not_observed(situation: Situation) -> Sequence[Hit]:
     return [Hit(words=words, evidence=unused)]
 
 
-_LEAST_REST = 0.01  # of the drive torque: below it, noise and tolerances of the leg decide
+_LEAST_REST = 0.01  # fraction of the drive torque: below it, noise and tolerances of the leg decide
 
 
 def nothing_found(situation: Situation) -> Sequence[Hit]:

@@ -13,7 +13,7 @@ from leg_wear_monitor.monitor.input_health import InputFault
 from leg_wear_monitor.monitor.verdict.verdict import estimate
 from leg_wear_monitor.state import JointClearance, Level, State, Verdict
 
-# What a verdict depends on, and nothing else; the defaults are those of a leg without a fault.
+# All inputs of a verdict; the defaults describe a leg without a fault.
 
 
 ACTS = "FOOT_LOAD"
@@ -284,7 +284,7 @@ def alarm_value(joint: JointSituation, alarm: Alarm) -> KnownClearance | None:
     known, sure, shown = judged(joint), surely_at(joint.limit_m, joint.seen), surest(joint.seen)
     if sure is not None and sure.clearance_m > known.clearance_m:
         return sure
-    # what the torque said, only the torque takes back: a new run shows nothing for a while
+    # only the torque clears an estimate of the torque: a new run shows nothing for a while
     is_back = shown is not None and _takes_back(shown, joint.limit_m)
     if is_observed(alarm, SEEN) and known.clearance_m < joint.limit_m and not is_back:
         return None

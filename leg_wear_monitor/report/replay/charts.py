@@ -24,7 +24,7 @@ from leg_wear_monitor.report.page import (
 from leg_wear_monitor.report.replay.joints import SIGMAS
 from leg_wear_monitor.state import Figure
 
-_STEADY = 0.1  # of the commanded cadence to either side, less does not fill the picture
+_STEADY = 0.1  # fraction of the commanded cadence: small changes do not fill the picture
 _NEAR = 3.0  # a limit further than so many times the largest value would only flatten the curve
 
 

@@ -98,7 +98,7 @@ SIGMAS = 2.0  # drawn to either side of an estimate
 _MOST_ALLOWANCES = 4.0  # longest axis of the bars
 _WIDTH = 100.0  # of a bar
 
-Span = tuple[float, float]  # where a part of a bar begins, and how long it is [% of the bar]
+Span = tuple[float, float]  # start and length of a part of a bar [% of the bar]
 
 
 def joints_and_leg(summary: ReplaySummary) -> str:

@@ -172,7 +172,7 @@ def recording_section(recording: ReplayRecording) -> Section:
     return Section("The recording", parts, is_folded=True)
 
 
-# What stands behind the verdict: its guide, and how often such a verdict is right.
+# Basis of the verdict: its guide, and how often such a verdict is right.
 
 
 _MEASURE = "docs/howto/measure_clearance.md"
@@ -204,11 +204,11 @@ def certainty_section(summary: ReplaySummary) -> Section:
     return Section("How sure is the verdict?", [table if rows else unknown], is_folded=True)
 
 
-# Whether the page's figures can be believed: input, torque, cadence and model, each in a card.
+# Validity of the page's values: input, torque, cadence and model, each in a card.
 
 
 _ANSWERS = {Level.OK: "yes", Level.WARN: "in part", Level.ERROR: "no"}
-_LEAST_REST = 0.01  # of the torque, as the verdict of a healthy leg says it
+_LEAST_REST = 0.01  # fraction of the torque, as in the verdict of a healthy leg
 
 _Card = tuple[str, Level, list[str]]
 """One question: its name, whether the answer is fine, and why."""

@@ -41,6 +41,9 @@ def verdict_of(findings: Sequence[Verdict]) -> Verdict:
     why, blind = lead.why, [each for each in findings if each.state is State.NOT_MONITORED]
     if blind and lead.state is not State.NOT_MONITORED:
         why += f"; the leg is not monitored now: {blind[0].why}"
+    inspected = [one for one in findings if one.joints and one.state.severity >= State.INSPECT.severity]
+    if not lead.joints:  # a reason without a joint does not hide a joint
+        why += "".join(f"; also: {one.why}. To do: {one.do}" for one in inspected)
     not_valid = tuple(figure for figure in Figure if figure in found)
     return attrs.evolve(lead, why=why, evidence=tuple(evidence.values()), not_valid=not_valid)
 

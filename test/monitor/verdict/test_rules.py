@@ -356,6 +356,12 @@ def test_every_cause_of_the_diagnosis_has_a_rule_and_words(cause: Cause) -> None
     assert ("no single cause" in verdict.why) == (cause is Cause.UNKNOWN)
 
 
+def test_a_finding_about_timing_does_not_hide_a_joint() -> None:
+    verdict = judged(explained=explained(Cause.TIMING), diagnosis=diagnosis(change(Cause.CLEARANCE, "G")))
+    assert (verdict.state, verdict.fault_code) == (State.INSPECT, "TORQUE_TIMING")
+    assert "also: the drive torque shows a clearance of 0.62 mm in joint G" in verdict.why
+
+
 def test_several_joints_stand_together_with_their_clearances() -> None:
     joints = tuple(
         NamedCause(Cause.CLEARANCE, value, 3.0e-5, joint) for joint, value in (("A", 4e-4), ("G", 5e-4))

@@ -249,8 +249,7 @@ def codes(_name: str) -> str:
         by_code.setdefault(code, []).append(line)
     for code, lines in by_code.items():
         path = guide_of(code)
-        title = (ROOT / path).read_text(encoding="utf-8").partition("\n")[0].removeprefix("# ")
-        lines.append(f"- Guide: [{title}](../{path.removeprefix('docs/')}).")
+        lines.append(f"- Guide: [{Path(path).stem}](../{path.removeprefix('docs/')}).")
     return "\n".join("\n".join([f"## {code}", "", *by_code[code], ""]) for code in sorted(by_code))
 
 

@@ -3,6 +3,7 @@
 import io
 from collections.abc import Sequence
 
+import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -26,6 +27,11 @@ BODY_COLOURS = (ORANGE, BLUE, GREEN, PURPLE, SKY, VERMILION, YELLOW)
 INK, PALE, PAPER = "#222222", "#d9d9d9", "#ffffff"
 
 SMALL, USUAL = 8.0, 9.5  # font sizes in points
+
+
+def use_own_style() -> None:
+    """Draw with the defaults of matplotlib: a ``matplotlibrc`` in this directory could end a command."""
+    matplotlib.rcdefaults()
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -154,6 +160,7 @@ def _draw(axes: Axes, turns: Floats, values: Floats, label: str, colour: str) ->
 
 def life_picture(life: Life) -> bytes:
     """PNG: mean (solid) and largest (dashed) clearance, and peak force, over the gait cycles."""
+    use_own_style()
     figure = new_figure(9.0, 3.6)
     clearance, peak = figure.subplots(1, 2)
     draw_life(clearance, life)

@@ -23,6 +23,7 @@ from leg_wear_monitor.report.figure import (
     new_figure,
     plain,
     png,
+    use_own_style,
     worn_bushings,
 )
 
@@ -82,6 +83,7 @@ def leg_picture(mechanism: Mechanism, joints: Collection[str]) -> Figure:
 
 def pictures(mechanism: Mechanism, result: SimulationResult) -> dict[str, bytes | None]:
     """PNG files by file name; None for a figure that needs data which the result does not contain."""
+    use_own_style()
     joints = result.clearance_joints
     files = {"leg.png": png(leg_picture(mechanism, joints)), "wear.png": None, "forces.png": None}
     if result.trace is not None:

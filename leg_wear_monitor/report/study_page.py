@@ -21,6 +21,7 @@ from leg_wear_monitor.report.figure import (
     finish,
     new_figure,
     png,
+    use_own_style,
 )
 from leg_wear_monitor.report.leg_picture import leg_picture
 from leg_wear_monitor.report.page import Gallery, Page, Part, Picture, Section, Table, Text
@@ -73,6 +74,7 @@ _KEY = "Shaded: the middle 90 % of all cycles. Blue: one cycle of one run, as an
 
 def study_page(results: StudyResults) -> Page:
     """The page of a study; a study without any result has a page that lists the missing points."""
+    use_own_style()
     found, exponents = results.of("response"), results.of("exponent")
     lines = [f"{label}: {fault}." for label, fault in results.faults]
     lines += [f"Not computed yet: {', '.join(results.missing)}."] if results.missing else []

@@ -19,10 +19,10 @@ from contextlib import suppress
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import attrs
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from leg_wear_monitor.compiled import numba
 from leg_wear_monitor.errors import AssemblyError
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.spec import Mechanism

@@ -2,6 +2,8 @@
 
 import json
 import os
+import subprocess
+import sys
 
 import pytest
 
@@ -58,6 +60,15 @@ def test_out_holds_result_and_pictures(run, tmp_path):
         assert files[name].startswith(b"\x89PNG\r\n\x1a\n")
     for name in files:
         assert f"written: deep/out/{name}" in result.stdout
+
+
+def test_settings_of_libraries_in_the_current_directory_are_not_read(run, tmp_path):
+    """With text.usetex, the first letter needs LaTeX; numba would import the class, if PyYAML is there."""
+    (tmp_path / "matplotlibrc").write_text("text.usetex: True\n")
+    (tmp_path / ".numba_config.yaml").write_text("cache_locator_classes: no_such_module.Locator\n")
+    line = [sys.executable, "-m", "leg_wear_monitor", *SHORT, "--trace", "90", "--out", "out"]
+    done = subprocess.run(line, capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert (done.returncode, "numba_config" in done.stderr) == (0, False), done.stderr
 
 
 def test_the_table_has_every_joint_and_fits_80_columns(run):

@@ -178,6 +178,7 @@ def _process(verb: str, out: Path, domain: int, **paths: Path) -> "Iterator[subp
     for name, path in paths.items():
         command += ["-p", f"{name}.path:={path.resolve()}"]
     environment = {**os.environ, "ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    environment["SKIP_DEFAULT_XML_FILE"] = "1"  # Fast DDS reads a file of settings in the current directory
     with (out / f"{verb}.log").open("wb") as log:
         process = subprocess.Popen(command, env=environment, stdout=log, stderr=subprocess.STDOUT)
         try:

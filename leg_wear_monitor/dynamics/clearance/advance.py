@@ -8,8 +8,7 @@ its number of intervals.
 
 import math
 
-from numba import types
-
+from leg_wear_monitor.compiled import numba
 from leg_wear_monitor.compiled.kernel import ByAddress, entry, kernel
 from leg_wear_monitor.compiled.vectors import (
     WIDTH,
@@ -226,7 +225,7 @@ def advance_clearances(model, feeds_back, state, polynomial, t_end, statistics, 
 
 
 # for kernels along whose way it goes: they need not contain it, which would double what there is to compile
-ADVANCE = ByAddress(advance_clearances, types.UniTuple(types.int64, 2))
+ADVANCE = ByAddress(advance_clearances, numba.types.UniTuple(numba.types.int64, 2))
 
 
 @kernel

@@ -163,7 +163,7 @@ class JointClearance:
         Its source: ``modelled``, ``torque``, ``encoders``, ``measured``, or ``wear_and_measurement`` if
         modelled wear and measurements give it together.
     modelled_m : float
-        Clearance when new, plus the wear counted since.
+        Clearance when new, plus the modelled wear since.
     estimated_m : float or None
         Clearance that measurements of the gait show.
     estimated_sigma_m : float or None

@@ -10,7 +10,7 @@ SURE_LOG_ODDS = 5.0  # 150 to 1
 # another. Under 300 N of load and twice the friction, B had 7 where G was open; right names had 15 and more
 # there, 85 and more in the air (2026-11-25)
 SURE_OF_NAME = 10.0
-# of the counted clearance: smaller openings are named wrongly where masses are 5 % off (diagnosis.md)
+# of the modelled clearance: smaller openings are named wrongly where masses are 5 % off (diagnosis.md)
 CORRECTED_FROM = 1.3
 SURE_SIGMAS = 2.0  # a clearance is surely beyond or below its limit by so many standard deviations
 
@@ -99,7 +99,7 @@ class Change(NamedCause):
     runner_up_log_odds : float
         Natural logarithm of the odds against the runner-up.
     is_corrected : bool
-        Whether the counted clearance was corrected by it.
+        Whether the modelled clearance was corrected by it.
     """
 
     since_ns: int

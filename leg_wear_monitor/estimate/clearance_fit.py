@@ -66,7 +66,7 @@ def fit_clearances(
         Mean signature.
     cycles : int
     start_m, modelled_m : (k,) arrays
-        Where the search begins, and the counted clearances.
+        Where the search begins, and the modelled clearances.
     known_sigma_m : (k,) array, optional
         Standard deviations of the clearances that the baseline was taken with.
     """
@@ -88,7 +88,7 @@ def fit_clearances(
 
         found = gauss_newton(at, np.log(clearance), low=low, high=high)
         clearance = np.asarray(np.exp(found.x), dtype=np.float64)
-    # what a clearance changes is known to a fraction, and so is a clearance that is far from the counted one
+    # what a clearance changes is known to a fraction, and so is a clearance that is far from the modelled one
     uncertain = np.hypot(_MODEL_M, MODEL_ERROR * (clearance - modelled_m))
     # a baseline after a correction hides the error of the correction
     covariance = found.covariance * np.outer(clearance, clearance) + np.diag(uncertain**2 + known_sigma_m**2)

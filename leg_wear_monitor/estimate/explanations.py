@@ -27,7 +27,7 @@ MODEL_NOISE = 0.3
 
 _APART = 2.0  # standard deviations by which likely sizes may scatter about the best one
 _SIZES = 24  # clearances of a joint that are tried; between them a parabola finds the best
-_LEAST_FACTOR = 0.7  # of the counted clearance
+_LEAST_FACTOR = 0.7  # of the modelled clearance
 # factors that are tried, on the mass of a body and on the friction in the joints
 _FACTORS = {Cause.MASS: np.geomspace(0.4, 2.0, 16), Cause.JOINT_FRICTION: np.geomspace(0.25, 4.0, 16)}
 _CORNER = 1.0e200

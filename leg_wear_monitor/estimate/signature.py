@@ -643,7 +643,7 @@ class CommissionedTorque:
 
     @property
     def is_as_modelled(self) -> bool:
-        """Whether the clearances were the counted ones, not corrected."""
+        """Whether the clearances were the modelled ones, not corrected."""
         return not self.sigma_m.any()
 
     @property

@@ -273,7 +273,7 @@ class ClearanceEstimate:
     clearance_m, sigma_m : float
         Clearance and its standard deviation; NaN unless it is estimated.
     departure_m : float
-        Estimated minus counted clearance; NaN unless it is estimated.
+        Estimated minus modelled clearance; NaN unless it is estimated.
     believed : bool
         Whether the forecast uses it: not if the model gives it a tail probability below 0.135 %.
     """
@@ -286,7 +286,7 @@ class ClearanceEstimate:
 
     @property
     def is_other(self) -> bool:
-        """Whether the clearance differs significantly from the counted one."""
+        """Whether the clearance differs significantly from the modelled one."""
         return abs(self.departure_m) >= max(LEAST_M, SURE_SIGMAS * self.sigma_m)
 
     @property
@@ -296,7 +296,7 @@ class ClearanceEstimate:
 
 
 def clearance_estimates(found: Estimate, modelled_m: Floats) -> tuple[ClearanceEstimate, ...]:
-    """Estimates of each joint, compared with the counted clearances (k,) [m]."""
+    """Estimates of each joint, compared with the modelled clearances (k,) [m]."""
     return tuple(
         _estimate(float(clearance), float(sigma), float(counted))
         for clearance, sigma, counted in zip(found.clearance_m, found.sigma_m, modelled_m, strict=True)

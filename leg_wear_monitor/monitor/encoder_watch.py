@@ -150,7 +150,7 @@ class EncoderWatch(Observer):
         return (Status("encoders", level, "; ".join([*wrong, *self._words()]), values, code),)
 
     def _words(self) -> list[str]:
-        """Joints that differ from the counted ones, or why nothing is seen."""
+        """Joints that differ from the modelled ones, or why nothing is seen."""
         if not self.estimates:
             return ["no whole gait cycle yet"]
         each = list(zip(self._leg.clearance_joints, self.estimates, strict=True))

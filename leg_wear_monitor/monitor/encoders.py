@@ -202,7 +202,7 @@ class EncoderState:
     updated_ns : int
         Stamp of the last forecast update with `found`, 0 if an update is due.
     other, believed : tuple of bool
-        At that update: whether each clearance differed significantly from the counted one, and whether the
+        At that update: whether each clearance differed significantly from the modelled one, and whether the
         forecast used it. Both are set by `monitor.cycle_report`.
     """
 
@@ -356,7 +356,7 @@ class EncoderObserver(KeepsSamples):
         self.state.found, self.state.is_requested, self.state.updated_ns = None, False, 0
 
     def estimates(self, modelled_m: Floats) -> tuple[ClearanceEstimate, ...]:
-        """Clearance estimate of each joint, compared with the counted clearances (k,) [m]."""
+        """Clearance estimate of each joint, compared with the modelled clearances (k,) [m]."""
         found = self.state.found
         if found is None:
             observation = (

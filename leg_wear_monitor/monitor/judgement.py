@@ -65,7 +65,7 @@ def update_verdict(leg: MonitoredLeg, situation: Situation | None = None) -> tup
 
 
 def is_forecast_valid(leg: MonitoredLeg, found: Sequence[Verdict]) -> bool:
-    """Whether the leg is in the range of the model, and is the counted one by some findings."""
+    """Whether the leg is in the range of the model, and is the modelled one by some findings."""
     invalid = any(Figure.FORECAST in finding.not_valid for finding in found)
     return leg.evaluation.is_model_valid() and not invalid
 

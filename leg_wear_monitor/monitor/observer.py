@@ -66,7 +66,7 @@ class Observer:
         """Forget what was estimated of the former part of joint k."""
 
     def renewed(self) -> None:
-        """A counted clearance was corrected, or one was measured: the forecast wants the next estimate."""
+        """A modelled clearance was corrected, or one was measured: the forecast wants the next estimate."""
 
     @property
     def seen(self) -> Sequence[KnownClearance | None]:

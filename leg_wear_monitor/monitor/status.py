@@ -173,7 +173,7 @@ def _joint(leg: MonitoredLeg, k: int, name: str) -> Status:
 
 
 def _with_measured(joint: Status, measured: Measurement | None) -> Status:
-    """A joint's status with its measured clearance beside the counted one."""
+    """A joint's status with its measured clearance beside the modelled one."""
     if measured is None:
         return joint
     words = f"{estimate(measured.clearance_m, measured.sigma_m, 'm')} was measured"

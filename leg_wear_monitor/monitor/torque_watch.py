@@ -185,7 +185,7 @@ class TorqueWatch(Observer):
             return None
 
     def end_period(self) -> None:
-        """Compare the torque with that of the counted leg, and correct what is surely counted wrong."""
+        """Compare the torque with the torque of the model, and correct what is surely counted wrong."""
         torque, leg = self.observer, self._leg
         if torque is None:
             return

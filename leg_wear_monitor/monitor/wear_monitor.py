@@ -462,7 +462,7 @@ class WearMonitor:
     ) -> MeasurementResult:
         """Add a measured clearance to the ledger; forecast, alarms and verdict follow at once.
 
-        The counted clearance stays as it is.
+        The modelled clearance stays as it is.
 
         Parameters
         ----------

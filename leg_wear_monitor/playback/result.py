@@ -89,7 +89,7 @@ class EncoderEvidence:
     observation : ClearanceObservation
         Whether the encoders show it, and why not.
     departure_m : float or None
-        Clearance that they show, minus the counted one.
+        Clearance that they show, minus the modelled one.
     sigma_m : float or None
         Its standard deviation.
     believed : bool
@@ -112,13 +112,13 @@ class ReplayJoint:
     Attributes
     ----------
     opened_m : float or None
-        By how much the counted clearance grew from the first to the last gait cycle of the replay.
+        By how much the modelled clearance grew from the first to the last gait cycle of the replay.
     growth_m_per_cycle : float or None
-        Growth of the counted clearance in a gait cycle; None while there is not enough data.
+        Growth of the modelled clearance in a gait cycle; None while there is not enough data.
     growth_error_m_per_cycle : float or None
         Standard deviation of its error.
     growth_mps : float or None
-        Growth of the counted clearance per second of walking.
+        Growth of the modelled clearance per second of walking.
     forecast : JointForecast or None
         Remaining life; None before the first forecast.
     peak_force_n : float or None
@@ -260,7 +260,7 @@ class ReplayMonitor:
     hardware_id : str
         Which leg this is.
     clearance_joints : tuple of str
-        Joints whose wear is counted.
+        Joints with modelled wear.
     commanded_rpm : float
         Cadence that the gait should have.
     wear_acceleration : float

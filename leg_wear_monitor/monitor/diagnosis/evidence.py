@@ -27,7 +27,7 @@ from leg_wear_monitor.monitor.diagnosis.state import (
     TorqueState,
 )
 
-SETTLING_CYCLES = 10  # since a change, before the counted clearances are corrected by it
+SETTLING_CYCLES = 10  # since a change, before the modelled clearances are corrected by it
 
 # mean square up to which another joint explains what a corrected leg shows beside the baseline before: G, I
 # and B left 0.9 to 1.1 where they had opened with A and G, and J 1.9, at 1.7 mm for 0.6 (2026-11-27)

@@ -190,7 +190,7 @@ class TorqueObserver(KeepsSamples):
         Returns
         -------
         Change or None
-            Of a counted clearance that is surely wrong, and shall be corrected before the next period.
+            Of a modelled clearance that is surely wrong, and shall be corrected before the next period.
         """
         before = attrs.evolve(self.state)
         try:
@@ -515,7 +515,7 @@ class TorqueObserver(KeepsSamples):
         return True
 
     def _follow_counted(self, modelled_m: Floats) -> None:
-        """Compare with the counted clearances as they grow."""
+        """Compare with the modelled clearances as they grow."""
         state = self.state
         if (np.abs(modelled_m / state.modelled_m - 1.0) > 0.005).any():
             state.modelled_m = np.asarray(modelled_m, float).copy()

@@ -113,7 +113,7 @@ class LegModels:
         return explainer_of(self._mechanism, reference, state.sensor, before, state.modelled_m)
 
     def detector(self, state: TorqueState, config: MonitorConfig) -> ChangeDetector:
-        """Tests for a change of the counted clearances."""
+        """Tests for a change of the modelled clearances."""
         own = self._of(state)
         if own.detector is None or own.modelled_m is not state.modelled_m:
             own.detector = self._detector(own.explainer, state, config)
@@ -223,7 +223,7 @@ UNLIKE_CYCLES = 20
 ROUNDS = 3  # most rounds of identification
 LOAD_ROUNDS = 4  # rounds of finding the ground's force: friction and impacts change with it, and it with them
 
-# a reference is renewed if a counted clearance differs by more than this fraction from that of its leg
+# a reference is renewed if a modelled clearance differs by more than this fraction from that of its leg
 _FAR_FRACTION = 0.1
 
 
@@ -531,7 +531,7 @@ class References:
 
 
 def _is_far(reference: TorqueReference, modelled_m: Floats) -> bool:
-    """Whether the expected leg of a reference has other clearances than the counted ones (k,) [m]."""
+    """Whether the expected leg of a reference has other clearances than the modelled ones (k,) [m]."""
     expected_m = np.maximum(modelled_m, LEAST_CLEARANCE_M)  # no leg is simulated with less
     return bool((np.abs(reference.clearance_m[0] / expected_m - 1.0) > _FAR_FRACTION).any())
 

@@ -123,7 +123,7 @@ class Diagnosis:
         Standard deviations of the modelled clearances. The torque shows the change since the baseline, so an
         estimated clearance contains this error in addition to its own.
     changes : tuple of Change
-        Significant departures, the oldest first: those by which counted clearances were corrected, and, where
+        Significant departures, the oldest first: corrections of modelled clearances, and, where
         the state is CHANGED, those of the interim, and the one that is not settled yet.
     channel : Channel
         Delay, low-pass and load friction of the drive by the commissioned gait cycles; of a drive that adds
@@ -191,7 +191,7 @@ class Diagnosis:
     def contradicts(self, explained: TorqueExplanation) -> bool:
         """Whether it names another cause of a torque mismatch.
 
-        The explanation compares with the counted leg, and supposes faults of the inputs, a load or a mass.
+        The explanation compares with the model, and supposes faults of the inputs, a load or a mass.
         The diagnosis compares with this leg as it was, and supposes more; but a torque that is wrong as
         received is not used by it.
         """
@@ -311,7 +311,7 @@ class TorqueState:
     changes : tuple of Change
         Unsettled changes; the last one is being observed.
     settled : tuple of Change
-        Changes by which the counted clearances were corrected, and one beside them that a measurement
+        Changes by which the modelled clearances were corrected, and one beside them that a measurement
         contradicts.
     measured : tuple of bool
         Whether each joint was measured since a correction; empty without one.
@@ -446,7 +446,7 @@ class TorqueState:
 
     @property
     def corrections(self) -> tuple[Change, ...]:
-        """Changes by which the counted clearances were corrected."""
+        """Changes by which the modelled clearances were corrected."""
         return tuple(change for change in self.settled if change.is_corrected)
 
     @property
@@ -470,7 +470,7 @@ class TorqueState:
 
     @property
     def not_corrected(self) -> tuple[Change, ...]:
-        """Changes by which counted clearances were not corrected."""
+        """Changes by which modelled clearances were not corrected."""
         return tuple(change for change in self.all_changes if not change.is_corrected)
 
     @property

@@ -161,7 +161,7 @@ def last_measured(measurements: Sequence[Measurement], joint: str, replaced_ns: 
 def judged_clearance_m(
     modelled_m: float, measured: Measurement | None, best_estimate_m: float = math.nan
 ) -> float:
-    """Clearance that is compared with the limit: the counted one, or a larger one by measurement.
+    """Clearance that is compared with the limit: the modelled one, or a larger one by measurement.
 
     Parameters
     ----------

@@ -5,7 +5,7 @@ the twin has counted with the nominal coefficient, x the joint's factor on it. T
 x and normal for d; measured clearances have normal errors. d is eliminated in closed form, x is on a grid
 around the estimate: an accepted measurement moves it as far as the data require.
 
-Where the counted clearance was corrected by what the drive torque shows, c_0, d and w begin anew with that
+Where the modelled clearance was corrected by what the drive torque shows, c_0, d and w begin anew with that
 clearance, its error and the wear since; x remains.
 
 Where the nominal coefficient was another one, w is what would have been counted with the present one, so what
@@ -248,7 +248,7 @@ def estimate_coefficient(
     prior : CoefficientPrior, optional
         Without it, the configured or usual spread about the nominal coefficient.
     corrections : sequence of CorrectedClearance and CoefficientSpan
-        Of its counted clearance, in the order of time.
+        Of its modelled clearance, in the order of time.
     """
     prior = prior or usual_prior(settings)
     mean, precision = measured_factor(settings, fresh_m, observations, corrections)

@@ -328,7 +328,7 @@ class Measurement:
     sigma_m : float
         Its standard deviation.
     wear_m : float
-        Wear that the twin had counted for this part at that time.
+        Modelled wear of this part at that time.
     cycles : int
         Gait cycles of this part at that time.
     replaced_ns : int
@@ -367,7 +367,7 @@ class Measurement:
 
 @attrs.frozen
 class CorrectedClearance:
-    """A counted clearance that was replaced by the one that the drive torque shows.
+    """A modelled clearance that was replaced by the one that the drive torque shows.
 
     Attributes
     ----------
@@ -378,7 +378,7 @@ class CorrectedClearance:
     sigma_m : float
         Its standard deviation.
     before_m : float
-        Wear that the twin had counted for this part.
+        Modelled wear of this part.
     wear_m : float
         Wear in the twin from then on, which makes the clearance this one.
     replaced_ns : int
@@ -404,7 +404,7 @@ class CoefficientSpan:
     replaced_ns : int
         When the part was replaced, 0 if it never was.
     from_m, to_m : float
-        Wear that the twin had counted for this part at begin and end.
+        Modelled wear of this part at begin and end.
     factor : float
         Present coefficient over that one.
     """

@@ -199,7 +199,7 @@ def believed_words(one: JointClearance) -> str:
 
 
 def judged(joint: JointSituation) -> KnownClearance:
-    """The counted clearance, or a larger one by measurement: what somebody found on the leg counts."""
+    """The modelled clearance, or a larger one by measurement: what somebody found on the leg counts."""
     found = [KnownClearance(COUNTED, joint.modelled_m, math.nan)]
     if joint.measured is not None:
         found.append(joint.measured)
@@ -227,7 +227,7 @@ def is_surely_below(limit_m: float, clearance_m: float, sigma_m: float) -> bool:
 def is_overruled(joint: JointSituation, alarm: Alarm | None) -> bool:
     """Whether a measurement contradicts the estimate that an alarm of the clearance rests on.
 
-    The counted clearance is below the limit, too: a measurement does not end what counting says.
+    The modelled clearance is below the limit, too: a measurement does not end what counting says.
     It was acknowledged with the measurement, and rises again, not acknowledged, if the estimate returns
     below the limit and then passes it again.
     """
@@ -258,7 +258,7 @@ def believed(joint: JointSituation, alarm: Alarm | None, is_counted_leg: bool) -
     alarm : Alarm or None
         That of the joint's clearance.
     is_counted_leg : bool
-        Whether the verdict does not list the counted clearances as not valid.
+        Whether the verdict does not list the modelled clearances as not valid.
     """
     known, estimate = judged(joint), at_limit_by_estimate(joint, alarm)
     if estimate is not None and estimate.clearance_m > known.clearance_m:
@@ -279,7 +279,7 @@ def joint_status(joint: str, is_known: bool, findings: Sequence[Verdict]) -> Sta
 def alarm_value(joint: JointSituation, alarm: Alarm) -> KnownClearance | None:
     """The clearance that its alarm is evaluated with at the end of a period; None to leave it as it is.
 
-    A counted clearance is evaluated once a gait cycle instead, unless another source keeps the alarm present.
+    A modelled clearance is evaluated once per gait cycle, unless a different source keeps the alarm present.
     """
     known, sure, shown = judged(joint), surely_at(joint.limit_m, joint.seen), surest(joint.seen)
     if sure is not None and sure.clearance_m > known.clearance_m:

@@ -45,6 +45,7 @@ class EncoderWatch(Observer):
             leg.ledger.commissioned if leg.ledger else None,
         )
         self.estimates: tuple[ClearanceEstimate, ...] | None = None
+        self._known = 0  # measurements and corrections in the forecast when it was last updated
 
     def configure(self, config: MonitorConfig) -> None:
         """Use other parameters from now on."""
@@ -63,16 +64,18 @@ class EncoderWatch(Observer):
         self.encoders.add_samples(piece)
 
     def end_cycle(self, statistics: CycleStatistics, is_refused: bool) -> None:
-        """Estimate the clearances; they update the forecast each minute of stamps, or on a finding."""
+        """Estimate the clearances; they update the forecast each minute of stamps, or if something is new."""
         del is_refused
         self.encoders.ended(statistics)
         leg, state = self._leg, self.encoders.state
         estimates = self.encoders.estimates(statistics.clearance_mean_m)
         is_seen = [one.observation is ClearanceObservation.SEEN for one in estimates]
         other = tuple(one.is_other for one in estimates)
-        is_due = other != state.other or not 0 <= statistics.stamp_ns - state.updated_ns < RENEWED_NS
+        known = len(leg.forecaster.measurements) + len(leg.forecaster.corrections)
+        is_new = other != state.other or known != self._known
+        is_due = is_new or not 0 <= statistics.stamp_ns - state.updated_ns < RENEWED_NS
         if is_due and any(is_seen):
-            state.updated_ns, state.other = statistics.stamp_ns, other
+            state.updated_ns, state.other, self._known = statistics.stamp_ns, other, known
             worn_m, replaced_ns = leg.worn_m(statistics.clearance_mean_m), leg.accounting.replaced_ns
             state.believed = tuple(
                 is_seen[k]
@@ -98,10 +101,6 @@ class EncoderWatch(Observer):
         if self.estimates:
             none = ClearanceEstimate(observation=ClearanceObservation.WAITING)
             self.estimates = (*self.estimates[:k], none, *self.estimates[k + 1 :])
-
-    def renewed(self) -> None:
-        """The forecast wants the next estimate."""
-        self.encoders.state.updated_ns = 0
 
     @property
     def seen(self) -> Sequence[KnownClearance | None]:

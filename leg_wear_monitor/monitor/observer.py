@@ -65,9 +65,6 @@ class Observer:
     def replaced(self, k: int) -> None:
         """Forget what was estimated of the former part of joint k."""
 
-    def renewed(self) -> None:
-        """A modelled clearance was corrected, or one was measured: the forecast wants the next estimate."""
-
     @property
     def seen(self) -> Sequence[KnownClearance | None]:
         """Clearance that is seen of each joint, None where it is not; empty without any."""

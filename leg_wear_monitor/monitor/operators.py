@@ -139,8 +139,6 @@ def measure(
             found, shown_m=best.clearance_m, shown_sigma_m=best.sigma_m, shown_by=SOURCES[best.by]
         )
     accounting.note(found.measurement)
-    for each in leg.observers:
-        each.renewed()
     renew_forecast(leg)
     before, board = leg.evaluation.board.alarms, leg.evaluation.board
     is_ended = _compare(leg, joint, stamp_ns)

@@ -174,7 +174,7 @@ def test_a_worn_joint_is_new_after_a_reset_and_the_others_stay(monitor_of) -> No
 @pytest.mark.chaotic
 def test_an_alarm_comes_after_its_delay_and_stays_until_it_is_acknowledged(monitor_of, parameters) -> None:
     """Peaks of G are some hundred newtons at least in each gait cycle."""
-    low = {"limits__impact_force_n": 50.0, "alarms__knock_on_delay_cycles": 2}
+    low = {"limits__impact_force_n": 50.0, "alarms__impact_on_delay_cycles": 2}
     monitor = monitor_of(**low)
     reports = monitor.update(walk(6.0))
     (rises, *_) = (
@@ -235,7 +235,7 @@ def test_a_measured_clearance_beyond_its_limit_keeps_its_alarm_while_the_leg_wal
 def test_counts_of_an_encoder_are_read_as_its_angle(parameters) -> None:
     counts, per_turn = np.arange(600) * 4096 // RATE_HZ, 4096
     columns = {"time": np.arange(600) / RATE_HZ, "drive_torque": np.zeros(600)}
-    inputs = {"input__units__crank_angle": "counts", "input__counts_per_turn": float(per_turn)}
+    inputs = {"table__units__crank_angle": "counts", "table__counts_per_turn": float(per_turn)}
     counted = lw.replay({**columns, "crank_angle": counts % per_turn}, parameters(**inputs)).summary()
     angles = 2.0 * np.pi * (counts % per_turn) / per_turn
     of_angles = lw.replay({**columns, "crank_angle": angles}).summary()

@@ -165,7 +165,7 @@ def print_state(
     if state.clearances:
         console.print()
         console.print(_joints(state, joint_words))
-        console.print("life: remaining hours of walking, not exceeded with 10, 50 and 90 % probability")
+        console.print("life: remaining hours of walking, not exceeded with 10 and 50 % probability")
     console.print()
     raised = [alarm for alarm in state.alarms.now if alarm.level]
     for alarm in raised:
@@ -180,39 +180,29 @@ def print_state(
 
 
 def _joints(state: "LegState", joint_words: Callable[[str], str]) -> Table:
-    """Best estimate of each clearance, its change since the baseline, its limit, and the remaining life."""
-    columns = (
-        "\njoint",
-        "clearance\nmm",
-        "±\nmm",
-        "change\nmm",
-        "±\nmm",
-        "limit\nmm",
-        "life\np10 h",
-        "\np50 h",
-        "\np90 h",
-        "\nsource",
-    )
-    table = plain_table(columns, 1, 10)
+    """Best estimate of each clearance, its limit, the remaining life, and the change since the baseline."""
+    has_change = any(one.change_m is not None for one in state.clearances.values())
+    columns = ["\njoint", "clearance\nmm", "limit\nmm", "life p10\nh", "life p50\nh", "\nsource"]
+    table = plain_table([*columns, *(["change\nmm"] if has_change else [])], 1, 6)
     for joint, one in state.clearances.items():
-        life = state.life.get(joint)
-        hours = (None, None, None) if life is None else (life.p10_h, life.p50_h, life.p90_h)
         table.add_row(
             joint_words(joint),
-            *(
-                "-" if each is None else f"{1.0e3 * each:.3f}"
-                for each in (one.best_estimate_m, one.best_estimate_sigma_m, one.change_m, one.change_sigma_m)
-            ),
+            _millimetres(one.best_estimate_m, one.best_estimate_sigma_m),
             f"{1.0e3 * one.limit_m:.3g}",
-            *map(figure, hours),
+            *_hours(state.life.get(joint)),
             SOURCES[one.best_estimate_source] if one.best_estimate_source else "not valid",
+            *([_millimetres(one.change_m, one.change_sigma_m)] if has_change else []),
         )
     if life := state.life.get("leg"):
-        table.add_row("leg", "", "", "", *_hours(life), "")
+        table.add_row("leg", "", "", *_hours(life))
     return table
 
 
-def _hours(life: "LifeHours | None") -> list[str]:
-    return (
-        ["-"] * 3 if life is None else [three_digits(each) for each in (life.p10_h, life.p50_h, life.p90_h)]
-    )
+def _millimetres(value_m: float | None, sigma_m: float | None) -> str:
+    if value_m is None:
+        return "-"
+    return f"{1.0e3 * value_m:.3f}" + (f" ± {1.0e3 * sigma_m:.3f}" if sigma_m else "")
+
+
+def _hours(life: "LifeHours | None") -> tuple[str, str]:
+    return (three_digits(life.p10_h), three_digits(life.p50_h)) if life else ("-", "-")

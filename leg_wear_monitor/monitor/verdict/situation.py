@@ -182,9 +182,9 @@ class Situation:
 COUNTED, MEASURED, BOTH = "modelled", "measured", "wear_and_measurement"
 SEEN = ("torque", "encoders")
 SOURCES = {
-    COUNTED: "counting",
+    COUNTED: "the wear model",
     MEASURED: "a measurement",
-    BOTH: "counting and measurements together",
+    BOTH: "wear model and measurements together",
     "torque": "the drive torque",
     "encoders": "the joint encoders",
 }

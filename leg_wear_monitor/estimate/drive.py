@@ -8,6 +8,7 @@ import numpy as np
 from leg_wear_monitor.mechanism.arrays import Complex, Floats
 from leg_wear_monitor.mechanism.position import TURN
 
+_RIGID_NM_PER_RAD = 2.0e4  # resonance above 35 Hz, which no signature of 200 samples a cycle shows
 _HALF_POWER = 0.442946  # x at which (sin(pi x) / (pi x))² is 1/2
 
 
@@ -119,6 +120,11 @@ class DriveFigures:
     coulomb_nm: float = math.nan
     viscous_nms: float = math.nan
     stiffness_nm_per_rad: float = math.nan
+
+    @property
+    def compliance(self) -> float:
+        """Declared compliance [rad/(N m)]; 0 without one, or if the drive is as good as rigid."""
+        return 1.0 / self.stiffness_nm_per_rad if self.stiffness_nm_per_rad < _RIGID_NM_PER_RAD else 0.0
 
     @property
     def declared(self) -> dict[str, float]:

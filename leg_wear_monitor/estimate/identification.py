@@ -1,4 +1,4 @@
-"""Masses, lengths, friction and the drive's compliance of a commissioned leg, from its drive torque.
+"""Masses, lengths and friction of a commissioned leg, from its drive torque.
 
 A real leg is not quite that of its mechanism file. Where its impacts fall, and what a clearance changes,
 depends on its masses, lengths and friction: a length that is 1 % off, or friction twice that of the file,
@@ -36,7 +36,6 @@ from leg_wear_monitor.twin.torque_reference import (
     HEAVIER,
     LONGER,
     ROUGHER,
-    STIFFER,
     TorqueReference,
     levels_of,
 )
@@ -53,13 +52,12 @@ FAR_FROM_FILE = 20.0  # misfit from which on the ideal torque comes first
 
 _MASS, _LENGTH = 0.03, 0.006  # standard deviations of a leg's bodies about those of its file
 _LOG_FRICTION = 0.7  # of the logarithm of its friction: a factor of two, greased or not
-_LOG_COMPLIANCE = 0.2  # of that of the drive's compliance, about that of the ideal leg's torque
 _FAR = 0.03  # that of masses and lengths of a leg far from its file
 _HARMONICS = 6  # of the torque that show masses and lengths rather than impacts
 _IDEAL = 0.01  # of the torque's size: what impacts change in each of them
 _STEP = 1.0e-4  # of the differences by masses and lengths, in standard deviations
 _DONE = 1.0e-3  # last step of them
-_LARGEST_LOG = 10.0  # of friction and compliance: far beyond a possible leg
+_LARGEST_LOG = 10.0  # of friction: far beyond a possible leg
 _SENSOR = 5.0  # times the usual changes of friction, scale, offset and load: they are constant here
 
 # a model with the right parameters is off by a part of the torque's size, by a part of its steps where it is
@@ -79,7 +77,6 @@ def identified_leg(
     model: SignatureModel,
     nuisances: Sequence[Nuisance],
     commissioned: CommissionedTorque,
-    is_drive_known: bool = False,
 ) -> LegParameters:
     """Most probable parameters of a commissioned leg: one step of Gauss and Newton.
 
@@ -93,30 +90,23 @@ def identified_leg(
     model : SignatureModel
     nuisances : sequence of Nuisance
     commissioned : CommissionedTorque
-    is_drive_known : bool
-        Whether the compliance of the drive stays as it is.
     """
     means = mean_signatures(legs, model.sensor)
     bodies, near = len(legs.parameters.mass), legs.parameters
-    # friction and compliance are positive, and known to a factor: their logarithms are the unknowns
+    # friction is positive, and known to a factor: its logarithm is the unknown
     before = np.concatenate([near.mass - 1.0, near.length - 1.0, [math.log(near.friction)]])
     far = float(np.sqrt(np.mean(np.square(near.length - 1.0))))
     steps = np.append(np.repeat([HEAVIER, LONGER], bodies), math.log(ROUGHER))
     sigma = np.append(np.repeat([_MASS, np.hypot(_LENGTH, far)], bodies), _LOG_FRICTION)
     levels = levels_of(near)[1:]
-    if near.compliance and not is_drive_known:  # its deviation from the compliance of the simulated leg
-        before, steps = np.append(before, 0.0), np.append(steps, -math.log(STIFFER))
-        sigma = np.append(sigma, _LOG_COMPLIANCE)
-    slopes = means[1:].T @ levels[:, : len(steps)] / (len(levels) * steps)
+    slopes = means[1:].T @ levels / (len(levels) * steps)
     weighted = np.linalg.solve(_covariance(model, nuisances, commissioned.cycles), slopes)
     information = slopes.T @ weighted + np.diag(sigma**-2.0)
     rest = commissioned.mean - means[0]
     found = before + np.linalg.solve(information, weighted.T @ rest - before / sigma**2)
-    mass, length, logs = np.split(found, [bodies, 2 * bodies])
-    log_friction, *log_compliance = np.clip(logs, -_LARGEST_LOG, _LARGEST_LOG).tolist()
-    compliance = near.compliance * math.exp(sum(log_compliance))
-    friction = math.exp(log_friction)
-    return attrs.evolve(near, mass=1.0 + mass, length=1.0 + length, friction=friction, compliance=compliance)
+    mass, length, log_friction = np.split(found, [bodies, 2 * bodies])
+    friction = math.exp(np.clip(log_friction.item(), -_LARGEST_LOG, _LARGEST_LOG))
+    return attrs.evolve(near, mass=1.0 + mass, length=1.0 + length, friction=friction)
 
 
 def leg_of_ideal_torque(

@@ -50,7 +50,7 @@ MASSES, FRICTIONS = (0.75, 1.4), (0.6, 1.5, 2.2, 3.2)
 
 # of each body's mass and length, and factors on the friction in the joints and on the stiffness of a drive
 # that is not rigid (a quarter of its resonance's width): up and down, all of them at once
-HEAVIER, LONGER, ROUGHER, STIFFER = 0.02, 0.002, 1.25, 1.08
+HEAVIER, LONGER, ROUGHER = 0.02, 0.002, 1.25
 
 _BEHIND = 2  # legs that are due and not simulated, from which on threads of higher priority help
 _SETTLING = 2  # gait cycles before those that count
@@ -473,21 +473,20 @@ def design(parameters: int) -> Floats:
 
 
 def levels_of(near: LegParameters) -> Floats:
-    """Levels, as of `design`, of masses, lengths, friction, and the compliance of the drive if it has any."""
-    return design(2 * len(near.mass) + 1 + bool(near.compliance))
+    """Levels, as of `design`, of masses, lengths and friction."""
+    return design(2 * len(near.mass) + 1)
 
 
 def _changed(near: LegParameters, clearance_m: Floats) -> list[Leg]:
-    """The leg with given parameters, then legs with other masses, lengths, friction, and stiffness if any."""
+    """The leg with given parameters, then legs with other masses, lengths and friction."""
     bodies, legs = len(near.mass), []
     for levels in levels_of(near):
-        mass, length, (friction, *stiffness) = np.split(levels, [bodies, 2 * bodies])
+        mass, length, friction = np.split(levels, [bodies, 2 * bodies])
         changed = attrs.evolve(
             near,
             mass=near.mass + HEAVIER * mass,
             length=near.length + LONGER * length,
-            friction=near.friction * ROUGHER**friction,
-            compliance=near.compliance * STIFFER ** -sum(stiffness),
+            friction=near.friction * ROUGHER ** friction.item(),
         )
         legs.append(Leg(changed, clearance_m))
     return legs

@@ -144,3 +144,8 @@ def test_a_drive_that_rubs_takes_power_whichever_way_the_power_flows():
     rubbing = Channel(load_friction=0.3)
     np.testing.assert_allclose(rubbing.received(torque, 0.01, 1.0), [13.0, -7.0, 0.0])
     np.testing.assert_allclose(rubbing.received(torque, 0.01, -1.0), [7.0, -13.0, 0.0])
+
+
+def test_a_drive_without_a_declared_stiffness_or_a_large_one_is_rigid():
+    assert DriveFigures().compliance == DriveFigures(stiffness_nm_per_rad=1.0e5).compliance == 0.0
+    assert DriveFigures(stiffness_nm_per_rad=1000.0).compliance == pytest.approx(1.0e-3)

@@ -16,7 +16,13 @@ NOT_DECLARED = -1.0
 
 
 def _figure(
-    unit: str, doc: str, least: float, most: float, usual: tuple[float, float], slip: str = ""
+    unit: str,
+    doc: str,
+    least: float,
+    most: float,
+    usual: tuple[float, float],
+    slip: str = "",
+    otherwise: str = "an estimate",
 ) -> float:
     """Parameter for a figure within bounds, or `NOT_DECLARED`; ``slip`` is the unit that is likely meant.
 
@@ -30,7 +36,7 @@ def _figure(
         bounds = f"{least:g} to {most:g} {unit}".rstrip()
         return f"{value!r} is not within its bounds, expected {bounds}, or {NOT_DECLARED} if not declared"
 
-    text = f"{doc}; {NOT_DECLARED:g} takes the value of drive.type or an estimate"
+    text = f"{doc}; {NOT_DECLARED:g} takes the value of drive.type or {otherwise}"
     words = USUAL if unit else "{value:g}, usual are {usual}"
     number: float = quantity(
         unit,
@@ -81,6 +87,7 @@ class DriveParameters:
         1.0e-3,
         1.0e12,
         (5.0, 1.0e7),
+        otherwise="a rigid drive",
     )
     temperature_interface: str = described(
         "interface of the crank in dynamic_joint_states with the temperature of the drive [°C]; needs "

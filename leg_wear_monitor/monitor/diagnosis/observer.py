@@ -14,7 +14,6 @@ import numpy as np
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.estimate.cause import CORRECTED_FROM, Cause, Change
 from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
-from leg_wear_monitor.estimate.coupling import compliance_of
 from leg_wear_monitor.estimate.drive import DIRECT
 from leg_wear_monitor.estimate.ground_load import stance_phases
 from leg_wear_monitor.estimate.least_squares import DATA_ERRORS
@@ -107,11 +106,10 @@ class TorqueObserver(KeepsSamples):
         self.models = LegModels(mechanism, figures)
         part = next((one for one in references if not one.is_whole), None)
         whole = [one for one in references if one.is_whole]
-        is_drive_known = not math.isnan(figures.stiffness_nm_per_rad)
         # references of a measured load, too, are simulated under the mean one that the torque shows
         self._is_on_ground = config.load.model in (GROUND, MEASURED) and mechanism.toe is not None
         self._up = upwards(mechanism)
-        self._references = References(mechanism, self.models, whole, part, is_drive_known, self._is_on_ground)
+        self._references = References(mechanism, self.models, whole, part, self._is_on_ground)
         self._evidence = Evidence(self.models)
         modelled_m = np.asarray(modelled_m, float).copy()
         if parameters is None:  # those that files and unfinished references were made with
@@ -121,9 +119,9 @@ class TorqueObserver(KeepsSamples):
             parameters = next((one for one in known if one != own), None)
         if parameters is not None and not self._is_on_ground:  # load.model has changed
             parameters = parameters.in_air
-        if is_drive_known:
+        if parameters is not None or figures.compliance:
             whole_leg = parameters or LegParameters.none(mechanism)
-            parameters = attrs.evolve(whole_leg, compliance=compliance_of(figures.stiffness_nm_per_rad))
+            parameters = attrs.evolve(whole_leg, compliance=figures.compliance)
         self.state = TorqueState(
             modelled_m,
             baselines=tuple(commissioned),

@@ -109,7 +109,10 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
     if state.load and not state.load.is_sure and not math.isnan(state.load.other_n):
         sizes = f"{state.load.peak_n:.0f} N and {state.load.other_n:.0f} N explain its drive torque as well"
         return f"{known}the force on the foot is not observable: {sizes}"
-    return f"{known}masses, lengths and friction near those of the file do not explain its drive torque"
+    return (
+        f"{known}masses, lengths and friction near those of the file do not explain its drive torque; "
+        "behind a belt or a soft coupling, declare drive.stiffness_nm_per_rad"
+    )
 
 
 def _hidden(state: TorqueState, known: CommissionedTorque, joints: Sequence[str]) -> str:

@@ -15,7 +15,6 @@ from leg_wear_monitor.estimate import identification, signature
 from leg_wear_monitor.estimate.body_torques import body_torques
 from leg_wear_monitor.estimate.change_detector import ChangeDetector
 from leg_wear_monitor.estimate.channel import with_channel_of
-from leg_wear_monitor.estimate.coupling import leg_behind_coupling
 from leg_wear_monitor.estimate.drive import DIRECT, UNDECLARED, DriveFigures
 from leg_wear_monitor.estimate.explanations import Explainer
 from leg_wear_monitor.estimate.ground_load import GroundLoad, ground_load
@@ -239,8 +238,6 @@ class References:
         Ones that were simulated under a load are for a leg on the ground.
     part : TorqueReference or None
         Unfinished reference of an earlier run, which is continued if it fits.
-    is_drive_known : bool
-        Whether the stiffness of the drive is declared; otherwise it is identified.
     is_on_ground : bool
         Whether the leg walks on the ground; then the force is identified.
 
@@ -263,11 +260,10 @@ class References:
         models: LegModels,
         given: Sequence[TorqueReference] = (),
         part: TorqueReference | None = None,
-        is_drive_known: bool = False,
         is_on_ground: bool = False,
     ) -> None:
         self._mechanism, self._models, self._part = mechanism, models, part
-        self._is_drive_known, self._is_on_ground = is_drive_known, is_on_ground
+        self._is_on_ground = is_on_ground
         usable = (one for one in given if is_on_ground or not one.parameters.load.size)
         self._given = (*usable, *shipped_references(mechanism))
         self._run: TorqueReferenceRun | None = None
@@ -392,7 +388,7 @@ class References:
     def _begin_identification(self, state: TorqueState, reference: TorqueReference, depth: Floats) -> None:
         """Begin a round of identification: simulate legs with each parameter changed.
 
-        The first round may find a compliant drive, or start from parameters fitted with ideal joints.
+        The first round may start from parameters fitted with ideal joints.
         """
         known = state.commissioned
         if known is None:
@@ -400,12 +396,6 @@ class References:
         start, model, is_first = reference.parameters, self._models.explainer(state).model, not state.rounds
         state.rounds += 1
         clearance_m, profile, leg = known.clearance_m, reference.profile, self._mechanism
-        if is_first and not (start.compliance or self._is_drive_known or self._is_on_ground):
-            found = leg_behind_coupling(leg, model.sensor, profile, known.mean)
-            if found is not None:
-                state.parameters = found
-                self._begin(found, clearance_m, depth, profile)
-                return
         if is_first and not start.compliance and self._models.misfit(state) >= identification.FAR_FROM_FILE:
             ideal = identification.leg_of_ideal_torque(leg, model, known, profile.speed, start.load)
             start = attrs.evolve(ideal, load_sigma=start.load_sigma)
@@ -491,7 +481,7 @@ class References:
         elif state.commissioned is not None:
             explainer = self._models.explainer(state, is_commissioned=True)
             found = identification.identified_leg(
-                legs, explainer.model, explainer.nuisances, state.commissioned, self._is_drive_known
+                legs, explainer.model, explainer.nuisances, state.commissioned
             )
             if not found.is_possible(self._mechanism):
                 _abandon(state)
@@ -512,18 +502,13 @@ class References:
             return
         state.reference = reference
         own, former, sensor = reference.parameters, before.parameters, state.sensor
-        is_new_drive = own.compliance != former.compliance
         is_new_load = not np.array_equal(own.load, former.load)
-        if (is_new_drive or is_new_load) and sensor is not None and state.commissioned is not None:
-            # the channel was found with a rigid drive, which takes compliance for delay, or without the load,
-            # which hides load friction
+        if is_new_load and sensor is not None and state.commissioned is not None:
+            # the channel was found without the load, which hides load friction
             state.sensor = self._models.channel(reference, sensor, state.commissioned)
         if own == former or self._models.misfit(state) <= misfit_before:
             return
         state.reference, state.sensor = before, sensor
-        if is_new_drive and not former.compliance:  # no coupling: identify the leg with a rigid drive
-            state.parameters = former
-            return
         state.is_final, state.rounds = True, ROUNDS
         # other cadences may use the identified parameters; if none does, they are withdrawn
         if all(one.reference.parameters != state.parameters for one in state.set_aside):

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from leg_wear_monitor.bags.budget import Budget
 from leg_wear_monitor.bags.findings import (
     DamageError,
     Finding,
@@ -316,7 +315,7 @@ class Source:
 
 
 def open_sources(
-    bag_files: Iterable[BagFile], config: MonitorConfig, budget: Budget, stack: ExitStack
+    bag_files: Iterable[BagFile], config: MonitorConfig, stack: ExitStack
 ) -> tuple[list[Source], list[Finding]]:
     """Open the files of a recording; an unreadable file becomes a finding if another one can be opened.
 
@@ -325,7 +324,6 @@ def open_sources(
     bag_files : iterable of BagFile
     config : MonitorConfig
         Columns and units of tables.
-    budget : Budget
     stack : contextlib.ExitStack
         Closes the files.
 
@@ -338,7 +336,7 @@ def open_sources(
     failed: list[RecordingError] = []
     for bag_file in bag_files:
         try:
-            sources.append(Source(bag_file, _open(bag_file, config, budget, stack)))
+            sources.append(Source(bag_file, _open(bag_file, config, stack)))
         except RecordingError as error:
             failed.append(error)
     if not sources:
@@ -389,7 +387,7 @@ def assign(
     return topics, findings
 
 
-def _open(bag_file: BagFile, config: MonitorConfig, budget: Budget, stack: ExitStack) -> OpenFile:
+def _open(bag_file: BagFile, config: MonitorConfig, stack: ExitStack) -> OpenFile:
     path = bag_file.path
     try:
         if bag_file.storage in TABLES:
@@ -397,13 +395,13 @@ def _open(bag_file: BagFile, config: MonitorConfig, budget: Budget, stack: ExitS
 
             is_file = bag_file.storage != IN_MEMORY
             content = stack.enter_context(open_recording(path)) if is_file else bag_file.table
-            return TableFile(path, content, bag_file.storage, config, budget)
+            return TableFile(path, content, bag_file.storage, config)
         if bag_file.storage == MCAP:
-            return McapFile(path, stack.enter_context(open_recording(path)), budget)
+            return McapFile(path, stack.enter_context(open_recording(path)))
         from leg_wear_monitor.bags.database import DatabaseFile
 
         open_recording(path).close()  # SQLite does not say why it cannot open a file
-        return DatabaseFile(path, budget, stack)
+        return DatabaseFile(path, stack)
     except DamageError as error:
         raise RecordingError(str(bag_file.path), "", str(error)) from error
     except OSError as error:

@@ -12,8 +12,7 @@ import numpy as np
 from rosbags.interfaces import MessageDefinitionFormat
 from rosbags.rosbag2 import Reader, ReaderError
 
-from leg_wear_monitor.bags.budget import Budget
-from leg_wear_monitor.bags.findings import Finding, RecordingError
+from leg_wear_monitor.bags.findings import MOST_BYTES, Finding, RecordingError
 from leg_wear_monitor.bags.piece import Channel, Due, Piece
 from leg_wear_monitor.messages.cdr import MESSAGE
 
@@ -30,7 +29,6 @@ class DatabaseFile:
     ----------
     path : pathlib.Path
         Nothing is written to it.
-    budget : Budget
     stack : contextlib.ExitStack
         Closes the file.
 
@@ -42,8 +40,8 @@ class DatabaseFile:
         If the system cannot read it.
     """
 
-    def __init__(self, path: Path, budget: Budget, stack: ExitStack) -> None:
-        self.path, self._budget, self.size = path, budget, path.stat().st_size
+    def __init__(self, path: Path, stack: ExitStack) -> None:
+        self.path, self.size = path, path.stat().st_size
         self.findings: list[Finding] = []
         try:
             self._reader: Any = stack.enter_context(Reader(path))
@@ -84,7 +82,7 @@ class DatabaseFile:
         chosen = [self._connections[number] for number in types]
         expected, read = sum(one.msgcount for one in chosen), 0
         rows: list[tuple[int, int, bytes]] = []
-        room = most = self._budget.part_limit // 4
+        room = most = MOST_BYTES // 4
         try:
             for one, time_ns, raw in self._reader.messages(chosen) if chosen else ():
                 if not isinstance(time_ns, int) or not isinstance(raw, bytes) or len(raw) > most:

@@ -90,6 +90,23 @@ class DamageError(Exception):
     """A part of a file is unusable; the reader records a finding and continues."""
 
 
+MOST_BYTES = 256_000_000
+"""Memory for one part of a file while it is read, whatever size the file declares."""
+
+
+def check_size(needed: int) -> None:
+    """Check that a part of a file fits into memory.
+
+    Raises
+    ------
+    DamageError
+        If it does not; the text is a predicate that follows the name of the part.
+    """
+    if needed > MOST_BYTES:
+        text = f"needs {needed / 1e6:.0f} MB to be read. Expected at most {MOST_BYTES / 1e6:.0f} MB"
+        raise DamageError(text)
+
+
 _POINTER = b"version https://git-lfs.github.com/spec/"
 
 

@@ -22,8 +22,7 @@ from mcap.records import Chunk, Schema, Statistics
 from mcap.stream_reader import get_chunk_data_stream
 from numpy.typing import NDArray
 
-from leg_wear_monitor.bags.budget import Budget
-from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError
+from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError, check_size
 from leg_wear_monitor.bags.piece import Channel, Due, Piece
 from leg_wear_monitor.messages.cdr import MESSAGE
 
@@ -74,7 +73,6 @@ class McapFile:
         Name of the file in findings and errors.
     file : binary file
         Seekable.
-    budget : Budget
 
     Raises
     ------
@@ -82,8 +80,8 @@ class McapFile:
         If the file is not an MCAP file.
     """
 
-    def __init__(self, path: Path, file: IO[bytes], budget: Budget) -> None:
-        self.path, self._file, self._budget = path, file, budget
+    def __init__(self, path: Path, file: IO[bytes]) -> None:
+        self.path, self._file = path, file
         self.size = file.seek(0, 2)
         self.findings: list[Finding] = []
         self._read = 0
@@ -151,7 +149,7 @@ class McapFile:
             (head,) = np.frombuffer(self._file.read(_HEAD.itemsize), _HEAD)
             self._add_message(_Segment(at, end - at, False, int(min(head["log_time_ns"], _LATEST_NS))))
         elif opcode in _DEFINITIONS or opcode == Opcode.STATISTICS:
-            self._budget.check(end - at)
+            check_size(end - at)
             self._define(opcode, self._file.read(end - at - _RECORD.size))
 
     def _define(self, opcode: int, data: bytes) -> None:
@@ -200,7 +198,7 @@ class McapFile:
 
     def _content(self, segment: _Segment) -> bytes:
         """Records of a segment."""
-        self._budget.check(segment.stored)
+        check_size(segment.stored)
         self._file.seek(segment.at)
         if not segment.is_chunk:
             return self._file.read(segment.stored)
@@ -211,7 +209,7 @@ class McapFile:
         """Records of a chunk, whose size and checksum must be right."""
         try:
             size = _declared(chunk)
-            self._budget.check(len(chunk.data) + max(size, chunk.uncompressed_size))
+            check_size(len(chunk.data) + max(size, chunk.uncompressed_size))
             stream, length = get_chunk_data_stream(chunk, validate_crc=True)
             if length != chunk.uncompressed_size:
                 raise DamageError(f"contains {length} bytes, expected {chunk.uncompressed_size}")
@@ -226,7 +224,7 @@ class McapFile:
         begins, ends = begins[is_message], ends[is_message]
         heads = _heads(np.frombuffer(data, np.uint8), begins)
         wanted = codes[heads["channel"]] != 0
-        self._budget.check(segment.stored + len(data) + _BYTES_PER_MESSAGE * int(wanted.sum()))
+        check_size(segment.stored + len(data) + _BYTES_PER_MESSAGE * int(wanted.sum()))
         messages = np.zeros(int(wanted.sum()), MESSAGE)
         messages["begin"], messages["end"] = begins[wanted] + _HEAD.itemsize, ends[wanted]
         for name in ("log_time_ns", "publish_time_ns"):

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from leg_wear_monitor.bags import bag
-from leg_wear_monitor.bags.budget import DEFAULT_MB, Budget
 from leg_wear_monitor.bags.findings import Clocks, Finding, RecordingError, Severity, reading
 from leg_wear_monitor.bags.piece import Piece
 from leg_wear_monitor.bags.table_layout import (
@@ -241,7 +240,7 @@ class Pauses:
 TIMES = ("header", "log", "publish")
 _TOGETHER = 4096  # smallest intended number of samples in a block
 _COMPARED = 100  # wrenches of a piece whose axes are compared
-_OF_A_SAMPLE = 800  # memory of one queued sample, including copies [bytes]
+_MOST_WAITING = 640_000  # samples of overlapping chunks that are held, at 800 bytes with copies
 
 
 class Recording:
@@ -260,8 +259,6 @@ class Recording:
         Topics; by default found by their relative names.
     time : str
         Time that stamps the samples, one of `TIMES`. Float64 messages have no header and use the log time.
-    memory_mb : float
-        Memory limit for reading [10⁶ bytes].
 
     Attributes
     ----------
@@ -283,19 +280,17 @@ class Recording:
         drive_torque: str | None = None,
         foot_load: str | None = None,
         time: str = "header",
-        memory_mb: float = DEFAULT_MB,
     ) -> None:
         if time not in TIMES:
             raise RecordingError("time", "", f"{time!r} is not one of {', '.join(TIMES)}")
         self.time = time
         self._clocks = Clocks()
         self._decoder = Decoder(config)
-        self._budget = Budget(memory_mb)
         bag_files, self._findings = bag.find_files(paths)
         self._axis = WrenchAxis(config.drive_torque.axis)
         self._joints = JointNames(config.crank_joint, wanted_interfaces(config))
         with ExitStack() as stack:
-            self._sources, lost = bag.open_sources(bag_files, config, self._budget, stack)
+            self._sources, lost = bag.open_sources(bag_files, config, stack)
             given = {"joint_states": joint_states, "drive_torque": drive_torque, "foot_load": foot_load}
             given["dynamic_joint_states"] = drive_torque
             self.topics, missing = bag.assign(self._sources, config, given)
@@ -357,7 +352,7 @@ class Recording:
             if passed >= _TOGETHER:
                 yield waiting.part(slice(passed))
                 waiting = waiting.part(slice(passed, None))
-            elif len(waiting.samples) * _OF_A_SAMPLE > self._budget.available:
+            elif len(waiting.samples) > _MOST_WAITING:
                 self._too_many_wait(bag_file.path)
                 yield waiting
                 waiting = waiting.part(slice(0))
@@ -380,9 +375,7 @@ class Recording:
                 yield number, piece
 
     def _too_many_wait(self, path: Path) -> None:
-        text = (
-            "has chunks that overlap in time by more messages than --memory-mb allows: some come out of order"
-        )
+        text = f"has chunks that overlap in time by over {_MOST_WAITING} messages: some come out of order"
         if not any(finding.text == text for finding in self._findings):
             self._findings.append(Finding(path, text))
 
@@ -442,7 +435,7 @@ def understood(path: Path, config: MonitorConfig) -> tuple[list[str], list[Findi
 
     files, findings = bag.find_files([path])
     with ExitStack() as stack:
-        (source,), _ = bag.open_sources(files, config, Budget(), stack)
+        (source,), _ = bag.open_sources(files, config, stack)
         table = source.file
         if not isinstance(table, TableFile):
             raise TypeError(f"{path} is no table")

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from leg_wear_monitor.bags.bag import Recordable, Source, check_channel, find_files, open_sources
-from leg_wear_monitor.bags.budget import Budget
 from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
 from leg_wear_monitor.bags.piece import Channel
 from leg_wear_monitor.estimate.joint_motion import Series, series
@@ -135,7 +134,7 @@ def read_signals(
     """
     bag_files, findings = find_files(paths)
     with ExitStack() as stack:
-        sources, unreadable = open_sources(bag_files, config, Budget(), stack)
+        sources, unreadable = open_sources(bag_files, config, stack)
         selected, skipped = _select(sources, joint_states, drive_torque)
         if not any(stream.kind == CRANK for _, stream in selected):
             raise RecordingError(

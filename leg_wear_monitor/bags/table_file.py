@@ -10,7 +10,6 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.bags.budget import Budget
 from leg_wear_monitor.bags.findings import Finding, RecordingError
 from leg_wear_monitor.bags.piece import Channel, Due, Piece
 from leg_wear_monitor.bags.table_layout import (
@@ -229,7 +228,6 @@ class TableFile:
         `CSV`, `PARQUET`, or empty for columns in memory.
     config : MonitorConfig
         Names the columns and their units.
-    budget : Budget
 
     Raises
     ------
@@ -237,12 +235,10 @@ class TableFile:
         If a column is missing, or no row can be read.
     """
 
-    def __init__(
-        self, path: Path, content: IO[bytes] | Any, storage: str, config: MonitorConfig, budget: Budget
-    ) -> None:
+    def __init__(self, path: Path, content: IO[bytes] | Any, storage: str, config: MonitorConfig) -> None:
         self.path, self._config, self._encoder = path, config, Encoder(config)
         self.findings: list[Finding] = []
-        source = open_table(path, content, storage, budget, config.table.columns.crank_angle)
+        source = open_table(path, content, storage, config.table.columns.crank_angle)
         self.size, self.names = source.size, source.head.names
         self.counts = Counts()
         parts = TableRows(path, source, config, self.findings).parts()

@@ -10,7 +10,6 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.bags.bag import find_files
-from leg_wear_monitor.bags.budget import Budget
 from leg_wear_monitor.bags.findings import open_recording
 from leg_wear_monitor.bags.table_layout import (
     CRANK_ANGLE,
@@ -86,7 +85,7 @@ def propose(path: Path) -> Proposal | None:
     """
     ((file,), _) = find_files([path])
     with open_recording(path) as content:
-        source = open_table(path, content, file.storage, Budget(), Columns().crank_angle)
+        source = open_table(path, content, file.storage, Columns().crank_angle)
         names = source.head.names
         if {Columns().stamp, Columns().crank_angle, Columns().drive_torque} <= set(names):
             return None

@@ -13,8 +13,7 @@ import pyarrow.csv
 import pyarrow.parquet
 from numpy.typing import NDArray
 
-from leg_wear_monitor.bags.budget import Budget
-from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError
+from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError, check_size
 from leg_wear_monitor.bags.table_head import Head, head_of
 from leg_wear_monitor.bags.table_layout import (
     CSV,
@@ -104,9 +103,7 @@ class Lost:
             self.tell(f"{self._count - self.MOST} more {self._word}s are lost")
 
 
-def open_table(
-    path: Path, content: IO[bytes] | Any, storage: str, budget: Budget, wanted: str = ""
-) -> Source:
+def open_table(path: Path, content: IO[bytes] | Any, storage: str, wanted: str = "") -> Source:
     """Open a table.
 
     Parameters
@@ -117,7 +114,6 @@ def open_table(
         A file is seekable.
     storage : str
         `CSV`, `PARQUET`, or empty for columns in memory.
-    budget : Budget
     wanted : str
         Name of a column, by which a line with the names of columns is recognised.
 
@@ -127,8 +123,8 @@ def open_table(
         If it is no such table.
     """
     if storage == CSV:
-        return _Csv(path, content, budget, wanted)
-    return _Parquet(path, content, budget) if storage == PARQUET else _Frame(path, content)
+        return _Csv(path, content, wanted)
+    return _Parquet(path, content) if storage == PARQUET else _Frame(path, content)
 
 
 # Rows in SI units, from texts, numbers or dates.
@@ -336,7 +332,6 @@ def _fault(column: Column, text: str) -> str:
 
 
 _BLOCK = 2**21
-_OF_A_BYTE = 32  # memory of cells, rows and samples per byte of text
 _UTF16_MARKS = b"\xff\xfe", b"\xfe\xff"
 
 
@@ -379,12 +374,11 @@ def _decoded(data: bytes) -> str:
 class _Csv:
     word = "line"
 
-    def __init__(self, path: Path, file: IO[bytes], budget: Budget, wanted: str) -> None:
+    def __init__(self, path: Path, file: IO[bytes], wanted: str) -> None:
         self._file, self.size = file, file.seek(0, 2)
-        self._block = min(_BLOCK, budget.part_limit // _OF_A_BYTE)
-        self._end = _end_of_lines(file, self.size, self._block)
+        self._end = _end_of_lines(file, self.size, _BLOCK)
         file.seek(0)
-        start = file.read(self._block)
+        start = file.read(_BLOCK)
         if not self.size:
             raise RecordingError(str(path), "", "is empty, expected a line with the names of the columns")
         if start.startswith(_UTF16_MARKS) or b"\0" in start:
@@ -430,7 +424,7 @@ class _Csv:
 
     def _reader(self, names: list[str], wanted: list[str], skip: Any) -> Any:
         read = pyarrow.csv.ReadOptions(
-            use_threads=False, block_size=self._block, skip_rows=self.head.lines, column_names=names
+            use_threads=False, block_size=_BLOCK, skip_rows=self.head.lines, column_names=names
         )
         parse = pyarrow.csv.ParseOptions(
             delimiter=self.head.separator, ignore_empty_lines=False, invalid_row_handler=skip
@@ -447,8 +441,8 @@ class _Csv:
 class _Parquet:
     word = "row"
 
-    def __init__(self, path: Path, file: IO[bytes], budget: Budget) -> None:
-        self._budget, self.size = budget, file.seek(0, 2)
+    def __init__(self, path: Path, file: IO[bytes]) -> None:
+        self.size = file.seek(0, 2)
         try:
             self._file = pyarrow.parquet.ParquetFile(file, page_checksum_verification=True)
             self.head = Head(list(self._file.schema_arrow.names))
@@ -464,7 +458,7 @@ class _Parquet:
             end = first + head.row_group(group).num_rows
             at = first
             try:
-                self._budget.check(2 * _expanded_size(head.row_group(group), set(names)))
+                check_size(2 * _expanded_size(head.row_group(group), set(names)))
                 for batch in self._file.iter_batches(_ROWS, row_groups=[group], columns=names):
                     row = at + 1 + np.arange(batch.num_rows)
                     stored = self.size * batch.num_rows // max(1, head.num_rows)

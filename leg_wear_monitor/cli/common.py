@@ -127,13 +127,6 @@ wait_option: Option = option(
     type=POSITIVE,
     default=10.0,
 )
-memory_option: Option = option(
-    "--memory-mb",
-    "MB",
-    "Memory limit of reading.",
-    type=Number(min=16.0),
-    default=512.0,
-)
 workers_option: Option = option(
     "--workers", "N", "Number of local processes.  [default: cores]", type=click.IntRange(min=1)
 )

@@ -148,19 +148,19 @@ def is_known(path: Path, line: ReadRecording | None, leg: FleetLeg, counted_ns: 
     return line.outcome == Outcome.ALREADY_COUNTED.value or line.settings == leg.settings
 
 
-def in_order(paths: Iterable[Path], leg: FleetLeg, memory_mb: float) -> list[Path]:
+def in_order(paths: Iterable[Path], leg: FleetLeg) -> list[Path]:
     """Recordings by their first stamp; one that cannot be read comes first, and its replay says why."""
     found = list(paths)
     if len(found) < 2:
         return found
-    return sorted(found, key=lambda path: (_first_stamp_ns(path, leg, memory_mb), str(path)))
+    return sorted(found, key=lambda path: (_first_stamp_ns(path, leg), str(path)))
 
 
-def _first_stamp_ns(path: Path, leg: FleetLeg, memory_mb: float) -> int:
+def _first_stamp_ns(path: Path, leg: FleetLeg) -> int:
     """First valid stamp; 0 if there is none."""
     topics: dict[str, Any] = {"joint_states": leg.joint_states, "drive_torque": leg.drive_torque}
     try:
-        with Recording([path], leg.config, memory_mb=memory_mb, **topics) as recording:
+        with Recording([path], leg.config, **topics) as recording:
             for block in recording.blocks():
                 stamps = block.samples["stamp_ns"][block.samples["fault"] == 0]
                 if len(stamps):

@@ -14,7 +14,6 @@ from pathlib import Path
 import attrs
 import numpy as np
 
-from leg_wear_monitor.bags.budget import DEFAULT_MB
 from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.errors import ConfigError, LegWearError, printable, system_asked
 from leg_wear_monitor.files import remove_parts, with_same_fields, write_whole
@@ -100,7 +99,6 @@ def update_fleet(
     *,
     workers: int = 1,
     scheduler: str | None = None,
-    memory_mb: float = DEFAULT_MB,
     progress: Callable[[float], None] | None = None,
 ) -> FleetUpdate:
     """Count the recordings of a fleet that are not counted yet, those of a leg in the order of time.
@@ -114,13 +112,11 @@ def update_fleet(
         Number of local processes; 1 uses this process only. Results do not depend on it.
     scheduler : str, optional
         Address of a Dask scheduler whose workers count instead; they need the same files at the same paths.
-    memory_mb : float
-        Memory limit of reading in each process, as in `leg_wear_monitor.replay` [10⁶ bytes].
     progress : callable, optional
         Called with the completed fraction of the legs, 0 to 1.
     """
     found: dict[str, LegUpdate] = {}
-    calls = {leg.id: partial(update_leg, leg, out.absolute(), memory_mb) for leg in fleet.legs}
+    calls = {leg.id: partial(update_leg, leg, out.absolute()) for leg in fleet.legs}
     for name, result in results(calls, workers, scheduler):
         found[name] = result
         if progress:
@@ -131,7 +127,7 @@ def update_fleet(
     return FleetUpdate(legs=legs, overview=overview)
 
 
-def update_leg(leg: FleetLeg, out: Path, memory_mb: float) -> LegUpdate:
+def update_leg(leg: FleetLeg, out: Path) -> LegUpdate:
     """Count the new recordings of one leg; a fault of the leg is a finding."""
     directory = leg_directory(out, leg.id)
     new: list[ReadRecording] = []
@@ -139,8 +135,8 @@ def update_leg(leg: FleetLeg, out: Path, memory_mb: float) -> LegUpdate:
     try:
         with _locked(directory):
             remove_parts(directory, "*")
-            for path in in_order(_new_recordings(leg, directory), leg, memory_mb):
-                new.append(_count(leg, directory, path, memory_mb))
+            for path in in_order(_new_recordings(leg, directory), leg):
+                new.append(_count(leg, directory, path))
             state = leg_state(leg, directory)
     except LegWearError as error:
         fault = printable(str(error))
@@ -191,7 +187,7 @@ def _new_recordings(leg: FleetLeg, directory: Path) -> list[Path]:
     ]
 
 
-def _count(leg: FleetLeg, directory: Path, path: Path, memory_mb: float) -> ReadRecording:
+def _count(leg: FleetLeg, directory: Path, path: Path) -> ReadRecording:
     """Replay a recording into the ledger of its leg."""
     size, changed_ns = state_of(path)
     about = ReadRecording(
@@ -221,7 +217,6 @@ def _count(leg: FleetLeg, directory: Path, path: Path, memory_mb: float) -> Read
             node=leg.node,
             joint_states=leg.joint_states,
             drive_torque=leg.drive_torque,
-            memory_mb=memory_mb,
             finish=finish,
         )
     except RecordingError as error:

@@ -8,7 +8,6 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.bags.bag import Recordable, listed_recordings
-from leg_wear_monitor.bags.budget import DEFAULT_MB
 from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
 from leg_wear_monitor.bags.reader import Block, Recording
 from leg_wear_monitor.errors import printable, system_asked
@@ -39,7 +38,6 @@ def replay(
     drive_torque: str | None = None,
     foot_load: str | None = None,
     node: str | None = None,
-    memory_mb: float = DEFAULT_MB,
     ready: Callable[[WearMonitor], None] | None = None,
     progress: Callable[[float], None] | None = None,
     finish: Callable[[ReplayResult], None] | None = None,
@@ -71,8 +69,6 @@ def replay(
     node : str, optional
         Full name of the node whose parameters, names and messages are used; by default the node in the
         namespace of the crank topic, such as ``/left/leg_wear_monitor`` for ``/left/joint_states``.
-    memory_mb : float
-        Memory limit for reading the recording [10⁶ bytes].
     ready : callable, optional
         Called with the monitor before the first sample.
     progress : callable, optional
@@ -119,7 +115,7 @@ def replay(
     named = listed_recordings(paths)
     asked = {"joint_states": joint_states, "drive_torque": drive_torque, "foot_load": foot_load}
     with (
-        Recording(named, config, time=time, memory_mb=memory_mb, **asked) as recording,
+        Recording(named, config, time=time, **asked) as recording,
         ExitStack() as stack,
     ):
         node = node or node_beside(printable(recording.topics["joint_states"]))

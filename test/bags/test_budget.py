@@ -7,11 +7,9 @@ import lz4.frame
 import pytest
 import zstandard
 
-from leg_wear_monitor.bags.budget import Budget
-from leg_wear_monitor.bags.findings import DamageError, RecordingError
-from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.bags import findings
+from leg_wear_monitor.bags.findings import RecordingError
 
-LITTLE_MB = 16.0
 BOMB_BYTES = 100_000_000
 
 
@@ -33,20 +31,21 @@ def with_a_chunk(whole, data, compression, size, is_cut=False):
 @pytest.mark.parametrize("claimed", [BOMB_BYTES, 1000])
 @pytest.mark.parametrize("compression", ["zstd", "lz4"])
 def test_a_chunk_that_grows_is_left_out_and_reported(
-    tmp_path, sent, write_bag, expected, read, compression, claimed, is_cut
+    tmp_path, monkeypatch, sent, write_bag, expected, read, compression, claimed, is_cut
 ):
+    monkeypatch.setattr(findings, "MOST_BYTES", 8_000_000)
     index_types = pytest.importorskip("mcap.writer").IndexType
     whole = write_bag(tmp_path / "whole.mcap", sent, index_types=index_types.NONE).read_bytes()
     compress = zstandard.compress if compression == "zstd" else lz4.frame.compress
     path = tmp_path / "bomb.mcap"
     bomb = compress(bytes(BOMB_BYTES))
     path.write_bytes(with_a_chunk(whole, bomb, compression.encode(), claimed, is_cut))
-    samples, recording = read(path, memory_mb=LITTLE_MB)
+    samples, recording = read(path)
     assert samples.tobytes() == expected(sent).tobytes()
     assert recording.is_partial
     if claimed == BOMB_BYTES and not is_cut:
         texts = [str(finding) for finding in recording.findings]
-        assert any("more than the 8 MB that --memory-mb 16 leaves for it" in text for text in texts)
+        assert any("needs 100 MB to be read. Expected at most 8 MB" in text for text in texts)
 
 
 def test_a_hole_that_claims_gigabytes_is_passed_over(tmp_path, sent, write_bag, expected, read):
@@ -75,16 +74,3 @@ def test_a_name_that_cannot_be_is_refused_in_a_line(tmp_path, read, name):
     with pytest.raises(RecordingError, match=r"cannot be read: |does not exist") as caught:
         read(tmp_path / name)
     assert str(caught.value).isprintable()
-
-
-def test_half_of_the_memory_is_for_one_part():
-    budget = Budget(100.0)
-    budget.check(50_000_000)
-    with pytest.raises(DamageError, match="needs 51 MB to be read, more than the 50 MB"):
-        budget.check(51_000_000)
-
-
-@pytest.mark.parametrize("megabytes", [0.0, -1.0, 15.9, float("nan")])
-def test_a_budget_in_which_nothing_can_be_read_is_refused(megabytes):
-    with pytest.raises(ConfigError, match=r"--memory-mb: .* is too little, expected at least 16 MB"):
-        Budget(megabytes)

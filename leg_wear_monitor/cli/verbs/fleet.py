@@ -33,14 +33,12 @@ def fleet() -> None:
 @common.out_option(_OUT)
 @common.workers_option
 @common.scheduler_option
-@common.memory_option
 @_fresh_option
 def update(
     description: Path,
     out: Path | None,
     workers: int | None,
     scheduler: str | None,
-    memory_mb: float,
     fresh_days: float,
 ) -> int:
     """Replay the new recordings of each leg into the ledger of this leg, in the order of time.
@@ -63,7 +61,6 @@ def update(
             out,
             workers=workers or os.cpu_count() or 1,
             scheduler=scheduler,
-            memory_mb=memory_mb,
             progress=progress,
         )
     _write_pages(out, done.overview, fresh_days)

@@ -48,7 +48,6 @@ TIMES = ("header", "log", "publish")
     "Full name of the node to replace.  [default: leg_wear_monitor in the namespace of the crank's topic]",
 )
 @common.option("--crank-joint", "NAME", "The crank's name.  [default: crank_joint of the parameters]")
-@common.memory_option
 @common.file_option(
     "--ledger", "FILE", "Ledger to continue or to begin; the one in the parameters is never touched."
 )

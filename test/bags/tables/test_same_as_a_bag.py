@@ -174,7 +174,7 @@ def test_a_file_larger_than_a_block_is_read_whole(tmp_path, read):
     columns = {"time": stamps, "crank_angle": np.random.default_rng(0).normal(size=len(stamps))}
     config = config_from({"table.units.stamp": "ms", "table.columns.drive_torque": ""})
     path = write_csv(tmp_path / "a.csv", columns)
-    samples, _ = read(path, config=config, memory_mb=16.0)
+    samples, _ = read(path, config=config)
     assert np.array_equal(samples["crank_angle_rad"], columns["crank_angle"])
     assert np.array_equal(samples["stamp_ns"], stamps * 10**6)
 

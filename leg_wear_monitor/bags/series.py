@@ -15,14 +15,15 @@ from numpy.typing import NDArray
 from leg_wear_monitor.bags.bag import Recordable, Source, check_channel, find_files, open_sources
 from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
 from leg_wear_monitor.bags.piece import Channel
+from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.estimate.joint_motion import Series, series
 from leg_wear_monitor.messages import outputs
 from leg_wear_monitor.messages.cdr import Decoder
-from leg_wear_monitor.messages.names import interfaces_in, names_in
+from leg_wear_monitor.messages.names import interfaces_in, names_in, twice
 from leg_wear_monitor.messages.streams import INTERFACES, JOINT_STATE, STREAMS, WRENCH_STAMPED, Stream
 from leg_wear_monitor.monitor.config.inputs import EFFORT, FLOAT64, INTERFACE, WRENCH, DriveTorque
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.twin import CRANK, TORQUE
+from leg_wear_monitor.twin import CRANK, KINDS, TORQUE
 from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, ZERO_STAMP, Samples
 
 # Identity of a series: each joint is a candidate for the crank, each torque for the drive torque.
@@ -90,6 +91,7 @@ _PUBLISHED = tuple(each.name.lstrip("~") for each in (outputs.CLEARANCES, output
 _NO_CANDIDATES = ("position", "velocity", "acceleration", "effort")
 _MOST_JOINTS = 200  # joints per topic: each joint is decoded separately, so this bounds the work
 _NAMING_MESSAGES = 20  # first messages of a piece, whose joint names are read
+_LONGEST_PAUSE_NS = 10 * 10**9
 _NO_JOINT = "(no joint)"  # name of a crank joint that no message has
 
 
@@ -225,7 +227,8 @@ def _add_piece(
         for name, samples, field in _decoded_series(topic, stream.code, data, chosen):
             # a message without a stamp is usable at its log time
             is_unstamped = samples["fault"] == ZERO_STAMP
-            is_usable = is_unstamped | (samples["fault"] == NO_FAULT)
+            largest = KINDS[CRANK if isinstance(name, JointName) else TORQUE].largest
+            is_usable = (is_unstamped | (samples["fault"] == NO_FAULT)) & (np.abs(samples[field]) <= largest)
             stamps = np.where(is_unstamped, chosen["log_time_ns"], samples["stamp_ns"])[is_usable]
             parts = collected.setdefault(name, [])
             parts.append((stamps, samples[field][is_usable], np.full(len(stamps), recording)))
@@ -269,7 +272,11 @@ def _joint_names(data: NDArray[np.uint8], messages: NDArray[np.void]) -> list[st
     """Names of the joints in the first messages, at most `_MOST_JOINTS`."""
     names: dict[str, None] = {}  # a set that keeps the order
     for raw in _first_decodable(EFFORT, data, messages):
-        names |= dict.fromkeys(names_in(raw)[:_MOST_JOINTS])
+        known = names_in(raw)[:_MOST_JOINTS]
+        again = next(filter(None, (twice(known, name) for name in known if name)), "")
+        if again:
+            raise LegWearError(again)
+        names |= dict.fromkeys(known)
     return [name for name in names if name][:_MOST_JOINTS]
 
 
@@ -294,13 +301,22 @@ def _first_decodable(source: str, data: NDArray[np.uint8], messages: NDArray[np.
 
 
 def _signals(collected: dict[JointName | TorqueSource, _Parts]) -> Signals:
-    """Join the parts of each series that is not empty; time 0 is the first stamp of all series."""
+    """Join the parts of each series that is not empty; time 0 is the first stamp of all series.
+
+    Longer pauses are shortened, and so is a clock that is set while recording: memory is for walking time.
+    """
     full: dict[JointName | TorqueSource, Any] = {}
     for name, parts in collected.items():
         if any(len(stamps) for stamps, _, _ in parts):
             full[name] = [np.concatenate(column) for column in zip(*parts, strict=True)]
-    first_ns = min((int(stamps.min()) for stamps, _, _ in full.values()), default=0)
-    found = {name: series(ns, values, recording, first_ns) for name, (ns, values, recording) in full.items()}
+    if not full:
+        return Signals({}, {})
+    all_ns = np.unique(np.concatenate([stamps for stamps, _, _ in full.values()]))
+    walked_ns = np.append(0, np.cumsum(np.minimum(np.diff(all_ns), _LONGEST_PAUSE_NS)))
+    found = {
+        name: series(walked_ns[np.searchsorted(all_ns, stamps)], values, recording, 0)
+        for name, (stamps, values, recording) in full.items()
+    }
     joints = {name: one for name, one in found.items() if isinstance(name, JointName)}
     torques = {name: one for name, one in found.items() if isinstance(name, TorqueSource)}
     return Signals(joints, torques)

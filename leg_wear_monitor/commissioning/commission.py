@@ -62,6 +62,8 @@ _ROUGH_REST = 0.15  # a repeating rest that may shift the scale by more than twi
 _DECLARED_ERROR = 0.3  # by which a drive differs from another one of its kind, and when it is warm
 _AT_ZERO_RAD = 0.02
 _AS_WELL = 1.02  # a fit is as good as the best one up to this ratio of mismatches
+_LARGEST_LIMIT = 0.3  # of the mismatch of a healthy leg
+_LEAST_SWING, _LEAST_TORQUE = 1.0e-6, 1.0e-9  # of a torque that changes: of its size, and in its unit
 
 
 def not_told(found: proposal.Found) -> tuple[str, ...]:
@@ -175,6 +177,8 @@ def _position(found: proposal.Found) -> str:
     measured = found.fit.gear_ratio
     if abs(measured / _IN_DEGREES - 1.0) < 2.0 * proposal.gear_error(found.fit):
         return "the joint's position looks like degrees; ROS expects radians: gear ratio 57.2958"
+    if abs(measured * TURN - 1.0) < 2.0 * proposal.gear_error(found.fit):
+        return "the joint's position looks like turns; ROS expects radians: gear ratio 0.159155"
     if found.motion.is_wrapped and proposal.gear(found)[0] != 1.0:
         return (
             f"the joint's position is wrapped to a turn, but its gear ratio is {measured:.6g}: the monitor "
@@ -285,6 +289,8 @@ def commission(
         walk = walk_of(recordings[-1:], result.config, *topics)
     except RecordingError as error:
         return attrs.evolve(result, notes=(*result.notes, f"{LIMIT} stays as it is: {error}"))
+    if walk.faults:
+        return attrs.evolve(result, not_told=(*result.not_told, *walk.faults), config=None)
     progress(0.8)
     fast = _fastest(found, walk, recordings, topics)
     legs = [expected_leg(one) for one in ((walk,) if fast is walk else (walk, fast)) if len(one.cycles)]
@@ -312,10 +318,13 @@ def _fastest(
 
 
 def _with_limit(result: CommissioningResult, walk: Walk) -> CommissioningResult:
-    """The proposal with a limit of the mismatch for this leg."""
+    """The proposal with a limit of the mismatch for this leg; none if that limit would hide a fault."""
     item = mismatch_item(walk)
     if item is None or result.config is None:
         return result
+    if float(item.value) > max(_LARGEST_LIMIT, walk.config.limits.torque_mismatch):
+        why = f"{LIMIT}: the torque differs from the model by {item.remark}, so a limit would hide a fault"
+        return attrs.evolve(result, not_told=(*result.not_told, why), config=None)
     config = config_from({**values_of(result.config), LIMIT: item.value}, "commission")
     return attrs.evolve(result, items=(*result.items, item), config=config)
 
@@ -440,7 +449,11 @@ def _torques(torques: dict[TorqueSource, Series]) -> dict[TorqueSource, Series]:
             "no torque was recorded, or only NaN: expected geometry_msgs/msg/WrenchStamped, "
             "std_msgs/msg/Float64, or the effort of the crank in its sensor_msgs/msg/JointState"
         )
-    varying = {name: each for name, each in torques.items() if float(each.value.std()) > 0.0}
+    varying = {
+        name: each
+        for name, each in torques.items()
+        if np.ptp(each.value) > max(_LEAST_TORQUE, _LEAST_SWING * np.abs(each.value).max())
+    }
     if not varying:
         constant = ", ".join(name.label for name in torques)
         raise LegWearError(f"no torque changes while the leg walks: {constant}")

@@ -51,6 +51,7 @@ from leg_wear_monitor.monitor.diagnosis.state import (
     SignedCycle,
     TorqueState,
 )
+from leg_wear_monitor.monitor.input_health import INPUT_RULES
 from leg_wear_monitor.monitor.reports import CycleReport
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.twin.load import torque_size
@@ -87,6 +88,8 @@ class Walk:
         Those at the commanded cadence whose torque has a signature.
     sensor : TorqueSensor or None
         How the torque was measured, without its noise; None without torques.
+    faults : tuple of str
+        Faults of the input that the monitor reports, with their remedies.
     """
 
     mechanism: Mechanism
@@ -94,6 +97,7 @@ class Walk:
     mismatch: Floats
     cycles: tuple[SignedCycle, ...]
     sensor: TorqueSensor | None
+    faults: tuple[str, ...] = ()
 
     @property
     def profile(self) -> CrankProfile:
@@ -142,16 +146,21 @@ def walk_of(
     cycles: list[SignedCycle] = []
     size_nm = torque_size(build_linkage(mechanism), config.cadence.commanded_rpm / 60.0 * TURN)
     state = TorqueState(np.zeros(len(mechanism.clearance_joints)))
+    codes, faults = {rule.code for rule in INPUT_RULES}, dict[str, str]()
     with Recording(recordings, config, joint_states=joint_states, drive_torque=drive_torque) as recording:
         for block in recording.blocks():
             state.samples = state.samples.extended(block.samples)
-            for one in monitor.update(block.samples).cycles:
+            reports = monitor.update(block.samples)
+            reported = (each.verdict for each in reports.verdicts)
+            faults |= {one.fault_code: f"{one.why}: {one.do}" for one in reported if one.fault_code in codes}
+            for one in reports.cycles:
                 mismatch.append(one.torque_mismatch)
                 before, is_short = state.sensor, len(cycles) < LEAST_CYCLES
                 found = _signed(state, one, config, size_nm, is_short)
                 cycles = [*(cycles if state.sensor is before else ()), *found]
                 state.samples = state.samples.after(one.stamp_ns)
-    return Walk(mechanism, config, np.array(mismatch), tuple(cycles[_SETTLING:]), state.sensor)
+    signed = tuple(cycles[_SETTLING:])
+    return Walk(mechanism, config, np.array(mismatch), signed, state.sensor, tuple(faults.values()))
 
 
 def _signed(

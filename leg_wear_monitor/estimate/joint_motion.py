@@ -59,6 +59,7 @@ def series(stamp_ns: NDArray[np.int64], value: Floats, recording: NDArray[np.int
 _WINDOW_S = 0.12  # local fit: a twelfth of a turn at 40 rpm, which keeps a ripple of two periods per turn
 _LEAST_WINDOW = 7  # samples: three more than a cubic has coefficients
 _GAP_SAMPLES = 4.0  # a longer gap between samples, in sampling intervals, is not bridged
+_LEAST_TURNS = 3.0  # of an angle in a wrong unit
 _LEAST_TRAVEL_RAD = 1.0  # a joint that moves by less in all does not turn
 # Least range of the positions as a fraction of the path: 1 for a crank that turns one way, 1/2 for one that
 # walks forwards and then as far back, 1/(2 n) for a joint that swings to and fro in each of n gait cycles.
@@ -104,6 +105,10 @@ def why_not_a_crank(joint: Series) -> str:
     if len(joint.value) < 4 * _LEAST_WINDOW:
         return f"has only {len(joint.value)} samples"
     position = _unwrapped(joint)
+    for turn, unit in ((1.0, "turns"), (360.0, "degrees")):
+        travel = np.ptp(np.unwrap(joint.value, period=turn))
+        if np.ptp(joint.value) < 1.1 * turn and travel > _LEAST_TURNS * turn:  # with some noise
+            return f"seems to be in {unit}, wrapped to a turn: publish radians"
     reach = float(np.ptp(position))
     if reach < _LEAST_TRAVEL_RAD:
         return f"moves by {reach:.2g} rad in all"

@@ -12,6 +12,7 @@ import pytest
 
 from leg_wear_monitor import LegWearError, Mechanism, MonitorConfig, simulate
 from leg_wear_monitor.bags.series import JointName, Signals, TorqueSource
+from leg_wear_monitor.commissioning import commission as commissioning
 from leg_wear_monitor.commissioning import detection
 from leg_wear_monitor.commissioning.commission import commission, propose
 from leg_wear_monitor.commissioning.result import CommissioningResult
@@ -299,10 +300,24 @@ def test_a_torque_that_looks_the_same_mirrored_and_noise_are_not_enough_to_tell(
             r"no joint turns continuously like a crank: crank moves by 0\.0",
         ),
         (lambda walk: {"angle_rad": np.sin(walk.angle_rad)}, 0.1, None, "crank swings to and fro"),
+        (lambda walk: {"angle_rad": walk.angle_rad / TURN % 1.0}, 0.0, None, "seems to be in turns"),
+        (lambda walk: {"angle_rad": np.degrees(walk.angle_rad) % 360.0}, 0.0, None, "seems to be in degrees"),
         (lambda walk: {"torque_nm": 0.0 * walk.torque_nm}, 0.0, None, "no torque changes"),
+        (lambda walk: {"torque_nm": 0.0 * walk.torque_nm + 3.7}, 0.0, None, "no torque changes"),
+        (lambda walk: {"torque_nm": 1.0e-308 * walk.torque_nm}, 0.0, None, "no torque changes"),
         (lambda walk: {}, 0.1, "hip", "'hip' is not a joint of the recording, it has crank"),
     ],
-    ids=["it is short", "the leg stands", "a joint swings", "the torque is constant", "an unknown joint"],
+    ids=[
+        "it is short",
+        "the leg stands",
+        "a joint swings",
+        "turns",
+        "degrees",
+        "the torque is zero",
+        "the torque is constant",
+        "the torque is tiny",
+        "an unknown joint",
+    ],
 )
 def test_what_is_no_walk_is_refused(
     changes: Callable[[Walk], dict[str, Any]],
@@ -315,6 +330,31 @@ def test_what_is_no_walk_is_refused(
     other = attrs.evolve(walked, **changes(walked))
     with pytest.raises(LegWearError, match=fault):
         proposed(signals_of(Robot(torque_noise_nm=noise_nm), other), crank_joint)
+
+
+def walking_table(pause_s: float = 0.0, scatter_ns: float = 0.0) -> dict[str, np.ndarray]:
+    """A walk of 16 gait cycles at 60 rpm, with a pause after the first half, and late by random times."""
+    ideal = simulate("bionic_leg", clearances=[], cycles=1, trace=200).trace
+    angle, random = np.tile(ideal.crank_angle_rad, 16), np.random.default_rng(1)
+    stamp_ns = 10**18 + 5_000_000 * np.arange(len(angle))
+    stamp_ns += np.where(np.arange(len(angle)) < len(angle) // 2, 0, round(1.0e9 * pause_s))
+    stamp_ns = np.maximum.accumulate(stamp_ns + random.exponential(scatter_ns, len(angle)).astype(np.int64))
+    torque = np.tile(ideal.drive_torque_nm, 16) + 0.1 * random.standard_normal(len(angle))
+    return {"time": stamp_ns, "crank_angle": angle, "drive_torque": torque}
+
+
+def test_a_pause_of_a_week_needs_no_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(commissioning, "expected_leg", lambda _: None)  # simulates what is not asked
+    monkeypatch.setattr(detection, "joint_detections", lambda *_: ())
+    result = commission(walking_table(pause_s=7.0 * 86400.0), config_from(NS))
+    assert result.config is not None and result.config.crank.gear_ratio == 1.0
+    assert result.item("cadence.commanded_rpm").value == pytest.approx(60.0, abs=0.5)
+
+
+def test_what_a_replay_would_report_of_the_input_is_refused() -> None:
+    result = commission(walking_table(scatter_ns=2.0e6), config_from(NS))
+    assert result.config is None
+    assert any("they are stamps of the arrival" in text for text in result.not_told)
 
 
 def test_a_missing_torque_is_refused(walked: Walk, proposed: Propose) -> None:

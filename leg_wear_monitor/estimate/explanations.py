@@ -329,7 +329,8 @@ class Explainer:
         for one in factors:
             found += _changed_by(self._best(seen, one, _FACTORS[one.cause]), nothing.square)
         best = min(found, key=lambda one: one.misfit)
-        if best.cause is Cause.CLEARANCE:
+        # without a baseline, a second opening would mostly explain the errors of the model
+        if best.cause is Cause.CLEARANCE and self.baseline.offset.any():
             found.append(self._with_second(seen, best, modelled_m))
         return sorted(found, key=lambda one: one.misfit)
 

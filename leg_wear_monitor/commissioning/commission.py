@@ -169,7 +169,7 @@ def _anew(found: proposal.Found) -> str:
     return (
         f"the encoder starts at a different zero in each recording: the torque's phase gives the offsets "
         f"{each} "
-        "rad; the proposed offset is that of the last recording and is valid until the next boot"
+        "rad; the proposed offset is from the last recording and is valid until the next boot"
     )
 
 

@@ -457,8 +457,8 @@ def sampling_of(one: Fit, model: TorqueModel) -> Sampling:
     near = min(_TYPICAL, key=lambda name: abs(math.log(max(added, _LEAST) / _TYPICAL[name])))
     odds = min(_odds(near, added - _SURE_SAMPLING * error), _odds(near, added + _SURE_SAMPLING * error))
     sentence = (
-        f"the errors of neighbouring samples add up to {added:.2g} ± {error:.1g} times those of independent "
-        f"samples (averages: about {_TYPICAL[AVERAGE]:g}, instants: about {_TYPICAL[INSTANT]:g})"
+        f"the errors of neighbouring samples add up to {added:.2g} ± {error:.1g} times as much as for "
+        f"independent samples (averages: about {_TYPICAL[AVERAGE]:g}, instants: about {_TYPICAL[INSTANT]:g})"
     )
     if added > _STRANGE or (near == INSTANT and narrow < _FLAT * added):
         return Sampling("", f"{sentence}: does a load change slowly?")

@@ -227,7 +227,7 @@ def _list_or_mapping(value: Any) -> tuple[Any, Any]:
     if isinstance(value, list) and any(value.count(name) > 1 for name in value):
         raise FieldError("", f"{shown(value)} names a joint twice")
     if not isinstance(value, list | dict):
-        raise FieldError("", f"{shown(value)} is not a list of names, nor a mapping of names to settings")
+        raise FieldError("", f"{shown(value)} is neither a list of names nor a mapping of names to settings")
     return (tuple[str, ...] if isinstance(value, list) else dict[str, Any]), value
 
 

@@ -29,7 +29,7 @@ class Friction:
     coefficient: float = quantity("", "friction coefficient", within=(0.0, 2.0), default=0.0)
     ramp: tuple[float, float] = quantity(
         "m/s",
-        "slip speeds where friction begins and is full",
+        "slip speeds at which friction begins and is complete",
         at_least=0.0,
         default=(0.001, 0.01),
         check=_rises,

@@ -154,7 +154,7 @@ class EncoderWatch(Observer):
             return ["no whole gait cycle yet"]
         each = list(zip(self._leg.clearance_joints, self.estimates, strict=True))
         words = [
-            f"joint {joint} is {'wider' if one.departure_m > 0.0 else 'narrower'} than counted"
+            f"joint {joint} is {'wider' if one.departure_m > 0.0 else 'narrower'} than modelled"
             for joint, one in each
             if one.is_other
         ]

@@ -212,7 +212,7 @@ def _caller(kind: Any, service: str, wait_s: float) -> Iterator[Callable[[Any], 
             client = node.create_client(kind, service)
             if not client.wait_for_service(timeout_sec=wait_s):
                 raise LegWearError(
-                    f"{service}: nobody offers this service within {wait_s:g} s; is the monitor running, "
+                    f"{service}: no node offers this service within {wait_s:g} s; is the monitor running, "
                     "with this name and this ROS_DOMAIN_ID?"
                 )
             yield partial(_answer, node, client, service, wait_s)

@@ -174,7 +174,8 @@ def asked_once(joint: str, wear: JointWear) -> str:
 def undone(joint: str, wear: JointWear) -> str:
     """Reply to an undone reset: the joint's wear, including the wear since the reset."""
     return (
-        f"joint {joint}: the reset is undone, {wear_words(wear)} are counted, including those since the reset"
+        f"joint {joint}: the reset is undone, the wear is again {wear_words(wear)}, including the wear since "
+        f"the reset"
     )
 
 

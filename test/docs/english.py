@@ -24,6 +24,7 @@ PATTERNS = {
     "is no": r"\b(?:is|are) no\b",
     "counted, believed, misfit": r"\b(?:counted|believed|misfit)\b",
 }
+WORD = re.compile(r"\S*\w\S*")  # the bars and rules of a table are none
 RIDDLE = re.compile(r"(?:of|what|by|that|whether|where)\b", re.IGNORECASE)
 LONG_SENTENCE = 25  # words
 PER = 10_000
@@ -69,7 +70,7 @@ def counts(texts: list[str]) -> tuple[int, dict[str, int]]:
     found = {name: len(re.findall(pattern, text, re.IGNORECASE)) for name, pattern in PATTERNS.items()}
     found["sentences over 25 words"] = sum(len(each.split()) > LONG_SENTENCE for each in sentences(text))
     found["comments that open with a riddle"] = sum(bool(RIDDLE.match(each.strip())) for each in texts)
-    return len(text.split()), found
+    return len(WORD.findall(text)), found
 
 
 def main(root: Path) -> None:
@@ -90,7 +91,7 @@ def main(root: Path) -> None:
     sections: dict[str, int] = {}
     for page in pages:
         place = page.parent.relative_to(root).as_posix()
-        sections[place] = sections.get(place, 0) + len(page.read_text(encoding="utf-8").split())
+        sections[place] = sections.get(place, 0) + len(WORD.findall(page.read_text(encoding="utf-8")))
     for place, words in [*sorted(sections.items()), ("all", sum(sections.values()))]:
         print(f"{place:{LABEL}}{words:{NUMBER}d}")
 

@@ -377,7 +377,7 @@ def cache(fill: bool, clear: bool) -> None:
             shutil.rmtree(directory, ignore_errors=True)
         left = [each for each in kept if each.exists()]
         if left:
-            raise LegWearError(f"{left[0]} could not be removed, nor {len(left) - 1} more")
+            raise LegWearError(f"{left[0]} and {len(left) - 1} more could not be removed")
         click.echo(f"removed: {_in_mb(size)} in {len(kept)} directories")
         return
     click.echo(f"total: {_in_mb(sum(map(_size, kept)))} in {len(kept)} directories")

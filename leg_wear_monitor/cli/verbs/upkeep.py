@@ -225,7 +225,7 @@ def reset(
         joint = monitor.mechanism.clearance_joint(joint)
         if undo:
             words = wear_words(monitor.undo_reset(joint, now_ns, who))
-            lines = [f"the reset is undone, {words} are counted, including those since the reset"]
+            lines = [f"the reset is undone, the wear is again {words}, including the wear since the reset"]
         else:
             words = wear_words(monitor.wear_of(joint))
             lines = [

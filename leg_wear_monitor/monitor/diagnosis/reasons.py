@@ -167,7 +167,7 @@ def _other_cadence(state: TorqueState, references: References) -> str:
     if _is_changing(state):
         now = f"now {abs(state.waiting[-1].profile.cadence_rpm):.3g} rpm" if state.waiting else "now"
         return f"the cadence changes, {now}; gait cycles are compared at {_cadences(state.known)}"
-    known = f"the crank turns otherwise than in the references ({_cadences(state.known)})"
+    known = f"the motion of the crank differs from the references ({_cadences(state.known)})"
     if state.waiting and references.is_for(state.waiting[-1].profile):
         return f"{known}; a new one is being simulated: {references.percent} %"
     return known

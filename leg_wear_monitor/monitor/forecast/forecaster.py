@@ -112,7 +112,8 @@ def read_lives(path: str, mechanism: Mechanism) -> Sequence[SimulatedLife]:
         raise ConfigError(
             path,
             "fingerprint",
-            f"{document.get('fingerprint')!r} is of another leg than this one, {own!r} (bodies, joints, or "
+            f"{document.get('fingerprint')!r} belongs to a different leg than this one, {own!r} (bodies, "
+            f"joints, or "
             "clearances when new); simulate its lives again with `leg-wear-monitor life --json`",
         )
     return _lives_in(document, path, mechanism)

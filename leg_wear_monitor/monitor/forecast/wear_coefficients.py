@@ -78,7 +78,7 @@ def coefficient_doubts(counted: Iterable[JointWear], leg: Mechanism) -> tuple[Do
 def _further(was_per_pa: float, now_per_pa: float) -> str:
     """What becomes of the wear to come where the coefficient is another one."""
     if not now_per_pa > 0.0:
-        return "and no more is counted"
+        return "and no further wear is modelled"
     return (
         "the model uses the new one from now on, and the forecast keeps a measured coefficient "
         f"(its factor is {was_per_pa / now_per_pa:.3g} times as large)"

@@ -265,7 +265,7 @@ class Entry:
 
 @attrs.frozen(eq=False)
 class Audit:
-    """An operator's change of the counted wear, such as a reset.
+    """An operator's change of the modelled wear, such as a reset.
 
     Attributes
     ----------

@@ -276,45 +276,6 @@ class EvaluationPeriods:
 _FASTER = 1.1  # than commanded; the default tolerance of the cadence is a tenth
 
 
-@attrs.define
-class AlarmEvaluationState:
-    """State of the evaluation.
-
-    Attributes
-    ----------
-    before : Intake
-        Counts at the last evaluation of the input.
-    skipped, skipped_before : int
-        Samples skipped up to the last evaluation, and up to the one before.
-    torque : TorqueRange
-        Range of the torques since the last evaluation.
-    not_finite : mapping of str to int
-        Numbers of samples since then, by stream, that have a value that is NaN or infinite.
-    evaluation_periods, cycles : int
-        Evaluation periods and whole gait cycles since the last evaluation.
-    health : InputHealth or None
-        Health of the input at the last evaluation.
-    withheld : int
-        Samples that the guard had withheld at the last evaluation.
-    causes : tuple of str or None
-        Causes of unused samples at the last evaluation.
-    cadence_rpm : float
-        Of the last gait cycle, 0 before the first.
-    """
-
-    before: Intake
-    skipped: int = 0
-    skipped_before: int = 0
-    torque: TorqueRange = TorqueRange()
-    not_finite: Mapping[str, int] = attrs.Factory(dict)
-    evaluation_periods: int = 0
-    cycles: int = 0
-    health: InputHealth | None = None
-    withheld: int = 0
-    causes: tuple[str, ...] | None = None
-    cadence_rpm: float = 0.0
-
-
 class AlarmEvaluation:
     """Evaluates a twin's gait cycles and its input.
 
@@ -328,6 +289,8 @@ class AlarmEvaluation:
 
     Attributes
     ----------
+    health : InputHealth or None
+        Health of the input at its last evaluation.
     is_late : bool
         Whether samples may be missing because this program was late, not the sender.
     """
@@ -344,8 +307,19 @@ class AlarmEvaluation:
         self._cycle_ns = cycle_ns
         self.config = config
         self.board = AlarmBoard(config, twin.clearance_joints, twin.torque_size_nm)
-        self.state = AlarmEvaluationState(twin.intake)
+        self.health: InputHealth | None = None
         self.is_late = False
+        self._last_causes: tuple[str, ...] | None = None  # of unused samples, at the last evaluation
+        self._cadence_rpm = 0.0  # of the last gait cycle, 0 before the first
+        self._skipped, self._skipped_before = 0, 0  # up to the last evaluation, and up to the one before
+        self._begin(twin.intake)
+
+    def _begin(self, intake: Intake) -> None:
+        """Begin to collect what the next evaluation of the input needs, from some counts on."""
+        self._before, self._withheld_before = intake, self._withheld
+        self._torque = TorqueRange()
+        self._not_finite: Mapping[str, int] = {}
+        self._periods, self._cycles = 0, 0
 
     def configure(self, config: MonitorConfig) -> None:
         """Use other limits from now on."""
@@ -359,22 +333,22 @@ class AlarmEvaluation:
     def add_samples(self, piece: Samples) -> None:
         """Add received samples."""
         saturation_nm = self.config.drive_torque.saturation_nm
-        self.state.torque = with_torques(self.state.torque, piece, saturation_nm)
-        self.state.not_finite = with_not_finite(self.state.not_finite, piece)
+        self._torque = with_torques(self._torque, piece, saturation_nm)
+        self._not_finite = with_not_finite(self._not_finite, piece)
 
     @property
     def causes(self) -> tuple[str, ...]:
         """Causes of unused samples, at present and over the duration of the last gait cycle."""
         now = (self.guard.cause,) if self.guard.cause else ()
-        return now + (self._causes() if self.state.causes is None else self.state.causes)
+        return now + (self._causes() if self._last_causes is None else self._last_causes)
 
     @property
     def _withheld(self) -> int:
         return self.guard.conflicting + self.guard.implausible
 
     def _causes(self) -> tuple[str, ...]:
-        state, withheld = self.state, self._withheld - self.state.withheld
-        return tuple(causes(state.before, self._twin.intake, withheld, self.config, state.not_finite))
+        withheld = self._withheld - self._withheld_before
+        return tuple(causes(self._before, self._twin.intake, withheld, self.config, self._not_finite))
 
     def end_cycle(
         self, report: CycleReport, observed: Mapping[str, float], is_refused: bool = False
@@ -389,7 +363,7 @@ class AlarmEvaluation:
         is_refused : bool
             Whether the crank's input has a fault: cadence and forces are then not those of the leg.
         """
-        self.state.cycles += 1
+        self._cycles += 1
         values, factor = dict(observed), 1.0
         if is_refused:
             clearance = alarm_specs.CLEARANCE
@@ -400,7 +374,7 @@ class AlarmEvaluation:
             for joint in report.joints:
                 values |= {spec.name(joint.joint): spec.value(joint) for spec in joint_specs(self.config)}
             factor = self._impact_factor(report.cadence_rpm)
-            self.state.cadence_rpm = report.cadence_rpm
+            self._cadence_rpm = report.cadence_rpm
         for name in self.board.observed:  # it is evaluated with all that is known, at the period's end
             values.pop(name, None)
         return self.board.evaluate(values, report.stamp_ns, impact_factor=factor)
@@ -415,7 +389,7 @@ class AlarmEvaluation:
         """
         cadence = self.config.cadence
         commanded = abs(cadence.commanded_rpm)
-        fastest = min(max(abs(rpm), abs(self.state.cadence_rpm)), commanded + cadence.tolerance_rpm)
+        fastest = min(max(abs(rpm), abs(self._cadence_rpm)), commanded + cadence.tolerance_rpm)
         return (fastest / commanded) ** 2 if fastest > _FASTER * commanded else 1.0
 
     def end_period(self, skipped: int = 0, is_refused: bool = False) -> tuple[AlarmList, ...]:
@@ -437,17 +411,15 @@ class AlarmEvaluation:
         early = () if is_refused else self.board.evaluate_early(peaks, stamp_ns, factor)
         sources = {alarm_specs.SOURCES.name(): alarm_specs.SOURCES.value(self.guard)}
         early += self.board.evaluate(sources, self.guard.stamp_ns)
-        self.state.evaluation_periods += 1
-        if self.state.evaluation_periods < A_CYCLE:
+        self._periods += 1
+        if self._periods < A_CYCLE:
             return early
         return early + self._evaluate_input(skipped, is_refused)
 
     def pause(self) -> None:
         """Note a pause of the recording: the evaluation of the input starts again with the next sample."""
-        intake = attrs.evolve(self._twin.intake, newest_stamp_ns=0)
-        self.state = AlarmEvaluationState(
-            intake, self.state.skipped, self.state.skipped_before, cadence_rpm=self.state.cadence_rpm
-        )
+        self.health, self._last_causes = None, None
+        self._begin(attrs.evolve(self._twin.intake, newest_stamp_ns=0))
 
     def _of_input(self, health: InputHealth) -> dict[str, float]:
         """Values of the input's alarms, by their names."""
@@ -456,29 +428,23 @@ class AlarmEvaluation:
         return {spec.name(): spec.value(health) for spec in read}
 
     def _evaluate_input(self, skipped: int, is_refused: bool) -> tuple[AlarmList, ...]:
-        state, intake, config = self.state, self._twin.intake, self.config
-        is_whole = skipped == state.skipped == state.skipped_before
-        health = input_health(state.before, intake, state.torque, is_whole)
+        intake, config = self._twin.intake, self.config
+        is_whole = skipped == self._skipped == self._skipped_before
+        health = input_health(self._before, intake, self._torque, is_whole)
         values = self._of_input(health)
         if self.is_late:
             # what is missing may be lost by this program; where nothing is, it says what a replay says.
             # A rate of 0 is of a kind that is not sent
-            unknown = input_health(state.before, intake, state.torque, is_whole=False)
+            unknown = input_health(self._before, intake, self._torque, is_whole=False)
             without = self._of_input(unknown)
             over_time = {name: value for name, value in values.items() if math.isnan(without[name])}
             if any(value and self.board.reaches(name, value) for name, value in over_time.items()):
                 health, values = unknown, without
-        if state.cycles == 0 and not is_refused and self._twin.tracking is Tracking.OUT_OF_STEP:
+        if self._cycles == 0 and not is_refused and self._twin.tracking is Tracking.OUT_OF_STEP:
             speed_rpm = self._twin.speed_radps * 30.0 / math.pi
             values[alarm_specs.CADENCE.name()] = abs(speed_rpm - config.cadence.commanded_rpm)
-        self.state = AlarmEvaluationState(
-            intake,
-            skipped,
-            state.skipped,
-            health=health,
-            withheld=self._withheld,
-            causes=self._causes(),
-            cadence_rpm=state.cadence_rpm,
-        )
+        self.health, self._last_causes = health, self._causes()
+        self._skipped, self._skipped_before = skipped, self._skipped
+        self._begin(intake)
         cycles = 1 if math.isnan(health.duration_s) else round(1.0e9 * health.duration_s / self._cycle_ns)
         return self.board.evaluate(values, intake.newest_stamp_ns, max(1, cycles))

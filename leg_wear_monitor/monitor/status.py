@@ -110,7 +110,7 @@ def _input(leg: MonitoredLeg) -> Status:
     faulty, used = counts.pop("faulty"), counts.pop("used")
     for stamp in ("newest_stamp_ns", "followed_stamp_ns"):
         counts.pop(stamp)
-    values = _health_values(evaluation.state.health) if evaluation.state.health else {}
+    values = _health_values(evaluation.health) if evaluation.health else {}
     values |= {"received": counts.pop("received")} | {f"{name}_used": count for name, count in used.items()}
     # the other counters of the intake by their names, such as duplicates and gaps_lost
     values |= counts | {"already_counted": leg.accounting.skipped}

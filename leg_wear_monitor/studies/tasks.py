@@ -41,14 +41,16 @@ ERRORS = ("toe_position_m", "toe_velocity_mps", "toe_acceleration_mps2", "drive_
 # Sampling grid of the studies.
 
 
-SAMPLES = 512  # samples per gait cycle: equal crank steps from angle 0, at whole intervals of the stepper
+# samples per gait cycle: equal crank steps from angle 0, at whole intervals of the stepper; with 512, a
+# portrait is a polygon
+SAMPLES, PORTRAIT_SAMPLES = 512, 2048
 
 
 # A leg sampled at equal crank steps over whole gait cycles, with run statistics.
 
 
 class ObservedLeg:
-    """A leg with constant crank speed, advanced in steps of 1 / `SAMPLES` of a gait cycle.
+    """A leg with constant crank speed, advanced in equal steps of the crank.
 
     Parameters
     ----------
@@ -73,18 +75,19 @@ class ObservedLeg:
         self.stepper = ClearanceStepper(setup, tables=tables, **accuracy)
         leg.start(self.stepper)
         self._polynomial = steady_drive(leg.crank_angle_rad, setup.speed)
-        self._step = TURN / abs(setup.speed) / SAMPLES
+        self._period = TURN / abs(setup.speed)
 
-    def advance(self, steps: int, statistics: RunStatistics) -> None:
-        """Advance by a number of steps and add to the run statistics.
+    def advance(self, steps: int, statistics: RunStatistics, samples: int = SAMPLES) -> None:
+        """Advance by a number of steps, of so many per gait cycle, and add to the run statistics.
 
         Raises
         ------
         SimulationError
             If the motion diverges.
         """
-        done = round(self.stepper.time / self._step)
-        status, k = self.stepper.advance(self._polynomial, (done + steps) * self._step, statistics)
+        step = self._period / samples
+        done = round(self.stepper.time / step)
+        status, k = self.stepper.advance(self._polynomial, (done + steps) * step, statistics)
         if status != DONE:
             raise stop(self.setup, status, k, self.stepper.time)
 
@@ -92,11 +95,11 @@ class ObservedLeg:
         """The present state of the leg."""
         return self.stepper.observe()
 
-    def moments(self, statistics: RunStatistics) -> Iterator[Moment]:
+    def moments(self, statistics: RunStatistics, samples: int = SAMPLES) -> Iterator[Moment]:
         """States at every step of the next cycle, from the present one on; adds to the run statistics."""
-        for _ in range(SAMPLES):
+        for _ in range(samples):
             yield self.observe()
-            self.advance(1, statistics)
+            self.advance(1, statistics, samples)
 
 
 # Ensembles: legs with equal parameters that differ in the initial positions of crank and journals.
@@ -499,7 +502,8 @@ def poincare_section(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
     (leg,) = observed_legs([attrs.evolve(first, crank_angle_rad=start)])
     statistics = new_run_statistics(len(mechanism.joints))
     leg.advance(settings["skip_cycles"] * SAMPLES, statistics)
-    portrait = [moment for _ in range(settings["portrait_cycles"]) for moment in leg.moments(statistics)]
+    cycles = (leg.moments(statistics, PORTRAIT_SAMPLES) for _ in range(settings["portrait_cycles"]))
+    portrait = [moment for cycle in cycles for moment in cycle]
     section = []
     for _ in range(settings["cycles"]):
         leg.advance(SAMPLES, statistics)

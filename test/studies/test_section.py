@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.studies.tables import period_of
-from leg_wear_monitor.studies.tasks import SAMPLES, poincare_section
+from leg_wear_monitor.studies.tasks import PORTRAIT_SAMPLES, poincare_section
 
 SETTINGS = {
     "clearances": ["G"], "clearance_m": 3.0e-4, "perturb_fraction": 0.3, "seed": 1, "skip_cycles": 4,
@@ -26,7 +26,7 @@ def test_a_motion_that_repeats_itself_has_one_point(calm):
     assert section.shape == (6, 1, 2)
     assert period_of(section[:, 0], 3, 1.0e-3) == 1
     portrait = calm["portrait_eccentricity_m"][:, 0] / 3.0e-4
-    assert portrait.shape == (SAMPLES, 2)
+    assert portrait.shape == (PORTRAIT_SAMPLES, 2)
     # the portrait begins at the section's angle
     assert portrait[0] == pytest.approx(section[0, 0], abs=1.0e-3)
     assert np.ptp(portrait, axis=0).max() > 0.1

@@ -130,19 +130,16 @@ def test_the_terminal_names_the_guide_of_the_code(bag: Replayed) -> None:
 
 
 def test_the_terminal_gives_no_number_that_the_verdict_does_not_believe(bag: Replayed) -> None:
-    not_valid = bag.found["verdict"]["not_valid"]
     (row,) = (line for line in bag.printed.splitlines() if line.startswith("A (hip, drive side)  "))
-    clearance, *others = re.split(r"\s{2,}", row)[1:]
-    if "according to" in bag.printed:  # what is believed, in place of what is counted
-        assert "clearances" in not_valid
-        best_estimate_m = bag.found["clearances"]["A"]["best_estimate_m"]
-        assert clearance == ("not valid" if best_estimate_m is None else f"{1e3 * best_estimate_m:.3f}")
-        return
-    assert (clearance == "not valid") == ("clearances" in not_valid)
-    if clearance != "not valid":
-        growth, _, peak = others
-        assert (growth == "not valid") == ("growth" in not_valid)
-        assert (peak == "not valid") == ("impact_forces" in not_valid)
+    clearance, _, p10, p50, *_ = re.split(r"\s{2,}", row)[1:]
+    known, life = bag.found["clearances"]["A"], bag.found["life"]["A"]
+    best_estimate_m, sigma_m = known["best_estimate_m"], known["best_estimate_sigma_m"]
+    if best_estimate_m is None:
+        assert clearance == "-"
+    else:
+        around = f" ± {1e3 * sigma_m:.3f}" if sigma_m else ""
+        assert clearance == f"{1e3 * best_estimate_m:.3f}{around}"
+    assert ([p10, p50] == ["-", "-"]) == (life is None)
 
 
 def test_the_summary_has_no_fields_but_those_that_are_kept(bag: Replayed, unknown) -> None:

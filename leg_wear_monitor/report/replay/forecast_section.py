@@ -100,7 +100,7 @@ def _validity(measurements: Sequence[Measurement]) -> Chart:
             is_one = [each.joint == joint and each.counts is counts for each in kept]
             below = np.where(is_one, [each.expected_below for each in kept], math.nan)
             if any(is_one):
-                name = f"{joint} {words}"
+                name = f"{words}: {joint}"  # a name that starts with = would be a formula in a spreadsheet
                 series.append(Series(name, "", below, colour, "points"))
     for name, end in (("p10", 0.1), ("p90", 0.9)):
         values = np.full(len(kept), end)

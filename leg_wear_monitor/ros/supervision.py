@@ -125,8 +125,8 @@ _OTHERS_S = 60.0  # for which it is known, though it publishes seldom
 _OF_A_BLOCK = 4  # wrenches that are compared, so that this costs little
 # rules of the verdict that a torque about a different axis can be the cause of
 _OF_AXIS = (
-    "TORQUE_CONSTANT", "FRICTION_CHANGED", "MECHANISM_CHANGED", "TORQUE_BIAS", "TORQUE_MASS",
-    "TORQUE_MISMATCH", "TORQUE_SCALE", "TORQUE_TIMING",
+    "TORQUE_CONSTANT", "FRICTION_CHANGED", "LOAD_NOT_OBSERVED", "MECHANISM_CHANGED", "TORQUE_BIAS",
+    "TORQUE_MASS", "TORQUE_MISMATCH", "TORQUE_SCALE", "TORQUE_TIMING",
 )  # fmt: skip
 
 

@@ -331,6 +331,7 @@ class TorqueObserver(KeepsSamples):
             cycles_not_used=state.not_used,
             channel=state.sensor.channel if state.sensor else DIRECT,
             load=self._load,
+            is_load_unknown=self._is_on_ground and self.config.load.model == GROUND and self._load is None,
             temperature_c=state.temperature_c,
             commissioned_c=known.temperature_c if known else None,
         )

@@ -134,6 +134,8 @@ class Diagnosis:
         Factor on the friction in the joints that the wear is counted with.
     load : FootLoad or None
         Force of the ground that the foot surely carries.
+    is_load_unknown : bool
+        Whether the leg walks on the ground, and neither a sensor nor the torque shows the ground's force.
     compliance : float
         Between the measured crank angle and the crank [rad/(N m)], that the wear is counted with; 0 if rigid.
     temperature_c, commissioned_c : float or None
@@ -156,6 +158,7 @@ class Diagnosis:
     bodies: tuple[Body, ...] = ()
     friction: float = 1.0
     load: FootLoad | None = None
+    is_load_unknown: bool = False
     compliance: float = 0.0
     temperature_c: float | None = attrs.field(default=None, converter=finite_or_none)
     commissioned_c: float | None = attrs.field(default=None, converter=finite_or_none)

@@ -209,8 +209,16 @@ def _diagnosed(code: str, situation: Situation) -> list[Hit]:
     ]
 
 
+def load_not_observed(situation: Situation) -> Sequence[Hit]:
+    """The drive torque does not fit the model on the ground, and the force of the ground is not known."""
+    is_unknown = situation.diagnosis.is_load_unknown
+    return raised("torque_mismatch", least=Level.ERROR)(situation) if is_unknown else []
+
+
 def mismatch(situation: Situation) -> Sequence[Hit]:
     """The drive torque does not fit the model; with its possible causes."""
+    if situation.diagnosis.is_load_unknown:  # a different ground explains as much as a joint
+        return []
     possible = [sentence(cause, situation.diagnosis) for cause in situation.torque_causes.values()]
     possible += [words_of(change, situation) for change in changes(situation)]
     causes = f"; possible cause: {'; '.join(possible)}" if possible else ""

@@ -236,6 +236,7 @@ ADVICE: Mapping[str, Advice] = {
     "TORQUE_MASS": _OTHER_LEG,
     "MECHANISM_CHANGED": _OTHER_LEG,
     "TORQUE_MISMATCH": _OTHER_LEG,
+    "LOAD_NOT_OBSERVED": _LOAD,
     "TORQUE_LOAD": attrs.evolve(_LOAD, measured=("load_name",)),
     "FRICTION_CHANGED": _LOAD,
     "FOOT_LOAD_STUCK": _FOOT_SENSOR,

@@ -193,6 +193,16 @@ RULES = (
     _cause("MECHANISM_CHANGED", "it does not fit the model of this leg", not_valid=EVERYTHING),
     _cause("TORQUE_LOAD", "a load acts at the foot", State.WATCH, OF_THE_MODEL),
     _inspect(
+        code="LOAD_NOT_OBSERVED",
+        hits=conditions.load_not_observed,
+        why="the load at the foot is not observable: the ground's force may have a different shape than in "
+        "the model; {value} of the predicted RMS is not explained (limit {limit}){past}",
+        do="measure the force at the foot (`foot_load.source`), or let the leg walk in the air with "
+        f"`load.model: none`, where the torque shows the joints; {_ACKNOWLEDGE}",
+        not_valid=EVERYTHING,
+        rests_on=(TORQUE,),
+    ),
+    _inspect(
         code="TORQUE_MISMATCH",
         hits=conditions.mismatch,
         why="the drive torque does not fit the model of this leg, so the forecast is not valid: {value} of "

@@ -157,6 +157,12 @@ CASES = [
     (raised("torque_mismatch", Level.WARN), State.WATCH, "ALARM", ()),  # healthy legs have it
     (raised("torque_mismatch"), State.INSPECT, "TORQUE_MISMATCH", ALL),
     (raised("torque_mismatch", present=Level.OK), State.INSPECT, "TORQUE_MISMATCH", ALL),
+    (
+        raised("torque_mismatch") | {"diagnosis": Diagnosis(is_load_unknown=True)},
+        State.INSPECT,
+        "LOAD_NOT_OBSERVED",
+        ALL,
+    ),
     *(
         (raised("torque_mismatch") | {"explained": explained(cause)}, State.INSPECT, cause.fault_code, ALL)
         for cause in (Cause.SIGN, Cause.SCALE, Cause.TIMING, Cause.LOAD, Cause.MASS)
@@ -354,6 +360,13 @@ def test_every_cause_of_the_diagnosis_has_a_rule_and_words(cause: Cause) -> None
     verdict = judged(diagnosis=diagnosis(change(cause, "foot", value=0.5, sigma=0.1)))
     assert verdict.fault_code == cause.fault_code and verdict.evidence
     assert ("no single cause" in verdict.why) == (cause is Cause.UNKNOWN)
+
+
+def test_a_ground_that_is_not_known_accuses_no_joint() -> None:
+    on_ground = Diagnosis(state=DiagnosisState.WAITING, is_load_unknown=True)
+    verdict = judged(**raised("torque_mismatch"), diagnosis=on_ground)
+    assert (verdict.state, verdict.fault_code, verdict.joints) == (State.INSPECT, "LOAD_NOT_OBSERVED", ())
+    assert "not observable" in verdict.why and "rock" not in verdict.do
 
 
 def test_a_finding_about_timing_does_not_hide_a_joint() -> None:

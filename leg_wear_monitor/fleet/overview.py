@@ -172,9 +172,12 @@ class FleetOverview:
         return json_text(self.to_dict())
 
     def to_csv(self) -> str:
-        """Text of ``fleet.csv``: one row per leg, the worst leg first."""
+        """Text of ``fleet.csv``: one row per leg, the worst leg first.
+
+        An apostrophe stands before a text that a spreadsheet would compute, such as ``=HYPERLINK(...)``.
+        """
         text = io.StringIO()
-        rows = [leg.row for leg in self.legs]
+        rows = [{name: _as_text(value) for name, value in leg.row.items()} for leg in self.legs]
         writer = csv.DictWriter(text, fieldnames=list(LegOverview(id="").row), lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
@@ -183,6 +186,11 @@ class FleetOverview:
     def to_pandas(self) -> "pd.DataFrame":
         """The same rows as a data frame; requires pandas."""
         return _frame([leg.row for leg in self.legs], list(LegOverview(id="").row))
+
+
+def _as_text(value: Any) -> Any:
+    is_formula = isinstance(value, str) and value.startswith(("=", "+", "-", "@"))
+    return f"'{value}" if is_formula else value
 
 
 def _without_version(state: LegState | None) -> dict[str, Any] | None:

@@ -266,3 +266,9 @@ def test_a_wrong_description_is_one_line(run, tmp_path, text, fault) -> None:
     errors = [line for line in done.lines if line.startswith("error: ")]
     assert (done.code, len(errors)) == (2, 1) and fault in errors[0], done.lines
     assert not (tmp_path / "fleet").exists()
+
+
+def test_a_name_is_no_formula_in_a_spreadsheet() -> None:
+    leg = lw.LegOverview(id='=HYPERLINK("x")')
+    table = lw.FleetOverview(counts={}, legs=(leg,), advice="").to_csv()
+    assert table.splitlines()[1].startswith('"\'=HYPERLINK(""x"")"')

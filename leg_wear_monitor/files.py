@@ -71,7 +71,7 @@ def unfinished(path: Path) -> Iterator[Path]:
     remove_parts(path.parent, f"{glob.escape(path.name)}.[0-9]*")
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     with part.open("wb") as locked:
-        fcntl.flock(locked, fcntl.LOCK_EX)  # so that no other process removes it
+        fcntl.flock(locked, fcntl.LOCK_EX)  # prevents other processes from removing it
         try:
             yield part
         finally:

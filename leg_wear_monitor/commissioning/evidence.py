@@ -37,7 +37,7 @@ _SETTLING, _CYCLES = 2, 40
 # below 0.6, by 0.65 below 1.2; beyond, clearances or masses are too far off, and 6 of 12 low-passes do not
 # show. 100 Hz were found for 3 of 5 sensors without a low-pass (n = 75, 2026-11-24)
 _SPREAD, _BY_SQUARE, _POOR = 0.2, 0.5, 1.0
-# corner frequencies that show, and their part of the sampling rate: at 100 Hz, 116 Hz seemed to be 50
+# observable corner frequencies, as a fraction of the sampling rate: at 100 Hz, 116 Hz looked like 50
 _SHOWS_HZ, _OF_RATE = 70.0, 0.4
 
 

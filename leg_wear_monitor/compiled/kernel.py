@@ -297,7 +297,7 @@ _KERNEL = {**_ENTRY, "forceinline": True}
 _HOME = Path(__file__).parents[1]  # directory of the package
 _PLAIN = (int, float, complex, str, bytes, slice, np.generic, EllipsisType, type(None))
 
-at_compilation: list[Callable[[], None]] = []  # called when an entry is compiled, and not loaded
+at_compilation: list[Callable[[], None]] = []  # called if an entry is compiled instead of loaded
 
 
 def uncompiled(function: Any) -> Any:

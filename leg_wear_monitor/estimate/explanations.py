@@ -423,7 +423,7 @@ class Explainer:
         known_nm = self.model.sensor.noise_nm
         is_less = np.array([one.noise_nm for one in self.noises]) < known_nm
         possible = misfits.square < _LEFT * as_modelled.square
-        # less noise is clear even where an opening makes up for it
+        # a decrease of noise is clear even if an opening compensates it
         usable = possible | (is_less & (as_modelled.value - misfits.value > 2.0 * SURE_OF_NAME))
         if not usable.any():
             return [], ()

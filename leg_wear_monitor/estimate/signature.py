@@ -237,7 +237,7 @@ class SimulatedSensor:
         self._reference, self._sensor = reference, sensor
         period = TURN / abs(reference.profile.speed)
         each = np.arange(1, cycles + 1) * _PART_OF_SAMPLE % 1.0 if late is None else np.full(cycles, late)
-        # as many as are averaged, from the first of each gait cycle on; the rest at its end is dropped
+        # groups of averaged samples from the start of each gait cycle, without the incomplete one at its end
         averages = int(period / (sensor.period_s * sensor.together)) + 1
         last = sensor.period_s * (sensor.together * np.arange(1, averages + 1) - 1)
         ends = sensor.period_s * each[:, None] + last

@@ -37,7 +37,7 @@ from leg_wear_monitor.twin.sample import Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics, SampleStatistics
 from leg_wear_monitor.wear import BUSHING
 
-# Stretches of time whose wear is counted, so that none is counted twice.
+# Stretches of time whose wear is in the model, so that no wear is added twice.
 
 
 Spans = tuple[tuple[int, int], ...]

@@ -258,7 +258,7 @@ class ClockMonitor:
 
 # Above this delay, topics with one message per sample are not published, so that the monitor can catch up.
 COARSE_FROM_S = 0.25
-# between two turns of the node; shared memory of Fast DDS holds 512 messages for a process that gets no turn
+# seconds between two turns of the node; shared memory of Fast DDS holds 512 messages meanwhile
 _LATE_NS = 250_000_000
 _CAUGHT_UP_NS = 1_000_000_000  # beside twice the time that it was late
 

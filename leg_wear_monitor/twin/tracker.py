@@ -63,7 +63,7 @@ def find_fault(sample):
     elif sample.kind == LOAD:
         value, largest = abs(sample.foot_force_n[0]), LARGEST_FORCE
         if not value >= abs(sample.foot_force_n[1]):
-            value = abs(sample.foot_force_n[1]) + 0.0 * value  # NaN if one of them is
+            value = abs(sample.foot_force_n[1]) + 0.0 * value  # NaN if one of the values is NaN
     else:
         return WRONG_TYPE
     if sample.stamp_ns <= 0:

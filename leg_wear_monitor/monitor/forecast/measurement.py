@@ -20,7 +20,7 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
 )
 from leg_wear_monitor.monitor.ledger.entry import JointWear, Measurement, Recount
 
-# How past forecasts did: a measured clearance is later reality, and the ledger says what was expected.
+# Accuracy of past forecasts: the ledger has the expected value of each measured clearance.
 
 
 LEAST = 5  # measurements, below which fractions have no meaning

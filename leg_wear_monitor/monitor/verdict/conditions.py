@@ -114,7 +114,7 @@ _KNOWN_BY = {MEASURED: "measured", BOTH: "estimated"}
 
 def hit_of(alarm: Alarm, situation: Situation) -> Hit:
     """An alarm as a case of a rule: its last value if that is beyond the limit, else its worst one."""
-    is_present = alarm.present is alarm.level  # a level that has fallen has a value within the limit
+    is_present = alarm.present is alarm.level  # after a level has fallen, the value is within the limit
     is_known = is_present and not math.isnan(alarm.value)
     value, past = alarm.worst, ""
     if math.isnan(alarm.worst) or (is_known and (alarm.worst >= alarm.limit) is (alarm.value >= alarm.limit)):

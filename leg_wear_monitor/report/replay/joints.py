@@ -17,7 +17,7 @@ from leg_wear_monitor.state import Figure, JointClearance, LegAlarm, Level, Life
 # A clearance joint as the first screen shows it: its best estimate, and no other clearance.
 
 
-_NEAR = 0.5  # used fraction of the wear allowance from which on a joint is drawn as near its limit
+_NEAR = 0.5  # a joint is drawn as near its limit above this used fraction of the wear allowance
 
 
 @attrs.frozen(kw_only=True)

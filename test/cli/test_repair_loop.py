@@ -90,8 +90,8 @@ def test_the_page_of_the_stop_shows_the_estimates_and_links_the_guide(knocked):
     joint = joints["G"]
     value, sigma = (1e3 * joint[name] for name in ("best_estimate_m", "best_estimate_sigma_m"))
     assert abs(value - 2.0) < 2.0 * sigma  # the bushing is broken out to 2 mm
-    assert f"estimated {value:.2f} ± {sigma:.2f} mm by the drive torque" in page
-    assert page.count("mm by the drive torque") == 1  # the others are not observable
+    assert f"{value:.2f} ± {sigma:.2f} mm according to the drive torque" in page
+    assert page.count("mm according to the drive torque</span>") == 1  # the others are not observable
     assert "Clearance of joint" in page
     for name in ("href", "id"):  # the guide is in the page
         assert re.search(f'{name}="#?guide-a-joint-is-at-its-limit"', page)

@@ -268,8 +268,8 @@ class Stretch:
         Stamps, and crank angles that count on over turns [rad].
     torque_ns, torque : (m,) arrays
         Stamps, and drive torques on the crank [N m].
-    spikes : int
-        Torques that the guard left out as outliers.
+    spikes : float
+        Fraction of the torques that the guard left out as outliers.
     size_nm : float
         RMS of the predicted drive torque.
     config : MonitorConfig
@@ -279,12 +279,12 @@ class Stretch:
     angle: Floats
     torque_ns: Ints
     torque: Floats
-    spikes: int
+    spikes: float
     size_nm: float
     config: MonitorConfig
 
     @classmethod
-    def of(cls, samples: Samples, spikes: int, size_nm: float, config: MonitorConfig) -> "Stretch":
+    def of(cls, samples: Samples, spikes: float, size_nm: float, config: MonitorConfig) -> "Stretch":
         """Those of some samples in any order."""
         cranks, torques = (within(part, 1, 2**63 - 1) for part in (of_crank(samples), of_torque(samples)))
         angle = np.unwrap(cranks["crank_angle_rad"], period=TURN)
@@ -329,7 +329,8 @@ _FROZEN = 0.2  # of a gait cycle, in which a torque that freezes has the same va
 _STEADY = 0.5  # by which speeds in two halves of a stretch may differ, of their mean
 _IN_TURNS = 0.1  # by which a speed may differ from the commanded one in turns instead of radians
 _AT_END, _BESIDE = 0.05, 4  # fraction of torques at the ends of a range; times as often as the next value
-_SPIKES = 0.02  # fraction of torque samples that are outliers: fewer are counted and left out
+_SPIKES = 0.03  # fraction of torque samples that are outliers: fewer are counted and left out
+_LEAST_SPIKES = 10  # fewer than that may come together by chance
 _ALIKE = 0.5  # correlation of torques over the crank angle
 _PHASES = (32, 16)  # of a gait cycle in which torques are compared
 _LEAST_A_PHASE = 2.0  # samples in each, on average
@@ -417,8 +418,7 @@ def _saturated(one: Stretch) -> Words | None:
 
 
 def _spikes(one: Stretch) -> Words | None:
-    part = one.spikes / (one.spikes + len(one.torque))
-    return {"percent": f"{100.0 * part:.1f}"} if part > _SPIKES else None
+    return {"percent": f"{100.0 * one.spikes:.1f}"} if one.spikes > _SPIKES else None
 
 
 @attrs.frozen(kw_only=True)
@@ -713,7 +713,7 @@ class InputJudge:
         has_refused, state.has_refused = state.has_refused, False
         joined = np.concatenate(state.now) if state.now else np.zeros(0, GAIT_SAMPLE)
         state.pieces = (*state.pieces, joined)[-_KEPT_PERIODS:]
-        state.spikes = (*state.spikes, spikes)[-_PERIODS - 1 :]
+        state.spikes = (*state.spikes, spikes)[-_KEPT_PERIODS - 1 :]
         state.now = ()
         cranks = of_crank(joined)
         self._look_for_jumps(cranks)
@@ -721,7 +721,11 @@ class InputJudge:
             words, stamps = {"size": amount(state.jumped_rad, "rad")}, cranks["stamp_ns"]
             self._note(JUMP, words, int(stamps[0]), int(stamps[-1]))
         last = np.concatenate(state.pieces[-_PERIODS:])
-        self._take(Stretch.of(last, spikes - state.spikes[0], self._size_nm, self.config))
+        found = spikes - state.spikes[0]
+        part = (
+            found / (found + len(of_torque(np.concatenate(state.pieces)))) if found > _LEAST_SPIKES else 0.0
+        )
+        self._take(Stretch.of(last, part, self._size_nm, self.config))
         if is_withheld:
             state.jumped_rad = 0.0
             state.faults = {code: one for code, one in state.faults.items() if one.rule.kind != CRANK}
@@ -733,7 +737,7 @@ class InputJudge:
         samples = np.concatenate([*state.pieces, *state.now])
         end_ns = statistics.stamp_ns
         own = samples[(samples["stamp_ns"] >= statistics.begin_ns) & (samples["stamp_ns"] < end_ns)]
-        self._take(Stretch.of(own, 0, self._size_nm, self.config))
+        self._take(Stretch.of(own, 0.0, self._size_nm, self.config))
         is_strange = self._is_strange(statistics.torque_profile)
         if is_strange:
             self._note(NOT_OF_GAIT, {}, statistics.begin_ns, end_ns)

@@ -102,8 +102,17 @@ CASES: dict[str, tuple[Callable[[Walk], Walk], str]] = {
     "dead": (torques(lambda torque: from_half(torque, 0.0)), "TORQUE_CONSTANT"),
     "saturated": (torques(lambda torque: np.clip(torque, -5.0, 5.0)), "TORQUE_SATURATED"),
     "spikes": (replaced(0.005, 600.0), "NONE"),
-    "overflow": (replaced(0.01, 32767.0), "NONE"),
-    "1e300": (replaced(0.04, 1.0e300), "TORQUE_SPIKES"),
+    "overflow": (replaced(0.015, -32767.0), "NONE"),
+    "constant with noise": (
+        torques(lambda torque: 3.7 + 1.0e-3 * np.random.default_rng(1).standard_normal(len(torque))),
+        "TORQUE_CONSTANT",
+    ),
+    "sine": (
+        torques(lambda torque: 5.0 * np.sin(0.0534 * np.arange(len(torque)))),
+        "TORQUE_NOT_OF_GAIT",
+    ),
+    "torque held": (torques(lambda torque: torque[np.arange(len(torque)) // 8 * 8]), "TORQUE_HELD"),
+    "1e300": (replaced(0.08, 1.0e300), "TORQUE_SPIKES"),
     "noise": (
         torques(lambda torque: 8.0 * np.random.default_rng(1).standard_normal(len(torque))),
         "TORQUE_NOT_OF_GAIT",

@@ -432,7 +432,7 @@ class Library:
         if _is_path(name) or str(name) in known:
             return ""
         hint = did_you_mean(str(name), known)
-        return f"unknown {self.what}, leg-wear-monitor {self.folder} lists them{hint}"
+        return f"no {self.what} of this name, leg-wear-monitor {self.folder} lists them{hint}"
 
     def load(self, name_or_path: str | Path) -> Any:
         """Read a file: by name, or by a path, which is anything with a suffix or a directory.

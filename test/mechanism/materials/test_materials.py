@@ -129,7 +129,7 @@ def test_a_file_of_ones_own(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        (", source: a book", "", ["friction.source", "missing", "where it is from"]),
+        (", source: a book", "", ["friction.source", "missing", "origin of the value"]),
         ("source: a book", "source: ' '", ["friction.source", "empty"]),
         (", conditions: dry", "", ["friction.conditions", "missing"]),
         ("friction:", "frictoin:", ["frictoin", "did you mean friction?"]),

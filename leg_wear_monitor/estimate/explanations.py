@@ -331,11 +331,11 @@ class Explainer:
         best = min(found, key=lambda one: one.misfit)
         # without a baseline, a second opening would mostly explain the errors of the model
         if best.cause is Cause.CLEARANCE and self.baseline.offset.any():
-            found.append(self._with_second(seen, best, modelled_m))
+            found += self._with_second(seen, best, modelled_m)
         return sorted(found, key=lambda one: one.misfit)
 
-    def _with_second(self, seen: _Seen, first: Explanation, modelled_m: Floats) -> Explanation:
-        """The best explanation by two open joints, one of which is the joint that explains most alone.
+    def _with_second(self, seen: _Seen, first: Explanation, modelled_m: Floats) -> list[Explanation]:
+        """Explanations by two open joints, one of which is the joint that explains most alone.
 
         Of two open joints, the wider change nearly always has the right name, but a wrong size.
         """
@@ -353,8 +353,13 @@ class Explainer:
                 misfits = self._misfits_of_pair(seen, pair, sizes, modelled_m)
                 best = int(misfits.value.argmin())
                 middle, step = np.log(sizes[best]), step / _PAIR_SIZES
-            found.append((float(misfits.value[best]), other, sizes, misfits))
-        _, other, sizes, misfits = min(found, key=lambda one: one[0])
+            found.append(self._pair(seen, pair, sizes, misfits, modelled_m))
+        return found
+
+    def _pair(
+        self, seen: _Seen, pair: Ints, sizes: Floats, misfits: "Misfits", modelled_m: Floats
+    ) -> Explanation:
+        """Explanation by two open joints, over some clearances (n, 2) [m] about the best ones."""
         best = int(misfits.value.argmin())
         square = float(misfits.square[best]) / len(seen.mean)
         likely = np.exp(-0.5 * (misfits.value - misfits.value[best]) / max(1.0, square))
@@ -367,7 +372,7 @@ class Explainer:
                 float(np.hypot(own_m[i], MODEL_ERROR * (mean_m[i] - modelled_m[joint]))),
                 self.joints[joint],
             )
-            for i, joint in enumerate((k, other))
+            for i, joint in enumerate(pair.tolist())
         )
         widest = max(joints, key=lambda one: one.value)
         return Explanation(

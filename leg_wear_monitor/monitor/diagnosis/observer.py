@@ -373,6 +373,9 @@ class TorqueObserver(KeepsSamples):
             np.where(observable, each, math.nan) for each in (fit.clearance_m, fit.sigma_m)
         )
         for change in self.state.not_corrected:
+            if change.cause is Cause.SEVERAL and not change.is_named:  # which joints, is not known
+                clearance_m[:] = sigma_m[:] = math.nan
+                continue
             opened = (change,) if change.cause is Cause.CLEARANCE else change.joints
             for one in opened:
                 k = self._joints.index(one.subject)

@@ -382,6 +382,8 @@ def test_several_joints_stand_together_with_their_clearances() -> None:
     verdict = judged(diagnosis=diagnosis(change(Cause.SEVERAL, "A and G", joints=joints)))
     assert (verdict.state, verdict.fault_code) == (State.INSPECT, "CLEARANCE_CHANGED_A_G")
     assert "A 0.4 mm ± 0.03 mm and G 0.5 mm ± 0.03 mm" in verdict.why
+    unsure = change(Cause.SEVERAL, "A and G", joints=joints, runner_up="A and B", runner_up_log_odds=1.0)
+    assert "(or A and B)" in judged(diagnosis=diagnosis(unsure)).why
 
 
 def test_a_reason_to_stop_is_not_hidden_by_an_input_that_fails() -> None:

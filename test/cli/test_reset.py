@@ -84,7 +84,7 @@ def test_an_undone_reset_is_as_before(run, ledger):
     before, spans = content(ledger)
     run("reset", "G", "--ledger", str(ledger))
     result = run("reset", "G", "--undo", "--ledger", str(ledger))
-    assert "60 um of wear from 4000 gait cycles are counted, including those since" in result.stdout
+    assert "the wear is again 60 um of wear from 4000 gait cycles, including the wear since" in result.stdout
     after, now = content(ledger)
     assert now == spans
     for one, other in zip(before.joints, after.joints, strict=True):

@@ -115,7 +115,7 @@ def test_a_worn_joint_is_found_named_and_alarmed(commissioned, read):
     assert [joint for joint, one in shown.items() if one.is_other] == ["G"]
     assert shown["G"].departure_m == pytest.approx(1.5e-4, abs=1e-5)
     assert not shown["G"].believed  # nothing has worn: the forecast holds it next to impossible
-    assert status_of(monitor, "encoders").message == "joint G is wider than counted"
+    assert status_of(monitor, "encoders").message == "joint G is wider than modelled"
     assert status_of(monitor, "encoders").level is Level.ERROR
     first = next(
         change.stamp_ns

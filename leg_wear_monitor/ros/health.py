@@ -76,7 +76,7 @@ class Silence:
                 kind.used, kind.steady_ns, kind.wall_ns = used[name], steady_ns, wall_ns
 
     def excuse(self, late_ns: int) -> None:
-        """Do not count a time in which the node did not take what came."""
+        """Exclude a time in which the node did not take arriving messages."""
         for kind in self._kinds.values():
             kind.steady_ns += late_ns
 
@@ -123,7 +123,7 @@ class Silence:
 
 
 SILENCE, AHEAD = "input_silence", "stamps_ahead"
-AHEAD_FROM_S = 1.0  # more than what a network's clocks differ by
+AHEAD_FROM_S = 1.0  # larger than the usual clock differences within a network
 _SILENT = Limit(SILENT_FROM_S, SILENT_FROM_S, is_latched=False)
 _AHEAD = Limit(AHEAD_FROM_S, 2.0 * AHEAD_FROM_S, is_latched=False)
 SOURCES = alarm_specs.SOURCES.kind
@@ -186,7 +186,7 @@ class NodeAlarms:
         return tuple(alarm for alarm in self._alarms.values() if alarm.level is not Level.OK)
 
     def beside(self, alarms: AlarmList) -> AlarmList:
-        """Merge the monitor's alarms with those of the node."""
+        """Merge the monitor's alarms with the node's alarms."""
         return attrs.evolve(alarms, alarms=with_worse(alarms.alarms, self.raised)) if self.raised else alarms
 
 
@@ -226,7 +226,7 @@ class ClockMonitor:
         ros_ns, steady_ns : int
             Present time of the node's clock and of a monotonic clock [ns].
         is_simulated : bool
-            Whether the node follows ``/clock``.
+            True if the node follows ``/clock``.
         ahead_s : float
             Largest lead of an input's stamps over the node's clock [s].
         """
@@ -260,7 +260,7 @@ class ClockMonitor:
 COARSE_FROM_S = 0.25
 # seconds between two turns of the node; shared memory of Fast DDS holds 512 messages meanwhile
 _LATE_NS = 250_000_000
-_CAUGHT_UP_NS = 1_000_000_000  # beside twice the time that it was late
+_CAUGHT_UP_NS = 1_000_000_000  # added to twice the time that the node was late
 
 
 @attrs.define
@@ -270,11 +270,11 @@ class Load:
     Attributes
     ----------
     delay_s, worst_delay_s : float
-        Waiting time of the oldest message: present, and maximum since the last report [s].
+        Waiting time of the oldest message: current, and maximum since the last report [s].
     unpublished : int
         Samples whose torque and forces were not published in order to catch up.
     lost, lost_before : int
-        Messages that were lost on the way while the node was late, and in all.
+        Messages lost in transport while the node was late, and all messages lost.
     dropped_reported : int
         Messages dropped up to the last report.
     """
@@ -289,9 +289,10 @@ class Load:
     _late_until_ns: int = 0
 
     def late_ns(self, now_ns: int) -> int:
-        """By how much the node is late with a turn at a time of the monotonic clock [ns]; 0 if it is not.
+        """Delay of a turn of the node at a time of the monotonic clock [ns]; 0 if the node is not late.
 
-        A turn comes every 50 ms. What came meanwhile waits in the middleware, which holds some seconds of it.
+        A turn comes every 50 ms. Messages that arrive between turns wait in the middleware, which holds
+        several seconds of them.
         """
         passed_ns, self._turn_ns = now_ns - (self._turn_ns or now_ns), now_ns
         if passed_ns < _LATE_NS:
@@ -302,7 +303,7 @@ class Load:
         return passed_ns
 
     def is_late(self, now_ns: int) -> bool:
-        """Whether the node may still be late, or was when what it takes now had come."""
+        """True if the node may still be late, or was late when the messages it now takes had arrived."""
         return now_ns < self._late_until_ns
 
     def note_lost(self, lost: int, now_ns: int) -> None:
@@ -318,7 +319,7 @@ class Load:
 
 
 def load_status(load: Load, inbox: Inbox, is_recorded: bool = False) -> Status:
-    """Status of the load; starts a new reporting interval. What is recorded is published, if late."""
+    """Status of the load; starts a new reporting interval. Recorded samples are published even if late."""
     dropped = inbox.shed + load.lost
     level, message, code = Level.OK, "keeps up", alarms.NO_FAULT
     if dropped > load.dropped_reported:

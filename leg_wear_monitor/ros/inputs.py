@@ -228,7 +228,7 @@ def message_class(name: str) -> Any:
     Raises
     ------
     ConfigError
-        If its package is not installed. Only that of the interfaces of ros2_control may be missing.
+        If its package is not installed. Only the ros2_control interface package may be missing.
     """
     package, _, message = name.split("/")
     try:
@@ -239,7 +239,7 @@ def message_class(name: str) -> Any:
     return getattr(found, message)
 
 
-# Publishers of an input: node names, publishers of another type, several publishers of one crank.
+# Publishers of an input: node names, publishers of a different type, several publishers of one crank.
 
 
 _STAMPED = "wrench, effort or interface"
@@ -255,7 +255,7 @@ class Publishers:
     fitting : tuple of str
         Full names of the nodes whose messages arrive.
     refused : tuple of (str, str)
-        Full names of the other nodes, and why none of theirs does.
+        Full names of the other nodes, and why none of their messages arrives.
     """
 
     fitting: tuple[str, ...] = ()
@@ -273,7 +273,7 @@ def publishers_of(node: Node, topic: str, expected: str, qos: QoSProfile) -> Pub
     expected : str
         Expected type, such as ``sensor_msgs/msg/JointState``.
     qos : QoSProfile
-        Of the subscription.
+        Quality of service of the subscription.
     """
     there = node.get_publishers_info_by_topic(topic)
     found = [(_full_name(one), _refusal(one, expected, qos)) for one in there]
@@ -300,7 +300,7 @@ def _full_name(info: object) -> str:
 
 
 def refusals(publishers: Publishers) -> str:
-    """Fault text for publishers of which no message arrives; empty if there are none."""
+    """Fault text for publishers without any arriving message; empty if there are none."""
     listed = _listed(f"{name} {why}" for name, why in publishers.refused)
     who = "it" if len(publishers.refused) == 1 else "them"
     return f"{listed}; no message arrives from {who}" if listed else ""
@@ -322,8 +322,9 @@ def _listed(names: Iterable[str]) -> str:
 def check_stamps(config: MonitorConfig, source: str) -> None:
     """Refuse inputs without stamps, for a node with ``use_sim_time``.
 
-    Wall time of arrival is not the time of the other inputs, and ``/clock`` comes 10 to 100 times a second: a
-    torque stamped by it would be late by more than ``drive_torque.max_lag_s``, and a healthy leg another one.
+    Wall time of arrival does not match the time of the other inputs, and ``/clock`` comes 10 to 100 times a
+    second. A torque stamped by it would be late by more than ``drive_torque.max_lag_s``, and a healthy leg
+    would look like a different leg.
 
     Raises
     ------
@@ -342,13 +343,13 @@ def check_stamps(config: MonitorConfig, source: str) -> None:
 # Subscriptions of the monitor: serialized messages, and the middleware's events about them.
 
 
-# of a subscription's queue: Fast DDS holds 5000 messages by default, five seconds at 1 kHz, and reports the
-# others as lost; with a smaller depth it would drop them without a word
+# Depth of a subscription's queue. Fast DDS holds 5000 messages by default, five seconds at 1 kHz, and reports
+# further messages as lost; with a smaller depth it would drop them silently.
 DEPTH = 10_000
 
 
 def _best_effort() -> QoSProfile:
-    """Of a subscription before its overrides, which rclpy writes into the profile itself."""
+    """Profile of a subscription before its overrides, which rclpy writes into the profile itself."""
     return QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
@@ -374,11 +375,11 @@ class InputTopic:
     without_crank : str
         Report on messages without the crank, or without its interface; empty if there are none.
     other_axis : str
-        Report on a torque about another axis than the one that is read; empty if there is none.
+        Report on a torque about a different axis than the axis that is read; empty if there is none.
     shared : int
-        Number of different lists of joints without the crank, which stands for that of their publishers.
+        Number of different lists of joints without the crank; stands for the number of their publishers.
     qos : QoSProfile
-        Of the subscription.
+        Quality of service of the subscription.
     """
 
     name: str
@@ -410,7 +411,7 @@ class Inputs:
     ----------
     topics : tuple of InputTopic
     subscriptions : tuple of Subscription
-        Those of the topics. No executor may serve them: messages are taken from rclpy's own handles.
+        Subscriptions of the topics. No executor may serve them: messages are taken from rclpy's own handles.
     """
 
     def __init__(self, node: Node, config: MonitorConfig) -> None:
@@ -421,7 +422,7 @@ class Inputs:
     def taken(self, now_ns: int) -> list[Arrival]:
         """Messages that have come since the last call, in the order of their arrival.
 
-        The caller holds the inbox's lock until it has added them: a thread may take messages, too.
+        The caller holds the inbox's lock until it has added them, because a thread may take messages as well.
 
         Parameters
         ----------

@@ -64,7 +64,7 @@ def topics_of(node: str) -> list[str]:
 
 @contextmanager
 def listening(node: str, leg: LiveLeg, setup: LegSetup | None = None) -> Iterator[None]:
-    """Tell a leg what a monitor publishes, in a thread, until the end of the context.
+    """Pass the messages of a monitor to a leg, in a thread, until the end of the context.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def listening(node: str, leg: LiveLeg, setup: LegSetup | None = None) -> Iterato
             leg.take_setup(setup)
         wanted = threading.Event()
         wanted.set()
-        # with the default executor, what fails in a callback is an exception, and messages are few
+        # With the default executor, a failure in a callback is an exception. Messages are few.
         spinning = listener, wanted.is_set, lambda node: SingleThreadedExecutor(context=node.context)
         thread = threading.Thread(target=spin, args=spinning, name="listener", daemon=True)
         thread.start()
@@ -163,7 +163,7 @@ def _setup(given: dict[str, Any], monitor: str) -> LegSetup:
 
 
 def _profile(qos: Qos) -> QoSProfile:
-    """What publishers of an output offer, also with another quality of service than the usual one."""
+    """Quality of service offered by the publishers of an output, even if it is not the usual one."""
     is_latched = qos == LATCHED
     return QoSProfile(
         depth=qos.depth,

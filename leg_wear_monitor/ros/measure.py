@@ -22,7 +22,7 @@ from leg_wear_monitor.errors import ConfigError, LegWearError, did_you_mean, pri
 from leg_wear_monitor.monitor.forecast.measurement import NOT_STORED
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 
-# Service ``~/measure``: a clearance that somebody measured, while the monitor runs.
+# Service ``~/measure``: the operator enters a measured clearance while the monitor runs.
 
 
 SERVICE = "~/measure"
@@ -49,7 +49,7 @@ def request_of(parameters: Sequence[Parameter]) -> dict[str, Any]:
     Raises
     ------
     ConfigError
-        For a parameter that is unknown, missing, given twice or of another type.
+        If a parameter is unknown, missing, given twice or of a different type.
     """
     values: dict[str, Any] = {}
     for one in parameters:
@@ -75,7 +75,7 @@ def _value(one: Parameter) -> Any:
 
 
 def measured(monitor: WearMonitor, wanted: dict[str, Any], stamp_ns: int) -> str:
-    """Enter a measured clearance into a running monitor; what came of it, in one line.
+    """Enter a measured clearance into a running monitor; return the outcome in one line.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def measured(monitor: WearMonitor, wanted: dict[str, Any], stamp_ns: int) -> str
 
 
 def not_stored(monitor: WearMonitor) -> str:
-    """Why the ledger does not contain what an operator did; empty if it does."""
+    """Reason why the ledger does not contain an operator's action; empty if it does."""
     try:
         monitor.save()
     except LegWearError as error:
@@ -101,7 +101,7 @@ def with_storage(reply: str, fault: str) -> str:
 
 
 def offer_measure(node: Node, act: Callable[[dict[str, Any]], str]) -> None:
-    """Create the service; an action enters what was measured and returns what came of it."""
+    """Create the service; an action enters the measured value and returns the outcome."""
 
     def answer(
         request: SetParametersAtomically.Request, response: SetParametersAtomically.Response
@@ -136,19 +136,19 @@ def measure_on(
     clearance_m, sigma_m : float
         Mean radial clearance, and its standard deviation.
     accept : bool
-        Whether the forecast uses it even if it contradicts the model.
+        True if the forecast uses it even if it contradicts the model.
     wait_s : float
         Longest wait for the service, and again for its answer.
 
     Returns
     -------
     str
-        What came of it.
+        Outcome of the measurement.
 
     Raises
     ------
     LegWearError
-        If nobody answers, or the monitor refuses it.
+        If no monitor answers, or the monitor refuses it.
     """
     service = _service_of(monitor, "measure")
     values = {"joint": joint, "clearance_m": clearance_m, "sigma_m": sigma_m, "accept": accept}
@@ -182,13 +182,13 @@ def trigger_on(monitor: str, name: str, wait_s: float, times: int) -> str:
     Raises
     ------
     LegWearError
-        If nobody answers, or the monitor refuses the last call.
+        If no monitor answers, or the monitor refuses the last call.
     """
     service = _service_of(monitor, name)
     with _caller(Trigger, service, wait_s) as call:
         for _ in range(times):
             answer = call(Trigger.Request())
-            if answer.success:  # somebody else may have asked for it just before
+            if answer.success:  # a different client may have asked for it just before
                 break
     if not answer.success:
         raise LegWearError(f"{service}: {answer.message}")
@@ -202,7 +202,7 @@ def _caller(kind: Any, service: str, wait_s: float) -> Iterator[Callable[[Any], 
     Raises
     ------
     LegWearError
-        If nobody offers the service, or nobody answers.
+        If no node offers the service, or no node answers.
     """
     context = Context()
     rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)

@@ -47,7 +47,7 @@ from leg_wear_monitor.twin.sample import NO_FAULT, Samples
 # A live leg cannot walk through the same time twice. If stamps agree with the node's own clock, the samples
 # are live and the clock was reset: simulation time restarted, the board has no hardware clock, or the clock
 # was set back. After a reboot, the same holds for stamps that are not calendar dates. Any other samples may
-# come from playback of a recording whose wear is already counted; this case is undecidable here.
+# come from playback of a recording whose wear is already in the ledger; the node cannot decide this case.
 
 
 NOW_NS = 10 * 10**9  # live samples are within this time of the node's clock; the inbox holds no more
@@ -138,7 +138,7 @@ class Confirmation:
         self._asked_s: dict[str, float] = {}
 
     def is_confirmed(self, what: str) -> bool:
-        """Whether the same request came less than `CONFIRM_S` ago; if not, register it as the first."""
+        """True if the same request came less than `CONFIRM_S` ago; otherwise registers it as the first."""
         now_s = self._now_s()
         asked_s = self._asked_s.pop(what, None)
         if asked_s is not None and now_s - asked_s <= CONFIRM_S:
@@ -184,8 +184,8 @@ NO_COMMANDS = "It publishes no commands and must not be part of a safety functio
 # Period at which messages are taken and processed. Each turn has its cost, whatever comes in it: 5 ms, with
 # processing when a spline node is complete, takes 4 % of a core more and reports 25 ms sooner.
 _TAKE_S = 0.05
-# period at which a thread takes messages, too: a reference keeps the node busy for up to ten seconds where
-# the machine is, and the middleware holds five seconds at 1 kHz
+# Period at which a thread takes messages as well. A reference keeps the node busy for up to ten seconds on
+# the leg's computer, and the middleware holds five seconds at 1 kHz.
 _RECEIVE_S = 1.0
 _RELEASE_S = 10.0  # period at which free memory is given back, in 0.2 ms
 _AT_ONCE = 500  # messages at once, so that services and parameters are also served
@@ -328,7 +328,7 @@ class MonitorNode(ClosingNode):
                 topic.heard_ns, topic.heard_wall_ns = now_ns, newest.log_time_ns
 
     def _turn(self) -> int:
-        """Now [ns], on a monotonic clock; what was silent while the node was late was not."""
+        """Current time [ns] on a monotonic clock; inputs are not taken as silent while the node was late."""
         now_ns = time.monotonic_ns()
         if late_ns := self._load.late_ns(now_ns):
             self._supervision.excuse(late_ns)
@@ -441,7 +441,7 @@ class MonitorNode(ClosingNode):
         return text
 
     def _send_state_and_forecast(self) -> None:
-        """Publish what an operator has changed: a leg at rest has no gait cycle that would."""
+        """Publish an operator's changes, because a leg at rest has no gait cycle that would publish them."""
         self._send_state()
         if last := self._monitor.last_cycle:
             self._outlets.send(outputs.FORECAST, time.time_ns(), self._messages.forecast(last))

@@ -44,7 +44,7 @@ _BEFORE_NS, _AFTER_NS = 30_000_000_000, 10_000_000_000
 
 
 class StopRecorder:
-    """Keeps the messages of the last 30 s in memory, and writes them and those of the next 10 s at a STOP.
+    """Keeps the messages of the last 30 s in memory; a STOP writes them and the messages of the next 10 s.
 
     Parameters
     ----------
@@ -85,14 +85,14 @@ class StopRecorder:
         if self._writer is not None and log_time_ns > self._until_ns:
             self.close()
         self._kept.append((log_time_ns, topic, raw))
-        # also what a clock that was set back has left in the future
+        # This also removes messages stamped in the future by a clock that was set back.
         while not log_time_ns - _BEFORE_NS <= self._kept[0][0] <= log_time_ns:
             self._kept.popleft()
         if self._writer is not None:
             self._write(log_time_ns, topic, raw)
 
     def stop(self, now_ns: int) -> None:
-        """Begin a file with what is kept; while one is being written, there is no other."""
+        """Begin a file with the stored messages; a file that is still being written gets no second file."""
         if self._writer is not None:
             return
         path = self._directory / f"stop-{_utc(now_ns * 1.0e-9)}-{self._leg}.mcap"
@@ -103,7 +103,7 @@ class StopRecorder:
             self._write(*kept)
 
     def flush(self) -> None:
-        """Bring what is written to the disk."""
+        """Flush the written messages to the disk."""
         if self._writer is not None:
             self._writer.flush()
 
@@ -136,13 +136,13 @@ class BlackBox:
     Parameters
     ----------
     path : str
-        MCAP file; empty disables the recording. An earlier recording of this name is kept under another.
+        MCAP file; empty disables the recording. An earlier recording of this name is kept under a new name.
     stops : str
         Directory for recordings of the seconds around a STOP; empty for none.
     leg : str
-        Hardware id, for the names of those.
+        Hardware id, for the names of these recordings.
     report : callable
-        Called with a line for the log: which file is written, and what became of an earlier one.
+        Called with a line for the log: the file that is written, and the new name of an earlier file.
 
     Attributes
     ----------
@@ -165,12 +165,12 @@ class BlackBox:
 
     @property
     def on(self) -> bool:
-        """Whether all messages are recorded, also those that nobody subscribes to."""
+        """True if all messages are recorded, including messages without a subscriber."""
         return self._writer is not None
 
     @property
     def takes_inputs(self) -> bool:
-        """Whether received messages are recorded, or kept for a STOP."""
+        """True if received messages are recorded, or kept for a STOP."""
         return self.on or self._stops is not None
 
     def add_topic(self, topic: str, kind: str, qos: "Qos") -> None:
@@ -239,7 +239,7 @@ def _writer(parameter: str, path: Path, report: Callable[[str], None]) -> "McapW
 def _move_aside(parameter: str, path: Path) -> Path | None:
     """Rename a file that is not empty by the time of its last change (UTC); its new name.
 
-    A restart with the same parameters must not delete what the former run has recorded.
+    A restart with the same parameters must not delete the recordings of the former run.
     """
     try:
         if not path.is_file() or not path.stat().st_size:
@@ -306,7 +306,7 @@ class Outlets:
             black_box.add_topic(publisher.topic_name, output.type, output.qos)
 
     def wanted(self, output: Output) -> bool:
-        """Whether a message is needed: for a subscriber, for a late one (latched), or for the recording."""
+        """True if a message is needed: for a subscriber, a late subscriber (latched), or the recording."""
         if self._black_box.on or output.qos.durability != VOLATILE:
             return True
         with until_down(self._context):
@@ -332,7 +332,7 @@ class Outlets:
 
 
 class MarkerTopic:
-    """``~/markers`` and ``~/linkage_states``, while wanted and somebody subscribes or the node is recorded.
+    """``~/markers`` and ``~/linkage_states``, published while wanted and either subscribed to or recorded.
 
     Parameters
     ----------
@@ -374,7 +374,7 @@ class MarkerTopic:
 
     @property
     def _is_wanted(self) -> bool:
-        """Whether markers are needed; if not, what they show is not kept up to date."""
+        """True if markers are needed; otherwise their content is not kept up to date."""
         wanted = self._monitor.config.publish_markers and any(map(self._outlets.wanted, (MARKERS, LINKAGE)))
         if not wanted:
             self._markers = None

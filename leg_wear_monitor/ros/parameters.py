@@ -56,13 +56,13 @@ class ParameterNode(Node):
     Attributes
     ----------
     fault_of : callable
-        Why parameters cannot be set, empty if they can. It is asked before rclpy, which would name neither
+        Reason why parameters cannot be set, empty if they can. Called before rclpy, which would name neither
         unit nor bounds of a value that is out of range.
 
     Raises
     ------
     ConfigError
-        For a parameter of rclpy itself, such as ``use_sim_time``, of another type.
+        If a parameter of rclpy itself, such as ``use_sim_time``, has a wrong type.
     """
 
     fault_of: Callable[[list[RosParameter]], str] = staticmethod(lambda _: "")
@@ -91,7 +91,7 @@ class ParameterNode(Node):
     def create_service(
         self, srv_type: Any, srv_name: str, callback: Callable[[Any, Any], Any], **options: Any
     ) -> Service:
-        """Create a service; rclpy creates those for parameters by this function, too.
+        """Create a service; rclpy creates its parameter services by this function as well.
 
         Requests with a parameter of a type that does not exist do not reach the callback: rclpy raises an
         exception for it, which ends the node.
@@ -105,7 +105,7 @@ class ParameterNode(Node):
     def create_subscription(
         self, msg_type: Any, topic: str, callback: Callable[[Any], None], *options: Any, **named: Any
     ) -> Subscription:
-        """Create a subscription; rclpy creates that of ``/clock`` by this function, too.
+        """Create a subscription; rclpy creates its ``/clock`` subscription by this function as well.
 
         A time before 0 does not reach the callback: rclpy raises an exception for it, which ends the node.
 
@@ -165,7 +165,7 @@ class ParameterNode(Node):
         """Set parameters, all or none.
 
         Read-only parameters may be set to their present value, so that a dump can be loaded. The clock cannot
-        be changed either: accounting and audit must not continue with another clock.
+        be changed either, because accounting and audit must not continue with a different clock.
         """
         wanted = [self._typed(one) for one in parameter_list]
         changes = [one for one in wanted if not self._is_unchanged(one)]
@@ -179,7 +179,7 @@ class ParameterNode(Node):
         return super().set_parameters_atomically(changes)
 
     def _can_be_set(self, one: RosParameter) -> bool:
-        """Whether a parameter is declared, of this type and not read-only; rclpy refuses the others."""
+        """True if a parameter is declared, of this type and not read-only; rclpy refuses any other."""
         if not self.has_parameter(one.name):
             return False
         declared = self.describe_parameter(one.name)
@@ -201,7 +201,7 @@ class ParameterNode(Node):
         return one
 
     def _is_unchanged(self, one: RosParameter) -> bool:
-        """Whether a parameter is read-only and already has this value."""
+        """True if a parameter is read-only and already has this value."""
         if not self.has_parameter(one.name):
             return False
         if not self.describe_parameter(one.name).read_only and one.name != _CLOCK:
@@ -264,7 +264,7 @@ _OF_ROS = (_CLOCK, "start_type_description_service")
 
 
 def _is_of_ros(name: str) -> bool:
-    """Whether a parameter is one of every node, handled by rclpy itself."""
+    """True if a parameter belongs to every node and is handled by rclpy itself."""
     return name in _OF_ROS or name.startswith(_QOS_OVERRIDES)
 
 

@@ -80,8 +80,8 @@ DONE, COULD_NOT = 0, 2
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
-# of the interpreter's lock, which each message takes: while another thread prepares a simulated leg, Python's
-# own 5 ms would let 200 messages a second through
+# Switch interval of the interpreter's lock, which each message takes. While a different thread prepares a
+# simulated leg, Python's default of 5 ms would let only 200 messages a second through.
 _SWITCH_S = 2.0e-4
 
 
@@ -111,15 +111,15 @@ _MMAP_THRESHOLD, _LARGE_BYTES = -3, 2**18  # M_MMAP_THRESHOLD of glibc's malloc.
 def release_large_arrays() -> None:
     """Have each large array given back to the system when it is freed, where the C library can.
 
-    By itself glibc keeps arrays of up to 32 MB for later ones once it has seen some: 40 MB of a walking node
-    of 260, and 300 MB of one that identifies a leg.
+    By default, glibc keeps freed arrays of up to 32 MB for reuse once it has seen some: 40 MB of the 260 MB
+    of a walking node, and 300 MB of a node that identifies a leg.
     """
     with suppress(AttributeError, OSError):
         ctypes.CDLL(None).mallopt(_MMAP_THRESHOLD, _LARGE_BYTES)
 
 
 def release_memory() -> None:
-    """Give back to the system what is free in this process between smaller objects; starting leaves 25 MB."""
+    """Return free memory between smaller objects to the system; starting leaves 25 MB of it."""
     with suppress(AttributeError, OSError):
         ctypes.CDLL(None).malloc_trim(0)
 
@@ -143,7 +143,7 @@ def spin(
         with until_down(node.context):
             executor.add_node(node)
             while node.context.ok() and wanted():
-                # a new one each time: a future keeps what waits for it
+                # The future is new each time, because a future keeps the objects that wait for it.
                 executor.spin_until_future_complete(Future(), timeout_sec=WAKE_S)
     finally:
         executor.shutdown()
@@ -203,8 +203,8 @@ def run(
 ) -> int:
     """Create a node, run it until a signal or its own end, and shut it down.
 
-    Signals are ours and not rclpy's: its handlers take the context down at once, between any two calls, and
-    with it the way to publish what was taken in last.
+    We handle signals ourselves: rclpy's handlers shut the context down at once, between any two calls. The
+    node could then no longer publish the last messages it took in.
 
     Parameters
     ----------

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 # Log of the node: alarm changes and new faults, each logged once.
 
 
-# Statuses that are logged; the others follow from alarms, which are logged already.
+# Statuses that are logged; the other statuses follow from alarms, which are logged already.
 STATUSES = ("topics", "cpu_load", "recording", "ledger", "clock")
 
 
@@ -93,7 +93,7 @@ def _plain(value: float) -> str:
 
 
 class StatusLog:
-    """Logs a line when a status becomes a fault, changes to another fault, or recovers.
+    """Logs a line when a status becomes a fault, changes to a different fault, or recovers.
 
     Parameters
     ----------
@@ -159,11 +159,11 @@ class Supervision:
 
     @property
     def is_current(self) -> bool:
-        """Whether usable crank samples are arriving."""
+        """True if usable crank samples are arriving."""
         return self._silence.level(KINDS[CRANK].name, time.monotonic_ns()) is Level.OK
 
     def excuse(self, late_ns: int) -> None:
-        """Do not take a time in which the node was late [ns] for a silence of its inputs."""
+        """Exclude a time in which the node was late [ns] from the silence of its inputs."""
         self._silence.excuse(late_ns)
         for topic in self.inputs:
             topic.heard_ns += late_ns if topic.heard_ns else 0
@@ -195,13 +195,13 @@ class Supervision:
         return int(self._node.get_clock().now().nanoseconds)
 
     def alarms(self, alarms: AlarmList) -> AlarmList:
-        """Merge the monitor's alarms with those of the node, and log the changes."""
+        """Merge the monitor's alarms with the node's alarms, and log the changes."""
         shown = self._alarms.beside(alarms)
         self._alarm_log.note(shown)
         return shown
 
     def verdict(self, report: VerdictReport) -> VerdictReport:
-        """Merge the monitor's verdict with what the node knows; without any, it is unchanged."""
+        """Merge the monitor's verdict with the node's knowledge; without any, the verdict is unchanged."""
         own, monitors = self._alarms.raised, report.findings
         if self._other_axis:
             monitors = tuple(map(self._with_axis, monitors))
@@ -211,7 +211,7 @@ class Supervision:
         return attrs.evolve(report, findings=(*monitors, *dated(found, (), report.stamp_ns)))
 
     def state(self, report: VerdictReport) -> VerdictReport:
-        """Merge the state of the leg with what the node knows: its alarms, and its part of the verdict."""
+        """Merge the state of the leg with the node's own alarms and its part of the verdict."""
         report, leg = self.verdict(report), report.leg
         if leg is None or not self._alarms.raised:
             return report
@@ -219,7 +219,7 @@ class Supervision:
         return attrs.evolve(report, leg=attrs.evolve(leg, alarms=LegAlarms(now=now)))
 
     def _with_axis(self, finding: Verdict) -> Verdict:
-        """A finding about the drive torque with its cause, if the torque is about another axis."""
+        """Issue of the drive torque with its cause, if the torque is about a different axis."""
         if code_of_rule(finding) not in _OF_AXIS:
             return finding
         do = "correct drive_torque.axis and start the monitor again; then acknowledge the alarms"
@@ -280,7 +280,7 @@ class Supervision:
         return self._silence.marked((*given.values(), topics), now_ns)
 
     def _sources(self, topic: InputTopic, now_ns: int) -> int:
-        """Number of publishers that certainly send what is expected of a topic."""
+        """Number of publishers that certainly send the expected data of a topic."""
         names = topic.publishers.fitting
         sources = len(names) - topic.shared
         if sources < 2:

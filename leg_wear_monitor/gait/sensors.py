@@ -29,8 +29,8 @@ from leg_wear_monitor.twin.sample import FAULTS, NO_FAULT, OUT_OF_RANGE, WRONG_T
 
 _SWITCH_N = 20.0  # vertical force above which a contact switch reads 1
 
-# Each sensor, and the transport, has a random stream of its own, by this number beside the seed. So another
-# setting of one sensor leaves the noise of the others as it is.
+# Each sensor and the transport has its own random stream, selected by this number together with the seed. A
+# changed setting of one sensor therefore leaves the noise of the other sensors unchanged.
 _CRANK_NOISE, _TORQUE_NOISE, _TRANSPORT_NOISE, _ENCODER_NOISE, _LOAD_NOISE = 1, 2, 3, 4, 5
 
 # Faults that a message can have on the wire. The tracker finds OUT_OF_RANGE in the values, and a message of
@@ -41,8 +41,8 @@ _INJECTED_FAULTS = tuple(fault for fault in FAULTS if fault not in (NO_FAULT, WR
 class Reading(NamedTuple):
     """A sensor message: times of arrival and of measurement [s since the start], and its content.
 
-    ``kind`` is CRANK, TORQUE or LOAD; values that another kind of sensor measures are NaN or empty. A reading
-    with a ``fault`` (a key of `FAULTS`) is sent as a message with that fault.
+    ``kind`` is CRANK, TORQUE or LOAD; values that a different kind of sensor measures are NaN or empty. A
+    reading with a ``fault`` (a key of `FAULTS`) is sent as a message with this fault.
     """
 
     arrival_s: float
@@ -192,7 +192,8 @@ def _transported(measured: Iterable[Reading], config: TransportConfig, noise: No
     for reading in measured:
         while in_transit and in_transit[0][0] <= reading.taken_s:
             yield heapq.heappop(in_transit)[2]
-        # four numbers for each reading, used or not, so that one setting leaves the effects of the others
+        # We draw four numbers for each reading, used or not, so that one setting does not change the effects
+        # of the other settings.
         chance = [noise.uniform() for _ in range(4)]
         if chance[0] < config.drop_fraction or _in_gap(reading.taken_s, config):
             continue

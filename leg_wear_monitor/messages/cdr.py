@@ -1,8 +1,8 @@
 """Messages as they lie in a bag: CDR (XCDR1, either byte order) of the input types, read in place.
 
 A message is four bytes of encapsulation and a body; members are aligned relative to the start of the body
-(OMG DDS-XTypes 1.3, section 7.4.3). Positions are indices into one array of bytes that holds many messages;
--1 is the position behind what cannot be read.
+(OMG DDS-XTypes 1.3, section 7.4.3). Positions are indices into one array of bytes that holds many messages.
+Position -1 marks the end of a message that cannot be read.
 """
 
 import math
@@ -44,7 +44,7 @@ _KIND[[stream.code for stream in STREAMS]] = [stream.kind for stream in STREAMS]
 
 ENCAPSULATION = 4
 # Bytes that may follow a message: up to 3 where a middleware fills up to a multiple of four, and 4 more for
-# each empty sequence of numbers: rclpy's serialize_message reserves room to align what is not there.
+# each empty sequence of numbers, because rclpy's serialize_message reserves room to align absent numbers.
 _MOST_PADDING = 15
 
 
@@ -147,7 +147,7 @@ def names(data, at, end, origin, big, wanted):
 
 @kernel
 def ends(at, end):
-    """Whether a message ends where its data do."""
+    """True if a message ends where its data end."""
     return at >= 0 and end - at <= _MOST_PADDING
 
 
@@ -161,7 +161,8 @@ def value(data, count, first, index, big):
 def joint_state(data, begin, end, big, crank):
     """Read sensor_msgs/JointState: fault, stamp [ns], the crank's position, velocity and effort.
 
-    NaN is what a driver gives for a velocity or an effort that it does not measure: absent, and no fault.
+    A driver gives NaN for a velocity or an effort that it does not measure. The value is then absent; this is
+    not a fault.
     """
     origin = begin + ENCAPSULATION
     stamp, at = header(data, origin, end, big)
@@ -237,8 +238,8 @@ def wrench_force(data, begin, end, big, out_force):
 def dynamic_joint_state(data, begin, end, big, joint, interface, further):
     """Read control_msgs/DynamicJointState: fault, stamp [ns], values of two interfaces of a joint.
 
-    NaN is what joint_state_broadcaster publishes for an interface that has no value yet. The second one may
-    be absent: it is then NaN, and no fault.
+    joint_state_broadcaster publishes NaN for an interface that has no value yet. The second value may be
+    absent: it is then NaN, and this is not a fault.
     """
     origin = begin + ENCAPSULATION
     stamp, at = header(data, origin, end, big)
@@ -294,24 +295,24 @@ def decode(
     crank : (characters,) array of uint8
         Name of the crank's joint, UTF-8.
     interface : (characters,) array of uint8
-        Name of the crank's interface that is its torque, UTF-8.
+        Name of the crank's torque interface, UTF-8.
     thermal : (characters,) array of uint8
-        Name of the crank's interface that is the temperature of its drive, UTF-8; empty: none.
+        Name of the crank's interface for the drive temperature, UTF-8; empty if there is none.
     encoders : (characters,) array of uint8
-        Names of the joints with further encoders, one after the other.
+        Names of the joints with further encoders, joined without a separator.
     ends_at : (m,) array of int
-        Where each of them ends.
+        End of each name.
     axis : int
         Axis of a wrench's torque: 0, 1, 2 for x, y, z.
     use_effort : bool
-        Whether the crank's effort is its torque.
+        True if the crank's effort is its torque.
     out : (n,) array of GAIT_SAMPLE
-        The stamp is the header's; the log time where a type has no header; 0 where it cannot be read. Its
-        ``encoder_rad`` and ``foot_force_n`` are left alone.
+        The stamp is the header stamp, the log time if a type has no header, and 0 if it cannot be read.
+        ``encoder_rad`` and ``foot_force_n`` are not modified.
     out_angles : (n, m) array
-        Of the further encoders.
+        Angles of the further encoders.
     out_force : (n, 2) array
-        Force on the foot, x and y [N]; a vertical one is y, and 0 or 1 that of a contact switch.
+        Force on the foot, x and y [N]. A vertical force is y. A contact switch gives 0 or 1.
     """
     for i in range(messages.shape[0]):
         begin, end = messages[i]["begin"], messages[i]["end"]

@@ -241,7 +241,7 @@ def diagnostic_array(
 # visualization_msgs/Marker
 SPHERE, LINE_LIST, TEXT = 2, 5, 9
 
-_LIFETIME_S = 2  # without a new message, tools remove the markers: those of a node that died would stay
+_LIFETIME_S = 2  # Tools remove markers without a new message, so markers of a node that died do not stay.
 
 
 @attrs.frozen(kw_only=True, eq=False)

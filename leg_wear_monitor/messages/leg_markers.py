@@ -52,13 +52,13 @@ class LegDrawing:
     joints : (STEPS, k, 3) array
         The clearance joints.
     tags : dict of int to str
-        Names of joints at one place, such as ``A B``, by the index of the first of them.
+        Names of joints at the same place, such as ``A B``, by the index of the first joint.
     title : (3,) array
-        Place beside the leg.
+        Position of the title next to the leg.
     links : tuple of str
         Joints that carry the links of the mechanism's robot description.
     link_positions : (STEPS, n) array
-        Their positions [rad, or m of a slider].
+        Positions of these joints [rad; m for a slider].
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
@@ -98,7 +98,7 @@ class LegDrawing:
 
 @attrs.frozen
 class _Shown:
-    """What the markers show besides the motion; joints in their order."""
+    """Values that the markers show in addition to the motion; joints in the order of the leg."""
 
     levels: tuple[Level, ...]
     clearances_m: tuple[float, ...]
@@ -164,7 +164,7 @@ class LegMarkers:
         yield single(LINKAGE, stamp_ns, rows[0].tobytes())
 
     def _take(self, begin_ns: int, end_ns: int) -> None:
-        """Show the changes with stamps between two; the others wait."""
+        """Show the changes with stamps between the two given stamps; later changes wait."""
         waiting = []
         for change in self._changes:
             if not begin_ns <= change.stamp_ns < end_ns:

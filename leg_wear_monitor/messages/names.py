@@ -1,4 +1,4 @@
-"""Names in a message, for reports on what is not in it."""
+"""Names in a message, for reports on missing names."""
 
 import struct
 from collections.abc import Mapping, Sequence
@@ -64,7 +64,7 @@ def wanted_interfaces(config: MonitorConfig) -> dict[str, str]:
 
 
 def twice(names: Sequence[str], joint: str) -> str:
-    """That a name is there several times, and at which places; empty if it is there at most once."""
+    """Report that a name occurs several times, and at which places; empty if it occurs at most once."""
     places = [str(i + 1) for i, name in enumerate(names) if name == joint]
     if len(places) < 2:
         return ""
@@ -72,7 +72,7 @@ def twice(names: Sequence[str], joint: str) -> str:
 
 
 def is_without(samples: Samples, interfaces: Mapping[str, str]) -> NDArray[np.bool_]:
-    """Which samples (n,) of control_msgs/DynamicJointState messages lack a wanted interface."""
+    """Mask (n,) of the samples of control_msgs/DynamicJointState that lack a wanted interface."""
     absent = samples["fault"] == MISSING_JOINT
     if interfaces["drive.temperature_interface"]:
         absent |= (samples["fault"] == NO_FAULT) & np.isnan(samples["temperature_c"])

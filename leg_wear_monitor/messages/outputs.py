@@ -124,7 +124,7 @@ class Messages:
         self._impacts = [f"{joint}_impact" for joint in clearance_joints]
 
     def of(self, reports: Reports) -> Iterator[Outgoing]:
-        """All messages for reports: those of samples, of gait cycles, of alarms, of verdict and state."""
+        """All messages for reports: samples, gait cycles, alarms, verdict and state."""
         yield from self.of_samples(reports.samples)
         for cycle in reports.cycles:
             yield single(CLEARANCES, cycle.stamp_ns, self.clearances(cycle))

@@ -44,9 +44,9 @@ class Stream:
         Value of the parameter of its kind, in `streams_of`, for which the stream is read; empty if it is
         always read.
     has_stamp : bool
-        Whether the type has a header; without one, the time of arrival stamps its samples.
+        True if the type has a header; without one, the time of arrival stamps its samples.
     is_needed : bool
-        Whether the stream is required.
+        True if the stream is required.
     """
 
     code: int
@@ -136,7 +136,7 @@ class Definition:
     Attributes
     ----------
     text : str
-        Definition in ros2msg format, including those of all nested types.
+        Definition in ros2msg format, including the definitions of all nested types.
     digest : str
         Type hash of REP-2011, ``RIHS01_...``.
     """
@@ -145,7 +145,7 @@ class Definition:
     digest: str
 
 
-# of ros2_control, which is not among ROS 2's common interfaces
+# This type belongs to ros2_control and is not among ROS 2's common interfaces.
 _FURTHER = {
     "control_msgs/msg/InterfaceValue": "string[] interface_names\nfloat64[] values",
     "control_msgs/msg/DynamicJointState": (
@@ -156,7 +156,7 @@ _FURTHER = {
 
 @cache
 def types() -> "Typestore":
-    """Types of ROS 2 Jazzy, and those of ros2_control that are read."""
+    """Types of ROS 2 Jazzy, and the types of ros2_control that the monitor reads."""
     # recordings need them; a node without one does without rosbags, which no ROS package has
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -193,7 +193,7 @@ def changed_fields(name: str, text: str, encoding: str) -> list[str]:
         if encoding == "ros2msg":
             recorded = get_types_from_msg(text, name)
         else:
-            # each type follows a line of equal signs; rosbags parses neither that line nor the next ones
+            # Each type follows a line of equal signs. rosbags parses neither this line nor the next lines.
             plain = re.sub(r"^(IDL: |#).*\n", "", text, flags=re.MULTILINE)
             parts = filter(str.strip, re.split(r"^=+\n", plain, flags=re.MULTILINE))
             recorded = {key: one for part in parts for key, one in get_types_from_idl(part).items()}
@@ -237,5 +237,5 @@ class ForecastTimes:
                 yield cycle
 
     def _is_minute(self, stamp_ns: int) -> bool:
-        """Whether no forecast was published yet, or the last is a minute old or of another time base."""
+        """True if no forecast was published yet, or the last is a minute old or has a different time base."""
         return self._published_ns is None or not 0 <= stamp_ns - self._published_ns < _MINUTE_NS

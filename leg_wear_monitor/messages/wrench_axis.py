@@ -10,7 +10,7 @@ _TORQUE = (struct.Struct(">3d"), struct.Struct("<3d"))  # the end of a wrench, b
 _KEPT = 400
 _LEAST = 40
 _SWINGS = 0.3  # RMS of a drive's torque, as a fraction of the predicted one
-_STILL = 0.02  # RMS of noise and of what a sensor's axes take from each other, as a fraction of the largest
+_STILL = 0.02  # Largest RMS of noise and crosstalk between a sensor's axes, as a fraction
 
 
 class WrenchAxis:
@@ -19,9 +19,9 @@ class WrenchAxis:
     Parameters
     ----------
     axis : str
-        The one that is read, ``x``, ``y`` or ``z``.
+        Axis that is read, ``x``, ``y`` or ``z``.
     predicted_nm : float, optional
-        RMS of the predicted torque, as the sensor has it.
+        RMS of the predicted torque at the sensor.
     """
 
     def __init__(self, axis: str, predicted_nm: float = 0.0) -> None:

@@ -44,8 +44,8 @@ def replay(
 ) -> ReplayResult:
     """Replay a recording through the monitor.
 
-    What the ledger contains already is not counted again; if that is all of the recording, ledger and earlier
-    reports stay as they are.
+    Wear that the ledger contains already is not added again. If it covers the whole recording, the ledger and
+    earlier reports stay unchanged.
 
     The ledger is written last and atomically. An interrupted replay leaves the ledger unchanged, so repeating
     the replay gives the same result.
@@ -133,13 +133,14 @@ def replay(
             _run(result, recording, sink, progress)
         if out is not None and part:
             place = Path(out) / REPORTS_FILE
-            if not (monitor.is_all_counted and place.exists()):  # empty ones not over those of before
+            if not (monitor.is_all_counted and place.exists()):  # keep earlier ones if these are empty
                 part.replace(place)
         result.findings = recording.findings + _about_the_ledger(result)
         result.is_partial = recording.is_partial
         if finish:
             finish(result)
-        # otherwise the wear of another machine would remain in the ledger, or a run that counted nothing
+        # Without this, the wear of a different machine, or of a run that evaluated nothing, would remain in
+        # the ledger.
         if not result.is_unusable and not monitor.is_all_counted:
             monitor.close()
     return result
@@ -225,7 +226,7 @@ def node_beside(topic: str) -> str:
 
 @contextmanager
 def _part(directory: Path, files: list[Path]) -> Iterator[Path]:
-    """File to write reports into: beside those of an earlier replay, which may have to stay."""
+    """File for the reports, next to those of an earlier replay, which may have to stay."""
     path = directory / REPORTS_FILE
     if any(path.resolve() == file.resolve() for file in files):
         raise RecordingError(str(path), "", "is both read and written. Expected a different directory")

@@ -39,7 +39,7 @@ class LegJoint:
     place_m : tuple of float
         Its place at crank angle 0.
     is_on_ground : bool
-        Whether it joins a body to the ground.
+        True if it joins a body to the ground.
     """
 
     label: str
@@ -68,7 +68,7 @@ class ReplayLeg:
         return f"{joint} ({label})" if label else joint
 
 
-# The leg after a replay: joints, remaining life, alarms, status; SI units, None for what is not known.
+# The leg after a replay: joints, remaining life, alarms, status. SI units; None for unknown values.
 
 
 def _known_values(values: Mapping[str, float | None]) -> dict[str, float | None]:
@@ -82,20 +82,20 @@ def _perhaps() -> Any:
 
 @attrs.frozen(kw_only=True)
 class EncoderEvidence:
-    """What further encoders show of a clearance; see `monitor.encoders.ClearanceEstimate`.
+    """Evidence of further encoders about a clearance; see `monitor.encoders.ClearanceEstimate`.
 
     Attributes
     ----------
     observation : ClearanceObservation
-        Whether the encoders show it, and why not.
+        State of the observation: whether the encoders show the clearance, and the reason if not.
     departure_m : float or None
-        Clearance that they show, minus the modelled one.
+        Clearance estimated from the encoders, minus the modelled clearance.
     sigma_m : float or None
         Its standard deviation.
     believed : bool
-        Whether the forecast uses it.
+        True if the forecast uses it.
     is_other : bool
-        Whether the difference is significant.
+        True if the difference is significant.
     """
 
     observation: ClearanceObservation
@@ -126,7 +126,7 @@ class ReplayJoint:
     mean_force_n : float or None
         Mean contact force over all gait cycles.
     encoders : EncoderEvidence or None
-        What further encoders show of the clearance; None without such encoders.
+        Evidence of further encoders about the clearance; None without such encoders.
     impacts : int
         Number of impacts.
     load : BushingLoad or None
@@ -161,7 +161,7 @@ class ReplayStatus:
     values : dict of str to float or None
         Values of the status; each key ends in its unit.
     fault_code : str
-        Stable name of what is wrong; empty in a file of an older version.
+        Stable name of the fault; empty in a file of an older version.
     """
 
     name: str
@@ -197,9 +197,9 @@ class ReplayFinding:
     Attributes
     ----------
     file : str
-        File in which it was found.
+        File with the issue.
     text : str
-        What was found, on one line.
+        Description of the issue, on one line.
     weight : Severity
         Effect on the result: ``loss`` if data are lost or may be wrong.
     """
@@ -211,7 +211,7 @@ class ReplayFinding:
 
 @attrs.frozen(kw_only=True)
 class ReplayRecording:
-    """What was read.
+    """The recording that the replay read.
 
     Attributes
     ----------
@@ -222,7 +222,7 @@ class ReplayRecording:
     time : str
         Source of the stamps: ``header``, ``log`` or ``publish``.
     is_partial : bool
-        Whether recorded data are lost or may be wrong.
+        True if recorded data are lost or may be wrong.
     findings : tuple of ReplayFinding
         Faults of the recording.
     crank_samples : int
@@ -285,7 +285,7 @@ class ReplayMonitor:
 
 @attrs.frozen(kw_only=True)
 class ReplayGait:
-    """Whether the motion was a gait of this leg.
+    """Result of the check that the motion was a gait of this leg.
 
     Attributes
     ----------
@@ -296,7 +296,7 @@ class ReplayGait:
     missing : str
         Why none fits; empty if one does.
     is_counted : bool
-        Whether all of the recording was in the ledger already.
+        True if all of the recording was in the ledger already.
     """
 
     believable_cycles: int
@@ -312,7 +312,7 @@ class ReplayGait:
 class ReplayHistory:
     """Columns over n groups of gait cycles: last value of each; maximum of peaks, sum of impacts.
 
-    NaN where a value is not known. What a joint has is an array a joint, by its name.
+    A value is NaN if it is not known. Values per joint are arrays, keyed by the joint's name.
 
     Attributes
     ----------
@@ -325,7 +325,7 @@ class ReplayHistory:
     moving_s : (n,) array
         Time in motion.
     bridged_s : (n,) array
-        Of it the time bridged in gaps.
+        Part of the moving time that bridges gaps.
     measured_torque_rms_nm : (n,) array
         RMS of the measured drive torque.
     predicted_torque_rms_nm : (n,) array
@@ -337,9 +337,9 @@ class ReplayHistory:
     friction_nm : (n,) array
         Friction of the drive, as estimated.
     modelled_m : dict of str to (n,) array
-        Counted mean radial clearance around the bushing.
+        Modelled mean radial clearance around the bushing.
     modelled_max_m : dict of str to (n,) array
-        Counted largest radial clearance around the bushing.
+        Modelled largest radial clearance around the bushing.
     growth_m_per_cycle : dict of str to (n,) array
         Growth of the mean clearance in a gait cycle.
     peak_force_n : dict of str to (n,) array
@@ -351,12 +351,12 @@ class ReplayHistory:
     impacts : dict of str to (n,) array
         Number of impacts.
     estimated_m : dict of str to (n,) array
-        Mean radial clearance that encoders or the drive torque show, the surer one; empty in a file of an
-        older version.
+        Mean radial clearance estimated from the encoders or the drive torque, by the more certain
+        source; empty in a file of an older version.
     estimated_sigma_m : dict of str to (n,) array
         Its standard deviation; empty in a file of an older version.
     lowest : dict of str to (n,) array
-        Of cadence, torques, mismatch, load and friction, by their names: the smallest value in each group;
+        Smallest value in each group, for cadence, torques, mismatch, load and friction, by their names;
         empty if each group is one gait cycle.
     highest : dict of str to (n,) array
         The largest value in each group.
@@ -412,7 +412,7 @@ _Path = tuple[str, ...]
 
 
 def columns_of(kind: type, parts: Sequence[Any]) -> dict[str, list[Any]]:
-    """One row a part of a class; None for what is not known, or is not there."""
+    """One row per part of a class; None for a value that is unknown or absent."""
     return {".".join(path): [_value(part, path) for part in parts] for path in _paths(kind)}
 
 
@@ -439,24 +439,24 @@ def _value(part: Any, path: _Path) -> Any:
 
 @attrs.frozen(kw_only=True, eq=False)
 class ReplaySummary(LegState):
-    """The state of the leg at the end of a replay, and what else was found; its page contains nothing else.
+    """The state of the leg after a replay, and the issues of the recording; its page contains nothing else.
 
     Attributes
     ----------
     recording : ReplayRecording
-        What was read.
+        The recording that was read.
     monitor : ReplayMonitor
         Settings of the monitor.
     leg : ReplayLeg
         The mechanism as a picture needs it; empty in a file of an older version.
     wall_s : float or None
-        Wall-clock duration of the replay [s]; None if nobody measured it.
+        Wall-clock duration of the replay [s]; None if it was not measured.
     real_time_factor : float or None
-        Duration of the recording, as a multiple of that.
+        Duration of the recording divided by the wall-clock duration.
     cycles : int
         Gait cycles.
     gait : ReplayGait
-        Whether the motion was a gait of this leg.
+        Result of the check that the motion was a gait of this leg.
     joints : dict of str to ReplayJoint
         Clearance joints; empty without one gait cycle that fits this leg, like ``clearances`` and ``life``.
     forecast : LegForecast or None
@@ -466,8 +466,8 @@ class ReplaySummary(LegState):
     walked : tuple of WalkedLoad
         Walking since the start of the ledger, or of the replay without one, by the foot load that acted.
     status : tuple of ReplayStatus
-        Lines of /diagnostics at the end; after a measurement or a repair in the ledger of a fleet's leg, the
-        verdict's, and those of the recording that still hold.
+        Lines of /diagnostics at the end. After a measurement or a repair in the ledger of a fleet's leg: the
+        verdict's lines, and the lines of the recording that are still valid.
     lost : Lost
         Samples and time that were not used.
     history : ReplayHistory
@@ -526,14 +526,14 @@ def summary_of(record: Any, source: str) -> ReplaySummary:
     Parameters
     ----------
     record : object
-        What a file of JSON contains.
+        Contents of a JSON file.
     source : str
         Name of the file, for messages.
 
     Raises
     ------
     ConfigError
-        If the object has another version, or is no summary; it names the key at fault.
+        If the object has a different version, or is not a summary; the message names the key at fault.
     """
     again = "replay the recording again"
     return structure_of_version(record, ReplaySummary, SCHEMA_VERSION, source, again, missing=1)

@@ -1,6 +1,6 @@
 """The result of a replay and its summary, from which its files and its page are made.
 
-What the verdict does not believe has no remaining life.
+A forecast that the verdict rejects has no remaining life.
 """
 
 from collections.abc import Callable, Mapping
@@ -44,7 +44,7 @@ from leg_wear_monitor.twin import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import Samples, has_value_of
 from leg_wear_monitor.wear import BUSHING, JOURNAL
 
-# Condition of the leg at the end of a replay; what the verdict does not believe has no remaining life.
+# Condition of the leg at the end of a replay. A forecast that the verdict rejects has no remaining life.
 
 
 def joint_forecast(forecast: JointForecast | None, verdict: Verdict) -> JointForecast | None:
@@ -96,7 +96,7 @@ class ReplayResult:
     findings : list of Finding
         Faults of the recording.
     is_partial : bool
-        Whether recorded data are lost or may be wrong.
+        True if recorded data are lost or may be wrong.
     evidence : GaitEvidence
         Evidence on whether the tracked motion is a gait of this leg.
     crank_samples, torque_samples : int
@@ -123,12 +123,12 @@ class ReplayResult:
 
     @property
     def is_believable(self) -> bool:
-        """Whether at least one gait cycle fits this leg; otherwise no value is meaningful."""
+        """True if at least one gait cycle fits this leg; otherwise no value is meaningful."""
         return self.evidence.believable > 0
 
     @property
     def is_unusable(self) -> bool:
-        """Whether no gait cycle fits this leg; a remainder next to counted time may have no cycle."""
+        """True if no gait cycle fits this leg; a remainder after wear in the ledger may have no cycle."""
         is_rest = self.monitor.lost.already_counted > 0 and not self.evidence.doubtful
         return not self.is_believable and not is_rest
 
@@ -142,14 +142,14 @@ class ReplayResult:
     def summary(
         self, wall_s: float | None = None, made_with: Mapping[str, str] | None = None
     ) -> ReplaySummary:
-        """What was found, as classes, which give JSON and tables.
+        """Summary of the replay as classes, which give JSON and tables.
 
         Parameters
         ----------
         wall_s : float, optional
             Wall-clock duration of the replay [s].
         made_with : mapping of str to str, optional
-            Names and versions of what made it.
+            Names and versions of the programs that made it.
         """
         last, monitor = self.history.last, self.monitor
         state = monitor.state
@@ -272,7 +272,7 @@ def _joint(history: History, k: int, joint: JointReport, verdict: Verdict) -> Re
 
 
 def _of_known(statistic: Callable[[Floats], Any], values: Floats) -> float | None:
-    """A statistic of the values that are known: forces of gait cycles that were followed."""
+    """A statistic of the values that are known: forces of gait cycles that were tracked."""
     known = values[np.isfinite(values)]
     return float(statistic(known)) if len(known) else None
 

@@ -152,7 +152,7 @@ class ExudynLeg:
     penalty : float
         Stiffness of springs in place of ideal joints [N/m]; 0 for ideal joints.
     watched : bool
-        Whether the contact forces are recorded.
+        True if the contact forces are recorded.
     """
 
     def __init__(self, setup: Setup, penalty: float = 0.0, watched: bool = False) -> None:

@@ -95,7 +95,7 @@ def inner_names(path: Path, tests: Path, packages: set[str], seen: set[Path]) ->
 
 
 def is_public(path: Path, tests: Path, packages: set[str]) -> bool:
-    """Whether a test file, its helpers and the conftests of its folder use public names only."""
+    """True if a test file, its helpers and the conftests of its folder use public names only."""
     seen = set[Path]()
     around = [each / "conftest.py" for each in path.parents if tests in each.parents]
     files = [path, *(each for each in around if each.exists())]

@@ -163,7 +163,7 @@ _closers: list[Callable[[], None]] = []
 
 
 def would_be_lost(frame: FrameType | None) -> bool:
-    """Whether an exception that is raised in a frame may be swallowed by one of its callers.
+    """True if an exception that is raised in a frame may be swallowed by one of its callers.
 
     Parameters
     ----------

@@ -116,12 +116,12 @@ def find_files(paths: Iterable[Recordable]) -> tuple[list[BagFile], list[Finding
 
 
 def is_recording_name(path: Path) -> bool:
-    """Whether a file is a recording by its name."""
+    """True if a file is a recording by its name."""
     return bool(_NAME.fullmatch(path.name) or _TABLE.fullmatch(path.name))
 
 
 def is_bag_directory(path: Path) -> bool:
-    """Whether a directory is one recording, not a collection of them.
+    """True if a directory is one recording, not a collection of them.
 
     It has metadata, or files with the names that rosbag2 gives them: it writes the metadata last.
     """

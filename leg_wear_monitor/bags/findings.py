@@ -33,7 +33,7 @@ class RecordingError(ConfigError):
 
     @property
     def is_passing(self) -> bool:
-        """Whether the system is at fault, such as a permission or a network, and not the recording."""
+        """True if the system is at fault, such as a permission or a network, and not the recording."""
         return isinstance(self.__cause__, OSError) and bool(self.__cause__.errno)
 
 

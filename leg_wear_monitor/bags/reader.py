@@ -322,7 +322,7 @@ class Recording:
 
     @property
     def is_partial(self) -> bool:
-        """Whether recorded data are lost or may be wrong."""
+        """True if recorded data are lost or may be wrong."""
         return any(finding.severity is Severity.LOSS for finding in self.findings)
 
     def blocks(self) -> Iterator[Block]:

@@ -97,7 +97,7 @@ class Encoder:
 
     @property
     def is_effort(self) -> bool:
-        """Whether the torque is the effort of the crank, which needs an angle in the same row."""
+        """True if the torque is the effort of the crank, which needs an angle in the same row."""
         return self.has_torque and self._torque.source == _EFFORT
 
     @property

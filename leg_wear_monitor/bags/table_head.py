@@ -90,7 +90,7 @@ def _usual_width(rows: Sequence[list[str]]) -> int:
 
 
 def _is_values(row: Sequence[str]) -> bool:
-    """Whether a row has numbers or dates, and hardly any text."""
+    """True if a row has numbers or dates, and hardly any text."""
     filled = [cell for cell in row if cell]
     values = sum(is_number(cell.replace(",", ".", 1)) or bool(dates([cell])[1][0]) for cell in filled)
     return 2 * values >= len(filled) > 0

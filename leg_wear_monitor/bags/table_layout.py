@@ -33,7 +33,7 @@ _MOST_LISTED = 20
 
 
 def is_table_name(name: str) -> bool:
-    """Whether a file is a table by its name, or a recording of a kind that is refused with a remedy."""
+    """True if a file is a table by its name, or a recording of a kind that is refused with a remedy."""
     return Path(name).suffix.lower() in (CSV, PARQUET, *REMEDIES)
 
 
@@ -78,7 +78,7 @@ class Rows:
     values : dict
         Values (n,) by the column's key; NaN where nothing was measured.
     measured : dict
-        Whether a value was measured (n,), by the column's key: an empty cell was not, a NaN was.
+        True if a value was measured (n,), by the column's key: an empty cell was not, a NaN was.
     stored : int
         Bytes that the rows occupy in the file.
     """
@@ -231,7 +231,7 @@ def units_named(text: str) -> tuple[str, str] | None:
 
 
 def is_number(text: str) -> bool:
-    """Whether a text is a number, NaN or infinity."""
+    """True if a text is a number, NaN or infinity."""
     try:
         float(text)
     except ValueError:

@@ -151,7 +151,7 @@ def _columns(names: Sequence[str]) -> Mapping[str, list[int]]:
 
 
 def _means(word: str, known: Sequence[str]) -> bool:
-    """Whether a word is known, or ends with a known one, as the German Kurbelwinkel does."""
+    """True if a word is known, or ends with a known one, as the German Kurbelwinkel does."""
     return word in known or any(len(each) > 4 and word.endswith(each) for each in known)
 
 

@@ -274,9 +274,9 @@ def numbers(texts: Any) -> tuple[Floats, _Bools, _Bools]:
     values : (n,) array
         Correctly rounded; NaN without a number.
     there : (n,) array of bool
-        Whether the cell is not empty.
+        True if the cell is not empty.
     good : (n,) array of bool
-        Whether it is empty or has a number.
+        True if it is empty or has a number.
     """
     there = np.ones(len(texts), bool)
     try:

@@ -482,7 +482,7 @@ def compile_for(compiled: Callable[..., object], *arguments: object) -> None:
 
 
 def is_stored(compiled: Callable[..., object]) -> bool:
-    """Whether code of an entry is in the cache; always without a compiler, never without a cache."""
+    """True if code of an entry is in the cache; always without a compiler, never without a cache."""
     function = getattr(compiled, "py_func", None)
     if function is None:
         return True

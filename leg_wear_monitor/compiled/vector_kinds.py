@@ -81,7 +81,7 @@ def as_vector(context: Any, builder: Any, kind: Any, value: Any) -> Any:
 
 
 def is_number(kind: Any) -> bool:
-    """Whether a type is that of numbers that a vector may be combined with."""
+    """True if a type is that of numbers that a vector may be combined with."""
     return isinstance(kind, types.Float | types.Integer | types.Boolean)
 
 

@@ -124,7 +124,7 @@ def repeated(_context: Any, _number: Any) -> Any:
 
 
 def any_flag(_context: Any, _flags: Any) -> Any:
-    """Whether one of eight answers is yes."""
+    """True if one of eight answers is yes."""
 
     def generate(_context: Any, builder: Any, _sig: Any, values: Any) -> Any:
         bits = ir.IntType(WIDTH)

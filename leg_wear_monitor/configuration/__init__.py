@@ -78,7 +78,7 @@ def described(
     metadata : mapping, optional
         Further metadata, stored with unit and doc.
     in_repr : bool
-        Whether it is in the object's repr; False for what no result depends on.
+        True if it is in the object's repr; False for what no result depends on.
 
     Raises
     ------

@@ -59,7 +59,7 @@ def contact_doubt(half_angle_rad: float, force_n: float, radius_m: float, is_win
     radius_m : float
         Radius of the bushing.
     is_winkler : bool
-        Whether the law is Winkler's.
+        True if the law is Winkler's.
     """
     if half_angle_rad <= (WIDEST_RAD if is_winkler else NARROW_RAD):
         return None
@@ -104,5 +104,5 @@ def half_angle_of(settings: Clearance, force_n: float) -> float:
 
 
 def is_winkler_form(number: int) -> bool:
-    """Whether the number of a form in compiled code is that of Winkler's law."""
+    """True if the number of a form in compiled code is that of Winkler's law."""
     return number == LAWS["winkler"].number

@@ -35,7 +35,7 @@ class Form(NamedTuple):
         Decrease of the energy at constant delta by wear depths with slopes [m/rad] of bushing and journal,
         divided by the elastic part of the force; one value [m/rad] for each surface.
     takes_stiffness : bool
-        Whether a joint's ``stiffness`` [N/m^1.5] may replace the coefficient from modulus and radii.
+        True if a joint's ``stiffness`` [N/m^1.5] may replace the coefficient from modulus and radii.
     """
 
     coefficient: Callable[..., Any]

@@ -12,7 +12,7 @@ _HOST = re.compile(r"\[(?P<six>[0-9a-fA-F:.]+)\](:\d{1,5})?|(?P<name>[A-Za-z0-9.
 
 
 def is_local(host: str) -> bool:
-    """Whether a server bound to a host can be reached from this machine only."""
+    """True if a server bound to a host can be reached from this machine only."""
     return host == "localhost" or _is_loopback(host)
 
 
@@ -25,7 +25,7 @@ def own_names(host: str) -> frozenset[str]:
 
 
 def is_allowed(header: str, host: str, names: frozenset[str]) -> bool:
-    """Whether the Host header of a request names this server.
+    """True if the Host header of a request names this server.
 
     Parameters
     ----------

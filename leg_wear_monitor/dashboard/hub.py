@@ -117,7 +117,7 @@ class Hub:
         return f"event: state\ndata: {json.dumps(state, allow_nan=False)}\n\n"
 
     async def _renew(self) -> bool:
-        """Whether the content has changed."""
+        """True if the content has changed."""
         async with self._lock:
             if not self._leg.has_news() and self._content is not None:
                 return False

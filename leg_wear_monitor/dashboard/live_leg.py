@@ -198,7 +198,7 @@ class LiveLeg:
         return Row(stamp_ns, leg, {**columns_m, "peak_force_n": self._peaks_n})
 
     def has_news(self) -> bool:
-        """Whether the leg has received anything since the last content."""
+        """True if the leg has received anything since the last content."""
         return self._is_new
 
     def content(self) -> Content:

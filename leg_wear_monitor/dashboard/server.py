@@ -176,7 +176,7 @@ class _Reading(RequestHandler):
 
     @property
     def _is_navigation(self) -> bool:
-        """Whether a person follows a link, in contrast to a page that reads."""
+        """True if a person follows a link, in contrast to a page that reads."""
         return self.request.headers.get("Sec-Fetch-Mode") == "navigate"
 
     def write_error(self, status_code: int, **_: Any) -> None:

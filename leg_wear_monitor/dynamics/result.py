@@ -203,7 +203,7 @@ class JointResult:
 
     @property
     def has_clearance(self) -> bool:
-        """Whether the joint has clearance, and therefore contact and wear."""
+        """True if the joint has clearance, and therefore contact and wear."""
         return self.clearance_m is not None
 
 
@@ -242,7 +242,7 @@ class JointTrace:
     penetration_m : (n,) array
         Penetration of journal and bushing; negative where they are apart.
     in_contact : (n,) array of bool
-        Whether they touch.
+        True if they touch.
     normal_force_n : (n,) array
         Normal force.
     tangential_force_n : (n,) array

@@ -291,7 +291,7 @@ def simulate(
     model : str, optional
         A key of `MODELS`; default: ``full`` for a drive by torque or controller, else ``clearance``.
     wear : bool
-        Whether wear widens the clearances during the run; it is counted in any case.
+        True if wear widens the clearances during the run; it is counted in any case.
     normal_law : str, optional
         Normal contact law of all clearance joints.
     restitution : float, optional

@@ -178,7 +178,7 @@ class FleetFile:
 
 
 def is_fleet_file(document: Any) -> bool:
-    """Whether the content of a YAML file is the description of a fleet, and not a mechanism."""
+    """True if the content of a YAML file is the description of a fleet, and not a mechanism."""
     return isinstance(document, dict) and ("legs" in document or "defaults" in document)
 
 

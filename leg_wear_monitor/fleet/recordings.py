@@ -52,7 +52,7 @@ class ReadRecording:
     last_cycle_ns : int
         End of the last of them [ns]. The ledger contains this stamp if the replay was completed.
     is_partial : bool
-        Whether recorded data are lost or may be wrong.
+        True if recorded data are lost or may be wrong.
     findings : tuple of str
         The first findings of the replay.
     """
@@ -71,7 +71,7 @@ class ReadRecording:
 
     @property
     def is_counted(self) -> bool:
-        """Whether its wear is in the ledger from it."""
+        """True if its wear is in the ledger from it."""
         return self.outcome == Outcome.COUNTED.value
 
     @property
@@ -126,7 +126,7 @@ def state_of(path: Path) -> tuple[int, int]:
 
 
 def is_known(path: Path, line: ReadRecording | None, leg: FleetLeg, counted_ns: Ints) -> bool:
-    """Whether a recording need not be read again.
+    """True if a recording need not be read again.
 
     The line of a recording is written before its wear is in the ledger. So a line that says ``counted`` holds
     only if the ledger contains the end of its last gait cycle.

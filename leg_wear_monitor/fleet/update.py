@@ -300,7 +300,7 @@ _SAME_M = 1e-12  # well below any wear, and above the rounding of JSON
 
 
 def _is_same_wear(now: LegState, summary: ReplaySummary) -> bool:
-    """Whether the parts are those of a summary, so that its forecast holds."""
+    """True if the parts are those of a summary, so that its forecast holds."""
     then = summary.clearances
     return now.clearances.keys() == then.keys() and all(
         abs(one.modelled_m - then[joint].modelled_m) < _SAME_M for joint, one in now.clearances.items()

@@ -57,9 +57,9 @@ class BushingLife:
     diameter_m, width_m, clearance_m : float
         Diameter of the pin, width, and radial clearance when new.
     is_present : bool
-        Whether this is the joint's present bushing.
+        True if this is the joint's present bushing.
     lasts : bool
-        Whether nine of ten such bushings last the hours wanted.
+        True if nine of ten such bushings last the hours wanted.
     limited_by : str
         ``p``, ``v``, ``p v`` or ``impact`` if a limit of the maker is exceeded, so that no life holds; else
         ``wear`` or ``rating life``; ``nothing`` without wear; ``unknown`` if the pair gives neither.

@@ -257,7 +257,7 @@ def shipped_mechanisms() -> dict[str, Path]:
 
 
 def is_file_name(name_or_path: str | Path) -> bool:
-    """Whether an argument is a path (has a suffix or a directory) instead of a shipped mechanism's name."""
+    """True if an argument is a path (has a suffix or a directory) instead of a shipped mechanism's name."""
     path = Path(name_or_path)
     return bool(path.suffix) or path.parent != Path()
 

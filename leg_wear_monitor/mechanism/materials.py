@@ -313,7 +313,7 @@ def settings_of(pair: Material) -> dict[str, Any]:
 
 
 def lacks_wear(settings: Clearance) -> bool:
-    """Whether a joint's pair gives no wear coefficient, and no value stands beside it."""
+    """True if a joint's pair gives no wear coefficient, and no value stands beside it."""
     if not settings.material or max(settings.wear_coefficient) > 0.0:
         return False
     return load_material(settings.material).wear_coefficients is None

@@ -537,7 +537,7 @@ def outline_of(mechanism: Mechanism) -> tuple[dict[str, Floats], dict[str, Float
 
 
 def is_on_ground(mechanism: Mechanism, joint: str) -> bool:
-    """Whether a joint joins a body to the ground."""
+    """True if a joint joins a body to the ground."""
     return GROUND in mechanism.sides(joint)
 
 

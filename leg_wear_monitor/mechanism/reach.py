@@ -58,7 +58,7 @@ class DeadPoint:
         the guide; empty if it is neither.
     is_in_line : bool
     is_folded : bool
-        Whether the two bodies lie on each other, and are not stretched.
+        True if the two bodies lie on each other, and are not stretched.
     """
 
     crank_angle: float
@@ -184,7 +184,7 @@ class Reach:
     q : (p, n, 3) array
         Coordinates at these angles. Where the mechanism does not close, those with the least gap.
     turns : bool
-        Whether it closes all over a turn of the crank.
+        True if it closes all over a turn of the crank.
     open_joint : str
         Joint that does not close at the crank angle of the assembly, with all others closed; empty if all
         close there.
@@ -224,7 +224,7 @@ class Reach:
         return np.asarray(np.linalg.norm(journal - bushing, axis=1))
 
     def is_open(self, joint: str) -> bool:
-        """Whether the two points of a joint are visibly apart in a mechanism that does not close."""
+        """True if the two points of a joint are visibly apart in a mechanism that does not close."""
         if self.turns or (self.mobility == 1 and not self.open_joint):
             return False
         largest = max(float(self.gap_of(name).max()) for name in self.mechanism.joints)

@@ -29,7 +29,7 @@ class Unit:
     factor : float
         SI value of one such unit; of a K, the factor before K / H.
     needs_hardness : bool
-        Whether the number is a K, to be divided by a hardness.
+        True if the number is a K, to be divided by a hardness.
     """
 
     dimension: str

@@ -151,7 +151,7 @@ class Picture:
     caption : str
         Caption below the picture; no caption if empty.
     wide : bool
-        Whether it needs the width of the page: on a phone it then scrolls sideways instead of being shrunk.
+        True if it needs the width of the page: on a phone it then scrolls sideways instead of being shrunk.
     """
 
     image: bytes = attrs.field(repr=False)
@@ -188,7 +188,7 @@ class Table:
     note : str
         Note below the table; no note if empty.
     is_text : bool
-        Whether its cells are texts, which wrap, and not numbers.
+        True if its cells are texts, which wrap, and not numbers.
 
     Raises
     ------
@@ -313,7 +313,7 @@ class Page:
         Further style sheets, and scripts that come before those of the interactive parts; by their names in
         ``report/templates``.
     has_dark : bool
-        Whether it follows a reader who prefers dark colours; its pictures must follow as well.
+        True if it follows a reader who prefers dark colours; its pictures must follow as well.
     live : str
         Settings, as JSON, of the script that renews a page from its server; empty for a page that is a file.
     generator : str
@@ -446,7 +446,7 @@ def since_words(summary: ReplaySummary, stamp_ns: int) -> str:
 
 
 def is_of_recording(summary: ReplaySummary) -> bool:
-    """Whether the verdict was known at the recording's end: nothing was measured or entered later."""
+    """True if the verdict was known at the recording's end: nothing was measured or entered later."""
     return summary.verdict.since_ns <= summary.recording.end_ns
 
 

@@ -379,7 +379,7 @@ def stretches(
     steps : int
         Number of steps.
     comparable : callable, optional
-        Whether the neighbour may be rescaled between these two states; default: always. Around an impact, the
+        True if the neighbour may be rescaled between these two states; default: always. Around an impact, the
         two are on different sides of it for a moment and their distance is not small.
 
     Returns

@@ -129,7 +129,7 @@ def _config(path: Path | None, crank_joint: str | None, node: str | None) -> "Mo
 
 
 def is_failed(result: "ReplayResult", allow_partial: bool, fail_on: tuple[str, ...]) -> bool:
-    """Whether the exit code tells of findings."""
+    """True if the exit code tells of findings."""
     return (
         (result.is_partial and not allow_partial)
         or is_raised(result.history.worst, fail_on)
@@ -140,12 +140,12 @@ def is_failed(result: "ReplayResult", allow_partial: bool, fail_on: tuple[str, .
 
 
 def asks_to_act(state: State) -> bool:
-    """Whether the verdict at the end asks a person to do something, or cannot be given."""
+    """True if the verdict at the end asks a person to do something, or cannot be given."""
     return state in (State.NOT_MONITORED, State.INSPECT, State.STOP)
 
 
 def is_raised(worst: dict[str, Level], fail_on: tuple[str, ...]) -> bool:
-    """Whether an alarm asked for was raised at any time, by the highest level of each kind."""
+    """True if an alarm asked for was raised at any time, by the highest level of each kind."""
     highest = max(worst.values(), default=Level.OK)
     if ("alarm" in fail_on and highest is Level.ERROR) or ("warning" in fail_on and highest > Level.OK):
         return True

@@ -173,7 +173,7 @@ def derivative(table: Floats) -> Floats:
 
 
 def is_damped(arrays: MechanismArrays) -> bool:
-    """Whether a spring has a damper."""
+    """True if a spring has a damper."""
     return bool((arrays.spring_law[:, 2] > 0.0).any())
 
 

@@ -85,7 +85,7 @@ def contact_laws(contacts: ContactArrays) -> Floats:
 
 
 def have_usual_laws(contacts: ContactArrays) -> bool:
-    """Whether vectors of joints compute all laws: Hertz's form, and a friction law of `VECTOR_LAWS`."""
+    """True if vectors of joints compute all laws: Hertz's form, and a friction law of `VECTOR_LAWS`."""
     is_hertz = (contacts.normal_form == _HERTZ).all()
     return bool(is_hertz and np.isin(contacts.friction_law, VECTOR_LAWS).all())
 

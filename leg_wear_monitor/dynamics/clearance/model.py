@@ -67,7 +67,7 @@ def coupling_of(
     tables : ClearanceTables
     joints : int
     is_damped : bool
-        Whether a spring of the leg has a damper.
+        True if a spring of the leg has a damper.
     interval : float
         Of the stepper [s].
     stiffness : float

@@ -1,6 +1,6 @@
 """Digital twin: crank tracker, leg model, load from drive torque (physics.md section 9); kinds of samples.
 
-What is imported here imports neither numpy nor numba.
+The modules imported here do not import numpy or numba.
 """
 
 from collections.abc import Mapping
@@ -22,8 +22,8 @@ class SampleKind:
         Name in statuses (``crank_rate_hz``), alarms (``input_rate crank``) and counts. A status of this name
         has no current data while no sample of the kind arrives.
     value : str
-        Field of `GAIT_SAMPLE` that must be finite in a sample of this kind. A sample of another kind may
-        contain it too.
+        Field of `GAIT_SAMPLE` that must be finite in a sample of this kind. A sample of a different kind may
+        contain the field as well.
     largest : float
         Largest plausible magnitude, in the field's unit, of each component.
     """

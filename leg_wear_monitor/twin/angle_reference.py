@@ -26,9 +26,9 @@ from leg_wear_monitor.twin.torque_reference import LEAST_CLEARANCE_M, Leg, Refer
 # Effect of clearances on the angles of further joints: the linear model of `monitor.encoders`.
 #
 # An encoder on a revolute joint measures the angle from the bushing's body to the journal's. It deviates from
-# that of the ideal linkage by S_phi(theta) e, linear in the eccentricities e (physics.md section 7). The mean
-# of e_k over gait cycles is c_k u_k: c_k is the clearance, and u_k(theta) a shape from simulation, of a
-# length near 1 and along the contact's normal.
+# the angle of the ideal linkage by S_phi(theta) e, linear in the eccentricities e (physics.md section 7). The
+# mean of e_k over gait cycles is c_k u_k: c_k is the clearance, and u_k(theta) a shape from simulation, of a
+# length near 1 along the contact's normal.
 
 
 PHASES = 128  # crank phases per turn: bins of samples, and points of the tables of this module
@@ -130,7 +130,7 @@ def design(model: AngleModel, shape: Floats) -> Floats:
     return np.concatenate([by_clearance, -model.by_crank[:, :, None], own], axis=2)
 
 
-CYCLES = 48  # simulated cycles of each leg: the scatter equals that of as many observed cycles
+CYCLES = 48  # simulated cycles per leg: their scatter equals the scatter of as many observed cycles
 OPENED_M = 1.5e-4  # increase of each clearance in turn [m]
 
 _PACE = 1  # simulated gait cycles in an evaluation period
@@ -187,7 +187,7 @@ class AngleReferenceRun(ReferenceRun[AngleReference]):
         depth : (k, 2, N) array
             Wear depths [m], which show where joints are worn.
         profile : CrankProfile, optional
-            That of a steady crank by default.
+            Motion of the crank; steady by default.
         """
         expected = np.maximum(clearance_m, LEAST_CLEARANCE_M)
         clearances = [expected, *(expected + OPENED_M * np.eye(len(expected)))]

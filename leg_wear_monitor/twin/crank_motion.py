@@ -29,8 +29,8 @@ from leg_wear_monitor.twin.steps import (
 #
 # The crank's angle, speed and acceleration are driven by a jerk that is white noise. With the sensor's noise
 # spread over the time between samples, the filter's bandwidth is (jerk / noise)^(1/6) rad/s at any rate. The
-# smoother is that of Bierman (1973, *Fixed interval smoothing with discrete measurements*): an adjoint vector
-# is propagated back over the later samples, without a matrix inverse.
+# smoother follows Bierman (1973, *Fixed interval smoothing with discrete measurements*): it propagates an
+# adjoint vector back over the later samples and needs no matrix inverse.
 
 
 _TURN = 2.0 * math.pi

@@ -88,14 +88,14 @@ def find(
 
 
 def bounded(gram: Floats, along: Floats, low: Floats, high: Floats) -> Floats:
-    """Values (n,) of least squares within bounds: those out of theirs are set to them, the furthest first.
+    """Least squares (n,) within bounds: values outside are set to their bounds, the furthest first.
 
     Parameters
     ----------
     gram : (n, n) array
-        Products of the regressors with each other; zeros for one that is not there, whose value is 0.
+        Products of the regressors with each other; zeros for an absent regressor, whose value is 0.
     along : (n,) array
-        Products of the regressors with what is to be explained.
+        Products of the regressors with the quantity to be explained.
     low, high : (n,) arrays
     """
     scale = np.sqrt(np.diag(gram))
@@ -162,7 +162,7 @@ class LoadEstimate:
         return self._least - self.acting, self._limit - self.acting
 
     def restart_load(self, load_n: float, acts: bool) -> None:
-        """Begin with a load of another shape [N], known from a few cycles; ``acts`` as in `take`."""
+        """Begin with a load of a different shape [N], known from a few cycles; ``acts`` as in `take`."""
         self.values[LOAD], self.state[REGRESSORS + LOAD] = load_n, _UNKNOWN[LOAD] ** 2
         self.state[-1] = load_n if acts else 0.0
 
@@ -293,18 +293,18 @@ def cycle_statistics(
 
 # The part of the torque residual that repeats over gait cycles, by crank phase (physics.md section 9).
 #
-# What a lost sample, a stamp that is off, noise and the chance of impacts leave in one gait cycle, they do
-# not leave in the next at the same phase: it shows as scatter over cycles, and is taken off. A mismatch of
-# the leg repeats.
+# A lost sample, a wrong stamp, noise or a random impact changes one gait cycle, but not the next cycle at the
+# same phase. Such a residual shows as scatter over cycles, and is subtracted. A residual from a wrong leg
+# model repeats.
 
 
 # gait cycles whose mean is taken, and how many are needed; fewer have more scatter, more have a longer delay
 # (tuned on the synthetic leg in full coordinates at 60 rpm: knocks in A and G, lost samples, late stamps)
-CYCLES, LEAST_CYCLES = 4, 3  # of averages
-INSTANT_CYCLES = 8  # of instants, whose scatter is larger
+CYCLES, LEAST_CYCLES = 4, 3  # cycles for averages
+INSTANT_CYCLES = 8  # cycles for instants, whose scatter is larger
 _LEAST_PHASES = 8
-_LONGEST_LAG_S = 0.01  # beyond the declared one: more is wrong as received, and is not explained
-_LEAST_WEIGHT = 0.05  # of a phase, as a fraction of the mean one: less is of samples elsewhere in the turn
+_LONGEST_LAG_S = 0.01  # beyond the declared lag: a larger lag is an input fault, and is not explained
+_LEAST_WEIGHT = 0.05  # weight of a phase over the mean weight; less comes from samples elsewhere in the turn
 
 
 class RepeatingResidual:
@@ -347,11 +347,11 @@ class RepeatingResidual:
         loads : (float, float)
             Least and largest possible load of the residual [N].
         other_m : (phases,) array, optional
-            Torque per newton of a load of another shape over the gait cycle than the supposed one.
+            Torque per newton of a load whose shape over the gait cycle differs from the assumed shape.
         acting_n : float, optional
-            Load of the supposed shape that acted in the model, for another one instead.
+            Load of the assumed shape that acted in the model, and that the other load replaces.
         tolerated_nm : (phases,) array, optional
-            Torque that may be there up to this size, with either sign.
+            Torque that is tolerated up to this size, with either sign.
         """
         number = len(self.cycles)
         if number < self._least:

@@ -166,7 +166,7 @@ class DigitalTwin:
             self._parameters = parameters
 
     def forget_torque(self) -> None:
-        """Forget what the drive torque of the last gait cycles showed, because its input had a fault."""
+        """Forget the results of the last gait cycles' drive torque, because its input had a fault."""
         self._follower.forget_torque()
 
     def freeze_load(self, is_frozen: bool, clears: bool = False) -> bool:
@@ -192,7 +192,7 @@ class DigitalTwin:
         Raises
         ------
         LegWearError
-            For another shape, or for values that are negative or not finite.
+            For a wrong shape, or for values that are negative or not finite.
         """
         own = self._setup.surfaces.depth
         if depth.shape != own.shape or not (np.isfinite(depth).all() and (depth >= 0.0).all()):

@@ -36,7 +36,7 @@ _DENT_M = 1.0e-5  # a third of the penetration under 10 kN
 _RUN_IN_S = 0.2
 _STEADY = 0.05  # relative difference of two gait cycles' durations beyond which the cadence changes
 _LARGEST_FRICTION = 0.3  # constant one, of the RMS torque: as drive_torque.max_friction_nm by default
-_NOTABLE, _MUCH_LESS = 0.05, 0.5  # residual, of the RMS torque, from which a load may have another shape
+_NOTABLE, _MUCH_LESS = 0.05, 0.5  # residual over RMS torque from which a load may have a different shape
 _LEAST_TORQUE_NM = 1.0e-6  # lower bound of the RMS torque, for a leg that needs no torque
 
 _EVENT_KINDS = {
@@ -92,7 +92,7 @@ class LegFollower:
 
     def __init__(self, setup: run.Setup, settings: TwinSettings) -> None:
         is_measured = settings.load_model == MEASURED
-        # beside a measured load, the estimated one is what the torque shows more
+        # with a measured load, the estimated load is only the excess that the torque shows
         self._setup, self._acts = setup, settings.estimate_load and not is_measured
         is_of_foot = settings.load_frame == FOOT_FRAME
         self._load = FootLoad(setup.linkage, setup.contacts, settings.load_shape, is_measured, is_of_foot)
@@ -104,7 +104,7 @@ class LegFollower:
         self.state: Record = record_of(self.records)
         self.statistics = run.new_run_statistics(len(setup.linkage.mechanism.joints))
         self._loads = settings.loads_n
-        # a load that nobody declared is a push, or the ground's in stance, whatever explains the torque
+        # an undeclared load is a push, or the ground's force in stance, whichever explains the torque
         self._is_load_known = is_measured or settings.load_model == GROUND or settings.load_shape != STANCE
         self._shape_torque = shape_torque(setup.linkage)
         self.estimate = cycle.LoadEstimate(self._loads[1], self._loads[0])
@@ -223,7 +223,7 @@ class LegFollower:
         return new_records(n, follower_state.EVALUATED), np.zeros((n, joints)), np.zeros((n, 2 * joints))
 
     def compile(self, steps: Steps) -> None:
-        """Compile what follows steps, but for the motion itself; the leg stays where it is."""
+        """Compile the evaluation that follows the steps, without moving the leg."""
         compile_for(
             follow, 0, self._stepper.model, self._setup.surfaces.feeds_back, self._stepper.state,
             self.statistics, self._stepper.work, self._sensor, self._load.signature, self._load.rows,
@@ -252,8 +252,8 @@ class LegFollower:
     def _run_in(self, angle: float, speed: float) -> int:
         """Run the leg in up to a crank angle [rad] and speed [rad/s], without wear.
 
-        Journals start centred, and their first impacts can be several times those of the gait: they must not
-        be reported.
+        Journals start centred, and their first impacts can be several times as large as in the gait: they
+        must not be reported.
 
         Returns
         -------
@@ -368,7 +368,7 @@ class LegFollower:
         self._repeating.cycles = ()
 
     def _beyond_shape(self, left_nm: float, shape: str, load_n: float) -> float:
-        """A residual [N m] less what another shape of the ground's force than the supposed one leaves."""
+        """A residual [N m] less the residual that a different shape of the ground's force leaves."""
         other_nm = self._shape_torque * load_n if shape == GROUND else 0.0
         return math.sqrt(max(0.0, left_nm**2 - other_nm**2)) if math.isfinite(left_nm) else left_nm
 
@@ -389,7 +389,7 @@ class LegFollower:
     @property
     def _unexplained_nm(self) -> float:
         """RMS of the residual that repeats and is not explained [N m]; NaN if unknown."""
-        # the residual of averages is from the torque without a load, that of instants is not
+        # the residual of averages refers to the torque without a load, the residual of instants does not
         loads = (-math.inf, math.inf) if self._instants else self._loads
         rms_nm, _ = self._repeating.rms_nm(loads, tolerated_nm=self._tolerated_nm)
         return self._beyond_shape(rms_nm, self._load.shape, float(self.estimate.values[follower_state.LOAD]))

@@ -12,7 +12,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 
 
 PHASES = 32  # crank phases per turn, for the residual that repeats over gait cycles
-FINE_PHASES = 128  # of the torque profile of a gait cycle
+FINE_PHASES = 128  # phases of the torque profile of a gait cycle
 
 # number and indices of the regressors of a torque residual
 REGRESSORS = 4
@@ -62,8 +62,8 @@ LEG_TORQUE = np.dtype(
         # comparison
         ("last_lever", "f8"),  # drive torque per foot load at the last torque sample [N m/N]
         ("last_predicted", "f8"),  # predicted torque after the low-pass filter [N m]
-        ("period", "f8"),  # of the torque sensor [s]
-        ("period_scatter", "f8"),  # mean departure of the times between samples from it, as a fraction
+        ("period", "f8"),  # period of the torque sensor [s]
+        ("period_scatter", "f8"),  # mean departure of sample intervals from the period, as a fraction
         ("unfiltered", "f8"),  # time since the last filtered sample [s]
     ]
 )
@@ -78,7 +78,7 @@ LOW_PASS = np.dtype(
         ("of_friction", "f8", (2,)),  # torque per friction [-]
         ("of_load_friction", "f8", (2,)),  # torque per friction under load [N m]
         # for a sensor that samples instants
-        ("weight", "f8", (2,)),  # of an instant
+        ("weight", "f8", (2,)),  # weight of an instant
         ("weighted_residual", "f8", (2,)),  # weight times residual [N m]
         ("weighted_regressor", "f8", (REGRESSORS, 2)),  # weight times regressors
     ]
@@ -87,8 +87,8 @@ LOW_PASS = np.dtype(
 WAITING_INSTANT = np.dtype(
     [
         ("measured", "f8"),  # torque [N m]
-        ("mean_predicted", "f8"),  # of the predicted torque since the previous instant [N m]
-        ("variance", "f8"),  # of that torque [N^2 m^2]
+        ("mean_predicted", "f8"),  # mean of the predicted torque since the previous instant [N m]
+        ("variance", "f8"),  # variance of the predicted torque [N^2 m^2]
         ("regressor", "f8", (REGRESSORS,)),  # torque per load, friction, lag, load friction
         ("time", "f8"),  # since the previous instant [s], 0 if none is stored
         ("angle", "f8"),  # crank angle [rad]
@@ -122,14 +122,14 @@ LOAD_SUMS = np.dtype(
         ("profile", "f8", (3, FINE_PHASES)),  # number, force x and y [N]
     ]
 )
-"""Of the samples of the foot load in a gait cycle, along the axes of the mechanism."""
+"""Sums over the foot load samples of a gait cycle, along the axes of the mechanism."""
 
 LOAD_FILTER = np.dtype(
     [
         ("last_ns", "i8"),  # stamp of the last sample, 0 before the first
         ("last", "f8", (2,)),  # its force [N]
         ("ahead_ns", "i8"),  # stamp of the last filtered sample, 0 before the first
-        ("stages", "f8", (2, 2)),  # of the low pass, of x and y [N]
+        ("stages", "f8", (2, 2)),  # states of the low pass for x and y [N]
         ("departure", "f8", (2, 2)),  # from the mean force: before the last filtered sample, and with it [N]
         ("reaches_ns", "i8", (2,)),  # stamps at which these are right
         ("peak_n", "f8"),  # largest vertical force of the gait cycle before
@@ -175,7 +175,7 @@ EVALUATED = np.dtype(
 
 
 class FollowerState(NamedTuple):
-    """State of the follower, beside the stepper's.
+    """State of the follower, in addition to the stepper's.
 
     ``records`` (1,): of `LEG_STATE`; ``polynomial`` (7,): present piece of the crank's motion; ``force`` (k,)
     [N]: contact forces at the end of the last step.

@@ -39,8 +39,9 @@ _VARIES, _FURTHEST = 0.5, 4.0
 def take_instant(sensor, leg, measured, mean, variance, lever, direction, dt, angle):
     """Store an instant, and compare the previous one, whose predicted torque on both sides is now known.
 
-    ``mean`` [N m] and ``variance`` [N^2 m^2] are those of the predicted torque since the previous instant,
-    ``dt`` [s] before; ``lever`` [N m/N] is the drive torque per foot load, ``angle`` [rad] the crank angle.
+    ``mean`` [N m] and ``variance`` [N^2 m^2] are the mean and variance of the predicted torque since the
+    previous instant, ``dt`` [s] before; ``lever`` [N m/N] is the drive torque per foot load, ``angle`` [rad]
+    the crank angle.
 
     Returns
     -------

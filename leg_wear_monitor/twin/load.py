@@ -42,7 +42,8 @@ from leg_wear_monitor.twin.steps import AHEAD_NS
 # filtered departure of the present cycle from it.
 
 
-# time constant of each of the two stages of the departure's filter: their delay is that of the sample ahead
+# time constant of each of the two stages of the departure's filter: they delay by the lead of the sample
+# ahead
 _STAGE_S = 0.5e-9 * AHEAD_NS
 # s: a longer time between samples is a gap; at twenty samples a second a stance has eight
 LONGEST_PUSH = 0.05
@@ -56,7 +57,7 @@ _MARGIN = COARSER
 
 
 class LoadRows(NamedTuple):
-    """The force at the points of the tables, and what it changes.
+    """The force at the points of the tables, and the tables that it changes.
 
     Attributes
     ----------
@@ -92,7 +93,7 @@ def load_rows(linkage: Linkage, tables: LoadedTables, acts: bool, is_of_foot: bo
     acts : bool
         Whether the force acts on the leg.
     is_of_foot : bool
-        Whether the samples' frame is that of the toe's body instead of the ground's.
+        Whether the samples' frame is fixed to the toe's body instead of the ground.
     """
     mechanism = linkage.mechanism
     force = np.zeros((POINTS if acts and mechanism.toe else 0, 2))
@@ -122,9 +123,9 @@ def take_push(load, push, row, rate, step, force):
     """Let a sample of the foot load act, ``force`` (2,) [N], at a row that changes by ``rate`` [1/s].
 
     Three parts: the mean force by phase is learned from the rows that the crank has passed; the departure
-    from it, which is noise and what differs from step to step, is filtered; both are written into the rows up
-    to the next sample. The filter's delay is that of the sample ahead that it takes, so the force acts at its
-    time.
+    from it, which contains noise and the differences from step to step, is filtered; both are written into
+    the rows up to the next sample. The filter takes a sample that is ahead by its delay, so the force acts at
+    the right time.
     """
     if load.force.shape[0] == 0 or push.is_frozen != 0:
         return
@@ -137,7 +138,7 @@ def take_push(load, push, row, rate, step, force):
 
 @kernel
 def _learn(load, before, row, force_before, force):
-    """Learn the mean force of the rows after one and up to another, from the forces (2,) there."""
+    """Learn the mean force of the rows between two rows, from the forces (2,) there."""
     n, step = load.force.shape[0], 1 if row >= before else -1
     first = math.floor(before) + 1 if step > 0 else math.ceil(before) - 1
     last = math.floor(row) if step > 0 else math.ceil(row)
@@ -230,7 +231,7 @@ def force_of(load: LoadRows) -> tuple[Floats, ...]:
 
 
 def set_force(load: LoadRows, force: tuple[Floats, ...]) -> None:
-    """Restore what `force_of` returned, and set the tables accordingly."""
+    """Restore the force that `force_of` returned, and set the tables accordingly."""
     for own, value in zip((load.force, load.mean, load.learned), force, strict=True):
         own[:] = value
     if len(load.force):
@@ -256,7 +257,7 @@ class FootLoad:
         Shape of the load over the gait cycle, one of `sample.LOAD_SHAPES`; a known load (`rebuild`) has
         priority.
     is_measured, is_of_foot : bool
-        Whether a measured force acts, and whether its axes are those of the foot.
+        Whether a measured force acts, and whether its axes are fixed to the foot.
 
     Attributes
     ----------
@@ -287,7 +288,7 @@ class FootLoad:
         self._set_up(linkage, basis)
 
     def rebuild(self, linkage: Linkage, known: Floats) -> None:
-        """Set the tables, in place, to those of a leg with other masses or lengths, under the same load.
+        """Set the tables, in place, for a leg with other masses or lengths under the same load.
 
         Parameters
         ----------
@@ -332,7 +333,7 @@ class FootLoad:
         return self._force_and_signature(shape)[1][:-1]
 
     def _force_and_signature(self, shape: str) -> tuple[Floats, Floats]:
-        """Force and signature of a shape; kept, since a leg with a mismatch needs them in each gait cycle."""
+        """Force and signature of a shape; cached, since a wrong leg model needs them in each gait cycle."""
         if shape not in self._shaped:
             force = load_shape(self._linkage, shape)
             self._shaped[shape] = force, load_signature(self._linkage, force)
@@ -364,7 +365,7 @@ def load_shape(linkage: Linkage, shape: str = STANCE) -> Floats:
 
 
 def shape_torque(linkage: Linkage) -> float:
-    """RMS by which steps differ from the template in drive torque, per newton of the peak [N m/N]."""
+    """RMS difference of steps from the template, in drive torque per newton of the peak [N m/N]."""
     toe = linkage.mechanism.toe
     if toe is None:
         return 0.0

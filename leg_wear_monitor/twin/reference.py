@@ -1,6 +1,6 @@
 """A simulated leg: its parameters, how its crank turns, and its drive torque and eccentricities.
 
-References are made of them: what the sensors of a leg with given clearances show.
+References are built from simulated legs: they hold the sensor signals of a leg with given clearances.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -30,15 +30,15 @@ from leg_wear_monitor.mechanism.person import with_toe_force
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 
-# A leg whose masses, lengths and friction are not quite those of the mechanism file.
+# A leg whose masses, lengths and friction differ a little from the mechanism file.
 
 
-# standard deviation of a body's mass about that of the file, where nothing else is known
+# standard deviation of a body's mass about the file's mass, if nothing else is known
 MASS_TOLERANCE = 0.05
 
 
-# of the crank on its coupling, with the mean inertia of the ideal leg: belts and elastomer couplings lose 30
-# to 60 % of the energy of an oscillation in it, 4 pi times as much
+# damping ratio of the crank on its coupling, with the mean inertia of the ideal leg: belts and elastomer
+# couplings lose 30 to 60 % of the energy of an oscillation in it, 4 pi times as much
 COUPLING_DAMPING = 0.05
 
 
@@ -53,18 +53,19 @@ class LegParameters:
     Attributes
     ----------
     mass, length : (bodies,) arrays
-        On bodies, in the order of the file. A heavier body has the same shape; a longer one is scaled in all
-        directions and has the same mass.
+        Factors on bodies, in the order of the file. A heavier body has the same shape; a longer one is scaled
+        in all directions and has the same mass.
     friction : float
-        On the friction coefficients of all clearance joints.
+        Factor on the friction coefficients of all clearance joints.
     compliance : float
-        Of what is between the measured crank angle and the crank [rad/(N m)], at the crank; 0 if it is rigid.
+        Compliance between the measured crank angle and the crank [rad/(N m)], at the crank; 0 if it is rigid.
     damping : float
-        Of the crank on a compliant drive, over the critical one with the mean inertia of the ideal leg.
+        Damping of the crank on a compliant drive, over the critical damping with the mean inertia of the
+        ideal leg.
     load : (PHASES, 2) array
         Mean force of the ground on the toe at equal steps of the crank angle from 0 [N]; (0, 2) without one.
     load_sigma : float
-        Standard deviation of its size, as a fraction of it; no part of the leg, which is equal with any.
+        Standard deviation of the load's size, as a fraction of it; ignored when legs are compared.
     """
 
     mass: Floats = attrs.field(eq=attrs.cmp_using(eq=np.array_equal))
@@ -82,7 +83,7 @@ class LegParameters:
 
     @property
     def in_air(self) -> "LegParameters":
-        """Those of the leg without a load."""
+        """Parameters of the leg without a load."""
         return attrs.evolve(self, load=np.zeros((0, 2)))
 
     def is_possible(self, mechanism: Mechanism) -> bool:
@@ -126,12 +127,12 @@ def _scaled(place: tuple[float, float], factor: float) -> tuple[float, float]:
 # How a crank turns in a gait cycle: its mean speed and its ripple, from samples of its angle.
 
 
-# of the mean speed: a crank that turns otherwise by more is not compared. At 57 rpm a leg looks as if its
-# joints were 0.03 to 0.09 mm wider than at 60, and what a clearance changes is in other phases (diagnosis.md)
+# fraction of the mean speed: a crank motion that differs by more is not compared. At 57 rpm a leg looks as if
+# its joints were 0.03 to 0.09 mm wider than at 60, and a clearance changes other phases (diagnosis.md)
 UNLIKE = 0.015
 
-# of a sensor's period: times in whole milliseconds, as tables have them, move samples at 200 Hz by up to a
-# tenth of it, so that the speed of the same crank differs by 2 % from gait cycle to gait cycle
+# fraction of a sensor's period: times in whole milliseconds, as tables have them, move samples at 200 Hz by
+# up to a tenth of it, so that the speed of the same crank differs by 2 % from gait cycle to gait cycle
 _COARSE = 0.01
 _LOST = 1.5  # steps: in a longer time between two samples, some were lost
 
@@ -188,7 +189,7 @@ class CrankProfile:
         return float(np.abs(own - others).max() / abs(other.speed))
 
     def is_like(self, other: "CrankProfile") -> bool:
-        """Whether a torque under this motion can be compared with one under another."""
+        """Whether a torque under this motion can be compared with a torque under the other."""
         return self.departure(other) <= UNLIKE
 
     def _speeds(self) -> Floats:
@@ -223,7 +224,7 @@ def cycle_profile(time_s: Floats, angle: Floats, duration_s: float) -> CrankProf
 def _fitted(
     time_s: Floats, angle: Floats, duration_s: float, is_whole: bool = True
 ) -> tuple[CrankProfile, float, float]:
-    """Profile of angles at some times, the RMS of what it leaves over [rad], and a factor on the duration.
+    """Profile of angles at some times, the RMS of its residual [rad], and a factor on the duration.
 
     The factor is 1 if the gait cycle is whole, that is, if its duration is known.
     """
@@ -431,7 +432,7 @@ class LegSimulation:
 
     def _prepare(self, parameters: LegParameters) -> None:
         """Prepare the simulation of legs with given masses, lengths and friction."""
-        self._parameters = self._loaded = self._tables = None  # 18 MB, while what follows needs 50
+        self._parameters = self._loaded = self._tables = None  # 18 MB, while the next step needs 50
         self._setup = prepare(parameters.in_air.applied(self._mechanism), wear=True)
         linkage, contacts = self._setup.linkage, self._setup.contacts
         contacts.wear_coefficient[:] = 0.0

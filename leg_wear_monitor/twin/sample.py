@@ -1,4 +1,4 @@
-"""Samples, the kinds and settings of inputs, and what is taken in: the seam between sensors and twin."""
+"""Samples, the kinds and settings of inputs, and accepted inputs: the interface between sensors and twin."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -19,7 +19,7 @@ from leg_wear_monitor.twin.statistics import Intake
 Samples = NDArray[Any]
 """Records of `GAIT_SAMPLE`, shape (n,), in order of arrival."""
 
-ENCODERS = 4  # largest number of further encoders, beside the crank's
+ENCODERS = 4  # largest number of encoders in addition to the crank's
 
 GAIT_SAMPLE = np.dtype(
     [
@@ -36,12 +36,12 @@ GAIT_SAMPLE = np.dtype(
 )
 """One sample: stamp of the header, kind, fault, and values, NaN where absent.
 
-The angle is that of the mechanism's crank, after sign, offset and gear ratio; it may be wrapped to a turn or
-be continuous. A crank sample may also contain a torque (``effort``), and the angles of further encoders in
-the order of ``encoders.names``, after their signs: NaN where absent, infinite where the value is no angle. An
-invalid torque or encoder angle is not a fault of the sample. The force of the ground on the foot is along the
-axes of the ground, the second one up, or with ``foot_load.frame: foot`` of the toe's body; a contact switch
-gives (0, 1) or (0, 0). The temperature is the drive's, and comes with its torque.
+The angle is the angle of the mechanism's crank, after sign, offset and gear ratio; it may be wrapped to a
+turn or be continuous. A crank sample may also contain a torque (``effort``), and the angles of further
+encoders in the order of ``encoders.names``, after their signs: NaN where absent, infinite where the value is
+no angle. An invalid torque or encoder angle is not a fault of the sample. The force of the ground on the foot
+is along the axes of the ground, the second one up, or with ``foot_load.frame: foot`` of the toe's body; a
+contact switch gives (0, 1) or (0, 0). The temperature is the drive's, and comes with its torque.
 """
 
 # Faults of a message, found by the conversion. Such a sample is counted and never used.
@@ -77,8 +77,8 @@ def gait_samples(
     stamp_ns : (n,) array of int
         Times of measurement [ns].
     kind : (n,) array or int
-        0 for a sample of the crank, which may contain a torque, too; 1 for one of the drive torque alone; 2
-        for one of the foot load.
+        0 for a sample of the crank, which may contain a torque as well; 1 for a sample of the drive torque
+        alone; 2 for a sample of the foot load.
     crank_angle_rad, crank_velocity_radps, torque_nm : (n,) array or float
         Angle and speed of the mechanism's crank [rad, rad/s], drive torque on the crank [N m]; NaN where
         absent.
@@ -255,9 +255,10 @@ class TwinSettings:
     ----------
     tracker : TrackerSettings
     clearance_joints : tuple of str, optional
-        The clearance joints; default: those of the mechanism (A, B, G, I, J of the bionic leg).
+        The clearance joints; default: all clearance joints of the mechanism (A, B, G, I, J of the bionic
+        leg).
     wear_acceleration : float
-        Factor on all wear coefficients, for demonstrations; 1 for the material's own.
+        Factor on all wear coefficients, for demonstrations; 1 for the material's coefficients.
     torque_bandwidth_hz : float
         Bandwidth of the low-pass filter of measured and predicted torque before their comparison.
     estimate_load : bool
@@ -269,11 +270,11 @@ class TwinSettings:
     load_limit_n : float
         Largest plausible foot load [N].
     load_source, load_frame : str
-        Samples of the foot load: ``none``, or what gives them; along which axes.
+        Source of the foot load samples, or ``none``; axes of the samples.
     load_model : str
-        Load that acts: ``measured``, that of the samples at their times; else see `estimate_load`.
+        Load that acts: ``measured``, the load of the samples at their times; else see `estimate_load`.
     torque_lag_s : float
-        Lag of the torque as declared.
+        Declared lag of the torque.
     torque_sampling : str
         Meaning of a torque sample: ``average``, the mean since the previous sample; ``instant``, the value at
         the stamp.
@@ -360,7 +361,8 @@ _MOST = 20_000  # samples of each kind: ten seconds at 2 kHz
 class KeepsSamples:
     """Base of an observer that evaluates whole gait cycles.
 
-    ``state.samples`` is what it keeps, ``state.due`` the begins and ends of cycles that are not evaluated.
+    ``state.samples`` holds the stored samples, ``state.due`` the starts and ends of the cycles still to
+    evaluate.
     """
 
     state: Any
@@ -398,7 +400,7 @@ def newest(kept: Samples, since_ns: int) -> Samples:
 
 
 def within(kept: Samples, begin_ns: int, end_ns: int) -> Samples:
-    """Samples from one stamp to another, in order; of equal stamps the first one."""
+    """Samples between two stamps, in order; only the first sample of equal stamps."""
     stamp_ns, first = np.unique(kept["stamp_ns"], return_index=True)
     found: Samples = kept[first[(stamp_ns >= begin_ns) & (stamp_ns < end_ns)]]
     return found

@@ -100,7 +100,7 @@ class TorqueStatistics:
     measured_rms_nm, predicted_rms_nm, residual_rms_nm : float
     unexplained_rms_nm : float
         RMS of the residual that repeats over the last compared gait cycles, without the parts of foot load,
-        frictions and lag and without what scatters from cycle to cycle: the mismatch of the model.
+        frictions and lag and without the scatter from cycle to cycle: the error of the model.
     condition : float
         Condition number of this cycle's estimate of the four parameters below, 1 at best.
     load_n, load_sigma_n : float
@@ -114,7 +114,7 @@ class TorqueStatistics:
     load_friction : float
         Friction of the drive over the size of the torque that it transmits.
     friction_sigma_nm, torque_lag_sigma_s, load_friction_sigma : float
-        Standard deviations of these three.
+        Standard deviations of the friction, the lag and the load friction.
     """
 
     samples: int
@@ -141,10 +141,10 @@ class TorqueProfile:
     Attributes
     ----------
     number, angle_rad : (FINE_PHASES,) array
-        Samples in each phase, averages weighed by the time that they stand for, and the sum of their crank
+        Samples in each phase, averages weighted by the time that they stand for, and the sum of their crank
         angles.
     measured_nm, predicted_nm : (FINE_PHASES,) array
-        Measured torque, and that of the model without a foot load.
+        Measured torque, and the torque of the model without a foot load.
     lever_m : (FINE_PHASES,) array
         Drive torque per foot load [N m/N].
     """
@@ -190,7 +190,7 @@ class CycleStatistics:
     cycle : int
         Number of the cycle, from 1 since the twin was created (or restored).
     begin_ns, stamp_ns : int
-        Stamps of its begin and end.
+        Stamps of the start and end of the cycle.
     direction : int
         1 forward, -1 backward.
     moving_s, bridged_s : float
@@ -203,13 +203,13 @@ class CycleStatistics:
     archard_j : array
         Integral of ``F_N |v_t| dt``.
     clearance_mean_m, clearance_max_m : array
-        Radial clearances at its end.
+        Radial clearances at the end of the cycle.
     growth_mean_m : array
         Change of the first over the cycle.
     torque : TorqueStatistics
     torque_profile : TorqueProfile
     not_compared : NotCompared or None
-        Why its torque is not among those of the mismatch; None if it is.
+        Why the torque residual leaves this cycle's torque out; None if it does not.
     load : LoadProfile or None
         None without a sample of the foot load.
     load_peak_n : float

@@ -3,11 +3,11 @@
 A clearance shows in where in the gait cycle the torque is rough. That depends on how the crank turns, so the
 leg is simulated under the measured profile of the crank: with the clearances that are expected, and with each
 of them wider in turn. That takes seconds of a processor, so threads of low priority do it while the leg walks
-on; compiled code does not hold the interpreter's lock. A reference is there a number of evaluation periods
-after it was begun that depends on what is to be simulated alone: a replay gives what the live monitor gave.
+on; compiled code does not hold the interpreter's lock. The number of evaluation periods until a reference is
+ready depends only on the legs to simulate: a replay gives the same results as the live monitor.
 
-It depends on the leg's masses, lengths and friction, too: legs in which all of them are changed at once show
-what each of them changes.
+The reference depends on the leg's masses, lengths and friction as well: legs in which all of them change at
+once show the effect of each parameter.
 """
 
 import os
@@ -42,14 +42,14 @@ _PERIODS = 4  # evaluation periods in a commanded gait cycle
 PACE = 8  # simulated gait cycles in an evaluation period, a quarter cycle; a core does half as many more
 WIDER = (1.2, 1.35, 1.5, 2.0, 3.0, 5.0, 8.0)  # factors on the expected clearance, one joint at a time
 
-WORN, NARROWER = 1.2, 0.8  # a clearance over the new one, and a factor on the others beside it
+WORN, NARROWER = 1.2, 0.8  # a clearance over its new one, and a factor on the other clearances
 
 # factors on the mass of one body at a time (half a kilogram on a foot, two on a thigh), and on the friction
 # of all joints. Files and ledgers know such legs by their places alone: others would need one for them there
 MASSES, FRICTIONS = (0.75, 1.4), (0.6, 1.5, 2.2, 3.2)
 
-# of each body's mass and length, and factors on the friction in the joints and on the stiffness of a drive
-# that is not rigid (a quarter of its resonance's width): up and down, all of them at once
+# changes of each body's mass and length, and factors on the friction in the joints and on the stiffness of a
+# drive that is not rigid (a quarter of its resonance's width): up and down, all of them at once
 HEAVIER, LONGER, ROUGHER = 0.02, 0.002, 1.25
 
 _BEHIND = 2  # legs that are due and not simulated, from which on threads of higher priority help
@@ -71,11 +71,11 @@ class TorqueReference:
     clearance_m : (legs, k) array
         Mean radial clearances of each leg; the first leg is the expected one, then each joint is wider in
         turn, all sizes of the first joint before those of the next. The last legs, if their clearances are
-        the expected ones, have another mass of each body in turn, then another friction.
+        the expected ones, have a changed mass of each body in turn, then a changed friction.
     torque_nm : tuple of (cycles, POINTS) arrays
         Mean drive torque between equal steps of time of a gait cycle, which begins at the profile's angle 0.
     parameters : LegParameters
-        Those of the expected leg.
+        Parameters of the expected leg.
     """
 
     profile: CrankProfile
@@ -90,37 +90,38 @@ class TorqueReference:
 
     @property
     def is_of_parameters(self) -> bool:
-        """Whether its legs differ in masses, lengths and friction, from those of the first one."""
+        """Whether its legs differ from the first leg in masses, lengths and friction."""
         return bool((self.clearance_m == self.clearance_m[0]).all())
 
     @property
     def of_masses(self) -> Ints:
-        """Indices (bodies, masses) of legs with another mass of a body; (0, masses) without such legs."""
+        """Indices (bodies, masses) of legs with a changed mass of a body; (0, masses) without such legs."""
         number = self._of_factors - len(FRICTIONS)
         return (np.arange(max(0, number)) + 1 + self.of_joints.size).reshape(-1, len(MASSES))
 
     @property
     def of_frictions(self) -> Ints:
-        """Indices (1, frictions) of legs with another friction; (0, frictions) without such legs."""
+        """Indices (1, frictions) of legs with a changed friction; (0, frictions) without such legs."""
         number, legs = min(self._of_factors, len(FRICTIONS)), len(self.clearance_m)
         return np.arange(legs - number, legs).reshape(-1, len(FRICTIONS))
 
     @property
     def _of_factors(self) -> int:
-        """Number of the last legs, which have another mass or friction."""
+        """Number of the last legs, which have a changed mass or friction."""
         number = len(MASSES) * len(self.parameters.mass) + len(FRICTIONS)
         are_there = (self.clearance_m[-number:] == self.clearance_m[0]).all() and not self.is_of_parameters
         return number if are_there else 0
 
     @property
     def of_joints(self) -> Ints:
-        """Indices (k, sizes) of legs with another clearance of a joint."""
+        """Indices (k, sizes) of legs with a changed clearance of a joint."""
         return np.arange(1, len(self.clearance_m) - self._of_factors).reshape(self.clearance_m.shape[1], -1)
 
     def in_order_of(self, mechanism: Mechanism, names: Sequence[str]) -> "TorqueReference":
-        """The same with bodies in the order of a mechanism, instead of that of their names.
+        """The same reference with bodies in the order of a mechanism, instead of the order of their names.
 
-        If the orders differ, one that is not whole keeps no leg with other bodies but the expected one.
+        If the orders differ, an unfinished reference drops its legs with changed bodies, except the expected
+        leg.
         """
         parameters = self.parameters.of_bodies(names, mechanism)
         order = [names.index(name) for name in mechanism.bodies]
@@ -156,9 +157,9 @@ class ReferenceSnapshot(NamedTuple):
 
 
 class ReferenceRun(Generic[FoundT]):
-    """Simulates legs while evaluation periods pass: what a sensor shows of them is its reference.
+    """Simulates legs while evaluation periods pass: the sensor signals of these legs are its reference.
 
-    Threads simulate some legs ahead of the caller. `advance` waits for them when all are due: what it returns
+    Threads simulate some legs ahead of the caller. `advance` waits for them when all are due: its result
     depends on the number of calls alone, and a machine that is busy for a while catches up before. There are
     as many threads as numba may use (NUMBA_NUM_THREADS); while they are behind, as many of the program's own
     priority help.
@@ -170,8 +171,8 @@ class ReferenceRun(Generic[FoundT]):
     Attributes
     ----------
     may_be_late : bool
-        Whether `advance` never waits, since the leg walks on meanwhile: what is not simulated where it is due
-        then comes later.
+        Whether `advance` never waits, since the leg walks on meanwhile: a simulation that is not ready in
+        time then comes later.
     """
 
     may_be_late = False
@@ -187,7 +188,7 @@ class ReferenceRun(Generic[FoundT]):
         self._urgent = ThreadPoolExecutor(self._threads, "reference-urgent")
         self._ahead: list[Future[NDArray[Any] | None]] = []
         self._hurried: list[Future[NDArray[Any] | None]] = []
-        self._wanted = object()  # another one as soon as nobody waits for what the threads simulate
+        self._wanted = object()  # replaced as soon as no caller waits for the threads' simulations
         self._of_thread = threading.local()
 
     def _so_far(self) -> FoundT:
@@ -195,7 +196,7 @@ class ReferenceRun(Generic[FoundT]):
         raise NotImplementedError
 
     def _kept(self, leg: SimulatedLeg) -> NDArray[Any]:
-        """What of a simulated leg the reference is made of."""
+        """Part of a simulated leg that the reference stores."""
         raise NotImplementedError
 
     def _cycles_of(self, leg: Leg) -> int:
@@ -214,7 +215,7 @@ class ReferenceRun(Generic[FoundT]):
 
     @property
     def profile(self) -> CrankProfile:
-        """Motion of the crank of what is simulated."""
+        """Motion of the crank in the simulation."""
         return self._profile
 
     @property
@@ -270,9 +271,9 @@ class ReferenceRun(Generic[FoundT]):
         self._done, self._periods = snapshot.done, snapshot.periods
 
     def leave(self) -> None:
-        """Let the threads leave what they simulate ahead, for which a program's end would wait.
+        """Let the threads stop simulating ahead, because a program's end would wait for them.
 
-        A call that follows has it simulated again.
+        A later call has the legs simulated again.
         """
         for one in self._ahead:
             one.cancel()
@@ -337,7 +338,7 @@ class ReferenceRun(Generic[FoundT]):
     def _simulated(
         self, wanted: object, profile: CrankProfile, leg: Leg, depth: Floats, cycles: int
     ) -> NDArray[Any] | None:
-        """What is kept of a leg; None if it cannot be simulated, or is not wanted any more."""
+        """Stored part of a leg; None if it cannot be simulated, or is not wanted any more."""
         own = self._of_thread
         if not hasattr(own, "simulation"):
             own.simulation = LegSimulation(self._mechanism)
@@ -385,7 +386,7 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
             Wear depths [m], which show where joints are worn.
         profile : CrankProfile
         parameters : LegParameters, optional
-            Those of the mechanism file by default.
+            Parameters of the leg; by default the mechanism file's.
         """
         parameters = parameters or LegParameters.none(self._mechanism)
         centre = np.maximum(clearance_m, LEAST_CLEARANCE_M)
@@ -461,9 +462,9 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
 def design(parameters: int) -> Floats:
     """Levels (legs, parameters) of parameters in simulated legs: 0 in the first, then all at once, -1 or 1.
 
-    What each of them changes is seen in all legs: their chaotic motion scatters it by a thirty-second of what
-    one leg each leaves (Hotelling, Annals of Mathematical Statistics 15 (1944), 297). As each leg has its
-    opposite, what two parameters change together cancels.
+    All legs show the effect of each parameter: its scatter from their chaotic motion is a thirty-second of
+    the scatter with one leg per parameter (Hotelling, Annals of Mathematical Statistics 15 (1944), 297). As
+    each leg has its opposite, the joint effect of two parameters cancels.
     """
     levels: Floats = np.ones((1, 1))
     while len(levels) < parameters:  # Sylvester's matrices: all columns are orthogonal
@@ -493,7 +494,7 @@ def _changed(near: LegParameters, clearance_m: Floats) -> list[Leg]:
 
 
 def _of_factors(near: LegParameters, clearance_m: Floats) -> list[Leg]:
-    """Legs with another mass of each body in turn, then with another friction."""
+    """Legs with a changed mass of each body in turn, then with a changed friction."""
     masses = [near.mass * factor**one for one in np.eye(len(near.mass)) for factor in MASSES]
     changed = [attrs.evolve(near, mass=mass) for mass in masses]
     changed += [attrs.evolve(near, friction=near.friction * factor) for factor in FRICTIONS]
@@ -502,6 +503,6 @@ def _of_factors(near: LegParameters, clearance_m: Floats) -> list[Leg]:
 
 def _lower_priority() -> None:
     """Lower the priority of this thread: samples come first."""
-    if sys.platform == "linux":  # elsewhere, it would be that of the whole process
-        with suppress(OSError):  # where a container forbids it, the thread runs at its program's priority
+    if sys.platform == "linux":  # elsewhere, it would be the whole process's priority
+        with suppress(OSError):  # if a container forbids it, the thread runs at its program's priority
             os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICE)

@@ -50,20 +50,20 @@ from leg_wear_monitor.monitor.config.sections import drive_figures
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.verdict.causes import sentence
 
-# Sentences on what cannot be determined, on what does not fit, and on what is worth knowing.
+# Sentences on undetermined parameters, on quantities that do not fit, and on further information.
 
 
 _SURE = 3.0
-_KNOWN_SIGMAS = 2.0  # standard deviations that have to be less than what is asked for
-_ANEW_RAD = 0.1  # by which offsets of two recordings of one absolute encoder do not differ
+_KNOWN_SIGMAS = 2.0  # standard deviations that must be below the requested accuracy
+_ANEW_RAD = 0.1  # offsets of two recordings of one absolute encoder differ by less
 _IN_DEGREES = math.degrees(1.0)
 _ROUGH_SCALE = 0.05
-_ROUGH_REST = 0.15  # a repeating rest that may shift the scale by more than twice what clearances do
-_DECLARED_ERROR = 0.3  # by which a drive differs from another one of its kind, and when it is warm
+_ROUGH_REST = 0.15  # a repeating residual that may shift the scale more than twice as much as clearances
+_DECLARED_ERROR = 0.3  # relative difference between drives of one kind, and between a cold and a warm drive
 _AT_ZERO_RAD = 0.02
-_AS_WELL = 1.02  # a fit is as good as the best one up to this ratio of mismatches
-_LARGEST_LIMIT = 0.3  # of the mismatch of a healthy leg
-_LEAST_SWING, _LEAST_TORQUE = 1.0e-6, 1.0e-9  # of a torque that changes: of its size, and in its unit
+_AS_WELL = 1.02  # a fit is as good as the best fit up to this ratio of torque residuals
+_LARGEST_LIMIT = 0.3  # torque residual of a healthy leg
+_LEAST_SWING, _LEAST_TORQUE = 1.0e-6, 1.0e-9  # swing of a changing torque: over its size, and in its unit
 
 
 def not_told(found: proposal.Found) -> tuple[str, ...]:
@@ -92,7 +92,7 @@ def not_told(found: proposal.Found) -> tuple[str, ...]:
 
 
 def findings(found: proposal.Found, load: Load | None, mechanism: Mechanism) -> tuple[str, ...]:
-    """What does not fit, or cannot be used as it is."""
+    """Quantities that do not fit, or that cannot be used as they are."""
     sentences = [_load(load)]
     if not found.doubts:  # friction and phases say nothing about an unknown leg
         sentences += [does_not_fit(found.fit, mechanism), _drives(found), _late(found), _anew(found)]
@@ -188,7 +188,7 @@ def _position(found: proposal.Found) -> str:
 
 
 def notes(found: proposal.Found) -> Iterator[str]:
-    """What is worth knowing."""
+    """Further information for the operator."""
     yield from found.choice.also
     yield from _otherwise(found)
     ratio = proposal.gear(found)[0]
@@ -218,7 +218,7 @@ def notes(found: proposal.Found) -> Iterator[str]:
 
 
 _LEAST_S = 10.0  # ten turns at 60 rpm
-_FASTER = 1.15  # another cadence
+_FASTER = 1.15  # a different cadence
 
 
 def commission(
@@ -239,8 +239,8 @@ def commission(
         MCAP, .db3, CSV and Parquet files, bag directories, tables in memory (see `replay`); an encoder may
         start anew in each.
     config : MonitorConfig or path, optional
-        Parameters, or a parameter file: names the mechanism, and keeps what is not measured; default: the
-        file shipped with the package.
+        Parameters, or a parameter file: names the mechanism, and supplies the values that are not measured;
+        default: the file shipped with the package.
     joint_states, drive_torque : str, optional
         Topics; default: all are tried.
     crank_joint : str, optional
@@ -318,7 +318,7 @@ def _fastest(
 
 
 def _with_limit(result: CommissioningResult, walk: Walk) -> CommissioningResult:
-    """The proposal with a limit of the mismatch for this leg; none if that limit would hide a fault."""
+    """The proposal with a torque residual limit for this leg; no limit if it would hide a fault."""
     item = mismatch_item(walk)
     if item is None or result.config is None:
         return result
@@ -337,14 +337,14 @@ def propose(
     progress: Callable[[float], None] = lambda _fraction: None,
     model: TorqueModel | None = None,
 ) -> CommissioningResult:
-    """Propose parameters from what was recorded; see `commission`.
+    """Propose parameters from recorded signals; see `commission`.
 
     Parameters
     ----------
     signals : Signals
     mechanism : Mechanism
     base : MonitorConfig
-        Keeps what is not measured.
+        Supplies the values that are not measured.
     crank_joint : str, optional
         Joint; default: all are tried.
     progress : callable
@@ -403,7 +403,7 @@ def _final(
     low_pass_s, low_pass_sigma_s = low_pass_time(low_pass, declared)
     terms = Terms(bias=one.pair.walks_both_ways, load_friction=True, lag=separates_lag(one.pair))
     start = attrs.evolve(one.refined, lag_s=low_pass_s, low_pass_s=low_pass_s)
-    # an acceleration that repeats has less noise, but lacks that of a ramp
+    # a repeating acceleration has less noise, but lacks the acceleration of a ramp
     pairs = one.pair, with_repeating_acceleration(one.pair, one.ratio)
     own, repeating = (fit(pair, model, start, terms, with_errors=True) for pair in pairs)
     again = repeating if repeating.mismatch <= _AS_WELL * own.mismatch else own

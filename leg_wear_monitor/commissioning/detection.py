@@ -1,7 +1,7 @@
-"""For which joints a drive torque is good enough: what the monitor's tests would find of wider joints.
+"""Joints for which a drive torque is good enough: the results of the monitor's tests on wider joints.
 
-The signature that a wider joint would have is that of the measured leg, changed as a simulated leg with this
-joint changes. The tests and explanations of the diagnosis are asked about it, gait cycle by gait cycle.
+The signature of a wider joint is the signature of the measured leg plus the change that the simulated leg
+shows with this joint. The tests and explanations of the diagnosis evaluate it, gait cycle by gait cycle.
 """
 
 import math
@@ -83,9 +83,9 @@ class Walk:
         With the parameters applied.
     config : MonitorConfig
     mismatch : (n,) array
-        Of the drive torque in each gait cycle, as the monitor finds it.
+        Torque residual in each gait cycle, as the monitor finds it.
     cycles : tuple of SignedCycle
-        Those at the commanded cadence whose torque has a signature.
+        Gait cycles at the commanded cadence whose torque has a signature.
     sensor : TorqueSensor or None
         How the torque was measured, without its noise; None without torques.
     faults : tuple of str
@@ -101,7 +101,7 @@ class Walk:
 
     @property
     def profile(self) -> CrankProfile:
-        """Mean motion of the crank in the gait cycles, of which there is at least one."""
+        """Mean motion of the crank in the gait cycles; at least one is there."""
         return mean_profile([cycle.profile for cycle in self.cycles])
 
     @property
@@ -123,12 +123,12 @@ def walk_of(
     joint_states: str | None,
     drive_torque: str | None,
 ) -> Walk:
-    """What the monitor sees in recordings of a healthy leg.
+    """Results of the monitor for recordings of a healthy leg.
 
     Parameters
     ----------
     recordings : sequence
-        Of the leg with the crank's zero of the parameters.
+        Recordings of the leg with the crank's zero of the parameters.
     config : MonitorConfig
         Proposed parameters.
     joint_states, drive_torque : str or None
@@ -183,11 +183,11 @@ def _signed(
 
 
 OPENED = (1.5, 2.0)  # 0.45 and 0.60 mm of the default leg's joints
-SOON = 100  # gait cycles: until then, a joint twice as wide has to be named
+SOON = 100  # gait cycles: by then, a joint twice as wide must be identified
 
-# of the simulated change, in the direction that a test looks at: legs in full coordinates, masses 4 % off,
-# A, B, G, I, J at 0.45 mm, G, I at 0.60 mm, six sensors of 50 to 200 Hz, 0.5 and 3 N m, some behind 20 Hz,
-# had 0.27 to 1.47, half of them 0.87 and more, four of five 0.57 and more (n = 42, 2026-11-24)
+# fraction of the simulated change, in the direction that a test looks at: legs in full coordinates, masses
+# 4 % off, A, B, G, I, J at 0.45 mm, G, I at 0.60 mm, six sensors of 50 to 200 Hz, 0.5 and 3 N m, some behind
+# 20 Hz, had 0.27 to 1.47, half of them 0.87 and more, four of five 0.57 and more (n = 42, 2026-11-24)
 _USUAL, _AT_LEAST = 0.85, 0.6
 
 _FIRST = 2  # gait cycles that an explanation needs at least
@@ -197,7 +197,7 @@ _QUIETER = 0.25
 
 
 def joint_detections(walk: Walk, reference: TorqueReference) -> tuple[JointDetection, ...]:
-    """What the torque of a walk will show of each joint, with a reference for its crank's motion.
+    """Detectability of each joint in the torque of a walk, with a reference for its crank's motion.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ def joint_detections(walk: Walk, reference: TorqueReference) -> tuple[JointDetec
 def _commissioned(
     walk: Walk, reference: TorqueReference, sensor: TorqueSensor, known: CommissionedTorque
 ) -> Explainer:
-    """What explains changes of the leg once the monitor has a whole baseline."""
+    """Explainer of changes of the leg once the monitor has a whole baseline."""
     one = explainer_of(walk.mechanism, reference, sensor, known)
     part = min(1.0, known.cycles / COMMISSIONING_CYCLES)
     baseline = attrs.evolve(one.baseline, covariance=part * one.baseline.covariance)
@@ -276,7 +276,7 @@ def _detected(detector: ChangeDetector, signature: Floats) -> float:
 def _named(
     explainer: Explainer, signature: Floats, joint: str, new_m: Floats, detected: float
 ) -> tuple[float, str]:
-    """Gait cycles until a signature (F,) surely is a wider joint, NaN if never, and what else explains it."""
+    """Gait cycles until a signature (F,) surely is a wider joint, NaN if never; best other explanation."""
     runner_up = ""
     for cycles in _longer(detected):
         explanations = explainer.explanations(signature, cycles, new_m)
@@ -299,12 +299,12 @@ def _longer(detected: float) -> Iterator[int]:
 
 
 def _why(each: JointDetection) -> str:
-    """What else explains a wider joint that is detected but not named."""
+    """Other explanation of a wider joint that is detected but not identified."""
     return f"{each.runner_up} explains as much, and " if each.runner_up else ""
 
 
 def _reasons(walk: Walk, reference: TorqueReference, sensor: TorqueSensor, bad: list[int]) -> dict[int, str]:
-    """For joints by number, what would make the torque good enough."""
+    """Remedies that would make the torque good enough, by joint number."""
     reasons: dict[int, str] = {}
     for text, better in _better(sensor):
         left = [k for k in bad if k not in reasons]
@@ -318,7 +318,7 @@ def _reasons(walk: Walk, reference: TorqueReference, sensor: TorqueSensor, bad: 
 
 
 def _better(sensor: TorqueSensor) -> Iterator[tuple[str, TorqueSensor]]:
-    """Sensors that are better in one respect, then in all, with what is wrong with the present one."""
+    """Sensors that are better in one respect, then in all, with the fault of the present sensor."""
     yield (
         "the torque varies from step to step by more than for a leg that walks steadily in the air",
         sensor,
@@ -353,7 +353,7 @@ def with_detections(
     file: str | Path | None,
     progress: Callable[[float], None] = lambda _fraction: None,
 ) -> CommissioningResult:
-    """The result with what the torque will show of each joint.
+    """The result with the detectability of each joint.
 
     Parameters
     ----------
@@ -361,7 +361,7 @@ def with_detections(
         With proposed parameters.
     walk : Walk
     file : str, pathlib.Path or None
-        For a reference that is to be simulated; None: one that is there already is taken.
+        File for a reference to simulate; None: use the existing reference.
     progress : callable
 
     Raises
@@ -402,7 +402,7 @@ def _known(walk: Walk) -> tuple[TorqueReference | None, str]:
 
 
 def _none(walk: Walk) -> str:
-    """That there is no reference, and when there will be one."""
+    """Message that there is no reference yet, and when the monitor will have it."""
     leg = walk.mechanism
     of_factors = len(leg.bodies) * len(MASSES) + len(FRICTIONS)
     legs = 1 + len(leg.clearance_joints) * len(WIDER) + of_factors

@@ -1,4 +1,4 @@
-"""What a walk says of its sensors and drive: timing, sampling, noise, low-pass, misfit."""
+"""Evidence of a walk on its sensors and drive: timing, sampling, noise, low-pass, torque residual."""
 
 import math
 
@@ -25,17 +25,17 @@ from leg_wear_monitor.twin.sample import AVERAGE, INSTANT
 from leg_wear_monitor.twin.torque_reference import TorqueReference
 from leg_wear_monitor.wear import SECTORS
 
-# The low-pass of a drive: by how rough the torque of the expected leg comes through it.
+# The low-pass of a drive, from the roughness of the expected leg's torque behind it.
 #
-# At one cadence a low-pass delays slow changes of the torque as a lag does. What is fast, the impacts of the
-# joints, becomes smoother: one simulated leg shows how rough the torque would be without it.
+# At one cadence a low-pass delays slow changes of the torque as a lag does. It also smooths fast changes, the
+# impacts of the joints: one simulated leg shows how rough the torque would be without it.
 
 
 _SETTLING, _CYCLES = 2, 40
 # legs in full coordinates, joints of 0.2 to 0.4 mm, 30 to 85 rpm, low-passes of 15 to 120 Hz: the logarithm
-# of the corner frequency is off by 0.24 where the mean square s of what is left over is below 0.3, by 0.32
-# below 0.6, by 0.65 below 1.2; beyond, clearances or masses are too far off, and 6 of 12 low-passes do not
-# show. 100 Hz were found for 3 of 5 sensors without a low-pass (n = 75, 2026-11-24)
+# of the corner frequency is off by 0.24 where the mean square s of the residual is below 0.3, by 0.32 below
+# 0.6, by 0.65 below 1.2; beyond, clearances or masses are too far off, and 6 of 12 low-passes do not show.
+# 100 Hz were found for 3 of 5 sensors without a low-pass (n = 75, 2026-11-24)
 _SPREAD, _BY_SQUARE, _POOR = 0.2, 0.5, 1.0
 # observable corner frequencies, as a fraction of the sampling rate: at 100 Hz, 116 Hz looked like 50
 _SHOWS_HZ, _OF_RATE = 70.0, 0.4
@@ -88,7 +88,7 @@ def low_pass_of(walk: Walk, reference: TorqueReference) -> LowPass | None:
     one = found.channel
     least_hz = min(_SHOWS_HZ, _OF_RATE / walk.sensor.period_s)
     shows = TURN * one.time_constant_s * least_hz > 0.99
-    # a direct channel is what is taken where no other one is surely better
+    # a direct drive is assumed if no other drive dynamics are surely better
     is_known = found.square <= _POOR and bool(one.delay_s or one.time_constant_s)
     log_sigma = _SPREAD + _BY_SQUARE * found.square
     time_constant_s = one.time_constant_s if shows else 0.0
@@ -131,7 +131,7 @@ _SURE_CAUSE = 5.0  # standard deviations
 
 @attrs.frozen
 class Load:
-    """A foot load that explains most of what did not fit.
+    """A foot load that explains most of the torque residual.
 
     Attributes
     ----------
@@ -161,7 +161,7 @@ def with_load(one: Fit, model: TorqueModel, terms: Terms) -> tuple[Fit, Load | N
 
 
 def does_not_fit(one: Fit, mechanism: Mechanism) -> str:
-    """What repeats and does not fit, and the body whose mass would explain most of it; empty if little."""
+    """The repeating residual, and the body whose mass would explain most of it; empty if it is small."""
     rest = repeating(one)
     if rest < _NOTABLE:
         return ""
@@ -195,20 +195,20 @@ def _heavier(one: Fit, mechanism: Mechanism) -> tuple[str, float, float]:
     return best
 
 
-# The mismatch of the drive torque that a healthy leg has with the monitor itself, and the limit for it.
+# The torque residual of a healthy leg as the monitor measures it, and the limit for it.
 
 
 LIMIT = "limits.torque_mismatch"
 
 _LEAST_CYCLES = 10
-# scatters of a gait cycle's mismatch by which a warning is above its mean: by chance less than once in 1e6
+# scatters of a cycle's torque residual from its mean to a warning: by chance less than once in 1e6
 _SIGMAS = 5.3
 
 
 def mismatch_item(walk: Walk) -> CommissioningItem | None:
-    """Limit of the mismatch by what a healthy leg has; None with too few gait cycles.
+    """Torque residual limit from a healthy leg; None with too few gait cycles.
 
-    A given limit stays where it is enough.
+    A given limit stays if it is high enough.
     """
     found = walk.mismatch
     found = found[np.isfinite(found)]
@@ -229,7 +229,7 @@ def mismatch_item(walk: Walk) -> CommissioningItem | None:
 
 
 _QUIETEST = 5  # parts of the turn of 48: so many that the median of an odd number is taken
-_MEDIAN_TO_SIGMA = 1.0 / 0.6745  # of a normal distribution's absolute values
+_MEDIAN_TO_SIGMA = 1.0 / 0.6745  # sigma over the median absolute value of a normal distribution
 
 
 def sensor_noise(one: Fit) -> float:
@@ -257,7 +257,7 @@ def _size(steps: Floats) -> float:
 
 
 def scatter(one: Fit) -> float:
-    """RMS of what does not repeat, in means over a twelfth of a turn, in the sensor's unit."""
+    """RMS of the residual that does not repeat, in means over a twelfth of a turn, in the sensor's unit."""
     energy = float(np.mean(one.rest**2)) - (repeating(one) * float(one.measured.std())) ** 2
     return math.sqrt(max(energy, 0.0))
 
@@ -266,13 +266,13 @@ def scatter(one: Fit) -> float:
 
 
 _SPEED_SPREAD = 0.15  # relative spread of the speed from which on a lag is separated from the offset
-_FILTERED = 0.25  # of an interval: behind a low-pass, instants look like averages, and are not late by a half
+_FILTERED = 0.25  # intervals late: behind a low-pass, instants look like averages, and are not late by a half
 # a drive may have no lag to speak of, or any up to 30 ms: current loops, filters, buses; neither is likelier
 _MOST_S, _STEP_S = 0.030, 0.00025
-_UNKNOWN_S = 0.0122  # the RMS of that, where nothing is measured: then the proposal allows for no lag
-_DECLARED_S = 0.001  # by which a declared lag may be off
-_MARGIN = 1.5  # of the cadence's tolerance beyond the departures seen
-_ONE_CADENCE = 0.2  # relative distance from the usual cadence beyond which there is another one
+_UNKNOWN_S = 0.0122  # RMS lag if nothing is measured: then the proposal allows for no lag
+_DECLARED_S = 0.001  # error of a declared lag
+_MARGIN = 1.5  # cadence tolerance over the observed departures
+_ONE_CADENCE = 0.2  # relative distance from the usual cadence beyond which the cadence is a different one
 
 
 def separates_lag(pair: Pair) -> bool:
@@ -294,8 +294,8 @@ class Timing:
     is_lag_separated : bool
         Whether the recording tells a lag from an offset.
     late_s, error_s : float
-        Time by which the torque is late beside its sampling, and its standard deviation [s]; NaN if it is not
-        separated.
+        Time by which the torque is late in addition to its sampling, and its standard deviation [s]; NaN if
+        it is not separated.
     sampling_s, sampling_sigma_s : float
         Lag of the sampling, half a sampling interval for averages, and its standard deviation.
     declared_s : float
@@ -315,7 +315,7 @@ class Timing:
 
     @property
     def lag_s(self) -> float:
-        """Lag to allow for: what sampling, low-pass and drive make of it [s]."""
+        """Lag to allow for, from sampling, low-pass and drive [s]."""
         return self.sampling_s + self.low_pass_s + self._drive[0]
 
     @property
@@ -329,7 +329,7 @@ class Timing:
 
     @property
     def _drive(self) -> tuple[float, float]:
-        """Expected lag of the drive beside sampling and low-pass, and its standard deviation [s]."""
+        """Expected lag of the drive in addition to sampling and low-pass, and its standard deviation [s]."""
         is_declared = math.isfinite(self.declared_s)
         if not self.is_lag_separated:
             return (self.declared_s, _DECLARED_S) if is_declared else (0.0, _UNKNOWN_S)
@@ -370,14 +370,14 @@ def timing_of(one: Fit, sampling: str, is_sampling_known: bool, declared_s: floa
 
 
 def lag_error_s(one: Fit) -> float:
-    """Standard deviation of the lag [s], with what clearances may shift the phase from speed to speed."""
+    """Standard deviation of the lag [s], with the phase shift by clearances from speed to speed."""
     speed = np.quantile(np.abs(one.crank()[1]), [0.1, 0.9])
     shift = one.error.lag_rad / max(float(speed[1] - speed[0]), 1.0e-9)
     return math.hypot(one.sigma.get("lag_s", math.inf), shift)
 
 
 def cadence_rpm(one: Fit) -> tuple[float, float]:
-    """Usual cadence, negative for clockwise, and its tolerance [rpm]: a tenth, or what the leg needs."""
+    """Usual cadence, negative for clockwise, and its tolerance [rpm]: a tenth, or more if needed."""
     speed = slow_speed(one.pair) * one.ratio * 60.0 / TURN
     usual = _usual(speed)
     departures = np.abs(speed - usual)
@@ -402,44 +402,44 @@ def cadences_rpm(one: Fit) -> list[float]:
 
 # Decide between averages (mean since the previous sample) and instants (torque at the stamp).
 #
-# Joints with clearance let go and hit again. The bodies' momenta are bounded, so what the torque lacks during
-# a flight is in the impact after it: means cancel over a part of a turn. Of impacts that last a millisecond,
-# instants meet some and miss others: their errors add up as independent ones do.
+# Joints with clearance let go and hit again. The bodies' momenta are bounded, so the torque missing during a
+# flight comes with the impact after it: means cancel over a part of a turn. Of impacts that last a
+# millisecond, instants meet some and miss others: their errors add up as independent ones do.
 
 
 _WINDOW = 0.125  # turns, half of the window's width: it contains some flights with their impacts
-# Of a turn: what repeats with it is of a load or of other masses, and does not cancel either. Not more, or
-# impacts that repeat would be taken out with it, and what is left of means would cancel no longer
+# Harmonics of a turn that are removed: a load or wrong masses repeat with the turn, and do not cancel either.
+# More harmonics would remove repeating impacts as well, and the rest of the means would no longer cancel
 _HARMONICS = 8
 _SINGULAR = 1.0e-9
 _CHUNKS = 12
-# Energy of windows as a fraction of that of independent samples, typical of each, and how much legs differ
-# (natural logarithm): the default leg in full coordinates, five joints of 0.2 to 0.4 mm, 35 to 90 rpm,
-# 100 to 500 Hz; averages have 0.002 to 0.009, instants 0.4 to 1.1
+# Typical energy of windows over the energy of independent samples, and how much legs differ (natural
+# logarithm): the default leg in full coordinates, five joints of 0.2 to 0.4 mm, 35 to 90 rpm, 100 to 500 Hz;
+# averages have 0.002 to 0.009, instants 0.4 to 1.1
 _TYPICAL = {AVERAGE: 0.005, INSTANT: 0.65}
 _LEGS_DIFFER = 0.7
 _SURE_ODDS = 20.0
 _MOST_ODDS = 1000.0  # the typical values are not known so well that more could be said
 _SURE_SAMPLING = 2.0  # standard deviations of the recording
-_STRANGE = 3.0  # what neither adds up to
-_LEAST = 1.0e-4  # below which it is rounding
+_STRANGE = 3.0  # energy that neither kind adds up to
+_LEAST = 1.0e-4  # smaller energies are rounding
 _NOISE_ERROR = 0.25  # relative error of the noise's variance
-_HIDDEN = 0.5  # of the rest's energy that is the sensor's noise, from which on nothing is decided
-_LARGE = 0.3  # of the torque; smaller ones do not drown slow errors of 0.02, which add up; impacts: 0.5 to 2
+_HIDDEN = 0.5  # fraction of sensor noise in the residual's energy from which nothing is decided
+_LARGE = 0.3  # of the torque: impacts have 0.5 to 2; smaller errors do not drown slow ones of 0.02
 _NARROWER, _FLAT = 3.0, 0.5  # independent errors add up as much in narrow windows, slow ones less
-_ROUGH = 0.5  # energy of neighbours' steps as a fraction of that of independent ones; of impacts, 0.8 to 1.4
+_ROUGH = 0.5  # energy of neighbours' steps over the energy of independent steps; 0.8 to 1.4 for impacts
 
 
 @attrs.frozen
 class Sampling:
-    """What a torque sample is, as far as it is known.
+    """Meaning of a torque sample, as far as it is known.
 
     Attributes
     ----------
     value : str
         ``average``, ``instant``, or empty if it is not known.
     why : str
-        Why, or why it is not.
+        Reason for the value, or why it is not known.
     """
 
     value: str
@@ -500,7 +500,7 @@ def _by_lag(one: Fit) -> Sampling:
 
 
 def added_up(rest: Floats, noise: float, half: int) -> tuple[float, float]:
-    """Energy of triangular windows of a rest, as a fraction of that of independent samples, and its error.
+    """Energy of triangular windows of a residual, over the energy of independent samples, and its error.
 
     NaN if there are too few samples, or only noise.
 
@@ -526,9 +526,10 @@ def added_up(rest: Floats, noise: float, half: int) -> tuple[float, float]:
 
 
 def _rest(one: Fit, model: TorqueModel) -> Floats:
-    """What of each torque sample is neither the ideal leg's, nor slow and repeating (n,).
+    """Part (n,) of each torque sample beyond the ideal leg's torque and the slow repeating residual.
 
-    Without changes of the speed, at which the smoothed motion and so the leg's torque are off for a while.
+    Changes of the speed are left out: there the smoothed motion, and so the leg's torque, is wrong for a
+    while.
     """
     angle, speed, acceleration = one.crank()
     rest: Floats = one.pair.torque - one.gain * model.torque(angle, speed, acceleration)[0]

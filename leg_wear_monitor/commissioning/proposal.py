@@ -26,7 +26,7 @@ from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.inputs import INTERFACE, WRENCH
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 
-# A gear's ratio is that of two numbers of teeth: the simplest fraction within a measurement's error.
+# A gear's ratio is the ratio of two numbers of teeth: the simplest fraction within a measurement's error.
 
 
 _LARGEST_DENOMINATOR = 20
@@ -68,9 +68,9 @@ def exact_ratio(measured: float, error: float) -> float | None:
 
 
 _SURE = 3.0  # standard deviations
-_DRIFT_RAD = 0.05  # by which clearances may shift the phase over a recording
-# of the torque's RMS, half of its energy: legs with clearance have 0.03 to 0.05 of averages, 0.3 to 0.45 of
-# instants at 50 to 200 Hz (full coordinates, 60 rpm)
+_DRIFT_RAD = 0.05  # phase shift by clearances over a recording
+# fraction of the torque's RMS, half of its energy: legs with clearance have 0.03 to 0.05 with averages, 0.3
+# to 0.45 with instants at 50 to 200 Hz (full coordinates, 60 rpm)
 UNEXPLAINED = 0.7
 # factor on the errors of friction where the foot carries a load, whose course is not known exactly
 _UNDER_LOAD = 3.0
@@ -78,7 +78,7 @@ _UNDER_LOAD = 3.0
 
 @attrs.frozen(eq=False)
 class Found:
-    """What the parameters are made of."""
+    """Measured quantities from which the parameters are derived."""
 
     choice: Choice
     fit: Fit
@@ -105,7 +105,7 @@ class Found:
 
     @property
     def used_sampling(self) -> str:
-        """What is found, or what the given parameters have if it is not known."""
+        """The sampling found, or the given parameter's sampling if it is not known."""
         return self.sampling.value or self.base.drive_torque.sampling
 
     @property
@@ -126,7 +126,7 @@ class Found:
 
     @property
     def _roughly(self) -> float:
-        """Factor on what clearances change."""
+        """Factor on the changes by clearances."""
         return _UNDER_LOAD if "load" in self.fit.linear else 1.0
 
     @property
@@ -174,7 +174,7 @@ def offset_rad(found: Found, number: int) -> float:
 
 
 def offset_sigma_rad(found: Found) -> float:
-    """Standard deviation of the offset, with what clearances, a rest that repeats and a lag make of it."""
+    """Standard deviation of the offset, with the effect of clearances, a repeating residual and a lag."""
     one, timing = found.fit, found.timing
     # were all of the rest that repeats a shift of the phase, it would shift by this
     slope = np.gradient(one.predicted) / np.gradient(one.blocks.mean(one.crank()[0]))
@@ -191,7 +191,7 @@ _TWO_CADENCES = "record two cadences in one recording, 40 rpm apart"
 
 
 def better(name: str, found: Found) -> str:
-    """What would determine a quantity better; empty where nothing has to."""
+    """Measure that would determine a quantity better; empty if none is needed."""
     return _WAYS[name](found) if name in _WAYS else ""
 
 
@@ -233,8 +233,8 @@ _WAYS: Mapping[str, Callable[[Found], str]] = {
 # Parameters of the monitor from the chosen fit, each with its error and its runner-up.
 
 
-_NEAR = 0.05  # relative error by which clearances shift the scale: a given one that near is kept
-_HALF_A_GEAR = 0.5, 1.5  # efficiencies with which a torque may be that of the motor's shaft
+_NEAR = 0.05  # relative error by which clearances shift the scale: a given scale that near is kept
+_HALF_A_GEAR = 0.5, 1.5  # efficiencies for which a torque may be measured at the motor's shaft
 
 
 def items(found: Found) -> list[Item]:
@@ -312,7 +312,7 @@ def _torque(found: Found) -> Iterator[Item]:
 
 
 def _scale(found: Found) -> tuple[float, float]:
-    """Scale and gear ratio of the torque, of which only the product is measured."""
+    """Scale and gear ratio of the torque; only their product is measured."""
     one, given = found.fit, found.base.drive_torque
     total = 1.0 / abs(one.gain)
     if abs(given.scale * given.gear_ratio / total - 1.0) <= _NEAR:

@@ -24,26 +24,26 @@ if TYPE_CHECKING:
 
 @attrs.frozen(kw_only=True)
 class JointDetection:
-    """What the drive torque of a recording will show of a joint.
+    """Detectability of a joint in the drive torque of a recording.
 
     Attributes
     ----------
     joint : str
-        Its name.
+        Name of the joint.
     is_good : bool
-        Whether a joint with the last clearance of `clearances_m` is found, and named, soon enough.
+        Whether a joint with the last clearance of `clearances_m` is detected, and identified, soon enough.
     clearances_m : tuple of float
         Clearances of a wider joint.
     cycles : tuple of float
         Expected number of gait cycles until a joint with each of these clearances is detected; NaN where it
         is not.
     named_cycles : tuple of float
-        Number of gait cycles until it is named, of four of five legs whose masses are 4 % off; NaN where it
-        is not.
+        Number of gait cycles until the joint is identified in four of five legs whose masses are 4 % off; NaN
+        if it is not.
     runner_up : str
-        What else explains the last clearance best, human-readable; empty if it is not detected.
+        Best other explanation of the last clearance, human-readable; empty if it is not detected.
     reason : str
-        Why the torque is not good enough for this joint, and what would be; empty if it is.
+        Why the torque is not good enough for this joint, and the remedy; empty if it is good enough.
     """
 
     joint: str
@@ -102,7 +102,8 @@ def parameter_text(config: MonitorConfig, remarks: Sequence[str]) -> str:
     return head + stream.getvalue()
 
 
-# The result: each parameter with its runner-up, the undetermined ones, and what does not fit.
+# The result: each parameter with its runner-up, the undetermined parameters, and the quantities that do not
+# fit.
 
 
 SCHEMA_VERSION = 1
@@ -123,15 +124,16 @@ class CommissioningItem:
     sigma : float, optional
         Standard deviation, in the unit.
     mismatch : float, optional
-        RMS of the torque that this leaves unexplained, as a fraction of the torque's.
+        Torque residual: RMS of the torque that this value leaves unexplained, as a fraction of the torque's
+        RMS.
     other : str, int, float or None
         The runner-up.
     other_mismatch : float, optional
-        Its mismatch.
+        Torque residual of the runner-up.
     remark : str
         Further information.
     better : str
-        How it could be known better; empty if it need not be.
+        How it could be determined better; empty if it need not be.
     """
 
     name: str
@@ -156,7 +158,7 @@ class CommissioningResult:
     not_told : tuple of str
         Parameters that the recording does not determine, and why.
     findings : tuple of str
-        What does not fit, and the remedy.
+        Quantities that do not fit, and the remedy.
     notes : tuple of str
         Further information.
     config : MonitorConfig or None
@@ -164,13 +166,13 @@ class CommissioningResult:
     turns : float
         Turns of the crank in the recording.
     faults : tuple of Finding
-        Of the recordings, whose other parts were used.
+        Faults of the recordings, whose other parts were used.
     joints : tuple of JointDetection
-        What the torque will show of each joint; empty where that is not known.
+        Detectability of each joint in the torque; empty if it is not known.
     reference_used : str
-        Torque reference by which the joints are judged, or why they are not.
+        Torque reference used to judge the joints, or why they are not judged.
     reference : TorqueReference or None
-        The one that was simulated for ``diagnosis.reference``, if it was asked for.
+        Reference simulated for ``diagnosis.reference``, if it was requested.
     """
 
     items: tuple[CommissioningItem, ...]
@@ -199,7 +201,7 @@ class CommissioningResult:
         return {each.name: each for each in self.items}[name]
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain object for JSON; null for what cannot be determined."""
+        """Plain object for JSON; null for a value that cannot be determined."""
         return {
             "schema_version": SCHEMA_VERSION,
             "turns": self.turns,
@@ -214,7 +216,7 @@ class CommissioningResult:
         }
 
     def to_json(self) -> str:
-        """Text of `to_dict`: what ``commission --json`` writes."""
+        """Text of `to_dict`, as ``commission --json`` writes it."""
         return json_text(self.to_dict())
 
     def to_pandas(self) -> "pd.DataFrame":

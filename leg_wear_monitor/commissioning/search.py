@@ -18,7 +18,7 @@ from leg_wear_monitor.monitor.config.inputs import EFFORT, INTERFACE
 # Search of start values: every gear ratio, direction, offset and torque sign at once, by the leg's model.
 #
 # Over the joint's angle, the torque is periodic with the crank's turn. One spectrum holds its harmonics for
-# every gear ratio; their correlation with those of the model, over all offsets, is a further Fourier
+# every gear ratio; their correlation with the model's harmonics, over all offsets, is a further Fourier
 # transform. Multiples and fractions of the true ratio have the wrong harmonics, and the model the wrong
 # speed.
 
@@ -110,7 +110,7 @@ def _peaks(value: Floats, count: int) -> list[int]:
 
 
 _PEAKS = 2  # ratios that are fitted, of each direction and sign
-_HOPELESS = 0.3  # of the best explained fraction, below which a pair gets one fit only
+_HOPELESS = 0.3  # fraction of the best explained fraction below which a pair gets only one fit
 _LEAST_PAIRS = 4  # so that there is a runner-up
 _ON_ONE_SHAFT_RAD = 0.005  # more than smoothed noise; the ripple of a gait that a wheel has not is larger
 SAME_GEAR = 0.05
@@ -165,7 +165,7 @@ def _refined(pair: Pair, steady: Pair, model: TorqueModel, start: Start) -> Fit:
 
 
 def on_one_shaft(one: Fit, other: Fit) -> bool:
-    """Whether two joints turn in a fixed ratio: the crank angles that they give differ by a constant."""
+    """Whether two joints turn in a fixed ratio: the crank angles from them differ by a constant."""
     angle, there = one.crank()[0], other.crank()[0]
     time_s, times = one.pair.time_s, other.pair.time_s
     both = (time_s >= times[0]) & (time_s <= times[-1])
@@ -181,9 +181,9 @@ def same_gear(one: Fit, other: Fit) -> bool:
 # The best candidate, its rival in each respect, and whether the rival may be the truth.
 
 
-_SAME_PHASE_RAD = 0.3  # two sensors of one torque differ by their lags, those of two legs by more
+_SAME_PHASE_RAD = 0.3  # two sensors of one torque differ by their lags, sensors of two legs by more
 _SIGNALS = ("crank_joint", "drive_torque.source")
-ANOTHER_LEG = 0.5  # repeating rest beyond which nothing that fits is known
+ANOTHER_LEG = 0.5  # repeating residual beyond which no known leg fits
 
 
 @attrs.frozen(eq=False)
@@ -250,7 +250,7 @@ def choose(found: list[Candidate]) -> Choice:
 
 
 def _nearest_to_the_crank(found: list[Candidate]) -> Candidate:
-    """Of joints on one shaft, which fit alike, the one with the least gear."""
+    """Candidate with the least gear among joints on one shaft, which fit alike."""
     best = found[0]
     near = [
         each
@@ -264,7 +264,7 @@ def _nearest_to_the_crank(found: list[Candidate]) -> Candidate:
 
 
 def _is_the_same(name: str, best: Candidate, rival: Candidate) -> bool:
-    """Whether a rival that fits as well means the same: another encoder of the shaft, another sensor."""
+    """Whether an equally good rival means the same: a second encoder of the shaft, a second sensor."""
     if name == "crank_joint":
         return on_one_shaft(best.fit, rival.fit) and not same_gear(best.fit, rival.fit)
     if name == "drive_torque.source":

@@ -28,7 +28,7 @@ from leg_wear_monitor.messages.streams import Stream, changed_fields, streams_of
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin import TORQUE
 
-# Resolve what a user names to an ordered list of recordings: bags (plain, split, compressed) and tables.
+# Resolve the user's paths to an ordered list of recordings: bags (plain, split, compressed) and tables.
 
 
 METADATA = "metadata.yaml"
@@ -42,7 +42,7 @@ _EXPECTED = "a bag directory, .mcap, .db3, .csv or .parquet"
 
 
 class DataFrame(Protocol):
-    """What is used of a data frame, of pandas or of another library."""
+    """The used interface of a data frame, of pandas or of a different library."""
 
     @property
     def columns(self) -> Iterable[Any]:
@@ -95,7 +95,7 @@ def find_files(paths: Iterable[Recordable]) -> tuple[list[BagFile], list[Finding
     Raises
     ------
     RecordingError
-        If a path does not exist, or its name is not that of a recording.
+        If a path does not exist, or its name is not the name of a recording.
     """
     files: list[BagFile] = []
     findings: list[Finding] = []
@@ -187,18 +187,18 @@ def _by_number(path: Path) -> tuple[list[tuple[int, str]], str]:
 def find_topic(
     stream: Stream, given: str | None, topics: Iterable[str], where: str, beside: str | None
 ) -> str | None:
-    """Topic of a stream: the given one, else its name beside the crank's, in the root, or in one namespace.
+    """Topic of a stream: the given one, else its name next to the crank's, in the root, or in one namespace.
 
     Parameters
     ----------
     stream : Stream
     given : str, optional
     topics : iterable of str
-        Of the recording.
+        Topics of the recording.
     where : str
         File name in errors.
     beside : str, optional
-        The crank's topic. Where that has a namespace, what stands in another one is of another leg.
+        The crank's topic. If it has a namespace, topics in other namespaces belong to other legs.
 
     Returns
     -------
@@ -235,7 +235,7 @@ def _option(stream: Stream) -> str:
 
 
 def check_channel(stream: Stream, channel: Channel, where: str) -> None:
-    """Check that the messages of a channel can be decoded as those of a stream.
+    """Check that the messages of a channel can be decoded as messages of a stream.
 
     Parameters
     ----------
@@ -317,7 +317,7 @@ class Source:
 def open_sources(
     bag_files: Iterable[BagFile], config: MonitorConfig, stack: ExitStack
 ) -> tuple[list[Source], list[Finding]]:
-    """Open the files of a recording; an unreadable file becomes a finding if another one can be opened.
+    """Open the files of a recording; an unreadable file becomes a finding if other files can be opened.
 
     Parameters
     ----------
@@ -379,7 +379,7 @@ def assign(
                 source.select(stream, topic)
             continue
         text = f"is not a topic of the recording, it has {listed(recorded)}"
-        if set(recorded) - set(topics.values()):  # one of them may be it, under another name
+        if set(recorded) - set(topics.values()):  # an unused topic may be it, renamed
             text += f"; select one with {_option(stream)}"
         if stream.is_needed:
             raise RecordingError(str(first), stream.topic, text)

@@ -1,4 +1,4 @@
-"""What readers of recordings share: findings and errors, opening of files, clocks.
+"""Shared parts of the readers of recordings: findings and errors, opening of files, clocks.
 
 A recording may be damaged. A reader reads the usable part and lists the faults; only an unusable recording
 raises an error.
@@ -39,7 +39,7 @@ class RecordingError(ConfigError):
 
 @contextmanager
 def reading(paths: Iterable[Path]) -> Iterator[None]:
-    """What the system reports while recordings are read makes them unusable, such as a bad sector.
+    """System errors while reading recordings that make them unusable, such as a bad sector.
 
     Raises
     ------
@@ -69,7 +69,7 @@ class Finding:
     ----------
     file : pathlib.Path
     text : str
-        One printable line: what was found, and at which byte.
+        One printable line: the problem, and its byte position.
     severity : Severity
     """
 

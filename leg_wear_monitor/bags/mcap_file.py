@@ -1,4 +1,4 @@
-"""MCAP files. The records are those of the mcap library; the messages of a chunk are found here.
+"""MCAP files. The mcap library defines the records; this module finds the messages of a chunk.
 
 The library makes an object of each message, and takes ten times as long.
 """
@@ -65,7 +65,8 @@ class _Segment:
 class McapFile:
     """An open MCAP file; its faults are listed in `findings`.
 
-    The heads of all records are read at first. They replace the index, so a file without one is no exception.
+    The reader first reads the heads of all records. They replace the index, so a file without an index needs
+    no special treatment.
 
     Parameters
     ----------
@@ -141,7 +142,7 @@ class McapFile:
             self._find(f"is cut off or damaged at byte {at} of {self.size}: the rest is lost")
 
     def _add(self, opcode: int, at: int, end: int) -> None:
-        """Add a record, of which the head has just been read."""
+        """Add a record whose head has just been read."""
         if opcode == Opcode.CHUNK:
             (start_ns,) = struct.unpack("<Q", self._file.read(8))
             self._segments.append(_Segment(at, end - at, True, min(start_ns, _LATEST_NS)))
@@ -206,7 +207,7 @@ class McapFile:
         return self._expanded(Chunk.read(ReadDataStream(BytesIO(stored[_RECORD.size :]))))
 
     def _expanded(self, chunk: Chunk) -> bytes:
-        """Records of a chunk, whose size and checksum must be right."""
+        """Records of a chunk; its size and checksum must be right."""
         try:
             size = _declared(chunk)
             check_size(len(chunk.data) + max(size, chunk.uncompressed_size))

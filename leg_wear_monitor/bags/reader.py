@@ -63,7 +63,7 @@ def check_topics(
     Raises
     ------
     RecordingError
-        If a file has a crank's topic in another namespace and the user named no topic.
+        If a file has a crank's topic in a different namespace and the user named no topic.
     """
     topic, findings = topics["joint_states"], []
     for source in sources:
@@ -239,7 +239,7 @@ class Pauses:
 
 TIMES = ("header", "log", "publish")
 _TOGETHER = 4096  # smallest intended number of samples in a block
-_COMPARED = 100  # wrenches of a piece whose axes are compared
+_COMPARED = 100  # wrenches per file to compare the axes
 _MOST_WAITING = 640_000  # samples of overlapping chunks that are held, at 800 bytes with copies
 
 
@@ -417,7 +417,7 @@ _SI = {CRANK_SPEED: "rad/s", DRIVE_TORQUE: "N m", FOOT_LOAD: "N", FOOT_LOAD_ALON
 
 
 def understood(path: Path, config: MonitorConfig) -> tuple[list[str], list[Finding]]:
-    """Read a table as a whole: what was understood, a line each, and the findings.
+    """Read a table as a whole; return how it was interpreted, one line per item, and the findings.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """All joints and torques of recordings as time series.
 
-Which of the joints is the crank, and which torque drives it, `commissioning` then finds out.
+`commissioning` then finds out which joint is the crank, and which torque drives it.
 """
 
 from collections import Counter
@@ -84,10 +84,11 @@ class Signals:
 # axis. A recording is read in pieces, because it may be larger than the memory.
 
 
-# Ends of the topics that the monitor publishes as joint states or wrenches. They are no sensors, and its
-# predicted torque would fit better than any measured one.
+# Ends of the topics that the monitor publishes as joint states or wrenches. They are not sensors, and the
+# monitor's predicted torque would fit better than any measured torque.
 _PUBLISHED = tuple(each.name.lstrip("~") for each in (outputs.CLEARANCES, outputs.IMPACTS, outputs.TORQUE))
-# Interfaces of a joint that are no candidates: three are no torques, and joint_states has the effort, too.
+# Interfaces of a joint that are not candidates: three are not torques, and joint_states has the effort as
+# well.
 _NO_CANDIDATES = ("position", "velocity", "acceleration", "effort")
 _MOST_JOINTS = 200  # joints per topic: each joint is decoded separately, so this bounds the work
 _NAMING_MESSAGES = 20  # first messages of a piece, whose joint names are read
@@ -168,8 +169,8 @@ def _select(
     """Choose the topics to be read, and enter their channels in `Source.types`.
 
     A source writes the number that `Source.types` has for a channel into the field `type` of its messages.
-    Elsewhere that is the code of the stream. Here several topics may have the same stream, so it is the place
-    of topic and stream in the returned list, counted from 1.
+    Elsewhere this number is the code of the stream. Here several topics may have the same stream, so the
+    number is the position of topic and stream in the returned list, counted from 1.
     """
     selected: dict[tuple[str, Stream], int] = {}
     findings: list[Finding] = []
@@ -192,7 +193,7 @@ def _stream(channel: Channel, joint_states: str | None, drive_torque: str | None
     if channel.topic.endswith(_PUBLISHED):
         return None
     for stream in STREAMS:
-        # the streams of a foot load have the types of torques, too, and no torque is read as one
+        # The streams of a foot load have the same types as torques; they are not read as torques.
         if stream.type == channel.type and stream.kind in (CRANK, TORQUE):
             wanted = joint_states if stream.kind == CRANK else drive_torque
             return stream if wanted in (None, channel.topic, channel.topic.lstrip("/")) else None
@@ -239,7 +240,7 @@ def _decoded_series(
 ) -> list[tuple[JointName | TorqueSource, Samples, str]]:
     """Each series in the messages of a topic: its name, its samples, and the field of these with its values.
 
-    Samples are one for each message. Those of a joint state have both the angle and the effort of the joint.
+    Each message gives one sample. Samples of a joint state have both the angle and the effort of the joint.
     """
     found: list[tuple[JointName | TorqueSource, Samples, str]] = []
     if code == JOINT_STATE:
@@ -263,7 +264,7 @@ def _decoded_series(
 
 
 def _decoder(source: str, axis: str = "z", joint: str = _NO_JOINT, interface: str = "effort") -> Decoder:
-    """Decoder of one torque source and of one joint as the crank; a source ignores what it does not have."""
+    """Decoder of one torque source and of one joint as the crank; a source ignores missing parts."""
     torque = DriveTorque(source=source, axis=axis, interface=interface)
     return Decoder(MonitorConfig(crank_joint=joint, drive_torque=torque))
 
@@ -281,7 +282,7 @@ def _joint_names(data: NDArray[np.uint8], messages: NDArray[np.void]) -> list[st
 
 
 def _interfaces(data: NDArray[np.uint8], messages: NDArray[np.void]) -> list[tuple[str, str]]:
-    """Joints with those of their interfaces that may be a torque, in the first messages."""
+    """Joints with their interfaces that may be a torque, in the first messages."""
     pairs: dict[tuple[str, str], None] = {}
     for raw in _first_decodable(INTERFACE, data, messages):
         for joint, names in list(interfaces_in(raw).items())[:_MOST_JOINTS]:
@@ -293,7 +294,7 @@ def _first_decodable(source: str, data: NDArray[np.uint8], messages: NDArray[np.
     """The first messages that are not damaged.
 
     The decoder is made for a joint that no message has: it reports an undamaged message as MISSING_JOINT, and
-    a damaged one with another fault.
+    a damaged message with a different fault.
     """
     faults = _decoder(source).many(data, messages)["fault"]
     decodable = np.flatnonzero(faults == MISSING_JOINT)[:_NAMING_MESSAGES]

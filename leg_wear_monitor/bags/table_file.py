@@ -1,4 +1,4 @@
-"""Tables as recordings: their rows, counted, as messages of the streams."""
+"""Tables as recordings: their rows as messages of the streams."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -81,7 +81,7 @@ _Group = tuple[int, NDArray[np.int64], NDArray[np.uint8]]
 
 
 class Encoder:
-    """Encodes rows as messages, by the parameters with which they are decoded.
+    """Encodes rows as messages, with the parameters that decode them again.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ _SAMPLE = 200  # lines
 
 @attrs.frozen
 class Head:
-    """What is known of a table before its rows are read.
+    """The known properties of a table before its rows are read.
 
     Attributes
     ----------

@@ -15,7 +15,7 @@ from leg_wear_monitor.monitor.config import tables
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin.sample import CONTACT, NO_LOAD, WRENCH
 
-# Which columns of a table are read, in which units, and which of them it has.
+# Columns of a table: the columns to read, their units, and the columns that the table has.
 
 
 CSV, PARQUET = ".csv", ".parquet"
@@ -44,14 +44,14 @@ class Column:
     Attributes
     ----------
     key : str
-        What it is: one of the above, or the name of a further encoder.
+        Meaning of the column: one of the keys above, or the name of a further encoder.
     name : str
         Its name in the table.
     parameter : str
         Parameter that gives the name.
     unit : str
     factor, divisor : float
-        To SI.
+        Factor and divisor that convert to SI.
     """
 
     key: str
@@ -183,7 +183,7 @@ def dates(texts: Sequence[str], form: str = "") -> tuple[NDArray[np.int64], NDAr
 
 
 def _without_zone(text: str) -> str:
-    """Text without the mark of UTC; another zone is refused, as numpy reads it with a warning only."""
+    """Text without the UTC mark; refuses other time zones, because numpy would only warn."""
     for mark in _UTC:
         text = text.removesuffix(mark)
     text = text.replace(",", ".")  # ISO 8601 permits a decimal comma, numpy does not

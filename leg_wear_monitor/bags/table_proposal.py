@@ -1,4 +1,4 @@
-"""Proposes the parameters with which a table is read, by the names, units and first rows of its columns."""
+"""Proposes the parameters to read a table, by the names, units and first rows of its columns."""
 
 import json
 import re
@@ -81,7 +81,7 @@ def propose(path: Path) -> Proposal | None:
     Raises
     ------
     RecordingError
-        If the file is no table.
+        If the file is not a table.
     """
     ((file,), _) = find_files([path])
     with open_recording(path) as content:
@@ -137,7 +137,7 @@ def _proposal(names: Sequence[str], units: Sequence[str], texts: Sequence[Sequen
 
 
 def _columns(names: Sequence[str]) -> Mapping[str, list[int]]:
-    """Places of the columns that may be a column of each key, those of a crank first."""
+    """Positions of the columns that may belong to each key; a crank's columns come first."""
     found: dict[str, list[int]] = {key: [] for key in _WORDS}
     for place, name in enumerate(names):
         words = re.findall(r"[a-zäöüß]+", re.sub(r"([a-z])([A-Z])", r"\1 \2", name).lower())

@@ -78,7 +78,7 @@ class Source(Protocol):
 
 
 class Lost:
-    """Findings about rows that cannot be read: the first five are listed, the others counted."""
+    """Findings about rows that cannot be read: lists the first five, and counts the rest."""
 
     MOST = 5
 
@@ -86,7 +86,7 @@ class Lost:
         self._path, self._word, self._findings, self._count = path, word, findings, 0
 
     def add(self, lines: Sequence[int], fault: Callable[[int], str]) -> None:
-        """Report rows, and what is wrong with each by its index."""
+        """Report rows, with the fault of each row by its index."""
         for k, line in enumerate(lines):
             if self._count + k >= self.MOST:
                 break
@@ -120,7 +120,7 @@ def open_table(path: Path, content: IO[bytes] | Any, storage: str, wanted: str =
     Raises
     ------
     RecordingError
-        If it is no such table.
+        If it is not a table of this kind.
     """
     if storage == CSV:
         return _Csv(path, content, wanted)
@@ -237,7 +237,7 @@ class TableRows:
         return pa.compute.replace_substring(texts, ",", ".") if comma else texts
 
     def _of_numbers(self, times: NDArray[Any], scale: int) -> tuple[_Stamps, _Bools]:
-        """Stamps of times in a unit of `scale` nanoseconds, exact to what a double has."""
+        """Stamps of times in a unit of `scale` nanoseconds, exact to the precision of a double."""
         with np.errstate(invalid="ignore"):
             within = np.asarray((times <= MOST_NS // scale) & (times >= -(MOST_NS // scale)))
         times = np.where(within, times, 0)
@@ -318,7 +318,7 @@ def _text(cell: Any) -> str:
 
 
 def _fault(column: Column, text: str) -> str:
-    """What is wrong with a cell."""
+    """Description of the fault in a cell."""
     shown, unit = printable(text.strip(), 60), column.unit
     if column.key != STAMP:
         return f"{shown!r} is not a number. Expected a value in {unit}"
@@ -451,7 +451,7 @@ class _Parquet:
             raise RecordingError(str(path), "", fault) from error
 
     def parts(self, columns: list[int], lost: Lost) -> Iterator[Part]:
-        """Rows of some columns; what a damaged group still had is lost."""
+        """Rows of some columns; the remaining rows of a damaged group are lost."""
         head, first = self._file.metadata, 0
         names = [self.head.names[k] for k in columns]
         for group in range(head.num_row_groups):
@@ -484,7 +484,7 @@ class _Frame:
     def __init__(self, path: Path, table: Any) -> None:
         self._path, self._table = path, table if isinstance(table, Mapping) else _named(table)
         self.head = Head([str(name) for name in self._table])
-        self.size = len(next(iter(self._table.values()), ()))  # rows, of which each counts the same
+        self.size = len(next(iter(self._table.values()), ()))  # number of rows, used to count progress
 
     def parts(self, columns: list[int], lost: Lost) -> Iterator[Part]:
         """Rows of some columns; NaN is null."""

@@ -13,7 +13,7 @@ from leg_wear_monitor.state import State
 FRESH_DAYS = 7.0
 DAY_NS = 86_400 * 10**9
 
-_NEAR = 0.8  # fraction of a clearance, from which on its bar has the colour of a warning
+_NEAR = 0.8  # fraction of the clearance limit above which its bar has the warning colour
 
 
 def fleet_page(
@@ -29,7 +29,7 @@ def fleet_page(
     fresh_days : float
         Age of the last recording up to which a leg counts as monitored [days].
     pages : container of str
-        Ids of the legs that have a page of their own.
+        Ids of the legs that have their own page.
     """
     rows = [_row(leg, _doubt(leg, now_ns, fresh_days), leg.id in pages) for leg in overview.legs]
     rows.sort(key=lambda row: -row["state"].severity)  # stable: legs of one state stay in their order

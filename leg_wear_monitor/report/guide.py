@@ -16,7 +16,7 @@ _OWN_HEADING = 2  # level of a page's sections: headings of a document inside it
 def enclosed(path: Path) -> tuple[str, str]:
     """Title and markup of a document for a page that is a file, and may be anywhere.
 
-    No link leads to another document.
+    The document contains no links to other documents.
     """
     tokens = [
         token

@@ -66,7 +66,7 @@ def draw_leg(axes: Axes, reach: Reach, shown: int, clearance_joints: Collection[
 
 
 def in_line(reach: Reach) -> list[tuple[int, DeadPoint]]:
-    """Numbers of the positions in which three joints are in line, with the dead points."""
+    """Numbers of the positions, including the dead points, that have three joints in line."""
     ends = ((0, reach.low), (len(reach.q) - 1, reach.high))
     return [(i, dead) for i, dead in ends if dead and dead.is_in_line and not reach.open_joint]
 

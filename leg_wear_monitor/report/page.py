@@ -64,7 +64,7 @@ class Panel:
     title : str
     series : sequence of Series
     low, high : float or None
-        Ends of the y axis; those of the values if None.
+        Ends of the y axis; if None, the smallest and largest value.
     height : int
         [CSS pixels].
     bands : sequence of pair of int
@@ -111,7 +111,7 @@ class Chart:
 
     @property
     def csv(self) -> str:
-        """All columns as CSV, with units in the titles; an empty cell for what is not known."""
+        """All columns as CSV, with units in the titles; unknown values are empty cells."""
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(series.head for series in self.columns)
@@ -126,7 +126,7 @@ class Chart:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """What the script needs beside the values, as plain data."""
+        """Data that the script needs in addition to the values, as plain data."""
         panels = [attrs.asdict(panel, filter=_is_setting) for panel in self.panels]
         return {"group": self.group, "x": self.x.head, "ends": self.ends, "panels": panels}
 
@@ -193,7 +193,7 @@ class Table:
     Raises
     ------
     ValueError
-        If a row has another number of cells than `head`.
+        If a row and `head` have different numbers of cells.
     """
 
     caption: str
@@ -224,7 +224,7 @@ class Sentences:
 
 @attrs.frozen
 class Fragment:
-    """Markup of a template of this package, and what makes it interactive.
+    """Markup of a template of this package, and the script that makes it interactive.
 
     Attributes
     ----------
@@ -264,19 +264,19 @@ class Section:
 
     @property
     def anchor(self) -> str:
-        """The HTML id, to which the table of contents links."""
+        """The HTML id that the table of contents links to."""
         return _SPACES.sub("-", self.title.lower()).strip("-")
 
 
 @attrs.frozen(kw_only=True)
 class Banner:
-    """The head of a page; symbol and word say what its colour says.
+    """The head of a page; symbol and word repeat the meaning of its colour.
 
     Attributes
     ----------
     symbol, word : str
     subject : str
-        What the word concerns; may be empty.
+        Subject of the word; may be empty.
     text : str
     notes : sequence of pairs of str
         Lines below the text, each with its title.
@@ -317,7 +317,7 @@ class Page:
     live : str
         Settings, as JSON, of the script that renews a page from its server; empty for a page that is a file.
     generator : str
-        What made it, in its head; nothing if empty.
+        Name of the program in the head of the page; none if empty.
     """
 
     title: str
@@ -334,7 +334,7 @@ class Page:
 
     @property
     def scripts(self) -> tuple[str, ...]:
-        """The scripts, each once: the libraries, then those of the interactive parts."""
+        """The scripts, without repetition: the libraries, then the scripts of the interactive parts."""
         parts = (part for section in self.sections for part in section.parts)
         scripts = (part.script for part in parts if isinstance(part, Fragment) and part.script)
         return tuple(dict.fromkeys((*map(template_text, self.libraries), *scripts)))
@@ -401,7 +401,7 @@ def _environment() -> Any:
 
 
 def marked(text: Any) -> Markup:
-    """A text as markup, what stands between backticks as code."""
+    """A text as markup; text between backticks becomes code."""
     return Markup(_CODE.sub(r"<code>\1</code>", str(escape(text))))
 
 
@@ -417,7 +417,7 @@ def template_text(name: str) -> str:
     return text
 
 
-# Words that the parts of the page share: what is not valid and why, joints, times, values.
+# Words that the parts of the page share: invalid values and the reason, joints, times, values.
 
 
 NOT_VALID = "not valid"
@@ -476,7 +476,7 @@ LEVEL_LOOKS = {Level.OK: ("✓", "fine"), Level.WARN: ("▲", "careful"), Level.
 
 
 def verdict_banner(summary: ReplaySummary, guide: str, certainty: str) -> Banner:
-    """State as symbol and word, joints, reason, the decision, code, begin, and what is not valid.
+    """State as symbol and word, joints, reason, decision, code, start, and the values that are not valid.
 
     Parameters
     ----------

@@ -51,16 +51,16 @@ def plot(result: Any, axes: Axes | None = None, **of_simulation: str) -> Axes:
     Parameters
     ----------
     result : SimulationResult, Life, ReplayResult, ReplaySummary or Mechanism
-        Of a simulation, the force in each clearance joint over the turns of the crank, or without a trace the
-        mean, 99 % and largest force in every joint [N]; of a life, the clearance of each joint over the gait
-        cycles [µm]; of a replay, how much each clearance has opened over time, dotted and named
-        in the title where the verdict says that this is not valid; of a mechanism, its bodies at crank
-        angle 0, to scale, and the path of its toe [m]; where it does not close or turn, the bodies apart, or
+        A simulation: the force in each clearance joint over the turns of the crank, or without a trace the
+        mean, 99 % and largest force in every joint [N]. A life: the clearance of each joint over the gait
+        cycles [µm]. A replay: how much each clearance has opened over time, dotted and named
+        in the title where the verdict says that this is not valid. A mechanism: its bodies at crank
+        angle 0, to scale, and the path of its toe [m]; if it does not close or turn, the bodies apart, or
         at the dead point.
     axes : matplotlib.axes.Axes, optional
         Where to draw; default: new axes of pyplot.
     kind : str, optional
-        What to draw of a simulation: ``force``, or ``portrait`` (place of a journal in its bushing against
+        Quantity of a simulation to draw: ``force``, ``portrait`` (place of a journal in its bushing against
         its rate), ``poincare`` (the same once per gait cycle), ``wear`` (depth around bushing and journal),
         ``torque``, or the deviation of the toe from the ideal leg: ``displacement``, ``velocity``,
         ``acceleration``. All but ``wear`` need a trace.
@@ -75,7 +75,7 @@ def plot(result: Any, axes: Axes | None = None, **of_simulation: str) -> Axes:
     Raises
     ------
     ConfigError
-        If the result lacks the trace or the joint, or there is no such kind.
+        If the result lacks the trace or the joint, or the kind does not exist.
 
     Examples
     --------

@@ -156,7 +156,7 @@ def _zone_text(zone: tuple[float, float] | None) -> str:
 
 
 def _known(found: Found) -> list[tuple[str, str, str, float]]:
-    """Quantities whose ideal curve all results contain; a leg without a toe has the drive torque only."""
+    """Quantities that have an ideal curve in all results; a leg without a toe has the drive torque only."""
     return [each for each in _QUANTITIES if all(f"ideal_{each[0]}" in arrays for _, arrays in found)]
 
 
@@ -281,7 +281,7 @@ def _claims(responses: Responses) -> Table:
 
 
 def _axis(found: Found) -> tuple[str, list[float]] | None:
-    """Label and values of the one quantity that varies from point to point; None if it is not a number."""
+    """Label and values of the only quantity that varies between points; None if several vary."""
     varied = [key for key in _AXES if len({point.settings.get(key) for point, _ in found}) > 1]
     if len(varied) != 1:
         return None

@@ -114,11 +114,11 @@ def _greatest(*columns: Floats, otherwise: float = 0.0) -> float:
                default=otherwise)  # fmt: skip
 
 
-# A joint over time: its clearance as counted and as estimated, with an interval, and its contact forces.
+# A joint over time: its modelled and its estimated clearance, with an interval, and its contact forces.
 
 
 def joint_trends(summary: ReplaySummary, joint: str) -> list[Part]:
-    """Chart of what is known of a joint over time, and why something is not shown; empty if nothing is."""
+    """Chart of a joint over time, and the reason if something is not shown; empty without any data."""
     panels: list[Panel] = []
     doubts: list[Part] = []
     for name, figure, panel in (

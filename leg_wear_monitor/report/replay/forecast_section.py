@@ -63,7 +63,7 @@ def _table(summary: ReplaySummary) -> Table:
 
 
 def _forecasts(summary: ReplaySummary) -> list[tuple[str, JointForecast]]:
-    """Joints of which there is a forecast."""
+    """Joints that have a forecast."""
     return [(name, joint.forecast) for name, joint in summary.joints.items() if joint.forecast]
 
 
@@ -134,7 +134,7 @@ def wear_section(summary: ReplaySummary) -> Section:
 
 
 def _deepest(summary: ReplaySummary) -> str:
-    """The deepest wear beside the clearance limit, which shows how much it is."""
+    """The deepest wear next to the clearance limit, which gives it a scale."""
     depths = {name: _greatest(worn) for name, worn in summary.wear_depth_m.items()}
     name = max(depths, key=lambda joint: depths[joint], default="")
     if not name or not depths[name]:

@@ -55,7 +55,7 @@ def _view(summary: ReplaySummary, joint: str) -> JointView:
     clearance = summary.clearances.get(joint)
     used = _used(clearance) if clearance else None
     if summary.verdict.state is State.NOT_MONITORED and (used or 0.0) < 1.0:
-        used = None  # a joint that nobody watches is not shown as one that is all right
+        used = None  # an unmonitored joint must not look healthy
     drawn, now = summary.leg.joints.get(joint), summary.alarms.now
     raised = [alarm for alarm in now if alarm.level is not Level.OK and joint_of(alarm.name) == joint]
     return JointView(
@@ -102,7 +102,7 @@ Span = tuple[float, float]  # start and length of a part of a bar [% of the bar]
 
 
 def joints_and_leg(summary: ReplaySummary) -> str:
-    """Markup of the leg's picture beside a row a joint."""
+    """Markup of the leg's picture next to one row per joint."""
     views = joint_views(summary)
     drawing, rows = leg_drawing(summary, views), joint_rows(summary, views)
     return render("replay/joints_and_leg.html", drawing=drawing, rows=rows)
@@ -210,7 +210,7 @@ def _clearance_words(view: JointView, doubt: str) -> list[tuple[str, str]]:
 
 
 def _life_axis(lives: Sequence[LifeHours | None]) -> tuple[int, int] | None:
-    """Decades of hours from which and to which the life axis goes; None without any life."""
+    """First and last decade of hours on the life axis; None without any life."""
     hours = [max(end, 1.0) for life in lives if life for end in (life.p10_h, life.p90_h)]
     if not hours:
         return None
@@ -318,7 +318,7 @@ def _marks(placed: Sequence[tuple[JointView, float, float]], height: float) -> l
 
 
 def _lines(label: str) -> list[str]:
-    """A joint's label in lines that fit beside the drawing."""
+    """A joint's label in lines that fit next to the drawing."""
     return textwrap.wrap(label, _CAPITALS if label.isupper() else _LETTERS)
 
 

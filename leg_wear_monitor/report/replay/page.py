@@ -76,7 +76,7 @@ def _raised(summary: ReplaySummary, alarm: LegAlarm) -> dict[str, str]:
 
 
 def _source(known: JointClearance | None, clearance_m: float | None) -> str | None:
-    """Who says that a joint has a clearance: the verdict may rest on another one by now."""
+    """Source of an alarm's clearance; the verdict may rest on a different source by now."""
     if known is None or clearance_m is None:
         return None
     sources = [
@@ -152,7 +152,7 @@ def _numbers(caption: str, numbers: dict[str, float]) -> Table:
 
 
 def recording_section(recording: ReplayRecording) -> Section:
-    """Files, topics, times, and what was wrong with them."""
+    """Files, topics and times, and their faults."""
     rows = [
         ("files", ", ".join(recording.files)),
         ("topics", ", ".join(f"{name}: {topic}" for name, topic in recording.topics.items())),
@@ -179,7 +179,7 @@ _MEASURE = "docs/howto/measure_clearance.md"
 
 
 def guide_sections(summary: ReplaySummary) -> list[Section]:
-    """What to do step by step, folded; beside the guide of the verdict, how a clearance is measured.
+    """Step-by-step instructions, folded: the guide of the verdict, and how to measure a clearance.
 
     They are in the page, since it may be read where the package is not installed.
     """
@@ -191,7 +191,7 @@ def guide_sections(summary: ReplaySummary) -> list[Section]:
 
 
 def certainty_section(summary: ReplaySummary) -> Section:
-    """What the verdict's certainty was measured on."""
+    """The data used to measure the verdict's certainty."""
     rows = [(each.counted, each.words, each.where, each.date, each.source) for each in figures_of(summary)]
     table = Table(
         caption="How often such a verdict is right, where the truth is known",
@@ -270,7 +270,7 @@ def _cadence(summary: ReplaySummary) -> _Card:
 
 
 def _foot_load(summary: ReplaySummary) -> list[_Card]:
-    """What the foot carries; nothing where no load is known."""
+    """The load on the foot; nothing if no load is known."""
     load = summary.load
     if load.peak_n is None:
         return []
@@ -302,7 +302,7 @@ def _model(summary: ReplaySummary) -> _Card:
 
 
 def _explained(summary: ReplaySummary) -> str:
-    """What of the drive torque the model explains; empty if that is not known."""
+    """The part of the drive torque that the model explains; empty if this is not known."""
     mismatch = _unexplained(summary)
     if math.isnan(mismatch):
         return ""
@@ -318,7 +318,7 @@ def _unexplained(summary: ReplaySummary) -> float:
 
 
 def _entered(summary: ReplaySummary) -> list[Part]:
-    """That the verdict is later than what was recorded; nothing if it is not."""
+    """Note that the verdict is later than the recording; nothing if it is not."""
     if is_of_recording(summary):
         return []
     words = "The verdict uses entries or measurements after this recording"
@@ -351,7 +351,7 @@ def replay_page(summary: ReplaySummary) -> Page:
 
 
 def _joints(summary: ReplaySummary) -> Section:
-    """The leg's picture beside a row a joint, and what follows for the leg."""
+    """The leg's picture next to one row per joint, and the consequences for the leg."""
     parts: list[Part] = [Fragment(joints_and_leg(summary))]
     sentences = _gait_sentences(summary.gait)
     if sentences:
@@ -360,7 +360,7 @@ def _joints(summary: ReplaySummary) -> Section:
 
 
 def _gait_sentences(gait: ReplayGait) -> list[str]:
-    """Why there are no forces, if there are none."""
+    """Reason why there are no forces, if there are none."""
     if gait.is_counted:
         return ["All of it is in the ledger already, so no gait cycle was processed again."]
     if gait.believable_cycles:

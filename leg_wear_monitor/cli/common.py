@@ -1,4 +1,4 @@
-"""What verbs share: options, nodes, files that are written, progress and warnings."""
+"""Shared parts of the verbs: options, nodes, written files, progress and warnings."""
 
 import math
 import sys
@@ -67,7 +67,7 @@ Option = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
 def option(name: str, metavar: str, text: str, *own: str, **of_click: Any) -> Option:
-    """Option with a value, whose default is shown; ``own`` is the name of its parameter if that differs."""
+    """Option with a value and its default; ``own`` is the name of its parameter if it differs."""
     return click.option(name, *own, metavar=metavar, help=text, show_default=True, **of_click)
 
 
@@ -166,7 +166,7 @@ def with_clearance_joints(leg: "Mechanism", names: str | None) -> "Mechanism":
     return attrs.evolve(leg, clearance_joints=joints)
 
 
-# Nodes: as verbs, whose arguments are those of ROS, and as receivers of what an operator enters.
+# Nodes: as verbs, which take ROS arguments, and as receivers of the operator's entries.
 
 
 def need_rclpy() -> None:
@@ -180,7 +180,7 @@ def need_rclpy() -> None:
 
 
 def check_alone(**others: object) -> None:
-    """Refuse options beside ``--node``: a running monitor has its own parameters and ledger."""
+    """Refuse options together with ``--node``: a running monitor has its own parameters and ledger."""
     if any(others.values()):
         names = ", ".join(f"--{name.replace('_', '-')}" for name in others)
         raise click.UsageError(f"--node cannot be combined with {names}")
@@ -192,7 +192,7 @@ def trigger(node: str, service: str, wait_s: float, times: int = 1) -> str:
     Raises
     ------
     LegWearError
-        Without ROS, if nobody answers, or if the last call is refused.
+        Without ROS, if no node answers, or if the last call is refused.
     """
     need_rclpy()
     from leg_wear_monitor.ros.measure import trigger_on
@@ -290,7 +290,7 @@ def write_json(path: Path | None, text: str) -> list[Path]:
 
 
 def say(json_file: Path | None, lines: Iterable[str], written: Iterable[Path]) -> None:
-    """Print a result and what was written, unless ``--json`` has stdout for itself."""
+    """Print a result and the written files, unless ``--json`` reserves stdout."""
     if json_file != STDOUT:
         for line in (*lines, *(f"written: {path}" for path in written)):
             click.echo(line)
@@ -319,7 +319,7 @@ def write_file(path: Path, content: bytes) -> None:
 
 
 def write_directory(path: Path, files: Mapping[str, bytes | None]) -> list[Path]:
-    """Write files into a directory, each whole; None removes what an earlier run left.
+    """Write files into a directory, each atomically; None removes the file of an earlier run.
 
     Returns
     -------
@@ -347,12 +347,12 @@ def page_of(summary: "ReplaySummary") -> bytes:
     return page_html(replay_page(summary)).encode()
 
 
-# Warnings of values that are likely meant in a different unit, and what a user sees while something takes
-# long, all on stderr.
+# Warnings of values that are likely meant in a different unit, and messages during long operations, all on
+# stderr.
 
 
 def warn_of(source: str, found: Iterable["Doubt"]) -> None:
-    """Warn of what was found in a file."""
+    """Warn of problems in a file."""
     for doubt in found:
         warnings.warn(f"{source}: {doubt}", ConfigWarning, stacklevel=2)
 
@@ -361,7 +361,7 @@ def warn_of(source: str, found: Iterable["Doubt"]) -> None:
 def compilation() -> Iterator[None]:
     """Say in a line, once, that the work inside compiles: only then does it take long.
 
-    The line comes with the first function that is compiled, so bad input is one line, too.
+    The line appears when the first function is compiled, so bad input also gives only one line.
     """
     from leg_wear_monitor.compiled.kernel import at_compilation
 
@@ -380,7 +380,7 @@ def compilation() -> Iterator[None]:
 
 
 def compile_monitor(config: "MonitorConfig") -> None:
-    """Compile what a monitor needs, once, before several processes need it at the same time."""
+    """Compile the monitor's kernels once, before several processes need them at the same time."""
     from leg_wear_monitor.dynamics.clearance.stepper import advance_beside
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.monitor.wear_monitor import WearMonitor

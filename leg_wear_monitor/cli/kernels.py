@@ -28,7 +28,7 @@ def _simulation() -> None:
 
 
 def _monitor() -> None:
-    """What the monitor runs beside the leg, and what it simulates while the leg walks."""
+    """Run the kernels of the monitor, and of the reference that it simulates while the leg walks."""
     leg = lw.load_mechanism()
     lw.WearMonitor(leg).warm_up()
     parameters, depth = LegParameters.none(leg), np.zeros((len(leg.clearance_joints), 2, 1))
@@ -38,7 +38,7 @@ def _monitor() -> None:
 
 
 def _reading() -> None:
-    """What reads messages, and recordings where their libraries are installed."""
+    """Run the kernels that read messages, and recordings if their libraries are installed."""
     decoder = Decoder(lw.MonitorConfig())
     for stream in STREAMS:
         decoder.one(b"", stream.code)
@@ -54,7 +54,7 @@ _CALLS: dict[str, Callable[[], None]] = {call.__name__: call for call in (_simul
 
 
 def compile_all(progress: AbstractContextManager[Callable[[float], None]]) -> None:
-    """Compile what simulations, monitor, synthetic leg and replays need: in two processes if joblib is there.
+    """Compile all kernels for simulation, monitor, synthetic leg and replay; with joblib in two processes.
 
     Parameters
     ----------

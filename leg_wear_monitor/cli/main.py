@@ -49,7 +49,7 @@ class Verbs(click.Group):
         return verb
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Call a verb; ^C ends it without the empty line that click prints into a pipe, too."""
+        """Call a verb; ^C ends it without the empty line that click would print, even into a pipe."""
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt as error:

@@ -1,8 +1,8 @@
-"""Where the commands start: ^C is answered from the first moment, with one line and exit code 130.
+"""Entry point of the commands: handles ^C from the first moment, with one line and exit code 130.
 
 A node is also ended by SIGTERM, and either signal is an orderly end: exit code 0.
 
-What this module imports delays that moment, so it imports next to nothing.
+Imports of this module delay the ^C handling, so it imports next to nothing.
 """
 
 import os
@@ -57,4 +57,4 @@ def _start(node: str | None = None) -> None:
     except KeyboardInterrupt:
         leave()
     finally:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done; what is left is to go
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # all work is done; only the exit is left

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
 
 def plain_table(columns: Iterable[str], *left: int) -> Table:
-    """A table without lines, whose columns of these numbers, from 1 on, are words.
+    """A table without lines; the columns with these numbers, counted from 1, contain words.
 
-    Where it is too wide, words after the first column are folded, down to twelve characters.
+    If the table is too wide, words after the first column are folded, down to twelve characters.
     """
     table = Table(box=None, pad_edge=False, padding=(0, 1), header_style="bold")
     for number, column in enumerate(columns, start=1):

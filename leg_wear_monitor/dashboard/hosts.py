@@ -1,7 +1,7 @@
-"""Which names a request may call the server by: another site must not reach it under a name of its own.
+"""Server names that a request may use: a different site must not reach the server under its own name.
 
-Another site can let its name point to this machine (DNS rebinding), and its page then reads what this
-server sends. An address cannot be turned around like this, nor can this machine's own names.
+A different site can let its name point to this machine (DNS rebinding), and its page then reads the server's
+answers. An address cannot be misused like this, and neither can this machine's own names.
 """
 
 import ipaddress
@@ -17,7 +17,7 @@ def is_local(host: str) -> bool:
 
 
 def own_names(host: str) -> frozenset[str]:
-    """Names that may be asked for, beside addresses, if a server is bound to a host."""
+    """Names that a request may use, in addition to addresses, if a server is bound to a host."""
     if is_local(host):
         return frozenset({"localhost"})
     own = {"localhost", host.lower(), socket.gethostname().lower(), f"{socket.gethostname().lower()}.local"}
@@ -31,9 +31,9 @@ def is_allowed(header: str, host: str, names: frozenset[str]) -> bool:
     ----------
     header : str
     host : str
-        What the server is bound to.
+        Host name or address that the server is bound to.
     names : frozenset of str
-        As `own_names` returned them.
+        Names returned by `own_names`.
     """
     found = _HOST.fullmatch(header)
     if found is None:

@@ -1,4 +1,4 @@
-"""Keeps the page of a leg, renews it while somebody looks, and sends each viewer the changes."""
+"""Keeps the page of a leg, renews it while a viewer is connected, and sends each viewer the changes."""
 
 import asyncio
 import json
@@ -19,7 +19,7 @@ _TICKS_A_WORD = 2  # a word every second, also if nothing has changed: so a view
 
 @attrs.define(eq=False)
 class Viewer:
-    """Somebody who looks: what he was given last, by region, and the bell that wakes him."""
+    """A connected viewer: the version last sent of each region, and the event that wakes the viewer."""
 
     given: dict[str, int] = attrs.Factory(dict)
     bell: asyncio.Event = attrs.Factory(asyncio.Event)
@@ -40,7 +40,7 @@ class Hub:
         self._lock = asyncio.Lock()
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="dashboard")
         self._viewers: set[Viewer] = set()
-        self._sent: dict[tuple[tuple[str, int], ...], str] = {}  # messages of this tick, by what is given
+        self._sent: dict[tuple[tuple[str, int], ...], str] = {}  # messages of this tick, by sent versions
         self.is_closing = False
 
     def join(self) -> Viewer | None:
@@ -57,7 +57,7 @@ class Hub:
         self._viewers.discard(viewer)
 
     async def run(self) -> None:
-        """Renew the content while somebody looks, until `close`."""
+        """Renew the content while a viewer is connected, until `close`."""
         ticks = 0
         while not self.is_closing:
             await asyncio.sleep(_TICK_S)
@@ -75,7 +75,7 @@ class Hub:
         self._ring()
 
     def finish(self) -> None:
-        """End the worker, when nobody asks any more."""
+        """End the worker when no viewer is left."""
         self._worker.shutdown(wait=False)
 
     def _ring(self) -> None:
@@ -96,7 +96,7 @@ class Hub:
         return self._content
 
     async def message(self, viewer: Viewer) -> str:
-        """What a viewer does not have yet, as one server-sent event."""
+        """Content that a viewer does not have yet, as one server-sent event."""
         if self._content is None:
             await self._renew()
         key = tuple(sorted(viewer.given.items()))

@@ -142,9 +142,9 @@ class Freshness:
     age_s : float or None
         None before there are any.
     silence : str
-        The likely reason if nothing new comes, and where to look.
+        The likely reason if no new data arrive, and the place to look.
     old_after_s : float
-        Age from which on the page says loudly that its data are old.
+        Data age above which the page shows a clear warning.
     """
 
     age_s: float | None

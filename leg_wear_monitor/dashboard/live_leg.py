@@ -52,7 +52,7 @@ def received_status(name: str, level: int, message: str, values: Mapping[str, st
 
 
 def own_statuses(node: str, statuses: Iterable[ReplayStatus]) -> dict[str, ReplayStatus]:
-    """The statuses of a node by their names without the node's; those of other nodes are left out."""
+    """The statuses of a node by their names without the node's name; statuses of other nodes are left out."""
     prefix, own = f"{node.lstrip('/')}: ", {}
     for status in islice((each for each in statuses if each.name.startswith(prefix)), MOST):
         name = status.name.removeprefix(prefix)
@@ -72,7 +72,7 @@ def received_state(text: str, source: str) -> LegState:
     Raises
     ------
     ConfigError
-        If it is no state, or one of a different version.
+        If it is not a state, or has a different version.
     """
     record = received_json(text, source, _MOST_CHARACTERS)
     record = structure(_clean(record), dict[str, Any], source, "")

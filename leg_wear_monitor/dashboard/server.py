@@ -34,7 +34,7 @@ _HEADERS = {
 
 @attrs.frozen
 class Place:
-    """Where a server listens.
+    """Address and sockets of a server.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Place:
 
     @property
     def address(self) -> str:
-        """Of its page."""
+        """Address of the server's page."""
         return f"http://{f'[{self.host}]' if ':' in self.host else self.host}:{self.port}/"
 
 
@@ -118,7 +118,7 @@ async def serve(hub: Hub, place: Place, ready: Callable[[asyncio.Event], None]) 
     finally:
         hub.close()
         server.stop()
-        await renewing  # raises what it may have ended with
+        await renewing  # raises the error that ended it, if any
         await server.close_all_connections()
         hub.finish()
 
@@ -176,20 +176,20 @@ class _Reading(RequestHandler):
 
     @property
     def _is_navigation(self) -> bool:
-        """True if a person follows a link, in contrast to a page that reads."""
+        """True if a browser follows a link, in contrast to a page that reads data."""
         return self.request.headers.get("Sec-Fetch-Mode") == "navigate"
 
     def write_error(self, status_code: int, **_: Any) -> None:
-        """One line, in which nothing of the request stands."""
+        """Answer with one line that contains nothing of the request."""
         if status_code == HTTPStatus.METHOD_NOT_ALLOWED:
             self.set_header("Allow", ", ".join(self.SUPPORTED_METHODS))
         self.set_header("Content-Type", "text/plain; charset=utf-8")
         self.finish(f"{status_code} {HTTPStatus(status_code).phrase}\n")
 
     def log_exception(self, kind: Any, value: Any, trace: Any) -> None:
-        """No line for a refused request: whoever asks could fill a disk; a fault of ours has its line.
+        """Log no line for a refused request, because clients could fill a disk; log faults of the server.
 
-        Requests that are cut off by the end of the server are no fault.
+        Requests that are cut off by the end of the server are not faults.
         """
         if not isinstance(value, HTTPError) and not self._hub.is_closing:
             super().log_exception(kind, value, trace)

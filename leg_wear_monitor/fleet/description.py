@@ -32,13 +32,13 @@ class FleetLeg:
     config : MonitorConfig
         Parameters of its monitor.
     config_file : pathlib.Path or None
-        File of these parameters; None for those of the package.
+        File of these parameters; None for the parameters of the package.
     recordings : tuple of pathlib.Path
         Recordings, sorted by name.
     home : pathlib.Path
         Directory of the description.
     node, joint_states, drive_torque : str or None
-        As in `leg_wear_monitor.replay`.
+        Same meaning as in `leg_wear_monitor.replay`.
     """
 
     id: str
@@ -193,7 +193,7 @@ def load_fleet(path: str | Path) -> FleetDescription:
     Raises
     ------
     ConfigError
-        Naming file, key, value and what was expected.
+        Names file, key, value and the expected value.
 
     Warns
     -----

@@ -53,9 +53,9 @@ class LegOverview:
     last_recording : str
         Recording that ends last.
     last_ns : int
-        Its last stamp [ns]; 0 without a recording.
+        Last stamp of this recording [ns]; 0 without a recording.
     faults : tuple of str
-        Why the leg could not be updated, and recordings that were not counted as a whole; the first ten.
+        Why the leg could not be updated, and recordings that were not modelled completely; the first ten.
     """
 
     id: str
@@ -90,7 +90,7 @@ class LegOverview:
 
     @property
     def worst_joint(self) -> str:
-        """The joint whose clearance is used up most; empty if none is known."""
+        """The joint that has used up the largest part of its clearance limit; empty if none is known."""
         used = self.used_fraction
         return max(used, key=lambda joint: used[joint], default="")
 
@@ -110,7 +110,7 @@ class LegOverview:
 
     @property
     def row(self) -> dict[str, Any]:
-        """The leg as a row of a table; None for what is not known."""
+        """The leg as a row of a table; None for unknown values."""
         verdict = self.state.verdict if self.state else None
         joint = self.worst_joint
         clearance: JointClearance | None = self.state.clearances[joint] if self.state and joint else None
@@ -160,7 +160,7 @@ class FleetOverview:
         return {leg.id: leg for leg in self.legs}[name]
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain object: the content of ``fleet.json``; null for what is not known."""
+        """Plain object: the content of ``fleet.json``; null for unknown values."""
         legs = [
             {**part_document(attrs.evolve(leg, state=None)), "state": _without_version(leg.state)}
             for leg in self.legs
@@ -219,7 +219,7 @@ def load_overview(path: Path) -> FleetOverview:
     Raises
     ------
     ConfigError
-        If there is none, or it has another version; it names the key at fault.
+        If there is none, or it has a different version; the message names the key at fault.
     """
     place = path / FILE
     try:
@@ -269,7 +269,7 @@ class Fleet:
         return self.overview.to_pandas()
 
     def recordings(self) -> "pd.DataFrame":
-        """Table with one row per recording: whether it was counted, and if not, why."""
+        """Table with one row per recording: whether its wear was modelled, and if not, the reason."""
         rows = [
             {"leg": leg.id, **attrs.asdict(one), "findings": "; ".join(one.findings)}
             for leg in self.overview.legs

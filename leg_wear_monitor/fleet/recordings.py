@@ -40,17 +40,17 @@ class ReadRecording:
     file : str
         Its path, relative to the description if it is below it.
     size, changed_ns : int
-        Bytes of its files, and the time of their last change; with others, it is read again.
+        Bytes of its files, and the time of their last change. If they differ, the recording is read again.
     settings : str
-        Digest of the settings of its leg; with others, a recording that was not counted is read again.
+        Digest of the settings of its leg. If it differs, a recording that was not counted is read again.
     outcome : str
         Value of an `Outcome`.
     begin_ns, end_ns : int
         First and last stamp [ns].
     cycles : int
-        Gait cycles that were counted.
+        Gait cycles whose wear was modelled.
     last_cycle_ns : int
-        End of the last of them [ns]. The ledger contains this stamp if the replay was completed.
+        End of the last such gait cycle [ns]. The ledger contains this stamp if the replay was completed.
     is_partial : bool
         True if recorded data are lost or may be wrong.
     findings : tuple of str
@@ -71,7 +71,7 @@ class ReadRecording:
 
     @property
     def is_counted(self) -> bool:
-        """True if its wear is in the ledger from it."""
+        """True if the ledger contains the wear of this recording, read from it."""
         return self.outcome == Outcome.COUNTED.value
 
     @property
@@ -86,7 +86,7 @@ class ReadRecording:
 def read_lines(directory: Path) -> dict[str, ReadRecording]:
     """The last line about each recording, by its file; lines that are damaged or cut off are left out.
 
-    Without a line, its recording is replayed once more. The ledger then knows what is counted.
+    Without a line, its recording is replayed once more. The ledger then knows which time it already contains.
     """
     found: dict[str, ReadRecording] = {}
     path = directory / FILE

@@ -1,7 +1,7 @@
 """The update of a fleet: the recordings that are new for a leg are replayed into the ledger of this leg.
 
-Each leg is one job, so no leg waits for a different one. A process may be killed at any moment: the wear of a
-recording is in the ledger completely or not at all, and the ledger tells which time is counted.
+Each leg is one job, so no leg waits for a different one. A process may be killed at any moment: the ledger
+contains the wear of a recording completely or not at all, and it tells which time it already contains.
 """
 
 import fcntl
@@ -60,7 +60,7 @@ class LegUpdate:
     new : tuple of ReadRecording
         Recordings that this update has read.
     findings : tuple of str
-        Lines for the operator: a recording that was not counted as a whole, or why the leg could not go on.
+        Lines for the operator: a recording that was not modelled completely, or why the leg stopped.
     """
 
     leg: LegOverview
@@ -84,7 +84,7 @@ class FleetUpdate:
 
     @property
     def counted(self) -> int:
-        """Number of recordings that were counted."""
+        """Number of recordings whose wear was modelled."""
         return sum(one.is_counted for leg in self.legs for one in leg.new)
 
     @property
@@ -101,7 +101,7 @@ def update_fleet(
     scheduler: str | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> FleetUpdate:
-    """Count the recordings of a fleet that are not counted yet, those of a leg in the order of time.
+    """Model the wear of a fleet's new recordings; the recordings of a leg are taken in the order of time.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def update_fleet(
     workers : int
         Number of local processes; 1 uses this process only. Results do not depend on it.
     scheduler : str, optional
-        Address of a Dask scheduler whose workers count instead; they need the same files at the same paths.
+        Address of a Dask scheduler whose workers do the jobs; they need the same files at the same paths.
     progress : callable, optional
         Called with the completed fraction of the legs, 0 to 1.
     """
@@ -268,7 +268,7 @@ def _known_again(line: ReadRecording, leg: FleetLeg, directory: Path) -> ReadRec
 
 
 def leg_state(leg: FleetLeg, directory: Path) -> LegState | None:
-    """State of a leg; None before its first counted recording.
+    """State of a leg; None before the first recording whose wear was modelled.
 
     It is the state at the end of the last recording. If an operator has changed the ledger since, by
     ``measure``, ``reset`` or ``acknowledge``, it is the state that the ledger has.
@@ -300,7 +300,7 @@ _SAME_M = 1e-12  # well below any wear, and above the rounding of JSON
 
 
 def _is_same_wear(now: LegState, summary: ReplaySummary) -> bool:
-    """True if the parts are those of a summary, so that its forecast holds."""
+    """True if the parts belong to a summary, so that its forecast is valid."""
     then = summary.clearances
     return now.clearances.keys() == then.keys() and all(
         abs(one.modelled_m - then[joint].modelled_m) < _SAME_M for joint, one in now.clearances.items()

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _Sourced = TypeVar("_Sourced", "Drive", "Material")
 
 
-# ``leg-wear-monitor check``: what is wrong with a configuration or an installation.
+# ``leg-wear-monitor check``: faults of a configuration or an installation.
 
 
 _FIGURES = {
@@ -75,7 +75,7 @@ def _installation() -> bool:
 
 
 def _all_well(parts: Mapping[str, Callable[[], str]]) -> bool:
-    """Print what each part says of itself, on stderr what is wrong with it."""
+    """Print each part's description, and its faults on stderr."""
     well = True
     for name, part in parts.items():
         try:
@@ -119,7 +119,7 @@ def _files(names: tuple[str, ...]) -> Mapping[str, Callable[[], str]]:
 
 
 def _table(name: str, parameters: str | None) -> str:
-    """Read a table, and say what was understood of it."""
+    """Read a table, and describe how it was interpreted."""
     from leg_wear_monitor.bags.findings import Severity
     from leg_wear_monitor.bags.reader import understood
     from leg_wear_monitor.bags.table_proposal import propose
@@ -144,7 +144,7 @@ def _table(name: str, parameters: str | None) -> str:
 
 
 def _file(name: str) -> str:
-    """Check a file as what it is."""
+    """Check a file according to its kind."""
     from leg_wear_monitor.mechanism.loader import is_file_name, read_yaml
     from leg_wear_monitor.monitor.config.parameters import is_parameter_file, monitors_of
 
@@ -164,7 +164,7 @@ def _file(name: str) -> str:
 
 
 def _fleet(path: str) -> str:
-    """Read the description of a fleet, and say what was understood."""
+    """Read the description of a fleet, and describe how it was interpreted."""
     from leg_wear_monitor.fleet.description import load_fleet, understood
 
     fleet = load_fleet(path)
@@ -174,7 +174,7 @@ def _fleet(path: str) -> str:
 
 
 def _parameters(path: str, node: str | None = None) -> str:
-    """Read the monitor's parameters, and say what they are set to."""
+    """Read the monitor's parameters, and list their values."""
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.monitor.config.fitting import fitted, parameter_doubts, twin_settings
     from leg_wear_monitor.monitor.config.parameters import load_config
@@ -205,7 +205,7 @@ def _parameters(path: str, node: str | None = None) -> str:
 
 
 def _drive(parameters: "DriveParameters", path: str) -> str:
-    """What is declared of the drive, in a line of its own; empty if nothing is."""
+    """The declared values of the drive, on a separate line; empty if none is declared."""
     from leg_wear_monitor.monitor.config.parameters import PARAMETERS
     from leg_wear_monitor.monitor.config.sections import drive_figures
 
@@ -225,7 +225,7 @@ def _first_line(name: str) -> str:
 
 
 def _mechanism(name: str) -> str:
-    """Load, assemble and turn a mechanism, and say what it is."""
+    """Load, assemble and turn a mechanism, and describe it."""
     from leg_wear_monitor.mechanism.loader import load_mechanism, understood
     from leg_wear_monitor.mechanism.plausible import doubts
 
@@ -272,7 +272,7 @@ def _report(
 
 
 def _in_lines(values: "Iterable[tuple[str, SourcedValue]]") -> list[str]:
-    """Two lines for each number: what it is, and where it is from."""
+    """Two lines for each number: its meaning and its source."""
     lines = []
     for key, value in values:
         lines += [f"{key}: {value.text}, {value.conditions}", f"    {value.source}"]
@@ -280,7 +280,7 @@ def _in_lines(values: "Iterable[tuple[str, SourcedValue]]") -> list[str]:
 
 
 def _drive_listed(drive: "Drive") -> list[str]:
-    """A drive in two lines: what it is, and what is known of it."""
+    """A drive in two lines: its kind, and its known values."""
     known = ", ".join(f"{key.replace('_', ' ')} {value.text}" for key, value in drive.values())
     return [drive.name, f"    {drive.title}: {known}"]
 
@@ -310,7 +310,7 @@ def materials(name: str | None, json_file: Path | None) -> None:
 
 
 def _listed(pair: "Material") -> list[str]:
-    """A pair in two lines: what it is, and what is known of it."""
+    """A pair in two lines: its materials, and its known values."""
     known = pair.wear_coefficients
     wear = "no wear coefficient" if known is None else " and ".join(f"{k:.3g}" for k in known) + " 1/Pa"
     limits = (pair.limits.dynamic_pressure or pair.limits.static_pressure, pair.limits.pressure_speed)

@@ -95,7 +95,7 @@ def commission(
 
 
 def _print(result: "CommissioningResult") -> None:
-    """Print what was found, what cannot be determined, and what does not fit."""
+    """Print the results, the quantities that cannot be determined, and the contradictions."""
     from rich.console import Console
 
     from leg_wear_monitor.cli.tables import figure, plain_table
@@ -141,7 +141,7 @@ def _shown(value: str | int | float | None) -> str:
     return f"{value:.5g}" if isinstance(value, float) else printable(str(value), 60)
 
 
-# ``leg-wear-monitor reference``: simulates what the diagnosis compares a drive torque with.
+# ``leg-wear-monitor reference``: simulates the reference that the diagnosis compares with a drive torque.
 
 
 @click.command(short_help="Simulate a torque reference beforehand.")

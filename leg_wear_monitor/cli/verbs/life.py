@@ -125,7 +125,7 @@ def _document(leg: "Mechanism", lives: "Lives", limit_m: float) -> dict[str, Any
 
 
 def life_lines(result: "Life", limit_m: float, validity: dict[str, Any]) -> list[str]:
-    """Mean clearances [µm] at some points of the life, when each joint reaches the limit, and what holds."""
+    """Lines: clearances [µm] over the life, when each joint reaches the limit, and the validity."""
     points = len(result.cycles)
     rows = min(_TABLE_ROWS, points)
     lines = [f"{'cycles':>10}" + "".join(f"{f'{joint} µm':>10}" for joint in result.clearance_joints)]
@@ -158,7 +158,7 @@ def _life_end(result: "Life", end: dict[str, float | None], limit_m: float) -> s
     return f"reaches {1e6 * limit_m:g} µm after {after}{beyond}"
 
 
-# ``leg-wear-monitor design``: which bushings let each joint of a leg last the hours that one wants.
+# ``leg-wear-monitor design``: bushings that let each joint of a leg last the wanted hours.
 
 
 def _numbers(ctx: click.Context, param: click.Parameter, value: str) -> tuple[float, ...]:

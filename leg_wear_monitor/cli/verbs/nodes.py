@@ -103,7 +103,7 @@ def demo(out: Path) -> int:
 
 
 def _compile(out: Path) -> None:
-    """Compile what the nodes need: the monitor's kernels here, the leg in a process beside."""
+    """Compile the nodes' kernels: the monitor's kernels here, the leg's kernels in a second process."""
     from leg_wear_monitor.monitor.config.settings import MonitorConfig
     from leg_wear_monitor.workers import python_command  # numba: not for --help
 
@@ -123,7 +123,7 @@ def _compile(out: Path) -> None:
 
 
 def compile_leg() -> None:
-    """Compile what the synthetic leg needs."""
+    """Compile the kernels of the synthetic leg."""
     from leg_wear_monitor.gait.config import GaitConfig
     from leg_wear_monitor.gait.leg import SyntheticLeg
 
@@ -236,7 +236,7 @@ def _headline(verdict: dict[str, Any]) -> str:
 
 
 def _compare_with_truth(out: Path, live: dict[str, Any]) -> None:
-    """Print the clearance of the broken joint on the synthetic leg beside the monitor's estimate."""
+    """Print the clearance of the broken joint on the synthetic leg next to the monitor's estimate."""
     truth: dict[str, Any] = json.loads((out / "truth.json").read_text())
     for joint in live["verdict"]["joints"]:
         estimate = live["clearances"][joint]

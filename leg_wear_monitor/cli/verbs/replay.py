@@ -129,7 +129,7 @@ def _config(path: Path | None, crank_joint: str | None, node: str | None) -> "Mo
 
 
 def is_failed(result: "ReplayResult", allow_partial: bool, fail_on: tuple[str, ...]) -> bool:
-    """True if the exit code tells of findings."""
+    """True if the exit code reports findings."""
     return (
         (result.is_partial and not allow_partial)
         or is_raised(result.history.worst, fail_on)
@@ -140,12 +140,12 @@ def is_failed(result: "ReplayResult", allow_partial: bool, fail_on: tuple[str, .
 
 
 def asks_to_act(state: State) -> bool:
-    """True if the verdict at the end asks a person to do something, or cannot be given."""
+    """True if the verdict at the end asks the operator to act, or cannot be given."""
     return state in (State.NOT_MONITORED, State.INSPECT, State.STOP)
 
 
 def is_raised(worst: dict[str, Level], fail_on: tuple[str, ...]) -> bool:
-    """True if an alarm asked for was raised at any time, by the highest level of each kind."""
+    """True if a requested alarm was raised at any time, by the highest level of each kind."""
     highest = max(worst.values(), default=Level.OK)
     if ("alarm" in fail_on and highest is Level.ERROR) or ("warning" in fail_on and highest > Level.OK):
         return True
@@ -156,7 +156,7 @@ def is_raised(worst: dict[str, Level], fail_on: tuple[str, ...]) -> bool:
 def write_replay(
     result: "ReplayResult", wall_s: float, out: Path | None, json_file: Path | None
 ) -> list[Path]:
-    """Write what was asked for, and give the files."""
+    """Write the requested files, and return their paths."""
     if out is None and json_file is None:
         return []
     from leg_wear_monitor.playback.replay import REPORTS_FILE
@@ -210,7 +210,7 @@ def _refuse(name: str) -> None:
 
 @contextmanager
 def _as_one_line(source: Path) -> Iterator[None]:
-    """Data that a page cannot be made of is the file's fault: the run itself made one of what it wrote."""
+    """Report data that no page can be made of as a fault of the file: the run made a page of its own data."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", RuntimeWarning)  # numpy would print it and go on

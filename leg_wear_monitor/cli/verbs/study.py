@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 # ``leg-wear-monitor study``: the paper's parameter studies, each with a page of its own.
 
 
-# by their files, for --help shall not wait for numpy
+# The names come from the files, because --help must not wait for numpy.
 NAMES = tuple(sorted(path.stem for path in (share_directory() / "config" / "studies").glob("*.yaml")))
 
 
@@ -99,7 +99,7 @@ def write_study_page(path: Path) -> int:
 
 
 _URDF = ".urdf"
-_OURS = b"leg-wear-monitor draw"  # near the start of what this verb writes
+_OURS = b"leg-wear-monitor draw"  # near the start of a file that this verb writes
 
 
 @click.command(short_help="Draw a mechanism, working or not.")
@@ -256,7 +256,7 @@ def simulate(mechanism: str, json_file: Path | None, out: Path | None, **options
 
 
 def _keywords(clearances: str | None, wear: str, **options: Any) -> dict[str, Any]:
-    """Arguments of the library's simulate; what was not asked for is left to the library."""
+    """Arguments of the library's simulate; options that are not given keep the library's defaults."""
     keywords = {"wear": wear == "on", **options}
     if clearances is not None:
         names = [] if clearances.strip() == "none" else clearances.split(",")
@@ -293,7 +293,7 @@ def _write(
     json_file: Path | None,
     out: Path | None,
 ) -> list[Path]:
-    """Write what was asked for, and give the files."""
+    """Write the requested files, and return their paths."""
     if json_file is None and out is None:
         return []
     written: list[Path] = []

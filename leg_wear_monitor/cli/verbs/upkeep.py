@@ -237,7 +237,7 @@ def reset(
     return 0
 
 
-# ``leg-wear-monitor measure``: a clearance that somebody measured, into the ledger.
+# ``leg-wear-monitor measure``: enters a measured clearance into the ledger.
 
 
 @click.command(short_help="Enter a measured clearance, which updates the forecast.")

@@ -1,1 +1,1 @@
-"""The estimate: what signals say of a leg, its drive and its clearances, with covariance and cause."""
+"""Estimates of a leg, its drive and its clearances from signals, with covariance and cause."""

@@ -1,4 +1,4 @@
-"""Drive torque of ideal joints at any motion of the crank, and what masses and lengths change of it."""
+"""Drive torque with ideal joints at any motion of the crank, and its change with masses and lengths."""
 
 import functools
 
@@ -28,14 +28,15 @@ _NEWTON_ROUNDS = 4  # rounds of Newton's method: from lengths that are 0.2 % off
 class BodyTorques:
     """Coefficients of the drive torque at equal steps of the crank angle from 0.
 
-    They are those of 1, of the crank's speed, of its square, and of its acceleration.
+    The torque is their sum, weighted with 1, the crank's speed, its square, and its acceleration.
 
     Attributes
     ----------
     own : (4, points) array
-        Of the whole leg.
+        Coefficients of the whole leg.
     mass, length : (bodies, 4, points) arrays
-        Derivatives by factors on bodies, in the order of the mechanism's file; a mass with its inertia.
+        Derivatives with respect to factors on bodies, in the order of the mechanism's file; a mass with its
+        inertia.
     """
 
     own: Floats
@@ -93,16 +94,16 @@ def _closed(linkage: Linkage, near: Floats) -> Floats:
 
 
 def torque_coefficients(linkage: Linkage, q: Floats) -> tuple[Floats, Floats]:
-    """Coefficients (4, points) of the drive torque, and what of them is each body's mass (bodies, 4, points).
+    """Coefficients (4, points) of the drive torque, and the part of each body's mass (bodies, 4, points).
 
-    The power of the drive is that of inertia less that of all applied forces; v and a are those of the unit
-    speed.
+    The power of the drive is the power of inertia minus the power of all applied forces; v and a are velocity
+    and acceleration at unit speed.
 
     Parameters
     ----------
     linkage : Linkage
     q : (points, n, 3) array
-        Coordinates that close it.
+        Coordinates that close the linkage.
     """
     arrays, jacobian = linkage.arrays, jacobians(linkage, q)
     v, a, work = np.zeros_like(q), np.zeros_like(q), np.empty((q.shape[1], 2))

@@ -1,4 +1,4 @@
-"""What explains a measured drive torque: one enum of causes, what names them, changes and explanations."""
+"""Causes of a measured drive torque: one enum of causes, named causes, changes and explanations."""
 
 import math
 from enum import Enum
@@ -6,22 +6,22 @@ from enum import Enum
 import attrs
 
 SURE_LOG_ODDS = 5.0  # 150 to 1
-# against the runner-up: what the model has wrong is common to all phases, and speaks for one joint against
-# another. Under 300 N of load and twice the friction, B had 7 where G was open; right names had 15 and more
-# there, 85 and more in the air (2026-11-25)
+# log odds against the runner-up: an error of the model affects all phases, and can favour a wrong joint.
+# Under 300 N of load and twice the friction, B had 7 where G was open; right names had 15 and more there, 85
+# and more in the air (2026-11-25)
 SURE_OF_NAME = 10.0
-# of the modelled clearance: smaller openings are named wrongly where masses are 5 % off (diagnosis.md)
+# multiple of the modelled clearance: smaller openings get wrong names if masses are 5 % off (diagnosis.md)
 CORRECTED_FROM = 1.3
 SURE_SIGMAS = 2.0  # a clearance is surely beyond or below its limit by so many standard deviations
 
 
 class Cause(Enum):
-    """What explains a drive torque that is not as predicted; the value is human-readable.
+    """Cause of a drive torque that is not as predicted; the value is human-readable.
 
     Attributes
     ----------
     fault_code : str
-        Stable name, whoever finds the cause.
+        Stable name, the same for every detector.
     """
 
     fault_code: str
@@ -51,7 +51,7 @@ class Cause(Enum):
 
 
 INPUTS = (Cause.SIGN, Cause.SCALE, Cause.TIMING, Cause.CRANK_OFFSET, Cause.LAG, Cause.NOISE)
-"""Causes in what is received, not in the leg."""
+"""Causes in the received signals, not in the leg."""
 
 
 @attrs.frozen
@@ -84,22 +84,22 @@ class NamedCause:
 
 @attrs.frozen(kw_only=True)
 class Change(NamedCause):
-    """A significant departure of the leg from the one that the monitor counts.
+    """A significant departure of the leg from the monitor's wear model.
 
     Attributes
     ----------
     since_ns : int
         Stamp of the first gait cycle that belongs to the change.
     counted : float
-        Value that the monitor supposes, in the unit of the value.
+        Value in the monitor's model, in the unit of `value`.
     log_odds : float
-        Natural logarithm of the odds against the leg as counted.
+        Natural logarithm of the odds against the leg as modelled.
     runner_up : str
         Next best explanation, human-readable; empty if there is none.
     runner_up_log_odds : float
         Natural logarithm of the odds against the runner-up.
     is_corrected : bool
-        Whether the modelled clearance was corrected by it.
+        Whether this change corrected the modelled clearance.
     """
 
     since_ns: int
@@ -111,7 +111,7 @@ class Change(NamedCause):
 
     @property
     def is_named(self) -> bool:
-        """Whether no other explanation comes near."""
+        """Whether no other explanation is nearly as good."""
         return self.runner_up_log_odds >= SURE_OF_NAME
 
     @property
@@ -121,21 +121,21 @@ class Change(NamedCause):
 
     @property
     def is_wide(self) -> bool:
-        """Whether a clearance is so much wider than counted that it is corrected."""
+        """Whether a clearance is so much wider than modelled that the monitor corrects it."""
         return self.cause is Cause.CLEARANCE and self.value >= CORRECTED_FROM * self.counted
 
 
 @attrs.frozen(kw_only=True)
 class TorqueExplanation:
-    """Explanation of a torque mismatch.
+    """Explanation of a torque residual.
 
     Attributes
     ----------
     alternatives : tuple of tuple of NamedCause
         Each explains the torque as well as the others, the best first, and is made of causes that hold at
-        once; empty: nothing explains half of the mismatch.
+        once; empty: nothing explains half of the torque residual.
     before, after : float
-        What is not explained without and with the first alternative, as a fraction of the predicted RMS.
+        Torque residual without and with the first alternative, as a fraction of the predicted RMS.
     after_sigma : float
     limit : float
         Fraction below which a torque counts as predicted.
@@ -144,7 +144,7 @@ class TorqueExplanation:
     bias : NamedCause
         Constant torque that friction cannot be, for the first alternative.
     cycles : int
-        Gait cycles in it.
+        Gait cycles in the explanation.
     """
 
     alternatives: tuple[tuple[NamedCause, ...], ...] = ()
@@ -163,14 +163,14 @@ class TorqueExplanation:
 
     @property
     def named(self) -> tuple[NamedCause, ...]:
-        """The causes, where they are the only ones that fit and explain the mismatch for the most part."""
+        """The causes, if they are the only ones that fit and explain most of the torque residual."""
         # with less it is a part of a cause that is not among these
         sure = len(self.alternatives) == 1 and (self.is_whole or self.after <= 0.25 * self.before)
         return self.alternatives[0] if sure else ()
 
     @property
     def is_input_fault(self) -> bool:
-        """Whether the torque or the crank angle is wrong as received, so that it says nothing of the leg."""
+        """Whether the torque or the crank angle is wrong as received, and tells nothing about the leg."""
         found = self.alternatives if self.is_whole else (self.named,)
         return bool(found) and all(any(one.cause in INPUTS for one in each) for each in found)
 

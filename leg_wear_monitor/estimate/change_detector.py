@@ -1,8 +1,8 @@
-"""Detects when a leg departs from the one that is counted: one CUSUM test for each quantity and size.
+"""Detects when a leg departs from its wear model: one CUSUM test for each quantity and size.
 
 A CUSUM adds up, gait cycle by gait cycle, by how much a changed leg explains the signature better, and
-starts again where it falls below zero. Where the likelihoods are what it supposes, the mean time between
-two false alarms of a test is at least exp(threshold) cycles (Lorden 1971).
+starts again where it falls below zero. If its likelihoods are right, the mean time between two false alarms
+of a test is at least exp(threshold) cycles (Lorden 1971).
 """
 
 import math
@@ -18,8 +18,9 @@ FACTORS = (1.08, 1.2, 1.35, 1.5, 2.0, 2.5, 3.3, 5.0, 8.0)
 
 _LEAST_INFORMATION = 1.0e-6  # information per gait cycle below which a test shows nothing
 _SIGMAS = 4.0  # possible error of the baseline in standard deviations
-# of the threshold: what one gait cycle counts at most, so that two alone raise nothing. One of 260 healthy
-# cycles on the ground looked like a wider joint: two in a row come each twenty hours by chance (2026-11-25)
+# fraction of the threshold that one gait cycle adds at most, so that two alone raise no alarm. One of 260
+# healthy cycles on the ground looked like a wider joint: two in a row occur by chance every twenty hours
+# (2026-11-25)
 _MOST = 0.4
 
 
@@ -36,9 +37,9 @@ def threshold(false_alarm_cycles: float, tests: int) -> float:
 
 
 def excess(scatter: Floats) -> Floats:
-    """By how much more than expected the statistics (n, tests) of some tests scatter, at least 1.
+    """Factor by which the statistics (n, tests) of some tests scatter more than expected, at least 1.
 
-    They are of gait cycles that the tests do not know, less their mean, in standard deviations.
+    The statistics come from gait cycles that the tests do not know, minus their mean, in standard deviations.
     """
     pairs = len(scatter) // 2
     if not pairs:
@@ -59,13 +60,13 @@ def _scatter(explainer: Explainer, change: Floats) -> Floats:
 
 
 class ChangeDetector:
-    """CUSUM tests of a leg against one with a wider joint, with a new part, of another mass or friction.
+    """CUSUM tests of a leg against legs with a wider joint, a new part, a changed mass or friction.
 
     Parameters
     ----------
     explainer : Explainer
     modelled_m : (k,) array
-        Counted clearances.
+        Modelled clearances.
     false_alarm_cycles : float
         Mean number of gait cycles between two false alarms.
     """
@@ -124,7 +125,7 @@ class ChangeDetector:
 def first_changed(explainer: Explainer, signatures: Floats, modelled_m: Floats, changed_m: Floats) -> int:
     """Index of the first of some gait cycles, signatures (n, F), that belongs to a change of clearances.
 
-    It is where the likelihood of the cycles before as counted, and of those after as changed, is largest.
+    The index maximises the likelihood of the earlier cycles as modelled and of the later cycles as changed.
     """
     before, after = (explainer.model.at(clearance)[0] for clearance in (modelled_m, changed_m))
     weighted = np.linalg.solve(explainer.covariance(1), after - before)

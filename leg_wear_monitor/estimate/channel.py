@@ -33,8 +33,8 @@ from leg_wear_monitor.twin.torque_reference import TorqueReference
 _DELAYS_S = 0.005 * np.arange(-4, 9)
 _TIME_CONSTANTS_S = (0.0, *(1.0 / (TURN * hz) for hz in (100.0, 70.0, 50.0, 35.0, 25.0, 20.0, 14.0, 10.0)))
 _STEP_S = 0.0025  # to both sides of the best of these delays
-# From the best of them on, by what is free: bounds, the difference for a derivative, the longest step, and
-# the one after which it is enough.
+# The search starts at the best of them. For each free value: bounds, the difference for a derivative, the
+# longest step, and the step that ends the search.
 _RANGES = {
     "delay_s": (-0.02, 0.04, 0.0005, 0.0025, 0.0001),
     "time_constant_s": (0.0005, 0.025, 0.0005, 0.0025, 0.0001),
@@ -45,8 +45,8 @@ _CYCLES = 20  # simulated gait cycles; enough for a mean signature
 # A channel has to lower the mean square of the residual by this much, compared with none: unknown masses and
 # lengths change it by about 0.2 (docs/explanation/diagnosis.md).
 _CHANNEL_IMPROVEMENT = 0.3
-# Another low-pass than one of first order has to lower the mean square by this much. With masses 4 % off and
-# a worn joint, a second order does by 0.17 to 1.8 behind Butterworth's and means over 20 to 40 ms (24 of 25,
+# A low-pass that is not of first order must lower the mean square by this much. With masses 4 % off and a
+# worn joint, a second order does by 0.17 to 1.8 behind Butterworth's and means over 20 to 40 ms (24 of 25,
 # one 0.05), by at most 0.04 behind low-passes of first order and lags (n = 20).
 _IMPROVEMENT = 0.05
 _SECOND_ORDER = 0.3  # the first that is tried
@@ -58,12 +58,13 @@ _FRICTION_STEP = 0.1  # for its derivative
 # load friction has to lower the mean square by this much: chance does by 0.02, a load friction of 0.1 by 0.8
 _FRICTION_IMPROVEMENT = 0.1
 _FRICTION_ERROR = 0.02  # error of the estimate, from legs with masses 4 % off
-_DECLARED_FRICTION_SIGMA = 0.03  # standard deviation of a declared one
+_DECLARED_FRICTION_SIGMA = 0.03  # standard deviation of a declared load friction
 
-# Standard deviations of what makes a leg differ from its reference besides the channel. In each phase, an
-# error of the model: of the mean torque, as a fraction of the torque's size, and of the logarithm of the
-# roughness. Clearances other than counted: of their logarithm. Masses, lengths, bias, scale and load: by
-# cause, in units of their `Nuisance`. On the ground, the first harmonics of the mean torque are free instead.
+# Standard deviations of the differences between a leg and its reference besides the drive dynamics. In each
+# phase, an error of the model: of the mean torque, as a fraction of the torque's size, and of the logarithm
+# of the roughness. Clearances other than modelled: of their logarithm. Masses, lengths, bias, scale and load:
+# by cause, in units of their `Nuisance`. On the ground, the first harmonics of the mean torque are free
+# instead.
 _MEAN_SIGMA, _ROUGHNESS_SIGMA, _CLEARANCE_SIGMA = 0.05, 0.4, math.log(1.25)
 _SPREADS = {Cause.MASS: 0.05, Cause.LENGTH: 0.005, Cause.FRICTION: 5.0, Cause.SCALE: 0.1, Cause.LOAD: 20.0}
 _SPREAD_FACTOR = 5.0  # times `Nuisance.spread`, the usual change of a known leg, where this is larger
@@ -73,7 +74,7 @@ _HARMONICS, _HARMONIC_NM = 16, 100.0
 
 @attrs.frozen(eq=False)
 class ChannelFit:
-    """A channel that explains a measured signature.
+    """Drive dynamics that explain a measured signature.
 
     Attributes
     ----------
@@ -81,12 +82,12 @@ class ChannelFit:
     square : float
         Mean square of the residual, in units of its expected standard deviation.
     load_friction_sigma : float
-        Standard deviation of its load friction; NaN if that is not observable, as on the ground, where the
-        unknown load hides it.
+        Standard deviation of the channel's load friction; NaN if the load friction is not observable, as on
+        the ground, where the unknown load hides it.
     misfit : float
         Minus twice the logarithm of the likelihood, up to a constant; compares hypotheses.
     rest : (m,) array
-        What is left of the signature, and of the prior, in standard deviations.
+        Residuals of the signature, and of the prior, in standard deviations.
     """
 
     channel: Channel
@@ -179,7 +180,7 @@ def channel_of(
 
 
 def _slopes(measured: Floats, sensor: TorqueSensor) -> Floats:
-    """Sizes (F,) of a signature's derivatives by the crank angle; those of the torque by its roughness."""
+    """Sizes (F,) of a signature's derivatives by the crank angle; for the torque, from its roughness."""
     rough = measured[sensor.phases :]
     per_phase = 0.5 * np.abs(np.roll(rough, -1) - np.roll(rough, 1))
     return np.concatenate([np.exp(rough) * sensor.samples, per_phase * sensor.phases]) / TURN
@@ -264,7 +265,7 @@ def _best_channel(
     """
 
     def fit_of(near: Channel) -> ChannelFit:
-        channel = attrs.evolve(near, load_friction=0.0)  # which is fitted anew
+        channel = attrs.evolve(near, load_friction=0.0)  # the load friction is fitted anew
         rubbing = attrs.evolve(channel, load_friction=_FRICTION_STEP)
         friction_change = (residual(channel) - residual(rubbing)) / _FRICTION_STEP
         return hypothesis.fit(channel, residual(channel), friction_change, clearances(channel))
@@ -304,7 +305,7 @@ def _best_channel(
 
 
 def _refined(fit_of: Callable[[Channel], ChannelFit], near: Channel, *free: str) -> ChannelFit:
-    """The best channel near another one, by those of its attributes that are free."""
+    """The best channel near a given channel, with some attributes free."""
     low, high, difference, longest, done = np.array([_RANGES[name] for name in free]).T
 
     def fit_at(x: Floats) -> ChannelFit:
@@ -325,7 +326,7 @@ def _refined(fit_of: Callable[[Channel], ChannelFit], near: Channel, *free: str)
 def _clearance_columns(reference: TorqueReference, sensor: TorqueSensor) -> Floats:
     """Columns (k, F): change of the signature by one standard deviation of each clearance.
 
-    Of the legs of each joint, the smallest wider one comes first.
+    The smallest wider leg comes first among the legs of each joint.
     """
     firsts = reference.of_joints[:, :1].ravel().tolist()
     expected = simulated_signatures(reference, 0, sensor, cycles=_CYCLES).mean(axis=0)

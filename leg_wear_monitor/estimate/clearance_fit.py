@@ -25,8 +25,8 @@ _MODEL_M = 5.0e-6  # error of the model against full coordinates (docs/explanati
 class ClearanceFit:
     """Clearances (k,) [m] and their covariance (k, k) [m^2].
 
-    `square` is the mean square of what they leave over, about 1 if the model holds; `unlikely` is minus twice
-    the logarithm of their probability, less a constant.
+    `square` is the mean square of their residual, about 1 if the model holds; `unlikely` is minus twice the
+    logarithm of their probability, less a constant.
     """
 
     clearance_m: Floats
@@ -41,11 +41,11 @@ class ClearanceFit:
 
     @property
     def explains(self) -> bool:
-        """Whether the clearances explain what was measured."""
+        """Whether the clearances explain the measured signature."""
         return self.square <= _EXPLAINED
 
     def agrees(self, k: int, change: Change) -> bool:
-        """Whether joint k has the size by all clearances at once that it has alone, by a change of it."""
+        """Whether the fit of all clearances gives joint k the same size as a change of joint k alone."""
         return bool(abs(self.clearance_m[k] - change.value) <= SURE_SIGMAS * change.sigma)
 
 
@@ -88,7 +88,7 @@ def fit_clearances(
 
         found = gauss_newton(at, np.log(clearance), low=low, high=high)
         clearance = np.asarray(np.exp(found.x), dtype=np.float64)
-    # what a clearance changes is known to a fraction, and so is a clearance that is far from the modelled one
+    # the effect of a clearance is known to a fraction, and so is a clearance far from the modelled one
     uncertain = np.hypot(_MODEL_M, MODEL_ERROR * (clearance - modelled_m))
     # a baseline after a correction hides the error of the correction
     covariance = found.covariance * np.outer(clearance, clearance) + np.diag(uncertain**2 + known_sigma_m**2)

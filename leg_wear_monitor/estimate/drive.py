@@ -1,4 +1,4 @@
-"""A drive and its sensor: what they make of the leg's torque, and what is declared of them."""
+"""A drive and its sensor: their effect on the leg's torque, and their declared values."""
 
 import math
 
@@ -14,7 +14,7 @@ _HALF_POWER = 0.442946  # x at which (sin(pi x) / (pi x))² is 1/2
 
 @attrs.frozen(kw_only=True)
 class Channel:
-    """What a drive makes of the leg's torque before it is sampled.
+    """Effect of a drive on the leg's torque before it is sampled.
 
     Attributes
     ----------
@@ -93,9 +93,9 @@ DIRECT = Channel()
 
 @attrs.frozen(kw_only=True)
 class DriveFigures:
-    """Declared figures of a drive, at the crank's shaft; NaN where nothing is declared.
+    """Declared values of a drive, at the crank's shaft; NaN for undeclared values.
 
-    A motor's or a gear's own figures are converted to the crank before: the torque by its turns per turn of
+    A motor's or a gear's own values are converted to the crank before: the torque by its turns per turn of
     the crank, friction by speed and stiffness by their square.
 
     Attributes
@@ -103,7 +103,7 @@ class DriveFigures:
     lag_s : float
         Time by which the measured torque is late.
     bandwidth_hz : float
-        Corner frequency of a first-order low-pass between the torque on the crank and the measured one.
+        Corner frequency of a first-order low-pass between the torque on the crank and the measured torque.
     load_friction : float
         Fraction eta of the friction eta |torque| sign(speed).
     coulomb_nm : float

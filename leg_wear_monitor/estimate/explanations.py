@@ -1,4 +1,4 @@
-"""What may explain a change of the torque's signature: a clearance, or something else."""
+"""Possible explanations of a change of the torque's signature: a clearance, or other causes."""
 
 import math
 from collections.abc import Sequence
@@ -18,49 +18,50 @@ from leg_wear_monitor.estimate.cause import (
 from leg_wear_monitor.estimate.signature import Changes, SignatureModel
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 
-# of what a clearance changes, and of an opening: legs with masses 4 % off show 10 to 27 % less (2026-11-23)
+# relative error of a clearance's effect, and of an opening: legs with masses 4 % off show 10 to 27 % less
+# (2026-11-23)
 MODEL_ERROR = 0.2
 
-# of the root mean square of a change, in units of the scatter of gait cycles: what the model has wrong of its
-# shape, 0.27 to 0.6 where masses are 4 % off, 0.05 to 0.18 where they were identified (2026-11-26)
+# error of a change's shape in the model, over its root mean square in units of the scatter of gait cycles:
+# 0.27 to 0.6 where masses are 4 % off, 0.05 to 0.18 where they were identified (2026-11-26)
 MODEL_NOISE = 0.3
 
-_APART = 2.0  # standard deviations by which likely sizes may scatter about the best one
+_APART = 2.0  # standard deviations within which likely sizes scatter about the best size
 _SIZES = 24  # clearances of a joint that are tried; between them a parabola finds the best
-_LEAST_FACTOR = 0.7  # of the modelled clearance
+_LEAST_FACTOR = 0.7  # least size over the modelled clearance
 # factors that are tried, on the mass of a body and on the friction in the joints
 _FACTORS = {Cause.MASS: np.geomspace(0.4, 2.0, 16), Cause.JOINT_FRICTION: np.geomspace(0.25, 4.0, 16)}
 _CORNER = 1.0e200
-# of the mean square: less than a channel's delay, 2.5 ms from the next that is tried, leaves over
+# fraction of the mean square: less than the residual of a delay that is 2.5 ms, a step of the search, off
 _LEFT = 0.5
 _LATE_SIGMA_S = 0.0015  # about the step between the channels that are tried
-_NOISE_SIGMA = 0.08  # of the noise: half of the step between those that are tried
-_QUIETEST = 0.01  # of the square of the roughness
-_QUIETER = 0.25  # of less noise than known: what an opening beside it may hide of its decrease
-_ROUNDS = 2  # of the search for a clearance and a noise
-# The search for two open joints tries seven sizes of each joint, a fifth apart; those of the second joint lie
-# about 1.5 times its modelled clearance. A second round tries finer steps about the best sizes.
-_LEAST_SECOND = 1.2  # of the modelled clearance: a smaller second opening may be an error of the model
+_NOISE_SIGMA = 0.08  # relative error of the noise: half of the step between the tried values
+_QUIETEST = 0.01  # fraction of the square of the roughness
+_QUIETER = 0.25  # of a decreased noise: an opening may hide the rest of the decrease
+_ROUNDS = 2  # rounds of the search for a clearance and a noise
+# The search for two open joints tries seven sizes of each joint, a fifth apart; the sizes of the second joint
+# lie about 1.5 times its modelled clearance. A second round tries finer steps about the best sizes.
+_LEAST_SECOND = 1.2  # over the modelled clearance: a smaller second opening may be an error of the model
 _PAIR_SIZES, _PAIR_ROUNDS, _PAIR_STEP, _PAIR_MIDDLE = 3, 2, 0.2, 1.5
 # mean square up to which it is noise alone: up to 1.4 of a healthy leg, a real motor's stick-slip too; where
 # two joints opened as well, which no single one explains, it would explain most of it (2026-11-27)
 _NOISE_ALONE = 2.0
 
 # mean square up to which a joint is sure by itself: right names have 0.6 to 1.9, but A 3 to 15 at 0.7 and
-# 0.8 mm, G 2 to 6 at 0.50 and 0.52. Else it has to be far better than the next cause. Where it is twice to
-# four times as wide as counted, others look like it, too: A has odds of e^134 and more there; a mass of 1 to
-# 2.5 kg on a healthy leg e^2 to e^13, as I at 0.9 mm; B and G at 0.50 mm e^3 to e^63 in ten gait cycles, as
-# G at 0.79 to 0.86 mm; G at 0.45 and 0.50 mm beside 0.48 kg on the foot e^20 to e^91, as G at 0.79 to 0.84
-# mm. Below and above, G has e^57 to e^96 at 0.5 mm, and e^71 and more at 2 mm in a leg without a baseline.
-# Or it is so wide that its size is hardly known, and leaves such a part of what is left over without it: G
-# at 2 mm, as 1.3 to 2.1 mm, 0.08 to 0.17 (2026-11-27)
+# 0.8 mm, G 2 to 6 at 0.50 and 0.52. Else it must be far better than the next cause. Where it is twice to four
+# times as wide as modelled, other causes look like it as well: A has odds of e^134 and more there; a mass of
+# 1 to 2.5 kg on a healthy leg e^2 to e^13, as I at 0.9 mm; B and G at 0.50 mm e^3 to e^63 in ten gait cycles,
+# as G at 0.79 to 0.86 mm; G at 0.45 and 0.50 mm with 0.48 kg on the foot e^20 to e^91, as G at 0.79 to
+# 0.84 mm. Below and above, G has e^57 to e^96 at 0.5 mm, and e^71 and more at 2 mm in a leg without a
+# baseline. Or it is so wide that its size is hardly known, and leaves such a part of the residual without it:
+# G at 2 mm, as 1.3 to 2.1 mm, 0.08 to 0.17 (2026-11-27)
 _SURE_SQUARE, _SURE_BY, _SURE_BY_AMONG_OTHERS = 2.0, 50.0, 100.0
 _WIDER, _WIDE, _OF_WIDE = 2.0, 4.0, 0.2
 _ANYTHING_ELSE = "something else"
 
 # mean square above which an explanation does not explain (docs/explanation/diagnosis.md), and values that
 # linear columns can show and a leg can have
-POOREST, _PART = 4.0, 0.3  # or of what is left over without it: a large opening is known less well
+POOREST, _PART = 4.0, 0.3  # or this part of the residual without it: a large opening is known less well
 _POSSIBLE = {
     Cause.MASS: (-0.9, 1.0),
     Cause.LENGTH: (-0.1, 0.1),
@@ -68,7 +69,7 @@ _POSSIBLE = {
     Cause.TIMING: (-0.1, 0.1),
     Cause.LOAD_FRICTION: (-0.5, 0.5),
 }
-_COUNTED = {Cause.SCALE: 1.0}  # value of a leg as counted; 0 for others
+_COUNTED = {Cause.SCALE: 1.0}  # value of a leg as modelled; 0 for others
 
 
 @attrs.frozen(eq=False)
@@ -83,7 +84,8 @@ class Nuisance:
     column : (F,) array
         Change of the signature by a unit of the quantity.
     spread : float
-        Standard deviation of its changes in a leg that is all right; 0 for what does not change by itself.
+        Standard deviation of its changes in a leg that is all right; 0 for a quantity that does not change by
+        itself.
     """
 
     cause: Cause
@@ -94,7 +96,7 @@ class Nuisance:
 
 @attrs.frozen(eq=False)
 class OtherChannel:
-    """Another delay or low-pass of the torque sensor.
+    """A different delay or low-pass of the torque sensor.
 
     Attributes
     ----------
@@ -117,7 +119,7 @@ class OtherNoise:
     noise_nm : float
         Standard deviation of a sample.
     power : (F,) array
-        What it adds to the square of the roughness [(N m)^2]; 0 for the mean torque.
+        Contribution of the noise to the square of the roughness [(N m)^2]; 0 for the mean torque.
     scatter : (F,) array
         Variance of a gait cycle's signature in addition.
     """
@@ -133,7 +135,7 @@ class OtherNoise:
         return np.asarray(signature + 0.5 * np.log1p(np.where(self.power == 0.0, 0.0, more)))
 
     def variance(self, signature: Floats, cycles: int) -> Floats:
-        """What is uncertain of the mean of some cycles' signatures (F,) with it, beside what there is."""
+        """Additional variance (F,) of the mean of some cycles' signatures with this noise."""
         share = 1.0 - np.exp(2.0 * (signature - self.shown(signature)))
         return np.asarray(self.scatter / cycles + (_NOISE_SIGMA * share) ** 2)
 
@@ -159,14 +161,14 @@ class LeftOut:
 
 @attrs.frozen(eq=False)
 class Baseline:
-    """What measured signatures have in addition to those of the model, in a leg as it is counted.
+    """Difference between measured signatures and the model's signatures in a leg as modelled.
 
     Attributes
     ----------
     offset : (F,) array
-        Mean difference of the commissioned leg; zeros before.
+        Mean difference in the commissioned leg; zeros before commissioning.
     covariance : (F, F) array
-        Its uncertainty.
+        Uncertainty of the offset.
     left_out : tuple of LeftOut
         Parts of the commissioned leg's gait cycles; none before.
     """
@@ -183,11 +185,11 @@ class Explanation(NamedCause):
     Attributes
     ----------
     counted : float
-        As that of `Change`.
+        As in `Change`.
     misfit : float
         Minus twice the logarithm of its likelihood, less a constant.
     square : float
-        Mean square of what it leaves over, in units of its covariance: about 1 if the cause is right.
+        Mean square of its residual, in units of the covariance: about 1 if the cause is right.
     """
 
     counted: float
@@ -195,7 +197,7 @@ class Explanation(NamedCause):
     square: float
 
     def explains(self, without: float) -> bool:
-        """Whether a leg can have it, and whether it explains what was measured.
+        """Whether a leg can have this cause, and whether it explains the measured signature.
 
         Parameters
         ----------
@@ -208,12 +210,12 @@ class Explanation(NamedCause):
 
 
 class _Seen(NamedTuple):
-    """A mean signature (F,) of some cycles, and what is expected of it in a leg as counted.
+    """A mean signature (F,) of some cycles, and its expectation in a leg as modelled.
 
     Attributes
     ----------
     scatter : float
-        Variance of what is expected, as a part of that of a gait cycle; beside the covariance (F, F).
+        Variance of the expectation, as a part of a gait cycle's variance; added to the covariance (F, F).
     """
 
     mean: Floats
@@ -224,17 +226,17 @@ class _Seen(NamedTuple):
 
     @property
     def rest(self) -> Floats:
-        """What a leg as counted leaves over (F,)."""
+        """Residual (F,) of a leg as modelled."""
         return self.mean - self.expected
 
     @property
     def as_modelled(self) -> "Misfits":
-        """How well a leg as counted explains it."""
+        """How well a leg as modelled explains the signature."""
         return Misfits(self.rest[None], self.covariance)
 
 
 class _Quantity(NamedTuple):
-    """One of some quantities whose changes were simulated, with its counted value."""
+    """A quantity whose changes were simulated, with its modelled value."""
 
     cause: Cause
     subject: str
@@ -255,7 +257,7 @@ class Explainer:
     channels : sequence of OtherChannel, optional
     noises : sequence of OtherNoise, optional
     fresh_m : (k,) array, optional
-        Clearances of new parts, the least that a joint can have; those of the expected leg by default.
+        Clearances of new parts, the least that a joint can have; by default the expected leg's.
     """
 
     def __init__(
@@ -275,25 +277,25 @@ class Explainer:
         self.fresh_m = model.joints.grid[:, 0] if fresh_m is None else fresh_m
         usual = (one.spread**2 * np.outer(one.column, one.column) for one in nuisances)
         self._constant = sum(usual, baseline.covariance)  # errors that averaging over cycles does not reduce
-        # combinations of a signature's entries that are independent under both covariances: variances of 1
-        # in a gait cycle, and these in what stays
+        # combinations of a signature's entries that are independent under both covariances: variances of 1 in
+        # a gait cycle, and these variances in the constant part
         apart = np.linalg.inv(np.linalg.cholesky(model.covariance))
         self._stays, axes = np.linalg.eigh(apart @ self._constant @ apart.T)
         self._apart = axes.T @ apart
         self._log_size = -2.0 * float(np.linalg.slogdet(apart)[1])
 
     def covariance(self, cycles: int) -> Floats:
-        """Covariance (F, F) of the mean of some cycles' signatures in a leg as counted."""
+        """Covariance (F, F) of the mean of some cycles' signatures in a leg as modelled."""
         return np.asarray(self.model.covariance / cycles + self._constant)
 
     def error(self, change: Floats) -> Floats:
-        """Variance (n,) of what the model of changes (n, F) is off, as a part of that of a gait cycle."""
+        """Variance (n,) of the model's error for changes (n, F), as a part of a gait cycle's variance."""
         return np.asarray(MODEL_NOISE**2 * np.square(self._apart @ change.T).mean(axis=0))
 
     def whitening(self, cycles: int, scatter: float) -> tuple[Floats, float]:
         """Matrix (F, F) that makes the mean of some cycles' signatures independent with variances of 1.
 
-        ``scatter``: further variance, as a part of that of a gait cycle. Also the logarithm of the
+        ``scatter``: further variance, as a part of a gait cycle's variance. Also the logarithm of the
         determinant of the covariance.
         """
         variance = np.maximum(self._stays, 0.0) + 1.0 / cycles + scatter
@@ -308,7 +310,7 @@ class Explainer:
             Mean signature of the cycles since the change.
         cycles : int
         modelled_m : (k,) array
-            Counted clearances.
+            Modelled clearances.
         """
         model = self.model
         expected, scatter = self.baseline.offset + model.at(modelled_m)[0], model.scatter_at(modelled_m)
@@ -335,9 +337,9 @@ class Explainer:
         return sorted(found, key=lambda one: one.misfit)
 
     def _with_second(self, seen: _Seen, first: Explanation, modelled_m: Floats) -> list[Explanation]:
-        """Explanations by two open joints, one of which is the joint that explains most alone.
+        """Explanations by two open joints: the joint that explains most alone, and a second joint.
 
-        Of two open joints, the wider change nearly always has the right name, but a wrong size.
+        The wider change of two open joints nearly always has the right name, but a wrong size.
         """
         k, found = self.joints.index(first.subject), []
         for other in range(len(modelled_m)):
@@ -415,9 +417,10 @@ class Explainer:
         return [misfits.explanation(best, NamedCause(Cause.LAG, self.channels[best].later_s, _LATE_SIGMA_S))]
 
     def _noise(self, seen: _Seen) -> tuple[list[Explanation], Sequence[OtherNoise]]:
-        """Other noise as the cause, and what noise there may be beside an opening.
+        """Other noise as the cause, and the noise that is possible together with an opening.
 
-        An opened joint makes the torque rougher, too, so that there is at most as much as without one.
+        An opened joint makes the torque rougher as well, so there is at most as much noise as without an
+        opening.
         """
         if not self.noises:
             return [], ()
@@ -444,7 +447,7 @@ class Explainer:
     def _best(
         self, seen: _Seen, one: _Quantity, values: Floats, noises: Sequence[OtherNoise] = ()
     ) -> Explanation:
-        """Best of some values (n,) of a quantity, all else as counted, beside other noise if any."""
+        """Best of some values (n,) of a quantity, all else as modelled, with other noise if any."""
         noise = None
         for _ in range(_ROUNDS if noises else 0):  # from the most noise on
             value = values[self._misfits(seen, one, values, noise or noises[-1]).value.argmin()]
@@ -490,8 +493,9 @@ class Explainer:
     def _others(self, seen: _Seen) -> list[Explanation]:
         """Best values of the nuisances, each with the spread by which it is most probable.
 
-        What is within the usual spread is no more probable than a leg as counted, which has that, too. Masses
-        whose changes were simulated are none of them: the ideal torque is but a part of what they change.
+        A value within the usual spread is no more probable than a leg as modelled, which has this spread as
+        well. Masses whose changes were simulated are left out: the ideal torque is only a part of their
+        effect.
         """
         rest, covariance, has_masses = seen.rest, seen.covariance, len(self.model.masses.grid) > 0
         nuisances = [one for one in self.nuisances if not (has_masses and one.cause is Cause.MASS)]
@@ -514,20 +518,20 @@ class Explainer:
 
 
 class Misfits:
-    """How well normal distributions explain what is left over by several causes.
+    """How well normal distributions explain the residuals of several causes.
 
     Parameters
     ----------
     rest : (n, F) array
-        What is left over.
+        Residuals.
     covariance : (F, F) or (n, F, F) array
     more : (n, F) array, optional
-        Columns whose outer products belong to the covariance, too.
+        Columns whose outer products belong to the covariance as well.
 
     Attributes
     ----------
     square : (n,) array
-        Squares of what is left over, in units of its covariance: about F each if the cause is right.
+        Squares of the residuals, in units of their covariance: about F each if the cause is right.
     value : (n,) array
         Minus twice the logarithms of the densities, less a constant.
     """
@@ -564,8 +568,8 @@ def _diagonal(sigma: Floats) -> Floats:
 def _nearby(change: Floats) -> Floats:
     """Root mean squares of changes (n, F) over each phase and its two neighbours.
 
-    Impacts of another leg than the simulated one come a bit earlier or later. A phase that has none here may
-    have one there: G at 2 mm, where impacts move most, left 17 to 36, and now 7 to 9 (2026-11-27).
+    Impacts of a leg that differs from the simulated leg come a bit earlier or later. A phase that has none
+    here may have one there: G at 2 mm, where impacts move most, left 17 to 36, and now 7 to 9 (2026-11-27).
     """
     square = np.square(change).reshape(len(change), 2, -1)  # mean, roughness
     around = square + np.roll(square, 1, axis=2) + np.roll(square, -1, axis=2)
@@ -573,18 +577,18 @@ def _nearby(change: Floats) -> Floats:
 
 
 def opened(clearance_m: Floats, k: int, size: float) -> Floats:
-    """Clearances (k,) [m] with that of one joint replaced."""
+    """Clearances (k,) [m] with one joint's clearance replaced."""
     changed = clearance_m.copy()
     changed[k] = size
     return changed
 
 
 def _changed_by(factor: Explanation, without: float) -> list[Explanation]:
-    """An explanation by a factor as one by the fraction of a change; none where it does not explain.
+    """Converts an explanation by a factor to the fraction of a change; none where it does not explain.
 
-    Nor where it may as well be 1, nor friction that leaves much over: a knee of 2 mm looked like 3.8 times
-    the friction, and was to be watched, where the right one leaves 0.6 to 2.1; and a foot 85 % heavier, which
-    left 10 of 27, made that knee's name unsure (2026-11-27).
+    A factor that may as well be 1 gives none, and so does friction with a large residual. A knee of 2 mm
+    looked like 3.8 times the friction, and was to be watched, where the right cause leaves 0.6 to 2.1; and a
+    foot 85 % heavier, which left 10 of 27, made the name of this knee unsure (2026-11-27).
     """
     change = attrs.evolve(factor, value=factor.value - 1.0, counted=0.0)
     is_poor = change.cause is Cause.JOINT_FRICTION and change.square > POOREST
@@ -609,10 +613,10 @@ def as_modelled(explanations: Sequence[Explanation]) -> Explanation:
 
 
 def change_of(explanations: Sequence[Explanation], since_ns: int) -> Change | None:
-    """The change that explanations, the best first, amount to; None where the leg may be as counted.
+    """The change that follows from explanations, the best first; None if the leg may be as modelled.
 
-    Of many causes one always explains a bit more than none. Where even the best one explains badly, as for
-    two joints that opened at once, it has to be as much better than the next: by the square of Birge's ratio.
+    One of many causes always explains a bit more than none. If even the best cause explains badly, as for two
+    joints that opened at once, it must be better than the next cause by the square of Birge's ratio.
     """
     best = explanations[0]
     nothing = as_modelled(explanations)
@@ -640,7 +644,7 @@ def change_of(explanations: Sequence[Explanation], since_ns: int) -> Change | No
 
 
 def _is_rival(one: Explanation, best: Explanation) -> bool:
-    """Whether an explanation says something else than the best one; a second open joint adds to the first."""
+    """Whether an explanation contradicts the best one; a second open joint only adds to the first."""
     if one.cause is Cause.SEVERAL and best.cause is Cause.CLEARANCE:
         return False
     return (one.cause.fault_code, one.subject) != (best.cause.fault_code, best.subject)

@@ -1,12 +1,12 @@
 """The force of the ground on the toe from the mean drive torque of a leg that walks on it.
 
-By virtual work, a force F at the toe needs the drive torque -F . dr/dtheta, r the toe's place: one equation
-in each phase for two components. What is known beside it is a template of stance, from which real steps
-differ in size, begin, end, fore-aft part and shape. A sensor shows that torque behind its channel, and the
-friction of the load of a drive follows the whole torque.
+By virtual work, a force F at the toe needs the drive torque -F . dr/dtheta, with r the toe's position: one
+equation in each phase for two components. In addition, a template of stance is known. Real steps differ from
+it in size, start, end, fore-aft part and shape. A sensor shows this torque after the drive dynamics, and the
+load friction of a drive follows the whole torque.
 
-Under a force the joints rub more, and impacts fall elsewhere: a reference under the force that was found
-leads to the next one.
+Under a force the joints rub more, and impacts fall elsewhere: a reference under the estimated force leads to
+the next estimate.
 """
 
 import functools
@@ -32,11 +32,11 @@ from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 _HARMONICS = 12  # sin(k pi s) over stance, in each component
 
-# standard deviations about the template: begin and end of stance [turns], fore-aft over vertical force, each
+# standard deviations about the template: start and end of stance [turns], fore-aft over vertical force, each
 # harmonic of the vertical and fore-aft shape over the peak. Measured ones differ by 0.04 and 0.03 (RMS) up to
-# the sixth and by 0.02 and 0.01 from there on, 0.119 and 0.074 at most (docs/appendix/benchmarks.md): those
-# of a continuous force fall with the square of their number. With 0.05 and 0.025 in all twelve, what the
-# model's torque is off became a ripple of the force, and the heel wore 1.3 times as fast under 100 N
+# the sixth and by 0.02 and 0.01 from there on, 0.119 and 0.074 at most (docs/appendix/benchmarks.md): the
+# harmonics of a continuous force fall with the square of their number. With 0.05 and 0.025 in all twelve, the
+# error of the model's torque became a ripple of the force, and the heel wore 1.3 times as fast under 100 N
 _TIMING, _FORE_AFT = 0.03, 0.03
 _SHAPES = np.outer([0.06, 0.03], np.minimum(1.0, (6.0 / np.arange(1, _HARMONICS + 1)) ** 2))
 # usual difference of steps from the template: half of the difference on a treadmill
@@ -46,20 +46,20 @@ _USUAL[1, 1:3] = 0.007, -0.007
 _FRICTION, _DECLARED_FRICTION = 0.2, 0.03  # load friction of the drive
 _MEAN = 0.02  # error of the model in each phase, of the torque's size
 _SPREADS = {Cause.MASS: 0.05, Cause.LENGTH: 0.005, Cause.FRICTION: 5.0, Cause.SCALE: 0.05, Cause.TIMING: 0.02}
-_SURE, _WORSE = 2.0, 3.0  # standard deviations of a load, and a factor on what is left over without it
+_SURE, _WORSE = 2.0, 3.0  # standard deviations of a load, and a factor on the residual without it
 # 3 % of cogging, with all else that drives do, was a load of 13 ± 4 N (2026-11-26); so little of it would
 # hardly change the wear, but keep the leg from being identified
 _LEAST_N = 25.0
 _UNIT_N = 100.0
 _IN_STANCE = 0.05  # the foot is on the ground above this fraction of the peak force
-# of the fit, which has several minima: 69 N and a toe-off later by 0.04 left over 2.5, 100 N left over
-# 2.2 (2026-11-25). Sizes, and toe-offs in standard deviations, where it begins
+# Start values of the fit, which has several minima: sizes, and toe-offs in standard deviations. With 69 N and
+# a toe-off later by 0.04 the residual was 2.5, with 100 N it was 2.2 (2026-11-25)
 _STARTS_N, _TOE_OFFS, _ROUNDS = (50.0, 200.0, 600.0), (-2.0, 0.0, 2.0), 4
 _SAME = 0.5  # standard deviations: within them minima are one
-_AS_GOOD = 4.0  # by which the squares of forces differ that explain as well
+_AS_GOOD = 4.0  # difference of the squares of forces that explain equally well
 _MOST_N = 5000.0
 _FURTHEST = 4.0  # standard deviations
-_STEP, _DONE = 1.0e-4, 1.0e-3  # of the differences, and the last step, in standard deviations
+_STEP, _DONE = 1.0e-4, 1.0e-3  # step of the differences, and the last step, in standard deviations
 
 
 @attrs.frozen(eq=False)
@@ -69,18 +69,18 @@ class GroundLoad:
     Attributes
     ----------
     force : (PHASES, 2) array
-        At equal steps of the crank angle from 0 [N].
+        Force at equal steps of the crank angle from 0 [N].
     peak_n, peak_sigma_n : float
-        Size of the template, the largest vertical force of its shape; its standard deviation, that of other
-        forces that explain almost as well included.
+        Size of the template, the largest vertical force of its shape; its standard deviation, which includes
+        other forces that explain almost as well.
     heel_strike, toe_off : float
-        Crank angle at the begin and at the end of stance, as a fraction of a turn.
+        Crank angle at the start and at the end of stance, as a fraction of a turn.
     load_friction : float
         Friction of the drive over the size of the torque that it transmits.
     square, without : float
-        Mean squares of what is left over with it and without a load, in units of its uncertainty.
+        Mean squares of the residual with this load and without a load, in units of its uncertainty.
     other_n : float
-        Size of another force that explains the torque as well; NaN without one.
+        Size of a different force that explains the torque equally well; NaN without one.
     """
 
     force: Floats

@@ -1,16 +1,16 @@
 """Masses, lengths and friction of a commissioned leg, from its drive torque.
 
-A real leg is not quite that of its mechanism file. Where its impacts fall, and what a clearance changes,
-depends on its masses, lengths and friction: a length that is 1 % off, or friction twice that of the file,
-makes a reference name wrong joints. So the reference is simulated again with the parameters that explain
-the torque of the leg when it was commissioned.
+A real leg differs a little from its mechanism file. The times of its impacts and the effect of a clearance
+depend on its masses, lengths and friction: a length that is 1 % off, or twice the friction, makes a reference
+name wrong joints. So the reference is simulated again with the parameters that explain the torque of the leg
+when it was commissioned.
 
-Simulated legs show what each parameter changes, near the leg that is simulated. All parameters are changed
-at once: with one leg for each, 4 % of a body's mass changed less than the scatter of simulated legs, and
-slopes of masses were noise.
+Simulated legs show the effect of each parameter near the simulated leg. All parameters are changed at once:
+with one leg for each, 4 % of a body's mass changed less than the scatter of simulated legs, and slopes of
+masses were noise.
 
-Where a leg is far from its file, the torque with ideal joints leads near it: lengths that are 5 % off
-change that by half of the torque's size.
+If a leg is far from its file, the torque with ideal joints leads near it: lengths that are 5 % off change
+this torque by half of its size.
 """
 
 import math
@@ -40,24 +40,23 @@ from leg_wear_monitor.twin.torque_reference import (
     levels_of,
 )
 
-UNLIKE_FILE = 0.8  # misfit from which on the leg is not that of its file (docs/explanation/diagnosis.md)
+UNLIKE_FILE = 0.8  # misfit from which on the leg differs from its file (docs/explanation/diagnosis.md)
 
-# misfit from which on a leg is identified, and, as it is not that of its file then, down to which: scatter
-# alone leaves 0.1 to 0.25, and 0.5 to 0.6 where samples fall at the same angles in each gait cycle. J at
-# 0.45 mm was 0.48 to 0.50 mm where 0.39 was left, 0.54 at 0.58, and 0.62, or I was taken for it, at 0.68
-# (2026-11-26)
+# misfit from which on a leg is identified, and the misfit at which identification ends: scatter alone leaves
+# 0.1 to 0.25, and 0.5 to 0.6 where samples fall at the same angles in each gait cycle. J at 0.45 mm was 0.48
+# to 0.50 mm where 0.39 was left, 0.54 at 0.58, and 0.62, or I was taken for it, at 0.68 (2026-11-26)
 WORTH_IDENTIFYING, ONLY_SCATTER = 0.6, 0.45
 
 FAR_FROM_FILE = 20.0  # misfit from which on the ideal torque comes first
 
-_MASS, _LENGTH = 0.03, 0.006  # standard deviations of a leg's bodies about those of its file
-_LOG_FRICTION = 0.7  # of the logarithm of its friction: a factor of two, greased or not
-_FAR = 0.03  # that of masses and lengths of a leg far from its file
-_HARMONICS = 6  # of the torque that show masses and lengths rather than impacts
-_IDEAL = 0.01  # of the torque's size: what impacts change in each of them
-_STEP = 1.0e-4  # of the differences by masses and lengths, in standard deviations
-_DONE = 1.0e-3  # last step of them
-_LARGEST_LOG = 10.0  # of friction: far beyond a possible leg
+_MASS, _LENGTH = 0.03, 0.006  # standard deviations of a leg's bodies about the file's bodies
+_LOG_FRICTION = 0.7  # standard deviation of the logarithm of its friction: a factor of two, greased or not
+_FAR = 0.03  # standard deviation of masses and lengths of a leg far from its file
+_HARMONICS = 6  # harmonics of the torque that show masses and lengths rather than impacts
+_IDEAL = 0.01  # fraction of the torque's size: effect of impacts on each harmonic
+_STEP = 1.0e-4  # step of the differences for masses and lengths, in standard deviations
+_DONE = 1.0e-3  # last step of masses and lengths
+_LARGEST_LOG = 10.0  # largest logarithm of friction: far beyond a possible leg
 _SENSOR = 5.0  # times the usual changes of friction, scale, offset and load: they are constant here
 
 # a model with the right parameters is off by a part of the torque's size, by a part of its steps where it is
@@ -66,7 +65,7 @@ _OF_SIZE, _OF_STEP, _ROUGHNESS = 0.005, 0.1, 0.1
 
 
 def misfit(model: SignatureModel, nuisances: Sequence[Nuisance], commissioned: CommissionedTorque) -> float:
-    """Mean square of what a model does not explain of a commissioned leg, in units of its uncertainty."""
+    """Mean square of a model's residual for a commissioned leg, in units of its uncertainty."""
     rest = commissioned.mean - model.at(commissioned.clearance_m)[0]
     covariance = _covariance(model, nuisances, commissioned.cycles)
     return float(rest @ np.linalg.solve(covariance, rest)) / len(rest)
@@ -80,13 +79,13 @@ def identified_leg(
 ) -> LegParameters:
     """Most probable parameters of a commissioned leg: one step of Gauss and Newton.
 
-    What the torque does not show of them stays that of the file. Lengths are supposed to be as far from the
-    file as those of the simulated leg are.
+    Parameters that the torque does not show keep the file's values. Lengths are assumed to be as far from the
+    file as the simulated leg's lengths.
 
     Parameters
     ----------
     legs : TorqueReference
-        Of `begin_identification`, with the clearances of the commissioned leg.
+        Legs of `begin_identification`, with the clearances of the commissioned leg.
     model : SignatureModel
     nuisances : sequence of Nuisance
     commissioned : CommissionedTorque
@@ -112,21 +111,21 @@ def identified_leg(
 def leg_of_ideal_torque(
     mechanism: Mechanism, model: SignatureModel, commissioned: CommissionedTorque, speed: float, load: Floats
 ) -> LegParameters:
-    """Masses and lengths near those of a leg far from its file, by the torque with ideal joints.
+    """Approximate masses and lengths of a leg far from its file, from the torque with ideal joints.
 
-    That torque differs from the torque of the file's leg as the measured mean torque differs from the
+    The ideal torques of this leg and of the file's leg differ as the measured mean torque differs from the
     model's, if impacts have the same part in both.
 
     Parameters
     ----------
     mechanism : Mechanism
     model : SignatureModel
-        Of the leg of the file.
+        Model of the file's leg.
     commissioned : CommissionedTorque
     speed : float
-        Of the crank [rad/s].
+        Speed of the crank [rad/s].
     load : (PHASES, 2) array
-        Of the model's leg [N], or none.
+        Load of the model's leg [N], or none.
     """
     phases, bodies = model.sensor.phases, len(mechanism.bodies)
     unit = _IDEAL * model.sensor.size_nm
@@ -162,7 +161,7 @@ def _harmonics(torque: Floats) -> Floats:
 
 
 def _covariance(model: SignatureModel, nuisances: Sequence[Nuisance], cycles: int) -> Floats:
-    """Covariance (F, F) of what a leg's mean signature over some cycles is off its model."""
+    """Covariance (F, F) of the difference between a leg's mean signature over some cycles and its model."""
     phases = model.sensor.phases
     steep = np.hypot(_OF_SIZE * model.sensor.size_nm, _OF_STEP * np.exp(model.mean[phases:]))
     found = model.covariance * (1.0 / cycles + model.own)

@@ -59,7 +59,7 @@ def series(stamp_ns: NDArray[np.int64], value: Floats, recording: NDArray[np.int
 _WINDOW_S = 0.12  # local fit: a twelfth of a turn at 40 rpm, which keeps a ripple of two periods per turn
 _LEAST_WINDOW = 7  # samples: three more than a cubic has coefficients
 _GAP_SAMPLES = 4.0  # a longer gap between samples, in sampling intervals, is not bridged
-_LEAST_TURNS = 3.0  # of an angle in a wrong unit
+_LEAST_TURNS = 3.0  # least travel of an angle in a wrong unit
 _LEAST_TRAVEL_RAD = 1.0  # a joint that moves by less in all does not turn
 # Least range of the positions as a fraction of the path: 1 for a crank that turns one way, 1/2 for one that
 # walks forwards and then as far back, 1/(2 n) for a joint that swings to and fro in each of n gait cycles.
@@ -164,7 +164,7 @@ def _window(time_s: Floats) -> tuple[float, int]:
 
 
 def is_wrapped(value: Floats) -> bool:
-    """Whether readings (n,) [rad] jump by about a turn and stay within one, but for noise."""
+    """Whether readings (n,) [rad] jump by about a turn and stay within one turn, apart from noise."""
     jumps = np.abs(np.diff(value)) > math.pi
     return bool(jumps.any() and np.ptp(value) <= 1.05 * TURN)
 
@@ -277,7 +277,7 @@ class Pair:
 
     @property
     def walks_both_ways(self) -> bool:
-        """Whether at least a tenth of the samples is of either direction."""
+        """Whether each direction has at least a tenth of the samples."""
         backwards = float(np.mean(self.speed_radps < 0.0))
         return 0.1 < backwards < 0.9
 
@@ -332,7 +332,7 @@ def with_repeating_acceleration(pair: Pair, ratio: float) -> Pair:
 def slow_speed(pair: Pair, span_s: float = _SLOW_S) -> Floats:
     """Speed of the joint (n,) [rad/s] without its ripple: the mean over a time [s] around each sample.
 
-    That is over at most a quarter of all samples, and at both ends over those that there are.
+    The mean spans at most a quarter of all samples, and fewer at both ends.
     """
     samples = max(1, min(len(pair.time_s) // 4, round(span_s / max(pair.interval_s, 1.0e-6))))
     total = np.concatenate([[0.0], np.cumsum(pair.speed_radps)])
@@ -357,7 +357,7 @@ def steady_stretch(pair: Pair) -> Pair:
     best = slice(0, 0)
     for centre in centres:
         steady = np.abs(speed - centre) <= _STEADY * abs(centre)
-        # which samples belong together with the next one; a stretch is a run of these
+        # samples that belong together with the next sample; a stretch is a run of them
         linked = steady[1:] & steady[:-1] & (np.diff(pair.recording) == 0)
         edges = np.flatnonzero(np.diff(np.concatenate([[False], linked, [False]]).astype(int)))
         for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):

@@ -1,6 +1,6 @@
-"""Damped Gauss-Newton for least squares, and by how much what was found scatters.
+"""Damped Gauss-Newton for least squares, and the scatter of its result.
 
-A prior is a further row of the residual; a point that cannot be has an infinite residual.
+A prior is a further row of the residual; an impossible point has an infinite residual.
 """
 
 from collections.abc import Callable
@@ -14,11 +14,11 @@ from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.arrays import Floats
 
 DATA_ERRORS = (LegWearError, ArithmeticError, np.linalg.LinAlgError)
-"""What measured data can make an estimator raise. Everything else is a fault of this package."""
+"""Exceptions that measured data can make an estimator raise. Any other is a fault of this package."""
 
 _ROUNDS = 30
 _SHORTEST = 0.001  # fraction of a step that is tried last
-_LESS = 1.0e-9  # fraction by which the square has to become less
+_LESS = 1.0e-9  # fraction by which the square must decrease
 _SMALL = 1.0e-9  # singular values, as a fraction of the largest, that count as none
 
 

@@ -1,4 +1,4 @@
-"""The expected leg: what changes its torque's signature beside clearances, and its baseline."""
+"""The expected leg: changes of its torque's signature besides clearances, and its baseline."""
 
 import attrs
 import numpy as np
@@ -30,12 +30,13 @@ from leg_wear_monitor.twin.reference import MASS_TOLERANCE
 from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 # usual changes of a leg that is all right: friction warms up, sensors drift, the ground differs
-_FRICTION_CHANGE = 0.1  # of the torque's size
+_FRICTION_CHANGE = 0.1  # fraction of the torque's size
 _SCALE = 0.02
 _OFFSET_RAD = 0.01  # a lag of 1.6 ms at 60 rpm, or a crank offset: at one speed the two look alike
 _LOAD_N = 5.0
 _LOAD_FRICTION = 0.03  # a gear that warms up
-# of the ground's peak: its mean over some steps, and the harmonics of its vertical and fore-aft shape
+# fractions of the ground's peak force: its mean over some steps, and the harmonics of its vertical and
+# fore-aft shape
 _LOAD_FRACTION, _VERTICAL, _FORE_AFT_CHANGE, _LOAD_HARMONICS = 0.05, 0.01, 0.005, 8
 
 # leg without a commissioning: tolerances of bodies and further errors of the model
@@ -53,8 +54,8 @@ _NOISE_STEP = 0.16  # step of the noise's logarithm
 _NOISE = 0.001 * np.exp(_NOISE_STEP * np.arange(40))  # fractions of the torque's size
 _SENSOR_CYCLES = 20
 
-# gait cycles that the expected covariance counts as: a tenth to 0.45 of the weight is that of 50 measured
-# cycles where the others are most probable by it, in the air and on the ground (2026-11-25)
+# gait cycles that the expected covariance counts as: the other cycles are most probable if 50 measured cycles
+# have a tenth to 0.45 of the weight, in the air and on the ground (2026-11-25)
 _EXPECTED_CYCLES = 120
 _PARTS = 5  # parts of the commissioned cycles; each part is tested against the others
 _LEAST_PARTED = 4  # gait cycles: each part leaves a mean and a scatter
@@ -190,8 +191,8 @@ def commissioned_baseline(
 ) -> Baseline:
     """Baseline of a commissioned leg; the signature (F,) that is expected, covariance (F, F) of a cycle.
 
-    What the reference of the expected leg is off is in that difference, and cancels. What other places of the
-    samples change, with a covariance (F, F) of its own, does not.
+    The error of the reference of the expected leg is part of the difference, and cancels. The effect of other
+    sample places, with its own covariance (F, F), does not cancel.
     """
     mean = commissioned.mean
     return Baseline(mean - expected, covariance / commissioned.cycles + places, left_out)
@@ -200,7 +201,7 @@ def commissioned_baseline(
 def unknown_baseline(found: list[Nuisance], sensor: TorqueSensor, covariance: Floats) -> Baseline:
     """Baseline of a leg that was never commissioned, with its tolerances.
 
-    The covariance (F, F) is that of the expected signature.
+    The covariance (F, F) belongs to the expected signature.
     """
     phases = sensor.phases
     sigma = np.repeat([_MEAN_ERROR * sensor.size_nm, _ROUGHNESS_ERROR], phases)
@@ -238,10 +239,10 @@ def explainer_of(
     commissioned: CommissionedTorque | None,
     corrected_m: Floats | None = None,
 ) -> Explainer:
-    """What explains changes of a leg, measured by a sensor whose noise is known.
+    """Explainer of changes of a leg, measured by a sensor whose noise is known.
 
-    With clearances (k,) [m] that were corrected since the baseline, that is what its signatures had in
-    addition to those of the model, and a fifth of what was corrected is uncertain.
+    With clearances (k,) [m] that were corrected since the baseline, the baseline is the difference between
+    its signatures and the model's, and a fifth of the correction is uncertain.
     """
     model = signature_model(reference, sensor)
     found, joints = nuisances(mechanism, reference, sensor), mechanism.clearance_joints

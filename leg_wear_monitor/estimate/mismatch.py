@@ -1,4 +1,4 @@
-"""Explanation of a torque mismatch: the fewest causes that explain it, and the alternatives to these.
+"""Explanation of a torque residual: the fewest causes that explain it, and their alternatives.
 
 The file goes from curves of the torque and the timing of a curve over the fit of one hypothesis to the choice
 among all hypotheses (`explanation`).
@@ -149,7 +149,7 @@ class TimingBySpeed:
         return max(yy - found[1].value * y + found[0].value * xy, 0.0) if found else 0.0
 
 
-# Fit of one hypothesis: measured = factor * (predicted + load + mass) at another crank angle + constant.
+# Fit of one hypothesis: measured = factor * (predicted + load + mass) at a shifted crank angle + constant.
 
 
 # angles that are tried, every half degree, from 0 to half a turn and then from minus half a turn to 0
@@ -157,14 +157,14 @@ _GRID_RAD = (np.arange(720) / 720 + 0.5) % 1.0 * TURN - 0.5 * TURN
 _MASS_RANGE = (-0.9, 4.0)  # possible error of a body's mass, as a fraction of it
 _POINTS, _SECTORS = 64, 8  # points of a turn; sectors of it for the jackknife, each left out once
 _LEAST_CYCLES = 6  # gait cycles to separate offset and lag
-_SURE_SIGMAS = 3.0  # an offset or a lag is named beside the other from so many standard deviations
+_SURE_SIGMAS = 3.0  # an offset and a lag are both named from so many standard deviations
 # Offset and lag are separated if the angle is at least so many standard deviations of the offset.
 _RESOLVED_SIGMAS = 6.0
 
 
 @attrs.frozen(kw_only=True)
 class Hypothesis:
-    """Supposed causes of a mismatch.
+    """Assumed causes of a torque residual.
 
     Attributes
     ----------
@@ -299,7 +299,7 @@ def _fits_of_angles(
 
 
 def _fraction(square: float, factor: float, size_nm: float) -> float:
-    """RMS of a residual as a fraction of that of the scaled prediction; infinite without a prediction."""
+    """RMS of a residual over the RMS of the scaled prediction; infinite without a prediction."""
     return math.sqrt(square) / (abs(factor) * size_nm) if factor and size_nm else math.inf
 
 
@@ -311,10 +311,10 @@ class Refined:
     ----------
     fit : Fit
     sigma : (float, float, float, float)
-        Of factor, angle, load and mass; 0 for a fixed one.
+        Standard deviations of factor, angle, load and mass; 0 for a fixed value.
     unexplained_sigma : float
     constant_nm, constant_sigma_nm : float
-        Constant torque beside the prediction.
+        Constant torque in addition to the prediction.
     """
 
     fit: Fit
@@ -348,7 +348,7 @@ def refined(curves: TorqueCurves, one: Fit) -> Refined:
 
 
 def _with_remaining_rms(matrix: Floats, residual: Floats) -> Floats:
-    """Coefficients of least squares, and the RMS [N m] of what they leave."""
+    """Coefficients of least squares, and the RMS [N m] of their residual."""
     found = solved(matrix, residual)
     return np.append(found, np.sqrt(np.mean((residual - matrix @ found) ** 2)))
 
@@ -385,7 +385,7 @@ def _sureness(one: NamedCause) -> float:
 
 _MOST_CAUSES = 3
 _LEAST_FACTOR = 1.0e-5  # fraction of the predicted RMS: far below the torque of a leg in a wrong unit
-_LARGEST_REMAINDER = 0.5  # more causes may leave at most this fraction of what fewer leave unexplained
+_LARGEST_REMAINDER = 0.5  # more causes may leave at most this fraction of the residual of fewer causes
 # alternatives to the best hypothesis may leave so many times as much unexplained, plus an error of the model
 _ALTERNATIVE_FACTOR, _MODEL_ERROR = 3.0, 0.02
 # bodies whose double mass changes the torque by a smaller fraction of its RMS are not supposed as causes
@@ -417,7 +417,7 @@ class Allowed:
 def explanation(
     mechanism: Mechanism, cycles: Sequence[CycleStatistics], allowed: Allowed
 ) -> TorqueExplanation | None:
-    """Explanation of the mismatch in gait cycles; None without a mismatch, or with too few samples."""
+    """Explanation of the torque residual in gait cycles; None if it is small, or with too few samples."""
     speed = float(np.mean([one.direction * TURN / one.moving_s for one in cycles]))
     curves = curves_of([one.torque_profile for one in cycles], _body_torques(mechanism, speed))
     if curves is None or not curves.predicted_rms_nm > 0.0:
@@ -481,7 +481,7 @@ def _chosen(curves: TorqueCurves, angle_rad: float, allowed: Allowed) -> tuple[F
             fits[one.size].append(found)
     for each in fits:
         each.sort(key=lambda one: one.unexplained)
-    # add causes while the mismatch is above its limit, and more of them leave half of it or less
+    # add causes while the torque residual is above its limit, and more causes leave half of it or less
     best = [each[0].unexplained if each else math.inf for each in fits]
     limit, size = allowed.unexplained, 0
     while best[size] > limit:

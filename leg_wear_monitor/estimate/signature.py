@@ -1,4 +1,4 @@
-"""The signature of a gait cycle: what its drive torque is in each phase, and how rough.
+"""The signature of a gait cycle: mean and roughness of its drive torque in each phase.
 
 Throughout, F is the length of a signature: mean and roughness in each phase.
 """
@@ -15,11 +15,11 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.reference import POINTS
 from leg_wear_monitor.twin.torque_reference import FRICTIONS, MASSES, TorqueReference
 
-SAMPLES = 200  # a gait cycle: what comes faster is averaged, since clearances show at these times already
+SAMPLES = 200  # per gait cycle: faster samples are averaged, since clearances show at this rate already
 
 _MOST_PHASES, _LEAST_PHASES = 80, 10
 _IN_PHASE = 2.5  # samples, at least: with fewer, some phases have one only
-_FLOOR = 1.0e-4  # of the torque's size, below which roughness is rounding
+_FLOOR = 1.0e-4  # fraction of the torque's size below which roughness is rounding
 _CLIP = 8.0  # times the torque's size: a peak counts as at most this
 
 
@@ -90,7 +90,7 @@ class TorqueSensor:
 
 
 def averaged(values: Floats, together: int) -> Floats:
-    """Means (n // together,) of neighbouring values; what is left over at the end is dropped."""
+    """Means (n // together,) of neighbouring values; the remainder at the end is dropped."""
     whole = len(values) // together * together
     return np.asarray(values[:whole].reshape(-1, together).mean(axis=1))
 
@@ -105,7 +105,7 @@ def signatures(cycle: Ints, angle: Floats, torque: Floats, step: Floats, sensor:
     angle, torque : (n,) arrays
         Crank angle [rad] and drive torque [N m] of each sample.
     step : (n,) array
-        Torque less that of the sample before [N m]; NaN where that was lost.
+        Torque minus the torque of the sample before [N m]; NaN if the sample before was lost.
     sensor : TorqueSensor
 
     Returns
@@ -124,7 +124,7 @@ class PhaseMeans:
     """Means of quantities in each phase of gait cycles, for samples at given angles.
 
     A sample counts for the two phases whose middles are next to it, the nearer one more. Samples often come
-    at the same angles in each cycle, and a small shift of theirs must not move them into another phase.
+    at the same angles in each cycle, and a small shift must not move them into a different phase.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ class PhaseMeans:
     angle : (n,) array
         Crank angle of each sample [rad].
     shape : (cycles, phases)
-        That of the means.
+        Shape of the means.
     """
 
     def __init__(self, cycle: Ints, angle: Floats, shape: tuple[int, int]) -> None:
@@ -163,13 +163,13 @@ def signatures_by_phase(
 
 
 def quiet_phases(signature: Floats) -> Floats:
-    """Which entries (2 phases,) are the roughness of the calmest third of the phases, as booleans."""
+    """Mask (2 phases,) of the roughness entries of the calmest third of the phases."""
     phases = len(signature) // 2
     limit = np.sort(signature[phases:])[math.ceil(phases / 3) - 1]
     return np.concatenate([np.zeros(phases, bool), signature[phases:] <= limit])
 
 
-# The drive torque of the leg with ideal joints, and what it makes of a signature.
+# The drive torque of the leg with ideal joints, and its effect on a signature.
 
 
 _POINTS = 240  # points per gait cycle: three in each of 80 phases
@@ -197,19 +197,19 @@ def signature_of_torque(torque: Floats, sensor: TorqueSensor, speed: float) -> F
 # A torque sensor on simulated legs: its samples, and their signatures.
 
 
-# of the noise that is added to simulated torques: the same at each start, and another one for each leg, or
-# their covariance would be that of a single leg's cycles
+# seed of the noise that is added to simulated torques: the same at each start, and different for each leg, or
+# their covariance would be the covariance of a single leg's cycles
 _SEED = 20261122
 
-# of that noise, for the mean signature of a leg: it is three quarters of the scatter of simulated cycles, and
-# drawing it again costs no simulation
+# draws of this noise for the mean signature of a leg: the noise is three quarters of the scatter of simulated
+# cycles, and drawing it again costs no simulation
 _DRAWS = 4
 _PART_OF_SAMPLE = 0.618  # fraction of a sampling period by which samples move in each simulated gait cycle
 _PLACES = 8  # tried places of samples within their period
 
 
 class SimulatedSensor:
-    """A sensor on legs of a reference that were simulated for as many gait cycles as each other.
+    """A sensor on legs of a reference that were simulated for the same number of gait cycles.
 
     Its samples fall at the same times on each of these legs.
 
@@ -222,8 +222,8 @@ class SimulatedSensor:
     offset_rad : float
         Added to the crank angle.
     late : float, optional
-        From the begin of each gait cycle to its first sample, in periods of the sensor; by default another
-        one in each: samples of a real leg fall anywhere, too.
+        Time from the start of each gait cycle to its first sample, in periods of the sensor; by default
+        different in each, because samples of a real leg fall anywhere as well.
     """
 
     def __init__(
@@ -268,7 +268,7 @@ class SimulatedSensor:
         return signatures_by_phase(*self._phases, torque, step, self._sensor)
 
     def torque(self, leg: int, channel: Channel | None = None) -> Floats:
-        """Averaged samples (n,) of a leg [N m], without noise; behind the sensor's channel or another one."""
+        """Averaged samples (n,) of a leg [N m], without noise; behind the sensor's channel or a given one."""
         simulated = self._reference.torque_nm[leg][: self._cycles].astype(float).ravel()
         direction = float(np.sign(self._reference.profile.speed))
         torque = (channel or self._sensor.channel).received(simulated, self._step_s, direction)
@@ -276,7 +276,7 @@ class SimulatedSensor:
             back = np.arange(self._sensor.together) * self._between
             at = np.maximum(self._ends[:, None] - back, 0.0).astype(np.int64)
             return np.asarray(torque[at].mean(axis=1))
-        # a mean is the difference of what was received up to the ends of two samples
+        # a mean is the difference of the torque sums received up to the ends of two samples
         since = self._sensor.together * self._between
         received = _received_until(torque, np.stack([self._ends - since, self._ends]))
         return np.asarray(np.diff(received, axis=0)[0] / since)
@@ -290,7 +290,7 @@ class SimulatedSensor:
         torque : (n,) array
             At equal steps of the crank angle from 0 [N m].
         step : float
-            Part of it by which the signature is differenced.
+            Fraction of the torque for the finite difference of the signature.
         """
         even: Floats = np.linspace(0.0, TURN, len(torque), endpoint=False)
         shown = self._sensor.shown(torque, self._reference.profile.speed)
@@ -320,16 +320,16 @@ _HALVINGS = 12  # halvings of that range: the noise is found to 0.2 %
 
 @attrs.frozen(eq=False)
 class Changes:
-    """What each of n quantities changes of a signature (F,), as far as it was simulated.
+    """Changes of a signature (F,) by each of n quantities, as far as they were simulated.
 
     Attributes
     ----------
     grid : (n, s) array
         Increasing values of each quantity.
     change : (n, s, F) array
-        What it changes there.
+        Change of the signature at each value.
     scatter : (n, s) array
-        Variance of each change, as a part of that of a gait cycle; 0 where they are exact.
+        Variance of each change, as a part of a gait cycle's variance; 0 if it is exact.
     """
 
     grid: Floats
@@ -350,7 +350,7 @@ class Changes:
         return self.change[which, i] + beyond[:, None] * slopes, slopes
 
     def scatter_at(self, value: Floats, which: Ints) -> Floats:
-        """Variances (m,) of the changes, as of `at`, as a part of that of a gait cycle."""
+        """Variances (m,) of the changes, as in `at`, as a part of a gait cycle's variance."""
         pairs = zip(np.log(value), which, strict=True)
         return np.array([np.interp(x, self._log_grid[i], self.scatter[i]) for x, i in pairs])
 
@@ -373,7 +373,7 @@ class Changes:
 class SignatureModel:
     """Expected signatures (F,) of a leg, as a function of its k clearances, masses, and friction.
 
-    What several of them change is the sum of what each of them changes alone.
+    The effects of several quantities add up.
 
     Attributes
     ----------
@@ -381,16 +381,16 @@ class SignatureModel:
     mean : (F,) array
         Signature of the expected leg.
     joints : Changes
-        By the clearances [m].
+        Changes by the clearances [m].
     covariance : (F, F) array
-        Of the signature of one gait cycle.
+        Covariance of the signature of one gait cycle.
     own : float
-        Variance of the mean signature of a simulated leg, as a part of that of a gait cycle.
+        Variance of the mean signature of a simulated leg, as a part of a gait cycle's variance.
     masses, friction : Changes
-        By factors on the mass of each body, and on the friction in all joints; of none where such legs were
-        not simulated.
+        Changes by factors on the mass of each body, and on the friction in all joints; empty if such legs
+        were not simulated.
     places : (F, F) array
-        Covariance of what changes where samples come at other angles of the crank; 0 where nothing does.
+        Covariance of the changes if samples come at other angles of the crank; 0 if nothing changes.
     """
 
     sensor: TorqueSensor
@@ -408,7 +408,7 @@ class SignatureModel:
         return self.mean + change.sum(axis=0), slopes.T
 
     def scatter_at(self, clearance_m: Floats) -> float:
-        """Variance of the signature at clearances (k,) [m], as a part of that of a gait cycle."""
+        """Variance of the signature at clearances (k,) [m], as a part of a gait cycle's variance."""
         return float(self.joints.scatter_at(clearance_m, np.arange(len(clearance_m))).sum())
 
     @masses.default
@@ -432,7 +432,7 @@ def signature_model(reference: TorqueReference, sensor: TorqueSensor) -> Signatu
     own = _part_of_cycle(drawn[0], covariance) / cycles
 
     def changes(legs: Ints, grid: Floats) -> Changes:
-        """What n quantities change, of which legs (n, s) have other values than the expected one."""
+        """Effects of n quantities whose values in legs (n, s) differ from the expected leg."""
         found, variance = np.zeros((*grid.shape, len(means[0]))), np.zeros(grid.shape)
         for i, each in enumerate(legs):
             ratio = np.log(grid[i, 1:] / grid[i, 0])
@@ -456,8 +456,8 @@ def signature_model(reference: TorqueReference, sensor: TorqueSensor) -> Signatu
 def _of_places(reference: TorqueReference, sensor: TorqueSensor) -> Floats:
     """Covariance (F, F) of the mean signature of the expected leg over the places of its samples.
 
-    A drive that has the sensor's clock leaves samples at their angles until one of both is started again, and
-    another clock moves them within minutes or hours.
+    A drive that shares the sensor's clock leaves samples at their angles until either is restarted, and a
+    separate clock moves them within minutes or hours.
     """
     cycles, places = len(reference.torque_nm[0]), (np.arange(_PLACES) + 0.5) / _PLACES
     legs = [SimulatedSensor(reference, cycles, sensor, late=place) for place in places]
@@ -472,7 +472,7 @@ def _drawn(reference: TorqueReference, sensor: TorqueSensor) -> list[Floats]:
 
 
 def _part_of_cycle(drawn: Floats, covariance: Floats) -> float:
-    """Variance of a gait cycle over several draws of noise (draws, cycles, F), over that of a single one."""
+    """Variance of a gait cycle over several draws of noise (draws, cycles, F), over a single draw's."""
     off = (drawn - drawn.mean(axis=0)).reshape(-1, drawn.shape[2])
     square = float((off * np.linalg.solve(covariance, off.T).T).sum())
     part = square / ((len(drawn) - 1) * drawn[0].size)
@@ -482,10 +482,10 @@ def _part_of_cycle(drawn: Floats, covariance: Floats) -> float:
 # variances per logarithm of a clearance that are tried, of a cycle's variance
 _STEEPNESS = np.geomspace(1.0e-4, 1.0e4, 81)
 
-# entries of a signature as which the mean of all of them counts, where the steepness of one is sought. J
-# changes a few phases much and the others hardly: with one steepness for all, a change of it was 0.81 to 0.89
-# of what it is at 1.35 and 1.5 times its clearance, with 4 it is 0.88 to 0.95; with 2, three times as much of
-# mere scatter is left of a joint that the torque does not show (2026-11-26)
+# number of entries as which the mean of all entries counts in the estimate of one entry's steepness. J
+# changes a few phases much and the others hardly: with one steepness for all, its estimated change was 0.81
+# to 0.89 of the true change at 1.35 and 1.5 times its clearance, with 4 it is 0.88 to 0.95; with 2, three
+# times as much mere scatter is left for a joint that the torque does not show (2026-11-26)
 _ALIKE = 4.0
 _LEAST_VARIANCE = 1.0e-12  # over the largest: rounding, if fewer cycles than entries were simulated
 
@@ -493,32 +493,32 @@ _LEAST_VARIANCE = 1.0e-12  # over the largest: rounding, if fewer cycles than en
 def without_scatter(
     wider: Floats, change: Floats, covariance: Floats, own: Floats, common: float
 ) -> tuple[Floats, Floats]:
-    """Most probable changes (s, F) of a signature by one clearance, given those of chaotic simulated legs.
+    """Most probable changes (s, F) of a signature by one clearance, given changes of chaotic simulated legs.
 
-    The change of each entry, in units of the scatter of a gait cycle, is taken for a random walk over the
-    clearance's logarithm, from zero at the expected one. Its steepness is that by which its own s changes
-    and, with a fixed weight, those of all entries are most probable. Without this, what simulated means
-    scatter counts as what a clearance changes, and a clearance that the torque does not show seems known.
+    The change of each entry, in units of the scatter of a gait cycle, is modelled as a random walk over the
+    clearance's logarithm, from zero at the expected clearance. Its steepness makes its own s changes and,
+    with a fixed weight, the changes of all entries most probable. Without this, the scatter of simulated
+    means counts as an effect of the clearance, and a clearance that the torque does not show seems known.
 
     Parameters
     ----------
     wider : (s,) array
-        Logarithm of the clearance over the expected one; negative where it is narrower.
+        Logarithm of the clearance over the expected clearance; negative if it is narrower.
     change : (s, F) array
     covariance : (F, F) array
-        Of a gait cycle.
+        Covariance of a gait cycle.
     own : (s,) array
-        Variance of the mean of each leg, as a part of that of a gait cycle.
+        Variance of the mean of each leg, as a part of a gait cycle's variance.
     common : float
-        Likewise of the expected leg, which all changes have in common.
+        The same for the expected leg, which all changes have in common.
 
     Returns
     -------
     change : (s, F) array
     variance : (s,) array
-        Of each of them, as a part of that of a gait cycle.
+        Variance of each change, as a part of a gait cycle's variance.
     """
-    # the symmetric root: an entry stays that of its phase
+    # the symmetric root keeps each entry with its phase
     variances, axes = np.linalg.eigh(covariance)
     root = np.sqrt(np.maximum(variances, _LEAST_VARIANCE * variances[-1]))
     measured = change @ (axes / root) @ axes.T
@@ -598,30 +598,30 @@ class CommissionedTorque:
     Attributes
     ----------
     stamp_ns : int
-        End of its last gait cycle.
+        End of the last gait cycle.
     clearance_m : (k,) array
-        Counted clearances then.
+        Modelled clearances at that time.
     signatures : (cycles, F) array
-        Of each gait cycle, as in `estimate.signature`.
+        Signature of each gait cycle, as in `estimate.signature`.
     sigma_m : (k,) array
-        Standard deviations of the clearances: above 0 where a correction made them.
+        Standard deviations of the clearances: above 0 if a correction set them.
     channel : Channel
-        Of the drive, by these signatures.
+        Drive dynamics by these signatures.
     speed : float
-        Mean speed of the crank [rad/s]; 0 where it is not known.
+        Mean speed of the crank [rad/s]; 0 if it is not known.
     temperature_c : float
-        Mean temperature of the drive [°C]; NaN where it was not measured.
+        Mean temperature of the drive [°C]; NaN if it was not measured.
     period_s : float
-        Of the sensor that measured it; NaN where it is not known.
+        Period of the sensor that measured the torque; NaN if it is not known.
     together : int
-        Number of its samples that were averaged into one.
+        Number of samples that were averaged into one.
     is_instant : bool
-        As of `TorqueSensor`.
+        As in `TorqueSensor`.
     before : CommissionedTorque or None
-        Before a correction: what signatures had in addition to those of the model. The other joints are still
-        to be compared with it.
+        Baseline before a correction: difference between signatures and the model's signatures. The other
+        joints are still to be compared with it.
     is_interim : bool
-        Whether it is of a leg with a lasting change, which is no baseline.
+        Whether the leg has a lasting change, so that this is no baseline.
     """
 
     stamp_ns: int
@@ -643,12 +643,12 @@ class CommissionedTorque:
 
     @property
     def is_as_modelled(self) -> bool:
-        """Whether the clearances were the modelled ones, not corrected."""
+        """Whether the clearances were modelled, not corrected."""
         return not self.sigma_m.any()
 
     @property
     def is_unknown(self) -> Flags:
-        """Whether each clearance (k,) is unknown: another was corrected, and it may have opened, too."""
+        """Whether each clearance (k,) is unknown: a correction elsewhere may hide its opening."""
         return np.asarray(self.sigma_m >= self.clearance_m)
 
     @property
@@ -662,7 +662,7 @@ class CommissionedTorque:
         return attrs.evolve(self, period_s=period_s, together=together, is_instant=is_instant)
 
     def is_of(self, sensor: TorqueSensor) -> bool:
-        """Whether a sensor measured it in the same way; one that is not known, in as many phases."""
+        """Whether a sensor measured the torque in the same way; if unknown, in as many phases."""
         own = self.period_s, self.together, self.is_instant
         is_same = own == (sensor.period_s, sensor.together, sensor.is_instant)
         return (is_same or math.isnan(self.period_s)) and self.signatures.shape[1] == 2 * sensor.phases

@@ -1,4 +1,4 @@
-"""Fit of phase, scale, friction and offset of a measured torque to that of a leg."""
+"""Fit of phase, scale, friction and offset of a measured torque to the torque of a leg."""
 
 import math
 
@@ -36,7 +36,7 @@ class Start:
         Time by which slow changes of the torque are late [s]; it stays unless it is among the terms of the
         fit.
     low_pass_s : float
-        What of it is the time constant of a first-order low-pass.
+        Part of the lag that is the time constant of a first-order low-pass.
     """
 
     ratio: float
@@ -72,7 +72,7 @@ class Blocks:
     kept : (m,) array of bool
         Whether a run is long enough to be used.
     part : (m,) array of int
-        Which part of a turn, counted on over turns.
+        Part of a turn, counted on over turns.
     """
 
     first: NDArray[np.int64]
@@ -122,7 +122,7 @@ PHASES = 128  # tried offsets, if a start does not give an offset
 
 @attrs.frozen
 class Terms:
-    """Terms of the regression beside gain, friction and offset."""
+    """Terms of the regression besides gain, friction and offset."""
 
     ratio: bool = True
     bias: bool = False
@@ -146,11 +146,11 @@ class State:
     ratio : float
         Turns of the crank per turn of the joint.
     phase, middle : (recordings,) array
-        Crank angle at a position in the middle of each recording, and that position [rad].
+        Crank angle at a position in the middle of each recording, and the position [rad].
     row : (n,) array of int
         Recording of each sample, as an index of `phase`.
     lag_s, low_pass_s : float
-        As those of `Start`.
+        As in `Start`.
     """
 
     ratio: float
@@ -238,7 +238,7 @@ _NO_TERMS = Terms()
 
 @attrs.frozen(eq=False)
 class Fit:
-    """What fits best, near a start.
+    """The best fit near a start.
 
     Attributes
     ----------
@@ -256,9 +256,9 @@ class Fit:
         Standard deviations of ``ratio``, ``offset_rad``, ``lag_s`` and the linear terms; empty if not asked
         for.
     error : ModelError
-        What clearances change that is not in the standard deviations.
+        Effect of clearances that is not in the standard deviations.
     measured, predicted, rest : (m,) arrays
-        Torques of the blocks, in the sensor's unit; the prediction is that of the leg alone.
+        Torques of the blocks, in the sensor's unit; the prediction is the torque of the leg alone.
     """
 
     ratio: float
@@ -281,7 +281,7 @@ class Fit:
 
     @property
     def refined(self) -> Start:
-        """Where a further fit starts."""
+        """Start of a further fit."""
         return attrs.evolve(
             self.start, ratio=self.ratio, offset_rad=self.offset_rad[self.start.recording], lag_s=self.lag_s
         )
@@ -396,8 +396,8 @@ def _errors(by: Floats, rest: Floats, state: State, terms: Terms) -> dict[str, f
 # How much of a torque repeats and does not fit, and whether a rival fits nearly as well.
 
 
-_WORSE_CHUNKS = 11  # in which a rival has to be worse; of two that are alike, in 3 of 1000 recordings
-_LEAST_STEP = 0.02  # of the torque's variance
+_WORSE_CHUNKS = 11  # chunks in which a rival has to be worse; if two are alike, in 3 of 1000 recordings
+_LEAST_STEP = 0.02  # fraction of the torque's variance
 # The best fit's repeating rest is the model's error; a rival nearer than twice its energy may be the truth
 _MODEL_ERROR = 2.0
 
@@ -405,7 +405,7 @@ _MODEL_ERROR = 2.0
 def repeating(one: Fit) -> float:
     """RMS of the rest that repeats from turn to turn, as a fraction of the measured torque's RMS.
 
-    From the product of the means of even and of odd turns, in which what does not repeat averages out.
+    Computed from the product of the means of even and odd turns: the rest that does not repeat averages out.
     """
     even, odd = (_folded(one, one.blocks.turn % 2 == remainder) for remainder in (0, 1))
     both = np.isfinite(even) & np.isfinite(odd)
@@ -422,9 +422,9 @@ def _folded(one: Fit, which: Floats) -> Floats:
 
 
 def too_alike(best: Fit, rival: Fit, other_signal: bool = False) -> bool:
-    """Whether a rival is so near to the best that the best need not be the truth.
+    """Whether a rival is so close to the best fit that the best fit need not be the truth.
 
-    With another signal, the model errs in the same way for both; else its error may favour the wrong one.
+    With another signal, the model errs in the same way for both; else its error may favour the wrong fit.
     """
     steps = _by_time(rival) - _by_time(best)
     error = 0.0 if other_signal else _MODEL_ERROR * repeating(best) ** 2

@@ -14,7 +14,7 @@ from leg_wear_monitor.twin.load import load_signature
 from leg_wear_monitor.twin.reference import even_angles
 from leg_wear_monitor.twin.torque_reference import TorqueReference
 
-_HARMONICS = 12  # of what clearances change: a mean over a twelfth of a turn shows no more
+_HARMONICS = 12  # effect of clearances: a mean over a twelfth of a turn shows no more
 
 PHASE_ERROR_RAD = 0.02
 """Standard deviation by which clearances of 0.3 mm in five joints shift the torque's phase."""
@@ -32,16 +32,16 @@ def at_angles(tables: Floats, angle: Floats) -> tuple[Floats, Floats]:
 
 @attrs.frozen(kw_only=True)
 class ModelError:
-    """Standard deviations of what clearances change that is not in a model.
+    """Standard deviations of the effects of clearances that are not in a model.
 
     Attributes
     ----------
     phase_rad, lag_rad : float
-        Of the torque's phase, and of that from one speed to another [rad].
+        Standard deviation of the torque's phase, and of its change between speeds [rad].
     scale : float
-        Of a factor on the torque.
+        Standard deviation of a factor on the torque.
     friction : float
-        Of the constant friction, as a fraction of the torque's RMS.
+        Standard deviation of the constant friction, as a fraction of the torque's RMS.
     load_friction : float
     """
 
@@ -102,16 +102,16 @@ def torque_model(mechanism: Mechanism) -> TorqueModel:
 
 
 def with_clearances(model: TorqueModel, legs: Sequence[TorqueReference]) -> TorqueModel:
-    """The model with what clearances change of the torque, in simulated legs at one or several cadences.
+    """The model with the effect of clearances on the torque, in simulated legs at one or several cadences.
 
-    They shift its phase, and impacts and friction in the joints take power. Between the cadences the change
-    is linear in the speed.
+    Clearances shift the torque's phase, and impacts and friction in the joints take power. Between the
+    cadences the change is linear in the speed.
 
     Parameters
     ----------
     model : TorqueModel
     legs : sequence of TorqueReference
-        Of which the first legs are used; at least one.
+        References whose first legs are used; at least one.
     """
     points = model.tables.shape[1]
     at = np.arange(points) * (TURN / points)

@@ -15,7 +15,7 @@ from leg_wear_monitor.errors import ConfigError, ConfigWarning
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
 
-# laws that are valid for nearly elastic impacts only, and the restitution from which they are
+# Laws that are valid for nearly elastic impacts only, and the lowest restitution for which they are valid.
 NEARLY_ELASTIC, LEAST_RESTITUTION = ("hunt-crossley", "lankarani-nikravesh"), 0.7
 
 

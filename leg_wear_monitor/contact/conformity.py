@@ -1,8 +1,8 @@
 """Conformity: whether a contact is narrow, as Hertz's force supposes (physics.md section 4).
 
-The half angle psi of the contact arc is that of the elastic foundation (`normal.winkler`), which is Hertz's
-line contact where it is narrow: F = kappa E* w c (2 psi / sin 2 psi - 1). It grows with force and softness,
-and as the clearance falls: bushings of plastic, and tight ones, are conformal.
+The half angle psi of the contact arc follows from the elastic foundation (`normal.winkler`), which becomes
+Hertz's line contact for a narrow arc: F = kappa E* w c (2 psi / sin 2 psi - 1). It grows with force and
+softness, and as the clearance falls: plastic bushings and tight bushings are conformal.
 """
 
 import math
@@ -77,7 +77,7 @@ def contact_doubt(half_angle_rad: float, force_n: float, radius_m: float, is_win
 
 
 def conformity_doubts(linkage: Linkage) -> Iterator[Doubt]:
-    """Clearance joints whose law is not valid at the 99th percentile of the force in the ideal motion."""
+    """Clearance joints with a law that is not valid at the ideal motion's 99th percentile of the force."""
     mechanism, drive = linkage.mechanism, linkage.mechanism.drive
     if not mechanism.clearance_joints or not isinstance(drive, SpeedDrive | TrackDrive):
         return
@@ -104,5 +104,5 @@ def half_angle_of(settings: Clearance, force_n: float) -> float:
 
 
 def is_winkler_form(number: int) -> bool:
-    """True if the number of a form in compiled code is that of Winkler's law."""
+    """True if a form's number in compiled code is the number of Winkler's law."""
     return number == LAWS["winkler"].number

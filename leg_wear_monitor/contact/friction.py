@@ -20,7 +20,7 @@ def no_ramp(speed, v0, v1):
 def ambrosio_ramp(speed, v0, v1):
     """Fraction c_d [-] of Coulomb's friction: 0 up to v0, 1 from v1, linear between [m/s] (Ambrosio 2003).
 
-    For numbers or vectors.
+    The arguments are numbers or vectors.
     """
     return where(speed > v0, where(speed < v1, (speed - v0) / largest(v1 - v0, LEAST_DIVISOR), 1.0), 0.0)
 

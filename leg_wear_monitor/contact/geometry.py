@@ -3,8 +3,8 @@
 from leg_wear_monitor.compiled.kernel import kernel
 from leg_wear_monitor.compiled.vectors import LEAST_DIVISOR, largest, root, where
 
-# Bound of that part of the gradient across the eccentricity which is due to the bend (`worn_contact`),
-# compared with the wall's unit normal, whose length is 1.
+# Bound of the gradient across the eccentricity due to the bend (`worn_contact`), compared with the wall's
+# unit normal, which has length 1.
 _SHARPEST = 1.0
 
 
@@ -12,7 +12,7 @@ _SHARPEST = 1.0
 def journal_contact(ex, ey, clearance):
     """Penetration [m], negative when apart, and unit normal of a journal at eccentricity (ex, ey) [m].
 
-    For numbers or vectors. physics.md section 3.
+    The arguments are numbers or vectors. physics.md section 3.
     """
     e = root(ex * ex + ey * ey)
     inverse, away = 1.0 / largest(e, LEAST_DIVISOR), e > 0.0
@@ -21,7 +21,7 @@ def journal_contact(ex, ey, clearance):
 
 @kernel
 def worn_contact(ex, ey, clearance, slope, bend):
-    """Penetration [m] and its gradient on worn surfaces, whose clearance depends on the direction.
+    """Penetration [m] and its gradient on worn surfaces; the clearance depends on the direction.
 
     ``slope`` [m/rad] and ``bend`` [m/rad^2] are the first and second derivative of the clearance by the
     direction. The penetration is |e| - c along the worn wall's normal. The normal force acts along the whole

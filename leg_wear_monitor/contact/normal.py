@@ -24,7 +24,7 @@ class Form(NamedTuple):
     ----------
     coefficient : kernel (given, modulus, width, bushing, journal)
         The law's coefficient, in a unit that depends on the form. ``given`` [N/m^1.5] is the joint's
-        ``stiffness`` or 0, ``modulus`` [Pa] that of `contact_modulus`; width and local radii [m].
+        ``stiffness`` or 0, ``modulus`` [Pa] the value of `contact_modulus`; width and local radii [m].
     force : kernel (coefficient, clearance, loss, delta, delta_dot)
         Normal force f_n [N], never negative, its derivatives by delta [N/m] and by delta_dot [N s/m], and its
         elastic part [N]; all 0 where delta <= 0. ``loss`` [s/m] is the hysteresis factor over the approach
@@ -85,8 +85,8 @@ def hu_guo(restitution: float) -> float:
 def with_hysteresis(elastic, exponent, loss, delta, delta_dot):
     """Normal force with damping in proportion to its elastic part [N]; never negative: no adhesion.
 
-    For numbers or vectors; ``exponent`` [-] is that of the elastic part at delta [m], d ln F / d ln delta;
-    ``loss`` [s/m] is chi over the approach speed.
+    The arguments are numbers or vectors. ``exponent`` [-] is the exponent of the elastic part at delta [m], d
+    ln F / d ln delta; ``loss`` [s/m] is chi over the approach speed.
 
     Returns
     -------
@@ -135,7 +135,7 @@ _EXPONENT = 1.5
 def contact_stiffness(modulus, bushing_radius, journal_radius):
     """Hertz stiffness K [N/m^1.5] of a journal in a bushing: modulus sqrt(R_b R_j / (R_b - R_j)); Pa, m.
 
-    For numbers or vectors. physics.md section 4.
+    The arguments are numbers or vectors. physics.md section 4.
     """
     clearance = largest(bushing_radius - journal_radius, LEAST_DIVISOR)
     return modulus * root(bushing_radius * journal_radius / clearance)
@@ -143,9 +143,9 @@ def contact_stiffness(modulus, bushing_radius, journal_radius):
 
 @kernel
 def hertz_coefficient(given, modulus, width, bushing, journal):
-    """Contact stiffness K [N/m^1.5]: the given one if above 0, else that of the radii [m].
+    """Contact stiffness K [N/m^1.5]: the given stiffness if above 0, else computed from the radii [m].
 
-    For numbers or vectors.
+    The arguments are numbers or vectors.
     """
     return where(given > 0.0, given, contact_stiffness(modulus, bushing, journal))
 
@@ -159,7 +159,7 @@ def elastic_force(stiffness, delta):
 
 @kernel
 def hertz_force(stiffness, clearance, loss, delta, delta_dot):
-    """As `Form.force`, for numbers or vectors."""
+    """Same as `Form.force`, for numbers or vectors."""
     return with_hysteresis(elastic_force(stiffness, delta), _EXPONENT, loss, delta, delta_dot)
 
 
@@ -171,7 +171,7 @@ def _hertz_energy(stiffness, clearance, delta):
 
 @kernel
 def hertz_softening(given, delta, bushing, journal, slope_b, slope_j):
-    """As `Form.softening`, for numbers or vectors: -2/5 delta d ln K, with K that of the local radii."""
+    """Same as `Form.softening`, for numbers or vectors: -2/5 delta d ln K, with K of the local radii."""
     softer = 0.2 * delta / largest((bushing - journal) * bushing * journal, LEAST_DIVISOR)
     softer = where(given > 0.0, 0.0, softer)
     return softer * slope_b * journal * journal, softer * slope_j * bushing * bushing
@@ -191,14 +191,14 @@ HERTZ = Form(hertz_coefficient, hertz_force, _hertz_energy, hertz_softening, tak
 #
 # F is below the exact load of a pin in a plate of the same material (Persson 1964, in the form of Ciavarella
 # and Decuzzi 2001) by 0.2 % at a half angle of 10 degrees, 2 % at 30, 5 % at 45, 11 % at 60 and 28 % at 75:
-# valid up to 60 degrees, where delta = c. The penetration is that of the circles; in plane elasticity it
-# would depend logarithmically on the size of the bodies.
+# valid up to 60 degrees, where delta = c. The penetration is the overlap of the circles; in plane elasticity
+# it would depend logarithmically on the size of the bodies.
 
 
 _KAPPA = 3.0 * math.pi / 8.0
 _E_STAR = 0.75  # E* over the contact modulus 4 / (3 (sigma_b + sigma_j))
 
-_NARROW = 0.02  # tan^2 psi up to which eight terms of the series are exact to rounding
+_NARROW = 0.02  # tan^2 psi up to which eight series terms are exact to rounding
 # Gauss-Legendre rule with eight points on [0, 1]: offsets of the pairs of nodes from the middle, and weights
 _ASIDE = (0.09171732124782489, 0.26276620495816450, 0.39833323870681336, 0.48014492824876809)
 _WEIGHT = (0.18134189168918083, 0.15685332293894344, 0.11119051722668721, 0.05061426814518853)
@@ -247,7 +247,7 @@ def _winkler_coefficient(given, modulus, width, bushing, journal):
 
 @kernel
 def _winkler_force(coefficient, clearance, loss, delta, delta_dot):
-    """As `Form.force`."""
+    """Same as `Form.force`."""
     if delta <= 0.0:
         return 0.0, 0.0, 0.0, 0.0
     x = delta / clearance
@@ -264,7 +264,7 @@ def _winkler_energy(coefficient, clearance, delta):
 
 @kernel
 def _winkler_softening(given, delta, bushing, journal, slope_b, slope_j):
-    """As `Form.softening`: both depths widen the clearance, which only the coefficient does not depend on."""
+    """Same as `Form.softening`: both depths widen the clearance; the coefficient does not depend on it."""
     x = delta / (bushing - journal)
     softer = x - 2.0 * load_integral(x) / load(x)
     return softer * slope_b, softer * slope_j

@@ -1,6 +1,6 @@
 """The mechanism: its description, its arrays, its ideal motion; names of the contact laws.
 
-What is imported here imports neither numpy nor numba.
+The modules imported here import neither numpy nor numba.
 """
 
 NORMAL_LAWS = ("hertz", "hunt-crossley", "lankarani-nikravesh", "gonthier", "flores", "hu-guo", "winkler")

@@ -90,7 +90,7 @@ def _need_moving(mechanism: Mechanism, body: str, key: str) -> None:
         raise ConfigError(mechanism.source, key, f"{body!r} is not a moving body, expected one of {bodies}")
 
 
-# Summary of a mechanism in everyday units, in which a wrong unit is obvious.
+# Summary of a mechanism in everyday units, so that a wrong unit is obvious.
 
 
 _POINTS = 180  # crank steps per turn: enough for a stride with an error of 0.1 %
@@ -192,7 +192,7 @@ def _settings(defaults: dict[str, Any], own: Any, source: str, name: str) -> Cle
     # a pair named in the defaults, then their values; a pair of the joint's own, then its values
     for given, where in ((defaults, "clearances.defaults"), (own, place)):
         of_pair = _of_pair(given, source, where)
-        if given is own or "material" not in own:  # nothing of another pair than its own
+        if given is own or "material" not in own:  # skip the default pair if the joint has one
             merged = _over(merged, of_pair)
         merged = _over(merged, given)
     try:
@@ -278,7 +278,7 @@ def load_mechanism(name_or_path: str | Path = "bionic_leg") -> spec.Mechanism:
     Raises
     ------
     ConfigError
-        Names file, key, value and what was expected.
+        Names file, key, value and the expected value.
 
     Examples
     --------
@@ -331,7 +331,7 @@ def read_yaml(path: Path, source: str) -> Any:
         raise ConfigError(source, "", f"cannot be read: {error.strerror}{hint if known else ''}") from error
 
 
-# --- entries that are one class or another ---
+# --- entries that have one of several classes ---
 
 
 def _joint_class(entry: Any) -> tuple[type, Any]:

@@ -1,4 +1,4 @@
-"""Material pairs of bushing and journal: their files, those of joints, load p, v and p v, rating life."""
+"""Material pairs of bushing and journal: their files, the joints' pairs, load p, v and p v, rating life."""
 
 import math
 from collections.abc import Sequence
@@ -32,7 +32,7 @@ class Side:
 
     @property
     def wear_si(self) -> float | None:
-        """Its wear coefficient [1/Pa]; 0 if its wear is not counted, None if it is not known."""
+        """Wear coefficient of the body [1/Pa]; 0 if its wear is not modelled, None if it is not known."""
         if self.wear_coefficient is not None:
             return self.wear_coefficient.si
         return None if self.is_counted else 0.0
@@ -82,7 +82,7 @@ class Material(SourcedFile):
 
     @property
     def wear_coefficients(self) -> tuple[float, float] | None:
-        """Wear coefficients of bushing and journal [1/Pa]; None unless both are known or not counted."""
+        """Wear coefficients of bushing and journal [1/Pa]; None if one is neither known nor excluded."""
         bushing, journal = self.bushing.wear_si, self.journal.wear_si
         return None if bushing is None or journal is None else (bushing, journal)
 
@@ -120,7 +120,7 @@ def load_material(name_or_path: str | Path) -> Material:
     Raises
     ------
     ConfigError
-        Names file, key, value and what was expected.
+        Names file, key, value and the expected value.
 
     Examples
     --------
@@ -165,8 +165,8 @@ class Excess:
 class BushingLoad:
     """Pressure and sliding speed in a joint over a gait cycle, and the limits of its material.
 
-    The 99th percentile of the pressure and the means of the others are held against the limits: makers limit
-    the speed and the product because they heat the bushing.
+    The limits apply to the 99th percentile of the pressure, and to the means of speed and product: makers
+    limit the speed and the product because they heat the bushing.
 
     Attributes
     ----------
@@ -179,13 +179,13 @@ class BushingLoad:
     mean_pressure_speed_pa_mps : float
         Mean of pressure times sliding speed.
     pressure_limit_pa : float or None
-        Limit of the pressure; None where the material gives none, like the next two.
+        Limit of the pressure. This and the next two are None if the material gives no limit.
     sliding_speed_limit_mps : float or None
         Limit of the sliding speed.
     pressure_speed_limit_pa_mps : float or None
         Limit of their product.
     outside_limits : str or None
-        What is beyond the limits, so that the wear coefficient does not hold; None within them.
+        Values beyond the limits, where the wear coefficient is not valid; None within the limits.
     """
 
     mean_pressure_pa: float = _si("Pa")
@@ -222,7 +222,7 @@ class BushingLoad:
 
 @attrs.frozen(kw_only=True)
 class Bushing:
-    """What a bushing's load follows from, and its limits.
+    """Data of a bushing that determine its load, and its limits.
 
     Attributes
     ----------
@@ -286,7 +286,7 @@ class Bushing:
 
 
 def bushing_of(mechanism: Mechanism, joint: str) -> Bushing:
-    """The bushing of a joint: those of the crank turn, others swing."""
+    """The bushing of a joint; bushings of the crank turn, all others swing."""
     is_swinging = mechanism.drive.body not in mechanism.sides(joint)
     return Bushing.of(mechanism.clearances[joint], is_swinging=is_swinging)
 
@@ -300,7 +300,8 @@ _BESIDE = "a value beside "  # a wear coefficient of the mechanism file, in plac
 def settings_of(pair: Material) -> dict[str, Any]:
     """Settings of a clearance joint that a pair gives, as a mechanism file would have them.
 
-    A pair without wear coefficient gives 0: the coefficient of another pair must not take its place.
+    A pair without a wear coefficient gives 0, because the coefficient of a different pair must not take its
+    place.
     """
     given: dict[str, Any] = {"wear_coefficient": list(pair.wear_coefficients or (0.0, 0.0))}
     for key in ("youngs_modulus", "poissons_ratio"):
@@ -313,7 +314,7 @@ def settings_of(pair: Material) -> dict[str, Any]:
 
 
 def lacks_wear(settings: Clearance) -> bool:
-    """True if a joint's pair gives no wear coefficient, and no value stands beside it."""
+    """True if a joint's pair gives no wear coefficient, and the joint has no value of its own."""
     if not settings.material or max(settings.wear_coefficient) > 0.0:
         return False
     return load_material(settings.material).wear_coefficients is None
@@ -340,7 +341,7 @@ def check_wear_is_known(mechanism: Mechanism, joints: Sequence[str]) -> None:
 
 
 def regimes(mechanism: Mechanism, joints: Sequence[str]) -> dict[str, list[str]]:
-    """The joints by what their wear holds for: pair and regime, or a bare coefficient."""
+    """The joints by the validity of their wear: pair and regime, or a bare coefficient."""
     found: dict[str, list[str]] = {}
     for joint in joints:
         settings = mechanism.clearances[joint]
@@ -351,7 +352,7 @@ def regimes(mechanism: Mechanism, joints: Sequence[str]) -> dict[str, list[str]]
 
 
 def regime_of(settings: Clearance) -> str:
-    """What a joint's wear coefficient holds for: its pair and the pair's regime."""
+    """Validity of a joint's wear coefficient: its pair and the pair's regime."""
     if not settings.material:
         return "no material named, regime unknown"
     pair = load_material(settings.material)
@@ -382,7 +383,7 @@ def spread_of(settings: Clearance, usual: float) -> float | None:
     Returns
     -------
     float or None
-        None if the pair gives no spread, or if a wear coefficient stands beside the pair.
+        None if the pair gives no spread, or if the joint has its own wear coefficient.
     """
     if not settings.material:
         return None
@@ -398,7 +399,7 @@ def spread_of(settings: Clearance, usual: float) -> float | None:
     return weighted / sum(settings.wear_coefficient)
 
 
-# A maker's rating life of a bushing, beside which a life by Archard's law can be held.
+# A maker's rating life of a bushing, for comparison with a life by Archard's law.
 #
 # SKF, Plain bearings, Calculation example, and Federal-Mogul, GLYCODUR, Nominal service life:
 # G_h = c1 c2 c3 c4 c5 K_M / (p v)^n, with p in N/mm^2, v in m/s and the life in h. The factors are read from

@@ -19,9 +19,9 @@ from leg_wear_monitor.mechanism.spec import GROUND, Body, Mechanism, PhaseLoad, 
 
 # A person's leg that hangs on a linkage: segments added to its thigh, shank and foot (physics.md section 9).
 #
-# Segments by Winter, *Biomechanics and Motor Control of Human Movement*: mass over that of the body; over the
-# length of the segment, the distance of the centre of mass from the proximal joint and the radius of gyration
-# about the centre of mass.
+# Segments by Winter, *Biomechanics and Motor Control of Human Movement*. Masses are relative to the body's
+# mass. The distance of the centre of mass from the proximal joint, and the radius of gyration about the
+# centre of mass, are relative to the length of the segment.
 
 
 PERSON_TOLERANCE = 0.2  # of the mass of a person, who eats, dresses and carries
@@ -210,15 +210,15 @@ def nominal_stance(linkage: Linkage) -> Stance:
 def read_toe_force(path: Path) -> Floats:
     """Force of the ground on the toe (PHASES, 2) [N] of a CSV file with one gait cycle.
 
-    Its columns are those of a table that `replay` reads, ``crank_angle`` [rad], ``foot_load`` (up) and, where
-    there is one, ``foot_load_along`` (along x) [N]; between its rows the force is linear.
+    Its columns are the same as in a table for `replay`: ``crank_angle`` [rad], ``foot_load`` (up) and
+    optionally ``foot_load_along`` (along x) [N]. Between its rows the force is linear.
 
     Warns of a force that is far outside the usual.
 
     Raises
     ------
     ConfigError
-        If the file cannot be read, lacks a column, has a value that is no finite number, has a crank that
+        If the file cannot be read, lacks a column, has a value that is not a finite number, has a crank that
         does not turn once in one direction, without wide gaps, or a ground that pulls.
     """
     try:
@@ -248,7 +248,7 @@ def read_toe_force(path: Path) -> Floats:
 
 
 def _column(path: Path, rows: Sequence[Mapping[str, str]], name: str) -> Floats:
-    """Column of a table with a toe's force (n,); 0 for the one that need not be there."""
+    """Column of a table with a toe's force (n,); 0 if the optional column is missing."""
     if rows and name not in rows[0]:
         if name == _OF_FORCE[-1]:
             return np.zeros(len(rows))

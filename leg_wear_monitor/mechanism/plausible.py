@@ -1,6 +1,7 @@
 """Doubtful values of a mechanism: valid, but far outside the usual range, likely in a wrong unit.
 
-What is unusual by itself is declared beside its bounds; here stands what is unusual beside something else.
+Values that are unusual by themselves are declared with their bounds. This module checks values that are
+unusual in relation to other values.
 
 The ranges are wide: the shipped mechanisms, from Andrews' squeezer with links of 7 mm to a leg, lie well
 within.
@@ -101,7 +102,7 @@ def _masses(mechanism: spec.Mechanism) -> Iterator[Doubt]:
 
 
 def _inertia(name: str, body: spec.Body, length: float) -> Iterator[Doubt]:
-    """Doubt about an inertia whose radius of gyration is above 10 or below 0.001 times the largest link."""
+    """Doubt about an inertia with a radius of gyration above 10 or below 0.001 times the largest link."""
     gyration = math.sqrt(body.inertia / body.mass)
     if _beyond(gyration, 1.0e-3 * length, 10.0 * length):
         slip = "kg mm^2 for kg m^2" if gyration > length else "t m^2 for kg m^2"
@@ -142,7 +143,7 @@ def _clearance(c: spec.Clearance) -> Iterator[Doubt]:
 
 
 def ratio_fault(clearance_m: float, radius_m: float) -> str | None:
-    """What is unusual of a radial clearance [m] beside its bushing's radius [m]; None if nothing is."""
+    """Doubt about a radial clearance [m] relative to its bushing's radius [m]; None if it is usual."""
     ratio = clearance_m / radius_m
     if not _beyond(ratio, 1.0e-5, 0.25):
         return None
@@ -218,5 +219,5 @@ def sigma_fault(measured_m: float, sigma_m: float) -> str | None:
 
 
 def _meant(value_m: float, above_m: float, below_m: float) -> float | None:
-    """The value [m] in another unit of length that lies between the bounds; None if there is none."""
+    """The value [m] after a unit mistake is undone, if it lies between the bounds; None if none does."""
     return next((value_m * slip for slip in _SLIPS if above_m < value_m * slip < below_m), None)

@@ -74,7 +74,7 @@ def build_linkage(mechanism: Mechanism) -> Linkage:
     Raises
     ------
     AssemblyError
-        If the linkage has another number of degrees of freedom than one.
+        If the linkage does not have exactly one degree of freedom.
     """
     freedom = mobility(mechanism)
     if freedom != 1:
@@ -134,7 +134,7 @@ def assemble(linkage: Linkage) -> Floats:
     Raises
     ------
     AssemblyError
-        If there is no assembly, naming the joint that does not close and its gap; or if the one found is far
+        If there is no assembly, naming the joint that does not close and its gap; or if the assembly is far
         from the initial guess.
     """
     where = f"{linkage.mechanism.source}: assembly"
@@ -239,7 +239,7 @@ def open_joint(linkage: Linkage) -> OpenJoint:
 
 
 def all_but(linkage: Linkage, joint: str) -> Floats:
-    """Weights (m,) of the rows for `nearest`: all joints closed rather than this one."""
+    """Weights (m,) of the rows for `nearest`: closes all joints in preference to this joint."""
     weight = np.full(len(linkage.rows.body), 100.0)
     row = linkage.rows.row[list(linkage.rows.closure).index(list(linkage.mechanism.joints).index(joint))]
     weight[row : row + 2] = 1.0
@@ -303,7 +303,7 @@ def walk(linkage: Linkage, q: Floats, angle: float, target: float) -> Iterator[t
 
     Before a dead point, they end early.
     """
-    longest = _LONGEST_STEP  # shorter after a step that failed: near a dead point, the next would fail, too
+    longest = _LONGEST_STEP  # shorter after a failed step: near a dead point, the next would fail as well
     while angle != target:
         step = float(np.clip(target - angle, -longest, longest))
         while (near := _step(linkage, q, angle, step)) is None:
@@ -433,7 +433,7 @@ def _geometry_of(linkage: Linkage) -> _Geometry:
 
 @functools.lru_cache(maxsize=16)
 def _turned(geometry: _Geometry) -> None:
-    """Turn the crank by a full cycle; what fails is not kept."""
+    """Turn the crank by a full cycle; a failure is not cached."""
     linkage = geometry.linkage
     start = linkage.mechanism.assembly.crank_angle
     follow(linkage, assemble(linkage), start, start + TURN)
@@ -542,7 +542,7 @@ def is_on_ground(mechanism: Mechanism, joint: str) -> bool:
 
 
 def carriers(mechanism: Mechanism, joint: str) -> tuple[str, str]:
-    """The two bodies of a joint, last the one at whose point it is drawn: the ground, or the journal."""
+    """The two bodies of a joint; the last carries the drawn point: the ground, or the journal."""
     bushing, journal = mechanism.sides(joint)
     is_fixed = bushing == GROUND and not isinstance(mechanism.joints[joint], PrismaticJoint)
     return (journal, bushing) if is_fixed else (bushing, journal)

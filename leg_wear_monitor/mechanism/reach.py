@@ -1,4 +1,4 @@
-"""How far the linkage can turn: its dead points, and what to say of them."""
+"""Range of the linkage: its dead points, and their description."""
 
 from collections import deque
 from collections.abc import Iterator
@@ -27,7 +27,7 @@ from leg_wear_monitor.mechanism.position import (
 )
 from leg_wear_monitor.mechanism.spec import Mechanism, PrismaticJoint
 
-# Which bodies are in line where the crank cannot go on.
+# Bodies that are in line where the crank is blocked.
 #
 # At a dead point, the Jacobian is singular: with the crank locked, some bodies can still move a little. Where
 # two of them are joined to each other, and each to something that stays, the three joints are in line
@@ -35,8 +35,8 @@ from leg_wear_monitor.mechanism.spec import Mechanism, PrismaticJoint
 # the guide instead. Other linkages have dead points without two bodies in line.
 
 
-# the position is not exactly that of the dead point
-_STILL = 0.05  # speed of a joint that stays, as a fraction of that of the joint that moves
+# the search does not reach the dead point exactly
+_STILL = 0.05  # largest speed of a still joint, as a fraction of the moving joint's speed
 _STRAIGHT = 0.1  # sine of the angle between bodies in line
 
 
@@ -49,13 +49,13 @@ class DeadPoint:
     crank_angle : float
         [rad].
     q : (n, 3) array
-        Coordinates there.
+        Coordinates at the dead point.
     bodies : tuple of str
-        The two bodies in line, or the one at a right angle to a guide; those that can move with the crank
+        The two bodies in line, or the body at a right angle to a guide; bodies that can move with the crank
         locked if it is neither.
     joints : tuple of str
-        The three joints in line, that of both bodies in the middle; the joint with the slider, then that of
-        the guide; empty if it is neither.
+        The three joints in line, with the common joint in the middle; the joint with the slider, then the
+        guide's joint; empty if it is neither.
     is_in_line : bool
     is_folded : bool
         True if the two bodies lie on each other, and are not stretched.
@@ -70,7 +70,7 @@ class DeadPoint:
 
 
 def dead_point(linkage: Linkage, crank_angle: float, q: Floats) -> DeadPoint:
-    """The dead point beside coordinates q (n, 3) at a crank angle [rad]."""
+    """The dead point near coordinates q (n, 3) at a crank angle [rad]."""
     mechanism = linkage.mechanism
     velocity = _locked_velocity(linkage, q)
     speed = {body: _joint_speeds(mechanism, q, velocity, body) for body in mechanism.bodies}
@@ -91,7 +91,7 @@ def dead_point(linkage: Linkage, crank_angle: float, q: Floats) -> DeadPoint:
 def _dyads(
     mechanism: Mechanism, q: Floats, speed: dict[str, dict[str, float]]
 ) -> Iterator[tuple[float, tuple[str, str], tuple[str, str, str], bool]]:
-    """Two bodies whose common joint moves while another joint of each stays, all three in line.
+    """Two bodies with a moving common joint and one still joint each, all three joints in line.
 
     How still these are, the bodies, the joints, and whether the bodies are folded.
     """
@@ -137,14 +137,14 @@ def _pairs(mechanism: Mechanism, speed: dict[str, dict[str, float]]) -> Iterator
 
 
 def _still_joint(speeds: dict[str, float], moving: str) -> str:
-    """The joint of a body that stays while another moves, empty without one."""
+    """The joint of a body that stays still while a different joint moves; empty without such a joint."""
     limit = _STILL * speeds[moving]
     still = {name: value for name, value in speeds.items() if name != moving and value <= limit}
     return min(still, key=lambda name: still[name], default="")
 
 
 def _guide(mechanism: Mechanism, slider: str, speed: dict[str, dict[str, float]], limit: float) -> str:
-    """The prismatic joint in which a body slides along another that stays, empty without one."""
+    """The prismatic joint in which a body slides along a still body; empty without such a joint."""
     for name, joint in mechanism.joints.items():
         if isinstance(joint, PrismaticJoint) and slider in mechanism.sides(name):
             other = next(body for body in mechanism.sides(name) if body != slider)
@@ -161,11 +161,11 @@ def _bend(mechanism: Mechanism, q: Floats, joints: tuple[str, str, str]) -> tupl
     return float(a[0] * b[1] - a[1] * b[0]) / length, bool(np.dot(a, b) > 0.0)
 
 
-# Positions of a mechanism over its crank's range: all of them where it works, what there is where not.
+# Positions of a mechanism over its crank's range: all of them if it works, the possible ones if not.
 
 
 POINTS = 180  # a cycle: smooth to the eye
-_OPEN_POINTS = 72  # of an open mechanism, whose positions take long
+_OPEN_POINTS = 72  # for an open mechanism, because its positions take long
 _VISIBLE = 0.02  # of the largest gap
 _CLOSED = 1.0e-9  # gap [m] below which a joint counts as closed
 
@@ -178,7 +178,7 @@ class Reach:
     ----------
     linkage : Linkage
     mobility : int
-        Degrees of freedom; 1 for a mechanism with one drive. With another, there is one position.
+        Degrees of freedom; 1 for a mechanism with one drive. With any other number, there is one position.
     crank_angle : (p,) array, rad
         Rising; a whole turn from 0 if the crank turns through.
     q : (p, n, 3) array
@@ -193,7 +193,7 @@ class Reach:
     low, high : DeadPoint or None
         Ends of the range in which it closes; None if the crank turns through, or it never closes.
     fault : str
-        What is wrong with the assembly found; empty if nothing is.
+        Fault of the assembly; empty if there is none.
     """
 
     linkage: Linkage
@@ -238,7 +238,7 @@ def reach_of(mechanism: Mechanism, crank_angle: float | None = None, points: int
     ----------
     mechanism : Mechanism
     crank_angle : float, optional
-        An angle [rad] that is to be among those of the result, if the crank reaches it.
+        An angle [rad] that the result must include, if the crank reaches it.
     points : int
         Positions over the range, where the mechanism closes.
 
@@ -250,7 +250,7 @@ def reach_of(mechanism: Mechanism, crank_angle: float | None = None, points: int
     arrays = compile_arrays(mechanism)
     linkage = Linkage(mechanism, arrays, select_rows(arrays, range(len(mechanism.joints)), driven=True))
     wanted = () if crank_angle is None else (crank_angle,)
-    with np.errstate(all="ignore"):  # what comes of it is looked at
+    with np.errstate(all="ignore"):  # the result is checked below
         reach = _reach(linkage, np.array(wanted), points)
     if not np.isfinite(reach.q).all():
         raise AssemblyError(f"{mechanism.source}: bodies: lengths are too far apart to place the bodies")
@@ -328,7 +328,7 @@ def _open(linkage: Linkage, wanted: Floats) -> Reach:
 def _closes_between(
     linkage: Linkage, reach: Reach, gaps: Floats
 ) -> tuple[DeadPoint | None, DeadPoint | None]:
-    """Ends of the range of crank angles in which the joint that is open at the start closes."""
+    """Ends of the range of crank angles that close the joint that is open at the start."""
     i = int(gaps.argmin())
     angle = float(reach.crank_angle[i])
     q = newton(linkage, reach.q[i], angle) if gaps[i] < _CLOSED else None
@@ -339,7 +339,7 @@ def _closes_between(
     return low, high
 
 
-# What is wrong with a mechanism that does not close or turn, in words.
+# Faults of a mechanism that does not close or turn, in words.
 
 
 def headline(reach: Reach) -> str:
@@ -354,7 +354,7 @@ def headline(reach: Reach) -> str:
 
 
 def findings(reach: Reach) -> tuple[str, ...]:
-    """What is wrong, a sentence each with its numbers; empty for a mechanism that works."""
+    """Description of the faults, one sentence each with numbers; empty for a mechanism that works."""
     found = [*_mobility(reach), *_open_words(reach), *_turns(reach)]
     if reach.fault:
         found.append(f"assembly.{reach.fault}")
@@ -369,7 +369,7 @@ def gap_words(reach: Reach, i: int) -> str:
 
 
 def dead_words(dead: DeadPoint) -> str:
-    """Which bodies are in line at a dead point."""
+    """Description of the bodies in line at a dead point."""
     joints = ", ".join(dead.joints)
     if dead.is_in_line:
         how = "folded" if dead.is_folded else "stretched"

@@ -11,7 +11,7 @@ import attrs
 from leg_wear_monitor.configuration import FieldError, choice, described
 from leg_wear_monitor.configuration.strict import Library
 
-# Units of the files of materials and drives, by what they measure, and their factors to SI.
+# Units of the files of materials and drives, by measured quantity, and their factors to SI.
 #
 # Two traps are spelled out. A dimensionless K of Archard's law is worth nothing without the form of the law:
 # books write V = K F s / H and V = K F s / (3 H), so the unit names the form, and K / H or K / (3 H) is the
@@ -25,7 +25,7 @@ class Unit:
     Attributes
     ----------
     dimension : str
-        What it measures.
+        Measured quantity.
     factor : float
         SI value of one such unit; of a K, the factor before K / H.
     needs_hardness : bool
@@ -159,7 +159,7 @@ class WearCoefficient(SourcedValue):
 
 
 def unit_fault(dimension: str, value: SourcedValue) -> str | None:
-    """What is wrong with the unit or the sign of a value that measures this; None if nothing is."""
+    """Fault of the unit or the sign of a value with this dimension; None if there is none."""
     if UNITS[value.unit].dimension != dimension:
         known = " or ".join(name for name, unit in UNITS.items() if unit.dimension == dimension)
         return f"unit {value.unit!r} is not one of {dimension}, expected {known}"
@@ -211,7 +211,7 @@ def _document(part: Any) -> Any:
 
 @attrs.frozen(kw_only=True)
 class Drive(SourcedFile):
-    """A motor with its gear and controller; what no source states is left out."""
+    """A motor with its gear and controller; values without a source are left out."""
 
     name: str = described("name, as the file's")
     title: str = described("maker, type and gear, in words")
@@ -280,7 +280,7 @@ def load_drive(name_or_path: str | Path) -> Drive:
     Raises
     ------
     ConfigError
-        Names file, key, value and what was expected.
+        Names file, key, value and the expected value.
 
     Examples
     --------

@@ -65,9 +65,9 @@ class Clearance:
     )
     poissons_ratio: Pair = quantity("", "Poisson's ratio", within=(0.0, 0.5))
     normal_law: str = choice(NORMAL_LAWS, "law of the normal force", default="lankarani-nikravesh")
-    # where the loss goes by 1/restitution, a smaller one is beyond the tolerance of steps in clearance
-    # coordinates: mean forces are right at 0.02, up to 4 % low at 0.01, and to 21 % at 0.003 (physics.md
-    # section 4)
+    # The loss grows as 1/restitution. A smaller restitution is beyond the tolerance of steps in clearance
+    # coordinates: mean forces are right at 0.02, up to 4 % low at 0.01, and up to 21 % low at 0.003
+    # (physics.md section 4).
     restitution: float = quantity("", "coefficient of restitution", within=(0.02, 1.0), default=0.9)
     friction: Friction = described("friction, a mapping of the keys below", default=Friction())
     wear_coefficient: Pair = quantity(
@@ -150,7 +150,7 @@ class Body:
 
 
 _LONGEST_LABEL = 30
-_IN_LABELS = " ',-./+"  # beside letters and digits: nothing that a page or a terminal could take for markup
+_IN_LABELS = " ',-./+"  # with letters and digits: nothing that a page or a terminal takes for markup
 
 
 def _label_fault(label: str) -> str | None:
@@ -326,13 +326,13 @@ class Mechanism:
     Attributes
     ----------
     clearances : dict of str to Clearance
-        Settings of every revolute joint that may have clearance: defaults merged with its own.
+        Settings of every revolute joint that may have clearance: defaults merged with the joint's own.
     clearance_joints : tuple of str
         Default clearance joints.
     toe_point : tuple of str, optional
         Body and point whose motion is reported; default: the point called ``toe``.
     person_kg : float
-        Mass of a person one of whose legs hangs on it and is a part of its bodies; 0 for none.
+        Mass of a person with one leg attached to the mechanism; the bodies include this leg. 0 for none.
     source : str
         Name of the file, for messages.
     """
@@ -404,7 +404,7 @@ class Mechanism:
 
     @property
     def toe(self) -> tuple[str, str] | None:
-        """Body and point whose motion is reported: ``toe_point``, or the point called ``toe``, or None."""
+        """Body and point with reported motion: ``toe_point``, or the point called ``toe``, or None."""
         if self.toe_point:
             return self.toe_point
         for body, spec in self.bodies.items():

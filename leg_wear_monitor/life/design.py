@@ -1,4 +1,4 @@
-"""Bushings for a leg that is being designed: how long each joint lasts with pairs and sizes that one can buy.
+"""Bushings for a leg that is being designed: how long each joint lasts with commercial pairs and sizes.
 
 One life gives the sliding work of every joint over its clearance. A bushing of a different size has the same
 forces and turns by the same angles, so its sliding work is proportional to its radius, and its mean clearance
@@ -120,7 +120,7 @@ def design(
     Returns
     -------
     list of BushingLife
-        Joint by joint: the present bushing, then those that last, the smallest first, then the others.
+        Joint by joint: the present bushing, then the bushings that last, smallest first, then the rest.
 
     Raises
     ------
@@ -173,7 +173,7 @@ def _even_life(
     limit_m: float,
     progress: Callable[[float], None] | None,
 ) -> Life:
-    """A life from a common clearance in which all joints reach the limit at about the same time.
+    """A life from a common clearance; all joints reach the limit at about the same time.
 
     It shows the sliding work of every joint over its whole clearance.
     """
@@ -215,7 +215,7 @@ def _row(
     peak_pa = float(life.peak_force_n[0, k]) / of_pair.area_m2
     rating_h = finite_or_none(rating_hours(bushing, load.mean_pressure_speed_pa_mps))
     wear_h = None if lacks_wear(bushing) else _wear_hours(bushing, life.clearance_m[:, k], rubbing_w, limit_m)
-    # the scatter of the motion is a few percent, that of wear coefficients a factor of two
+    # The scatter of the motion is a few percent; the scatter of wear coefficients is a factor of two.
     away = math.exp(_P90 * (spread_of(bushing, USUAL_SPREAD) or USUAL_SPREAD))
     limited_by = _limited_by(bushing, load, peak_pa, wear_h, rating_h)
     surely_h = {"wear": (wear_h or 0.0) / away, "rating life": rating_h or 0.0, "nothing": math.inf}

@@ -103,13 +103,13 @@ class LifeSettings:
     cycles : int
         Gait cycles of each leg that are averaged before a jump.
     settle_cycles : int
-        Gait cycles before those, since the surfaces have changed.
+        Gait cycles before the averaged ones, because the surfaces have changed.
     perturb_fraction : float
         Journals start up to this fraction of the smallest clearance from the centre.
     jump : JumpControl
         Limits of a jump: deepest change of a surface ``max_wear_per_jump_m``, error ``tolerance_m`` [m].
     seed : int
-        Of where the legs start.
+        Seed of the legs' start positions.
     """
 
     legs: int = quantity("", "legs whose wear is averaged, alike but for their start", at_least=1, default=2)
@@ -351,7 +351,7 @@ def simulate_life(
 
 
 def _turned(mechanism: Mechanism, speed_rpm: float | None) -> Mechanism:
-    """The mechanism whose drive turns in the direction of a speed: that of a stance."""
+    """The mechanism with its drive turning in the direction of a speed, such as a stance's speed."""
     drive = mechanism.drive
     if speed_rpm is None or not isinstance(drive, SpeedDrive):
         return mechanism
@@ -438,8 +438,8 @@ def spread_factors(nominal: Life) -> Iterator[Floats]:
     """Factors (k,) on the wear coefficients, life by life, as an endless sequence.
 
     The clearances at the ends of the lives should be evenly distributed. In each life the first joint reaches
-    its full growth, and the others reach fractions from an evenly distributed sequence (Roberts's additive
-    recurrence), if they grow as in the nominal life.
+    its full growth, and the remaining joints reach fractions from an evenly distributed sequence (Roberts's
+    additive recurrence), if they grow as in the nominal life.
 
     Parameters
     ----------
@@ -457,9 +457,9 @@ def spread_factors(nominal: Life) -> Iterator[Floats]:
 
 
 def lives_document(lives: list[tuple[Floats, Life]], limit_m: float) -> dict[str, Any]:
-    """Plain object for JSON: the nominal life, and the data of the others that the forecast needs.
+    """Plain object for JSON: the nominal life, and the data of the further lives that the forecast needs.
 
-    With a duty, also when each joint of the nominal life reaches the limit.
+    With a duty, it also contains the time when each joint of the nominal life reaches the limit.
     """
     (factor, nominal), *further = lives
     duty = (

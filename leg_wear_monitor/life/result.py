@@ -136,7 +136,7 @@ class LifePoint:
     peak_force_n : (k,) array
         Largest contact force of a cycle, mean over the simulated cycles; of a duty the load where it is most.
     toe_position_m : float
-        Largest distance of the toe from that of the ideal linkage in a cycle, likewise; 0 without a toe.
+        Largest distance of the toe from the ideal linkage's toe in a cycle, likewise; 0 without a toe.
     rubbing_j_per_cycle : (k,) array
         Integral of ``F_N |v_t| dt`` over a gait cycle, mean over the simulated cycles.
     archard_j : (k,) array
@@ -194,7 +194,7 @@ class Life:
     period_s : float
         Duration of a gait cycle.
     duty : Duty or None
-        Loads under which the leg walks; None: those of its mechanism alone.
+        Loads under which the leg walks; None for the loads of its mechanism alone.
     part_growth_m_per_cycle : (p, parts, k) array
         Growth of the mean clearance in a gait cycle under each load of the duty.
     """
@@ -230,7 +230,8 @@ class Life:
     def end(self, limit_m: float) -> dict[str, dict[str, float | None]]:
         """When each joint, and the leg as the first of them, reaches a mean clearance.
 
-        As ``cycles``, ``hours`` of walking and, with a duty, its ``days``; None if it never does.
+        The time has ``cycles``, ``hours`` of walking and, with a duty, ``days``; None if the joint never
+        does.
         """
         cycles = [self.cycles_to(k, limit_m) for k in range(len(self.clearance_joints))]
         return {
@@ -262,7 +263,7 @@ class Life:
         }
 
     def to_json(self) -> str:
-        """Text of `to_dict`; ``life --json`` writes the same fields, and what they belong to."""
+        """Text of `to_dict`; ``life --json`` writes the same fields and the settings they belong to."""
         return json_text(self.to_dict())
 
     def columns(self) -> dict[str, list[Any]]:
@@ -347,7 +348,7 @@ def pressure_speed(mechanism: Mechanism, life: Life) -> dict[str, float]:
 
 
 def contact_doubts(mechanism: Mechanism, life: Life) -> dict[str, str]:
-    """Joints whose normal law does not hold at their largest peak force when new, and why."""
+    """Joints with a normal law that is not valid at their largest peak force when new, and the reason."""
     found = {}
     for k, joint in enumerate(life.clearance_joints):
         settings, force_n = mechanism.clearances[joint], float(life.peak_force_n[0, k])
@@ -365,7 +366,7 @@ def rating_hours(settings: Clearance, load: float) -> float | None:
 
 
 def validity(mechanism: Mechanism, life: Life) -> dict[str, Any]:
-    """What each joint's life holds for, as ``life --json`` has it; parameters as of `pressure_speed`."""
+    """Validity of each joint's life, as written by ``life --json``; same parameters as `pressure_speed`."""
     loads, contacts = pressure_speed(mechanism, life), contact_doubts(mechanism, life)
     found = {}
     for joint in life.clearance_joints:

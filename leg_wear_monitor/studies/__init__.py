@@ -1,1 +1,1 @@
-"""What the paper asks: clearance size, speed, place, number and laws; wear over a life; chaos."""
+"""Questions of the paper: clearance size, speed, place, number and laws; wear over a life; chaos."""

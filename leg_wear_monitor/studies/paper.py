@@ -28,8 +28,8 @@ Measure = Callable[[Responses], Estimate]
 HOLDS, FAILS, UNDECIDED = "holds", "fails", "undecided"
 STANDARD_ERRORS = 3.0  # a measure within so many of its standard errors decides nothing
 _TINY = 1.0e-300  # in place of a mean of 0, such as of impacts that do not occur
-_SUM_WITHIN = 0.1  # deviation up to which the effect of all at once counts as the sum
-_REGULAR = 0.5  # fraction of a force's variance from which on it counts as regular: most of it repeats
+_SUM_WITHIN = 0.1  # deviation up to which the combined effect counts as the sum
+_REGULAR = 0.5  # fraction of a force's variance above which it counts as regular: most repeats
 
 
 @attrs.frozen
@@ -41,7 +41,7 @@ class Claim:
     measure: Measure
 
     def state(self, responses: Responses) -> str:
-        """Whether the claim holds or fails, or whether the scatter over runs leaves it undecided."""
+        """State of the claim: it holds, it fails, or the scatter over runs leaves it undecided."""
         effect = self.measure(responses)
         if abs(effect.score) < STANDARD_ERRORS:
             return UNDECIDED
@@ -57,7 +57,7 @@ def responses_of(found: Found) -> Responses | None:
 def of_runs(responses: Responses, name: str, where: Names, joint: str = "") -> Floats:
     """A statistic (r,) of the leg in every run with clearance there; of a joint, if it has one.
 
-    NaN for wear that is not counted, as without a wear coefficient.
+    NaN for wear that is not modelled, for example without a wear coefficient.
     """
     arrays = responses[where]
     if not joint:
@@ -117,7 +117,7 @@ def _above(name: str, *pairs: _Pair) -> Measure:
 
 
 def _in_one(name: str, where: Names, *pairs: str) -> Measure:
-    """As `_above`, for pairs of joints such as ``AB`` with the same clearance joints."""
+    """Like `_above`, for pairs of joints such as ``AB`` with the same clearance joints."""
     return _above(name, *((where, pair[0], where, pair[1]) for pair in pairs))
 
 
@@ -127,7 +127,7 @@ def _with_all(name: str, joints: str, place: Names) -> Measure:
 
 
 def _repeats(where: Names, more: str, less: str) -> Measure:
-    """Forces of the joints ``more`` repeat more than those of ``less``, on the mean of each group."""
+    """Forces of the joints ``more`` repeat more than forces of ``less``, on the mean of each group."""
 
     def mean(leg: Responses, joints: str) -> Floats:
         each = [of_runs(leg, "repeats_contact_force", where, joint) for joint in joints]

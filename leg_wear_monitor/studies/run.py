@@ -1,4 +1,4 @@
-"""Execution of a study: missing points are computed, each result is stored at once; what was found."""
+"""Execution of a study: computes missing points, stores each result at once, and returns the results."""
 
 import io
 import zipfile
@@ -100,7 +100,7 @@ def run_study(
 
 
 def _write_manifest(study: Study, keys: list[str], out: Path) -> None:
-    """Create the directory with the settings, or take the one of a study with the same title."""
+    """Create the directory with the settings, or use the directory of a study with the same title."""
     if (out / MANIFEST).exists():
         present = _read_manifest(out)["settings"]["title"]
         if present != study.title:
@@ -155,7 +155,7 @@ class StudyResults:
 
     @property
     def faults(self) -> list[tuple[str, str]]:
-        """Label and fault of the points whose motion diverged."""
+        """Label and fault of the points with a diverged motion."""
         pairs = zip(self.points, self.arrays, strict=True)
         return [(point.label, str(arrays["fault"])) for point, arrays in pairs if "fault" in arrays]
 

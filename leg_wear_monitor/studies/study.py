@@ -51,7 +51,7 @@ _values = partial(quantity, default=(), check=_rising)
 
 @attrs.frozen(kw_only=True)
 class Ensemble:
-    """The runs whose statistics a point gives: motion with clearance is chaotic, so one run says little."""
+    """The runs behind a point's statistics: motion with clearance is chaotic, so one run says little."""
 
     runs: int = _count("runs with different initial conditions", within=(2, _MOST), default=12)
     cycles: int = _count("gait cycles of each run that the results use", within=(2, _MOST), default=20)

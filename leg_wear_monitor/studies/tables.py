@@ -20,7 +20,7 @@ TITLES = ("toe displacement", "toe velocity", "toe acceleration", "drive torque"
 """The quantities in `ERRORS` in words."""
 # wear depth, and normal force times sliding distance: by Archard's law the worn volume is proportional to it
 DEPTH, ARCHARD = "wear_depth_m_per_cycle", "archard_integral_j_per_cycle"
-FORGET = 3  # first cycles of an exponent, in which the neighbours turn into the fastest growing direction
+FORGET = 3  # skipped first cycles of an exponent: neighbours turn into the fastest growing direction
 _OF_ALL_JOINTS = ("peak_force_n", "mean_force_n", "rms_force_n", "p99_force_n")  # others: of clearance joints
 
 
@@ -70,7 +70,7 @@ def largest_error(arrays: Arrays, name: str) -> Spread:
 def fraction_of_range(arrays: Arrays, name: str) -> float:
     """Mean of the largest deviations as a fraction of the range of the ideal curve.
 
-    Of a quantity of the toe, it is the range of x or y, the larger one.
+    For a quantity of the toe, it is the range of x or y, whichever is larger.
     """
     return largest_error(arrays, name).mean / float(np.ptp(arrays[f"ideal_{name}"], axis=0).max())
 
@@ -107,14 +107,14 @@ def power_law(values: ArrayLike, effects: ArrayLike) -> tuple[float, float]:
     Parameters
     ----------
     values : (n,) array
-        What is varied, such as the clearance; above 0.
+        Varied quantity, such as the clearance; above 0.
     effects : (n,) array
-        What follows from each, such as the largest deviation; above 0.
+        Effect of each value, such as the largest deviation; above 0.
 
     Returns
     -------
     exponent, error : float
-        The error is NaN for less than four points, whose scatter says too little.
+        The error is NaN for less than four points, because their scatter says too little.
     """
     x, y = np.log(np.asarray(values, dtype=float)), np.log(np.asarray(effects, dtype=float))
     if len(x) < 4:

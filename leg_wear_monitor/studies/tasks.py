@@ -277,7 +277,7 @@ def _follow(leg: ObservedLeg, settings: dict[str, Any]) -> dict[str, Any]:
 
 
 def _known(joints: Iterable[JointResult], name: str) -> Floats:
-    """Values of the joints that have this statistic; those of contact exist for clearance joints only."""
+    """Values of the joints that have this statistic; contact statistics exist for clearance joints only."""
     values = [getattr(joint, name) for joint in joints]
     return np.array([value for value in values if value is not None])
 
@@ -536,7 +536,7 @@ def code_digest() -> str:
 
 
 def compute(task: str, mechanism: Mechanism, settings: dict[str, Any], code: str) -> Arrays:
-    """Compute the result of a point in a worker, whose sources must have the caller's digest ``code``.
+    """Compute the result of a point in a worker; the worker's sources must have the caller's digest ``code``.
 
     If the motion diverges, the result is only ``fault`` (), the message: divergence is a valid result.
     """

@@ -40,7 +40,7 @@ class Leg:
     normal_law : str, optional
     wear : bool
     crank_angle_rad : float
-        Initial crank angle, from which cycles are counted.
+        Initial crank angle; cycles are counted from there.
     perturb_m : float
         Largest initial eccentricity; initial positions of the journals are uniform over this disc.
     seed : int
@@ -109,7 +109,8 @@ def prepare_legs(legs: Sequence[Leg]) -> list[Setup]:
     known: dict[str, Setup] = {}
     setups = []
     for leg in legs:
-        # as a dict, for the text of a mechanism leaves out materials and labels, which results name
+        # The key is a dict, because the text of a mechanism leaves out materials and labels that results
+        # name.
         key = repr(attrs.asdict(attrs.evolve(leg, crank_angle_rad=0.0, seed=0)))
         if key not in known:
             known[key] = leg.prepare()
@@ -141,7 +142,7 @@ def advance_batch(
     Returns
     -------
     list of (status, k)
-        Status of each stepper, as in `ClearanceStepper.advance`; a failed one does not stop the others.
+        Status of each stepper, as in `ClearanceStepper.advance`; a failed stepper does not stop the rest.
 
     Raises
     ------

@@ -223,7 +223,7 @@ def assemble_schur(rows, arrays, jac, out_schur):
 def accelerate(model, surfaces, approach, polynomial, t, q, v, scratch, out_a, out_rate, out_drive_rate):
     """Accelerations (n, 3) and multipliers at time t [s], and the rates of the statistics' integrals.
 
-    ``approach`` (k,) [m/s] contains the approach speed of each clearance joint in contact, 0 for the others.
+    ``approach`` (k,) [m/s] contains the approach speed of each clearance joint in contact, 0 for open joints.
     Returns False if the closures are singular.
     """
     arrays, rows = model.arrays, model.rows
@@ -278,9 +278,9 @@ def _accelerations(model, scratch, out_a):
 
 @kernel
 def _ideal_rates(model, q, v, torque, scratch, out_rate, out_drive_rate):
-    """Rates of the integrals of ideal joints and of the drive; the drive's power includes that of the loads.
+    """Rates of the integrals of ideal joints and of the drive; the drive's power includes the loads' power.
 
-    ``torque`` [N m] is that of a controller or constant-torque drive.
+    ``torque`` [N m] is the torque of a controller or constant-torque drive.
     """
     for c in range(model.rows.closure.shape[0]):
         joint, r = model.rows.closure[c], model.rows.row[c]

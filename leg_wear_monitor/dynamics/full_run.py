@@ -62,8 +62,8 @@ from leg_wear_monitor.wear import BUSHING
 
 # Time integration in full coordinates: adaptive steps and contact events (physics.md section 2).
 #
-# The local error of every step is below a tolerance in every coordinate and velocity (Dormand-Prince 5(4)). A
-# step in which a contact would begin is shortened so that it ends at the begin of the contact, to 1e-11 m.
+# The local error of every step is below a tolerance in every coordinate and velocity (Dormand-Prince 5(4)).
+# If a contact would begin within a step, the step is shortened to end at the contact's start, to 1e-11 m.
 
 
 LONGEST_STEP = 1.0e-3  # s: its product with Baumgarte's alpha is well inside the region of stability
@@ -74,8 +74,8 @@ class FullState(NamedTuple):
     """Complete state of a run, the surfaces aside.
 
     ``y`` (6 n,): coordinates, then velocities, of n bodies [m, m, rad; per s]; ``clock`` (2,) [s]: time, and
-    the next trial step; ``approach`` (k,) [m/s]: approach speed of each clearance joint in contact, 0 for the
-    others; ``recent`` (k, 4): its last two samples of time [s] and normal force [N].
+    the next trial step; ``approach`` (k,) [m/s]: approach speed of each clearance joint in contact, 0 for
+    open joints; ``recent`` (k, 4): its last two samples of time [s] and normal force [N].
     """
 
     y: Floats
@@ -109,7 +109,7 @@ def full_state(q: Floats, v: Floats, clearance_joints: int, t: float = 0.0) -> F
 
 
 def full_work(model: FullModel, tolerance_m: float, tolerance_mps: float, sectors: int) -> FullWork:
-    """Work arrays; the tolerances are those of a step's local error, of coordinates and of velocities."""
+    """Work arrays; the tolerances apply to a step's local error, of coordinates and of velocities."""
     n, k = len(model.arrays.mass), len(model.contacts.joint)
     joints = len(model.arrays.joint_kind)
     return FullWork(
@@ -259,7 +259,7 @@ class FullRun:
     ----------
     setup : Setup
     tolerance_m : float
-        Local error allowed in a step [m or rad]; that of velocities is `TOLERANCE_RATE` times it per second.
+        Local error allowed in a step [m or rad]; for velocities, `TOLERANCE_RATE` times it per second.
 
     Attributes
     ----------

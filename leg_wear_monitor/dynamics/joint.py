@@ -25,8 +25,8 @@ CONTACT_EVENT = 1.0e-11  # penetration [m] at which a contact counts as just beg
 NEVER = 2.0
 
 _CLOSE = 1.0e-14  # tolerance of a crossing, as a fraction of the step
-# of a joint's largest force so far: from which on a maximum counts as large. With all maxima, the largest
-# reactions of the default leg's ideal joints are the same
+# Fraction of a joint's largest force so far; a maximum above it counts as large. With all maxima, the largest
+# reactions of the default leg's ideal joints are the same.
 _LARGE = 0.25
 
 
@@ -77,7 +77,7 @@ def first_contact_event(approach, h, start, end):
 
 @kernel
 def begin_contact(k, joint, speed_floor, t, rate, approach, recent, impact, impacts):
-    """Begin a contact in clearance joint k at time t [s]; ``rate`` [m/s] is that of the penetration.
+    """Begin a contact in clearance joint k at time t [s]; ``rate`` [m/s] is the rate of penetration.
 
     Changes approach (k,) [m/s], recent (k, 4) [s, N, s, N], and the run statistics' impact and impacts.
     """
@@ -137,10 +137,10 @@ def pushed_through(bushing_radius, sample):
 def penetration(contacts, surfaces, k, ex, ey, direction, angle_b, angle_j):
     """Penetration, contact normal and local radii of clearance joint k.
 
-    ``direction`` [rad] is that of the eccentricity (ex, ey) [m]; it is used only with wear feedback. The
-    normal is a unit vector on fresh surfaces, see `worn_contact` for worn ones: the normal force times the
-    normal is the gradient of the contact's energy, including the change of the local radii with direction.
-    physics.md section 3.
+    ``direction`` [rad] is the direction of the eccentricity (ex, ey) [m]; it is used only with wear feedback.
+    The normal is a unit vector on fresh surfaces, see `worn_contact` for worn surfaces: the normal force
+    times the normal is the gradient of the contact's energy, including the change of the local radii with
+    direction. physics.md section 3.
 
     Returns
     -------
@@ -190,8 +190,8 @@ def joint_force(contacts, surfaces, k, ex, ey, vx, vy, angle_b, angle_j, speed_b
     """Forces in clearance joint k; 0 for an open joint, whose ``approach_speed`` [m/s] is 0.
 
     Eccentricity (ex, ey) [m] and its rate [m/s]; angles [rad] and speeds [rad/s] of the bushing's and the
-    journal's body. Both forces act at the bushing's surface point P_b + R_b n, so action equals reaction
-    in moments too; the slip is that of the two bodies at this point. A rotating worn bushing lifts the
+    journal's body. Both forces act at the bushing's surface point P_b + R_b n, so action equals reaction in
+    moments as well; the slip is the slip of the two bodies at this point. A rotating worn bushing lifts the
     journal like a cam, by the couple ``moment`` between the bodies. The work of these forces is exactly F_N
     delta_dot and F_t v_t. physics.md sections 3 and 4.
 

@@ -157,7 +157,7 @@ class JointResult:
         Integral of ``F_N |v_t| dt`` per cycle [J]; times a wear coefficient [1/Pa] it is the worn volume
         [m³].
     wear_depth_m_per_cycle : WearDepth or None
-        Of both surfaces.
+        Wear depth of both surfaces.
     wear_zone_deg : tuple of two floats or None
         Narrowest zone (from, to) [deg] with 90 % of the bushing's wear, in the frame of the bushing's body,
         from 0 to 360; ``to`` is below ``from`` if the zone crosses 0. None without wear.
@@ -172,14 +172,14 @@ class JointResult:
     mean_pressure_speed_pa_mps : float or None
         Mean of pressure times sliding speed [Pa m/s].
     outside_limits : str or None
-        What of ``p99_pressure_pa`` and the two means is beyond the limits of the joint's material, so that
-        its wear coefficient does not hold; None within the limits, and without limits.
+        Values among ``p99_pressure_pa`` and the two means beyond the joint material's limits, so that
+        its wear coefficient is not valid; None within the limits, and without limits.
     holds_for : str or None
-        Material pair and regime that the wear holds for.
+        Material pair and regime of the wear coefficient.
     contact_half_angle_deg : float or None
         Half angle of the contact arc under ``p99_force_n`` [deg].
     outside_contact_law : str or None
-        Why the joint's normal law does not hold for this arc; None if it does.
+        Reason why the joint's normal law is not valid for this arc; None if it is.
     """
 
     mean_force_n: float
@@ -449,12 +449,12 @@ class SimulationResult:
         )
 
     def to_dict(self, wall_s: float | None = None) -> dict[str, Any]:
-        """Plain object: what ``simulate --json`` writes.
+        """Plain object, as written by ``simulate --json``.
 
         Parameters
         ----------
         wall_s : float, optional
-            Wall-clock duration of the simulation [s]; without it, what follows from it is left out.
+            Wall-clock duration of the simulation [s]; without it, values that depend on it are left out.
         """
         clock = {} if wall_s is None else {"wall_s": wall_s}
         factor = {} if wall_s is None else {"real_time_factor": self.simulated_s / wall_s}
@@ -477,7 +477,7 @@ class SimulationResult:
         return record if self.trace is None else {**record, "trace": trace_document(self.trace)}
 
     def to_json(self, wall_s: float | None = None) -> str:
-        """Text of `to_dict`: what ``simulate --json`` writes.
+        """Text of `to_dict`, as written by ``simulate --json``.
 
         Examples
         --------

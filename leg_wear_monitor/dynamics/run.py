@@ -1,4 +1,4 @@
-"""What both formulations share: interface, crank motion, statistics of a run, traces, Runge-Kutta."""
+"""Shared parts of both formulations: interface, crank motion, statistics of a run, traces, Runge-Kutta."""
 
 import math
 from typing import NamedTuple, Protocol, Self
@@ -186,7 +186,7 @@ def percentile(seconds: Floats, fraction: float) -> float:
 
 
 def signed_percentile(seconds: Floats, fraction: float) -> float:
-    """As `percentile`, for a signed quantity: time (2, bins) [s] at negative and at positive values."""
+    """Same as `percentile`, for a signed quantity: time (2, bins) [s] at negative and at positive values."""
     below, total = seconds[0].sum(), seconds.sum()
     if not total > 0.0:
         return 0.0
@@ -250,7 +250,7 @@ def end_impact(impact, impacts, joint, t):
 
 @kernel
 def parabola_peak(t0, f0, t1, f1, t2, f2):
-    """Maximum of the parabola through three samples (t [s], f [N]), the middle one of which is largest.
+    """Maximum of the parabola through three samples (t [s], f [N]); the middle sample is the largest.
 
     Just the middle sample where one step is much shorter than the other: wear that is deposited and a change
     of tables are small jumps of the force, and over a very short step (one cut at a contact event) their

@@ -53,12 +53,12 @@ _KINDS: dict[str, tuple[Any, str]] = {
 
 
 def given_mechanism(mechanism: Mechanism | str | Path) -> Mechanism:
-    """The given mechanism, or the one of a name or a file.
+    """The given mechanism, or the mechanism with a name or in a file.
 
     Raises
     ------
     ConfigError
-        If the argument is of another type, or the file is invalid.
+        If the argument has a wrong type, or the file is invalid.
     """
     if isinstance(mechanism, Mechanism):
         return mechanism
@@ -121,7 +121,7 @@ def check_kinds(**values: object) -> None:
 
 
 _POINTS = 1440
-_MOST_WHOLE = 100  # whole cycles beside which a part of one is counted; beside more it hardly weighs
+_MOST_WHOLE = 100  # whole cycles up to which a partial cycle is counted; beyond, it hardly matters
 
 
 def ideal_result(setup: Setup, cycles: float, trace: int, begin: float = 0.0) -> SimulationResult:
@@ -197,8 +197,8 @@ LEAST_INTERVALS, MOST_INTERVALS = 1024, 65536
 
 _REPORTS_A_CYCLE = 20
 
-# way of a crank over its net turn, from which on it swings: one that turns may step back; turns that may be
-# rounding
+# Ratio of a crank's path to its net turn above which it swings (a turning crank may step back); and turns
+# that may be rounding.
 _MOST_PATH, _ROUNDING = 1.1, 1.0e-9
 
 
@@ -277,13 +277,13 @@ def simulate(
     Parameters
     ----------
     mechanism : Mechanism, str or pathlib.Path
-        A mechanism, the name of a shipped one, or a file.
+        A mechanism, the name of a shipped mechanism, or a file.
     clearances : sequence of str, optional
-        Names of the clearance joints, empty for the ideal leg; default: those of the mechanism.
+        Names of the clearance joints, empty for the ideal leg; default: the mechanism's clearance joints.
     clearance_m : float, optional
-        Radial clearance of all clearance joints [m]; default: those of the mechanism.
+        Radial clearance of all clearance joints [m]; default: the mechanism's clearances.
     speed_rpm : float, optional
-        Crank speed, negative for clockwise; default: that of the mechanism.
+        Crank speed, negative for clockwise; default: the mechanism's speed.
     cycles, duration_s : float
         Counted length of the run, in gait cycles or as time [s].
     skip_cycles : float, optional

@@ -66,7 +66,7 @@ def toe_errors(statistics: RunStatistics) -> ToeResult:
 
 
 def energy_balance(statistics: RunStatistics, stored_before: float, stored_after: float) -> EnergyBalance:
-    """Energy balance over the counted time, from the stored energy [J] at its begin and end."""
+    """Energy balance over the counted time, from the stored energy [J] at its start and end."""
     work = float(statistics.drive_integral[POWER])
     friction, contact = (float(statistics.integral[:, i].sum()) for i in (FRICTION, DISSIPATION))
     wear = float(statistics.worn_energy[0])
@@ -81,8 +81,8 @@ def energy_balance(statistics: RunStatistics, stored_before: float, stored_after
     )
 
 
-# residual over the losses, and over its standard error, from which on the energy does not close: five
-# clearance joints of the default leg have 0.3 % at 0.6 mm, 1.3 % at 2 mm and 6 % at 3 mm, where wear is off
+# Residual over the losses, and over its standard error, above which the energy does not close: five clearance
+# joints of the default leg have 0.3 % at 0.6 mm, 1.3 % at 2 mm and 6 % at 3 mm, with wear off.
 _MOST_RESIDUAL, _SURE = 0.02, 3.0
 # losses that count at least, over the work to and fro, the drive's RMS torque times its way: with hardly any
 # losses, as at 0.6 rpm or with elastic contacts without friction, residuals of up to 9e-5 of it are beyond
@@ -91,9 +91,9 @@ _LEAST_LOSS = 0.005
 
 
 def open_balance(result: SimulationResult) -> str | None:
-    """What is wrong with a result in clearance coordinates whose energy does not close; None if it does.
+    """Fault of a result in clearance coordinates with an energy balance that does not close; None if it does.
 
-    None below two whole cycles, too, which have no standard error.
+    Also None below two whole cycles, which have no standard error.
     """
     energy, errors = result.energy_j, result.standard_error
     if energy is None or errors is None or result.model != "clearance":
@@ -120,7 +120,7 @@ class CycleScatter:
     ----------
     setup : Setup
     statistics : RunStatistics
-        Those of the counted time, empty.
+        Statistics of the counted time, empty.
     stored : float, J
         Stored energy now.
     """
@@ -154,7 +154,8 @@ class CycleScatter:
     def standard_errors(self, cycles: float) -> dict[str, float] | None:
         """Standard errors of the values over a number of cycles, by path; None after fewer than two cycles.
 
-        Energies are sums over the cycles, all else are means. The greatest depth is that of one sector.
+        Energies are sums over the cycles; all other values are means. The greatest depth belongs to one
+        sector.
         """
         if self._count < 2:
             return None
@@ -192,7 +193,7 @@ def _numbers(path: str, part: Any) -> Iterator[tuple[str, float]]:
 
 @cache
 def _summed(kind: type) -> tuple[str, ...]:
-    """Names of the fields of a part of a result that may add up over cycles; none of what has no fields."""
+    """Names of the fields of a part of a result that may add up over cycles; empty without fields."""
     fields = attrs.fields(kind) if attrs.has(kind) else ()
     return tuple(field.name for field in fields if field.name not in _ONE_SAMPLE)
 

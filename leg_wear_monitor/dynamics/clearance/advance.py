@@ -1,9 +1,9 @@
 """Time integration in clearance coordinates: adaptive steps, contact events (physics.md section 7).
 
 The state exists at whole intervals of time. Within an interval, or within each of its parts where the linkage
-moves fast, the tables are those of the middle and the steps adapt to a local error (Rosenbrock, order 2). The
-result therefore does not depend on how the time is divided into calls, and the cost of a call is bounded by
-its number of intervals.
+moves fast, the tables hold the values at the middle, and the steps adapt to a local error (Rosenbrock, order
+2). The result therefore does not depend on how the time is divided into calls, and the cost of a call is
+bounded by its number of intervals.
 """
 
 import math
@@ -109,7 +109,8 @@ def sudden_impulse(now, x, added):
     """Integral over a step [N m s] of the drive torque without its smooth part.
 
     The term of e'' follows from the change of the rates, row DV, which is exact for the torque peaks of
-    impacts; those of the contact forces from their integrals in ``added``, which have the rule of the losses.
+    impacts. The terms of the contact forces follow from their integrals in ``added``, which use the same rule
+    as the losses.
     """
     total = every(0.0)
     for i in range(0, now.torque_a.shape[0], WIDTH):
@@ -187,7 +188,7 @@ WEARING = 8  # intervals after which pending wear is deposited, to spread its co
 MOST_TRIALS = 20000  # trial steps in a part of an interval before the run stops
 
 _SHORTEST_STEP = 1.0e-13  # s
-_CUBE_ROOT_GUESS = 0x553EF0FF289DD796  # bits of 1 times 4/3, less what makes the largest error least
+_CUBE_ROOT_GUESS = 0x553EF0FF289DD796  # bits of 1, times 4/3, minus the offset with the least maximal error
 # A rest that is one step but for rounding is one step: a step of half a rest leaves as much, and which of the
 # two is longer would depend on the last bit.
 _NEARLY = 1.0 + 1.0e-6
@@ -209,7 +210,7 @@ def advance_clearances(model, feeds_back, state, polynomial, t_end, statistics, 
     -------
     status, k
         DONE, or the reason for stopping and the clearance joint concerned (-1 if none). The state is then
-        that of the last whole interval; it is finite and can be continued.
+        the state of the last whole interval; it is finite and can be continued.
     """
     surfaces = Surfaces(state.depth, feeds_back)
     while (state.intervals[0] + 1.0) * model.interval <= t_end * (1.0 + 1.0e-12) + 1.0e-15:
@@ -224,7 +225,8 @@ def advance_clearances(model, feeds_back, state, polynomial, t_end, statistics, 
     return DONE, -1
 
 
-# for kernels along whose way it goes: they need not contain it, which would double what there is to compile
+# Address for kernels that call it indirectly: they need not contain it, which would double the code to
+# compile.
 ADVANCE = ByAddress(advance_clearances, numba.types.UniTuple(numba.types.int64, 2))
 
 
@@ -280,7 +282,7 @@ def _part(model, surfaces, state, polynomial, begin, end, statistics, work):
     if coupled:
         whole, steeper = release(model.coupling, angle, length, torque, work)
     impulse = statistics.drive_integral[TORQUE]
-    turned = -0.5 * length * speed  # crank angle at the begin, relative to that of the tables
+    turned = -0.5 * length * speed  # crank angle at the start, relative to the tables' angle
     sample_start(model, surfaces, state, turned, begin, statistics, work)
     status, k = _steps(model, surfaces, state, begin, length, statistics, work)
     if status == DONE:
@@ -336,7 +338,7 @@ def _steps(model, surfaces, state, begin, length, statistics, work):
 
 @kernel
 def _next_over(error, growth):
-    """Length of the next step over that of this one, which has a local error relative to the tolerance."""
+    """Ratio of the next step's length to this step's length, by the local error relative to the tolerance."""
     return growth if error * growth**3 <= 0.9**3 else 0.9 * inverse_cube_root(error)
 
 
@@ -355,7 +357,7 @@ def inverse_cube_root(x):
 def _accept(model, surfaces, state, t, h, turned, statistics, work):
     """Accept the trial step of length h [s] from time t [s]: statistics, wear, contact events.
 
-    ``turned``: crank angle at the end of the step, relative to that of the tables [rad].
+    ``turned``: crank angle at the end of the step, relative to the crank angle of the tables [rad].
     """
     x, now, start, end, contacts = work.x, work.now, work.start, work.end, model.contacts
     statistics.steps[1] += 1

@@ -17,7 +17,7 @@ from leg_wear_monitor.mechanism.position import (
     jacobians,
 )
 
-COARSER = 2  # ratio of the step of the tables of first order in e to that of the others
+COARSER = 2  # ratio of the first-order (in e) tables' step to the other tables' step
 
 _NUDGE = 1.0e-5  # m or rad: step of central differences of smooth functions of the coordinates
 
@@ -97,7 +97,7 @@ class Basis:
         self.loaded = tuple(self._under_load(one, curvature) for one in loaded)
 
     def with_contacts(self, linkage: Linkage, contacts: ContactArrays) -> "Basis":
-        """That of the same linkage and joints with other radii: only the levers of friction differ."""
+        """Basis of the same linkage and joints with other radii: only the levers of friction differ."""
         other = copy.copy(self)
         other._take_levers(linkage, contacts)
         return other
@@ -247,8 +247,8 @@ def motion_shapes(k: int, damped: bool) -> Shapes:
     coefficients of 1 and e, and the derivative of the latter by the crank angle; with dampers, ``viscous``:
     accelerations, and ``damper``: dissipated power as a quadratic form, both in (e', w).
 
-    In square parts the second index is that of the result (in a form, of the first vector), so that loops run
-    along rows.
+    In square parts the second index is the index of the result (in a form, of the first vector), so that
+    loops run along rows.
     """
     d = 2 * k
     return {

@@ -1,6 +1,6 @@
 """Contact forces and accelerations in clearance coordinates (physics.md sections 3, 4 and 7).
 
-This is the innermost loop: the joints are the entries of vectors, and what depends on a joint's state is a
+This is the innermost loop. The joints are the entries of vectors, and a dependence on a joint's state is a
 choice of two values, not a jump.
 """
 
@@ -59,8 +59,8 @@ from leg_wear_monitor.wear import BUSHING, JOURNAL, profiles_at
 
 # Laws of the clearance joints in vectors: normal and friction forces of eight joints at once.
 #
-# The usual laws are formulas for vectors, in which what depends on a joint's state is a choice of two values,
-# not a jump. Laws of other forms are computed joint by joint.
+# The usual laws are formulas for vectors: a dependence on a joint's state is a choice of two values, not a
+# jump. Laws of other forms are computed joint by joint.
 
 
 # rows of the joints' laws: number of the normal law's form, its hysteresis factor and its coefficient on
@@ -139,7 +139,7 @@ def joint_forces(model, k, coefficient, clearance, approach, delta, rate, slip):
 # angle [rad]
 TO_X, TO_Y, TO_ANGLE = range(3)
 
-_NEAR = 0.1  # largest sine of an angle for the arc sine's series, whose error is then 3e-11 rad
+_NEAR = 0.1  # largest sine of an angle for the arc sine's series; its error is then 3e-11 rad
 
 
 @kernel
@@ -173,9 +173,9 @@ def directions_of(ex, ey, k, toward):
 
 @kernel
 def touch_worn_walls(model, surfaces, now, turned, k, ex, ey):
-    """Penetrations of eight joints from joint k on, and what depends on the place on worn walls.
+    """Penetrations of eight joints from joint k on, and the values that depend on the place on worn walls.
 
-    ``turned``: crank angle relative to that of the tables [rad]; eccentricities (ex, ey) [m].
+    ``turned``: crank angle relative to the crank angle of the tables [rad]; eccentricities (ex, ey) [m].
 
     Returns
     -------
@@ -227,8 +227,8 @@ NX, NY, SLIP, STIFFNESS = range(SAMPLE, SAMPLE + 4)
 DAMPING, ELASTIC, CAM, COEFFICIENT, CLEARANCE = range(SAMPLE + 4, SAMPLE + 9)
 SAMPLE_ROWS = SAMPLE + 9
 
-# integrals of a joint in a step beyond those of the run statistics: friction force [N s]; moment about the
-# crank of the normal force on rotating worn walls [N m s]
+# Integrals of a joint in a step, in addition to the integrals of the run statistics: friction force [N s];
+# moment about the crank of the normal force on rotating worn walls [N m s].
 RUB, LIFT = JOINT_RATES, JOINT_RATES + 1
 ADDED = JOINT_RATES + 2
 
@@ -240,7 +240,7 @@ VECTORS = 18
 
 
 def fresh_sample(law: Floats) -> Floats:
-    """A sample (SAMPLE_ROWS, room) with what does not change as long as the walls are not worn."""
+    """A sample (SAMPLE_ROWS, room) with the values that stay the same as long as the walls are not worn."""
     sample = np.zeros((SAMPLE_ROWS, law.shape[1]))
     sample[CLEARANCE], sample[COEFFICIENT] = law[FRESH_CLEARANCE], law[FRESH_COEFFICIENT]
     return sample
@@ -251,9 +251,9 @@ def accelerate_clearances(model, surfaces, approach, now, turned, x, at_e, at_v,
     """Accelerations of the eccentricities [m/s^2] with all contact forces, and samples of the joints.
 
     ``approach`` (k,): approach speeds [m/s], 0 for open joints; ``now``: the step's tables; ``turned``: crank
-    angle relative to that of the tables [rad]; x (VECTORS, room) with eccentricities [m] and rates [m/s] in
-    rows at_e and at_v, the result in row out_a; out_sample (SAMPLE_ROWS, room), only what the accelerations
-    need of it if not ``whole``.
+    angle relative to the crank angle of the tables [rad]; x (VECTORS, room) with eccentricities [m] and rates
+    [m/s] in rows at_e and at_v, the result in row out_a; out_sample (SAMPLE_ROWS, room), if not ``whole``
+    only the rows that the accelerations need.
     """
     for k in range(0, out_sample.shape[1], WIDTH):
         _push_joints(model, surfaces, approach, now, turned, k, x, at_e, at_v, out_sample, whole)

@@ -22,7 +22,7 @@ from leg_wear_monitor.mechanism.arrays import Floats, Ints
 #     (D^-1 + N^T B) p = N^T r_v + gamma h D^-1 K N^T r_e,    D = gamma h C + (gamma h)^2 K,
 #
 # and x_v = r_v - B p, x_e = r_e + gamma h x_v solve (I - gamma h A) x = r. The same steps that eliminate D^-1
-# + N^T B turn B into T = B (D^-1 + N^T B)^-1, with which each of the three solutions of a step is a product.
+# + N^T B turn B into T = B (D^-1 + N^T B)^-1. Each of the three solutions of a step is then a product with T.
 
 
 GAMMA = 1.0 - math.sqrt(0.5)

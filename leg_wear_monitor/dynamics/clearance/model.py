@@ -29,18 +29,18 @@ from leg_wear_monitor.mechanism.arrays import Floats, Ints
 
 STIFFNESS, DAMPING, PARTS = 0, 1, 2  # indices of a coupling's law
 
-# rad: longest part of an interval in the oscillation on its coupling of a crank whose joints are open, and
-# fewest parts. The mean torque of the default leg is then within 0.6 % of its RMS of full coordinates, on 200
-# to 5000 N m/rad; with a half and a quarter of the parts it is off by 0.7 and 7 % on 1000 N m/rad
+# rad: longest part of an interval, measured in the oscillation on its coupling of a crank with open joints;
+# and fewest parts. The mean torque of the default leg is then within 0.6 % of its RMS of full coordinates, on
+# 200 to 5000 N m/rad. With a half and a quarter of the parts it is off by 0.7 and 7 % on 1000 N m/rad.
 _LONGEST, _FEWEST = 0.25, 4
 
 
 class Coupling(NamedTuple):
-    """What is between the drive and the crank.
+    """The elastic connection between the drive and the crank.
 
     ``law`` (3,): stiffness [N m/rad], 0 for a rigid drive, damping [N m s/rad], and number of parts of an
-    interval; ``inertia`` (N + 1,) [kg m^2]: that of the crank with all clearance joints open, at the angles
-    of the tables.
+    interval; ``inertia`` (N + 1,) [kg m^2]: inertia of the crank with all clearance joints open, at the
+    angles of the tables.
     """
 
     law: Floats
@@ -113,12 +113,12 @@ class ClearanceModel(NamedTuple):
 class ClearanceState(NamedTuple):
     """Complete state of a run; a snapshot consists of copies of ``motion`` and ``depth``.
 
-    ``depth`` (k, 2, N) [m]: wear depth of bushing and journal; ``motion`` (s,): everything else, of which the
-    remaining fields are views: ``intervals`` (1,): number of intervals since time 0; ``e`` [m], ``v`` [m/s]
-    (d,): eccentricities and rates; ``drive`` (3,): angle [rad], speed and acceleration of the crank; ``step``
-    (1,) [s]: next trial step; ``approach`` (k,) [m/s]: approach speed of each joint in contact, 0 for the
-    others; ``recent`` (k, 4): its last two samples of time [s] and normal force [N]; ``pending`` (4, k):
-    Archard integral that is not yet deposited as wear [J], and the integrals of its product with the
+    ``depth`` (k, 2, N) [m]: wear depth of bushing and journal; ``motion`` (s,): everything else; the
+    remaining fields are views of it: ``intervals`` (1,): number of intervals since time 0; ``e`` [m], ``v``
+    [m/s] (d,): eccentricities and rates; ``drive`` (3,): angle [rad], speed and acceleration of the crank;
+    ``step`` (1,) [s]: next trial step; ``approach`` (k,) [m/s]: approach speed of each joint in contact, 0
+    for open joints; ``recent`` (k, 4): its last two samples of time [s] and normal force [N]; ``pending`` (4,
+    k): Archard integral that is not yet deposited as wear [J], and the integrals of its product with the
     direction (x, y) [J] and the length [J m] of the eccentricity.
     """
 
@@ -140,12 +140,11 @@ class StepTables(NamedTuple):
     Parts that depend on e are evaluated for the eccentricities in the middle of the part of an interval.
     ``speed`` (2,): speed [rad/s] and acceleration [rad/s^2] of the crank. ``middle`` (d,): these
     eccentricities. For both: ``force`` (d,) [N]: on e at rest, without contact; ``bare`` (d,): its
-    acceleration; ``drift`` (d, d): accelerations per e', ``drift_line`` and ``coriolis_line``
-    (room for d d): the entries of ``drift`` and ``coriolis`` in vectors, ``angle_line`` and ``turn_line``
-    those of ``angle`` and ``turn``; ``moment`` (k, d): forces on e per friction force in each joint,
-    ``lever`` transposed; drive torque: ``torque_0`` (1,) [N m] at rest, ``torque_by_v`` (d,) per e',
-    ``torque_by_e`` (d,) per e. ``toward`` (3, k): reference directions of the eccentricities at the start of
-    the interval.
+    acceleration; ``drift`` (d, d): accelerations per e', ``drift_line`` and ``coriolis_line`` (room for d d):
+    the entries of ``drift`` and ``coriolis`` in vectors, ``angle_line`` and ``turn_line`` the entries of
+    ``angle`` and ``turn``; ``moment`` (k, d): forces on e per friction force in each joint, ``lever``
+    transposed; drive torque: ``torque_0`` (1,) [N m] at rest, ``torque_by_v`` (d,) per e', ``torque_by_e``
+    (d,) per e. ``toward`` (3, k): reference directions of the eccentricities at the start of the interval.
     """
 
     row: Floats
@@ -185,12 +184,12 @@ class ClearanceWork(NamedTuple):
     """Work arrays of an interval.
 
     ``now``: step tables; ``system``: contact system; ``start``, ``end`` (SAMPLE_ROWS, room): samples of the
-    joints at a step's start and end; ``x`` (VECTORS, 2 room): vectors of a step; ``weight`` (N,): of the wear
-    on an arc; ``by`` (c,): factors of the reactions' table; ``reaction`` (room,), ``toe`` (2,): observed;
-    ``added`` (ADDED, room): increments of the joints' integrals in a step, ``sums`` (JOINT_RATES, room): in
-    an interval; ``drive_start``, ``drive_end`` (3,): of the drive at its ends; ``backup`` (s,): state to
-    restore after a failed interval; ``pending`` (4, room): that of the state, within an interval; ``crank``
-    (3,): drive at the start of the interval.
+    joints at a step's start and end; ``x`` (VECTORS, 2 room): vectors of a step; ``weight`` (N,): weights of
+    the wear on an arc; ``by`` (c,): factors of the reactions' table; ``reaction`` (room,), ``toe`` (2,):
+    observed; ``added`` (ADDED, room): increments of the joints' integrals in a step, ``sums`` (JOINT_RATES,
+    room): in an interval; ``drive_start``, ``drive_end`` (3,): values of the drive at its ends; ``backup``
+    (s,): state to restore after a failed interval; ``pending`` (4, room): the state's ``pending``, within an
+    interval; ``crank`` (3,): drive at the start of the interval.
     """
 
     now: StepTables
@@ -358,7 +357,7 @@ def _times_table(table, n, w, block, values):
 
 @kernel
 def fetch_tables(tables, angle, speed):
-    """Have the memory bring the rows that the next intervals need, while this one is computed."""
+    """Prefetch the rows that the next intervals need, while this interval is computed."""
     motion, by_e, bend = tables.motion, tables.by_e, tables.bend
     ahead = 2 if speed > 0.0 else -1
     i, w = blend(motion.shape[0] - 1, angle)
@@ -375,7 +374,7 @@ def fetch_tables(tables, angle, speed):
 
 @kernel
 def _fetch_blocks(table, i):
-    """Fetch row i of a table in blocks of single vectors, of which two are in a line of memory."""
+    """Fetch row i of a table in blocks of single vectors; a memory line contains two of them."""
     for block in range(table.shape[1]):
         for j in range(0, table.shape[2], 2):
             fetch(table, (i, block, j, 0))

@@ -95,9 +95,10 @@ def drift(now, x):
 def try_step(model, surfaces, approach, h, turned, now, system, x, start, end):
     """Trial step of length h [s] from rows E0, V0, A0 of x to E1, V1, A1 and the sample ``end``.
 
-    ``turned``: crank angle at the end of the step, relative to that of the tables [rad]. Returns the local
-    error over the tolerance: the difference of the second-order step and the cubic through the accelerations
-    at both ends, filtered like a stage so that stiff contacts do not exaggerate it (Shampine's filter).
+    ``turned``: crank angle at the end of the step, relative to the crank angle of the tables [rad]. Returns
+    the local error over the tolerance: the difference of the second-order step and the cubic through the
+    accelerations at both ends, filtered like a stage so that stiff contacts do not exaggerate it (Shampine's
+    filter).
     """
     d, tolerance = now.bare.shape[0], model.tolerance
     m = factorise_contacts(h, now.inverse_mass, now.speed[0], start, system)
@@ -250,8 +251,8 @@ def gather_wear(added, start, end, pending):
 def deposit_pending(contacts, surfaces, k, start, now, turned, acted, pending, out_weight):
     """Deposit the pending wear of joint k at its mean direction and eccentricity.
 
-    ``turned``: crank angle relative to that of the tables [rad], ``acted``: the same at the time the wear
-    acted. Returns the contact energy lost with the removed material [J].
+    ``turned``: crank angle relative to the crank angle of the tables [rad], ``acted``: the same angle at the
+    time the wear acted. Returns the contact energy lost with the removed material [J].
     """
     lost = 0.0
     integral = pending[0, k]
@@ -287,18 +288,18 @@ def deposit_due(contacts, surfaces, approach, start, now, turned, pending, out_w
 # The motion of a crank behind a coupling, a spring and a damper (physics.md section 7).
 #
 # The drive turns as given; the crank's angle and speed are states. In a part of an interval of length h the
-# coupling's torque T is that of its middle, where the crank is at angle + h/2 speed; with the crank's change
-# of speed at the end this is Störmer's and Verlet's method. The crank's acceleration a follows within each
-# step,
+# coupling's torque T is the torque in the part's middle, where the crank is at angle + h/2 speed. With the
+# crank's change of speed at the end this is Störmer's and Verlet's method. The crank's acceleration a follows
+# within each step,
 #
 #     A e'' + m a = F + Q,    m e'' + (c + h d / 2) a = T - T_rest,
 #
-# with m the drive torque's coefficients of e'', c those of a, T_rest the drive torque without both, and h d /
-# 2 because the damper d sees the mean of the speeds. Elimination of a changes the inverse of A by a product
-# of vectors, and the accelerations without contact by another: a light crank yields to impacts, as a real
-# one.
+# with m the drive torque's coefficients of e'', c the coefficients of a, and T_rest the drive torque without
+# both. The term h d / 2 appears because the damper d sees the mean of the speeds. Elimination of a changes
+# the inverse of A by a product of vectors, and the accelerations without contact by a second product: a light
+# crank yields to impacts, as a real crank does.
 #
-# Neglected: what the rotation of worn walls (row CAM of a sample) adds to T_rest in e'', not in a.
+# Neglected: the contribution of rotating worn walls (row CAM of a sample) to T_rest in e'', but not in a.
 
 
 @kernel
@@ -309,7 +310,7 @@ def coupling_torque(law, drive_angle, drive_speed, angle, speed):
 
 @kernel
 def release(coupling, angle, length, torque, work):
-    """Let the crank yield in a part of a length [s] in which a torque [N m] acts; as `_let_yield`."""
+    """Let the crank yield in a part of a length [s] under a torque [N m]; see `_let_yield`."""
     i, w = blend(coupling.inertia.shape[0] - 1, angle)
     inertia = coupling.inertia[i] + w * (coupling.inertia[i + 1] - coupling.inertia[i])
     inertia += 0.5 * length * coupling.law[DAMPING]
@@ -322,7 +323,8 @@ def release(coupling, angle, length, torque, work):
 def turn_crank(law, whole, steeper, length, torque, impulse, state, statistics, work):
     """Turn the crank in a part of a length [s], and let the statistics count the coupling's torque [N m].
 
-    ``impulse``: integral of the torque before the part; since then, they counted that at a steady crank.
+    ``impulse``: integral of the torque before the part. Since then, the statistics counted the torque at a
+    steady crank.
     """
     integral, motor, crank, now = statistics.drive_integral, state.drive[SPEED], work.crank, work.now
     needed = integral[TORQUE] - impulse
@@ -386,8 +388,8 @@ def _let_yield(inertia, torque, now, x, v, by_v, along, by_speed):
 def _follow_speed(whole, now, x, v, by_v, by_speed):
     """Let the tables' forces follow the crank's speed; returns the drive torque's derivative by it [N m s].
 
-    An impact changes the speed as it changes e', since whole w + m e' does not: with the speed at the begin
-    of the part, what turns with the crank would have pushed a light crank away.
+    An impact changes the speed as it changes e', because whole w + m e' does not change. With the speed at
+    the start of the part, the masses that turn with the crank would push a light crank away.
     """
     d, by, speed, held = now.bare.shape[0], now.torque_a, now.speed[0], 0.0
     steeper = 2.0 * speed * now.torque[2] + now.torque[3]
@@ -407,7 +409,7 @@ def _follow_speed(whole, now, x, v, by_v, by_speed):
 
 @kernel
 def _turned(whole, steeper, length, needed, torque, now, e, v, x, e1, v1):
-    """What a part of a length [s] adds to the crank's angle [rad] and speed [rad/s].
+    """Change of the crank's angle [rad] and speed [rad/s] in a part of a length [s].
 
     ``needed``: integral of the drive torque at a steady crank [N m s]; ``torque``: of the coupling [N m]. The
     eccentricities and rates at the end are in rows e1 and v1 of x, those at the begin in e and v (d,).

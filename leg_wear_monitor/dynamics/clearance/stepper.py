@@ -65,7 +65,7 @@ from leg_wear_monitor.wear import BUSHING
 from leg_wear_monitor.workers import compiled_beside
 
 INTERVALS = 2048  # intervals per turn at the setup's speed
-# where only statistics and wear are asked, and the drive is rigid; their errors are in physics.md section 7
+# Used if only statistics and wear are needed, and the drive is rigid; the errors are in physics.md section 7.
 STATISTICS_INTERVALS = 1024
 _MOST_PARTS = 8  # parts of an interval of the usual length: bounds its cost
 TOLERANCE_M = 5.0e-9  # local error of a step in the eccentricities [m]; a smaller one does not change means
@@ -111,9 +111,9 @@ class ClearanceStepper:
         Time between the instants at which the state exists; default: `INTERVALS` per turn at the setup's
         speed.
     tolerance_m : float
-        Local error allowed in a step [m]; that of the rates is `TOLERANCE_RATE` times it [m/s].
+        Local error allowed in a step [m]; the rates' allowed error is `TOLERANCE_RATE` times it [m/s].
     tables : ClearanceTables, optional
-        Tables of this setup, to reuse those built before.
+        Tables of this setup, to reuse existing tables.
 
     Raises
     ------
@@ -242,7 +242,7 @@ class ClearanceStepper:
         -------
         status, k : int
             `DONE`, or the reason for stopping and the clearance joint concerned (-1: none); the state is then
-            that of the last whole interval.
+            the state of the last whole interval.
         """
         status, k = advance_clearances(
             self.model, self._setup.surfaces.feeds_back, self.state, polynomial, t_end, statistics, self.work
@@ -250,7 +250,7 @@ class ClearanceStepper:
         return int(status), int(k)
 
     def advance_address(self, polynomial: Floats, statistics: RunStatistics) -> int:
-        """Address by which compiled code calls `ADVANCE` with this stepper; compiles it if need be."""
+        """Address of `ADVANCE` for calls with this stepper from compiled code; compiles it if need be."""
         feeds_back = self._setup.surfaces.feeds_back
         return ADVANCE.address(self.model, feeds_back, self.state, polynomial, 0.0, statistics, self.work)
 
@@ -275,7 +275,7 @@ def length_of(setup: Setup, intervals: int) -> float:
 
 
 def _parts(tables: ClearanceTables, length: float) -> Ints:
-    """Number of parts (N,) of an interval at the tables' points; ``length``: over that of the usual one.
+    """Number of parts (N,) of an interval at the tables' points; ``length``: ratio to the usual interval.
 
     A longer interval has more parts, so that none is longer where the linkage moves fast.
     """
@@ -303,7 +303,8 @@ def _toe_deviations(toe: Floats, speed: float, e: Floats, v: Floats, a: Floats) 
     """
     d = len(e)
     by, turning = toe[:, 1 : 1 + d], speed * toe[:, 1 + d :]
-    # as in the run statistics, without the second derivative by the crank angle, whose part is 1e-3
+    # Same formula as in the run statistics, without the second derivative by the crank angle, which
+    # contributes 1e-3.
     return np.stack([by @ e, by @ v + turning @ e, by @ a + 2.0 * (turning @ v)])
 
 
@@ -483,7 +484,7 @@ def advance_beside() -> AbstractContextManager[None]:
 
 @contextmanager
 def motion_beside() -> Iterator[None]:
-    """Have two processes compile the motion: `advance_clearances` the second, `observe` this one."""
+    """Have two processes compile the motion: the second `advance_clearances`, this process `observe`."""
     with advance_beside():
         compile_for(observe, *observe_arguments())
         yield
@@ -506,7 +507,7 @@ class LoadedTable(NamedTuple):
 
 
 class LoadedTables(NamedTuple):
-    """Those of `ClearanceTables` in `UNDER_LOAD`."""
+    """The tables of `ClearanceTables` in `UNDER_LOAD`."""
 
     motion: LoadedTable
     reaction: LoadedTable
@@ -530,17 +531,17 @@ def under_trial_force(linkage: Linkage) -> list[Linkage]:
 def loaded_tables(
     linkage: Linkage, contacts: ContactArrays, tables: ClearanceTables, basis: Basis | None = None
 ) -> LoadedTables:
-    """What a force on the toe changes.
+    """The tables that a force on the toe changes.
 
     Parameters
     ----------
     linkage : Linkage
-        One without a toe has nothing to push.
+        Without a toe, no force acts.
     contacts : ContactArrays
     tables : ClearanceTables
-        Of this linkage; `put_force` changes them.
+        Tables of this linkage; `put_force` changes them.
     basis : Basis, optional
-        Of these tables, loaded as `under_trial_force`.
+        Basis of these tables, loaded as `under_trial_force`.
     """
     basis = basis or build_basis(linkage, contacts, loaded=under_trial_force(linkage))
     found = []
@@ -561,7 +562,7 @@ def put_force(loaded: LoadedTables, force: Floats) -> None:
 
 
 def _slope(table: Floats | Singles, rows: Floats | Singles) -> tuple[Flags, Floats]:
-    """Columns in which a table under a trial force is not that without it, and what they change by per N."""
+    """Columns of a table that a trial force changes, and their change per N."""
     slope: Floats = np.subtract(table.reshape(rows.shape), rows, dtype=float)
     slope /= _TRIAL_N
     changed = np.asarray(slope.any(axis=0))
@@ -573,6 +574,6 @@ def _loaded(rows: Floats | Singles, slopes: Sequence[tuple[Flags, Floats]]) -> L
     columns = np.flatnonzero(np.any([none, *(changed for changed, _ in slopes)], axis=0))
     parts = np.zeros((3, len(rows), len(columns)))
     parts[0] = rows[:, columns]
-    for part, (changed, slope) in zip(parts[1:], slopes, strict=False):  # without a toe there is no column
+    for part, (changed, slope) in zip(parts[1:], slopes, strict=False):  # no column without a toe
         part[:, changed[columns]] = slope
     return LoadedTable(rows, columns.astype(np.int64), parts)

@@ -69,7 +69,7 @@ class ClearanceTables(NamedTuple):
 def build_basis(
     linkage: Linkage, contacts: ContactArrays, points: int = POINTS, loaded: Sequence[Linkage] = ()
 ) -> Basis:
-    """What the tables of a linkage are made of, but for the radii of its clearance joints: most of the time.
+    """Data for the tables of a linkage, except the radii of its clearance joints: they take most of the time.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def build_basis(
     points : int
         Crank steps per turn.
     loaded : sequence of Linkage
-        The same linkage under other loads, whose bases are to be made as well.
+        The same linkage under other loads; their bases are made as well.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def build_tables(
     points : int
         Crank steps per turn.
     basis : Basis, optional
-        That of the same linkage and clearance joints, with any radii; ``points`` is then not used.
+        Basis of the same linkage and clearance joints, with any radii; ``points`` is then not used.
 
     Returns
     -------
@@ -240,7 +240,7 @@ def _by_e(_linkage: Linkage, _contacts: ContactArrays, basis: Basis) -> Singles:
 
 
 def _in_blocks(table: Floats | Singles) -> Singles:
-    """A table (M + 1, d, u) in the order in which vectors are taken from it, (M + 1, u / WIDTH, d, WIDTH)."""
+    """A table (M + 1, d, u) in the order that vectors are read, (M + 1, u / WIDTH, d, WIDTH)."""
     points, d, u = table.shape
     blocks = np.zeros((points, padded(u) // WIDTH, d, WIDTH), dtype=np.float32)
     for i, first in enumerate(range(0, u, WIDTH)):

@@ -1,4 +1,4 @@
-"""Where compiled code may lie. Its index files are pickles, so nobody else may be able to write them."""
+"""Directories for compiled code. Its index files are pickles, so no other user may be able to write them."""
 
 import atexit
 import fcntl
@@ -24,16 +24,16 @@ _OTHERS_WRITE, _OTHERS_ENTER, _OTHERS = 0o022, 0o011, 0o077
 
 
 def fault_of(path: Path) -> str | None:
-    """Say why another local user could write below a path, or put another directory in its place.
+    """Say why another local user could write below a path, or replace its directory.
 
-    Every directory and symbolic link on the way must belong to this user or to root. A directory that
-    others can write to is accepted only with the sticky bit, as ``/tmp`` has it, and only on the way; below a
-    directory that nobody else can enter, the modes do not matter.
+    Every directory and symbolic link on the way must belong to this user or to root. A directory that others
+    can write to is accepted only with the sticky bit, as ``/tmp`` has it, and only on the way. Below a
+    directory that no other user can enter, the modes do not matter.
 
     Parameters
     ----------
     path : pathlib.Path
-        Need not exist; what does not exist is not judged.
+        Need not exist; missing parts are not checked.
 
     Returns
     -------
@@ -78,12 +78,12 @@ def make_private(path: Path) -> str | None:
     Parameters
     ----------
     path : pathlib.Path
-        Directories above it are made with mode 0700, too.
+        Directories above it are made with mode 0700 as well.
 
     Returns
     -------
     str or None
-        What is wrong with it, None if it can be used.
+        Fault of the directory, None if it can be used.
     """
     fault = fault_of(path)
     if fault:
@@ -98,7 +98,7 @@ def make_private(path: Path) -> str | None:
         return f"{path} cannot be made: {error.strerror}"
     if not os.access(path, os.W_OK | os.X_OK):
         return f"{path} cannot be written to"
-    return fault_of(path)  # somebody may have been quicker with a part of it
+    return fault_of(path)  # a concurrent process may have made a part of it
 
 
 @cache
@@ -137,8 +137,8 @@ def code_directory(name: str) -> Path | None:
 def _remove_old(leaf: Path) -> None:
     """Remove directories that a newer version of the same code has replaced.
 
-    The two that were used last stay, and what was used within a day: who works on several copies compiles
-    none of them anew.
+    The two most recently used directories stay, and every directory used within a day, so that a developer
+    with several copies compiles none of them again.
     """
     group, _, _ = leaf.name.rpartition("-")
     now = leaf.stat().st_mtime
@@ -160,7 +160,7 @@ def kept_directories(place: Path) -> list[Path]:
 
 @contextmanager
 def one_process_at_a_time(path: Path) -> Iterator[None]:
-    """Wait until no other process is inside with the same lock file; where there are no locks, do not wait.
+    """Wait until no other process is inside with the same lock file; without lock support, do not wait.
 
     A process that ends inside, however it does, lets the next one in.
 
@@ -192,7 +192,7 @@ def _home() -> Path | None:
 
 
 def _usual_homes() -> list[tuple[str, Path]]:
-    """Where compiled code may lie, in the order of preference, each with who says so."""
+    """Possible directories for compiled code in order of preference, each with the source of the path."""
     asked = [(name, os.environ.get(name)) for name in _ASKED]
     homes = [(name, Path(home).absolute()) for name, home in asked if home]
     user = Path(os.path.expanduser("~"))  # "~" itself where there is none
@@ -211,7 +211,7 @@ def _home_of_this_process() -> Path | None:
             shutil.rmtree(home, ignore_errors=True)
 
     atexit.register(remove)
-    if fault_of(home):  # the temporary directory itself is another's
+    if fault_of(home):  # other users can write to the temporary directory
         return None
     os.environ[VARIABLE] = str(home)
     return home

@@ -22,13 +22,13 @@ from leg_wear_monitor.compiled.cache import PACKAGE, code_directory, one_process
 
 # numba's compiler, told to optimise an entry once and as a whole: all that is private in numba is here.
 #
-# By itself numba compiles every function as a program of its own: it writes the wrappers that Python and C
-# would call it by, optimises it with all that it calls, and makes machine code of it. A chain of kernels pays
-# that at every level, for code that is inlined into the next level and thrown away. Here a kernel is typed
-# and lowered and no more; the entry links the kernels that it needs, and is optimised once.
+# By default, numba compiles every function as a separate program: it writes the wrappers that Python and C
+# would call, optimises it with all functions that it calls, and makes machine code of it. A chain of kernels
+# pays for this at every level, for code that is inlined into the next level and thrown away. Here a kernel is
+# only typed and lowered; the entry links the kernels that it needs, and is optimised once.
 #
-# Where numba's internals are not as expected, `AVAILABLE` is False and plain numba compiles: the same
-# results, later.
+# If numba's internals are not as expected, `AVAILABLE` is False and plain numba compiles: the same results,
+# later.
 
 
 _LIBRARY = (
@@ -39,7 +39,7 @@ _DISPATCHER = ("add_overload", "get_call_template", "get_overload")
 
 
 def _unliteral(one: Any) -> Any:
-    """The type of a constant; another type as it is."""
+    """The type of a constant; any other type unchanged."""
     from numba.core.types.misc import unliteral
 
     return unliteral(one)
@@ -78,10 +78,10 @@ _Library, _Compiler, _Dispatcher = _FOUND or (object, object, object)
 
 
 class _Part(_Library):  # type: ignore[misc]
-    """Code of a kernel: only ever linked into an entry, so neither optimised nor made machine code of."""
+    """Code of a kernel. It is only linked into an entry, so it is neither optimised nor compiled."""
 
     def finalize(self) -> None:
-        """Leave it as it was lowered; what it calls is linked beside it, not into it."""
+        """Leave it as it was lowered; the kernels that it calls are linked next to it, not into it."""
         self._finalized = True
 
     def get_pointer_to_function(self, name: str) -> int:
@@ -114,13 +114,13 @@ class _PartDispatcher(_Dispatcher):  # type: ignore[misc]
 
 
 class KernelDispatcher(_Dispatcher):  # type: ignore[misc]
-    """A kernel: compiled like an entry if Python calls it, a part of what calls it in compiled code.
+    """A kernel: compiled like an entry if Python calls it, a part of the caller in compiled code.
 
     Parameters
     ----------
     py_func : callable
     targetoptions : dict
-        As those of `numba.njit`.
+        Same options as for `numba.njit`.
     """
 
     def __init__(self, py_func: Callable[..., object], targetoptions: dict[str, object]) -> None:
@@ -134,12 +134,12 @@ class KernelDispatcher(_Dispatcher):  # type: ignore[misc]
         return self._part.get_call_template([_unliteral(one) for one in args], general)
 
     def get_overload(self, sig: Any) -> Any:
-        """What stands for the part with a signature."""
+        """Overload of the part for a signature."""
         return self._part.get_overload(sig)
 
 
 class _Place:
-    """Where numba stores code: a directory whose name is a digest of all sources, wherever they lie.
+    """Directory where numba stores code: its name is a digest of all sources, wherever they lie.
 
     Its own locators know the source by its path and time, so an equal copy would be compiled again.
     """
@@ -155,21 +155,21 @@ class _Place:
         return str(self._directory)
 
     def get_source_stamp(self) -> str:
-        """Always the same: another source has another directory."""
+        """Always the same, because different sources have different directories."""
         return ""
 
     def get_disambiguator(self) -> str:
-        """What tells functions of one name apart."""
+        """Text that distinguishes functions of the same name."""
         return str(self._line)
 
 
 def store(entry: Any, directory: Path) -> None:
     """Have numba store an entry's code in a directory, and load it from there.
 
-    numba stores an entry's intermediate code beside its machine code, for other entries to be linked with,
-    parses it again at each start and keeps it; and before it loads anything it registers all that it can
-    compile. Nothing here is linked with an entry (`ByAddress`), and what is loaded was compiled: without
-    both, a monitor needs 60 MB less and starts 0.6 s earlier.
+    By default, numba stores an entry's intermediate code next to its machine code, so that other entries can
+    link it; it parses this code again at each start and keeps it. Before it loads anything, it registers all
+    functions that it can compile. Here no code is linked with an entry (`ByAddress`), and loaded code was
+    compiled before. Without both steps, a monitor needs 60 MB less and starts 0.6 s earlier.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def store(entry: Any, directory: Path) -> None:
         from numba.core.caching import CompileResultCacheImpl, FunctionCache
 
         class Locators:
-            """As numba asks for them."""
+            """Locators in the form that numba asks for."""
 
             @staticmethod
             def from_function(function: Callable[..., object], _file: str) -> _Place:
@@ -203,7 +203,7 @@ def store(entry: Any, directory: Path) -> None:
                 return result
 
         class Cache(FunctionCache):  # type: ignore[misc]
-            """Loads without registering what compiles; where there is no code, the compiler registers it."""
+            """Loads without registering compilable functions; without code, the compiler registers them."""
 
             _impl_class = Stored
 
@@ -225,7 +225,7 @@ def store(entry: Any, directory: Path) -> None:
 
 
 def _names_alone(intermediate: bytes) -> bytes:
-    """Intermediate code with the names that are defined in another, and nothing else."""
+    """Intermediate code that contains only the names defined in the given code."""
     from llvmlite.binding import parse_assembly, parse_bitcode
 
     module = parse_bitcode(intermediate)
@@ -244,14 +244,14 @@ def address_of(entry: Any, arguments: Iterable[object], returns: Any) -> int:
     ----------
     entry : dispatcher
     arguments : iterable
-        Any of the types that it will be called with.
+        Any of the types of its later calls.
     returns : numba type
-        Expected type of what it returns.
+        Expected return type.
 
     Raises
     ------
     TypeError
-        If the entry returns another type.
+        If the entry returns a different type.
     """
     types = tuple(map(entry.typeof_pyval, arguments))
     entry.compile(types)
@@ -267,7 +267,7 @@ def caller(returns: Any) -> Any:
     Parameters
     ----------
     returns : numba type
-        What the code at the address returns.
+        Return type of the code at the address.
     """
     from numba.core.cgutils import if_unlikely, unpack_tuple
     from numba.extending import intrinsic
@@ -303,18 +303,18 @@ at_compilation: list[Callable[[], None]] = []  # called if an entry is compiled 
 def uncompiled(function: Any) -> Any:
     """The Python function of a kernel or an entry; other values as they are.
 
-    For a formula that Python needs once: a kernel that Python calls is compiled in each process anew.
+    Used for a formula that Python needs once: a kernel that Python calls is compiled again in each process.
     """
     return getattr(function, "py_func", function)
 
 
 def _description(value: object, digest: Any, known: set[object]) -> None:
-    """Add to a digest what a value is for the compiler, with all that it depends on in its turn.
+    """Add to a digest the compiler's view of a value, including all values that it depends on.
 
     Raises
     ------
     TypeError
-        For a kind of value of which it is not known what compiled code makes of it.
+        For a kind of value with unknown effect on compiled code.
     """
     function = uncompiled(value)
     if isinstance(function, FunctionType):
@@ -337,7 +337,7 @@ def _description(value: object, digest: Any, known: set[object]) -> None:
         name = f"{getattr(value, '__module__', '')}.{value.__name__}"
         digest.update(f"name {name} {getattr(value, '_field_defaults', '')} ".encode())
         digest.update(f"{getattr(value, '_fields', '')} ".encode())
-    elif isinstance(value, _Intrinsic):  # defined in this room, of which all sources are in the digest
+    elif isinstance(value, _Intrinsic):  # defined in this package; the digest covers its sources
         cells = [cell.cell_contents for cell in value._defn.__closure__ or ()]
         digest.update(f"intrinsic {value._name} {[str(one) for one in cells if not callable(one)]} ".encode())
     elif isinstance(value, np.dtype):
@@ -367,7 +367,8 @@ def _names_in(code: CodeType) -> Iterator[str]:
 def _add_function(function: FunctionType, digest: Any, known: set[object]) -> None:
     """Code of a function, and every global and every variable around it that it uses.
 
-    A name may be that of an attribute: of a module of this package it is taken as one, and as a global, too.
+    A name may be the name of an attribute. For a module of this package it is taken as an attribute, and also
+    as a global.
     """
     _add_code(function.__code__, digest, known)
     _description(function.__defaults__ or (), digest, known)
@@ -398,9 +399,9 @@ def _compiler() -> bytes:
 def cache_directory(function: Callable[..., object] | None = None) -> Path | None:
     """Directory of the compiled code of a function, named by a digest of all that it is compiled from.
 
-    numba checks only the file of the cached function itself: after a change of a kernel in another file it
-    would use the old code. The digest covers the code of the function, of all that it calls, and the values
-    of the globals that they use; so a change of anything else in their files compiles nothing anew. A
+    numba checks only the file of the cached function itself: after a change of a kernel in a different file
+    it would use the old code. The digest covers the code of the function, of all functions that it calls, and
+    the values of the globals that they use; so other changes in their files compile nothing again. A
     directory outside the package also works if the package directory is read-only.
 
     Parameters
@@ -417,7 +418,7 @@ def cache_directory(function: Callable[..., object] | None = None) -> Path | Non
     Raises
     ------
     TypeError
-        If the function uses a global of a kind of which it is not known what compiled code makes of it.
+        If the function uses a global of a kind with unknown effect on compiled code.
     """
     digest = hashlib.sha256(_compiler())
     if function is None:
@@ -445,7 +446,7 @@ def kernel(function: _Function) -> _Function:
 def entry(function: _Function) -> _Function:
     """Compile a function for calls from Python: cached on disk, and without the interpreter's lock.
 
-    While another process compiles the same entry, this one waits for it and loads the result.
+    While a different process compiles the same entry, this process waits for it and loads the result.
     """
     compiled = numba.njit(nogil=True, **_ENTRY)(function)
     if not numba.config.DISABLE_JIT:
@@ -499,7 +500,7 @@ class ByAddress:
     target : callable
         The entry.
     returns : numba type
-        What it returns.
+        Return type of the entry.
 
     Attributes
     ----------
@@ -520,7 +521,7 @@ class ByAddress:
 
 
 def _called_directly(target: Callable[..., object]) -> Callable[..., Any]:
-    """An entry as compiled with whoever calls it, or not compiled."""
+    """An entry compiled together with its caller, or not compiled."""
 
     @kernel
     def call(_address, arguments):  # type: ignore[no-untyped-def]
@@ -531,8 +532,8 @@ def _called_directly(target: Callable[..., object]) -> Callable[..., Any]:
 
 # Records of a structured dtype as state of compiled code, with the same access in compiled and plain Python.
 #
-# An entry takes an array of records, also for a single one, and begins with ``record = records[0]``: numba
-# identifies the type of an array in half a microsecond, that of a `numpy.record` in ten.
+# An entry takes an array of records, also for a single record, and begins with ``record = records[0]``: numba
+# identifies the type of an array in half a microsecond, the type of a `numpy.record` in ten.
 
 
 Record = Any
@@ -561,7 +562,7 @@ def new_records(n: int, dtype: np.dtype[Any]) -> Records:
 
 
 def _names(dtype: np.dtype[Any]) -> Iterator[str]:
-    """Names of all fields, including those of nested records."""
+    """Names of all fields, including the fields of nested records."""
     for name, (inner, *_) in (dtype.fields or {}).items():
         yield name
         yield from _names(inner.base)

@@ -10,12 +10,12 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import models, register_model
 
-# Types of vectors in compiled code, and what their operations have in common.
+# Types of vectors in compiled code, and the shared parts of their operations.
 
 
 WIDTH = 8
 
-# a formula without a jump divides by the larger of this and what may be 0, whatever its unit
+# A formula without a jump divides by the larger of this and a value that may be 0, whatever its unit.
 LEAST_DIVISOR = 1.0e-300
 
 WORD, NUMBER = ir.IntType(32), ir.DoubleType()
@@ -81,7 +81,7 @@ def as_vector(context: Any, builder: Any, kind: Any, value: Any) -> Any:
 
 
 def is_number(kind: Any) -> bool:
-    """True if a type is that of numbers that a vector may be combined with."""
+    """True if a type is a number type that can be combined with a vector."""
     return isinstance(kind, types.Float | types.Integer | types.Boolean)
 
 
@@ -137,7 +137,7 @@ def folded(value: Floats, combine: Callable[[Floats, Floats], Floats]) -> float:
 
 
 def replaced(value: Floats, i: int, number: float) -> Floats:
-    """A vector with another number at an entry."""
+    """A vector with a different number at an entry."""
     found = value.copy()
     found[i] = number
     return found
@@ -186,7 +186,7 @@ def _place(context: Any, builder: Any, sig: Any, values: Any) -> tuple[Any, Any]
 
 
 def _flags_below(builder: Any, count: Any) -> Any:
-    """Flags of the entries whose number is below a count."""
+    """Flags of the entries with a number below a count."""
     return builder.icmp_signed("<", numbered(count.type), spread(builder, count))
 
 
@@ -290,7 +290,7 @@ def fetch_entry(_context: Any, array: Any, index: Any) -> Any:
 
 
 def copy(_context: Any, source: Any, out: Any) -> Any:
-    """Copy an array without gaps into another of as many entries."""
+    """Copy an array without gaps into a second array of as many entries."""
 
     def generate(context: Any, builder: Any, sig: Any, values: Any) -> Any:
         both = zip(sig.args, values, strict=True)

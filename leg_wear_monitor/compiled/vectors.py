@@ -1,11 +1,10 @@
 """Eight neighbouring numbers of an array as one value, for kernels that work along short rows.
 
 A leg in clearance coordinates has rows of two to twenty numbers: x and y of each joint, or one number for
-each joint. A loop over them is too short for the compiler's own vector code, and what depends on the state of
-a joint is a jump that the processor often guesses wrong. A vector is computed in one instruction (AVX-512),
-two (AVX2) or four, stays in a register, and has a choice of two values in place of a jump. Every entry is
-rounded as a number by itself would be, and sums have a fixed order, so the results do not depend on the
-machine.
+each joint. A loop over them is too short for the compiler's own vector code, and a branch on the state of a
+joint is a jump that the processor often guesses wrong. A vector is computed in one instruction (AVX-512), two
+(AVX2) or four, stays in a register, and has a choice of two values in place of a jump. Every entry is rounded
+as a single number would be, and sums have a fixed order, so the results do not depend on the machine.
 
 Formulas written with `root`, `largest` and `where` hold for numbers and for vectors.
 
@@ -94,7 +93,7 @@ def entry(_context: Any, _value: Any, _i: Any) -> Any:
 
 
 def replaced(_context: Any, _value: Any, _i: Any, _number: Any) -> Any:
-    """The vector with another number at entry i."""
+    """The vector with a different number at entry i."""
 
     def generate(_context: Any, builder: Any, _sig: Any, values: Any) -> Any:
         vector, i, number = values
@@ -124,7 +123,7 @@ def repeated(_context: Any, _number: Any) -> Any:
 
 
 def any_flag(_context: Any, _flags: Any) -> Any:
-    """True if one of eight answers is yes."""
+    """True if one of eight answers is true."""
 
     def generate(_context: Any, builder: Any, _sig: Any, values: Any) -> Any:
         bits = ir.IntType(WIDTH)
@@ -237,7 +236,7 @@ def _combined(name: str) -> Callable[[Any, Any, Any], Any]:
 
 
 def _compared(sign: str) -> Callable[[Any, Any, Any], Any]:
-    """Builds a comparison, whose answer for what cannot be compared is no."""
+    """Builds a comparison; it is false for values that cannot be compared."""
     return lambda builder, a, b: builder.fcmp_ordered(sign, a, b)
 
 
@@ -306,14 +305,14 @@ def _kernel(compiled: Any, without: Callable[..., Any]) -> Any:
     return intrinsic(compiled) if _COMPILED else without
 
 
-# vector_at(array, index): entries of a row of an array from an index on, of which the row has as many
+# vector_at(array, index): entries of a row of an array from an index on; the row must have as many
 vector_at: Any = _kernel(vector_kinds.loading(whole=True), vector_kinds.loaded)
 # part_at(array, index): the same; entries beyond the row's end are 0
 part_at: Any = _kernel(vector_kinds.loading(whole=False), vector_kinds.loaded)
-# put_vector(array, index, value), put_part(array, index, value): store a vector, or what fits of it
+# put_vector(array, index, value), put_part(array, index, value): store a vector, or the part that fits
 put_vector: Any = _kernel(vector_kinds.storing(whole=True), vector_kinds.stored)
 put_part: Any = _kernel(vector_kinds.storing(whole=False), vector_kinds.stored)
-# copy_array(source, out): copy an array into another of as many entries; both without gaps
+# copy_array(source, out): copy an array into a second array of as many entries; both without gaps
 copy_array: Any = _kernel(
     vector_kinds.copy, lambda source, out: np.copyto(out.reshape(-1), source.reshape(-1))
 )
@@ -330,7 +329,7 @@ zip_last: Any = _kernel(shuffling(_ZIPPED[WIDTH:]), vector_kinds.picked(_ZIPPED[
 # vector_sum(value), vector_max(value): of all entries
 vector_sum: Any = _kernel(total, lambda value: vector_kinds.folded(value, np.add))
 vector_max: Any = _kernel(greatest, lambda value: vector_kinds.folded(value, vector_kinds.larger_of))
-# entry_of(value, i), with_entry(value, i, number): an entry, and a vector with another one there
+# entry_of(value, i), with_entry(value, i, number): an entry, and a vector with a different entry there
 entry_of: Any = _kernel(entry, lambda value, i: float(value[i]))
 with_entry: Any = _kernel(replaced, vector_kinds.replaced)
 # every(number), only(number, i): a vector of the same number everywhere, or at entry i and 0 elsewhere

@@ -1,4 +1,4 @@
-"""Errors of this package, printable text, suggestions for unknown names, and what an interrupt does.
+"""Errors of this package, printable text, suggestions for unknown names, and the handling of interrupts.
 
 `cli.start` imports this module before all others, so that Ctrl-C is answered at once: it imports little.
 """
@@ -19,7 +19,7 @@ def printable(text: str, most: int = _MOST_SHOWN) -> str:
     r"""Text from a file on one line, without control sequences for the terminal, and not too long.
 
     Characters that cannot be printed are replaced by their escapes (``\x1b``): control characters, line
-    breaks, marks that reverse the direction of writing, and bytes of a file name that are no UTF-8.
+    breaks, marks that reverse the direction of writing, and bytes of a file name that are not UTF-8.
 
     Parameters
     ----------
@@ -43,11 +43,11 @@ class ConfigError(LegWearError):
     Parameters
     ----------
     source : str
-        File or command-line option the value came from.
+        File or command-line option of the value.
     key : str
         Dotted path of the key, empty if the fault concerns the whole file.
     fault : str
-        What was found and what was expected, with its unit.
+        Found and expected value, with the unit.
 
     Examples
     --------
@@ -84,7 +84,7 @@ class ConfigWarning(UserWarning):
 def system_asked(
     source: object, fault: str, key: object = "", error_of: type[ConfigError] = ConfigError
 ) -> Iterator[None]:
-    """Within this context, what the system refuses is an error of a file or an option.
+    """Within this context, a refusal of the system becomes an error of a file or an option.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def extras_hinted() -> Iterator[None]:
     Raises
     ------
     LegWearError
-        Instead of the ModuleNotFoundError of an optional module. That of another module passes unchanged.
+        Replaces the ModuleNotFoundError of an optional module. Errors of other modules pass unchanged.
     """
     try:
         yield
@@ -147,15 +147,15 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 # Effect of an interrupt, also if an exception would be lost: in imports and in the compiler.
 #
 # A signal handler usually raises KeyboardInterrupt. But numba compiles in callbacks and finalisers, which
-# print an exception or swallow it, and an import that is cut short ends in a traceback or leaves half a
-# module. There the handler must not raise: it closes what is open (ledger, child processes, progress bar)
-# and ends the process.
+# print or swallow an exception, and an interrupted import ends in a traceback or leaves half a module. There
+# the handler must not raise: it closes all open things (ledger, child processes, progress bar) and ends the
+# process.
 
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C: 128 and the number of SIGINT, as shells have it."""
 
-# packages whose functions may swallow an exception
+# Packages with functions that may swallow an exception.
 _SWALLOWING = {"importlib", "_frozen_importlib", "_frozen_importlib_external", "llvmlite", "numba"}
 
 _closers: list[Callable[[], None]] = []
@@ -182,7 +182,7 @@ def would_be_lost(frame: FrameType | None) -> bool:
 def closed_on_interrupt(close: Callable[[], None]) -> Iterator[None]:
     """Have something closed if an interrupt ends the process within this context.
 
-    Whoever leaves the context in the usual way, or by an exception, closes it himself.
+    A caller that leaves the context normally, or by an exception, must close it itself.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ _Record = TypeVar("_Record", bound=attrs.AttrsInstance)
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a file and bring it to the disk; nobody ever sees a part of it.
+    """Write a file and bring it to the disk; readers never see a partial file.
 
     Several processes may write the same file at the same time: the last one counts.
 
@@ -54,9 +54,9 @@ def write_whole(path: Path, content: bytes) -> None:
 
 @contextmanager
 def unfinished(path: Path) -> Iterator[Path]:
-    """A new file beside ``path`` to write into; it is removed at the end, unless it was put in its place.
+    """A new file next to ``path`` to write into; it is removed at the end, unless it was put in its place.
 
-    Those of processes that were killed are removed at the start.
+    Files of killed processes are removed at the start.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def remove_parts(directory: Path, names: str) -> None:
         Pattern of the names of the files.
     """
     for part in directory.glob(f".{names}.part"):
-        with suppress(OSError):  # a process writes it, or it may not be removed: it harms nobody
+        with suppress(OSError):  # in use by a process, or not removable: harmless
             if part.is_file() and not part.is_symlink():
                 with part.open("r+b") as file:
                     fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -116,7 +116,7 @@ def read_json(path: str) -> Any:
     Raises
     ------
     ConfigError
-        If it cannot be read, or is no JSON.
+        If it cannot be read, or is not JSON.
     """
     try:
         return json.loads(Path(path).read_text(encoding="utf-8"))
@@ -152,7 +152,7 @@ def with_same_fields(kind: type[_Record], *of: object, **own: Any) -> _Record:
     )
 
 
-# Where the files that come with the package are: config/, launch/, bags/.
+# Directories of the files that come with the package: config/, launch/, bags/.
 
 
 class ShareNotFoundError(LegWearError):
@@ -163,9 +163,9 @@ def share_directory() -> Path:
     """Directory that contains config/, in every form of installation.
 
     A checkout is its own share directory; an editable install and ``colcon build --symlink-install`` lead
-    back to it. Otherwise pip and colcon put ``share/leg_wear_monitor`` into the prefix whose
-    ``lib/python3.x/site-packages`` holds this file, so it is met on the way up: no ROS and no environment
-    variable is needed.
+    back to it. Otherwise pip and colcon put ``share/leg_wear_monitor`` into the prefix that holds this file
+    in its ``lib/python3.x/site-packages``, so a search upwards finds it: no ROS and no environment variable
+    is needed.
 
     Returns
     -------
@@ -194,7 +194,7 @@ def package_version() -> str:
     return ElementTree.parse(share_directory() / "package.xml").findtext("version") or "unknown"
 
 
-# Tables as pandas has them; pandas is wanted only by whoever asks for one.
+# Tables in pandas form; pandas is imported only if a caller asks for one.
 
 
 def data_frame(columns: Mapping[str, Any], index: str | list[str] | None = None) -> "pd.DataFrame":
@@ -220,7 +220,7 @@ def data_frame(columns: Mapping[str, Any], index: str | list[str] | None = None)
 
 
 def received_json(text: str, source: str, most: int) -> Any:
-    """What a JSON text of a message contains, which anybody may have sent; NaN and infinities are None.
+    """Contents of a JSON message from an unknown sender; NaN and infinities become None.
 
     Parameters
     ----------

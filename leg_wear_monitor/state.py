@@ -1,7 +1,6 @@
-"""State of a leg: verdict, one believed clearance a joint, drive, load, diagnosis, remaining life.
+"""State of a leg: verdict, best estimate of each clearance, drive, load, diagnosis, remaining life.
 
-The monitor makes it, and all else that is shown of a leg is a view of it. SI units; None for what is not
-known.
+The monitor makes it, and every display of a leg is a view of it. SI units; None for unknown values.
 """
 
 import re
@@ -27,7 +26,7 @@ class Level(IntEnum):
 
 
 class _Word(Enum):
-    """Members whose value is the word that files contain."""
+    """Members that have the word in files as their value."""
 
     @property
     def words(self) -> str:
@@ -64,7 +63,7 @@ class Figure(_Word):
 
     @property
     def words(self) -> str:
-        """What operators read: a clearance by torque, by encoders or by hand is not meant."""
+        """Words for operators; they exclude a clearance measured by torque, by encoders or by hand."""
         return "modelled clearances" if self is Figure.CLEARANCES else super().words
 
 
@@ -80,13 +79,13 @@ class Evidence:
     Attributes
     ----------
     name : str
-        Name of the alarm, or of what was observed.
+        Name of the alarm, or of the observed quantity.
     value : float or None
-        Its value; None if it is not known.
+        Value of this quantity; None if it is not known.
     limit : float or None
-        Its limit; None where there is no limit.
+        Limit of this quantity; None if there is no limit.
     unit : str
-        Of both, SI; empty for a fraction.
+        SI unit of value and limit; empty for a fraction.
     """
 
     name: str
@@ -104,15 +103,15 @@ class Verdict:
     state : State
         State of the leg.
     joints : tuple of str
-        The joints that the reason concerns; empty if that is not known, or none is.
+        The joints that the reason concerns; empty if they are not known, or if there are none.
     why : str
         The reason, with values and units.
     since_ns : int
         Stamp since which the reason has been valid; 0 if it is not known.
     do : str
-        Next action of a person; commands stand between backticks, as they may in ``why``.
+        Next action for the operator; commands stand between backticks, as they may in ``why``.
     evidence : tuple of Evidence
-        Of all findings, that of the reason first.
+        Evidence of all findings; the evidence of the reason comes first.
     not_valid : tuple of Figure
         Kinds of values that are not valid meanwhile.
     fault_code : str
@@ -156,7 +155,7 @@ class JointClearance:
     Attributes
     ----------
     best_estimate_m : float or None
-        The clearance that the verdict rests on; None where nothing known of the joint is valid.
+        The clearance that the verdict rests on; None if no known value of the joint is valid.
     best_estimate_sigma_m : float or None
         Its standard deviation.
     best_estimate_source : str or None
@@ -165,17 +164,17 @@ class JointClearance:
     modelled_m : float
         Clearance when new, plus the modelled wear since.
     estimated_m : float or None
-        Clearance that measurements of the gait show.
+        Clearance estimated from measurements of the gait.
     estimated_sigma_m : float or None
         Its standard deviation.
     estimated_by : tuple of str
-        What shows it, such as ``encoders``.
+        Sources of this estimate, such as ``encoders``.
     change_m : float or None
-        Change since the baseline that the drive torque shows; None without a baseline.
+        Change since the baseline, estimated from the drive torque; None without a baseline.
     change_sigma_m : float or None
         Its standard deviation, without the error of the clearance in the baseline.
     measured_m : float or None
-        Clearance that somebody measured last on this part.
+        Clearance from the last measurement by hand on this part.
     measured_sigma_m : float or None
         Its standard deviation.
     new_m : float
@@ -183,7 +182,7 @@ class JointClearance:
     limit_m : float
         Limit of the clearance.
     status : State
-        What the verdict's findings say of the joint; ``not_monitored`` where nothing known of it is valid.
+        State of the joint by the verdict's findings; ``not_monitored`` if no known value of it is valid.
     """
 
     best_estimate_m: float | None = None
@@ -225,19 +224,19 @@ class Drive:
     Attributes
     ----------
     scale : Estimate or None
-        Measured over actual torque; None while a torque mismatch does not show that it is another one than 1.
+        Measured over actual torque; None while the torque residual does not show that it differs from 1.
     lag_s : Estimate or None
         Delay of the measured torque.
     coulomb_nm : Estimate or None
-        Constant friction; at one cadence it contains the viscous one.
+        Constant friction; at one cadence it contains the viscous friction.
     viscous_nms : Estimate or None
         Viscous friction; None while gait cycles of one cadence do not separate it.
     load_friction : Estimate or None
         Friction over the size of the torque that the drive transmits.
     bandwidth_hz : Estimate or None
-        Corner frequency of the low-pass between the leg and the torque; None if none is seen.
+        Corner frequency of the low-pass between the leg and the torque; None if none is detected.
     temperature_c : Estimate or None
-        Temperature of the drive [°C]; None where it is not measured.
+        Temperature of the drive [°C]; None if it is not measured.
     """
 
     scale: Estimate | None = None
@@ -256,7 +255,7 @@ class FootLoad:
     Attributes
     ----------
     source : str
-        What it is known by: ``measured``, ``estimated`` from the drive torque, or ``none``.
+        Source of the load: ``measured``, ``estimated`` from the drive torque, or ``none``.
     peak_n : float or None
         Largest vertical force in the mean over gait cycles.
     peak_sigma_n : float or None
@@ -266,7 +265,7 @@ class FootLoad:
     heel_strike_sigma, toe_off_sigma : float or None
         Their standard deviations from step to step.
     cycles : int
-        Number of gait cycles that it is from.
+        Number of gait cycles in the estimate.
     """
 
     source: str = "none"
@@ -281,14 +280,14 @@ class FootLoad:
 
 @attrs.frozen(kw_only=True)
 class TorqueDiagnosis:
-    """What the drive torque shows of the leg.
+    """Diagnosis of the leg from the drive torque.
 
     Attributes
     ----------
     state : str
         ``off``, ``waiting``, ``as_modelled`` or ``changed``.
     reason : str
-        Why there is no estimate yet, or why it is not to be believed now; empty otherwise.
+        Reason why there is no estimate yet, or why it is not valid now; empty otherwise.
     cycles_used : int
         Gait cycles in the estimate.
     cycles_not_used : dict of str to int
@@ -296,8 +295,8 @@ class TorqueDiagnosis:
     misfit : float or None
         RMS of the torque that load, friction and lag do not explain, as a fraction of the predicted RMS.
     cause : str or None
-        What explains it, such as ``clearance`` or ``lag``; None where nothing is to be explained, or more
-        than one cause does.
+        Explanation of the residual, such as ``clearance`` or ``lag``; None without a residual, or if more
+        than one cause explains it.
     cause_subject : str
         The joint or the body concerned; empty if there is none.
     cause_value : float or None
@@ -417,11 +416,11 @@ class LegState:
     load : FootLoad
         Load at the foot over the last gait cycles.
     diagnosis : TorqueDiagnosis
-        What the drive torque shows of the leg.
+        Diagnosis of the leg from the drive torque.
     life : dict of str to LifeHours or None
-        Remaining life of each joint, and of the ``leg``; None where it is not known or not valid.
+        Remaining life of each joint, and of the ``leg``; None if it is not known or not valid.
     life_answers : dict of str to str
-        What can be said of the remaining life of each joint, and of the ``leg``.
+        Statement on the remaining life of each joint, and of the ``leg``.
     first_probability : dict of str to float
         Probability of each joint to be the first at its limit; empty unless known.
     alarms : LegAlarms
@@ -445,7 +444,7 @@ class LegState:
     life_cycles: int = 0
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain object; null for what is not known."""
+        """Plain object; null for unknown values."""
         changes = [
             {"stamp_ns": change.stamp_ns, **part_document(change.alarm)} for change in self.alarms.changes
         ]

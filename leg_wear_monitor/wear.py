@@ -1,9 +1,9 @@
 """Worn surfaces: depth over angular sectors of bushing and journal (physics.md sections 5 and 6).
 
-Sector i spans the angles [i, i + 1] x 2 pi / N of its own body's frame. Wear is deposited in the sectors in
-which the two profiles overlap, in proportion to the overlap. On fresh surfaces these are the sectors of the
-arc cos psi = (R_b^2 + e^2 - R_j^2) / (2 R_b e); on worn surfaces, those where the journal overlaps the worn
-profile. A journal under a constant load therefore wears its own shape into the bushing, as in the
+Sector i spans the angles [i, i + 1] x 2 pi / N of its own body's frame. Wear is deposited in the sectors
+where the two profiles overlap, in proportion to the overlap. On fresh surfaces these are the sectors of the
+arc cos psi = (R_b^2 + e^2 - R_j^2) / (2 R_b e); on worn surfaces, the sectors where the journal overlaps the
+worn profile. A journal under a constant load therefore wears its own shape into the bushing, as in the
 closed-form solution.
 """
 
@@ -42,7 +42,7 @@ def fresh_surfaces(contacts: ContactArrays, feeds_back: bool, sectors: int = SEC
 def profile_at(profile, angle):
     """Depth [m] at an angle [rad] of the surface's own frame, and its derivatives [m/rad, m/rad^2].
 
-    The profile (N,) is interpolated by a quadratic spline, whose slope is continuous. physics.md section 6.
+    The profile (N,) is interpolated by a quadratic spline with a continuous slope. physics.md section 6.
     """
     n = profile.shape[0]
     before, here, after, w = _sectors_at(n, angle)
@@ -51,7 +51,7 @@ def profile_at(profile, angle):
 
 @kernel
 def profiles_at(depth, k, surface, angle):
-    """As `profile_at`, of eight joints from joint k on: depth (k, 2, N), a vector of angles."""
+    """Same as `profile_at`, for eight joints from joint k on: depth (k, 2, N), a vector of angles."""
     n = depth.shape[2]
     before, here, after, w = _sectors_at(n, angle)
     return _spline(
@@ -67,7 +67,7 @@ def profiles_at(depth, k, surface, angle):
 def _sectors_at(n, angle):
     """Numbers of the sectors before, at and after an angle [rad], and the fraction of the sector before it.
 
-    For numbers or vectors; the sectors' numbers are floats.
+    The arguments are numbers or vectors; the sectors' numbers are floats.
     """
     turns, last = angle * _TURNS_PER_RAD, n - 1.0
     u = n * (turns - floor(turns))
@@ -89,8 +89,8 @@ def _spline(n, w, before, here, after):
 def local_surfaces(contacts, surfaces, k, direction, angle_b, angle_j):
     """Local radii [m] of bushing and journal in a direction [rad] of the ground's frame, and derivatives.
 
-    The derivatives are those of the depths by the direction: slopes of bushing and journal [m/rad], then
-    second derivatives [m/rad^2]; 0 without wear feedback. physics.md section 6.
+    The derivatives are derivatives of the depths by the direction: slopes of bushing and journal [m/rad],
+    then second derivatives [m/rad^2]; 0 without wear feedback. physics.md section 6.
     """
     bushing = contacts.bushing_radius[k]
     journal = bushing - contacts.clearance[k]
@@ -105,8 +105,8 @@ def local_surfaces(contacts, surfaces, k, direction, angle_b, angle_j):
 def _weigh_arc(contacts, surfaces, k, ex, ey, angle_b, angle_j, centre, side, turning, out_weight):
     """Overlap [m] of the sectors from ``centre`` to one side (1 or -1); returns its sum [m] and their number.
 
-    ``turning``: cosine and sine of a sector, by which the direction is turned from one to the next.
-    physics.md section 6.
+    ``turning``: cosine and sine of a sector; each step turns the direction by this angle. physics.md section
+    6.
     """
     n = surfaces.depth.shape[2]
     width = TURN / n
@@ -153,7 +153,7 @@ def deposit_wear(contacts, surfaces, k, ex, ey, angle_b, angle_j, integral, out_
     sector = TURN / n
     turning = math.cos(sector), math.sin(sector)
     towards = math.floor((math.atan2(ey, ex) - angle_b) / sector) % n
-    # on a worn flank the overlap may begin some sectors beside; search order 0, 1, -1, 2, ...
+    # On a worn flank the overlap may begin some sectors away. The search order is 0, 1, -1, 2, ...
     for beside in range(2 * _BESIDE + 1):
         aside = (beside + 1) // 2
         centre = (towards + (aside if beside % 2 == 1 else -aside)) % n
@@ -210,7 +210,7 @@ def wear_zone(depth: Floats, fraction: float = 0.9) -> tuple[float, float] | Non
     if not total > 0.0:
         return None
     sums = np.concatenate([[0.0], np.cumsum(np.concatenate([depth, depth]))])
-    # for every start, the first end that contains the fraction
+    # The first end that contains the fraction, for every start.
     ends = np.searchsorted(sums, sums[:n] + fraction * total * (1.0 - 1.0e-12))
     start = int(np.argmin(ends - np.arange(n)))
     return 360.0 * start / n, 360.0 * int(ends[start]) / n

@@ -18,7 +18,7 @@ from typing import IO, Any
 from leg_wear_monitor.compiled.kernel import cache_directory, is_stored
 from leg_wear_monitor.errors import ConfigError, ConfigWarning, LegWearError, closed_on_interrupt
 
-# The code that a worker runs: it has to be that of who asks.
+# The code that a worker runs; it must be the same as the caller's code.
 
 
 @cache
@@ -39,9 +39,9 @@ def package_digest(*parts: str) -> str:
 Calls = Mapping[str, Callable[[], Any]]
 """Calls by their names; workers need picklable ones, such as a `functools.partial`."""
 
-TRIES = 3  # attempts at a call whose worker dies
-PATIENCE_S = 10.0  # time in which a scheduler has to answer
-WORKERS_S = 60.0  # time in which a scheduler has to have a worker
+TRIES = 3  # attempts at a call if its worker dies
+PATIENCE_S = 10.0  # time for a scheduler to answer
+WORKERS_S = 60.0  # time for a scheduler to get a worker
 
 
 def results(calls: Calls, workers: int = 1, scheduler: str | None = None) -> Iterator[tuple[str, Any]]:
@@ -173,9 +173,9 @@ def _end_with(parent: int) -> None:
     os._exit(1)
 
 
-# Python processes that this one starts, and compilation in a second one.
+# Python processes that this process starts, and compilation in a second process.
 #
-# What that one compiles reaches this one through the cache.
+# The cache passes the second process's compiled code to this process.
 
 
 def _processors() -> int:
@@ -189,7 +189,7 @@ def _processors() -> int:
 def compiled_beside(compile_it: Callable[[], None], entry: Callable[..., object]) -> Iterator[None]:
     """Have a second process compile an entry while the work inside compiles others.
 
-    Where the work inside needs the entry, it waits until the second process has stored it in the cache, and
+    If the work inside needs the entry, it waits until the second process has stored it in the cache, and
     loads it. If the second process fails, it compiles the entry itself. There is no second process if the
     entry is stored already, if nothing can be stored, or on one processor.
 
@@ -198,7 +198,7 @@ def compiled_beside(compile_it: Callable[[], None], entry: Callable[..., object]
     compile_it : callable
         Function of a module that the second process calls.
     entry : callable
-        What it compiles.
+        Entry that this function compiles.
 
     Warns
     -----
@@ -232,7 +232,8 @@ def python_command(call: Callable[[], None], *arguments: str) -> list[str]:
     *arguments : str
         Of the command line.
     """
-    # set inside, since what stands beside a user's script must not replace what Python itself starts with
+    # The path is set inside the command, because files next to a user's script must not replace modules that
+    # Python itself starts with.
     found = f"import sys; sys.path[:] = {sys.path!r}"
     called = f"from {call.__module__} import {call.__name__} as run; run()"
     return [sys.executable, "-P", "-c", f"{found}; {called}", *arguments]

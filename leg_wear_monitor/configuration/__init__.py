@@ -1,6 +1,6 @@
 """Settings: YAML within bounds, strict conversion with one clear line an error; keys declared once.
 
-What is imported here imports neither numpy nor numba.
+The modules imported here import neither numpy nor numba.
 """
 
 import math
@@ -26,7 +26,7 @@ class FieldError(ValueError):
     key : str
         Dotted path of the key.
     fault : str
-        What was found and what was expected.
+        Found and expected value.
     """
 
     def __init__(self, key: str, fault: str) -> None:
@@ -68,9 +68,9 @@ def described(
     Parameters
     ----------
     doc : str
-        What it is, in one line.
+        Meaning of the field, in one line.
     unit : str
-        SI unit, ``""`` where there is none.
+        SI unit, ``""`` if there is none.
     default, factory : optional
         Value when the key is absent; without either the key is required.
     check : callable, optional
@@ -78,7 +78,7 @@ def described(
     metadata : mapping, optional
         Further metadata, stored with unit and doc.
     in_repr : bool
-        True if it is in the object's repr; False for what no result depends on.
+        True if it is in the object's repr; False for a field that no result depends on.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def quantity(
     unit : str
         SI unit, ``""`` for a pure number.
     doc : str
-        What it is, in one line.
+        Meaning of the field, in one line.
     above, at_least, at_most : float, optional
         Bounds, the first exclusive.
     within : tuple of float, optional
@@ -128,12 +128,12 @@ def quantity(
     usual : tuple of float, optional
         Least and most of its size beyond which `doubts` names it.
     doubt : str or callable
-        What is said of a value beyond, with ``{value}``, ``{unit}`` and ``{usual}``; a function of the value
-        where the unit that is likely meant depends on it.
+        Message for a value beyond, with ``{value}``, ``{unit}`` and ``{usual}``; a function of the value
+        if the unit that is likely meant depends on it.
     default : optional
         Value when the key is absent; without it the key is required.
     check : callable, optional
-        Returns another fault of a value within its bounds, None if there is none.
+        Returns a further fault of a value within its bounds, None if there is none.
     metadata : mapping, optional
         Further metadata, stored with unit, doc and bounds.
 
@@ -161,7 +161,7 @@ def quantity(
 
 
 def doubts(thing: Any, section: str = "") -> Iterator[Doubt]:
-    """What is unusual of an attrs object; of several numbers of a key, the largest of those."""
+    """Unusual values of an attrs object; if a key has several numbers, the largest unusual number."""
     for field in attrs.fields(type(thing)):
         if not (usual := field.metadata.get("usual")):
             continue
@@ -196,7 +196,7 @@ def choice(names: tuple[str, ...], doc: str, *, default: str) -> Any:
 
 
 def part_document(part: Any) -> Any:
-    """Fields of a part, or a plain value; null for what is not known."""
+    """Fields of a part, or a plain value; null for unknown values."""
     if attrs.has(type(part)):
         return part_document(attrs.asdict(part, recurse=False))
     if isinstance(part, dict):

@@ -57,7 +57,7 @@ def unknown_fault(what: str, name: str, known: Collection[str], listed: str) -> 
     known : collection of str
         Known names, to find a renamed or similar one.
     listed : str
-        End of the message if there is none: where the known names are listed.
+        End of the message if there is no similar name: the place that lists the known names.
     """
     renamed = new_name(name)
     if renamed in known:
@@ -83,7 +83,7 @@ def structure(value: Any, kind: type[_T], source: str, key: str) -> _T:
     Raises
     ------
     ConfigError
-        Naming source, the key at fault, its value and what was expected.
+        Names the source, the key at fault, its value and the expected value.
     """
     try:
         return cast(_T, _part(key, value, kind))
@@ -105,7 +105,7 @@ def structure_of_version(
 
 
 def choose(kind: Any, pick: Callable[[Any], tuple[Any, Any]]) -> None:
-    """Structure a type as another one: for a value, ``pick`` returns that type and its value."""
+    """Structure a type as a different type: for a value, ``pick`` returns this type and its value."""
 
     def hook(value: Any, _kind: Any) -> Any:
         chosen, taken = pick(value)
@@ -402,7 +402,7 @@ def _fault(error: Exception) -> str:
     return f"line {mark.line + 1}: {text}" if mark else text
 
 
-# Files of one kind that come with the package, and a user's own ones beside them.
+# Files of one kind that come with the package, and a user's own files of this kind.
 
 
 @attrs.frozen
@@ -413,9 +413,9 @@ class Library:
     ----------
     folder : str
     what : str
-        One of them, in a word, for messages.
+        Name for one such file, in a word, for messages.
     kind : type
-        Class that a file is structured as.
+        Class of the structured file.
     """
 
     folder: str
@@ -427,7 +427,7 @@ class Library:
         return dict(_files(share_directory() / "config" / self.folder))
 
     def unknown(self, name_or_path: str | Path) -> str:
-        """Fault of a name that none of the files has; empty for a path, or a name that one has."""
+        """Fault of a name that none of the files has; empty for a path or a known name."""
         name, known = Path(name_or_path), self.files()
         if _is_path(name) or str(name) in known:
             return ""
@@ -440,7 +440,7 @@ class Library:
         Raises
         ------
         ConfigError
-            Names file, key, value and what was expected.
+            Names file, key, value and the expected value.
         """
         path = Path(name_or_path)
         if _is_path(path):

@@ -1,9 +1,10 @@
-"""Ten robots with random signs, gears, offsets, drives, torque sources and noise: what commissioning finds.
+"""Commissioning of ten robots with random signs, gears, offsets, drives, torque sources and noise.
 
 The legs walk in full coordinates with 0.2 to 0.4 mm in five joints, at several cadences, some with a foot
 load. Their torque passes a drive, with friction that grows with the load, constant friction, a low-pass and a
-lag; the robots differ in what their encoders and torque sensors make of it. A row a robot, each cell *made /
-found*; the last lines count how often the truth is within 1.28 standard deviations, 80 % if they are right.
+lag. The robots have different encoders and torque sensors. The table has one row per robot, each cell *made /
+found*. The last lines count how often the truth is within 1.28 standard deviations: 80 % if the standard
+deviations are right.
 `python benchmarks/commission.py [--first 121] [--cache DIRECTORY]` takes ten minutes, two without the walks.
 """
 
@@ -95,7 +96,7 @@ def received(walk: Floats, truth: dict[str, Any]) -> tuple[Floats, Floats]:
                 rubbing[i] = value
         return np.concatenate([np.full(late, rubbing[0]), rubbing[: len(rubbing) - late]])
 
-    # a low-pass averages over impacts, of which instants meet some and miss others
+    # A low-pass averages over impacts; single instants meet some impacts and miss others.
     return behind(mean), behind(instant if math.isinf(truth["bandwidth_hz"]) else mean)
 
 
@@ -167,12 +168,12 @@ def record(path: Path, truth: dict[str, Any], walk: Floats, seed: int) -> None:
 
 
 def late_s(truth: dict[str, Any]) -> float:
-    """Time by which slow changes of the torque are late, beside its sampling."""
+    """Delay of slow changes of the torque, in addition to the delay of its sampling."""
     return float(truth["lag_s"] + 1.0 / (TURN * truth["bandwidth_hz"]))
 
 
 def errors(truth: dict[str, Any], result: CommissioningResult) -> dict[str, float]:
-    """What is off, in standard deviations, of each quantity that the recording tells."""
+    """Error of each quantity that the recording determines, in standard deviations."""
     found = {item.name: item for item in result.items}
 
     def away(name: str, true: float, turn: float = math.inf) -> float:
@@ -196,7 +197,7 @@ def errors(truth: dict[str, Any], result: CommissioningResult) -> dict[str, floa
 
 
 def _by_factor(item: CommissioningItem | None, true: float) -> float:
-    """What the logarithm of a quantity is off, in standard deviations."""
+    """Error of the logarithm of a quantity, in standard deviations."""
     if item is None or item.sigma is None or isinstance(item.value, str) or math.isinf(true):
         return math.nan
     return math.log(float(item.value) / true) / (item.sigma / float(item.value))

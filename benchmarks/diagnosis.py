@@ -1,4 +1,4 @@
-"""Clearances from the drive torque alone, of legs in full coordinates whose masses are others.
+"""Clearances from the drive torque alone, of legs in full coordinates with different masses.
 
 Each leg walks with the clearances when new, and with one joint or two opened; its crank has a ripple. Torques
 are means over a sample, with noise. Times to detection, names and clearances come out of the code that the
@@ -70,7 +70,7 @@ NEW_M = 3.0e-4
 NEW = np.full(5, NEW_M)  # of the default leg
 SIZES = (3.6e-4, 4.5e-4, 6.0e-4, 1.0e-3)
 MONTH = 8.64e5  # gait cycles: eight hours a day at 60 rpm
-CLOCK = 1.0021  # period of the sensor over what it says: its samples drift through the gait cycle
+CLOCK = 1.0021  # true over nominal period of the sensor: its samples drift through the gait cycle
 UNWORN = np.zeros((5, 2, SECTORS))  # of the default leg
 STARTS = 5  # gait cycles between two starts of a test
 
@@ -180,7 +180,7 @@ def cases(joints: tuple[str, ...], sizes: tuple[float, ...]) -> Iterator[tuple[s
 
 
 def kept(file: Path | None, make):
-    """What a file has; made and kept if it is not there."""
+    """Contents of a file; made and stored if it is not there."""
     if file and file.exists():
         return pickle.loads(file.read_bytes())
     made = make()
@@ -224,7 +224,7 @@ def bodies_of(leg: Mechanism, explainer: Explainer, known: CommissionedTorque, r
 
 
 def simulated(run: TorqueReferenceRun) -> TorqueReference:
-    """What a run simulates."""
+    """Reference that a run simulates."""
     found = run.finish()
     if found is None:
         raise SystemExit("the leg could not be simulated")
@@ -242,7 +242,7 @@ def measured(walk: np.ndarray, sensor: TorqueSensor, noise_nm: float, random) ->
         angle, torque = taken[:, 1], taken[:, 3]
     torque += noise_nm * random.standard_normal(len(torque))
     cycle = np.floor(angle / TURN - 1e-9).astype(np.int64)
-    # as many as are averaged, from the first of each gait cycle on
+    # Average over this many samples, from the first sample of each gait cycle on.
     since = np.arange(len(cycle)) - np.searchsorted(cycle, cycle)
     ends = np.flatnonzero(since % sensor.together == sensor.together - 1)
     torque = torque[ends[:, None] - np.arange(sensor.together)].mean(axis=1)
@@ -275,7 +275,7 @@ def detected(detector: ChangeDetector, cycles: np.ndarray) -> int | None:
 
 
 def largest_sum(detector: ChangeDetector, cycles: np.ndarray) -> float:
-    """Largest sum of any test over a leg that is as counted."""
+    """Largest sum of any test over a leg that is as modelled."""
     state, most = detector.fresh(), 0.0
     for i, signature in enumerate(cycles):
         state = detector.with_cycle(state, signature, i + 1)
@@ -284,7 +284,7 @@ def largest_sum(detector: ChangeDetector, cycles: np.ndarray) -> float:
 
 
 def counted(explainer: Explainer) -> np.ndarray:
-    """Clearances that are counted."""
+    """Modelled clearances."""
     return np.full(len(explainer.joints), NEW_M)
 
 
@@ -368,7 +368,7 @@ def observed(
 
 
 def first_diagnosis(name: str, walks: dict[str, np.ndarray], options, random) -> list[str]:
-    """Gait cycles and seconds of processor until joints are named surely, and what is named from then on."""
+    """Gait cycles and processor seconds until joints are surely identified; then the identified joints."""
     leg = load_mechanism(LEGS[name].mechanism)
     size, known = torque_size(build_linkage(leg), TURN), new(leg)
     steady, own = CrankProfile.steady(TURN), LegParameters.none(leg)
@@ -416,7 +416,7 @@ def walks_of(name: str, leg: Mechanism, keep: Path | None) -> dict[str, np.ndarr
 
 
 class Round(NamedTuple):
-    """A leg as one round of identification knows it; without a baseline no misfit."""
+    """A leg's data in one round of identification; without a baseline there is no torque residual."""
 
     reference: TorqueReference
     explainer: Explainer
@@ -428,7 +428,7 @@ class Round(NamedTuple):
 def rounds_of(leg, reference, walk, sensor, noise_nm, draws, file, next_leg=bodies_of, commissioned=True):
     """Yield the rounds of a leg as the monitor does them: with its first reference, then identified again.
 
-    `draws` makes the random numbers of a round; `file` names what is kept.
+    `draws` makes the random numbers of a round; `file` gives the path of the stored data.
     """
     for number in range(1, ROUNDS + 2):
         explainer, known, healthy = explained(leg, reference, walk, sensor, noise_nm, draws(), commissioned)
@@ -444,7 +444,7 @@ def rounds_of(leg, reference, walk, sensor, noise_nm, draws, file, next_leg=bodi
 
 
 def best_of(rounds: Iterator[Round], name: str) -> Round:
-    """The last round that is no worse than the one before it, as in the monitor."""
+    """The last round that is not worse than the round before it, as in the monitor."""
     best = None
     for one in rounds:
         if best is not None and one.misfit > best.misfit:

@@ -1,12 +1,12 @@
-"""Legs behind drives as they are sold: what the diagnosis says of healthy and of worn ones.
+"""Legs with commercial drives: the diagnosis of healthy and of worn legs.
 
 The legs walk in the air, in full coordinates, with masses 4 % off the file. Their torque passes a drive:
 friction that grows with the load, Coulomb and viscous friction, cogging, a low-pass of first or second order,
 a mean over some time, a lag, a torque constant and friction that change over twenty minutes, steps of the
-sensor, lost samples, a coupling between the measured angle and the crank. The first table is of healthy legs:
-gait cycles drawn in blocks of ten make up the given time. The second is of joints that open after 690 gait
-cycles, when a leg is identified and a drive that warms up is half warm; J on three walks. With
-`--as-of-file` no leg is identified, and names count as if the leg were that of its file.
+sensor, lost samples, a coupling between the measured angle and the crank. The first table is for healthy
+legs: gait cycles drawn in blocks of ten make up the given time. The second table is for joints that open
+after 690 gait cycles, when a leg is identified and a drive that warms up is half warm; J on three walks. With
+`--as-of-file` no leg is identified, and names count as if the leg were exactly as in its file.
 `python benchmarks/drives.py --keep DIRECTORY [--hours 100]`.
 """
 
@@ -46,17 +46,17 @@ from leg_wear_monitor.twin.reference import COUPLING_DAMPING, LegParameters
 
 MASSES = dict(zip(BODIES, (1.04, 0.96, 1.04, 0.96, 1.04, 0.96, 1.04), strict=True))
 NOISE_NM, BLOCK, COMMISSIONED, HEALTHY, WORN = 0.5, 10, 90, 260, 40
-OPENINGS = (  # and the walk, whose start is another one
+OPENINGS = (  # joint, clearance [mm] and walk; each walk starts differently
     *((joint, 0.45, 0) for joint in "ABGI"), *(("J", 0.45, walk) for walk in range(3)),
     ("G", 0.6, 0), *(("J", 1.0, walk) for walk in range(3)),
 )  # fmt: skip
 WARM = 1200  # gait cycles until a drive is warm
-LEVELS = 11  # of what drifts, between cold and warm
+LEVELS = 11  # levels of the drifting values, between cold and warm
 
 
 @attrs.frozen(kw_only=True)
 class Drive:
-    """What stands between the leg's torque and its samples; drifts are what a warm drive has more."""
+    """The drive between the leg's torque and its samples; drifts are the excess of a warm drive."""
 
     lag_s: float = 0.0
     hz: float = 0.0
@@ -178,10 +178,10 @@ def watched(
     periods: int = 1,
     modelled_m: np.ndarray = NEW,
 ) -> tuple[observer.TorqueObserver, list[str]]:
-    """The observer after gait cycles with given signatures; what it named, corrected or stopped, and when.
+    """The observer after gait cycles with given signatures; its diagnoses, corrections and stops, with times.
 
-    Goes on with an observer whose gait cycles end before the one with the number ``first``. Of the evaluation
-    periods of a gait cycle, all but one can be left out where no reference is made.
+    The given observer may already have gait cycles, up to the one before number ``first``. If no reference is
+    made, all evaluation periods of a gait cycle except one can be left out.
     """
     left, reference = iter(rows), shipped_references(leg)[0]
     one = one or observer.TorqueObserver(leg, config or MonitorConfig(), size_nm, NEW)
@@ -272,7 +272,7 @@ def main() -> None:
     @functools.cache
     def walk(stiffness: float, joint: str = "", size_mm: float = 0.3, number: int = 0) -> np.ndarray:
         clearance = np.where(np.array(leg.clearance_joints) == joint, 1e-3 * size_mm, NEW)
-        clearance *= 1.0 + 1e-12 * number  # chaotic: another draw
+        clearance *= 1.0 + 1e-12 * number  # chaotic: a different draw
         name = " ".join(f"{one:g}" for one in (0, stiffness, number)[: 1 + 2 * bool(stiffness or number)])
         file = options.keep / f"{joint or 'new'} {size_mm:.2f} {name}.pkl" if options.keep else None
         driven, cycles = behind(real, stiffness) if stiffness else real, WORN if joint else HEALTHY
@@ -327,7 +327,7 @@ def summary(found: list[str]) -> str:
 
 
 def when(found: list[str], since: int) -> str:
-    """What was found, and the gait cycle since a change in which it first was."""
+    """The diagnosis, and the gait cycle since a change that first gave it."""
     cycles_of = {text.partition(": ")[2]: int(text.partition(":")[0]) for text in reversed(found)}
     return ", ".join(f"{what} ({at - since + 1})" for what, at in reversed(cycles_of.items()))
 

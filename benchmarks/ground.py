@@ -1,12 +1,12 @@
 """Healthy and worn legs on the ground: names, sizes, the load, and the wear.
 
-A leg in full coordinates, with masses 4 % off, walks under a force of another shape than the template's (a
-treadmill's), whose size and time differ from step to step by 10 % and by 2 % of the cycle, behind drives that
-people have. `load.model` is ground: the force is found, and the references are simulated under it. Healthy
-cycles, drawn in blocks of ten, make up some hours; joints open after 600 cycles, when the leg is identified.
-The wear is that of the twin under the force that was found, over what the leg has, by the Archard integral of
-60 gait cycles; the last rows have it under a measured force, at 200 Hz with noise of 5 % of its value or of
-its peak.
+A leg in full coordinates, with masses 4 % off, walks under a force with a different shape than the template's
+(a treadmill's). Its size and time differ from step to step by 10 % and by 2 % of the cycle. The leg has
+commercial drives. `load.model` is ground: the force is estimated, and the references are simulated under it.
+Healthy cycles, drawn in blocks of ten, make up some hours; joints open after 600 cycles, when the leg is
+identified. The wear is the twin's wear under the estimated force, divided by the leg's wear, by the Archard
+integral of 60 gait cycles. The last rows have it under a measured force, at 200 Hz with noise of 5 % of its
+value or of its peak.
 `python benchmarks/ground.py --keep DIRECTORY` takes half an hour of two cores, a minute with `--wear-only`.
 """
 
@@ -71,7 +71,7 @@ def walked_steps(
 
 
 def sensed(leg: Mechanism, cycles: int, load: LoadConfig, seed: int, of_value: float, of_peak: float):
-    """Samples of a foot load sensor on a walk, whose noise is a part of the value and one of the peak."""
+    """Samples of a foot load sensor on a walk; the noise is a fraction of the value and of the peak."""
     up, random, place = upwards(leg), np.random.default_rng(seed), np.arange(POINTS) / POINTS
     steps = list(walked_steps(leg, cycles, load, seed))
     row = np.arange(0, cycles * RATE, RATE // FORCE_HZ)
@@ -111,7 +111,7 @@ def walked(leg: Mechanism, clearance: np.ndarray, cycles: int, load: LoadConfig,
 def worn(
     leg: Mechanism, walk: Walk, parameters: LegParameters | None, settings: TwinSettings, *more: np.ndarray
 ) -> np.ndarray:
-    """Archard integral (k,) of the twin of a walk, over that of the leg; with samples of further sensors."""
+    """Archard integral (k,) of a walk's twin, divided by the leg's; with samples of further sensors."""
     twin = DigitalTwin(leg, settings)
     if parameters is not None:
         twin.set_parameters(parameters)
@@ -137,7 +137,7 @@ def masses_off(leg: Mechanism, lengths: dict[str, float] | None = None, friction
 
 
 def with_law(leg: Mechanism, law: str) -> Mechanism:
-    """A leg with masses 4 % off and another law of contact in its joints."""
+    """A leg with masses 4 % off and a different law of contact in its joints."""
     clearances = {joint: attrs.evolve(one, normal_law=law) for joint, one in leg.clearances.items()}
     return masses_off(attrs.evolve(leg, clearances=clearances))
 

@@ -1,8 +1,8 @@
-"""Measured ground reactions on the leg: how far the template of stance is off, and wear counted with it.
+"""Measured ground reactions on the leg: the error of the stance template, and of wear modelled with it.
 
-DIR contains the public repositories opensim-models (opensim-org) and BMC (BMClab). None of these stances is
-the template's. Truth is the leg in full coordinates under the measured shape; counted is the clearance model
-under the template of the same peak, begin and end.
+DIR contains the public repositories opensim-models (opensim-org) and BMC (BMClab). None of these stances
+equals the template. The truth is the leg in full coordinates under the measured shape. The modelled wear
+comes from the clearance model under the template with the same peak, start and end.
 """
 
 import argparse
@@ -121,7 +121,7 @@ def shapes(measured: list[Measured]) -> Iterator[str]:
 
 
 def wear(measured: list[Measured], peak_n: float, runs: int, cycles: int) -> Iterator[str]:
-    """Rows on wear counted under the template, against wear under each shape in full coordinates."""
+    """Rows on wear modelled under the template, against wear under each shape in full coordinates."""
     leg = load_mechanism("bionic_leg")
     stance = nominal_stance(build_linkage(leg))
     known = archard(with_ground_reaction(leg, peak_n), "clearance", runs, cycles)

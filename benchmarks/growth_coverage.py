@@ -1,11 +1,12 @@
-"""Whether growth's interval of 80 % holds 80 %: legs in full coordinates that are not quite the leg on paper.
+"""Coverage of growth's interval of 80 %: legs in full coordinates that differ from the leg on paper.
 
-Each leg has masses and joints of its own and a crank with a ripple. Its truth is the mean growth of many gait
-cycles in full coordinates; the monitor's twin is the leg on paper, in clearance coordinates, and has noisy
-crank angles only, or the drive torque as well (`--torque`). The factor in `model_error.py` on what impacts
-make is printed too: it is of the first sixteen legs with `--quick`, so that others show the coverage.
+Each leg has its own masses and joints, and a crank with a ripple. Its truth is the mean growth of many gait
+cycles in full coordinates. The monitor's twin is the leg on paper, in clearance coordinates, and has noisy
+crank angles only, or the drive torque as well (`--torque`). The benchmark also prints the factor in
+`model_error.py` for the growth from impacts: it comes from the first sixteen legs with `--quick`, so other
+legs show the coverage.
 `python benchmarks/growth_coverage.py --first 16 --keep DIRECTORY` takes about half an hour of one core, and
-again some minutes for other windows. With `--quick` the truth is a twin of the leg as built instead: not
+some more minutes for other windows. With `--quick` the truth is a twin of the leg as built instead: not
 independent, but in a third of the time.
 """
 
@@ -70,7 +71,7 @@ def heavier(paper: Mechanism, factors: dict[str, float]) -> Mechanism:
 
 
 def built(paper: Mechanism, seed: int) -> Leg:
-    """A leg whose masses and joints are off those on paper."""
+    """A leg with masses and joints that differ from those on paper."""
     random, bodies, factors = np.random.default_rng(seed), {}, {}
     for name, body in paper.bodies.items():
         factors[name] = 1.0 + MASS_SIGMA * random.standard_normal()
@@ -127,7 +128,7 @@ def counted(
 
 
 def kept(file: Path, cycles: int, leg: Leg) -> list[Cycle]:
-    """So many gait cycles of a leg: those of a file if it has them, else walked and kept there."""
+    """A number of gait cycles of a leg: from a file if it has them, otherwise walked and stored there."""
     if file.exists():
         walked = pickle.loads(file.read_bytes())
         if len(walked) >= cycles + SETTLING:

@@ -1,4 +1,4 @@
-"""Cycle jumps beside every single cycle, ten million cycles to the limit, and the law of growth.
+"""Cycle jumps compared with every single cycle, ten million cycles to the limit, and the law of growth.
 
 `python benchmarks/life.py` simulates 20 000 cycles of accelerated wear one by one (seven to ten minutes of a
 core), and the same by jumps of several lengths, from several starts each.
@@ -76,7 +76,7 @@ def against_every_cycle(leg: Mechanism, cycles: int) -> None:
 
 
 def ten_million(leg: Mechanism) -> None:
-    """Time to the limit, and that of a forecast."""
+    """Processor time of a life to the limit, and of a forecast."""
     began = time.process_time()
     life = lived(leg, LifeSettings(), 1.0, LIMIT_M, 1.0e12)
     took = time.process_time() - began
@@ -101,7 +101,7 @@ def ten_million(leg: Mechanism) -> None:
 
 
 def law_of_growth(leg: Mechanism) -> None:
-    """The shipped law, and what each life is off the law of the others."""
+    """The shipped law, and the deviation of each life from the law of the other lives."""
     lives = read_lives(str(share_directory() / "config" / "lives" / "bionic_leg.json"), leg)
     law = law_of(leg, "", Forecasting().model_sigma)
     print(f"\nlaw of growth from {law.lives} lives: B\n{np.round(law.coupling, 2)}")

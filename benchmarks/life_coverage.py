@@ -90,7 +90,7 @@ def read(path: Path) -> list[HiddenLife]:
 
 @attrs.frozen
 class Case:
-    """A leg now: what the monitor has, the true clearances, and what remains to the joints' ends."""
+    """A leg now: the monitor's data, the true clearances, and the remaining cycles to the joints' ends."""
 
     now: list[JointCondition]
     clearance_m: np.ndarray
@@ -98,7 +98,7 @@ class Case:
 
 
 def terms(clearance: np.ndarray) -> np.ndarray:
-    """What ln growth of the truth is linear in: clearances and their squares, unlike the monitor's."""
+    """Terms for a linear model of the true ln growth: clearances and their squares, unlike the monitor's."""
     x = clearance / FRESH_M - 1.0
     return np.concatenate([np.ones((len(x), 1)), x, x**2], axis=1)
 
@@ -134,7 +134,7 @@ def lived(law: np.ndarray, off: np.ndarray, joints: int, random: np.random.Gener
 
 
 def counted(twin: HiddenLife, k: int, now: float) -> tuple[float, float]:
-    """Growth and wear that the twin has: nobody holds it at the limit, it goes on at its last rate there.
+    """Growth and wear of the twin; it is not stopped at the limit, but continues at its last rate there.
 
     A point of a life has eight cycles, the monitor averages 2000: growth is that over many points about now.
     """
@@ -150,7 +150,7 @@ def counted(twin: HiddenLife, k: int, now: float) -> tuple[float, float]:
 
 
 def case_of(life: HiddenLife, now: float, twin: HiddenLife, joints: str, random: np.random.Generator) -> Case:
-    """What the monitor has of a leg after so many cycles; from then on it wears by another load."""
+    """The monitor's data of a leg after so many cycles; from then on it wears under a different load."""
     later = float(np.exp(SETTINGS.load_sigma * random.standard_normal()))
     state = []
     for k, joint in enumerate(joints):

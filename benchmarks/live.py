@@ -1,18 +1,18 @@
-"""The live node under load: what is lost, what it takes, how long a report takes.
+"""The live node under load: lost messages, resource use, and the delay of a report.
 
 python benchmarks/live.py [--legs 1] [--rate-hz 1000] [--rpm 60] [--seconds 20] [--without-diagnosis]
                           [--foot-load-hz 0] [--ground-n 0] [--record DIRECTORY]
                           [--topics predicted_torque,impact_forces] [--set publish_markers:=true ...]
 
-With --foot-load-hz, a sensor of the foot load sends too, and its load acts in the node.
-At 60 rpm the diagnosis uses the reference of the package: it is put in after five gait cycles, and reviewed
-after 50. At another speed the node simulates a reference while it monitors. With --record, each node records
-what it receives and publishes, keeps a ledger, and the recording is replayed: messages, and what both ledgers
-have of references, are compared.
+With --foot-load-hz, a sensor of the foot load sends as well, and its load acts in the node. At 60 rpm the
+diagnosis uses the reference of the package: the node loads it after five gait cycles, and reviews it after
+50. At a different speed the node simulates a reference while it monitors. With --record, each node records
+the messages that it receives and publishes, and keeps a ledger. The recording is then replayed, and messages
+and both ledgers' references are compared.
 
-Each leg is a monitor in a process and a namespace of its own; one more process sends the joint states and
-the torque of all legs, a recorded walk again and again; this one listens to --topics, to the clearances
-and to the diagnostics. --set gives each node a parameter, to see what an option costs.
+Each leg is a monitor in its own process and namespace. One more process sends the joint states and the torque
+of all legs, a recorded walk again and again. This process listens to --topics, to the clearances and to the
+diagnostics. --set gives each node a parameter, to see the cost of an option.
 """
 
 import argparse
@@ -128,11 +128,11 @@ def publish(legs: int, rate_hz: float, rpm: float, seconds: float, load_hz: floa
 
 
 def ignore(raw: bytes) -> None:
-    """What a subscriber does that only costs the node its sending."""
+    """Callback of a subscriber that only costs the node the sending."""
 
 
 class Listener(Node):
-    """Delays of predicted torques and of gait cycles behind their stamps, and what the nodes report."""
+    """Delays of predicted torques and of gait cycles behind their stamps, and the reports of the nodes."""
 
     def __init__(self, legs: int, topics: list[str]) -> None:
         super().__init__("listener")
@@ -163,7 +163,7 @@ class Listener(Node):
     def hear_diagnostics(self, message: DiagnosticArray) -> None:
         leg = self.hardware.get(message.status[0].hardware_id)
         if leg is None:
-            return  # somebody else's in the same domain
+            return  # from a different node in the same domain
         counts = self.counts[leg]
         for status in message.status:
             if status.name.endswith(": diagnosis"):
@@ -175,7 +175,8 @@ class Listener(Node):
 def beyond_lag_s(stamps: np.ndarray, delays: np.ndarray) -> np.ndarray:
     """Delays [s] beyond the tracker's lag and window, of the newest sample that each spline node completes.
 
-    Samples wait for the node after them; in the time of two nodes, the one that waits least waits for none.
+    Samples wait for the node after them. Among the samples within two node intervals, the sample with the
+    shortest wait waits for no node.
     """
     tracker = TrackerSettings()
     bins = np.floor((stamps - stamps.min()) / (2.0 * tracker.node_interval)).astype(int)
@@ -272,7 +273,7 @@ def main() -> None:
 
 
 def replay(leg: int, args: argparse.Namespace) -> None:
-    """Replay what a node recorded, and compare what both published and stored."""
+    """Replay a node's recording, and compare the published and stored data of both."""
     own, out = args.record / f"leg{leg}.mcap", args.record / f"replay{leg}"
     config = args.record / "leg.yaml"
     config.write_text(

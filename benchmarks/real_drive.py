@@ -1,22 +1,22 @@
-"""What currents of real drives do to the diagnosis, from public recordings that are not in this repository.
+"""Effect of real drives' currents on the diagnosis, from public recordings that are not in this repository.
 
 DIR contains two folders. `dynamic_calibration` (https://github.com/shamilmamedov/dynamic_calibration) has the
-currents of a robot's joints; what is asked of them is in `real_robot.py`. `laas_anti_cogging`
+currents of a robot's joints; `real_robot.py` evaluates them. `laas_anti_cogging`
 (https://github.com/heitor-andrade/laas_anti_cogging) has the angle and the current of a motor without load,
-whose speed is controlled, at 1 kHz: eight seconds with stick-slip, and eight without.
+with controlled speed, at 1 kHz: eight seconds with stick-slip, and eight without.
 
-This current is put on the torque of simulated legs in full coordinates with masses 4 % off, behind gears and
-torque constants of drives for legs. What repeats with the motor's angle (cogging, ripple, mean friction) is
-read at the gear's ratio times the crank angle; what is left (noise, stick-slip) is read at its own times. Its
-size is the recorded one, although a motor that turns faster shows less cogging in its current. The samples go
-through the observer of the monitor: it has the reference that comes with the package, commissions the healthy
-leg, and identifies it where that is required; its twin and its checks of size, sign and timing are not part
-of it. Behind a gear the crank turns evenly: ripple of the motor's speed, which its inertia limits, is less by
-the square of the ratio there. Without one, the crank turns evenly or as the motor did. Each drive begins with
-300 healthy gait cycles; each opened joint follows these, for 12 gait cycles, and a minute in which the leg is
-healthy and the current that of the other half of the recording.
-`python benchmarks/real_drive.py DIR --keep DIRECTORY` takes a quarter of an hour of one core, a third of it
-with `--as-of-file`, which does not identify the leg and corrects wherever a name is sure.
+This current is added to the torque of simulated legs in full coordinates with masses 4 % off, behind gears
+and torque constants of drives for legs. The part that repeats with the motor's angle (cogging, ripple, mean
+friction) is read at the gear's ratio times the crank angle. The rest (noise, stick-slip) is read at its own
+times. Its size is the recorded size, although a motor that turns faster shows less cogging in its current.
+The samples go through the observer of the monitor: it has the reference that comes with the package,
+commissions the healthy leg, and identifies it if required. Its twin and its checks of size, sign and timing
+are not part of the benchmark. Behind a gear the crank turns evenly: ripple of the motor's speed, which its
+inertia limits, is less by the square of the ratio there. Without a gear, the crank turns evenly or as the
+motor did. Each drive begins with 300 healthy gait cycles. Each opened joint follows these, for 12 gait
+cycles. A minute follows with a healthy leg and the current of the other half of the recording.
+`python benchmarks/real_drive.py DIR --keep DIRECTORY` takes a quarter of an hour of one core. With
+`--as-of-file` it takes a third of this time: it does not identify the leg, and corrects if a name is sure.
 """
 
 import argparse
@@ -54,12 +54,12 @@ from leg_wear_monitor.twin.sample import gait_samples
 FILE = Path("laas_anti_cogging/codes/Testing/speed_data/speed_test.txt")
 HEAD = "Time, Position, Velocity, Reference Velocity, Iq, Function Activated"
 SETTLED_S = 1.0  # left out at the begin of each half
-MOTION_S = 2.6  # and of its motion: the turn before is 3 % off the others, which differ by 0.5 to 1.1 %
+MOTION_S = 2.6  # also for its motion: the turn before is 3 % off, later turns by 0.5 to 1.1 %
 ORDERS = (
     180  # waves a motor turn that repeat: in a second at 44 to 51 rpm, 130 to 150 of 500 that 1 kHz shows
 )
-# of the crank's ripple a turn: the 72 of cogging are 14 % of the speed of a motor without load, which would
-# take 120 N m on the leg's mean inertia of 0.30 kg m^2; those below take 4
+# Waves of the crank's ripple per turn: the 72 waves of cogging are 14 % of the speed of a motor without load,
+# which would take 120 N m on the leg's mean inertia of 0.30 kg m^2; the waves below take 4.
 WAVES = 30
 GRID = np.linspace(0.0, TURN, 7201)  # of motor angles
 
@@ -78,8 +78,8 @@ AFTER = 12  # gait cycles of an opened joint: a correction takes ten
 class Motor(NamedTuple):
     """A motor that turns without load.
 
-    ``speed`` [rad/s]; ``repeated`` current [A] at the motor angles GRID; ``left`` (n,) the rest of it at
-    1 kHz [A]; ``ripple`` (n,) angle less that of an even turn over a number of ``turns`` [rad].
+    ``speed`` [rad/s]; ``repeated`` current [A] at the motor angles GRID; ``left`` (n,) the rest of it at 1
+    kHz [A]; ``ripple`` (n,) angle minus the angle of an even turn over a number of ``turns`` [rad].
     """
 
     speed: float
@@ -142,7 +142,7 @@ def turning(motor: Motor) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def turned(leg: Mechanism, clearance: np.ndarray, cycles: int, motor: Motor) -> np.ndarray:
-    """As `diagnosis.walked`, of a leg whose crank turns as a motor did."""
+    """Same as `diagnosis.walked`, for a leg with a crank that turns as a motor did."""
     setup, motions, statistics = prepare(leg), np.array(turning(motor)).T, new_run_statistics(len(leg.joints))
     setup.contacts.clearance[:] = clearance
     count, walk = len(motions), np.empty((cycles * RATE, 4))
@@ -193,7 +193,7 @@ def received(
 
 
 class Monitored:
-    """The observer of the monitor on a leg: what it found, named, corrected or stopped.
+    """The observer of the monitor on a leg, with its diagnoses, corrections and stops.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ class Monitored:
             self.observer.restore(snapshot)
         self.joints, self.cycle, self.counted = leg.clearance_joints, cycle, NEW.copy()
         self.end_ns = cycle * 10**9
-        self.found: dict[str, list[int]] = {}  # and in which gait cycles
+        self.found: dict[str, list[int]] = {}  # gait cycles of each finding
 
     def add(self, samples: np.ndarray, ends: np.ndarray) -> None:
         """Receive samples up to the ends of gait cycles [s]."""
@@ -275,13 +275,13 @@ def cases() -> Iterator[Case]:
 
 
 def in_words(found: dict[str, list[int]], since: int = 0) -> str:
-    """What was found, in how many gait cycles, and how many after a given one it was first."""
+    """Findings: the number of gait cycles with each, and the cycles from a given one to the first."""
     each = (f"{text} ({cycles[0] - since + 1}; {len(cycles)})" for text, cycles in found.items())
     return ", ".join(each) or "nothing"
 
 
 def of_leg(one: Monitored) -> str:
-    """What the observer knows of a healthy leg, and what it found, in words."""
+    """The observer's knowledge of a healthy leg, and its findings, in words."""
     state, diagnosis = one.observer.state, one.observer.diagnosis
     sensor, channel, off = state.sensor, state.sensor.channel, one.observer.models.misfit(state)
     unused = ", ".join(f"{cause} {number}" for cause, number in diagnosis.cycles_not_used.items())

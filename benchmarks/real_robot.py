@@ -1,22 +1,22 @@
-"""Whether the currents of a real robot's joints have changed, by the code that asks it of a leg's torque.
+"""Changes in the currents of a real robot's joints, found by the code for a leg's torque.
 
 DIR contains the folder `dynamic_calibration` (https://github.com/shamilmamedov/dynamic_calibration), with the
 currents of a UR10e at 100 Hz in `dataset_ur10e`. The current of a joint takes the place of the torque, and a
-period of ten seconds that of the gait cycle. What can be asked of it is the part that compares a cycle with a
-baseline: signatures by phase, their scatter, and causes that need no simulated leg: friction, scale, an
-offset in time, and a load at the flange, whose column is its lever (gravity and inertia of a mass there).
-What cannot be asked: a clearance and the tests for it, the channel, and the identification, which need
-simulated references of the robot. The recordings of collisions are of a robot that stands, pushed by hand at
-times that are not noted: there is no motion whose phases could be compared, and after a push the current
+period of ten seconds takes the place of the gait cycle. The benchmark tests the part that compares a cycle
+with a baseline: signatures by phase, their scatter, and causes that need no simulated leg: friction, scale,
+an offset in time, and a load at the flange, with its lever as column (gravity and inertia of a mass there).
+It cannot test a clearance and the tests for it, the drive dynamics, and the identification, because these
+need simulated references of the robot. In the recordings of collisions, the robot stands and is pushed by
+hand at times that are not noted: there is no motion with phases to compare, and after a push the current
 stays elsewhere within static friction.
 
 1. Nothing has changed: in `jointwise_motion` one joint after the other swings with a period of ten seconds,
-   five times. Each period is compared with a baseline of the other four.
-2. Another load: the same motion was run without and with a load, once each. Each ten seconds of the first run
-   are the baseline of the same ten of the second. How a period scatters is known from 1.
+five times. Each period is compared with a baseline of the other four periods.
+2. A different load: the same motion was run without and with a load, once each. Each ten seconds of the first
+run are the baseline of the same ten seconds of the second run. Case 1 gives the scatter of a period.
 
-A change is reported where the odds of the best cause exceed those of one false finding in 240 hours, the
-default of the monitor, which asks for causes only after a test for a clearance.
+A change is reported if the odds of the best cause exceed the odds of one false finding in 240 hours, the
+default of the monitor, which looks for causes only after a test for a clearance.
 `python benchmarks/real_robot.py DIR` takes seconds, and `real_drive.py` prints the same.
 """
 
@@ -129,7 +129,7 @@ def signed(values: np.ndarray, sensor: TorqueSensor, offset_rad: float = 0.0) ->
 
 
 def mean_column(values: np.ndarray, sensor: TorqueSensor) -> np.ndarray:
-    """Column (F,) of what adds a quantity (n,) of one period to the mean current, per unit."""
+    """Column (F,) of a quantity (n,) of one period that adds to the mean current, per unit."""
     values = averaged(values, sensor.together)
     place = TURN * sensor.together * STEP_S / PERIOD_S * (np.arange(len(values)) + 0.5)
     means = PhaseMeans(np.zeros(len(values), np.int64), place, (1, sensor.phases)).of(values)[0]
@@ -184,7 +184,7 @@ def changed(own: Explainer, signature: np.ndarray) -> Change | None:
 
 
 def in_words(change: Change | None) -> str:
-    """What changed."""
+    """Name of the change."""
     return "nothing" if change is None else change.cause.value
 
 
@@ -208,7 +208,7 @@ def period(run: Run, lever: np.ndarray, joint: int, k: int) -> Period:
 
 
 def unchanged(folder: Path) -> tuple[dict[tuple[bool, int], Counter], dict[int, np.ndarray]]:
-    """What was found where nothing had changed, by whether the joint swings and the joint; scatters."""
+    """Findings without any change, by whether the joint swings and by joint; and scatters."""
     found, scatters = {}, {}
     for swinging, run in swings(folder):
         lever = levers(run)
@@ -241,12 +241,12 @@ def loaded(folder: Path, scatters: dict[int, np.ndarray]) -> list[Counter]:
 
 
 def of(found: Counter) -> str:
-    """What was found how often, in words."""
+    """Each finding with its number of occurrences, in words."""
     return ", ".join(f"{name} {number}" for name, number in found.most_common())
 
 
 def print_tables(folder: Path) -> None:
-    """Print what is found of a robot's joints without a change and with a load."""
+    """Print the findings for a robot's joints without a change and with a load."""
     found, scatters = unchanged(folder)
     print("| joint | in the period it | periods without a change | found |\n|---|---|---|---|")
     for (is_swinging, joint), names in sorted(found.items()):

@@ -65,7 +65,7 @@ FLYWHEEL = 1.0e6  # kg m^2
 
 ALLOWED = 0.02
 TOLERANCES = (1.0e-5, 1.0e-6, 1.0e-7)
-FEW = 3  # cycles where a method is far slower than the others
+FEW = 3  # cycles for a method that is far slower than the rest
 
 
 class Watch:
@@ -167,7 +167,7 @@ class ExudynLeg:
         self._system.Assemble()
 
     def solve(self, scheme: Scheme, seconds: float) -> tuple[float, float]:
-        """Move from the start for so long; returns what that took, as a watch reads it."""
+        """Move from the start for a duration; returns the elapsed wall-clock time."""
         sampling = (2.0 * scheme.step if self._penalty else 1.0e-9) if self._sensors else 1.0e9
         settings = scheme.settings(seconds, sampling)
         kinds = exudyn.DynamicSolverType
@@ -223,7 +223,7 @@ class ExudynLeg:
         markers, k = [bushing, journal], self._penalty
         if not k:
             return int(system.AddObject(item.ObjectJointRevolute2D(markerNumbers=markers)))
-        damping = 0.04 * float(np.sqrt(k))  # N s/m: 2 % of what is critical for 1 kg
+        damping = 0.04 * float(np.sqrt(k))  # N s/m: 2 % of critical damping for 1 kg
         spring = {"stiffness": [k, k, 0.0], "damping": [damping, damping, 0.0]}
         return int(
             system.AddObject(item.ObjectConnectorCartesianSpringDamper(markerNumbers=markers, **spring))
@@ -329,7 +329,7 @@ class ScipyLeg:
     ) -> tuple[tuple[float, float], Floats, int]:
         """Go on for so long [s] with a local error as the package defines it.
 
-        Returns what that took, as a watch reads it, the mean forces (k,) [N], and the evaluations.
+        Returns the elapsed wall-clock time, the mean forces (k,) [N], and the evaluations.
         """
         half = (len(self._y) - self._clearance_joints) // 2
         at_most = np.concatenate([np.full(half, tolerance_m), np.full(half, tolerance_m * TOLERANCE_RATE)])
@@ -458,7 +458,7 @@ def compare_own(setup: Setup, cycles: int) -> tuple[Forces, FullRun, RunStatisti
 def check_others(
     clearance_joints: Sequence[str], schemes: Sequence[Scheme], method: str, tolerance: float, cycles: int
 ) -> None:
-    """Forces of the others with fewer clearance joints, as they were found best with five."""
+    """Forces of the other programs with fewer clearance joints, with their best settings for five joints."""
     setup = prepare(LEG, clearances=clearance_joints)
     full = FullRun(setup)
     reference, statistics = own_forces(full, setup, 3 * cycles)

@@ -1,6 +1,7 @@
 """A replay end to end: 1 kHz each of joint states and torque, five clearance joints; where its time goes.
 
-The leg has clearances, and the same gait cycles of it are repeated: the diagnosis finds a leg as counted.
+The leg has clearances, and the same gait cycles of it are repeated: the diagnosis finds that the leg is as
+modelled.
 """
 
 import argparse

@@ -19,7 +19,7 @@ from leg_wear_monitor.bags.mcap_writer import McapWriter
 ROOT = Path(__file__).parents[1]
 DOMAIN = "77"
 
-# for each recording, parameters of the leg; those of the monitor are in bags/NAME.yaml
+# Parameters of the leg for each recording; the monitor's parameters are in bags/NAME.yaml.
 BAGS: dict[str, dict[str, object]] = {
     "healthy": {},
     "knocking": {"knock.joint": "G", "knock.at_s": 5.0, "knock.clearance_m": 2.0e-3},
@@ -43,7 +43,7 @@ BAGS: dict[str, dict[str, object]] = {
         "torque_sensor.resolution_nm": 0.0625,
     },
 }
-INPUTS_ONLY = ("ground",)  # what the monitor publishes would be four fifths of a longer recording
+INPUTS_ONLY = ("ground",)  # the monitor's messages would be four fifths of a longer recording
 JOINT_STATES = "/joint_states"
 LEG = {"duration_s": 12.0, "seed": 4, "wait_for_subscribers": 1, "precompute": True}
 PATIENCE_S = 300.0
@@ -51,7 +51,7 @@ PATIENCE_S = 300.0
 
 def start(verb: str, parameters: dict[str, object], *further: str) -> subprocess.Popen[bytes]:
     """A node as a process of its own."""
-    # JSON is what rcl takes for a value, too
+    # rcl also takes JSON for a value.
     settings = [word for name, value in parameters.items() for word in ("-p", f"{name}:={json.dumps(value)}")]
     environment = {
         **os.environ,
@@ -66,13 +66,13 @@ def start(verb: str, parameters: dict[str, object], *further: str) -> subprocess
 
 def record(name: str, path: Path, parameters: Path) -> None:
     """One recording."""
-    path.unlink(missing_ok=True)  # the monitor would keep the former one under another name
+    path.unlink(missing_ok=True)  # otherwise the monitor would keep the old file under a new name
     monitor = start("monitor", {"record.path": str(path)}, "--params-file", str(parameters))
     try:
         leg = start("gait-publisher", LEG | BAGS[name])
         if leg.wait(PATIENCE_S) != 0:
             raise SystemExit(f"{name}: the leg ended with {leg.returncode}")
-        time.sleep(2.0)  # what is on its way arrives
+        time.sleep(2.0)  # messages in transit arrive
     finally:
         monitor.send_signal(signal.SIGINT)
         monitor.wait(PATIENCE_S)
@@ -91,7 +91,7 @@ def keep_joint_states(path: Path) -> None:
 
 
 def expectation(path: Path, parameters: Path) -> dict[str, Any]:
-    """What a replay must find: counts, alarms, and of chaotic figures those that repeat."""
+    """Expected results of a replay: counts, alarms, and of chaotic values the repeatable ones."""
     found = lw.replay(path, parameters).summary()
     raised = {f"{change.alarm.name}: {change.alarm.level.name}" for change in found.alarms.changes}
     return {

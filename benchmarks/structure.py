@@ -130,7 +130,7 @@ def imported(of: Module, names: set[str]) -> set[str]:
 
 
 def circles(graph: dict[str, set[str]]) -> list[set[str]]:
-    """Sets of modules each of which reaches all others of its set."""
+    """Sets of modules in which each module reaches all other modules of the set."""
     reached: dict[str, set[str]] = {}
     for start in graph:
         seen, left = set[str](), [start]

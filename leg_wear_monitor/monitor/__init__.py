@@ -1,1 +1,1 @@
-"""What it means: growth, alarms, and the ledger that keeps the wear of months."""
+"""The meaning of the estimates: growth, alarms, and the ledger that stores the wear of months."""

@@ -57,14 +57,15 @@ def with_span(spans: Spans, begin_ns: int, end_ns: int) -> Spans:
 
 
 def is_within(stamp_ns: Ints, spans: Ints) -> NDArray[np.bool_]:
-    """Which stamps (n,) lie in one of the spans (m, 2), in order of their begin; ends are within."""
+    """Mask of the stamps (n,) in one of the spans (m, 2), sorted by their start; ends are within."""
     latest = np.maximum.accumulate(spans[:, 1])
     at = np.searchsorted(spans[:, 0], stamp_ns, side="right") - 1
     return np.asarray((at >= 0) & (stamp_ns <= latest[np.maximum(at, 0)]))
 
 
-POINT_S = 600.0  # of walking, between two points of the clearances' history
-# of all walking so far, likewise if it is more: a year of 8 h a day then has some 1100 points, not 17 500
+POINT_S = 600.0  # walking time between two points of the clearances' history
+# or this fraction of all walking so far, if it is more: a year of 8 h a day then has some 1100 points, not 17
+# 500
 POINT_FRACTION = 0.005
 
 _DUE_KEY = "history_due_s"  # moving_s at which the history takes its next point; of totals
@@ -92,7 +93,7 @@ class Accounting:
     Parameters
     ----------
     twin : DigitalTwin
-        Its wear is set to that of the ledger.
+        Twin whose wear is set to the ledger's wear.
     ledger : Ledger or None
     settings : LedgerFile
 
@@ -102,13 +103,13 @@ class Accounting:
         Gait cycles over all runs.
     parts : tuple of PartLife
     spans : Spans
-        Time that this run has counted, by the present epoch of the clock.
+        Time whose wear this run has counted, by the present epoch of the clock.
     skipped, skipped_s : int, float
-        Samples left out since they are counted, and their time.
+        Number of samples skipped because an earlier run counted their wear, and their time.
     without_zero_s : float
         Time of samples that did not reach the twin, because the crank's zero is not known.
     commissioned : dict of str to float
-        What the ledger keeps of this leg's torque, by names that end in their unit.
+        Values on this leg's torque for the ledger, by names that end in their unit.
     """
 
     def __init__(self, twin: DigitalTwin, ledger: Ledger | None, settings: LedgerFile) -> None:
@@ -122,12 +123,12 @@ class Accounting:
         self._kept_s = self._before.get("moving_s", 0.0)
         self.cycles, self.parts = self.cycles_before, (PartLife(),) * len(twin.clearance_joints)
         self.spans: Spans = ()
-        # begin, end and epoch of what this run counted before its clock began anew
+        # start, end and epoch of the spans that this run counted before its clock was reset
         self._past: tuple[tuple[int, int, int], ...] = ()
         self._is_anew = False
-        self._point_due_s = self._before.get(_DUE_KEY, 0.0)  # of moving_s over all runs, for the history
+        self._point_due_s = self._before.get(_DUE_KEY, 0.0)  # next history point, in moving_s over all runs
         self.skipped, self.skipped_s, self._skipped_ns = 0, 0.0, 0
-        self._shown: Mapping[str, tuple[Level, bool]] = {}  # of the alarms, what the history has last
+        self._shown: Mapping[str, tuple[Level, bool]] = {}  # last state of each alarm in the history
         self._pauses = Pauses()
         self.without_zero_s = 0.0
         self.commissioned: dict[str, float] = {}
@@ -146,7 +147,7 @@ class Accounting:
         self.parts = tuple(self._part(k, joint) for k, joint in enumerate(own))
 
     def _note_coefficients(self, entry: Entry) -> None:
-        """Take down how far the parts were worn with another wear coefficient."""
+        """Note how far the parts were worn under a different wear coefficient."""
         now = dict(zip(self._twin.clearance_joints, self._twin.wear_coefficient_per_pa, strict=True))
         for joint in entry.joints:
             if joint.wear_coefficient_per_pa not in (0.0, now[joint.name]):
@@ -175,9 +176,9 @@ class Accounting:
 
     @property
     def unmonitored_s(self) -> float:
-        """Time in which the leg was not followed in this run.
+        """Time in which the leg was not tracked in this run.
 
-        What earlier runs have counted is not in it, nor are pauses between recordings.
+        It excludes time that earlier runs have counted, and pauses between recordings.
         """
         unmonitored_s = self._twin.intake.unmonitored_s
         others_s = self.skipped_s + self._pauses.passed_s(unmonitored_s)
@@ -198,7 +199,7 @@ class Accounting:
         )
 
     def pause(self, pause_s: float) -> None:
-        """Nobody records for a time [s], from the newest sample on."""
+        """Recording pauses for a time [s], from the newest sample on."""
         self._pauses = self._pauses.with_pause(pause_s, self._twin.intake.unmonitored_s)
 
     @property
@@ -215,7 +216,7 @@ class Accounting:
         return {"cycles": float(self.cycles), **sums}
 
     def not_counted(self, samples: Samples) -> Samples:
-        """Samples but those of a time whose wear is in the ledger from an earlier run."""
+        """Samples without those whose wear is in the ledger from an earlier run."""
         known = self.counted(samples)
         if not known.any():
             return samples
@@ -227,7 +228,7 @@ class Accounting:
         return np.asarray(samples[~known])
 
     def counted(self, samples: Samples) -> NDArray[np.bool_]:
-        """Which samples are of a time whose wear is in the ledger from an earlier run."""
+        """Mask of the samples whose wear is in the ledger from an earlier run."""
         if self._is_anew or not len(self._counted):
             return np.zeros(len(samples), bool)
         return is_within(samples["stamp_ns"], self._counted)
@@ -238,7 +239,7 @@ class Accounting:
         return self.skipped > 0 and not (self.spans or self._past or self._is_anew)
 
     def begin_epoch(self) -> None:
-        """The clock has begun anew: stamps from now on are of another time than those before."""
+        """The clock was reset: stamps from now on are not comparable with earlier stamps."""
         epoch = self.ledger.epoch if self.ledger else 0
         self._past = (*self._past, *((*span, epoch) for span in self.spans))
         self.spans, self._is_anew = (), True
@@ -315,7 +316,7 @@ class Accounting:
         return together((*(self.ledger.loads if self.ledger else ()), *self._loads))
 
     def followed(self, samples: SampleStatistics) -> None:
-        """Take down the time in which the leg was followed."""
+        """Note the time in which the leg was tracked."""
         stamp = samples.stamp_ns[np.isfinite(samples.crank_angle_rad)]
         if len(stamp):
             step_ns = np.diff(stamp)

@@ -1,4 +1,4 @@
-"""The table of alarms: what each compares with which limit."""
+"""The table of alarms: the value and the limit that each alarm compares."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -78,8 +78,8 @@ class AlarmSpec(Generic[_E]):
     meaning, limit_words : str
         For operators: meaning of the value, and the parameters of its limit.
     value : callable
-        Value from the evidence: a joint's report, the input's health or its guard; of those of a gait cycle
-        and of its foot load, which are values by their kinds, the one of this kind.
+        Value from the evidence: a joint's report, the input's health or its guard; from the values of a gait
+        cycle or of its foot load, which are given by kind, the value of this kind.
     limit : callable
         Limit of ERROR.
     on_delay : callable
@@ -89,11 +89,11 @@ class AlarmSpec(Generic[_E]):
     is_count : bool
         Whether the value is a count: ERROR begins at the limit, without WARN and deadband.
     is_latched : bool
-        Whether the alarm stays until it is acknowledged; that of missing data ends when they return.
+        Whether the alarm stays until it is acknowledged; the alarm of missing data ends when they return.
     far : float
         A value beyond so many times a limit raises the level at once.
     figure : Figure or None
-        Kind of values that it belongs to: its value is not shown while the verdict says these are not valid.
+        Kind of values of this alarm: its value is not shown while the verdict says they are not valid.
     """
 
     kind: str
@@ -203,8 +203,9 @@ MISMATCH: "AlarmSpec[Mapping[str, float]]" = AlarmSpec(
     meaning="RMS of the torque that repeats over the last gait cycles, and that foot load, friction and lag "
     "do not explain, as a fraction of the predicted RMS",
     **_parameter("torque_mismatch"),
-    # what impacts scatter at 45 rpm reaches the limit once in some thousand gait cycles, three times in a row
-    # once in 300 000, and 1.3 times the limit at most; a torque that is wrong as received is known at once
+    # The scatter of impacts at 45 rpm reaches the limit once in some thousand gait cycles, three times in a
+    # row once in 300 000, and 1.3 times the limit at most. A torque that is wrong as received is known at
+    # once
     far=1.5,
 )
 CADENCE: "AlarmSpec[Mapping[str, float]]" = AlarmSpec(
@@ -358,7 +359,7 @@ OF_TORQUE = frozenset((*(spec.name() for spec in TORQUE), "input_torque"))
 
 INPUT_KINDS = tuple(dict.fromkeys(spec.kind for spec in OF_INPUT))
 KINDS: "dict[str, AlarmSpec[Any]]" = {spec.kind: spec for spec in ALL}
-"""The kinds of alarms, each with a spec: those of one kind have the same unit and figure."""
+"""The kinds of alarms, each with a spec: alarms of one kind have the same unit and figure."""
 
 
 QUANTITIES = {

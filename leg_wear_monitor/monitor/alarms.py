@@ -193,7 +193,7 @@ def evaluated(
     worst = value if is_estimate else _worst(level, alarm.worst, value, limit)
     if level is Level.OK:
         sigma, cause = math.nan, ""
-    elif worst == alarm.worst and not is_estimate:  # what was known of the worst value stays with it
+    elif worst == alarm.worst and not is_estimate:  # cause and deviation of the worst value stay with it
         sigma, cause = alarm.sigma, alarm.cause or cause
     return Alarm(  # all fields: `attrs.evolve` takes several times as long, for each value of each period
         kind=alarm.kind,
@@ -245,10 +245,10 @@ def has_changed(before: Alarm, after: Alarm) -> bool:
     return _SHOWN_STATE(before) != _SHOWN_STATE(after)
 
 
-# Stable names of what is wrong, one with each status: those of alarms, and those of the parts of a monitor.
+# Stable fault codes, one with each status: codes of alarms, and codes of the parts of a monitor.
 #
-# A status of the verdict has the code of its rule (`verdict.rules`), which is that of a cause
-# (`estimate.cause`) where one is found.
+# A status of the verdict has the code of its rule (`verdict.rules`), which is the code of a cause
+# (`estimate.cause`) if there is one.
 
 
 NO_FAULT = "NONE"
@@ -264,7 +264,7 @@ GAPS, STUCK, ZERO, SCALE, EXCHANGED, SIGN = (
     "input_gaps", "foot_load_stuck", "foot_load_zero", "foot_load_scale", "foot_load_exchanged",
     "foot_load_sign",
 )  # fmt: skip
-"""Kinds of the alarms of the foot load's sensor, by which their values are named."""
+"""Kinds of the alarms of the foot load's sensor; their values have these names."""
 FOOT_LOAD_LIMITS = {GAPS: 0.05, STUCK: 0.9, ZERO: 0.1, SCALE: 3.0, EXCHANGED: 0.5, SIGN: 0.5}
 
 FOOT_LOAD_WORDS = {
@@ -276,7 +276,7 @@ FOOT_LOAD_WORDS = {
     EXCHANGED: "the foot load is present while this foot is in the air: it belongs to the other leg",
     SIGN: "the foot load pulls: its sign is reversed",
 }
-"""What is wrong, by the kind of the alarm."""
+"""Fault code by the kind of the alarm."""
 
 FAULT_CODES = {
     NO_FAULT: "nothing is wrong",
@@ -313,7 +313,7 @@ def joint_of(name: str) -> str:
 
 
 def code_of(alarm: Alarm) -> str:
-    """Code of a raised alarm, such as ``CLEARANCE_A``; NONE for another."""
+    """Code of a raised alarm, such as ``CLEARANCE_A``; NONE for any other alarm."""
     return alarm.name.upper().replace(" ", "_") if alarm.level is not Level.OK else NO_FAULT
 
 
@@ -323,7 +323,7 @@ def worst_code(alarms: Iterable[Alarm]) -> str:
     return code_of(found[0]) if found else NO_FAULT
 
 
-# The page of the how-to guides for each fault code, so that a message leads to what to do.
+# The page of the how-to guides for each fault code, so that a message leads to the next action.
 
 
 FOLDER = "docs/howto/verdict"

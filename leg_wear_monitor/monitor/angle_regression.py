@@ -69,7 +69,7 @@ def regress(columns: Floats, deviation: Floats, counts: Floats, before: Estimate
     deviation, counts : (P, m) arrays
         Results of `binned`.
     before : Estimate
-        Prior, which separates with a very small weight what the sensors cannot.
+        Prior, which has a very small weight and separates values that the sensors cannot.
     """
     p = columns.shape[-1]
     used = (counts > 0.0).ravel()

@@ -1,4 +1,4 @@
-"""The leg as it is counted: the twin, its wear in the ledger, its growth, measurements and forecast."""
+"""The wear model of this leg: the twin, its wear in the ledger, its growth, measurements and forecast."""
 
 from collections.abc import Sequence
 
@@ -24,7 +24,7 @@ from leg_wear_monitor.twin.sample import GROUND
 
 
 class CountedLeg:
-    """The leg as it is counted; observers read it, and correct it.
+    """The wear model of this leg; observers read it, and correct it.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class CountedLeg:
     mechanism : Mechanism
         With the clearance joints and clearances of the configuration.
     config : MonitorConfig
-        Replaced where parameters change.
+        Replaced when parameters change.
     growth : tuple of GrowthWindow
     last : CycleReport or None
         The last gait cycle of this run.
@@ -64,7 +64,7 @@ class CountedLeg:
 
     @property
     def model_error(self) -> ModelError:
-        """What the growth may be off by masses, and by a load that was found; a measured one is known."""
+        """Error of the growth from masses and from an estimated load; a measured load is known."""
         own, speed = self.twin.parameters, self.twin.settings.tracker.commanded_speed_radps
         if self._error is None or self._error[0] is not own:
             sigma = own.load_sigma if self.config.load.model == GROUND else 0.0
@@ -77,7 +77,7 @@ class CountedLeg:
         return np.asarray(clearance_m - self.new_m)
 
     def grows_anew(self, joints: Sequence[str]) -> None:
-        """Discard the growth of some joints: what was counted of it is of another leg."""
+        """Discard the growth of some joints, because it belongs to a different leg."""
         each = zip(self.clearance_joints, self.growth, strict=True)
         self.growth = tuple(GrowthWindow() if name in joints else window for name, window in each)
 

@@ -20,7 +20,7 @@ from leg_wear_monitor.twin.sample import AVERAGE, NO_FAULT, Samples
 
 
 MOST_TURNS = 16  # as many as a sensor that samples instants needs, see docs/appendix/commissioning.md
-_STANDS = 0.1  # of a turn in the time of a gait cycle
+_STANDS = 0.1  # turns in the time of a gait cycle
 _LONGEST = 1.5  # times the time of the commanded turns, for slower ones
 
 
@@ -31,9 +31,9 @@ class Walk:
     Attributes
     ----------
     turns : int
-        Their number, at most `MOST_TURNS`.
+        Number of turns, at most `MOST_TURNS`.
     why : str
-        Why there are none; empty if there are some.
+        Why there are no turns; empty if there are some.
     crank, torque : Series
         Crank angle up to the unknown zero, counted on over turns [rad], and drive torque [N m] meanwhile.
     """
@@ -125,15 +125,15 @@ def _why_none(crank: Series, cadence: Cadence) -> str:
 # The crank's zero from the phase of the drive torque, or why it cannot be found.
 
 
-LEAST_TURNS = 3  # two were enough for sensors that average; the third shows what repeats
-_SURE_RAD = 0.015  # scatter that a found zero may have beside the error of the model
+LEAST_TURNS = 3  # two were enough for sensors that average; the third shows the repeating residual
+_SURE_RAD = 0.015  # scatter that a found zero may have in addition to the error of the model
 _LEAST_SAMPLES = 25  # torque samples in a turn: two and a half in a period of the tenth harmonic
 _SCANNED = 100  # samples of a turn that are enough to find the phases that are worth a fit
 _STARTS = 3  # phases that are fitted
 _APART_RAD = 0.3  # two phases nearer than that are one
-_UNLIKE = 0.7  # mismatch from which on less than half of the torque's energy is explained
-_ANOTHER_LEG = 0.5  # rest that repeats from which on the torque is that of another leg
-_DIGITS = 6  # of a zero [rad]: those beyond may depend on the library of linear algebra
+_UNLIKE = 0.7  # torque residual from which on less than half of the torque's energy is explained
+_ANOTHER_LEG = 0.5  # repeating residual from which on the torque comes from a different leg
+_DIGITS = 6  # digits of a zero [rad]: further digits may depend on the library of linear algebra
 
 
 @attrs.frozen
@@ -145,9 +145,9 @@ class Zero:
     offset_rad, sigma_rad : float
         Crank angle at joint position 0, from -pi to pi, and its standard deviation.
     turns : int
-        Turns of the crank that it was found from.
+        Turns of the crank from which the zero was found.
     mismatch : float
-        RMS of the torque that is not explained, as a fraction of that of the measured torque.
+        Torque residual: RMS of the unexplained torque over the RMS of the measured torque.
     other_rad, other_mismatch : float
         The runner-up; NaN if no other angle explains anything.
     """

@@ -40,22 +40,22 @@ SETTINGS = np.dtype(
 )
 STATE = np.dtype(
     [
-        # of the crank's series, and of another one that may take its place
+        # for the crank's series, and for a second series that may take its place
         ("number", "i8", (2,)),  # samples
         ("stamp", "i8", (2,)),  # stamp of the last sample [ns]
         ("angle", "f8", (2,)),  # [rad]
         ("speed", "f8", (2,)),  # [rad/s]
-        ("first_stamp", "i8"),  # of the other one [ns]
+        ("first_stamp", "i8"),  # first stamp of the second series [ns]
         ("first_angle", "f8"),  # [rad]
         ("event", "i8"),  # at the sample where the search ended
     ]
 )
 
-# The angle leaves its series; it is back, or another series has taken its place without a restart; it is
-# another series, so the encoder has restarted.
+# The angle leaves its series; it is back, or a different series has taken its place without a restart; it is
+# in a different series, so the encoder has restarted.
 LEAVES, CONTINUES, RESTARTS = range(3)
 
-_SURE = 3  # samples of another series; the tracker accepts one after five, see `twin.tracker.tracking`
+_SURE = 3  # samples of a new series; the tracker accepts a series after five, see `twin.tracker.tracking`
 _WRAP = 1.5 * _TURN  # an angle that is wrapped to a turn jumps by less
 
 
@@ -78,7 +78,7 @@ def _belongs(settings, state, k, stamp, angle):
 
 @kernel
 def _take_over(state):
-    """The other series becomes that of the crank."""
+    """The second series becomes the crank's."""
     state.number[0], state.stamp[0] = state.number[1], state.stamp[1]
     state.angle[0], state.speed[0] = state.angle[1], state.speed[1]
     state.number[1] = 0
@@ -115,7 +115,8 @@ def _event(settings, state, stamp, angle):
 def find_event(all_settings, states, stamp, kind, angle, fault, first):
     """Index of the sample, from ``first`` on, at which the next event is; -1 if there is none.
 
-    Of settings and states there is one each; the state is changed, its ``event`` says which one it is.
+    ``all_settings`` and ``states`` have one record each; the state is changed, and its ``event`` names the
+    event.
     """
     settings, state = all_settings[0], states[0]
     for i in range(first, stamp.shape[0]):
@@ -129,9 +130,9 @@ def find_event(all_settings, states, stamp, kind, angle, fault, first):
 
 
 _A_CYCLE = 4  # evaluation periods of a gait cycle
-_MOST_PERIODS = _A_CYCLE * (MOST_TURNS + 4)  # that samples wait: a slower cadence within tolerance, too
+_MOST_PERIODS = _A_CYCLE * (MOST_TURNS + 4)  # samples wait so long; enough for a slower cadence
 _MOST_SAMPLES = 400_000  # 30 MB
-_LONGEST_DOUBT = _A_CYCLE  # periods after which an angle that neither continues nor restarts is another one
+_LONGEST_DOUBT = _A_CYCLE  # periods after which an angle that neither continues nor restarts is a new series
 
 _LONGEST_REST = 4 * _A_CYCLE  # periods between attempts, each of which takes a tenth of a second
 
@@ -210,7 +211,7 @@ class CrankZero(Observer):
         self.passed(_NONE, ends_period=False)
 
     def passed(self, samples: Samples, ends_period: bool) -> Samples:
-        """Samples to be followed now, with the zero: these, earlier ones that waited, or none.
+        """Samples to track now, with the zero: these samples, earlier ones that waited, or none.
 
         Parameters
         ----------
@@ -293,7 +294,7 @@ class CrankZero(Observer):
         return samples
 
     def _take_event(self, out: list[Samples]) -> None:
-        """Settle what happens to doubtful samples before the sample of an event is added."""
+        """Settle the doubtful samples before the sample of an event is added."""
         state, event = self.state, int(self._event.event)
         if event == LEAVES:
             state.doubtful, state.doubts = (_NONE,), 0

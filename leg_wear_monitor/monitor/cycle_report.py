@@ -49,7 +49,7 @@ def cycle_report(
 
 
 def _mismatch(torque: TorqueStatistics) -> float:
-    """What load, frictions and lag do not explain, as a fraction of what was predicted; NaN if not known."""
+    """Torque residual without load, frictions and lag, as a fraction of the prediction; NaN if not known."""
     predicted_nm = torque.predicted_rms_nm
     return float(torque.unexplained_rms_nm / predicted_nm) if predicted_nm > 0.0 else math.nan
 

@@ -36,7 +36,7 @@ def fitted(mechanism: Mechanism, config: MonitorConfig, source: str = "parameter
         a mechanism with a torque as its drive, a drive that is not known, a person on bodies that are not
         there, or a load on a mechanism without a toe.
     """
-    drive_figures(config.drive, source)  # a fault of it ends the start, whoever uses the figures
+    drive_figures(config.drive, source)  # a fault of it stops the start, even if the values are not used
     interface, torque = config.drive.temperature_interface, config.drive_torque.source
     if interface and torque != INTERFACE:
         fault = f"{interface!r} needs drive_torque.source {INTERFACE!r}, which is {torque!r}"
@@ -125,7 +125,7 @@ def twin_settings(config: MonitorConfig, source: str = "parameters") -> sample.T
 
 
 def largest_lag_s(config: MonitorConfig) -> float:
-    """Largest lag that a torque may have: that of the drive as declared, and `drive_torque.max_lag_s`."""
+    """Largest lag that a torque may have: the declared lag of the drive, and `drive_torque.max_lag_s`."""
     return config.drive_torque.max_lag_s + drive_figures(config.drive).lateness_s
 
 
@@ -188,7 +188,7 @@ def _wrong_length(
     )
 
 
-# Usable parameters that are likely meant in another unit; see also `mechanism.plausible`.
+# Usable parameters that are likely meant in a different unit; see also `mechanism.plausible`.
 
 
 MOST_ACCELERATION = 1000.0  # impact forces of healthy legs stay as they are; at 5000 they reached 331 kN

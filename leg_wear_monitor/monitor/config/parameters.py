@@ -97,7 +97,7 @@ def parameters_of(kind: type) -> Mapping[str, Parameter]:
 
 
 PARAMETERS: Mapping[str, Parameter] = parameters_of(MonitorConfig)
-"""Those of the monitor."""
+"""Parameters of the monitor."""
 
 
 def is_of_node(name: str) -> bool:
@@ -161,7 +161,7 @@ def changed(config: _Config, changes: Mapping[str, Any], source: str = "paramete
     Raises
     ------
     ConfigError
-        If a value cannot be used, or another parameter is to change.
+        If a value cannot be used, or a parameter that must not change is given.
     """
     values = values_of(config)
     wanted = structured(type(config), values | dict(changes), source)
@@ -230,7 +230,7 @@ def load_config(path: str | Path | None = None, node: str | None = None) -> Moni
     Raises
     ------
     ConfigError
-        Naming file, parameter, value, unit and what was expected.
+        Naming file, parameter, value, unit and the expected value.
 
     Examples
     --------
@@ -245,7 +245,7 @@ def load_config(path: str | Path | None = None, node: str | None = None) -> Moni
 
 
 def is_parameter_file(document: Any) -> bool:
-    """Whether the content of a YAML file is ROS parameters, or those with a misspelt mark."""
+    """Whether the content of a YAML file is ROS parameters, or ROS parameters with a misspelt mark."""
     return bool(_misspelt(document)) or any(_is_marked(entry) for _, entry in _sections(document))
 
 

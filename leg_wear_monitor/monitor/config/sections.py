@@ -9,7 +9,7 @@ from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.estimate.drive import DriveFigures
 from leg_wear_monitor.mechanism.sourced import LIBRARY, Drive, load_drive
 
-# What is declared of the drive: a file by name, and numbers that override it.
+# Declared values of the drive: a file by name, and numbers that override it.
 
 
 NOT_DECLARED = -1.0
@@ -24,10 +24,10 @@ def _figure(
     slip: str = "",
     otherwise: str = "an estimate",
 ) -> float:
-    """Parameter for a figure within bounds, or `NOT_DECLARED`; ``slip`` is the unit that is likely meant.
+    """Parameter for a value within bounds, or `NOT_DECLARED`; ``slip`` is the unit that is likely meant.
 
-    What is usual holds all drives of config/drives and those that others measured, tenfold and more: geared
-    servos of 0.4 N m to harmonic drives of 100, belts, springs in series.
+    The usual range includes all drives of config/drives and measured drives, with a factor of ten and more:
+    geared servos of 0.4 N m to harmonic drives of 100, belts, springs in series.
     """
 
     def fault(value: float) -> str | None:
@@ -52,7 +52,7 @@ def _figure(
 
 @attrs.frozen(kw_only=True)
 class DriveParameters:
-    """What is known of the drive beforehand; all else is estimated. The numbers are at the crank."""
+    """Declared values of the drive; all others are estimated. The numbers are at the crank."""
 
     type: str = described(
         "drive: a name from `leg-wear-monitor drives`, or a file; empty if unknown", default=""
@@ -97,7 +97,7 @@ class DriveParameters:
 
 
 def drive_figures(parameters: DriveParameters, source: str = "parameters") -> DriveFigures:
-    """Declared figures of a drive at the crank: those of its file, overridden by the numbers.
+    """Declared values of a drive at the crank: the values of its file, overridden by the numbers.
 
     Parameters
     ----------
@@ -108,8 +108,8 @@ def drive_figures(parameters: DriveParameters, source: str = "parameters") -> Dr
     Raises
     ------
     ConfigError
-        If there is no drive of this name, with the nearest name, if its file has a fault, or if a figure of
-        it is at the crank beyond the bounds of the parameter that overrides it.
+        If there is no drive of this name, with the nearest name, if its file has a fault, or if a value of
+        the file is at the crank beyond the bounds of the parameter that overrides it.
     """
     figures = DriveFigures()
     if parameters.type:
@@ -128,7 +128,7 @@ def drive_figures(parameters: DriveParameters, source: str = "parameters") -> Dr
 
 
 def _of_file(drive: Drive, output_turns: float) -> DriveFigures:
-    """Figures of a file, at a crank for one turn of which the drive's output makes some turns."""
+    """Values of a file at a crank; the drive's output makes some turns for one turn of the crank."""
     turns = output_turns * drive.motor_turns
     factors = {
         "lag_s": (drive.lag, 1.0),
@@ -155,9 +155,9 @@ def _not_next_to_0(sigma: float) -> str | None:
 
 @attrs.frozen(kw_only=True)
 class Forecasting:
-    """Uncertainties of the forecast as standard deviations; those of factors are of the natural logarithm.
+    """Uncertainties of the forecast as standard deviations; for factors, of the natural logarithm.
 
-    What has no description is a constant of the method, not a parameter.
+    Values without a description are constants of the method, not parameters.
     """
 
     wear_coefficient_sigma: float = quantity(
@@ -168,11 +168,11 @@ class Forecasting:
         default=0.0,
         check=_not_next_to_0,
     )
-    load_sigma: float = 0.1  # of future wear per cycle, because load and pace vary
-    model_sigma: float = 0.4  # of the growth without simulated lives, and beyond them (forecast.md)
-    clearance_sigma_m: float = 5.0e-6  # of a new joint's clearance
+    load_sigma: float = 0.1  # for future wear per cycle, because load and pace vary
+    model_sigma: float = 0.4  # for the growth without simulated lives, and beyond them (forecast.md)
+    clearance_sigma_m: float = 5.0e-6  # for a new joint's clearance
     duty_hours_per_day: float = quantity("h", "walking per day", within=(0.01, 24.0), default=8.0)
-    duty_sigma: float = 0.2  # of the walking per day
+    duty_sigma: float = 0.2  # for the walking per day
     window_cycles: int = 2000  # over which growth is averaged, because single gait cycles scatter
     growth_law_file: str = described(
         "file that `leg-wear-monitor life --ensemble-size 16 --json` wrote for this leg: how growth changes "

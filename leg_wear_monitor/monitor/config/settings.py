@@ -29,7 +29,7 @@ def _filled(text: str) -> str | None:
 
 @attrs.frozen(kw_only=True)
 class Limits:
-    """Where alarms begin: ERROR at the limit, WARN at a fraction of it."""
+    """Limits of alarms: ERROR at the limit, WARN at a fraction of it."""
 
     warn_fraction: float = live_quantity(
         "", "alarm level WARN begins at this fraction of a limit", above=0.0, at_most=1.0, default=0.8
@@ -125,7 +125,7 @@ class Limits:
 class Alarms:
     """When a level changes."""
 
-    deadband: float = 0.05  # of a limit; a value at its limit must not switch the level in each gait cycle
+    deadband: float = 0.05  # over a limit; a value at its limit must not switch the level in each gait cycle
     on_delay_cycles: int = live_quantity(
         "", "consecutive gait cycles beyond a limit before the level rises", within=(1, 1000), default=3
     )
@@ -145,7 +145,7 @@ class Growth:
 
 @attrs.frozen(kw_only=True)
 class LedgerFile:
-    """Where the wear is kept."""
+    """File that stores the wear."""
 
     path: str = described("file of the ledger; if empty, the wear is lost when the monitor ends", default="")
     checkpoint_s: float = quantity(
@@ -159,7 +159,7 @@ class LedgerFile:
 
 @attrs.frozen(kw_only=True)
 class Record:
-    """A recording of what the node receives and publishes."""
+    """A recording of the messages that the node receives and publishes."""
 
     path: str = described("MCAP file to write; if empty, the node writes no recording", default="")
     stop_recording_dir: str = described(
@@ -171,7 +171,7 @@ class Record:
 
 @attrs.frozen(kw_only=True)
 class Diagnostics:
-    """What goes to /diagnostics."""
+    """Content of /diagnostics."""
 
     period_s: float = quantity(
         "s", "time between two messages on /diagnostics", within=(0.1, 2.0), default=1.0
@@ -197,7 +197,7 @@ class TorqueDiagnosis:
 
 @attrs.frozen(kw_only=True)
 class MonitorConfig:
-    """All parameters; their dotted names are those of the ROS node and of config/monitor.yaml."""
+    """All parameters; their dotted names are the same in the ROS node and in config/monitor.yaml."""
 
     mechanism: str = described(
         "mechanism of the leg: a name from the package, or a file",

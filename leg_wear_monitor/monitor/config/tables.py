@@ -13,7 +13,7 @@ from leg_wear_monitor.configuration import FieldError, choice, described, quanti
 
 DATE = "date"
 STAMPS: Mapping[str, int] = {"s": 9, "ms": 6, "us": 3, "ns": 0}
-"""Power of ten by which a time becomes nanoseconds."""
+"""Power of ten that converts a time to nanoseconds."""
 ANGLES: Mapping[str, tuple[float, float]] = {
     "rad": (1.0, 1.0),
     "deg": (math.pi, 180.0),
@@ -97,7 +97,7 @@ def _date(text: str) -> str | None:
 
 @attrs.frozen(kw_only=True)
 class TableInput:
-    """Columns of tables; signs and scales are those of `crank`, `drive_torque` and `foot_load`."""
+    """Columns of tables; signs and scales are in `crank`, `drive_torque` and `foot_load`."""
 
     columns: Columns = described("", factory=Columns)
     units: Units = described("", factory=Units)

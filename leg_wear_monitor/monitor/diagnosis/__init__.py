@@ -1,1 +1,1 @@
-"""Diagnosis: the clearances that the drive torque shows, and what has changed in the leg."""
+"""Diagnosis: the clearances that the drive torque shows, and changes of the leg."""

@@ -1,4 +1,4 @@
-"""The evidence of gait cycles: tests for a change, what explains it, and the clearances."""
+"""The evidence of gait cycles: tests for a change, its explanations, and the clearances."""
 
 import math
 from collections.abc import Sequence
@@ -29,21 +29,21 @@ from leg_wear_monitor.monitor.diagnosis.state import (
 
 SETTLING_CYCLES = 10  # since a change, before the modelled clearances are corrected by it
 
-# mean square up to which another joint explains what a corrected leg shows beside the baseline before: G, I
-# and B left 0.9 to 1.1 where they had opened with A and G, and J 1.9, at 1.7 mm for 0.6 (2026-11-27)
+# mean square up to which a second joint explains the residual of a corrected leg against the baseline before:
+# G, I and B left 0.9 to 1.1 where they had opened with A and G, and J 1.9, at 1.7 mm for 0.6 (2026-11-27)
 _WHOLLY = 1.5
 
-# mean square up to which all clearances at once explain a leg of which one or two opened: 0.9 to 1.4; five,
+# mean square up to which all clearances at once explain a leg with one or two open joints: 0.9 to 1.4; five,
 # which they do not tell apart, leave 1.5 to 1.7, and a mass on the thigh 1.8 to 3.6 (2026-11-27)
 _WHOLE = 1.4
 
-# by which the logarithms of odds over the next cause are divided beside an interim, as the model is not of
-# such a leg: beside twice the friction, G at 0.50 mm was B, with odds of e^12 over G. Right names have
-# e^62 and more beside a lag, e^118 and more at 2 mm, e^19 to e^38 at 0.5 to 0.6 mm beside a mass (2026-11-27)
+# divisor of the log odds over the next cause during an interim, because the model does not describe such a
+# leg: with twice the friction, G at 0.50 mm was B, with odds of e^12 over G. Right names have e^62 and more
+# with a lag, e^118 and more at 2 mm, e^19 to e^38 at 0.5 to 0.6 mm with a mass (2026-11-27)
 _BESIDE = 5.0
 
 _LEAST_CYCLES = 2  # since a change, before it is explained: the first contains the change itself
-_LEAST_CYCLES_UNLIKE = 6  # where the leg is not that of its reference: two strange steps are no change
+_LEAST_CYCLES_UNLIKE = 6  # for a leg that differs from its reference: two strange steps are no change
 _FIT_EVERY = 10  # gait cycles, but for the first ones of a change
 
 # times the detector's threshold (both are natural logarithms of odds), from which on it hardly matters that
@@ -61,13 +61,13 @@ _SURE_BEFORE = 20.0
 _LEAST_BEFORE = 3  # gait cycles before a change that show the leg without it
 
 # change of the load that the twin finds, in newtons and standard errors, from which on it has changed: 18 to
-# 590 N for 20 to 600 N, and none beside openings to 2 mm, masses, and dry joints (2026-11-27)
+# 590 N for 20 to 600 N, and none with openings to 2 mm, masses, and dry joints (2026-11-27)
 _LOAD_CHANGE_N, _LOAD_SIGMAS = 12.0, 4.0
 _AMIDST = 2  # gait cycles before and after its begin in which the twin may be about to find it
 
 
 def correction_of(state: TorqueState, joints: Sequence[str]) -> Change | None:
-    """A settled change of one clearance, seen at the present cadence: it surely is counted wrong."""
+    """A settled change of one clearance at the present cadence: its modelled value is surely wrong."""
     if not state.changes or state.fit_cycles < SETTLING_CYCLES or not state.is_compared:
         return None
     change = state.changes[-1]
@@ -79,7 +79,7 @@ def correction_of(state: TorqueState, joints: Sequence[str]) -> Change | None:
 
 
 def _is_alone(state: TorqueState, change: Change, joint: int) -> bool:
-    """Whether the change of a joint is of this one alone, and not of two that look like a wider one.
+    """Whether only this joint changed, and not two joints that look like one wider joint.
 
     B and G at 0.50 mm looked like G at 0.83 ± 0.11 mm, G and I like G at 0.84 ± 0.11, where all clearances at
     once had G at 0.47 and 0.54 mm (2026-11-27).
@@ -110,7 +110,7 @@ class Evidence:
     def review(self, state: TorqueState, config: MonitorConfig) -> None:
         """Evaluate all kept cycles again, because the reference or the baseline has changed."""
         self._know_sensor(state)
-        if not state.is_compared:  # what was found at another cadence stays
+        if not state.is_compared:  # results from a different cadence stay
             return
         reported = state.changes
         state.detector, state.changes, state.fit_due = None, (), 0
@@ -121,13 +121,13 @@ class Evidence:
             state.changes = (_since(state.changes[-1], reported[-1].since_ns, state),)
 
     def settle(self, state: TorqueState, change: Change, modelled_m: Floats) -> None:
-        """Make the gait cycles since a change those of the commissioned leg, with clearances (k,) [m].
+        """Take the gait cycles since a change as the commissioned leg's, with clearances (k,) [m].
 
-        What the correction is off does then not look like a further change; it stays in the standard
-        deviation. Nor does what other joints changed at the same time: theirs are not known until they are
-        compared with the baseline before (`compare_with_before`).
+        The error of the correction then does not look like a further change; it stays in the standard
+        deviation. Simultaneous changes of other joints do not show either: they are not known until the leg
+        is compared with the baseline before (`compare_with_before`).
         """
-        explainer = self._models.explainer(state)  # of the baseline before
+        explainer = self._models.explainer(state)  # for the baseline before
         state.cycles = tuple(cycle for cycle in state.cycles if cycle.begin_ns >= change.since_ns)
         before, sigma_m = state.commissioned, modelled_m.copy()
         if before is not None and before.before is not None:  # joints that were corrected since stay known
@@ -146,9 +146,9 @@ class Evidence:
     def compare_with_before(self, state: TorqueState, is_last: bool = False) -> Change | None:
         """Compare a corrected leg with the baseline before, once there is a reference about it.
 
-        What another joint changed at the same time is in the baseline after the correction, and would never
-        be seen. Returns a clearance that surely opened, too; without one, or the last time, the others are
-        known as well as they explain the leg.
+        A simultaneous change of a second joint is in the baseline after the correction, and would never be
+        detected. Returns the change of a joint that surely opened as well. Without one, or the last time, the
+        other clearances get the errors with which the fit explains the leg.
         """
         known, is_fitted = state.commissioned, state.fit_due == _FIT_EVERY - 1
         if known is None or known.before is None or state.reference is None:
@@ -171,7 +171,7 @@ class Evidence:
             apart_m = np.abs(found.clearance_m - modelled_m)
             own_m = np.sqrt(found.sigma_m**2 + apart_m**2 + (MODEL_ERROR * corrected_m) ** 2)
             own_m = np.hypot(own_m, known.before.sigma_m)
-            # as wide as is corrected, but not surely: J at 0.60 mm beside B was 0.57 ± 0.06, or it was I
+            # wide enough for a correction, but not surely: J at 0.60 mm with B was 0.57 ± 0.06, or it was I
             own_m = np.where(found.clearance_m >= CORRECTED_FROM * modelled_m, modelled_m, own_m)
             state.know_corrected(np.where(known.is_unknown, own_m, known.sigma_m))
         state.fit_due = 0
@@ -181,8 +181,8 @@ class Evidence:
         """Find the noise of the torque sensor, and the channel behind which a commissioned leg is expected.
 
         Before it is commissioned, a wide joint and a filter could be taken for each other, so there is no
-        channel. A baseline after a correction has an uncertain clearance: its channel is that of the one
-        before.
+        channel. A baseline after a correction has an uncertain clearance: its channel is the channel of the
+        baseline before.
         """
         known = state.commissioned
         if state.reference is None or state.sensor is None or not (known or state.cycles):
@@ -208,7 +208,7 @@ class Evidence:
     def _explain(self, state: TorqueState, config: MonitorConfig) -> None:
         """Renew the clearances, and the change if there is one."""
         if state.is_load_other and state.not_by_load:
-            return  # what is reported stays
+            return  # the reported changes stay
         if state.interim is not None and not state.interim.changes:
             state.interim = self._known_again(state, state.interim)
         # the gait cycles since the change, if there is one: often at first, then now and then
@@ -230,7 +230,7 @@ class Evidence:
             explanations = self._beside_interim(state, cycles, explanations)
             cycles = cycles[-len(state.cycles) :]
             mean = np.mean([cycle.signature for cycle in cycles], axis=0)
-        # a leg that is not that of the reference has no names and no clearances
+        # for a leg that differs from the reference, no names and no clearances are known
         is_known = state.commissioned or state.changes or state.is_load_other
         if not (is_known or self._fits(state, explanations, since_ns)):
             self._report(state, None, since_ns, len(cycles), config)
@@ -271,7 +271,7 @@ class Evidence:
         state.detector, state.fit_due = self._models.detector(state, config).fresh(), 0
 
     def _known_again(self, state: TorqueState, interim: Interim) -> Interim | None:
-        """What changed in the run before, found again; None where nothing is left of it."""
+        """The changes of the run before, found again; None if nothing is left of them."""
         known, explainer = interim.baseline, self._models.explainer(state, is_commissioned=True)
         found = change_of(explainer.explanations(known.mean, known.cycles, known.clearance_m), known.stamp_ns)
         return Interim((found,), known) if found else None
@@ -279,11 +279,11 @@ class Evidence:
     def _beside_interim(
         self, state: TorqueState, cycles: Sequence[SignedCycle], explanations: Sequence[Explanation]
     ) -> Sequence[Explanation]:
-        """Explanations of what changed beside the interim, or, where that is over, of all that changed.
+        """Explanations of changes beyond the interim, or, if the interim is over, of all changes.
 
-        It is over where the last gait cycles are those of the commissioned leg, and it is another where one
-        of these causes alone explains as well, with another size, what would be a further one, and where what
-        was unknown is known by now.
+        The interim is over if the last gait cycles match the commissioned leg. It is replaced if one of its
+        causes alone, with a different size, explains a seemingly further change as well, or if its unknown
+        cause is known by now.
         """
         recent = cycles if explanations else cycles[-SETTLING_CYCLES:]
         mean = np.mean([cycle.signature for cycle in recent], axis=0)
@@ -312,7 +312,7 @@ class Evidence:
     def _report(
         self, state: TorqueState, change: Change | None, since_ns: int, cycles: int, config: MonitorConfig
     ) -> None:
-        """Report a change; where none explains what was detected once it had time to settle, test anew."""
+        """Report a change; if no cause explains the detection once it had time to settle, test anew."""
         if change is not None:
             state.changes = (change,)
         elif since_ns and cycles >= SETTLING_CYCLES:
@@ -323,9 +323,9 @@ class Evidence:
         return _LEAST_CYCLES if self._models.fits(state) else _LEAST_CYCLES_UNLIKE
 
     def _fits(self, state: TorqueState, explanations: Sequence[Explanation], since_ns: int) -> bool:
-        """Whether a leg that was never commissioned is that of the reference, but for one clearance at most.
+        """Whether a leg that was never commissioned matches the reference, but for one clearance at most.
 
-        It is, too, if it was before a change: a large opening is explained less well.
+        It also matches if it did before a change: a large opening is explained less well.
         """
         if _is_of_reference(explanations):
             return True
@@ -338,12 +338,12 @@ class Evidence:
     def _change(
         self, state: TorqueState, explanations: Sequence[Explanation], since_ns: int
     ) -> Change | None:
-        """What has changed since a gait cycle, by the explanations of those from then on, the best first.
+        """The change since a gait cycle, by the explanations of the cycles from then on, the best first.
 
-        Before a leg is commissioned, only a clearance that is sure, and as wide as is corrected, counts: all
+        Before a leg is commissioned, only a sure clearance that is wide enough for a correction counts: all
         else is constant, and becomes part of the baseline. A change of a clearance gets its most probable
-        begin; another one keeps that of its detection. Under another load than in the reference, nothing is
-        sure: an unknown change is that of the load, and so is any before a baseline.
+        start; any other change starts at its detection. Under a load that differs from the reference, nothing
+        is sure: an unknown change is attributed to the load, and so is any change before a baseline.
         """
         change = change_of(explanations, since_ns)
         of_load = _changed_load(state, change) if change else None
@@ -389,7 +389,7 @@ class Evidence:
         the change is far above the threshold, or as many cycles have passed as settle it, one fit is enough:
         its bound counts as all of them.
         """
-        if state.fit is None or not self._models.fits(state):  # the change may be of another joint
+        if state.fit is None or not self._models.fits(state):  # the change may belong to a different joint
             state.least_m = ()
             return
         number = config.alarms.on_delay_cycles
@@ -400,17 +400,17 @@ class Evidence:
             if _is_alone(state, change, k):
                 least_m[k] = max(least_m[k], change.value - SURE_SIGMAS * change.sigma)
                 is_enough |= change.log_odds >= _FAR_BEYOND * self._models.detector(state, config).threshold
-            elif state.commissioned is None:  # nor do all at once show whose it is
+            elif state.commissioned is None:  # the fit of all clearances does not show the joint either
                 least_m[k] = -math.inf
         state.least_m = (least_m,) * number if is_enough else (*state.least_m, least_m)[-number:]
 
 
 def _changed_load(state: TorqueState, change: Change) -> Change | None:
-    """The change that the load at the foot is, where the twin finds another one since; else None.
+    """Attributes a change to the load at the foot if the twin finds a changed load since; else None.
 
-    Its shape is another one than that of the column for it, and impacts change where it presses the joints:
-    put on the ground, a healthy leg was A or J, *or something else*. What was surely named before stays, and
-    a leg that has a reference under a load, or is to get one, follows that.
+    The load's shape differs from the shape of its column, and impacts change where it presses the joints: put
+    on the ground, a healthy leg was A or J, *or something else*. A joint surely named before stays, and a leg
+    that has a reference under a load, or will get one, follows the reference.
     """
     reported = state.changes[-1] if state.changes else None
     follows = state.is_loaded or state.is_load_new or state.is_load_other
@@ -422,7 +422,7 @@ def _changed_load(state: TorqueState, change: Change) -> Change | None:
     known_n = float(np.mean(earlier)) if earlier else math.nan
     before_n = reported.counted if reported and reported.cause is Cause.LOAD else known_n
     value_n, sigma_n = float(np.mean(now)) - before_n, max(1.0, float(np.std(now)) / math.sqrt(len(now)))
-    if not abs(value_n) >= max(_LOAD_CHANGE_N, _LOAD_SIGMAS * sigma_n):  # nor where it is not known
+    if not abs(value_n) >= max(_LOAD_CHANGE_N, _LOAD_SIGMAS * sigma_n):  # or the load is not known
         return None
     return Change(
         cause=Cause.LOAD,
@@ -437,7 +437,7 @@ def _changed_load(state: TorqueState, change: Change) -> Change | None:
 def _report_wide(state: TorqueState, fit: ClearanceFit, joints: Sequence[str], since_ns: int) -> None:
     """Report a joint that is wider by all clearances at once, before the baseline under a new load hides it.
 
-    With doubt, as the load was found with what the joint changes of the torque.
+    The report is doubtful, because the load was found from a torque that includes the joint's effect.
     """
     beyond = (fit.clearance_m - state.modelled_m) / fit.sigma_m
     k = int(np.argmax(beyond))
@@ -463,9 +463,9 @@ def _since(change: Change, earlier_ns: int, state: TorqueState) -> Change:
 
 
 def _is_of_reference(explanations: Sequence[Explanation]) -> bool:
-    """Whether a leg as counted, but for one clearance at most, explains a torque better than anything else.
+    """Whether a leg as modelled, but for one clearance at most, explains a torque better than all others.
 
-    The explanations are sorted, the best first; UNKNOWN, the leg as counted, is always among them.
+    The explanations are sorted, the best first; UNKNOWN, the leg as modelled, is always among them.
     """
     best = explanations[0]
     own = next(one for one in explanations if one.cause in (Cause.CLEARANCE, Cause.UNKNOWN))

@@ -25,20 +25,21 @@ from leg_wear_monitor.twin.sample import INSTANT, within
 _LOST = 1.5  # periods of the sensor: in a longer time between two samples, some were lost
 _LEAST_CRANK_SAMPLES = 40  # in a gait cycle, for its profile
 
-# of the sensor's period: steps between samples at times that are more irregular say nothing of its roughness
+# fraction of the sensor's period: if times are more irregular, steps between samples do not show the
+# roughness
 _JITTER = 0.15
 
-# of the period: one so near the border between two rounded ones may be either of them in another run
+# A period near a rounding boundary may round either way between runs, so both are tried.
 _ROUNDED = (1.0, 0.995, 1.005)
 
 
 class CycleTorque(NamedTuple):
     """Drive torque over a gait cycle.
 
-    ``angle`` (n,) crank angle [rad], ``torque`` (n,) [N m], ``step`` (n,) torque less that of the sample
-    before [N m], NaN where that was lost; ``profile`` how the crank turned; ``jitter`` median departure of
-    the times between samples from the sensor's period, as a fraction of it; ``temperature_c`` mean
-    temperature of the drive, NaN where it is not measured.
+    ``angle`` (n,) crank angle [rad], ``torque`` (n,) [N m], ``step`` (n,) torque minus the torque of the
+    sample before [N m], NaN if the sample before was lost; ``profile`` how the crank turned; ``jitter``
+    median departure of the times between samples from the sensor's period, as a fraction of it;
+    ``temperature_c`` mean temperature of the drive, NaN if it is not measured.
     """
 
     angle: Floats
@@ -88,7 +89,7 @@ def find_sensor(
 ) -> None:
     """Find the sensor's period in the first gait cycle with torques, and again where its rate has changed.
 
-    What is known of the leg is not given up for a short disturbance, nor a change that was found.
+    A short disturbance does not discard the knowledge of the leg, or a change that was found.
     """
     own = state.sensor
     is_known = state.reference is not None or len(state.waiting) >= FIRST_CYCLES

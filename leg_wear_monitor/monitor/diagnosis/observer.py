@@ -1,4 +1,4 @@
-"""The drive torque in the monitor: from its samples to clearances, and to what has changed.
+"""The drive torque in the monitor: from its samples to clearances, and to changes of the leg.
 
 All evaluation takes place at the ends of evaluation periods, which depend on the order of arrival only. Each
 period evaluates the gait cycles that ended, and goes on with the simulation of a reference, if one is needed.
@@ -53,8 +53,8 @@ from leg_wear_monitor.twin.torque_reference import ReferenceSnapshot, TorqueRefe
 
 _LOG = logging.getLogger(__name__)
 
-# by which a load has moved, of its size: the twin's mean over twenty gait cycles is within 1 % of what the
-# foot carries, and where its shape was found under 100 N up to 23 % above it (2026-11-25)
+# relative change from which a load has changed: the twin's mean over twenty gait cycles is within 1 % of the
+# foot's load, and up to 23 % above it where its shape was found under 100 N (2026-11-25)
 _MOVED, _LEAST_LOAD_N = 0.3, 100.0
 _ESTIMATED_M, _ESTIMATED = 1.0e-4, 0.2  # largest standard deviation of an observable clearance; of it
 
@@ -68,7 +68,7 @@ TorqueObserverSnapshot = tuple[TorqueState, ReferenceSnapshot | None]
 
 
 class TorqueObserver(KeepsSamples):
-    """Estimates clearances from the drive torque, and detects what changes.
+    """Estimates clearances from the drive torque, and detects changes.
 
     Parameters
     ----------
@@ -78,13 +78,13 @@ class TorqueObserver(KeepsSamples):
     size_nm : float
         RMS of the leg's drive torque at the commanded speed.
     modelled_m : (k,) array
-        Counted clearances.
+        Modelled clearances.
     commissioned : sequence of CommissionedTorque, optional
-        Those of the ledger, the last one first.
+        Baselines of the ledger, the last one first.
     parameters : LegParameters or None
-        Those of the ledger.
+        Identified parameters of the ledger.
     references : sequence of TorqueReference, optional
-        Those of files first, then of the ledger; the simulation of one may not be finished.
+        References of files first, then of the ledger; one of them may be unfinished.
 
     Raises
     ------
@@ -130,11 +130,11 @@ class TorqueObserver(KeepsSamples):
         )
 
     def go_live(self) -> None:
-        """Never wait for what is simulated."""
+        """Never wait for simulations."""
         self._references.may_be_late = True
 
     def warm_up(self) -> None:
-        """Compute before the first sample what depends on the mechanism alone."""
+        """Compute the values that depend only on the mechanism, before the first sample."""
         self.models.warm_up()
 
     def ended(
@@ -176,19 +176,19 @@ class TorqueObserver(KeepsSamples):
             self._evidence.review(state, self.config)
 
     def end_period(self, modelled_m: Floats, depth: Floats) -> Change | None:
-        """Evaluate the gait cycles that ended, and go on with what is simulated for the reference.
+        """Evaluate the gait cycles that ended, and continue the simulation of the reference.
 
         Parameters
         ----------
         modelled_m : (k,) array
-            Counted mean clearances.
+            Modelled mean clearances.
         depth : (k, 2, N) array
-            Counted wear [m].
+            Modelled wear [m].
 
         Returns
         -------
         Change or None
-            Of a modelled clearance that is surely wrong, and shall be corrected before the next period.
+            Change of a modelled clearance that is surely wrong, and must be corrected before the next period.
         """
         before = attrs.evolve(self.state)
         try:
@@ -225,17 +225,18 @@ class TorqueObserver(KeepsSamples):
         return correction_of(state, self._joints) or self._opened_with_it()
 
     def _opened_with_it(self) -> Change | None:
-        """Another joint that opened with the one that was corrected."""
+        """A second joint that opened together with the corrected joint."""
         change = self._evidence.compare_with_before(self.state)
         if not any(one.before for one in self.state.all_commissioned):
             self.state.settled = self.state.corrections
         return change
 
     def contradicted(self, change: Change, clearance_m: float, sigma_m: float) -> None:
-        """Tell a change that a measured clearance [m] contradicts, and is not made.
+        """Note a change that a measured clearance [m] contradicts, and that is not applied.
 
-        Where the joint opened with one that was corrected, it is known from the measurement meanwhile, and
-        the others as well as they explain the leg. The comparison goes on, until both agree.
+        If the joint opened together with a corrected joint, its clearance is known from the measurement
+        meanwhile, and the other clearances get the errors with which the fit explains the leg. The comparison
+        goes on, until both agree.
         """
         state, k = self.state, self._joints.index(change.subject)
         known = state.commissioned
@@ -286,7 +287,7 @@ class TorqueObserver(KeepsSamples):
         return self._references.part
 
     def leave(self) -> None:
-        """Leave what is simulated ahead: the process is about to end."""
+        """Stop simulating ahead: the process is about to end."""
         self._references.leave()
 
     def begin_epoch(self) -> None:
@@ -296,9 +297,9 @@ class TorqueObserver(KeepsSamples):
 
     @property
     def _load(self) -> FootLoad | None:
-        """Force of the ground by the commissioned gait cycles, or that of the reference; None without any.
+        """Force of the ground by the commissioned gait cycles, or else the reference's; None without any.
 
-        In a run after the one that found it, the reference alone knows it.
+        Only the reference knows the force in later runs.
         """
         found, reference = self.state.load, self.state.reference
         if found is not None and found.is_sure:
@@ -320,7 +321,7 @@ class TorqueObserver(KeepsSamples):
 
     @property
     def diagnosis(self) -> Diagnosis:
-        """What the drive torque shows now."""
+        """Current results from the drive torque."""
         state, known = self.state, self.state.commissioned
         is_changed = state.changes or state.interim_changes
         is_old = not state.cycles or (len(state.unused) == UNUSED_CYCLES and not is_changed)
@@ -354,10 +355,10 @@ class TorqueObserver(KeepsSamples):
     def _observed(self, fit: ClearanceFit) -> tuple[Floats, Floats]:
         """Observable clearances and their standard deviations, NaN for the others.
 
-        Nor is a joint observable that no test would find as wide as is corrected. A joint that the fit of all
-        joints does not show, or only as somebody measured it, is known from its own change, and so is one
-        that opened beside the changes of an interim. Where the reference is not that of the leg, a
-        change can have the name of another joint, and no clearance is known.
+        A joint is not observable either if no test would detect it at the width of a correction. A joint that
+        the fit of all joints does not show, or only as it was measured, is known from its own change, and so
+        is a joint that opened during an interim. If the reference does not match the leg, a change can have
+        the name of a wrong joint, and no clearance is known.
         """
         if not self.models.fits(self.state):
             nothing = np.full(len(fit.clearance_m), math.nan)
@@ -373,7 +374,7 @@ class TorqueObserver(KeepsSamples):
             np.where(observable, each, math.nan) for each in (fit.clearance_m, fit.sigma_m)
         )
         for change in self.state.not_corrected:
-            if change.cause is Cause.SEVERAL and not change.is_named:  # which joints, is not known
+            if change.cause is Cause.SEVERAL and not change.is_named:  # the joints are not known
                 clearance_m[:] = sigma_m[:] = math.nan
                 continue
             opened = (change,) if change.cause is Cause.CLEARANCE else change.joints
@@ -428,10 +429,10 @@ class TorqueObserver(KeepsSamples):
         self._commission()
 
     def _commission(self) -> None:
-        """Keep the signatures of a leg that is as counted, and stays so while they are taken.
+        """Store the signatures of a leg that is as modelled, and stays so while they are taken.
 
-        A change within them ends the baseline, and is reported. A change in the first cycles, or one that no
-        cause explains, moves its start.
+        A change within them ends the baseline, and is reported. A change in the first cycles, or without an
+        explanation, moves its start.
         """
         state = self.state
         if state.commissioned is not None:
@@ -446,7 +447,7 @@ class TorqueObserver(KeepsSamples):
         before = tuple(cycle for cycle in state.cycles if cycle.begin_ns < since_ns)
         if len(before) >= PART_CYCLES:
             self._take_baseline(before)
-        if not state.changes:  # neither of the leg as it was, nor with this baseline
+        if not state.changes:  # the later cycles match neither the earlier leg nor this baseline
             state.commissioned, state.cycles = None, state.cycles[len(before) :]
             self._evidence.review(state, self.config)
 
@@ -460,14 +461,14 @@ class TorqueObserver(KeepsSamples):
             sigma_m = np.where(corrected.is_unknown, state.modelled_m, corrected.sigma_m)
             known = attrs.evolve(known, sigma_m=sigma_m, channel=corrected.channel)
         state.commissioned, state.failure = known, ""
-        if state.is_load_new and state.load_rounds >= LOAD_ROUNDS:  # the new load explains what was reported
+        if state.is_load_new and state.load_rounds >= LOAD_ROUNDS:  # the new load explains all changes
             state.is_load_new, state.settled = False, state.corrections
         elif state.is_load_new:
             state.load_rounds, state.renewed_n = 0, float(np.mean(state.carried_n))
         self._evidence.review(state, self.config)
 
     def _restart(self, modelled_m: Floats) -> None:
-        """Forget the kept cycles, because the leg, or what is counted of it, has changed."""
+        """Forget the stored cycles, because the leg or its wear model has changed."""
         state = self.state
         state.modelled_m = np.asarray(modelled_m, float).copy()
         state.forget_cycles()
@@ -476,9 +477,9 @@ class TorqueObserver(KeepsSamples):
         state.changes, state.carried_n, state.least_m = (), (), ()
 
     def _follow_load(self) -> None:
-        """Commission the leg anew where it carries another load than that of its reference.
+        """Commission the leg anew if its load differs from the load of its reference.
 
-        Once for each load: what the twin finds, or a sensor, may differ from the force of the reference. A
+        Once for each load: the load from the twin or a sensor may differ from the force of the reference. A
         joint that was named before stays reported until the leg is compared with a reference of the new load.
         """
         state = self.state
@@ -498,15 +499,16 @@ class TorqueObserver(KeepsSamples):
         self._restart(state.modelled_m)
 
     def _has_moved(self, peak_n: float, cycles: int) -> bool:
-        """Whether the foot carried another load in the last gait cycles than in the reference."""
+        """Whether the foot's load in the last gait cycles differed from the reference's load."""
         now_n = float(np.mean(self.state.carried_n[-cycles:]))
         is_renewed = abs(now_n - self.state.renewed_n) <= _MOVED * max(now_n, _LEAST_LOAD_N)
         return abs(now_n - peak_n) > _MOVED * max(peak_n, _LEAST_LOAD_N) and not is_renewed
 
     def _found_load(self) -> bool:
-        """Forget the baseline by which a new load was found, once the reference under it is in force.
+        """Forget the baseline that served to find a new load, once the reference under this load is in force.
 
-        What opened meanwhile is in it: the leg is compared with the reference alone before another one.
+        Joints that opened meanwhile are in this baseline: until the next one, the leg is compared with the
+        reference alone.
         """
         state = self.state
         is_done = state.load_rounds > 0 and not self._references.is_busy

@@ -1,4 +1,4 @@
-"""Why there is no estimate of the clearances yet, or why it is not sure, and what comes next."""
+"""Why there is no estimate of the clearances yet, or why it is not sure, and the next step."""
 
 import itertools
 import math
@@ -116,7 +116,7 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
 
 
 def _hidden(state: TorqueState, known: CommissionedTorque, joints: Sequence[str]) -> str:
-    """That joints may have opened with one that was corrected, and nobody has measured them since."""
+    """Message that joints may have opened with a corrected joint, and were not measured since."""
     measured = state.measured or (False,) * len(joints)
     names = ", ".join(itertools.compress(joints, known.is_unknown & ~np.array(measured)))
     if not names:
@@ -132,7 +132,7 @@ def _hidden(state: TorqueState, known: CommissionedTorque, joints: Sequence[str]
 
 
 def other_sensor(state: TorqueState) -> str:
-    """That a baseline is of another sensor, until there is one of the present sensor; empty otherwise."""
+    """Message that a baseline is from a different sensor than the present one; empty otherwise."""
     sensor = state.sensor
     if sensor is None or state.commissioned is not None:
         return ""
@@ -152,18 +152,18 @@ def _sampled(one: TorqueSensor | CommissionedTorque, phases: int) -> str:
 
 
 def _is_unlike(state: TorqueState) -> bool:
-    """Whether the crank turns otherwise than in all references, and not only as it starts or stops."""
+    """Whether the crank motion differs from all references, and not only as it starts or stops."""
     return state.unused[-UNUSABLE_CYCLES:] == (NotUsed.UNLIKE,) * UNUSABLE_CYCLES
 
 
 def _is_changing(state: TorqueState) -> bool:
-    """Whether the cadence changes: of the last gait cycles only a few are alike."""
+    """Whether the cadence changes: only a few of the last gait cycles are alike."""
     last = (NotUsed.UNLIKE,) * _CHANGING_CYCLES
     return state.unused[-_CHANGING_CYCLES:] == last and len(state.waiting) <= _ALIKE_CYCLES
 
 
 def _other_cadence(state: TorqueState, references: References) -> str:
-    """What becomes of gait cycles whose crank turns otherwise than in all references."""
+    """Message on the use of gait cycles whose crank motion differs from all references."""
     if _is_changing(state):
         now = f"now {abs(state.waiting[-1].profile.cadence_rpm):.3g} rpm" if state.waiting else "now"
         return f"the cadence changes, {now}; gait cycles are compared at {_cadences(state.known)}"
@@ -174,7 +174,7 @@ def _other_cadence(state: TorqueState, references: References) -> str:
 
 
 def next_step(state: TorqueState, references: References, config: MonitorConfig) -> str:
-    """What is known next if the leg walks on as it does, and when; empty where walking adds nothing."""
+    """Next result if the leg walks on as it does, and when; empty if walking adds nothing."""
     is_hopeless = state.has_failed or not (state.sensor and state.sensor.phases)
     if is_hopeless or not math.isnan(state.off_cadence_rpm):
         return ""
@@ -200,7 +200,7 @@ def next_step(state: TorqueState, references: References, config: MonitorConfig)
 
 
 def _simulated(state: TorqueState, references: References, is_unlike: bool) -> str:
-    """What is known when that which is being simulated is there."""
+    """Result once the running simulation is finished."""
     if state.is_identifying:
         return "masses, lengths and friction of this leg are identified"
     if state.reference is None:

@@ -133,7 +133,7 @@ def read_references(path: Path, mechanism: Mechanism) -> tuple[TorqueReference, 
     Raises
     ------
     ConfigError
-        If it cannot be read, or is of another leg.
+        If the file cannot be read, or describes a different leg.
     """
     found, name = _references(path, mechanism)
     if not found:
@@ -147,7 +147,7 @@ def read_references(path: Path, mechanism: Mechanism) -> tuple[TorqueReference, 
 
 
 def _references(path: Path, mechanism: Mechanism) -> tuple[tuple[TorqueReference, ...], str]:
-    """References in a file, none if it is of another leg, and the name of its mechanism."""
+    """References in a file, none if it describes a different leg, and the name of its mechanism."""
     try:
         if path.stat().st_size and not zipfile.is_zipfile(path):
             raise ValueError("it is not an archive of numpy")
@@ -175,7 +175,7 @@ def _references(path: Path, mechanism: Mechanism) -> tuple[tuple[TorqueReference
 
 
 def _reference(parts: Any, i: int, bodies: int, joints: int) -> TorqueReference:
-    """Reference number i of an archive; raises ValueError where values cannot be those of one."""
+    """Reference number i of an archive; raises ValueError for impossible values."""
     clearance_m = _checked(parts, f"clearance_m_{i}", (None, joints))
     torque = _checked(parts, f"torque_nm_{i}", (len(clearance_m) - 1, None, POINTS))
     expected = _checked(parts, f"expected_torque_nm_{i}", (None, POINTS))

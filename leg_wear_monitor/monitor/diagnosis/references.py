@@ -1,8 +1,8 @@
 """The torque reference of a measured leg: chosen, simulated, renewed, and its parameters identified.
 
-A reference is the drive torque of simulated legs: the expected one, and ones with a joint of another
-clearance. `LegModels` computes what follows from a reference and the state of the observer; `References`
-decides which reference is used, and simulates it.
+A reference is the drive torque of simulated legs: the expected leg, and legs with a changed clearance of one
+joint. `LegModels` computes the models that follow from a reference and the state of the observer;
+`References` decides which reference is used, and simulates it.
 """
 
 import math
@@ -36,8 +36,7 @@ from leg_wear_monitor.twin.torque_reference import (
 )
 
 # Models that follow from the state of a `TorqueObserver`: explanations, tests and the misfit.
-#
-# They are computed when first used, and again after what they depend on has changed.
+# They are computed when first used, and again after their inputs have changed.
 
 
 COMMISSIONING_CYCLES = 50  # gait cycles of a baseline: a recording of a minute at 60 rpm has them
@@ -47,13 +46,13 @@ PART_CYCLES = 10  # gait cycles of a baseline that a change ends: a mean and a s
 # wrong at 23 with load friction of 20 %, and from 40 on the ground (docs/explanation/diagnosis.md).
 NAMED_TO = 5.0
 
-# A channel that makes the misfit this many times as large is refused, as it stands for other lengths: 5 times
-# for leg c of benchmarks/diagnosis.py, whose lengths are 1 % off; true channels at most 1.9 times (under 300
-# N of load).
+# A channel that makes the misfit this many times as large is refused, because it stands for wrong lengths: 5
+# times for leg c of benchmarks/diagnosis.py, whose lengths are 1 % off; true channels at most 1.9 times
+# (under 300 N of load).
 _CHANNEL_MISFIT_FACTOR = 2.5
 
-# misfit up to which a leg on the ground counts as that of its reference once it was identified: other shapes
-# of the force leave 1.2 to 1.5. Before, twice the friction in the joints left 1.1, and G was taken for B
+# misfit up to which a leg on the ground matches its reference once it was identified: other shapes of the
+# force leave 1.2 to 1.5. Before, twice the friction in the joints left 1.1, and G was taken for B
 _UNLIKE_ON_GROUND = 2.0
 
 # misfit up to which a clearance is corrected: I was taken for J at 0.68, and J for I at 0.78
@@ -96,14 +95,15 @@ class LegModels:
     def explainer(self, state: TorqueState, is_commissioned: bool = False) -> Explainer:
         """Possible explanations of the measured torque: other clearances and other causes.
 
-        Beside the changes of the interim, if there is one; or, ``is_commissioned``, of all that changed.
+        They add to the changes of the interim, if there is one; with ``is_commissioned``, they cover all
+        changes.
         """
         return self._of(state, is_commissioned).explainer
 
     def explainer_since(
         self, before: signature.CommissionedTorque, reference: TorqueReference, state: TorqueState
     ) -> Explainer | None:
-        """Possible explanations of what a corrected leg shows beside the baseline before the correction.
+        """Possible explanations of a corrected leg's difference from the baseline before the correction.
 
         None before there is a reference about the corrected clearances.
         """
@@ -174,7 +174,7 @@ class LegModels:
         return plain if with_channel > _CHANNEL_MISFIT_FACTOR * without else found
 
     def ground_load(self, state: TorqueState, reference: TorqueReference) -> GroundLoad:
-        """Force of the ground on the commissioned leg; the reference may be one under another force."""
+        """Force of the ground on the commissioned leg; the reference may have a different force."""
         own, known, sensor = self._of(state, is_commissioned=True), state.commissioned, state.sensor
         if known is None or sensor is None:
             raise RuntimeError("the leg is not commissioned yet")
@@ -188,12 +188,12 @@ class LegModels:
         return not state.is_load_other and self.misfit(state) < NAMED_TO
 
     def is_of_file(self, state: TorqueState) -> bool:
-        """Whether the commissioned leg is that of the mechanism file, or of the identified parameters."""
+        """Whether the commissioned leg matches the mechanism file, or the identified parameters."""
         is_shape = state.is_loaded and state.rounds >= ROUNDS
         return self.misfit(state) < (_UNLIKE_ON_GROUND if is_shape else identification.UNLIKE_FILE)
 
     def is_sure(self, state: TorqueState) -> bool:
-        """Whether a clearance may be corrected: the leg is known and as it was, its drive passes enough."""
+        """Whether a clearance may be corrected: the leg is known and unchanged, its drive passes enough."""
         is_near = self.misfit(state) < CORRECTED_TO or (state.is_loaded and state.rounds >= ROUNDS)
         is_changed = state.is_load_new or state.is_load_other or bool(state.interim_changes)
         return not is_changed and self.is_of_file(state) and is_near and not state.is_narrow
@@ -222,7 +222,7 @@ UNLIKE_CYCLES = 20
 ROUNDS = 3  # most rounds of identification
 LOAD_ROUNDS = 4  # rounds of finding the ground's force: friction and impacts change with it, and it with them
 
-# a reference is renewed if a modelled clearance differs by more than this fraction from that of its leg
+# a reference is renewed if a modelled clearance differs from its leg's by more than this fraction
 _FAR_FRACTION = 0.1
 
 
@@ -234,8 +234,8 @@ class References:
     mechanism : Mechanism
     models : LegModels
     given : sequence of TorqueReference, optional
-        References known beforehand: of files first, then of the ledger. Those of the package follow them.
-        Ones that were simulated under a load are for a leg on the ground.
+        References known beforehand: from files first, then from the ledger. The package's references follow.
+        References simulated under a load are for a leg on the ground.
     part : TorqueReference or None
         Unfinished reference of an earlier run, which is continued if it fits.
     is_on_ground : bool
@@ -244,7 +244,7 @@ class References:
     Attributes
     ----------
     may_be_late : bool
-        Whether nothing waits for what is simulated, see `TorqueReferenceRun`.
+        Whether the monitor never waits for simulations, see `TorqueReferenceRun`.
 
     Raises
     ------
@@ -280,7 +280,7 @@ class References:
 
     @property
     def is_late(self) -> bool:
-        """Whether what is simulated is due, and not there: the machine is too slow."""
+        """Whether a simulation is overdue: the machine is too slow."""
         return self._run is not None and self._run.is_late
 
     def is_for(self, profile: CrankProfile) -> bool:
@@ -312,7 +312,7 @@ class References:
             self._running().restore(snapshot)
 
     def leave(self) -> None:
-        """Leave what is simulated ahead, see `ReferenceRun.leave`."""
+        """Stop simulating ahead, see `ReferenceRun.leave`."""
         if self._run is not None:
             self._run.leave()
 
@@ -335,7 +335,7 @@ class References:
         own, identified = state.reference.parameters, state.parameters
         if _is_far(state.reference, modelled_m):
             self._begin(own if state.is_final else identified, modelled_m, depth, state.profile)
-        elif not state.is_final and identified not in (None, own):  # identified at another cadence or earlier
+        elif not state.is_final and identified not in (None, own):  # from a different cadence or earlier
             self._begin(identified, modelled_m, depth, state.reference.profile)
         elif self._may_be_loaded(state):
             self._begin_under_load(state, state.reference, depth)
@@ -346,7 +346,7 @@ class References:
     def is_to_identify(self, state: TorqueState) -> bool:
         """Whether another round of identification is due for the commissioned leg.
 
-        One that was identified in an earlier run is identified again only where it is unlike that.
+        A leg that was identified in an earlier run is identified again only if it differs from that result.
         """
         if state.rounds >= ROUNDS or self.is_load_left_out(state):
             return False
@@ -409,9 +409,9 @@ class References:
     def _continue(
         self, run: TorqueReferenceRun, state: TorqueState, modelled_m: Floats, depth: Floats
     ) -> bool:
-        """Continue the simulation for a period, and use what it completes.
+        """Continue the simulation for a period, and use the reference that it completes.
 
-        Returns whether the state has another reference; it belongs to the cadence that it was simulated for.
+        Returns whether the state has a new reference; it belongs to the cadence that it was simulated for.
         """
         found = run.advance()
         if found is not None and state.is_identifying:
@@ -446,7 +446,7 @@ class References:
     def _begin(
         self, parameters: LegParameters | None, modelled_m: Floats, depth: Floats, profile: CrankProfile
     ) -> None:
-        """Begin the simulation of a reference, or continue that of an earlier run."""
+        """Begin the simulation of a reference, or continue an earlier run's simulation."""
         own = parameters or LegParameters.none(self._mechanism)
         part = self._unfinished(own, profile, modelled_m)
         if part is not None:
@@ -461,7 +461,7 @@ class References:
         part = self._part
         if part is None or part.is_of_parameters is not is_of_parameters or part.parameters != own:
             return None
-        if is_of_parameters and len(part.clearance_m) != len(levels_of(own)):  # of an earlier version
+        if is_of_parameters and len(part.clearance_m) != len(levels_of(own)):  # written by an earlier version
             return None
         return part if profile.is_like(part.profile) and not _is_far(part, clearance_m) else None
 

@@ -66,7 +66,7 @@ def mean_of(values: Floats) -> float:
 
 
 class DiagnosisState(Enum):
-    """What the diagnosis can report; the value is the word that files contain."""
+    """Possible states of the diagnosis; the value is the word that files contain."""
 
     OFF = "off"
     WAITING = "waiting"
@@ -87,7 +87,7 @@ class NotUsed(Enum):
 
 @attrs.frozen
 class Body:
-    """Identified mass and length of a body, as factors on those of the mechanism file."""
+    """Identified mass and length of a body, as factors on the mechanism file's values."""
 
     name: str
     mass: float
@@ -96,21 +96,21 @@ class Body:
 
 @attrs.frozen(kw_only=True)
 class Diagnosis:
-    """Clearances estimated from the drive torque, and what has changed.
+    """Clearances estimated from the drive torque, and changes of the leg.
 
     Attributes
     ----------
     state : DiagnosisState
     reason : str
-        Why there is no estimate yet, or why it is not to be believed now; empty otherwise.
+        Why there is no estimate yet, or why it is not valid now; empty otherwise.
     next_step : str
-        What is known next, and after how many gait cycles; empty where walking adds nothing.
+        Next result, and after how many gait cycles; empty if walking adds nothing.
     cycles : int
         Gait cycles in the estimate.
     cycles_not_used : mapping of str to int
-        Gait cycles of this run that were not used, by reason: another cadence; a stop and a start in it; a
-        bridged gap, or too few torque samples; irregular stamps; a torque that is wrong as received; a crank
-        that turns otherwise.
+        Gait cycles of this run that were not used, by reason: a different cadence; a stop and a start in it;
+        a bridged gap, or too few torque samples; irregular stamps; a torque that is wrong as received; a
+        crank that turns otherwise.
     clearance_m, sigma_m : tuple of float
         Estimated clearance of each clearance joint and its standard deviation; NaN where it is not
         observable.
@@ -123,24 +123,24 @@ class Diagnosis:
         Standard deviations of the modelled clearances. The torque shows the change since the baseline, so an
         estimated clearance contains this error in addition to its own.
     changes : tuple of Change
-        Significant departures, the oldest first: corrections of modelled clearances, and, where
-        the state is CHANGED, those of the interim, and the one that is not settled yet.
+        Significant departures, the oldest first: corrections of modelled clearances, and, if the state is
+        CHANGED, changes of the interim, and the change that is not settled yet.
     channel : Channel
         Delay, low-pass and load friction of the drive by the commissioned gait cycles; of a drive that adds
         nothing before.
     bodies : tuple of Body
-        Identified masses and lengths that the wear is counted with; empty while it is counted as in the file.
+        Identified masses and lengths in the wear model; empty while the model uses the file's values.
     friction : float
-        Factor on the friction in the joints that the wear is counted with.
+        Factor on the friction in the joints in the wear model.
     load : FootLoad or None
         Force of the ground that the foot surely carries.
     is_load_unknown : bool
         Whether the leg walks on the ground, and neither a sensor nor the torque shows the ground's force.
     compliance : float
-        Between the measured crank angle and the crank [rad/(N m)], that the wear is counted with; 0 if rigid.
+        Compliance between the measured crank angle and the crank in the wear model [rad/(N m)]; 0 if rigid.
     temperature_c, commissioned_c : float or None
-        Temperature of the drive in the last gait cycles, and in those of the baseline [°C]; None where it was
-        not measured.
+        Temperature of the drive in the last gait cycles, and in the baseline's gait cycles [°C]; None if it
+        was not measured.
     """
 
     state: DiagnosisState = DiagnosisState.OFF
@@ -192,11 +192,11 @@ class Diagnosis:
         return math.hypot(error_m, sigmas * self.tolerance_m[k]) if self.tolerance_m else error_m
 
     def contradicts(self, explained: TorqueExplanation) -> bool:
-        """Whether it names another cause of a torque mismatch.
+        """Whether the diagnosis names a different cause of a torque residual.
 
         The explanation compares with the model, and supposes faults of the inputs, a load or a mass.
-        The diagnosis compares with this leg as it was, and supposes more; but a torque that is wrong as
-        received is not used by it.
+        The diagnosis compares with this leg as it was, and supposes more; but it does not use a torque that
+        is wrong as received.
         """
         if explained.is_input_fault or self.state is not DiagnosisState.CHANGED:
             return False
@@ -207,7 +207,7 @@ class Diagnosis:
 
 WINDOW_CYCLES = 60  # gait cycles that are kept per cadence and used for the estimate of clearances
 LAST_CYCLES = 10  # gait cycles whose mean temperature is the present temperature of the drive
-# of a gait cycle: where a drive passed 11 and 13, I was taken for J; 17 and more: none
+# per gait cycle: where a drive passed 11 and 13, I was taken for J; with 17 and more, no joint was
 _LEAST_HARMONICS = 15.0
 FIRST_CYCLES = 5  # gait cycles before the first reference is chosen
 UNUSABLE_CYCLES = 3  # in a row: a start has two that are unlike
@@ -215,9 +215,9 @@ UNUSED_CYCLES = 20  # in a row, after which a result is not one of the leg as it
 
 
 class SignedCycle(NamedTuple):
-    """A gait cycle: stamps of its begin and end [ns], its signature (F,), and how the crank turned.
+    """A gait cycle: stamps of its start and end [ns], its signature (F,), and the crank's motion.
 
-    ``temperature_c`` is that of the drive, NaN where it is not measured.
+    ``temperature_c`` is the drive's temperature, NaN if it is not measured.
     """
 
     begin_ns: int
@@ -234,14 +234,14 @@ def temperature_of(cycles: Sequence[SignedCycle]) -> float:
 
 @attrs.frozen(eq=False)
 class Interim:
-    """A leg with a lasting change that is not of a clearance: joints that open then are seen beside it.
+    """A leg with a lasting change that is no clearance: joints that open then are detected on top of it.
 
     Attributes
     ----------
     changes : tuple of Change
-        What has changed, the oldest first; empty before it is known in a further run.
+        Changes, the oldest first; empty until they are known again in a further run.
     baseline : CommissionedTorque
-        Of the gait cycles since.
+        Baseline of the gait cycles since the change.
     """
 
     changes: tuple[Change, ...]
@@ -250,7 +250,7 @@ class Interim:
 
 @attrs.frozen(eq=False)
 class AtCadence:
-    """What is known of a leg at one cadence, more precisely under one motion of the crank.
+    """Knowledge of a leg at one cadence, more precisely under one motion of the crank.
 
     Attributes
     ----------
@@ -281,28 +281,28 @@ class TorqueState:
     ----------
     samples : TorqueSamples
     due : tuple of (int, int)
-        Begin and end [ns] of ended gait cycles that are not evaluated yet.
+        Start and end [ns] of ended gait cycles that are not evaluated yet.
     sensor : TorqueSensor or None
         As found in the first gait cycle with torques, or where its rate has changed.
     waiting : tuple of SignedCycle
         The last gait cycles alike whose motion of the crank has no reference.
     odd : tuple of SignedCycle
-        Others without a reference, of which the next may be like some.
+        Other cycles without a reference; the next cycles may be like some of them.
     reference : TorqueReference or None
     cycles : tuple of SignedCycle
         The last gait cycles at the reference's cadence.
     modelled_m : (k,) array
-        Counted clearances that the detector compares with.
+        Modelled clearances that the detector compares with.
     commissioned : CommissionedTorque or None
         At the reference's cadence.
     is_final : bool
-        As of `AtCadence`.
+        As in `AtCadence`.
     interim : Interim or None
-        What gait cycles are compared with instead of the baseline.
+        The interim with which gait cycles are compared instead of the baseline.
     set_aside : tuple of AtCadence
         Other cadences, the last one first.
     baselines : tuple of CommissionedTorque
-        Those of the ledger whose cadence was not walked yet, and those of other sensors.
+        Baselines of the ledger whose cadence was not walked yet, and baselines of other sensors.
     detector : DetectorState or None
     fit : ClearanceFit or None
     fit_cycles : int
@@ -314,8 +314,7 @@ class TorqueState:
     changes : tuple of Change
         Unsettled changes; the last one is being observed.
     settled : tuple of Change
-        Changes by which the modelled clearances were corrected, and one beside them that a measurement
-        contradicts.
+        Changes that corrected the modelled clearances, and a change that a measurement contradicts.
     measured : tuple of bool
         Whether each joint was measured since a correction; empty without one.
     not_used : dict of str to int
@@ -325,7 +324,7 @@ class TorqueState:
     off_cadence_rpm : float
         Cadence of the last gait cycle if it is not the commanded one, else NaN.
     parameters : LegParameters or None
-        Identified ones, of which references are made; None before.
+        Identified parameters for simulating references; None before.
     rounds, load_rounds : int
         How often parameters were identified, and the ground's force.
     load : GroundLoad or None
@@ -333,12 +332,12 @@ class TorqueState:
     carried_n : tuple of float
         Size of the load in the last gait cycles, by the twin.
     renewed_n : float
-        That under which the leg was commissioned anew; NaN before.
+        Load under which the leg was commissioned anew; NaN before.
     is_load_new : bool
         Whether the load has changed, and the leg is to be commissioned under a reference of the new one; a
         baseline before that only serves to find the load, and may contain joints that opened meanwhile.
     is_load_other : bool
-        Whether the foot carries another load than in the reference: no clearance is known, and no name sure.
+        Whether the foot's load differs from the reference's load: no clearance is known, and no name sure.
     is_identifying : bool
         Whether the run simulates legs with other parameters.
     has_failed : bool
@@ -441,7 +440,7 @@ class TorqueState:
 
     @property
     def compared_with(self) -> tuple[TorqueSensor | None, CommissionedTorque | None]:
-        """The sensor, and what gait cycles are compared with: the baseline, or that of the interim."""
+        """The sensor, and the baseline with which gait cycles are compared, or the interim's baseline."""
         if self.interim is None or self.sensor is None:
             return self.sensor, self.commissioned
         changed = self.interim.baseline
@@ -449,17 +448,17 @@ class TorqueState:
 
     @property
     def corrections(self) -> tuple[Change, ...]:
-        """Changes by which the modelled clearances were corrected."""
+        """Changes that corrected the modelled clearances."""
         return tuple(change for change in self.settled if change.is_corrected)
 
     @property
     def all_interims(self) -> tuple[Interim, ...]:
-        """Those of all cadences."""
+        """Interims of all cadences."""
         return tuple(one.interim for one in self.known if one.interim)
 
     @property
     def interim_changes(self) -> tuple[Change, ...]:
-        """Changes that later gait cycles are seen beside; at a cadence without any, those of another."""
+        """Changes present in later gait cycles; at a cadence without any, changes of a different one."""
         if self.interim is not None:
             return self.interim.changes
         others = next((one.interim.changes for one in self.set_aside if one.interim), ())
@@ -473,12 +472,12 @@ class TorqueState:
 
     @property
     def not_corrected(self) -> tuple[Change, ...]:
-        """Changes by which modelled clearances were not corrected."""
+        """Changes that did not correct modelled clearances."""
         return tuple(change for change in self.all_changes if not change.is_corrected)
 
     @property
     def not_by_load(self) -> tuple[Change, ...]:
-        """Surely changed clearances: another load at the foot does not end them."""
+        """Surely changed clearances: a changed load at the foot does not end them."""
         return tuple(change for change in self.changes if change.is_sure)
 
     @property
@@ -491,11 +490,11 @@ class TorqueState:
         self._baselines_as(lambda one: one if one.is_as_modelled else attrs.evolve(one, sigma_m=sigma_m))
 
     def at(self, profile: CrankProfile) -> AtCadence | None:
-        """Another cadence than the present one whose crank turns as in a profile."""
+        """A cadence other than the present one whose crank turns as in a profile."""
         return next((one for one in self.set_aside if profile.is_like(one.reference.profile)), None)
 
     def turn_to(self, one: AtCadence) -> None:
-        """Make another cadence the present one; what was found of changes stays."""
+        """Make a different cadence the present one; detected changes stay."""
         self.set_aside = tuple(each for each in self.known if each is not one)[: CADENCES - 1]
         self.reference, self.sensor, self.commissioned = one.reference, one.sensor, one.commissioned
         self.cycles, self.is_final, self.interim, self.fit_due = one.cycles, one.is_final, one.interim, 0
@@ -514,15 +513,15 @@ class TorqueState:
         self.waiting = ()
 
     def turn_towards(self, profile: CrankProfile) -> None:
-        """Make the cadence that was simulated the present one: the leg may walk at another one by now."""
+        """Make the cadence that was simulated the present one: the leg may walk at a different one by now."""
         other = self.at(profile)
         if other is not None and not (self.reference and self.reference.profile.is_like(profile)):
             self.turn_to(other)
 
     def take_baseline(self, speed: float, is_interim: bool = False) -> CommissionedTorque | None:
-        """The baseline of the sensor at a speed of the crank, which is not among the others any more.
+        """The baseline of the sensor at a speed of the crank; it is removed from the stored baselines.
 
-        Or, ``is_interim``, that of an interim.
+        With ``is_interim``, the baseline of an interim.
 
         Forces of inertia depend on the speed: compared with the baseline of 60 rpm, a healthy leg at 57 rpm
         had a wide joint A. Roughness depends on the rate, and on how many samples are averaged.
@@ -534,7 +533,7 @@ class TorqueState:
         return own
 
     def measure_with(self, sensor: TorqueSensor) -> None:
-        """Go on with another sensor; baselines, gait cycles and what they show are of the former one."""
+        """Continue with a different sensor; baselines, gait cycles and results belong to the former one."""
         self.baselines, known = self.all_commissioned, self.known
         self.forget_cycles()
         self.sensor, self.reference, self.interim, self.set_aside = sensor, None, None, ()

@@ -71,7 +71,7 @@ def heavier(paper: Mechanism, factors: dict[str, float]) -> Mechanism:
 
 
 def built(paper: Mechanism, seed: int) -> Leg:
-    """A leg with masses and joints that differ from those on paper."""
+    """A leg with masses and joints that differ from the leg on paper."""
     random, bodies, factors = np.random.default_rng(seed), {}, {}
     for name, body in paper.bodies.items():
         factors[name] = 1.0 + MASS_SIGMA * random.standard_normal()

@@ -53,7 +53,7 @@ from leg_wear_monitor.twin.sample import gait_samples
 
 FILE = Path("laas_anti_cogging/codes/Testing/speed_data/speed_test.txt")
 HEAD = "Time, Position, Velocity, Reference Velocity, Iq, Function Activated"
-SETTLED_S = 1.0  # left out at the begin of each half
+SETTLED_S = 1.0  # left out at the start of each half
 MOTION_S = 2.6  # also for its motion: the turn before is 3 % off, later turns by 0.5 to 1.1 %
 ORDERS = (
     180  # waves a motor turn that repeat: in a second at 44 to 51 rpm, 130 to 150 of 500 that 1 kHz shows
@@ -198,9 +198,9 @@ class Monitored:
     Parameters
     ----------
     leg : Mechanism
-        As in its file.
+        Mechanism as in its file.
     snapshot : TorqueObserverSnapshot, optional
-        Of the observer after some gait cycles.
+        Snapshot of the observer after some gait cycles.
     cycle : int
         Their number.
     """

@@ -70,7 +70,7 @@ FRICTION, SCALE, OFFSET_RAD = 0.1, 0.02, 0.01
 
 
 class Run(NamedTuple):
-    """A recording in steps of STEP_S from the begin of the motion: angles, speeds, currents (n, JOINTS)."""
+    """A recording in steps of STEP_S from the start of the motion: angles, speeds, currents (n, JOINTS)."""
 
     angle: np.ndarray
     speed: np.ndarray

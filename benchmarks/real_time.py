@@ -302,7 +302,7 @@ class ScipyLeg:
     ----------
     setup : Setup
     run : FullRun
-        Of this setup.
+        Run of this setup.
     approach : (k,) array, m/s
     """
 
@@ -491,7 +491,7 @@ def factors(seconds: float, spent: tuple[float, float]) -> Factors:
 def contestants(
     setup: Setup, schemes: Sequence[Scheme], method: str, tolerance: float
 ) -> dict[str, Contestant]:
-    """Those who take turns: each call moves the leg on and returns the real-time factors."""
+    """Contestants that take turns: each call moves the leg on and returns the real-time factors."""
 
     def exudyn(scheme: Scheme) -> Contestant:
         return lambda: factors(2.0, ExudynLeg(setup, scheme.penalty).solve(scheme, 2.0))

@@ -1,4 +1,4 @@
-"""Make the recordings in bags/ anew: by the synthetic leg and the monitor, as two ROS processes."""
+"""Renew the recordings in bags/ with the synthetic leg and the monitor, as two ROS processes."""
 
 import argparse
 import json

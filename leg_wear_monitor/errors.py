@@ -89,7 +89,7 @@ def system_asked(
     Parameters
     ----------
     source, key : object
-        As of ConfigError.
+        Same meaning as in ConfigError.
     fault : str
         Such as ``cannot be read``; the reason of the system follows.
     error_of : type of ConfigError

@@ -394,7 +394,7 @@ class LegAlarms:
     now : tuple of LegAlarm
         All of them.
     changes : tuple of AlarmChange
-        Of a replay, the first ten thousand changes; otherwise empty.
+        First ten thousand changes of a replay; otherwise empty.
     """
 
     now: tuple[LegAlarm, ...] = ()

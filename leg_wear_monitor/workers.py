@@ -230,7 +230,7 @@ def python_command(call: Callable[[], None], *arguments: str) -> list[str]:
     call : callable
         Function of a module.
     *arguments : str
-        Of the command line.
+        Arguments of the command line.
     """
     # The path is set inside the command, because files next to a user's script must not replace modules that
     # Python itself starts with.

@@ -101,7 +101,7 @@ class JointNames:
     ----------
     crank_joint : str
     interfaces : mapping of str to str
-        As of `wanted_interfaces`.
+        Interfaces returned by `wanted_interfaces`.
     """
 
     def __init__(self, crank_joint: str, interfaces: Mapping[str, str]) -> None:

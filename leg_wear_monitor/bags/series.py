@@ -91,7 +91,7 @@ _PUBLISHED = tuple(each.name.lstrip("~") for each in (outputs.CLEARANCES, output
 # well.
 _NO_CANDIDATES = ("position", "velocity", "acceleration", "effort")
 _MOST_JOINTS = 200  # joints per topic: each joint is decoded separately, so this bounds the work
-_NAMING_MESSAGES = 20  # first messages of a piece, whose joint names are read
+_NAMING_MESSAGES = 20  # messages at the start of a piece to read joint names from
 _LONGEST_PAUSE_NS = 10 * 10**9
 _NO_JOINT = "(no joint)"  # name of a crank joint that no message has
 
@@ -214,10 +214,10 @@ def _add_piece(
     collected : dict
         Parts of the series so far, added to.
     selected : list of (str, Stream)
-        As `_select` returns it.
+        List returned by `_select`.
     data : (bytes,) array of uint8
     messages : (n,) array of `cdr.MESSAGE`
-        Where each message is in the data; `type` is the place in ``selected``, from 1.
+        Position of each message in the data; `type` is the position in ``selected``, from 1.
     recording : int
         Index of the recording.
     """

@@ -62,7 +62,7 @@ class Source(Protocol):
     Attributes
     ----------
     head : Head
-        Names of all columns, and what precedes the first row.
+        Names of all columns, and the text before the first row.
     size : int
         Bytes of the table.
     word : str
@@ -115,7 +115,7 @@ def open_table(path: Path, content: IO[bytes] | Any, storage: str, wanted: str =
     storage : str
         `CSV`, `PARQUET`, or empty for columns in memory.
     wanted : str
-        Name of a column, by which a line with the names of columns is recognised.
+        Name of a column that identifies the line with the column names.
 
     Raises
     ------
@@ -139,7 +139,7 @@ class TableRows:
     source : Source
     config : MonitorConfig
     findings : list of Finding
-        Where the findings go.
+        List that receives the findings.
 
     Raises
     ------

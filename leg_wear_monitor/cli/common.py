@@ -273,7 +273,7 @@ def check_outputs(json_file: Path | None, out: Path | None) -> None:
 
 
 def _try(option: str, path: Path, directory: Path) -> None:
-    """Only writing shows it: rights, a read-only file system, an administrator whom rights do not stop."""
+    """Test by writing, because rights alone do not decide: read-only file systems, administrators."""
     with system_asked(option, "cannot be written", path), tempfile.TemporaryFile(dir=directory):
         return
 

@@ -1,7 +1,7 @@
 """All that knows numba: kernels, their cache, vectors.
 
-numba reads ``.numba_config.yaml`` of the current directory, where PyYAML is installed, at its import and
-at each compilation. A key of that file runs code, so numba finds here neither PyYAML nor the file.
+At its import and at each compilation, numba reads ``.numba_config.yaml`` of the current directory if PyYAML
+is installed. A key of this file runs code, so numba finds here neither PyYAML nor the file.
 """
 
 import os

@@ -108,7 +108,7 @@ def code_directory(name: str) -> Path | None:
     Parameters
     ----------
     name : str
-        Of the directory itself.
+        Name of the directory itself.
 
     Returns
     -------

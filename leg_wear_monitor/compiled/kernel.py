@@ -98,7 +98,7 @@ class _PartCompiler(_Compiler):  # type: ignore[misc]
         state.library = library = _Part(state.targetctx.codegen(), func.__qualname__)
         state.flags.no_compile = state.flags.no_cpython_wrapper = state.flags.no_cfunc_wrapper = True
         result = super().compile_extra(func)
-        # who calls it links it and all below it: a kernel that it calls has handed on its own list
+        # the caller links it and all kernels below it: each called kernel passes on its own list
         below = library._linking_libraries = list(dict.fromkeys(library._linking_libraries))
         key = object()  # stands for the function that Python would call
         state.targetctx.insert_user_function(key, result.fndesc, [library, *below])
@@ -175,7 +175,7 @@ def store(entry: Any, directory: Path) -> None:
     ----------
     entry : dispatcher
     directory : pathlib.Path
-        For these sources alone, and writable.
+        Directory for these sources alone; writable.
     """
     try:
         from numba.core.caching import CompileResultCacheImpl, FunctionCache
@@ -314,7 +314,7 @@ def _description(value: object, digest: Any, known: set[object]) -> None:
     Raises
     ------
     TypeError
-        For a kind of value with unknown effect on compiled code.
+        If the effect of this kind of value on compiled code is unknown.
     """
     function = uncompiled(value)
     if isinstance(function, FunctionType):
@@ -552,7 +552,7 @@ def new_records(n: int, dtype: np.dtype[Any]) -> Records:
     Raises
     ------
     ValueError
-        For a field with the name of an attribute of numpy's records, which would hide it.
+        If a field has the name of an attribute of numpy's records, which would hide it.
     """
     hidden = sorted(name for name in _names(dtype) if hasattr(np.record, name))
     if hidden:

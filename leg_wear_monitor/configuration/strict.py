@@ -94,7 +94,7 @@ def structure(value: Any, kind: type[_T], source: str, key: str) -> _T:
 def structure_of_version(
     record: Any, kind: type[_T], version: int, source: str, again: str, missing: int | None = None
 ) -> _T:
-    """Convert an object that a command has written, of one ``schema_version``; ``again`` makes it anew."""
+    """Convert an object that a command wrote with one ``schema_version``; ``again`` says how to renew it."""
     record = structure(record, dict[str, Any], source, "")
     found = record.get("schema_version", missing)
     if found != version:

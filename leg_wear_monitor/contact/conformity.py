@@ -33,7 +33,7 @@ def half_angle_under_load(force_n: float, modulus_pa: float, width_m: float, cle
     ----------
     force_n : float
     modulus_pa : float
-        Of `contact_modulus`.
+        Value of `contact_modulus`.
     width_m, clearance_m : float
         Axial contact width, and radial clearance.
     """

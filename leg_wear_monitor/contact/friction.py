@@ -50,5 +50,5 @@ def friction_force(law, coefficient, v0, v1, f_n, slip):
 
 @kernel
 def against(slip, force):
-    """A force [N] opposite to the slip speed. For numbers or vectors."""
+    """A force [N] opposite to the slip speed. The arguments are numbers or vectors."""
     return where(slip < 0.0, force, -force)

@@ -152,7 +152,7 @@ def hertz_coefficient(given, modulus, width, bushing, journal):
 
 @kernel
 def elastic_force(stiffness, delta):
-    """Elastic part of the force, K delta^1.5 [N]; 0 when apart. For numbers or vectors."""
+    """Elastic part of the force, K delta^1.5 [N]; 0 when apart. The arguments are numbers or vectors."""
     inside = largest(delta, 0.0)
     return stiffness * inside * root(inside)
 

@@ -199,7 +199,7 @@ def leg_content(now: ReplaySummary, node: str, freshness: Freshness, instead: st
     Parameters
     ----------
     now : ReplaySummary
-        As `summary_of_now` returned it.
+        Summary returned by `summary_of_now`.
     node : str
         Full name of the monitor, printable.
     freshness : Freshness

@@ -156,7 +156,7 @@ def application(hub: Hub, host: str) -> Application:
 
 
 class _Reading(RequestHandler):
-    """Answers to who asks by a name of this server, and for reading only."""
+    """Answers requests that use a name of this server, and only read."""
 
     SUPPORTED_METHODS = ("GET", "HEAD")
 

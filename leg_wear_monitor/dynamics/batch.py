@@ -63,7 +63,7 @@ class Leg:
         Raises
         ------
         ConfigError
-            For invalid values.
+            If a value is invalid.
         AssemblyError
             If the linkage does not close or has a dead point.
         """
@@ -102,7 +102,7 @@ def prepare_legs(legs: Sequence[Leg]) -> list[Setup]:
     Raises
     ------
     ConfigError
-        For invalid values.
+        If a value is invalid.
     AssemblyError
         If a linkage does not close or has a dead point.
     """

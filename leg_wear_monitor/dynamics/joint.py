@@ -96,7 +96,7 @@ def update_contacts(joint, speed_floor, t, h, start, end, approach, recent, peak
     Returns
     -------
     changed, peaked
-        Whether a contact began or ended, and whether a force passed a large maximum at the step's start.
+        True if a contact began or ended; true if a force passed a large maximum at the step's start.
     """
     changed, peaked = False, False
     for k in range(approach.shape[0]):

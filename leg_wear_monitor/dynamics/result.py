@@ -84,11 +84,11 @@ class ToeResult:
     Attributes
     ----------
     max_position_error_m : float
-        Of the position.
+        Largest error of the position.
     max_velocity_error_mps : float
-        Of the velocity.
+        Largest error of the velocity.
     max_acceleration_error_mps2 : float
-        Of the acceleration.
+        Largest error of the acceleration.
     """
 
     max_position_error_m: float
@@ -103,11 +103,11 @@ class WearDepth:
     Attributes
     ----------
     bushing_max : float
-        Of the deepest sector of the bushing.
+        Depth of the deepest sector of the bushing.
     bushing_mean : float
         Mean over all sectors of the bushing.
     journal_max : float
-        Of the deepest sector of the journal.
+        Depth of the deepest sector of the journal.
     journal_mean : float
         Mean over all sectors of the journal.
     """

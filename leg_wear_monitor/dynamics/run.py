@@ -296,7 +296,7 @@ class Setup:
         Names of the clearance joints, in the order of ``contacts``.
     contacts : ContactArrays
     bushings : tuple of Bushing
-        Of the clearance joints, in their order.
+        Bushings of the clearance joints, in the order of the joints.
     surfaces : Surfaces
         Worn surfaces; the run changes them.
     speed : float

@@ -226,7 +226,7 @@ def prepare(
     Raises
     ------
     ConfigError
-        For invalid values.
+        If a value is invalid.
     AssemblyError
         If the linkage does not close or has a dead point.
     """
@@ -303,7 +303,7 @@ def simulate(
     toe : str, optional
         Point whose motion is reported, with its body, such as ``shank.G``; default: the point called ``toe``.
     trace : int
-        Stored samples per cycle; 0 for none. The first is where counting begins: at crank angle 0 after whole
+        Stored samples per cycle; 0 for none. The first is where counting starts: at crank angle 0 after whole
         ``skip_cycles``, and of the ideal leg. They do not change the run. Each is integrated to its own
         instant: from some hundred per cycle on, they take longer than the run.
     intervals : int, optional
@@ -323,7 +323,7 @@ def simulate(
     Raises
     ------
     ConfigError
-        For invalid values.
+        If a value is invalid.
     AssemblyError
         If the linkage does not close or has a dead point.
     SimulationError

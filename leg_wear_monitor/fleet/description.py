@@ -198,7 +198,7 @@ def load_fleet(path: str | Path) -> FleetDescription:
     Warns
     -----
     ConfigWarning
-        For each pattern that matches no recording, and for accelerated wear.
+        If a pattern matches no recording, or wear is accelerated.
     """
     source, home = str(path), Path(path).resolve().parent
     file: FleetFile = structure(read_yaml(Path(path), source), FleetFile, source, "")

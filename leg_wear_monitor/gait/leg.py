@@ -66,7 +66,7 @@ class Ground:
     Raises
     ------
     ConfigError
-        For a mechanism without a toe that moves to and fro, or a stance that leaves no swing.
+        If the mechanism has no toe that moves to and fro, or the stance leaves no swing.
     """
 
     def __init__(self, mechanism: Mechanism, config: GaitConfig) -> None:
@@ -85,7 +85,7 @@ class Ground:
         Parameters
         ----------
         speed : float
-            Of the crank [rad/s], for the duration of the transient.
+            Speed of the crank [rad/s], for the duration of the transient.
         """
         load, stance = self._load, self._stance
         size, late = np.clip(self._random.standard_normal(2), -_FURTHEST, _FURTHEST)

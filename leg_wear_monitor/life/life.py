@@ -72,7 +72,7 @@ def check_life(
     Raises
     ------
     ConfigError
-        For limits and jumps that `simulate_life` refuses.
+        If `simulate_life` refuses the limits or jumps.
     """
     limits = np.broadcast_to(np.asarray(limit_m, dtype=float), len(clearance_joints))
     for joint, fresh, radius, limit in zip(clearance_joints, fresh_m, radius_m, limits, strict=True):
@@ -328,7 +328,7 @@ def simulate_life(
         If a limit does not lie between a joint's new clearance and the radius of its bushing, or if the run's
         jumps are too short to reach it.
     SimulationError
-        Where the motion diverges, or if the life takes more than `MOST_JUMPS` jumps.
+        If the motion diverges, or the life takes more than `MOST_JUMPS` jumps.
     """
     limits = np.broadcast_to(np.asarray(limit_m, dtype=float), len(run.clearance_joints))
     check_life(run.clearance_joints, run.fresh_m, run.radius_m, limits, run.settings.jump)
@@ -404,7 +404,7 @@ def simulate_lives(
     number : int
         Number of lives.
     limit_m, horizon_cycles : float
-        As in `simulate_life`.
+        Same meaning as in `simulate_life`.
     wear_factor : float
         Factor on all wear coefficients.
     speed_rpm : float, optional

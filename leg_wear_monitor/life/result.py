@@ -58,7 +58,7 @@ class Duty:
     Raises
     ------
     ConfigError
-        For forces and times that cannot be.
+        If a force or a time is impossible.
 
     Examples
     --------
@@ -110,7 +110,7 @@ class Duty:
         Raises
         ------
         ConfigError
-            For a mechanism without a toe that moves to and fro.
+            If the mechanism has no toe that moves to and fro.
         """
         return [with_ground_reaction(mechanism, peak) for peak in self.hours_by_peak]
 

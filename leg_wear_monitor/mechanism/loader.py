@@ -27,7 +27,7 @@ from leg_wear_monitor.mechanism.spec import (
     TorqueDrive,
 )
 
-# Check that every body and point to which a mechanism refers exists.
+# Check that every body and point named in a mechanism exists.
 
 
 def check_references(mechanism: Mechanism) -> None:
@@ -155,7 +155,7 @@ def clearance_joints(
     Returns
     -------
     settings : dict of str to Clearance
-        For every revolute joint with a complete set of settings.
+        Settings of every revolute joint with a complete set of settings.
     names : tuple of str
         The clearance joints.
 

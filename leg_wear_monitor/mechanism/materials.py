@@ -149,7 +149,7 @@ class Excess:
         ``p``, ``v`` or ``p v``.
     value, limit : float
     unit : str
-        Of both.
+        Unit of both.
     """
 
     name: str
@@ -414,7 +414,7 @@ def rating_life_hours(pressure_speed: float, constants: RatingLife) -> float:
     pressure_speed : float
         Specific load times mean sliding speed [Pa m/s]; the constants have a least value for it.
     constants : RatingLife
-        Of a pair.
+        Constants of a pair.
     """
     largest = constants.largest_pressure_speed
     if largest is not None and pressure_speed > largest.si:

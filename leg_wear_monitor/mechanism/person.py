@@ -24,7 +24,7 @@ from leg_wear_monitor.mechanism.spec import GROUND, Body, Mechanism, PhaseLoad, 
 # centre of mass, are relative to the length of the segment.
 
 
-PERSON_TOLERANCE = 0.2  # of the mass of a person, who eats, dresses and carries
+PERSON_TOLERANCE = 0.2  # fraction of a person's mass: food, clothes, loads
 
 
 class _Segment(NamedTuple):
@@ -54,7 +54,7 @@ def with_person(mechanism: Mechanism, person_kg: float) -> Mechanism:
     Raises
     ------
     ConfigError
-        For a mechanism without such bodies, joints and toe.
+        If the mechanism lacks such bodies, joints or toe.
 
     Examples
     --------
@@ -183,7 +183,7 @@ def nominal_stance(linkage: Linkage) -> Stance:
     Raises
     ------
     ConfigError
-        For a mechanism without a toe, or with one that does not move to and fro.
+        If the mechanism has no toe, or a toe that does not move to and fro.
     """
     mechanism = linkage.mechanism
     if mechanism.toe is None:
@@ -274,7 +274,7 @@ def with_toe_force(mechanism: Mechanism, force: Floats, name: str = GROUND_LOAD)
     Raises
     ------
     ConfigError
-        For a mechanism without a toe.
+        If the mechanism has no toe.
     """
     if mechanism.toe is None:
         raise ConfigError(mechanism.source, "bodies", "has no point called toe for the ground to push")
@@ -299,7 +299,7 @@ def with_ground_reaction(mechanism: Mechanism, peak_n: float) -> Mechanism:
     Raises
     ------
     ConfigError
-        For a mechanism without a toe that moves to and fro.
+        If the mechanism has no toe that moves to and fro.
 
     Examples
     --------

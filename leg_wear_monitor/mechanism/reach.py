@@ -182,7 +182,7 @@ class Reach:
     crank_angle : (p,) array, rad
         Rising; a whole turn from 0 if the crank turns through.
     q : (p, n, 3) array
-        Coordinates at these angles. Where the mechanism does not close, those with the least gap.
+        Coordinates at these angles; the coordinates with the least gap if the mechanism does not close.
     turns : bool
         True if it closes all over a turn of the crank.
     open_joint : str

@@ -114,7 +114,7 @@ class LegMarkers:
     monitor : WearMonitor
         Its present state is shown until its next reports.
     drawing : LegDrawing
-        Of its mechanism.
+        Drawing of the leg's mechanism.
     """
 
     def __init__(self, monitor: WearMonitor, drawing: LegDrawing) -> None:

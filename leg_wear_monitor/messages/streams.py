@@ -1,4 +1,4 @@
-"""Table of input streams, from which subscriptions, recording topics, decoding and checks are derived.
+"""Table of input streams, the source of subscriptions, recording topics, decoding and checks.
 
 `cdr` parses the messages of a stream; `twin` defines the use of its samples.
 """

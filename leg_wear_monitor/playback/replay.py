@@ -1,4 +1,4 @@
-"""Replay of a recording through the monitor; the reports equal those of a live run."""
+"""Replay of a recording through the monitor; the reports equal the reports of a live run."""
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
@@ -183,7 +183,7 @@ def state_in_ledger(mechanism: Mechanism, config: MonitorConfig) -> LegState:
     Raises
     ------
     ConfigError, LedgerError
-        For parameters or a ledger that cannot be used.
+        If parameters or a ledger cannot be used.
     """
     with copy_of(config.ledger.path) as copy:
         ledger = attrs.evolve(config.ledger, path=str(copy))
@@ -226,7 +226,7 @@ def node_beside(topic: str) -> str:
 
 @contextmanager
 def _part(directory: Path, files: list[Path]) -> Iterator[Path]:
-    """File for the reports, next to those of an earlier replay, which may have to stay."""
+    """File for the reports, next to an earlier replay's reports, which may have to stay."""
     path = directory / REPORTS_FILE
     if any(path.resolve() == file.resolve() for file in files):
         raise RecordingError(str(path), "", "is both read and written. Expected a different directory")

@@ -112,7 +112,7 @@ class ReplayJoint:
     Attributes
     ----------
     opened_m : float or None
-        By how much the modelled clearance grew from the first to the last gait cycle of the replay.
+        Growth of the modelled clearance from the first to the last gait cycle of the replay.
     growth_m_per_cycle : float or None
         Growth of the modelled clearance in a gait cycle; None while there is not enough data.
     growth_error_m_per_cycle : float or None
@@ -178,9 +178,9 @@ class WornDepth:
     Attributes
     ----------
     bushing : (N,) array
-        By sector of the bushing's frame, the first one from angle 0 on.
+        Wear depth by sector of the bushing's frame; the first sector starts at angle 0.
     journal : (N,) array
-        By sector of the journal's frame.
+        Wear depth by sector of the journal's frame.
     """
 
     bushing: Floats

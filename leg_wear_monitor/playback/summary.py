@@ -1,4 +1,4 @@
-"""The result of a replay and its summary, from which its files and its page are made.
+"""The result of a replay and its summary, the source of its files and its page.
 
 A forecast that the verdict rejects has no remaining life.
 """
@@ -61,7 +61,7 @@ def leg_forecast(forecast: LegForecast | None, verdict: Verdict) -> LegForecast 
     return attrs.evolve(forecast, cycles=None, hours=None, days=None, first_probability={}, first=None)
 
 
-# The summary of a replay, from which its files and its page are made.
+# The summary of a replay, the source of its files and its page.
 
 
 POINTS = 1000

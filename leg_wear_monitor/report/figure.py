@@ -76,7 +76,7 @@ def finish(axes: Axes, title: str = "", x: str = "", y: str = "", columns: int =
         axes.legend(fontsize=SMALL, frameon=False, ncols=min(columns, len(names)), handletextpad=0.3)
 
 
-# Units in which values are easy to read.
+# Units that make values easy to read.
 
 
 _LENGTHS = ((1.0e12, "pm"), (1.0e9, "nm"), (1.0e6, "µm"), (1.0e3, "mm"))

@@ -39,7 +39,7 @@ class Series:
     style : str
         ``line``, ``dashed``, ``points``, or ``edge`` of a band, which has no line.
     width : float
-        Of a line [CSS pixels].
+        Width of a line [CSS pixels].
     """
 
     name: str
@@ -93,7 +93,7 @@ class Chart:
     group : str
         Charts of one group share cursor and zoom.
     ends : tuple of float or None
-        Of the x axis; the first and the last value if None.
+        Ends of the x axis; the first and the last value if None.
     """
 
     name: str
@@ -310,7 +310,7 @@ class Page:
         Versions of the software, seeds and the origin of the data, by name.
     banner : Banner or None
     styles, libraries : sequence of str
-        Further style sheets, and scripts that come before those of the interactive parts; by their names in
+        Further style sheets, and scripts that come before the interactive parts' scripts; by their names in
         ``report/templates``.
     has_dark : bool
         True if it follows a reader who prefers dark colours; its pictures must follow as well.

@@ -76,7 +76,7 @@ class Silence:
                 kind.used, kind.steady_ns, kind.wall_ns = used[name], steady_ns, wall_ns
 
     def excuse(self, late_ns: int) -> None:
-        """Exclude a time in which the node did not take arriving messages."""
+        """Exclude a time when the node did not take arriving messages."""
         for kind in self._kinds.values():
             kind.steady_ns += late_ns
 
@@ -146,7 +146,7 @@ def sources_alarm(kind: str) -> Alarm:
 
 
 class NodeAlarms:
-    """Alarms of the node, in addition to those of the monitor.
+    """Alarms of the node, in addition to the monitor's alarms.
 
     The list of alarms contains them only while they are raised; otherwise live runs and replays publish the
     same bytes. ``input_sources`` is also an alarm of the monitor; the higher level of both is published.

@@ -57,7 +57,7 @@ class Inbox:
     received, shed : int
         Numbers of messages since the start.
     lock : threading.RLock
-        Held while messages are added or removed; held by who adds several in their order.
+        Held while messages are added or removed; a caller that adds several in order holds it.
     """
 
     def __init__(self, decoder: Decoder, limit: int, limit_bytes: int = HELD_BYTES) -> None:
@@ -196,7 +196,7 @@ class InterfaceNames:
     ----------
     crank_joint : str
     interfaces : mapping of str to str
-        As of `wanted_interfaces`.
+        Interfaces returned by `wanted_interfaces`.
     """
 
     def __init__(self, crank_joint: str, interfaces: Mapping[str, str]) -> None:

@@ -69,7 +69,7 @@ def listening(node: str, leg: LiveLeg, setup: LegSetup | None = None) -> Iterato
     Parameters
     ----------
     node : str
-        As `full_name` returned it.
+        Name returned by `full_name`.
     leg : LiveLeg
     setup : LegSetup, optional
         The leg's parameters; without them, the monitor is asked.

@@ -1,4 +1,4 @@
-"""Service ``~/measure``, and a client of the services of a monitor in another process."""
+"""Service ``~/measure``, and a client of the services of a monitor in a different process."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -80,7 +80,7 @@ def measured(monitor: WearMonitor, wanted: dict[str, Any], stamp_ns: int) -> str
     Raises
     ------
     LegWearError
-        For a joint without clearance, or impossible values; then nothing is entered.
+        If the joint has no clearance, or a value is impossible; then nothing is entered.
     """
     found = monitor.measure(**wanted, stamp_ns=stamp_ns, who=WHO)
     return with_storage("; ".join(found.lines), not_stored(monitor))
@@ -117,7 +117,7 @@ def offer_measure(node: Node, act: Callable[[dict[str, Any]], str]) -> None:
     node.create_service(SetParametersAtomically, SERVICE, answer)
 
 
-# Client of the services of a monitor in another process: measurements, acknowledgements, resets.
+# Client of the services of a monitor in a different process: measurements, acknowledgements, resets.
 
 
 _NAME = "leg_wear_measure"
@@ -168,7 +168,7 @@ def trigger_on(monitor: str, name: str, wait_s: float, times: int) -> str:
     monitor : str
         Full name of its node.
     name : str
-        Of the service below the node, such as ``reset_wear/G``.
+        Name of the service below the node, such as ``reset_wear/G``.
     wait_s : float
         Longest wait for the service, and again for each answer.
     times : int

@@ -272,7 +272,7 @@ class MonitorNode(ClosingNode):
 
     @property
     def subscriptions(self) -> Iterator[Subscription]:
-        """Those that an executor serves: the inputs are taken by a timer."""
+        """Subscriptions that an executor serves; a timer takes the inputs."""
         own = self._inputs.subscriptions if self._inputs else ()
         return (one for one in super().subscriptions if one not in own)
 

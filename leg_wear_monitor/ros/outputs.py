@@ -49,7 +49,7 @@ class StopRecorder:
     Parameters
     ----------
     directory : str
-        Where the files go, one for each STOP, named by the computer's time (UTC) and the leg.
+        Directory of the files, one per STOP, named by the computer's time (UTC) and the leg.
     leg : str
         Hardware id; several legs may write into one directory.
     report : callable

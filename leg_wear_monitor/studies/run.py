@@ -76,7 +76,7 @@ def run_study(
     Raises
     ------
     ConfigError, AssemblyError
-        For invalid values, before any point is computed.
+        If a value is invalid, before any point is computed.
     """
     mechanism, points, code = load_mechanism(study.mechanism), study.points(), code_digest()
     check_points(mechanism, [point.settings for point in points])

@@ -35,7 +35,7 @@ def leg_of(
 
     settings = load_config(config, node)
     if ledger is not None:
-        # who names a ledger means its leg, unless the parameters name one
+        # a named ledger selects its leg, unless the parameters name a leg
         hardware = settings.hardware_id or hardware_id_of(ledger)
         settings = attrs.evolve(_on(settings, ledger), hardware_id=hardware)
     elif node is not None:

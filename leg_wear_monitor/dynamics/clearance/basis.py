@@ -298,7 +298,7 @@ def stored_shapes(k: int) -> Shapes:
 
 
 def start_of(name: str, shapes: Shapes) -> int:
-    """Where a named part starts in a flat array."""
+    """Start index of a named part in a flat array."""
     return sum(math.prod(shapes[before]) for before in list(shapes)[: list(shapes).index(name)])
 
 

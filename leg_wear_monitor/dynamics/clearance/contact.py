@@ -105,7 +105,7 @@ def joint_forces(model, k, coefficient, clearance, approach, delta, rate, slip):
     Returns
     -------
     f_n, stiffness, damping, elastic, f_t
-        As in a sample; all 0 for a joint that is open or apart.
+        Same values as in a sample; all 0 for a joint that is open or apart.
     """
     law = model.law
     touching = (delta > 0.0) & (approach > 0.0)
@@ -180,7 +180,7 @@ def touch_worn_walls(model, surfaces, now, turned, k, ex, ey):
     Returns
     -------
     delta, nx, ny, cam, clearance, coefficient
-        As in a sample.
+        Same values as in a sample.
     """
     turn_b, turn_j = _of_bodies(now.turn_line, k)
     angle_b, angle_j = _of_bodies(now.angle_line, k)

@@ -69,11 +69,11 @@ def coupling_of(
     is_damped : bool
         True if a spring of the leg has a damper.
     interval : float
-        Of the stepper [s].
+        Interval of the stepper [s].
     stiffness : float
         [N m/rad]
     damping_ratio : float
-        Of the crank on the coupling, with the mean inertia of the ideal leg over a turn.
+        Damping ratio of the crank on the coupling, with the mean inertia of the ideal leg over a turn.
     """
     shapes, inertia, whole = motion_shapes(joints, is_damped), np.zeros(len(tables.motion)), 0.0
     for i, row in enumerate(tables.motion):

@@ -412,7 +412,7 @@ def _turned(whole, steeper, length, needed, torque, now, e, v, x, e1, v1):
     """Change of the crank's angle [rad] and speed [rad/s] in a part of a length [s].
 
     ``needed``: integral of the drive torque at a steady crank [N m s]; ``torque``: of the coupling [N m]. The
-    eccentricities and rates at the end are in rows e1 and v1 of x, those at the begin in e and v (d,).
+    eccentricities and rates at the end are in rows e1 and v1 of x, at the start in e and v (d,).
     """
     ahead, faster = 0.0, 0.0
     for i in range(e.shape[0]):

@@ -326,7 +326,7 @@ class ClearanceRun:
     Raises
     ------
     ConfigError
-        For a mechanism that is not driven by speed.
+        If the mechanism is not driven by speed.
     """
 
     def __init__(self, setup: Setup, intervals: int = INTERVALS) -> None:

@@ -1,9 +1,9 @@
 """Tables over the crank angle for the motion of the leg without contacts (physics.md section 7).
 
-With X = J^-1 at centred journals, J the Jacobian of all closures and the drive, the columns of X that
-belong to the clearance joints are S, the drive's is s. In the eccentricities e and the crank angle th, with
-its speed w, the Lagrangian to the first order of e / L in terms with w, and to the second in those with w^2
-and gravity, is
+With X = J^-1 at centred journals, J the Jacobian of all closures and the drive, the columns of X that belong
+to the clearance joints are S, the drive's is s. The Lagrangian is a function of the eccentricities e and the
+crank angle th, with its speed w. To the first order of e / L in terms with w, and to the second order in
+terms with w^2 and gravity, it is
 
     1/2 e' A e' + w e' (B + B_e e) + 1/2 w^2 (c + c_e e + 1/2 e c_ee e) - V,
 

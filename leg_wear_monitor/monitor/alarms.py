@@ -193,7 +193,7 @@ def evaluated(
     worst = value if is_estimate else _worst(level, alarm.worst, value, limit)
     if level is Level.OK:
         sigma, cause = math.nan, ""
-    elif worst == alarm.worst and not is_estimate:  # cause and deviation of the worst value stay with it
+    elif worst == alarm.worst and not is_estimate:  # sigma and cause of the worst value stay with it
         sigma, cause = alarm.sigma, alarm.cause or cause
     return Alarm(  # all fields: `attrs.evolve` takes several times as long, for each value of each period
         kind=alarm.kind,

@@ -1,4 +1,4 @@
-"""Further encoders in the monitor: what they show goes into reports, forecast and ledger."""
+"""Further encoders in the monitor: their results go into reports, forecast and ledger."""
 
 from collections.abc import Mapping, Sequence
 
@@ -33,7 +33,7 @@ class EncoderWatch(Observer):
     ----------
     encoders : EncoderObserver
     estimates : tuple of ClearanceEstimate or None
-        Those of the last gait cycle, and whether the forecast uses them.
+        Estimates of the last gait cycle, and whether the forecast uses them.
     """
 
     def __init__(self, leg: CountedLeg, board: AlarmBoard) -> None:
@@ -52,11 +52,11 @@ class EncoderWatch(Observer):
         self.encoders.config = config
 
     def go_live(self) -> None:
-        """Never wait for what is simulated."""
+        """Never wait for simulations."""
         self.encoders.go_live()
 
     def leave(self) -> None:
-        """Leave what is simulated ahead: the process is about to end."""
+        """Stop simulating ahead: the process is about to end."""
         self.encoders.leave()
 
     def add_samples(self, piece: Samples) -> None:
@@ -96,7 +96,7 @@ class EncoderWatch(Observer):
             self._leg.accounting.note(new)
 
     def replaced(self, k: int) -> None:
-        """Forget what was estimated of the former part of joint k."""
+        """Forget the estimates of the former part of joint k."""
         self.encoders.replaced()
         if self.estimates:
             none = ClearanceEstimate(observation=ClearanceObservation.WAITING)

@@ -70,7 +70,7 @@ def names_of(encoders: Encoders) -> tuple[str, ...]:
 
 
 def errors_of(encoders: Encoders, stored: Commissioned | None) -> EncoderErrors:
-    """Errors of encoders as stored in the ledger; those of encoders that are not stored are unknown."""
+    """Errors of encoders as stored in the ledger; errors of encoders that are not stored are unknown."""
     names = names_of(encoders)
     m = len(names)
     centre, mean = np.full(m, np.nan), np.zeros(1 + 2 * m)
@@ -78,7 +78,7 @@ def errors_of(encoders: Encoders, stored: Commissioned | None) -> EncoderErrors:
     covariance = np.diag(np.square(sigma))
     if stored is None:
         return EncoderErrors(centre, mean, covariance, (False,) * m)
-    # the configuration may list other encoders than the ledger, in another order
+    # the configuration may list other encoders than the ledger, in a different order
     common = [(i, stored.encoders.index(name)) for i, name in enumerate(names) if name in stored.encoders]
     here, there = [i for i, _ in common], [j for _, j in common]
     own, theirs = _rows(here, m), _rows(there, len(stored.encoders))
@@ -249,7 +249,7 @@ _CHANGE_CYCLES = 20  # cycles in a row with other encoders until the change coun
 _UNKNOWN_SIGMA_M = 1.0e-3  # prior standard deviation of a clearance without prior knowledge
 _PROFILE_CYCLES = 10  # gait cycles whose crank motion is averaged for a reference
 # A reference is renewed if an observable clearance, or the crank's speed as a fraction of its mean, differs
-# from that of the reference by more; and at the earliest this many cycles after the last one.
+# from the reference's by more; and at the earliest this many cycles after the last reference.
 _CLEARANCE_DEPARTURE_M, _SPEED_DEPARTURE, _LEAST_BETWEEN_REFERENCES = 1.0e-4, 0.015, 100
 
 
@@ -312,11 +312,11 @@ class EncoderObserver(KeepsSamples):
         )
 
     def go_live(self) -> None:
-        """Never wait for what is simulated."""
+        """Never wait for simulations."""
         self._reference.may_be_late = True
 
     def leave(self) -> None:
-        """Leave what is simulated ahead: the process is about to end."""
+        """Stop simulating ahead: the process is about to end."""
         self._reference.leave()
 
     def ended(self, statistics: CycleStatistics) -> None:
@@ -325,7 +325,7 @@ class EncoderObserver(KeepsSamples):
             self.state.due = (*self.state.due, (statistics.begin_ns, statistics.stamp_ns))
 
     def end_period(self, clearance_m: Floats, depth: Floats) -> Commissioned | None:
-        """Evaluate the queued gait cycles, and go on with what is simulated for the reference.
+        """Evaluate the queued gait cycles, and continue the simulation of the reference.
 
         Parameters
         ----------
@@ -457,7 +457,7 @@ class EncoderObserver(KeepsSamples):
             )
 
     def _is_reference_outdated(self) -> bool:
-        """Whether the estimated clearances or the crank motion have left those of the reference."""
+        """Whether the estimated clearances or the crank motion have left the reference's."""
         found, reference = self.state.found, self._clearance_regression.reference
         if found is None or reference is None or self.state.since_reference < _LEAST_BETWEEN_REFERENCES:
             return False

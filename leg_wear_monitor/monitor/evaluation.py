@@ -136,7 +136,7 @@ class AlarmBoard:
         return self._limits[name].reaches(value, Level.WARN)
 
     def _limit(self, name: str, impact_factor: float) -> Limit:
-        """Limit of an alarm, with a factor on those of impact forces."""
+        """Limit of an alarm, with a factor on the limits of impact forces."""
         is_impact = impact_factor != 1.0 and self.alarms[name].kind == alarm_specs.IMPACT.kind
         return self._limits[name].times(impact_factor) if is_impact else self._limits[name]
 
@@ -158,8 +158,8 @@ class AlarmBoard:
         Parameters
         ----------
         unmeasured : collection of str
-            Alarms whose values are not measured any more, beside those without a limit. They are normal, for
-            no value can take them back.
+            Alarms whose values are not measured any more, in addition to alarms without a limit. They become
+            normal, because no value can take them back.
         """
         names = {*unmeasured, *(self.alarms.keys() - self._limits)}
         gone = {name: attrs.evolve(self.alarms[name], present=Level.OK, beyond=(0, 0)) for name in names}
@@ -180,7 +180,7 @@ class AlarmBoard:
     def restore(self, alarms: Iterable[Alarm]) -> None:
         """Restore alarms from another run.
 
-        Those of encoders or of a foot load that are not read any more stay until they are acknowledged.
+        Alarms of encoders or of a foot load that are not read any more stay until they are acknowledged.
         """
         for alarm in alarms:
             is_done = alarm.acknowledged and alarm.name not in self._limits
@@ -309,13 +309,13 @@ class AlarmEvaluation:
         self.board = AlarmBoard(config, twin.clearance_joints, twin.torque_size_nm)
         self.health: InputHealth | None = None
         self.is_late = False
-        self._last_causes: tuple[str, ...] | None = None  # of unused samples, at the last evaluation
-        self._cadence_rpm = 0.0  # of the last gait cycle, 0 before the first
+        self._last_causes: tuple[str, ...] | None = None  # causes of unused samples, at the last evaluation
+        self._cadence_rpm = 0.0  # cadence of the last gait cycle, 0 before the first
         self._skipped, self._skipped_before = 0, 0  # up to the last evaluation, and up to the one before
         self._begin(twin.intake)
 
     def _begin(self, intake: Intake) -> None:
-        """Begin to collect what the next evaluation of the input needs, from some counts on."""
+        """Begin to collect the data for the next evaluation of the input, from some counts on."""
         self._before, self._withheld_before = intake, self._withheld
         self._torque = TorqueRange()
         self._not_finite: Mapping[str, int] = {}
@@ -361,7 +361,7 @@ class AlarmEvaluation:
         observed : mapping of str to float
             Values of the observers, by the names of their alarms.
         is_refused : bool
-            Whether the crank's input has a fault: cadence and forces are then not those of the leg.
+            Whether the crank's input has a fault: cadence and forces are then not the leg's.
         """
         self._cycles += 1
         values, factor = dict(observed), 1.0
@@ -380,7 +380,7 @@ class AlarmEvaluation:
         return self.board.evaluate(values, report.stamp_ns, impact_factor=factor)
 
     def _impact_factor(self, rpm: float) -> float:
-        """Factor on the limits of impact forces, which are those of the commanded cadence, at another one.
+        """Factor on the limits of impact forces at a cadence; the limits hold for the commanded cadence.
 
         Forces grow with the square of the speed and more: peaks of a healthy leg are 4.1 kN at 60 and 6.9 kN
         at 75 rpm (medians of joint A over an hour). A gait cycle that ends slower
@@ -433,8 +433,8 @@ class AlarmEvaluation:
         health = input_health(self._before, intake, self._torque, is_whole)
         values = self._of_input(health)
         if self.is_late:
-            # what is missing may be lost by this program; where nothing is, it says what a replay says.
-            # A rate of 0 is of a kind that is not sent
+            # missing samples may be lost by this program; if none are missing, it says the same as a replay.
+            # A rate of 0 belongs to a kind that is not sent
             unknown = input_health(self._before, intake, self._torque, is_whole=False)
             without = self._of_input(unknown)
             over_time = {name: value for name, value in values.items() if math.isnan(without[name])}

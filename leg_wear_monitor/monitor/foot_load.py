@@ -165,7 +165,7 @@ class FootLoadCheck(Observer):
 
     @property
     def acts(self) -> str:
-        """What acts on the leg as a foot load, in words."""
+        """The foot load that acts on the leg, in words."""
         if not self._load_acts:
             return "the load by the drive torque acts, if there is one"
         if not self._has_mean:
@@ -207,7 +207,7 @@ class FootLoadCheck(Observer):
 
     @property
     def notes(self) -> Mapping[str, Sequence[str]]:
-        """What acts while the sensor is wrong."""
+        """Notes on the load that acts while the sensor is wrong."""
         return {ACTS: (self.acts,)}
 
     @property
@@ -285,12 +285,12 @@ class FootLoadCheck(Observer):
         return float(cycles.mean(axis=0).std()) < _NOISE_SIGMAS * noise / math.sqrt(len(cycles))
 
     def _scale_factor(self, force: Floats) -> float:
-        """Factor between the load and what the drive torque shows of it, at least 1; NaN if not shown."""
+        """Factor between the load and its estimate from the drive torque, at least 1; NaN if unknown."""
         unexplained = np.mean([each.unexplained_nm for each in self._cycles], axis=0)
         if not np.isfinite(unexplained).all():
             return math.nan
         needed = -np.einsum("cn,cn->n", force, self._toe_per_turn)
-        # regression of the unexplained torque on that of the load, by virtual work; a constant is friction
+        # regression of the unexplained torque on the load's torque, by virtual work; a constant is friction
         of_load, residual = needed - needed.mean(), unexplained - unexplained.mean()
         square = float(of_load @ of_load)
         if not square > 0.0:

@@ -1,4 +1,4 @@
-"""What gait cycles say: are they of this leg, its torque at commissioning and now, how the mismatch went."""
+"""Evidence of gait cycles: fit to this leg, its torque at commissioning and now, torque residuals."""
 
 import math
 from collections import Counter
@@ -28,7 +28,7 @@ _SAMPLES_A_TURN = 12
 
 
 def _unit_words(measured: float, predicted: float) -> str:
-    """What to look at if the torque is in another unit; empty if it is not."""
+    """Parameters to check if the torque is in a wrong unit; empty if it is not."""
     if not any(1.0 / 3.0 < factor * measured / predicted < 3.0 for factor in (1.0e-3, 1.0e3)):
         return ""
     return (
@@ -78,7 +78,7 @@ def doubts(cycle: CycleReport, config: MonitorConfig) -> list[str]:
 
 @attrs.define
 class GaitEvidence:
-    """Counts gait cycles that fit this leg, and reports what is missing.
+    """Counts gait cycles that fit this leg, and reports missing conditions.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ class GaitEvidence:
         self._doubts = self._doubts or found
 
     def missing(self) -> str:
-        """What is missing for one gait cycle that fits this leg; empty if there is one."""
+        """Missing condition for one gait cycle that fits this leg; empty if there is one."""
         if self.believable:
             return ""
         if self.doubtful:
@@ -213,11 +213,11 @@ class TorqueRecord:
                 self.commissioned = friction
 
 
-# The gait cycles since the torque is not as predicted, and what explains them.
+# The gait cycles since the torque is not as predicted, and their explanation.
 
 
 _LONGEST = 60  # gait cycles
-_RISES = 2  # gait cycles of a new mismatch before it is found in the mean of the last ones
+_RISES = 2  # gait cycles of a new torque residual before it is found in the mean of the last cycles
 _FIRST, _EVERY = (3, 5, 10), 20  # gait cycles after which they are explained, then each so many
 
 
@@ -260,7 +260,7 @@ class MismatchWindow:
             self.cycles = (*self.cycles, statistics)[-_FIRST[0] :]
             self._number, self._is_open, self.explanation = self._number + 1, False, None
         elif alarm.level is not Level.OK and is_compared:
-            if not self._is_open:  # the cycles in which the mismatch was found belong to it
+            if not self._is_open:  # the cycles in which the torque residual was found belong to it
                 since = self._number if self._number < _FIRST[0] else _RISES - 1
                 self.cycles = self.cycles[-since:] if since else ()
                 self._number, self._is_open = len(self.cycles), True
@@ -275,7 +275,7 @@ class MismatchWindow:
 
 
 # fractions of the predicted torque's RMS, if the parameters are 0: joints and gears lose some tenths of the
-# transmitted torque; a tenth is also the limit of the mismatch
+# transmitted torque; a tenth is also the limit of the torque residual
 _FRICTION, _BIAS, _DRIFT = 0.3, 0.1, 0.15
 _SURE = 3.0  # standard deviations
 

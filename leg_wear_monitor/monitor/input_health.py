@@ -123,7 +123,7 @@ def input_health(before: Intake, after: Intake, torque: TorqueRange, is_whole: b
 
 
 def of_other_joints(before: Intake, after: Intake) -> int:
-    """Number of messages without the crank between two counts, if the crank came from another publisher.
+    """Number of messages without the crank between two counts, if the crank came from a different publisher.
 
     Several drivers may publish joints of one robot on one topic.
     """
@@ -138,7 +138,7 @@ def unused(counts: Intake) -> int:
     return faulty + sum(int(getattr(counts, name)) for name in _DROPPED)
 
 
-# Sentences on unused samples: how many of how many, the fault, and what to do.
+# Sentences on unused samples: how many of how many, the fault, and the remedy.
 
 
 _WORTH_TELLING = 0.01  # fraction of the samples; smaller ones are visible in the counters only
@@ -166,7 +166,7 @@ _STREAMS = {CRANK: "the crank", TORQUE: "drive_torque", LOAD: "foot_load"}
 
 
 def with_not_finite(before: Mapping[str, int], samples: Samples) -> Mapping[str, int]:
-    """Numbers of samples by stream that have a value that is NaN or infinite, with those of more samples."""
+    """Numbers of samples by stream that have a NaN or infinite value, with the numbers of more samples."""
     counts = Counter(before)
     for kind, name in _STREAMS.items():
         own = samples[samples["kind"] == kind]
@@ -186,7 +186,7 @@ def causes(
     ----------
     before, after : Intake
     withheld : int
-        Number of out-of-range samples that another sentence reports.
+        Number of out-of-range samples that a different sentence reports.
     config : MonitorConfig
         Gives the name of the crank.
     not_finite : mapping of str to int
@@ -285,7 +285,7 @@ class Stretch:
 
     @classmethod
     def of(cls, samples: Samples, spikes: float, size_nm: float, config: MonitorConfig) -> "Stretch":
-        """Those of some samples in any order."""
+        """Statistics of some samples in any order."""
         cranks, torques = (within(part, 1, 2**63 - 1) for part in (of_crank(samples), of_torque(samples)))
         angle = np.unwrap(cranks["crank_angle_rad"], period=TURN)
         return cls(
@@ -322,17 +322,17 @@ def of_torque(samples: Samples) -> Samples:
 
 _LEAST = 20  # samples of a stretch: fewer say nothing of its stamps and its values
 _MOVING_RAD, _STILL_RAD = 0.5, 1.0e-3  # turned in a stretch: the crank turns, it stands
-_SCATTERED, _SCATTERED_RAD = 0.12, 3.0e-3  # of stamps: of the period, and times the speed of the crank
+_SCATTERED, _SCATTERED_RAD = 0.12, 3.0e-3  # scatter of stamps: over the period, and times the crank's speed
 _HELD, _HELD_RAD = 2.5, 0.05  # samples that repeat a value, and the angle that the crank turns meanwhile
 _NO_VARIATION, _SWINGS = 1.0e-3, 0.5  # standard deviation of a torque, of the predicted RMS
-_FROZEN = 0.2  # of a gait cycle, in which a torque that freezes has the same value
-_STEADY = 0.5  # by which speeds in two halves of a stretch may differ, of their mean
-_IN_TURNS = 0.1  # by which a speed may differ from the commanded one in turns instead of radians
+_FROZEN = 0.2  # fraction of a gait cycle in which a torque that freezes has the same value
+_STEADY = 0.5  # largest relative difference of the speeds in two halves of a stretch
+_IN_TURNS = 0.1  # largest relative difference from the commanded speed, if in turns instead of radians
 _AT_END, _BESIDE = 0.05, 4  # fraction of torques at the ends of a range; times as often as the next value
 _SPIKES = 0.03  # fraction of torque samples that are outliers: fewer are counted and left out
 _LEAST_SPIKES = 10  # fewer than that may come together by chance
 _ALIKE = 0.5  # correlation of torques over the crank angle
-_PHASES = (32, 16)  # of a gait cycle in which torques are compared
+_PHASES = (32, 16)  # phases of a gait cycle in which torques are compared
 _LEAST_A_PHASE = 2.0  # samples in each, on average
 
 Words = Mapping[str, str]
@@ -355,8 +355,8 @@ def _unit(one: Stretch) -> Words | None:
 def _stamps(one: Stretch) -> Words | None:
     """Compare how smooth the angle is over the stamps with how smooth it is from sample to sample.
 
-    Stamps of the measurement may be irregular: the angle is then smooth over them. Stamps of the arrival are
-    not those of the angles, which are smooth from sample to sample.
+    Stamps of the measurement may be irregular: the angle is then smooth over them. Stamps of the arrival do
+    not belong to the angles, which are smooth from sample to sample.
     """
     steps = np.diff(one.crank_ns) * 1.0e-9
     if np.mean(np.abs(steps / one.period_s - 1.0)) < _SCATTERED:
@@ -431,7 +431,7 @@ class InputRule:
     kind : int
         `CRANK` or `TORQUE`, the stream.
     words : callable or None
-        Words of the sentence if a stretch has this fault; None if another part of `InputJudge` finds it.
+        Words of the sentence if a stretch has this fault; None if a different part of `InputJudge` finds it.
     why, do : str
         Sentence and remedy, with words in braces.
     needs_motion : bool
@@ -567,7 +567,7 @@ class InputFault:
 
     @property
     def sentence(self) -> str:
-        """What is wrong, and the remedy."""
+        """The fault, and the remedy."""
         return f"{self.rule.why}. {self.rule.do[0].upper()}{self.rule.do[1:]}".format(**self.texts)
 
 
@@ -616,7 +616,7 @@ def _likeness(one: Floats, other: Floats) -> float:
 
 _JUMP_RAD = 0.3  # deviation of an angle from a steady motion
 _JUMP_STEP_RAD = 0.2  # largest step of a crank between two samples over which a jump is known
-_AMONG = 5  # samples, of which two may be outliers
+_AMONG = 5  # samples; two of them may be outliers
 _PERIODS = 4  # evaluation periods per stretch
 _KEPT_PERIODS = 12  # periods of kept samples: a gait cycle may be slower than commanded
 _AFTER = 3  # commanded gait cycles without a fault, after which it is over
@@ -757,7 +757,7 @@ class InputJudge:
         return not (is_repeated and before is not None and _correlation(means[0], before) >= _ALIKE)
 
     def _take(self, one: Stretch) -> None:
-        """Note what a stretch shows, and forget what has not been seen for some gait cycles."""
+        """Note the faults in a stretch, and forget faults that have not occurred for some gait cycles."""
         newest_ns = int(one.crank_ns[-1]) if len(one.crank_ns) else 0
         newest_ns = max(newest_ns, int(one.torque_ns[-1]) if len(one.torque_ns) else 0)
         first_ns = int(one.crank_ns[0]) if len(one.crank_ns) else newest_ns
@@ -784,7 +784,7 @@ class InputJudge:
         known = (passed_s > 0.0) & (passed_s * self._commanded <= _JUMP_STEP_RAD)
         if len(step) <= _AMONG or not known.any():
             return
-        # a median of neighbours leaves outliers out; beside a gap, only one of their two steps is known
+        # a median of neighbours leaves outliers out; next to a gap, only one of their two steps is known
         off = np.cumsum(np.where(known, step - np.median(step[known]), 0.0))
         change = np.diff(np.median(sliding_window_view(off, _AMONG), axis=1))
         change = (change + math.pi) % TURN - math.pi

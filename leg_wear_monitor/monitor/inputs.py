@@ -33,7 +33,7 @@ def wrapped(angle):
 
 @kernel
 def guess_speed(settings, state, k, stamp, angle):
-    """Speed of a series of one sample: at rest, as commanded, or that of the other, what fits best."""
+    """Speed of a series of one sample: rest, commanded, or the other series' speed, whichever fits best."""
     if state.number[k] != 1:
         return
     h = 1.0e-9 * (stamp - state.stamp[k])
@@ -77,10 +77,10 @@ def begin(state, k, stamp, angle):
     state.angle[k], state.speed[k] = angle, 0.0
 
 
-# Crank angles that no one leg can give: two series that interleave, and angles in another unit.
+# Crank angles that a single leg cannot give: two series that interleave, and angles in a wrong unit.
 #
-# Both are found in the samples in their order of arrival alone, so that a replay finds what the live run
-# found.
+# Both are found from the samples' order of arrival alone, so that a replay has the same result as the live
+# run.
 #
 # *Series*: each sample belongs to the series whose motion it continues best. Where two series go on side by
 # side and neither continues the other, two sources send one crank's angle. *Unit*: the angle as it was sent,
@@ -100,7 +100,7 @@ SETTINGS = np.dtype(
 _RECENT = 512  # torques that an outlier is compared with
 STATE = np.dtype(
     [
-        # of both series
+        # for both series
         ("number", "i8", (2,)),  # samples
         ("stamp", "i8", (2,)),  # stamp of the last sample [ns]
         ("angle", "f8", (2,)),  # [rad]
@@ -109,7 +109,7 @@ STATE = np.dtype(
         ("switches", "i8"),  # changes of `last` since the younger series began
         ("since", "i8"),  # stamp of the last such change [ns]
         ("two", "i8"),  # 1 if two sources send
-        # of the unit
+        # for the unit
         ("anchor", "i8"),  # stamp of the last step's end [ns]
         ("anchor_angle", "f8"),  # [rad]
         ("step_speed", "f8"),  # speed of the last step [rad/s]
@@ -121,7 +121,7 @@ STATE = np.dtype(
         ("conflicting", "i8"),  # samples withheld since two sources send
         ("implausible", "i8"),  # samples withheld since the unit is wrong
         ("torque_outliers", "i8"),
-        # of the drive torque
+        # for the drive torque
         ("recent", "f8", (_RECENT,)),  # sizes of the last torques [N m]
         ("torques", "i8"),  # number of torques
     ]
@@ -157,7 +157,7 @@ def _are_two(settings, state, stamp, angle):
     if min(state.number[0], state.number[1]) >= _SERIES and state.switches >= _INTERLEAVED:
         state.two = 1
     if abs(stamp - state.since) > 1.0e9 * settings.alone:
-        # the other has gone; what begins anew must show itself again
+        # the other series has gone; a new series must show itself again
         state.two, state.number[1 - k], state.switches, state.since = 0, 0, 0, stamp
     return state.two == 1
 
@@ -217,9 +217,9 @@ def _is_torque_outlier(settings, state, torque):
 def check_samples(all_settings, states, stamp, kind, angle, out_torque, out_fault):
     """Mark samples (n,) that cannot be used, and leave torques out that are outliers.
 
-    Crank samples are marked as long as two sources send or the unit is another. ``out_fault`` (n,) are the
-    faults that are known, ``out_torque`` (n,) the torques, NaN for an outlier. Of settings and states there
-    is one each; the state is changed.
+    Crank samples are marked as long as two sources send or the unit is wrong. ``out_fault`` (n,) are the
+    known faults, ``out_torque`` (n,) the torques, NaN for an outlier. ``all_settings`` and ``states`` have
+    one record each; the state is changed.
     """
     settings, state = all_settings[0], states[0]
     for i in range(stamp.shape[0]):
@@ -247,7 +247,7 @@ def check_samples(all_settings, states, stamp, kind, angle, out_torque, out_faul
 
 
 _ALONE_S = 1.0
-_DEGREES, _NEAR = 180.0 / math.pi, 1.5  # factor by which a leg may be faster or slower than commanded
+_DEGREES, _NEAR = 180.0 / math.pi, 1.5  # largest factor between a leg's speed and the commanded speed
 
 
 class InputGuard:
@@ -306,7 +306,7 @@ class InputGuard:
 
     @property
     def implausible(self) -> int:
-        """Number of samples withheld because their angle changes as that of no leg."""
+        """Number of samples withheld because their angle changes as in no leg."""
         return int(self._state.implausible)
 
     @property
@@ -323,7 +323,7 @@ class InputGuard:
 
     @property
     def cause(self) -> str:
-        """Reason why crank samples are withheld at present, and what to do; empty if none are."""
+        """Reason why crank samples are withheld at present, and the remedy; empty if none are."""
         if self.sources > 1:
             return (
                 "two series of crank angles interleave and disagree: two publishers of one crank, or an "

@@ -85,13 +85,13 @@ def evaluate_clearances(
 
 
 def shown(leg: MonitoredLeg, joint: JointSituation) -> KnownClearance | None:
-    """What encoders or the drive torque show of a joint best, or showed when its alarm was raised."""
+    """Best estimate of a joint by encoders or the drive torque, now or when its alarm was raised."""
     alarm = leg.evaluation.board.alarms[alarm_specs.CLEARANCE.name(joint.joint)]
     return at_limit_by_estimate(joint, alarm) or surest(joint.seen)
 
 
 def situation_of(leg: MonitoredLeg) -> Situation:
-    """What the verdict depends on, at the end of an evaluation period."""
+    """Inputs of the verdict, at the end of an evaluation period."""
     evaluation, config = leg.evaluation, leg.config
     last, torque = leg.last, leg.torque
     alarms, explained = evaluation.board.alarms, torque.explained
@@ -114,7 +114,7 @@ def situation_of(leg: MonitoredLeg) -> Situation:
 
 
 def _joint_situations(leg: MonitoredLeg) -> tuple[JointSituation, ...]:
-    """What is known of each joint's clearance now."""
+    """Present knowledge of each joint's clearance."""
     estimates = leg.encoders.estimates if leg.encoders else None
     diagnosis = leg.torque.diagnosis
     last, measured, joints = leg.last, leg.measured, leg.clearance_joints
@@ -153,7 +153,7 @@ def with_measured(joint: JointSituation, measured: Measurement | None) -> JointS
 
 
 def _notes(leg: MonitoredLeg) -> dict[str, Sequence[str]]:
-    """What the monitor and its observers report for rules of the verdict, by the rule's code."""
+    """Notes of the monitor and its observers for rules of the verdict, by the rule's code."""
     unfollowed = _unfollowed(leg)
     notes: dict[str, Sequence[str]] = {
         ALREADY_COUNTED: ("",) if leg.accounting.is_all_counted else (),
@@ -164,12 +164,12 @@ def _notes(leg: MonitoredLeg) -> dict[str, Sequence[str]]:
     for each in leg.observers:
         notes |= each.notes
     if leg.guard.cause:
-        notes.pop(CRANK_ZERO, None)  # without samples that are believed, nobody can find it
+        notes.pop(CRANK_ZERO, None)  # it cannot be found without valid samples
     return notes
 
 
 def _other_cadence(leg: MonitoredLeg) -> tuple[str, ...]:
-    """That the leg walks at another cadence: not where it only starts or stops, after a right one."""
+    """Note that the leg walks at a wrong cadence: not if it only starts or stops, after a right one."""
     last, cadence = leg.last, leg.config.cadence
     was_right = last is not None and cadence.allows(last.cadence_rpm)
     if leg.twin.tracking is not Tracking.OUT_OF_STEP or was_right:
@@ -197,7 +197,7 @@ def _unfollowed(leg: MonitoredLeg) -> str:
     return f"the crank has not been followed for {out_s:.3g} s" if out_s >= cycle_s else ""
 
 
-# The state of the leg, made of what the monitor holds.
+# The state of the leg, from the data in the monitor.
 
 
 def leg_state(leg: MonitoredLeg, findings: Sequence[Verdict], situation: Situation) -> LegState:
@@ -240,15 +240,15 @@ def leg_alarm(alarm: Alarm) -> LegAlarm:
 def joint_clearance(
     joint: JointSituation, alarm: Alarm | None, findings: Sequence[Verdict], new_m: float
 ) -> JointClearance:
-    """Clearance of a joint, and what findings say of it.
+    """Clearance of a joint, and its state by the findings.
 
     Parameters
     ----------
     joint : JointSituation
     alarm : Alarm or None
-        That of the joint's clearance.
+        Alarm of the joint's clearance.
     findings : sequence of Verdict
-        Those of the rules, or the verdict alone.
+        Findings of the rules, or the verdict alone.
     new_m : float
         The clearance when new.
     """
@@ -278,7 +278,7 @@ def joint_clearance(
 def life_of(
     joints: Mapping[str, JointForecast | None], leg: LegForecast | None, verdict: Verdict
 ) -> dict[str, Any]:
-    """Of a `LegState`, the remaining life of each joint and of the ``leg``, as far as it is believed."""
+    """Remaining life of each joint and of the ``leg`` in a `LegState`, as far as it is valid."""
     forecasts: dict[str, JointForecast | LegForecast | None] = {**joints, "leg": leg}
     is_valid = Figure.FORECAST not in verdict.not_valid
     return {

@@ -38,7 +38,7 @@ class MonitoredLeg(CountedLeg):
     torque : TorqueWatch
         One of them.
     findings : tuple of Verdict
-        Those of the last evaluation period; empty before the first.
+        Findings of the last evaluation period; empty before the first.
     happened : Event or None
         The last event of the twin.
     has_ended : bool
@@ -78,7 +78,7 @@ class MonitoredLeg(CountedLeg):
 
     @property
     def unmeasured(self) -> frozenset[str]:
-        """Alarms of the drive torque, if none came in the last gait cycle, or of what nothing shows now."""
+        """Alarms of the drive torque, if none came in the last gait cycle, or of values without a source."""
         is_gone = self.last is not None and not self.last.torque_samples
         silent = set(SEEN) - {each.shows for each in self.observers} | ({"torque"} if is_gone else set())
         alarms = self.evaluation.board.alarms.values()

@@ -1,4 +1,4 @@
-"""Observers: what looks at the samples beside the twin."""
+"""Observers: parts that evaluate the samples in addition to the twin."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,7 +11,7 @@ from leg_wear_monitor.twin.statistics import CycleStatistics
 
 
 class Observer:
-    """An observer of a monitor; each one defines those of these methods that it needs.
+    """An observer of a monitor; each observer defines only the methods that it needs.
 
     The monitor calls `passed`, `add_samples`, `end_cycle`, `alarm_values`, `judge` and `end_period` in this
     order. All of them depend on the order of the samples only, not on how the stream is cut into blocks.
@@ -24,13 +24,13 @@ class Observer:
         """Use other parameters from now on."""
 
     def go_live(self) -> None:
-        """Never wait for what is simulated."""
+        """Never wait for simulations."""
 
     def close(self) -> None:
-        """Note what the last entry of the ledger is to contain."""
+        """Note the content of the last entry of the ledger."""
 
     def leave(self) -> None:
-        """Leave what is simulated ahead: the process is about to end."""
+        """Stop simulating ahead: the process is about to end."""
 
     def begin_epoch(self) -> None:
         """The stamps start again."""
@@ -63,7 +63,7 @@ class Observer:
         """Evaluate the gait cycles that ended in an evaluation period."""
 
     def replaced(self, k: int) -> None:
-        """Forget what was estimated of the former part of joint k."""
+        """Forget the estimates of the former part of joint k."""
 
     @property
     def seen(self) -> Sequence[KnownClearance | None]:
@@ -77,7 +77,7 @@ class Observer:
 
     @property
     def notes(self) -> Mapping[str, Sequence[str]]:
-        """What is to be reported for rules of the verdict, a sentence each, by the rule's code."""
+        """Notes for rules of the verdict, a sentence each, by the rule's code."""
         return {}
 
     @property

@@ -95,7 +95,7 @@ def undo_reset(leg: MonitoredLeg, joint: str, stamp_ns: int, who: str) -> JointW
 
 
 def _last_reset(accounting: Accounting, joint: str) -> tuple[Audit, JointWear]:
-    """The last reset of a joint, and its wear before; what happened before that cannot be undone."""
+    """The last reset of a joint, and its wear before; earlier events cannot be undone."""
     if accounting.ledger is None:
         raise LegWearError(f"joint {joint}: no ledger is used, so the wear before a reset is not stored")
     own = [one for one in accounting.ledger.audits if one.joint and one.joint.name == joint]
@@ -147,7 +147,7 @@ def measure(
         accounting.note(Audit(stamp_ns, who, "measure", alarms=(was,)))  # a withdrawal raises it again
         found = attrs.evolve(found, eased=_eased(was, now))
     _note_clearance_verdict(leg, before, joint, stamp_ns, is_ended)
-    renew_forecast(leg)  # without a remaining life, if the verdict rests on what it does not use
+    renew_forecast(leg)  # without a remaining life, if the verdict rests on data that it does not use
     leg.keep()
     return found
 
@@ -181,7 +181,7 @@ def _eased_by_withdrawn(leg: MonitoredLeg, like: Measurement) -> tuple[Alarm, ..
 
 
 def _eased(was: Alarm, now: Alarm) -> str:
-    """In words, what a measurement made of an alarm that an earlier measurement raised; empty for others."""
+    """Effect of a measurement on an alarm that an earlier measurement raised, in words; empty for others."""
     if was.cause not in (MEASURED, BOTH):
         return ""
     if now.level < was.level:
@@ -215,8 +215,8 @@ def _note_alarms(leg: MonitoredLeg, stamp_ns: int) -> None:
 def _rested_on(alarms: Iterable[Alarm], joint: str, named: Iterable[str]) -> tuple[str, ...]:
     """Names of the raised alarms that rested on the part of a joint that was replaced.
 
-    The joint's own ones; and the torque mismatch if this joint explains it: if its clearance was at a limit,
-    or the verdict named it for its clearance.
+    The joint's own alarms; and the torque residual if this joint explains it: if its clearance was at a
+    limit, or the verdict named it for its clearance.
 
     Parameters
     ----------
@@ -282,7 +282,7 @@ def _compare(leg: MonitoredLeg, joint: str, stamp_ns: int) -> bool:
 
 
 def _ends(joint: JointSituation, alarm: Alarm) -> bool:
-    """Whether the last measurement of a joint contradicts what the alarm of its clearance rests on."""
+    """Whether the last measurement of a joint contradicts the basis of the alarm of its clearance."""
     if joint.measured is None or alarm.cause in ("", COUNTED) or alarm.level is Level.OK:
         return False
     if alarm.cause in (MEASURED, BOTH) and not joint.is_measurement_used:

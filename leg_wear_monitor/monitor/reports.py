@@ -33,7 +33,7 @@ class JointReport:
         Growth of the mean clearance per cycle and per second of walking, averaged over gait cycles; None
         while there is not enough data.
     growth_error_m_per_cycle : float or None
-        Standard deviation of what it may be off: cycles scatter, and masses are not those on paper.
+        Standard deviation of the growth: cycles scatter, and real masses differ from the file.
     peak_force_n, p99_force_n, mean_force_n : float
         Of the contact force in this cycle; the peak is a sample of a heavy tail.
     impacts : int
@@ -164,7 +164,7 @@ class VerdictReport:
     stamp_ns : int
         When it changed.
     findings : tuple of Verdict
-        Those of the rules that hold; at least one.
+        Findings of the rules that hold; at least one.
     leg : LegState or None
         The leg then, in a report of its state; None in a report of a changed verdict.
     """
@@ -180,7 +180,7 @@ class VerdictReport:
 
     @property
     def state(self) -> LegState:
-        """The leg with the verdict of these findings, of which a node may have added some."""
+        """The leg with the verdict of these findings; a node may have added some of them."""
         if self.leg is None:
             raise ValueError("a report of a changed verdict has no state of the leg")
         clearances = {
@@ -207,11 +207,11 @@ class Lost:
     conflicting : int
         Of those out of range: crank samples from two sources.
     implausible : int
-        Of those out of range: crank samples in another unit.
+        Out-of-range samples that are crank samples in a wrong unit.
     torque_outliers : int
         Drive torques left out because they are far from the others.
     duplicates : int
-        Dropped samples that repeat another one.
+        Dropped samples that repeat an earlier one.
     late : int
         Dropped samples that are later than the window.
     stray_stamps : int
@@ -279,7 +279,7 @@ class Reports:
 class Status:
     """A line of /diagnostics: ``name`` stable, numbers only in ``values``, by keys that end in their unit.
 
-    ``fault_code`` is a stable name of what is wrong, one of `alarms.fault_codes`, an alarm or a verdict's.
+    ``fault_code`` is the stable name of the fault, one of `alarms.fault_codes`, of an alarm or of a verdict.
     """
 
     name: str

@@ -173,7 +173,7 @@ def _joint(leg: MonitoredLeg, k: int, name: str) -> Status:
 
 
 def _with_measured(joint: Status, measured: Measurement | None) -> Status:
-    """A joint's status with its measured clearance beside the modelled one."""
+    """A joint's status with its measured clearance next to the modelled one."""
     if measured is None:
         return joint
     words = f"{estimate(measured.clearance_m, measured.sigma_m, 'm')} was measured"
@@ -185,7 +185,7 @@ def _with_measured(joint: Status, measured: Measurement | None) -> Status:
 
 
 def _as_judged(joint: Status, known: JointClearance, findings: Sequence[Verdict]) -> Status:
-    """A joint's status with its believed clearance, and with what the verdict's findings say of it."""
+    """A joint's status with its best estimate of the clearance, and with the verdict's findings on it."""
     values, message = joint.values, joint.message
     if known.best_estimate_m is not None:
         values = {

@@ -29,7 +29,7 @@ def torque_status(
     causes: Mapping[str, NamedCause] | None,
     diagnosis: Diagnosis,
 ) -> Status:
-    """Comparison of measured and predicted torque, and what explains a mismatch.
+    """Comparison of measured and predicted torque, and the explanation of a torque residual.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def torque_status(
 
 
 def diagnosis_status(joints: Sequence[str], diagnosis: Diagnosis) -> Status:
-    """What the drive torque shows of the clearances; NaN where a joint is not observable."""
+    """Clearances by the drive torque; NaN for joints that are not observable."""
     values = {"cycles": float(diagnosis.cycles)}
     for reason in NotUsed:
         values[f"not_used_{reason.value}"] = float(diagnosis.cycles_not_used.get(reason.value, 0))
@@ -117,7 +117,7 @@ def diagnosis_status(joints: Sequence[str], diagnosis: Diagnosis) -> Status:
 
 
 def _explained_values(explained: TorqueExplanation) -> dict[str, float]:
-    """Values of the first explanation of a mismatch, and what it leaves."""
+    """Values of the first explanation of a torque residual, and the remaining residual."""
     values = {"unexplained": explained.after, "unexplained_sigma": explained.after_sigma}
     for one in explained.alternatives[0] if explained.alternatives else ():
         row = CAUSES[one.cause]

@@ -43,9 +43,9 @@ _LOG = logging.getLogger(__name__)
 
 WRONG_TORQUE = "the received drive torque is wrong; see the status `torque`"
 ACCELERATED = "wear is accelerated: clearances grow within the gait cycles that are compared"
-_CONTRADICTS = 3.0  # standard deviations between what the torque shows and what a person measured
-# of a part, since it was measured, that wear it by little: at ten times the wear that is counted for joint A
-# of the example in the air, 17 pm a gait cycle, 17 um; a correction is 90 um at least (diagnosis.md)
+_CONTRADICTS = 3.0  # standard deviations between the torque estimate and a measurement by an operator
+# gait cycles since a part was measured that wear it little: at ten times the modelled wear of joint A of the
+# example in the air, 17 pm per gait cycle, 17 um; a correction is 90 um at least (diagnosis.md)
 _LATELY_CYCLES = 100_000
 # standard deviation of a new clearance, as a fraction: the limits of a running fit are 20 % about its mean
 _FIT_TOLERANCE = 0.1
@@ -54,7 +54,7 @@ _FACTORS = (Cause.SCALE, Cause.SIGN)
 
 
 class TorqueWatch(Observer):
-    """Compares the drive torque with the predicted one, and corrects what is surely counted wrong.
+    """Compares the drive torque with the prediction, and corrects surely wrong modelled clearances.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class TorqueWatch(Observer):
     record : TorqueRecord
     mismatch : MismatchWindow
     unexplained : str
-        Why a torque mismatch has no explanation; empty if it has one or there is none.
+        Why a torque residual has no explanation; empty if it has one, or if the residual is small.
     """
 
     def __init__(self, leg: CountedLeg, board: AlarmBoard) -> None:
@@ -82,7 +82,7 @@ class TorqueWatch(Observer):
             leg.twin.set_parameters(self.observer.state.parameters)
 
     def _new_observer(self) -> TorqueObserver:
-        """The estimator, with what files and the ledger know of this leg."""
+        """The estimator, with the data of files and ledger on this leg."""
         leg, ledger, path = self._leg, self._leg.ledger, self._leg.config.diagnosis.reference
         known = ledger.parameters if ledger else None
         kept = ledger.references if ledger else ()
@@ -110,19 +110,19 @@ class TorqueWatch(Observer):
             self.observer.warm_up()
 
     def go_live(self) -> None:
-        """Never wait for what is simulated."""
+        """Never wait for simulations."""
         if self.observer:
             self.observer.go_live()
 
     def close(self) -> None:
-        """Keep what is simulated of a reference: recordings are often shorter than its simulation."""
+        """Store the simulated part of a reference: recordings are often shorter than its simulation."""
         part = self.observer.part_of_reference if self.observer else None
         if part is not None:
             stamp_ns = self._leg.twin.intake.followed_stamp_ns
             self._leg.accounting.note(SimulatedReference(stamp_ns, tuple(self._leg.mechanism.bodies), part))
 
     def leave(self) -> None:
-        """Leave what is simulated ahead: the process is about to end."""
+        """Stop simulating ahead: the process is about to end."""
         if self.observer:
             self.observer.leave()
 
@@ -142,14 +142,14 @@ class TorqueWatch(Observer):
             self.observer.ended(statistics, self.is_wrong or is_refused, statistics.load_peak_n)
 
     def alarm_values(self, report: CycleReport) -> Mapping[str, float]:
-        """Mismatch, bias, drift and lag of a gait cycle, by the names of their alarms."""
+        """Torque residual, bias, drift and lag of a gait cycle, by the names of their alarms."""
         values = torque_values(report, self.record, self._bounds)
         if self._leg.config.cadence.allows(report.cadence_rpm):
             values[MISMATCH.kind] = report.torque_mismatch
         return {spec.name(): spec.value(values) for spec in TORQUE}
 
     def judge(self, statistics: CycleStatistics, report: CycleReport) -> None:
-        """Look for causes of a torque mismatch, and record a torque that is as predicted."""
+        """Look for causes of a torque residual, and record a torque that is as predicted."""
         self._explain(statistics)
         is_allowed = self._leg.config.cadence.allows(statistics.cadence_rpm)
         why = statistics.not_compared if is_allowed else NotCompared.CADENCE
@@ -158,7 +158,7 @@ class TorqueWatch(Observer):
         self._leg.accounting.commissioned = self.record.totals
 
     def _explain(self, statistics: CycleStatistics) -> None:
-        """Look for causes of a torque mismatch; a wrong torque says nothing of the leg."""
+        """Look for causes of a torque residual; a wrong torque says nothing about the leg."""
         was_wrong = self.is_wrong
         self.mismatch.add_cycle(
             statistics,
@@ -174,7 +174,7 @@ class TorqueWatch(Observer):
             self.observer.withdraw(first.begin_ns - before * (first.stamp_ns - first.begin_ns))
 
     def _explanation(self, cycles: Sequence[CycleStatistics]) -> TorqueExplanation | None:
-        """What explains a torque mismatch; None if the data lead to no explanation, see `unexplained`."""
+        """Explanation of a torque residual; None if the data lead to no explanation, see `unexplained`."""
         before, self.unexplained = self.unexplained, ""
         try:
             return explanation(self._leg.mechanism, cycles, self._allowed)
@@ -185,7 +185,7 @@ class TorqueWatch(Observer):
             return None
 
     def end_period(self) -> None:
-        """Compare the torque with the torque of the model, and correct what is surely counted wrong."""
+        """Compare the torque with the torque of the model, and correct surely wrong modelled clearances."""
         torque, leg = self.observer, self._leg
         if torque is None:
             return
@@ -294,9 +294,9 @@ class TorqueWatch(Observer):
     def _contradiction(self, change: Change) -> str:
         """A measurement of the changed leg that contradicts the change of a clearance; empty without one.
 
-        One from before the change says nothing of it. Before this run, another clock may have stamped it: it
-        is of the changed leg unless kept gait cycles of this run show the leg before the change, or the part
-        had walked many since.
+        A measurement from before the change says nothing about it. Before this run, a different clock may
+        have stamped it: it counts for the changed leg unless stored gait cycles of this run show the leg
+        before the change, or the part had walked many cycles since.
         """
         if change.is_corrected or change.cause is not Cause.CLEARANCE:
             return ""
@@ -323,7 +323,7 @@ class TorqueWatch(Observer):
         )
 
     def _counted_bodies(self) -> tuple[Body, ...]:
-        """Bodies of the twin; none where its parameters are those of the mechanism file."""
+        """Bodies of the twin; none if its parameters equal the mechanism file's."""
         own, mechanism = self._leg.twin.parameters, self._leg.mechanism
         if attrs.evolve(own.in_air, compliance=0.0) == LegParameters.none(mechanism):
             return ()
@@ -332,13 +332,13 @@ class TorqueWatch(Observer):
 
     @property
     def is_wrong(self) -> bool:
-        """Whether drive torque or crank angle are wrong as received, by what explains a mismatch."""
+        """Whether a wrong received drive torque or crank angle explains a torque residual."""
         explained = self.mismatch.explanation
         return explained is not None and explained.is_input_fault
 
     @property
     def explained(self) -> TorqueExplanation | None:
-        """What explains a mismatch of the torque; None where the diagnosis names another cause."""
+        """Explanation of a torque residual; None if the diagnosis names a different cause."""
         explained = self.mismatch.explanation
         return None if explained and self.diagnosis.contradicts(explained) else explained
 
@@ -375,7 +375,7 @@ class TorqueWatch(Observer):
         return {"drive": self._drive(diagnosis), "diagnosis": self._shown(diagnosis), **load}
 
     def _drive(self, diagnosis: Diagnosis) -> Drive:
-        """The drive by the last gait cycle, by what explains a torque mismatch, and by the diagnosis."""
+        """The drive by the last gait cycle, by the explanation of a torque residual, and by the diagnosis."""
         last, explained = self._leg.last, self.explained
         named = explained.named if explained else ()
         factor = next((one for one in named if one.cause in _FACTORS), None)
@@ -404,7 +404,7 @@ class TorqueWatch(Observer):
         )
 
     def _cause(self, diagnosis: Diagnosis) -> NamedCause | None:
-        """What explains the torque: an unsettled change of the leg, or else the one cause of a mismatch."""
+        """Cause of the torque: an unsettled change of the leg, or else a torque residual's only cause."""
         if diagnosis.state is DiagnosisState.CHANGED and diagnosis.changes:
             return diagnosis.changes[-1]
         explained = self.explained
@@ -413,7 +413,7 @@ class TorqueWatch(Observer):
 
     @property
     def statuses(self) -> Sequence[Status]:
-        """Comparison of measured and predicted torque, and what the torque shows of the clearances."""
+        """Comparison of measured and predicted torque, and clearances by the torque."""
         diagnosis, causes = self.diagnosis, None if self.is_wrong else self.causes
         torque = torque_status(self._board, self._leg.last, self.record, self.explained, causes, diagnosis)
         return torque, diagnosis_status(self._leg.clearance_joints, diagnosis)

@@ -199,7 +199,7 @@ class WearMonitor:
         return piece
 
     def _follow(self, piece: Samples) -> tuple[SampleReports, tuple[CycleStatistics, ...]]:
-        """Pass samples to the twin and to the observers; what was followed, and the cycles that ended."""
+        """Pass samples to the twin and to the observers; returns tracked samples, and ended cycles."""
         leg = self._leg
         update = self._twin.update(piece)
         leg.judge.add_samples(piece)
@@ -244,7 +244,7 @@ class WearMonitor:
         return cycle_report(leg, statistics, forecast, seen, list(map(surest, leg.seen)))
 
     def _end_period(self, changes: list[AlarmList]) -> Situation:
-        """Evaluate the input, and what observers show; what the verdict then depends on."""
+        """Evaluate the input and the observers' results; returns the inputs of the verdict."""
         leg = self._leg
         if leg.judge.end_period(leg.guard.torque_outliers, bool(leg.guard.cause)):
             # later gait cycles must not be compared with this torque; only periods end alike in all blocks
@@ -345,7 +345,7 @@ class WearMonitor:
 
     @property
     def measurements(self) -> tuple[Measurement, ...]:
-        """Measured clearances, those of the ledger first."""
+        """Measured clearances, the ledger's first."""
         return self._leg.forecaster.measurements
 
     @property
@@ -368,7 +368,7 @@ class WearMonitor:
         return self._accounting.wear_of(joint)
 
     def begin_run(self, boot_id: str) -> bool:
-        """Store the boot id of the computer; return whether the last run is known to have another one."""
+        """Store the boot id of the computer; return whether the last run is known to have a different one."""
         ledger = self._accounting.ledger
         if ledger is None:
             return False
@@ -428,7 +428,7 @@ class WearMonitor:
     def reset_wear(self, joint: str, stamp_ns: int, who: str) -> Cleared:
         """Reset the wear of a joint whose part was replaced; its history stays in the ledger.
 
-        What rested on the former part is acknowledged and clears.
+        Alarms of the former part are acknowledged and clear.
 
         Returns
         -------
@@ -525,7 +525,7 @@ class WearMonitor:
             raise LegWearError(ledger.fault or "the ledger is written at the end of the recording")
 
     def close(self) -> None:
-        """Write the last entry, close the ledger, and leave what is simulated ahead.
+        """Write the last entry, close the ledger, and stop simulating ahead.
 
         Raises
         ------
@@ -564,7 +564,7 @@ class WearMonitor:
 
     @property
     def coefficient_doubts(self) -> tuple[Doubt, ...]:
-        """Joints whose wear the ledger has counted with another wear coefficient, when it was opened."""
+        """Joints whose wear in the ledger, when opened, was modelled with a different wear coefficient."""
         ledger = self._accounting.ledger
         return coefficient_doubts(ledger.entry.joints, self.mechanism) if ledger and ledger.entry else ()
 

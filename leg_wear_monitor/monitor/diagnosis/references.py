@@ -36,6 +36,7 @@ from leg_wear_monitor.twin.torque_reference import (
 )
 
 # Models that follow from the state of a `TorqueObserver`: explanations, tests and the misfit.
+#
 # They are computed when first used, and again after their inputs have changed.
 
 

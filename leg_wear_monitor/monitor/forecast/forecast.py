@@ -1,8 +1,8 @@
-"""How long joints and the leg will last, and how sure that is: a distribution, from all that is not known.
+"""Remaining life of the joints and the leg, with its uncertainty: a distribution over all unknown quantities.
 
-An ensemble of legs over what is believed of every joint's wear coefficient and clearance, over the growth's
-own scatter and the load to come. In each of them all joints grow together by the law of growth, until each
-has reached its limit (`GrowthLaw`, `cycles_to`).
+An ensemble of legs samples every joint's wear coefficient and clearance, the growth's own scatter and the
+future load. In each leg all joints grow together by the law of growth, until each has reached its limit
+(`GrowthLaw`, `cycles_to`).
 """
 
 import math
@@ -26,16 +26,17 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
 
 MEMBERS = 1021
 _MULTIPLIER = 333
-_SHIFT = 631  # moves each dimension by another amount, so that no member lies in a corner of all of them
+_SHIFT = 631  # moves each dimension by a different amount, so that no member lies in a corner of all
 
 
 @cache
 def even_fractions(dimensions: int) -> Floats:
     """Numbers in (0, 1), shape (dimensions, MEMBERS): a lattice of Korobov's.
 
-    Each dimension has the same evenly spaced numbers, in another order. By this multiplier every two of 17
-    dimensions, which five joints need, are filled like a good lattice of two: lines that hold all members
-    are at most 1/15 apart, where 1/34 is the least that could be; of 32 dimensions 1/6 (see the test).
+    Each dimension has the same evenly spaced numbers, in a different order. With this multiplier every two of
+    17 dimensions, which five joints need, are filled like a good two-dimensional lattice: lines that hold all
+    members are at most 1/15 apart, where 1/34 is the least that could be; of 32 dimensions 1/6 (see the
+    test).
     """
     member = np.arange(MEMBERS)
     rows = [
@@ -59,8 +60,8 @@ def even_normals(dimensions: int) -> Floats:
 #
 #     ln(growth_k / x_k) = a_k + sum over j of B_kj ln(c_j / c_j0)
 #
-# with x_k the factor on joint k's wear coefficient, c_j the mean clearances and c_j0 those when new: a power
-# law. What the lives are off a law that does not know them is its sigma.
+# with x_k the factor on joint k's wear coefficient, c_j the mean clearances and c_j0 the clearances when new:
+# a power law. The deviation of lives from a law that does not know them is its sigma.
 
 
 PRIOR_SIGMA = 1.0  # prior of B: growth may double or halve if a clearance doubles
@@ -148,7 +149,7 @@ def fitted_law(lives: Sequence[SimulatedLife], sigma: float) -> GrowthLaw:
 
 
 def _sigma(lives: Sequence[SimulatedLife], unknown: float) -> Floats:
-    """What lives are off, of each joint; where they are too few, or it does not open, what is given."""
+    """Deviation of lives from the law per joint; ``unknown`` with too few lives or no opening."""
     if len(lives) < LEAST_LIVES:
         return np.full(len(lives[0].factor), unknown)
     off = left_over(lives)
@@ -234,7 +235,7 @@ def cycles_to(law: GrowthLaw, clearance_m: Floats, base_m: Floats, limit_m: Floa
 
 
 class Answer(Enum):
-    """What the forecast can say; the value is human-readable."""
+    """Possible answers of the forecast; the value is human-readable."""
 
     KNOWN = "from the growth so far and its uncertainty"
     PARTLY_KNOWN = "of the joints whose growth is known; the others are not included"
@@ -271,7 +272,7 @@ class JointForecast:
     Attributes
     ----------
     answer : Answer
-        What can be said of it.
+        Answer of the forecast.
     cycles : Quantiles or None
         Gait cycles until the mean clearance reaches its limit; None unless known (0 at the limit).
     hours : Quantiles or None
@@ -283,8 +284,8 @@ class JointForecast:
     measurements : int
         Measured clearances of this part that are in it.
     prior : CoefficientPrior or None
-        What was believed of its wear coefficient before any measurement of this part, and the regime that it
-        holds for; None in a file of an older version.
+        Prior of its wear coefficient before any measurement of this part, and the regime that it holds for;
+        None in a file of an older version.
     """
 
     answer: Answer
@@ -308,7 +309,7 @@ class LegForecast:
     Attributes
     ----------
     answer : Answer
-        What can be said of it.
+        Answer of the forecast.
     cycles : Quantiles or None
         Gait cycles; None unless known.
     hours : Quantiles or None
@@ -372,7 +373,7 @@ class JointCondition:
     has_coefficient: bool = True
 
     def answer(self, clearance_m: float, valid: bool) -> Answer:
-        """What can be said of it, supposing its clearance."""
+        """Answer for the joint, assuming its clearance."""
         if clearance_m >= self.limit_m:
             return Answer.AT_LIMIT
         if not valid:
@@ -406,7 +407,7 @@ def forecast(
     cycle_s : float
         Time of a gait cycle.
     valid : bool
-        Whether the model holds for what the leg does.
+        Whether the model is valid for the present operation of the leg.
     """
     clearance_m, base_m, duty_h = _legs(now, estimates, settings, law)
     clearances = [quantiles(row) for row in clearance_m]
@@ -470,8 +471,8 @@ def _legs(
     sigma = law.sigma_to(limit[:, 0], settings.model_sigma)[:, None]
     log_rate = log_factor + np.hypot(sigma, relative) * normals[2 * k : 3 * k]
     log_rate += settings.load_sigma * normals[3 * k]
-    # The twin's growth is that at its own clearances. What is believed of a factor is a mean over the part's
-    # past, in which the other clearances departed from the twin's by and by: half of their doing is in it.
+    # The twin's growth belongs to its own clearances. The estimate of a factor is a mean over the part's
+    # past, in which the other clearances gradually departed from the twin's: half of their effect is in it.
     here, twin = law.log_growth(clearance), law.log_growth(fresh + wear)
     log_base = log_rate + 0.5 * (here - twin) - here
     duty = settings.duty_hours_per_day * np.exp(settings.duty_sigma * normals[3 * k + 1])
@@ -510,7 +511,7 @@ def quantiles(values: Floats) -> Quantiles:
 UNKNOWN = {
     f"{fraction}_{key}": math.nan for key in ("cycles", "hours", "days") for fraction in ("p10", "p50", "p90")
 }
-"""What `lifetime_values` gives, not known."""
+"""Result of `lifetime_values` if nothing is known."""
 
 
 def lifetime_values(forecast: JointForecast | LegForecast) -> dict[str, float]:
@@ -524,13 +525,13 @@ def lifetime_values(forecast: JointForecast | LegForecast) -> dict[str, float]:
 
 
 def answer_words(forecast: JointForecast) -> str:
-    """What can be said of a joint's life, and what it holds for."""
+    """Answer on a joint's life, and the conditions that it holds for."""
     basis = "" if forecast.prior is None else f"; {_basis(forecast.prior)}"
     return f"{forecast.answer.value}{basis}"
 
 
 def bases(forecasts: Mapping[str, JointForecast]) -> list[str]:
-    """What the lives of some joints hold for, a sentence for all joints alike."""
+    """Conditions for the lives of some joints, one sentence for all joints alike."""
     found: dict[str, list[str]] = {}
     for joint, forecast in forecasts.items():
         if forecast.prior is not None:

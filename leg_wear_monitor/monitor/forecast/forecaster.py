@@ -60,12 +60,12 @@ def law_of(mechanism: Mechanism, path: str, sigma: float) -> GrowthLaw:
         A file of its lives. If empty, the one that comes with the package for just this leg; if there is
         none, growth stays as it is.
     sigma : float
-        Standard deviation of what ln growth is off, where lives do not show it.
+        Standard deviation of ln growth, if lives do not show it.
 
     Raises
     ------
     ConfigError
-        If the file cannot be read, or is of another leg.
+        If the file cannot be read, or describes a different leg.
     """
     lives = read_lives(path, mechanism) if path else _shipped_lives(mechanism)
     if not lives:
@@ -104,7 +104,7 @@ def read_lives(path: str, mechanism: Mechanism) -> Sequence[SimulatedLife]:
     Raises
     ------
     ConfigError
-        If it cannot be read, or is of another leg.
+        If the file cannot be read, or describes a different leg.
     """
     document = _document(path)
     own = fingerprint(mechanism)
@@ -176,7 +176,7 @@ def _numbers(values: Any) -> list[float]:
 
 
 def _can_be(life: SimulatedLife) -> bool:
-    """Whether the figures of a life can be those of one; NaN is within no bounds."""
+    """Whether the values of a life are possible; NaN is within no bounds."""
     within = (
         (life.factor, 1.0e-9, 1.0e9),
         (life.cycles, 0.0, 1.0e30),
@@ -233,7 +233,7 @@ class Forecaster:
         self.growth = tuple(GrowthWindow() for _ in self._clearance_joints)
         self.measurements, self.corrections = tuple(measurements), tuple(corrections)
         self._last: Forecast | None = None  # None before the first, and when something is new
-        self._stamp_ns, self._known = 0, 0  # of the last; joints whose growth was known then
+        self._stamp_ns, self._known = 0, 0  # of the last forecast; joints whose growth was known then
         self.coefficient_estimates = tuple(
             self._estimate(k, when) for k, when in zip(range(len(self._fresh_m)), replaced_ns, strict=True)
         )
@@ -258,7 +258,7 @@ class Forecaster:
         is_valid : callable
             Whether the leg is in the range of the model.
         model : ModelError
-            What the growth may be off by the load.
+            Error of the growth because of the load.
         """
         self.growth = all_extended(self.growth, statistics, self._settings.window_cycles)
         is_recent = 0 <= statistics.stamp_ns - self._stamp_ns < RENEWED_NS
@@ -303,7 +303,7 @@ class Forecaster:
         return self._last
 
     def expire(self) -> None:
-        """Make a new forecast after the next gait cycle: what it rests on has changed."""
+        """Make a new forecast after the next gait cycle, because its inputs have changed."""
         self._last = None
 
     def last_measured(self, replaced_ns: Sequence[int]) -> tuple[Measurement | None, ...]:
@@ -312,7 +312,7 @@ class Forecaster:
         return tuple(measurement.last_measured(self.measurements, joint, when) for joint, when in parts)
 
     def replaced(self, joint: str, replaced_ns: int) -> None:
-        """Reset the estimate of a joint whose part changed to what is known of this part."""
+        """Reset the estimate of a joint with a new part to the prior knowledge of this part."""
         k = self._clearance_joints.index(joint)
         self.growth = _with(self.growth, k, GrowthWindow())
         self._update_coefficients(k, self._estimate(k, replaced_ns))
@@ -416,5 +416,5 @@ def _known(rates: Sequence[GrowthRate | None]) -> int:
 
 
 def _with(values: tuple[_T, ...], k: int, new: _T) -> tuple[_T, ...]:
-    """Values with another one at k."""
+    """Values with a new value at k."""
     return (*values[:k], new, *values[k + 1 :])

@@ -13,8 +13,8 @@ LEAST_CYCLES = 10
 LARGEST_ERROR = 0.5  # fraction of the mean: beyond it, the mean says nothing
 
 _BATCHES = 5  # batches of six cycles in a window of thirty: longer than the correlation of neighbours
-# five means leave four degrees of freedom: Student's t, not a normal distribution. So wide is the normal one
-# whose interval from p10 to p90 is that of t: 1.533 standard errors, not 1.282
+# five means leave four degrees of freedom: Student's t, not a normal distribution. With this factor, a normal
+# distribution has the same interval from p10 to p90 as t: 1.533 standard errors, not 1.282
 _WIDER = 1.533 / 1.282
 
 
@@ -82,8 +82,8 @@ def all_extended(
 def growth_rate(window: GrowthWindow) -> GrowthRate | None:
     """Mean growth, None while there is not enough data to know it.
 
-    A mean is used and not a median: wear comes in bursts, and the mean is what adds up. Neighbouring cycles
-    of a chaotic motion hang together, so the scatter is that of the means of batches.
+    A mean is used and not a median: wear comes in bursts, and means add up. Neighbouring cycles of a chaotic
+    motion are correlated, so the scatter is computed from the means of batches.
     """
     n = len(window.growth_m)
     if n < LEAST_CYCLES:

@@ -1,4 +1,4 @@
-"""A measured clearance: what it says of the joint, in figures and in words."""
+"""A measured clearance and its meaning for the joint, in values and in words."""
 
 import math
 from collections.abc import Sequence
@@ -27,10 +27,10 @@ LEAST = 5  # measurements, below which fractions have no meaning
 
 
 def validity(measurements: Sequence[Measurement]) -> str:
-    """What measurements say of the forecasts before each of them, in a line for operators.
+    """Agreement of measurements with the forecasts before each of them, in a line for operators.
 
-    Those that contradict the model count, too, and withdrawn ones do not. In the long run 80 % are between
-    the p10 and the p90 of what was expected.
+    Measurements that contradict the model count as well, and withdrawn measurements do not. In the long run
+    80 % are between the p10 and the p90 of the expected clearance.
     """
     below = np.array([m.expected_below for m in measurements if not m.is_withdrawn])
     within = int(np.count_nonzero((below >= 0.1) & (below <= 0.9)))
@@ -56,7 +56,7 @@ _SAYS_SOMETHING = 0.9  # a measurement is informative if it leaves at most this 
 
 @attrs.frozen(eq=False)
 class MeasurementResult:
-    """What a measurement says.
+    """Meaning of a measurement.
 
     Attributes
     ----------
@@ -71,11 +71,11 @@ class MeasurementResult:
     words : tuple of str
         For people, a line each.
     shown_m, shown_sigma_m, shown_by : float, float, str
-        What encoders or the drive torque showed of the joint before, with its source in words; NaN and empty
-        if they showed nothing.
+        Estimate of the joint by encoders or the drive torque before, with its source in words; NaN and empty
+        without an estimate.
     eased : str
-        What became of an alarm of the clearance that an earlier measurement had raised, such as ``ends``;
-        empty if it stays.
+        Effect on an alarm of the clearance that an earlier measurement had raised, such as ``ends``; empty if
+        it stays.
     limit_m, warn_fraction : float
         Limit of the joint's clearance, and the fraction of it at which its alarm begins.
     earlier : sequence of Measurement
@@ -98,12 +98,12 @@ class MeasurementResult:
 
     @property
     def agrees(self) -> bool:
-        """Whether the measurement is what encoders or the drive torque showed."""
+        """Whether the measurement agrees with the estimate by encoders or the drive torque."""
         sigma_m = math.hypot(self.measurement.sigma_m, self.shown_sigma_m)
         return abs(self.measurement.clearance_m - self.shown_m) <= SURE_SIGMAS * sigma_m  # not with NaN
 
     def _compared(self) -> list[str]:
-        """The measurement against what encoders or the drive torque showed."""
+        """The measurement against the estimate by encoders or the drive torque."""
         if math.isnan(self.shown_m) or math.isnan(self.shown_sigma_m):
             return []
         now, shown = self.measurement, f"{_mm(self.shown_m)} ± {_mm(self.shown_sigma_m)}"
@@ -116,7 +116,7 @@ class MeasurementResult:
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """The measurement and what came of it, for operators, a line each."""
+        """The measurement and its effects for operators, one line each."""
         now, limit_m, warn_fraction = self.measurement, self.limit_m, self.warn_fraction
         size = f"{_mm(now.clearance_m)} ± {_mm(now.sigma_m)}"
         lines = [f"{now.joint}: {size}, {now.cycles} gait cycles after the part was new"]
@@ -167,10 +167,10 @@ def judged_clearance_m(
     ----------
     modelled_m : float
     measured : Measurement or None
-        The last one of the part. A measurement that does not count for the forecast is still what somebody
-        found on the leg.
+        Last measurement of the part. A measurement that does not count for the forecast is still a finding on
+        the leg.
     best_estimate_m : float
-        Median of what counting and measurements together give; NaN if it is not known.
+        Median of the estimate from model and measurements together; NaN if it is not known.
     """
     if measured is None:
         return modelled_m
@@ -232,7 +232,7 @@ def measure(
     Raises
     ------
     ConfigError
-        For figures that cannot be: they are likely meant in another unit.
+        For impossible values: they are likely meant in a different unit.
     """
     fresh_m, radius_m = clearance.radial_clearance, clearance.bushing_radius
     for name, fault in (
@@ -303,7 +303,7 @@ _MOST_PER_PA: float = attrs.fields_dict(Clearance)["wear_coefficient"].metadata[
 
 
 def _change(before: CoefficientEstimate, after: CoefficientEstimate, doubted_per_pa: float) -> str:
-    """What became of the coefficient; with its nominal value, whether that can be one of a joint."""
+    """Change of the coefficient; with its nominal value, whether the new value is possible for a joint."""
     if after.observations == before.observations:
         return "the estimate of the wear coefficient is unchanged"
     if after.sigma > _SAYS_SOMETHING * before.sigma:

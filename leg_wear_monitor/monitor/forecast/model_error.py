@@ -1,8 +1,8 @@
-"""How far the growth of a real leg may be from that on paper, because of its masses and its load.
+"""Error of the modelled growth of a real leg, because of its masses and its load.
 
-Wear grows with force times sliding. What the ideal motion makes of it follows from its reactions, and so
-does its sensitivity to each body's mass: without a simulation, a fraction of a second for any mechanism.
-The rest is made by impacts.
+Wear grows with force times sliding. The part from the ideal motion follows from its reactions, and so does
+its sensitivity to each body's mass: this needs no simulation, and a fraction of a second for any mechanism.
+Impacts cause the rest.
 """
 
 import math
@@ -16,11 +16,11 @@ from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.reference import MASS_TOLERANCE
 
-# squared sensitivity of what impacts make: by regression over the joints of sixteen legs as built
+# squared sensitivity of the impacts' part: by regression over the joints of sixteen legs as built
 # (`benchmarks/growth_coverage.py --quick --legs 16`)
 _OF_IMPACTS = 1.6
-# what a load changes in the part of the growth that impacts make, of what it changes in the other one: least
-# squares over five joints under 300 and 600 N (docs/appendix/forecast.md, lives under a load of the ground)
+# effect of a load on the impacts' part of the growth, over its effect on the other part: least squares over
+# five joints under 300 and 600 N (docs/appendix/forecast.md, lives under a load of the ground)
 _LOAD_OF_IMPACTS = 0.3
 _POINTS = 160  # points per gait cycle
 _MASS_STEP = 0.01
@@ -28,14 +28,15 @@ _MASS_STEP = 0.01
 
 @attrs.frozen(eq=False)
 class ModelError:
-    """What the counted growth of each clearance joint may be off.
+    """Error of the modelled growth of each clearance joint.
 
     Attributes
     ----------
     ideal_m : (k,) array
         Growth a gait cycle that the ideal motion makes.
     sensitivity : (k,) array
-        Of its logarithm to those of all masses, root sum of squares; the person's is known less well.
+        Sensitivity of its logarithm to the logarithms of all masses, root sum of squares; the person's mass
+        is known less well.
     load : (k,) array
         Change of its logarithm by the standard deviation of the load's size.
     """

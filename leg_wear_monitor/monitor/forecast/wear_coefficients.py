@@ -5,11 +5,11 @@ the twin has counted with the nominal coefficient, x the joint's factor on it. T
 x and normal for d; measured clearances have normal errors. d is eliminated in closed form, x is on a grid
 around the estimate: an accepted measurement moves it as far as the data require.
 
-Where the modelled clearance was corrected by what the drive torque shows, c_0, d and w begin anew with that
-clearance, its error and the wear since; x remains.
+If the drive torque corrected the modelled clearance, c_0, d and w start again from the corrected clearance,
+its error and the wear since; x remains.
 
-Where the nominal coefficient was another one, w is what would have been counted with the present one, so what
-was learned of x times the coefficient stays, whatever is configured. That holds as soon as something was
+If the nominal coefficient was different, w is the wear that the present coefficient would have given, so the
+estimate of x times the coefficient stays, whatever is configured. That holds as soon as something was
 learned; until then wear is taken as it was counted.
 """
 
@@ -59,7 +59,7 @@ def nominal_per_pa(clearance: Clearance) -> float:
 
 
 def coefficient_doubts(counted: Iterable[JointWear], leg: Mechanism) -> tuple[Doubt, ...]:
-    """Joints whose wear was counted with another wear coefficient than that of the leg."""
+    """Joints whose wear was modelled with a different wear coefficient than the leg's."""
     found: dict[tuple[float, float], list[str]] = {}
     for part in counted:
         was, now = part.wear_coefficient_per_pa, nominal_per_pa(leg.clearances[part.name])
@@ -76,7 +76,7 @@ def coefficient_doubts(counted: Iterable[JointWear], leg: Mechanism) -> tuple[Do
 
 
 def _further(was_per_pa: float, now_per_pa: float) -> str:
-    """What becomes of the wear to come where the coefficient is another one."""
+    """Message on the future wear if the coefficient differs."""
     if not now_per_pa > 0.0:
         return "and no further wear is modelled"
     return (
@@ -106,10 +106,11 @@ def usual_prior(settings: Forecasting, clearance: Clearance | None = None) -> Co
     return CoefficientPrior(sigma=of_pair, basis=f"spread of {clearance.material}", holds_for=regime)
 
 
-# Clearances that do not rest on counted wear: that of a new part, and what the drive torque showed later.
+# Clearances that do not rest on modelled wear: the clearance of a new part, and later estimates by the drive
+# torque.
 #
-# Wear is counted from each of them on, so that only the wear since is multiplied by what is learned of the
-# wear coefficient: an opening that the counting had missed says nothing about how fast the joint wears.
+# Wear is modelled from each of them on, so only the wear since is multiplied by the estimated factor on the
+# wear coefficient: an opening that the model had missed says nothing about how fast the joint wears.
 
 
 @attrs.frozen
@@ -123,8 +124,8 @@ class ClearanceAtWear:
     wear_m : float
         Wear in the twin at that time.
     from_m : float
-        Measurements belong to this clearance if the wear at them is this much or more, and less than that of
-        the next one; else to the clearance before.
+        Measurements belong to this clearance if the wear at them is this much or more, and less than at the
+        next clearance; else to the clearance before.
     """
 
     clearance_m: float
@@ -148,7 +149,7 @@ def known_clearances(
     """
     return [
         ClearanceAtWear(fresh_m, settings.clearance_sigma_m),
-        # a correction opens the joint by far more than what rounding makes of the wear
+        # a correction opens the joint by far more than a rounding error of the wear
         *(
             ClearanceAtWear(c.clearance_m, c.sigma_m, c.wear_m, 0.5 * (c.before_m + c.wear_m))
             for c in corrections
@@ -164,7 +165,7 @@ def corrections_of(corrections: Sequence[Recount], joint: str, replaced_ns: int)
 
 GRID = 801
 _WIDTH = 8.0  # standard deviations on both sides, of the prior and of the measurements
-_DEEP = 25.0  # below the highest, of log density: what is left out weighs less than 1e-9
+_DEEP = 25.0  # log density below the highest: the neglected part weighs less than 1e-9
 _ZOOMS = 12  # each at least halves the grid's extent
 
 _phi = np.frompyfunc(NormalDist().cdf, 1, 1)
@@ -185,7 +186,7 @@ class CoefficientEstimate:
     observations : int
         Measurements in it.
     prior : CoefficientPrior
-        What was believed before them.
+        Prior before the measurements.
     known : ClearanceAtWear
         The one from which on wear is counted now; d is the deviation from it.
     """
@@ -253,7 +254,7 @@ def estimate_coefficient(
     prior = prior or usual_prior(settings)
     mean, precision = measured_factor(settings, fresh_m, observations, corrections)
     if math.sqrt(precision) * mean * prior.sigma < 1.0:
-        # nothing is known better than the nominal coefficient: another one says nothing of the wear before it
+        # nothing is known better than the nominal coefficient: a new one says nothing of the wear before it
         corrections = [one for one in corrections if not isinstance(one, CoefficientSpan)]
         mean, precision = measured_factor(settings, fresh_m, observations, corrections)
     log_factor, log_weight = posterior_grid(prior, mean, precision)
@@ -299,7 +300,7 @@ def _spans(
 ) -> list[tuple[ClearanceAtWear, list[ClearanceAtWear]]]:
     """Known clearances, each with the measurements between it and the next one.
 
-    Their wear is that of the present coefficient.
+    Their wear is computed with the present coefficient.
     """
     counted = [one for one in corrections if isinstance(one, CoefficientSpan)]
     known = [_recounted(each, counted) for each in known_clearances(settings, fresh_m, corrections)]
@@ -352,7 +353,7 @@ def posterior_grid(prior: CoefficientPrior, mean: float, precision: float) -> tu
     low, high = -_WIDTH * sigma, _WIDTH * sigma
     if precision > 0.0:
         own = precision**-0.5
-        # of a mean below 0, positive factors have the tail only, which falls by e over own² / |mean|
+        # with a mean below 0, positive factors have only the tail, which falls by e over own² / |mean|
         least = min(own, own**2 / abs(mean)) if mean < 0.0 else own
         low += min(0.0, math.log(least) - _WIDTH)
         high = max(high, math.log(max(mean, 0.0) + _WIDTH * own))

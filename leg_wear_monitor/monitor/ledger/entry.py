@@ -1,4 +1,4 @@
-"""Content of the ledger: what it belongs to, the wear at one instant (entry), and events between entries."""
+"""Content of the ledger: its leg, the wear at one instant (entry), and events between entries."""
 
 import hashlib
 import json
@@ -210,7 +210,7 @@ class JointWear:
 
     @property
     def mean_m(self) -> float:
-        """Mean depth of bushing and journal together, which is what the mean clearance has grown by [m]."""
+        """Mean depth of bushing and journal together, equal to the growth of the mean clearance [m]."""
         return float(self.depth.sum(axis=0).mean())
 
 
@@ -396,7 +396,7 @@ class CorrectedClearance:
 
 @attrs.frozen
 class CoefficientSpan:
-    """Wear of a part that was counted with another wear coefficient than the present one.
+    """Wear of a part that was modelled with a different wear coefficient than the present one.
 
     Attributes
     ----------

@@ -61,7 +61,7 @@ def connect(path: Path, binding: Binding) -> sqlite3.Connection:
 
 @contextmanager
 def transaction(db: sqlite3.Connection) -> Iterator[None]:
-    """A transaction: what is written within the context is on the disk at its end, or not at all."""
+    """A transaction: data written within the context are on the disk at its end, or not at all."""
     db.execute("BEGIN EXCLUSIVE")
     try:
         yield
@@ -74,7 +74,7 @@ def transaction(db: sqlite3.Connection) -> Iterator[None]:
 
 @contextmanager
 def damage_refused(path: Path) -> Iterator[None]:
-    """Report what makes a file unusable in one line."""
+    """Report in one line why a file is unusable."""
     try:
         yield
     except _DAMAGE as error:
@@ -148,13 +148,14 @@ def _create(path: Path, binding: Binding) -> None:
 
 
 def _connect(path: Path, mode: str) -> sqlite3.Connection:
-    """Connection to a file that is not checked; ``mode``, such as ``ro``, is that of an SQLite URI."""
+    """Connection to a file that is not checked; ``mode``, such as ``ro``, is an SQLite URI's."""
     db = sqlite3.connect(
         f"file:{quote(str(path.absolute()))}?mode={mode}",
         uri=True,
-        timeout=0.5,  # seconds to wait for a lock of another process
+        timeout=0.5,  # seconds to wait for a lock of a different process
         isolation_level=None,  # transactions begin where this module begins them
-        # the node's executor may call from another thread than the one that opened it, never from two at once
+        # the node's executor may call from a different thread than the one that opened it, never from two at
+        # once
         check_same_thread=False,
     )
     db.execute("PRAGMA synchronous = EXTRA")  # a transaction survives a power cut once it has ended
@@ -189,7 +190,7 @@ def _expected_tables() -> tuple[tuple[str, str], ...]:
 
 
 def _check_binding(db: sqlite3.Connection, path: Path, binding: Binding) -> None:
-    """Refuse the ledger of another leg, or of other parameters of this one."""
+    """Refuse the ledger of a different leg, or with other parameters of this leg."""
     found = dict(db.execute("SELECT key, value FROM binding"))
     for key, ours in binding.as_texts().items():
         if found.get(key) != ours:

@@ -49,7 +49,7 @@ from leg_wear_monitor.state import Verdict
 
 @attrs.frozen(kw_only=True, eq=False)
 class LedgerContent:
-    """What a ledger has of its leg.
+    """Content of a ledger on its leg.
 
     Attributes
     ----------
@@ -114,8 +114,8 @@ class Ledger:
     measurements : tuple of Measurement
         Manually measured clearances of earlier runs, including withdrawn ones.
     corrections : tuple of CorrectedClearance and CoefficientSpan
-        Counted clearances that were corrected by the drive torque in earlier runs; with `open_ledger`, also
-        wear that was counted with other wear coefficients than those of the leg now.
+        Modelled clearances that the drive torque corrected in earlier runs; with `open_ledger`, also wear
+        that was modelled with wear coefficients other than the leg's now.
     states : tuple of JointWear
         Parts as they were before each change of their wear in earlier runs, then as in `entry`.
     audits : tuple of Audit
@@ -135,7 +135,8 @@ class Ledger:
     last_run : Run
         The previous run.
     epoch, boot_id : int, str
-        Of this run's clock and computer, stored with each entry; until set, those of the previous run.
+        Epoch of this run's clock and boot id of its computer, stored with each entry; until set, the previous
+        run's.
     cut_off_s : float or None
         If a run was interrupted and that is not acknowledged: the longest time of walking whose wear was
         lost.
@@ -304,7 +305,8 @@ def read_ledger(path: Path, binding: Binding) -> LedgerContent:
     Raises
     ------
     LedgerError
-        If it cannot be read, is damaged or of another leg; also if the monitor wrote while it was copied.
+        If it cannot be read, is damaged or belongs to a different leg; also if the monitor wrote while it was
+        copied.
     """
     with copy_of(path) as copy:
         if not copy.is_file():

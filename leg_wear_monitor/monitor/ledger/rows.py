@@ -221,9 +221,9 @@ def _checksum(db: sqlite3.Connection, stamp_ns: int, run: int) -> int:
 def write_event(db: sqlite3.Connection, event: Event) -> None:
     """Append an event; to be called within a transaction.
 
-    A measurement that has a row is a withdrawn one: its row says so from then on. A reset, and its undoing,
-    delete the signatures of the drive torque: they are of different clearances. The stamps cannot order them:
-    those of recordings are of a different clock than the operator's.
+    A measurement that already has a row is a withdrawn one: its row says so from then on. A reset, and its
+    undoing, delete the signatures of the drive torque, because they belong to different clearances. The
+    stamps cannot order them: stamps of recordings come from a different clock than the operator's.
     """
     match event:
         case Measurement(id=row) if row:
@@ -240,9 +240,9 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
 
 
 def _beside(stored: Iterable[SimulatedReference], new: SimulatedReference) -> list[SimulatedReference]:
-    """References that stay beside a new one.
+    """References that stay together with a new one.
 
-    A whole reference replaces the one of its cadence. One that is not whole stays until the next one.
+    A whole reference replaces the reference of its cadence. An unfinished reference stays until the next one.
     """
     whole = [one for one in stored if one.reference.is_whole]
     if not new.reference.is_whole:

@@ -1,1 +1,1 @@
-"""Verdict: the state of the leg in one word, its reason, and what a person does next."""
+"""Verdict: the state of the leg in one word, its reason, and the next action."""

@@ -166,7 +166,7 @@ def evidence_of(one: NamedCause) -> Evidence:
 
 
 def explanation(explained: TorqueExplanation, found: Diagnosis | None = None) -> str:
-    """Alternatives that explain a torque mismatch, with their values and the unexplained rest."""
+    """Alternatives that explain a torque residual, with their values and the unexplained rest."""
     rest = estimate(explained.after, explained.after_sigma, "")
     left = f"{rest} of the predicted RMS remains unexplained: the mechanism or a clearance may have changed"
     if not explained.alternatives:

@@ -149,7 +149,7 @@ def hit_of(alarm: Alarm, situation: Situation) -> Hit:
 
 # Conditions on causes of a deviating drive torque: one code per cause.
 #
-# A torque mismatch is explained while its alarm is raised, further alarms of the torque are limits of single
+# A torque residual is explained while its alarm is raised, further alarms of the torque are limits of single
 # causes, and the diagnosis shows changes since the leg was commissioned.
 
 
@@ -161,7 +161,7 @@ def has_cause(code: str) -> Condition:
 
 
 def _explained(code: str, situation: Situation) -> list[Hit]:
-    """A torque mismatch that is explained, where the first of its causes has this code."""
+    """An explained torque residual whose first cause has this code."""
     explained = situation.explained
     if explained is None or not explained.named or explained.named[0].cause.fault_code != code:
         return []
@@ -263,7 +263,7 @@ def doubt(situation: Situation) -> str:
 # Conditions on clearances: best estimates of the forecast, and estimates by sensors.
 
 
-CONFIRMED_CYCLES = 20  # gait cycles of a new part; another leg is found in fewer
+CONFIRMED_CYCLES = 20  # gait cycles of a new part; a different leg is found in fewer
 
 
 def believed_at_limit(situation: Situation) -> Sequence[Hit]:
@@ -286,8 +286,8 @@ def believed_at_limit(situation: Situation) -> Sequence[Hit]:
 def counted_at_limit(situation: Situation) -> Sequence[Hit]:
     """Alarms of modelled or measured clearances at their limit.
 
-    The forecast is valid only if it has the joint at its limit as well: not beside a measurement that it does
-    not use, or believes in part only, nor beside an alarm that is only latched.
+    The forecast is valid only if it has the joint at its limit as well: not with a measurement that it does
+    not use, or uses only in part, and not with an alarm that is only latched.
     """
     alarms = (alarm for alarm in situation.alarms if alarm.kind == "clearance" and alarm.cause not in SEEN)
     hits = [hit_of(alarm, situation) for alarm in alarms if alarm.level is Level.ERROR]
@@ -370,7 +370,7 @@ def diagnosed(situation: Situation) -> Sequence[Hit]:
 
 
 def corrected(situation: Situation) -> Sequence[Hit]:
-    """Changes by which modelled clearances were corrected."""
+    """Changes that corrected modelled clearances."""
     found = (change for change in situation.diagnosis.changes if change.is_corrected)
     return [_clearance_hit(change, situation) for change in found]
 
@@ -435,7 +435,7 @@ def no_torque(situation: Situation) -> Sequence[Hit]:
 
 
 def not_compared(situation: Situation) -> Sequence[Hit]:
-    """There is a drive torque, but not yet enough of it to be compared, or to raise the mismatch."""
+    """There is a drive torque, but not yet enough of it to be compared, or to raise its alarm."""
     if not situation.has_torque or not situation.has_cycle:
         return []
     for alarm in situation.alarms:
@@ -448,9 +448,9 @@ def not_compared(situation: Situation) -> Sequence[Hit]:
 def not_observed(situation: Situation) -> Sequence[Hit]:
     """Neither the diagnosis nor an encoder shows some joints, or not yet.
 
-    The mismatch of the torque shows broken hip and knee joints, but not those of the foot
-    (monitor.md), so a leg without a mismatch is not known to be healthy. If the user switched the
-    diagnosis off, this does not hold.
+    The torque residual shows broken hip and knee joints, but not broken foot joints (monitor.md), so a leg
+    without a torque residual is not known to be healthy. If the user switched the diagnosis off, this does
+    not hold.
     """
     found = situation.diagnosis
     blind = [each.joint for each in situation.joints if not each.seen]

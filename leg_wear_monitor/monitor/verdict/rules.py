@@ -116,7 +116,7 @@ _FOOT_LOAD = {
 
 
 def _input(kind: int, state: State, not_valid: tuple[Figure, ...] = ()) -> tuple[Rule, ...]:
-    """Rules of the faults of a stream: they come before what this stream shows of the leg."""
+    """Rules of the faults of a stream: they come before the rules on the leg from this stream."""
     return tuple(
         Rule(
             code=one.code,
@@ -360,6 +360,6 @@ RULES = (
 
 
 def findings(situation: Situation) -> tuple[Verdict, ...]:
-    """Verdicts of all rules that hold, in the order of the table; that of a healthy leg only alone."""
+    """Verdicts of all rules that hold, in the order of the table; a healthy leg's verdict only alone."""
     found = tuple(each for rule in RULES if (each := rule.found(situation)) is not None)
     return tuple(each for each in found if each.fault_code != NONE) or found

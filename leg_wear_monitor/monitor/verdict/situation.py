@@ -1,4 +1,4 @@
-"""What rules judge: the situation of leg and joints, and the believed clearance."""
+"""Input of the rules: the situation of leg and joints, and the best estimate of the clearance."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,7 +17,7 @@ from leg_wear_monitor.state import JointClearance, Level, State, Verdict
 
 
 ACTS = "FOOT_LOAD"
-"""Key of the note on what acts as a foot load."""
+"""Key of the note on the acting foot load."""
 
 
 @attrs.frozen
@@ -27,8 +27,8 @@ class KnownClearance:
     Attributes
     ----------
     by : str
-        ``encoders``, ``torque``, ``measured`` for what a person measured, ``counted``, or ``both`` for what
-        counting and measurements give together.
+        ``encoders``, ``torque``, ``measured`` for a measurement by an operator, ``counted``, or ``both`` for
+        model and measurements together.
     clearance_m, sigma_m : float
         Mean radial clearance and its standard deviation; NaN if that is not known.
     least_m : float
@@ -60,13 +60,13 @@ class JointSituation:
     ----------
     joint : str
     label : str
-        What operators call the joint, such as ``knee``; empty if it has no label.
+        Operators' name of the joint, such as ``knee``; empty if it has no label.
     modelled_m, limit_m : float
         Counted mean radial clearance, and its limit.
     best_estimate_m : float
-        Median of what the forecast believes of the clearance; NaN before the first forecast.
+        Median of the clearance in the forecast; NaN before the first forecast.
     measured : KnownClearance or None
-        What a person measured last on the present part.
+        Last measurement on the present part.
     seen : tuple of KnownClearance
         Estimates from measurements, as far as there are any.
     change : (float, float) or None
@@ -74,7 +74,7 @@ class JointSituation:
     sigma_m : float
         Standard deviation of the modelled clearance; NaN where the torque is not compared.
     is_used : bool
-        Whether the forecast rests on what encoders show of this joint.
+        Whether the forecast uses the encoders' estimate of this joint.
     is_measurement_used : bool
         Whether it rests on `measured`; not on one that contradicts the model.
     replaced_ns, part_cycles : int
@@ -116,7 +116,7 @@ class Situation:
     torque_causes : mapping of str to NamedCause
         Causes of an impossible bias, drift or lag of the torque, by the alarm.
     notes : mapping of str to sequence of str
-        What observers report for a rule, a sentence each, by the rule's code.
+        Notes of observers for a rule, a sentence each, by the rule's code.
     input_causes : tuple of str
         Sentences on unused samples.
     input_faults : tuple of InputFault
@@ -124,9 +124,9 @@ class Situation:
     trusted_before_ns : mapping of int to int
         By the kinds of the streams with a fault: from this stamp on, they say nothing of the leg.
     diagnosis : Diagnosis
-        What the drive torque shows.
+        Results from the drive torque.
     explained : TorqueExplanation or None
-        What explains a torque mismatch; None without one, and in its first gait cycles.
+        Explanation of a torque residual; None without one, and in its first gait cycles.
     """
 
     joints: tuple[JointSituation, ...] = ()
@@ -199,7 +199,7 @@ def believed_words(one: JointClearance) -> str:
 
 
 def judged(joint: JointSituation) -> KnownClearance:
-    """The modelled clearance, or a larger one by measurement: what somebody found on the leg counts."""
+    """The modelled clearance, or a larger one by measurement: a finding on the leg counts."""
     found = [KnownClearance(COUNTED, joint.modelled_m, math.nan)]
     if joint.measured is not None:
         found.append(joint.measured)
@@ -225,10 +225,10 @@ def is_surely_below(limit_m: float, clearance_m: float, sigma_m: float) -> bool:
 
 
 def is_overruled(joint: JointSituation, alarm: Alarm | None) -> bool:
-    """Whether a measurement contradicts the estimate that an alarm of the clearance rests on.
+    """Whether a measurement contradicts the estimate behind an alarm of the clearance.
 
-    The modelled clearance is below the limit, too: a measurement does not end what counting says.
-    It was acknowledged with the measurement, and rises again, not acknowledged, if the estimate returns
+    The modelled clearance is below the limit as well: a measurement does not end an alarm of the model. The
+    alarm was acknowledged with the measurement, and rises again, not acknowledged, if the estimate returns
     below the limit and then passes it again.
     """
     if alarm is None or joint.measured is None or not alarm.acknowledged or alarm.cause not in SEEN:
@@ -240,7 +240,7 @@ def is_overruled(joint: JointSituation, alarm: Alarm | None) -> bool:
 
 
 def at_limit_by_estimate(joint: JointSituation, alarm: Alarm | None) -> KnownClearance | None:
-    """What encoders or the drive torque surely show at the limit, now or as the latched alarm keeps it."""
+    """Clearance surely at the limit by encoders or the drive torque, now or as the latched alarm keeps it."""
     if is_overruled(joint, alarm):
         return None
     now = surely_at(joint.limit_m, joint.seen)
@@ -256,7 +256,7 @@ def believed(joint: JointSituation, alarm: Alarm | None, is_counted_leg: bool) -
     ----------
     joint : JointSituation
     alarm : Alarm or None
-        That of the joint's clearance.
+        Alarm of the joint's clearance.
     is_counted_leg : bool
         Whether the verdict does not list the modelled clearances as not valid.
     """
@@ -269,7 +269,7 @@ def believed(joint: JointSituation, alarm: Alarm | None, is_counted_leg: bool) -
 
 
 def joint_status(joint: str, is_known: bool, findings: Sequence[Verdict]) -> State:
-    """What findings say of a joint: the worst that names it, or whether anything valid is known of it."""
+    """State of a joint by findings: the worst that names it, or whether anything valid is known of it."""
     found = [finding.state for finding in findings if joint in finding.joints]
     is_blind = any(finding.state is State.NOT_MONITORED for finding in findings)
     found.append(State.HEALTHY if is_known and not is_blind else State.NOT_MONITORED)
@@ -298,5 +298,5 @@ def _takes_back(shown: KnownClearance, limit_m: float) -> bool:
 
 
 def is_observed(alarm: Alarm, by: Sequence[str] = (MEASURED, BOTH, *SEEN)) -> bool:
-    """Whether an alarm of the clearance is present because of what some sources say, not counting alone."""
+    """Whether an alarm of the clearance is present because of some sources, not the model alone."""
     return alarm.present is not Level.OK and alarm.cause in by

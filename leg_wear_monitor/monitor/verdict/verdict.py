@@ -1,4 +1,4 @@
-"""The verdict: state, joints, reason, what to do."""
+"""The verdict: state, joints, reason, action."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -22,12 +22,12 @@ def level_of(verdict: Verdict) -> Level:
 
 
 def code_of_rule(verdict: Verdict) -> str:
-    """The verdict's code without its joints: that of the rule, such as ``CLEARANCE_DETECTED``."""
+    """The verdict's code without its joints: the rule's code, such as ``CLEARANCE_DETECTED``."""
     return verdict.fault_code.removesuffix("".join(f"_{joint}" for joint in verdict.joints))
 
 
 def guide_to(verdict: Verdict) -> str:
-    """Page that says what to do about a verdict's reason, as a path below the share directory."""
+    """Page with the remedy for a verdict's reason, as a path below the share directory."""
     return guide_of(code_of_rule(verdict))
 
 
@@ -49,7 +49,7 @@ def verdict_of(findings: Sequence[Verdict]) -> Verdict:
 
 
 def dated(findings: Iterable[Verdict], before: Iterable[Verdict], stamp_ns: int) -> tuple[Verdict, ...]:
-    """Findings with the stamp since which each holds: its own, that of the same one before, or this one."""
+    """Findings with the stamp since which each holds: its own, the same earlier one's, or the given stamp."""
     known = {each.fault_code: each.since_ns for each in before}
     return tuple(
         attrs.evolve(each, since_ns=each.since_ns or known.get(each.fault_code) or stamp_ns)

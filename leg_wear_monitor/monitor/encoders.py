@@ -241,7 +241,7 @@ def faults(names: Sequence[str], state: EncoderState) -> list[str]:
 #
 # Everything is computed at the end of an evaluation period; periods depend on the order of arrival only, so a
 # replay gives the same results. A period evaluates the gait cycles that ended in it. The cycles are compared
-# with a reference, a simulation of the leg as counted.
+# with a reference, a simulation of the leg as modelled.
 
 
 _CHANGE_CYCLES = 20  # cycles in a row with other encoders until the change counts as permanent
@@ -330,9 +330,9 @@ class EncoderObserver(KeepsSamples):
         Parameters
         ----------
         clearance_m : (k,) array
-            Counted mean clearances.
+            Modelled mean clearances.
         depth : (k, 2, N) array
-            Counted wear [m].
+            Modelled wear [m].
 
         Returns
         -------
@@ -467,7 +467,7 @@ class EncoderObserver(KeepsSamples):
         return bool((departure_m[found.sigma_m <= ESTIMATED_M] > _CLEARANCE_DEPARTURE_M).any())
 
     def _reference_clearances(self, modelled_m: Floats) -> Floats:
-        """Clearances for a new reference: estimated where observable, counted elsewhere."""
+        """Clearances for a new reference: estimated if observable, else modelled."""
         found = self.state.found
         if found is None:
             return modelled_m

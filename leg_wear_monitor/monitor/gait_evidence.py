@@ -17,7 +17,7 @@ from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin.sample import FAULTS, NO_FAULT, Samples
 from leg_wear_monitor.twin.statistics import LONGEST, CycleStatistics, NotCompared
 
-# Evidence that the followed motion is a gait of this leg; without one such cycle, forces are meaningless.
+# Evidence that the tracked motion is a gait of this leg; without one such cycle, forces are meaningless.
 
 
 _SLOWEST, _FASTEST = 0.5, 2.0  # cadence over the commanded one

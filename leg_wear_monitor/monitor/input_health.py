@@ -82,7 +82,7 @@ class InputHealth:
         Fraction of the samples that were not used: faulty, repeated, late, with a stray stamp, or outliers.
         Messages of other joints do not count while the crank's come.
     lost_fraction : float
-        Fraction of the time in which the leg was not followed.
+        Fraction of the time in which the leg was not tracked.
     stuck_torque_fraction : float
         Fraction of the torque samples that are saturated or repeat the largest or the smallest one; 1 if all
         are equal. Unknown where the leg stood in this time: a torque at rest does not change.
@@ -230,7 +230,7 @@ class Pauses:
     last_s : float
         Length of the last pause.
     unmonitored_s : float
-        The twin's unmonitored time when the last pause began; it includes the pause once the leg is followed
+        The twin's unmonitored time when the last pause began; it includes the pause once the leg is tracked
         again.
     """
 

@@ -84,7 +84,7 @@ def begin(state, k, stamp, angle):
 #
 # *Series*: each sample belongs to the series whose motion it continues best. Where two series go on side by
 # side and neither continues the other, two sources send one crank's angle. *Unit*: the angle as it was sent,
-# not wrapped to a turn, runs beyond the largest speed that is believed, evenly and for some time.
+# not wrapped to a turn, runs beyond the largest accepted speed, evenly and for some time.
 
 
 SETTINGS = np.dtype(

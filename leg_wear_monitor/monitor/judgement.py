@@ -1,4 +1,4 @@
-"""The verdict of a monitor and the state of its leg, by the leg as it is counted and observed."""
+"""The verdict of a monitor and the state of its leg, from the wear model of this leg and its observers."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -190,7 +190,7 @@ def _doubts(leg: MonitoredLeg) -> tuple[str, ...]:
 
 
 def _unfollowed(leg: MonitoredLeg) -> str:
-    """Why the crank is not followed; a loss shorter than a commanded gait cycle is reported by its alarm."""
+    """Why the crank is not tracked; a loss shorter than a commanded gait cycle is reported by its alarm."""
     if leg.guard.cause:
         return leg.guard.cause
     out_s, cycle_s = leg.twin.intake.out_s, 60.0 / abs(leg.config.cadence.commanded_rpm)

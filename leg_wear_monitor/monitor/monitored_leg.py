@@ -1,4 +1,4 @@
-"""The leg that a monitor watches: as it is counted, with all that looks at it."""
+"""The leg that a monitor watches: its wear model, with all observers."""
 
 from leg_wear_monitor.estimate.torque_model import torque_model
 from leg_wear_monitor.mechanism.spec import Mechanism
@@ -23,7 +23,7 @@ from leg_wear_monitor.twin.statistics import Event
 
 
 class MonitoredLeg(CountedLeg):
-    """The counted leg with all that looks at it.
+    """The wear model of this leg with all observers.
 
     Parameters
     ----------

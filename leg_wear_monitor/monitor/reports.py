@@ -17,7 +17,7 @@ from leg_wear_monitor.state import LegState, Level, Verdict
 from leg_wear_monitor.twin.statistics import SampleStatistics
 
 SampleReports = SampleStatistics
-"""The leg at each processed sample; NaN while it is not followed."""
+"""The leg at each processed sample; NaN while it is not tracked."""
 
 
 @attrs.frozen(kw_only=True)
@@ -42,7 +42,7 @@ class JointReport:
     seen : ClearanceEstimate or None
         The clearance estimated from further encoders; None without encoders.
     measured : Measurement or None
-        The last clearance of this part that somebody measured.
+        The last measured clearance of this part.
     load : BushingLoad or None
         Pressure and sliding speed in this cycle, against the limits of the joint's material.
     estimated_m, estimated_sigma_m : float or None
@@ -80,7 +80,7 @@ class CycleReport:
     Attributes
     ----------
     cycle : int
-        Counted over the whole life in the ledger.
+        Modelled over the whole life in the ledger.
     begin_ns, stamp_ns : int
         Its begin and end.
     cadence_rpm : float
@@ -199,7 +199,7 @@ class Lost:
     Attributes
     ----------
     unmonitored_s : float
-        Time during which the leg was not followed.
+        Time during which the leg was not tracked.
     already_counted : int
         Samples of a time whose wear is in the ledger from an earlier run.
     faulty : dict of str to int
@@ -219,7 +219,7 @@ class Lost:
     outliers : int
         Dropped samples with a value far off.
     gaps_bridged : int
-        Gaps over which the leg was followed.
+        Gaps over which the leg was tracked.
     gaps_lost : int
         Gaps over which it was not.
     backward_jumps : int

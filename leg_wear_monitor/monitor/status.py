@@ -81,7 +81,7 @@ def verdict_status(verdict: Verdict) -> Status:
 
 
 def _gait(leg: MonitoredLeg) -> Status:
-    """Whether the crank is followed, the cadence, and the totals of all walking."""
+    """Whether the crank is tracked, the cadence, and the totals of all walking."""
     tracking, event, last = leg.twin.tracking, leg.happened, leg.last
     cadence = leg.evaluation.board.alarms[alarm_specs.CADENCE.name()]
     message, level, code = tracking.name.lower().replace("_", " "), cadence.level, code_of(cadence)
@@ -143,7 +143,7 @@ def _health_values(health: InputHealth) -> dict[str, float]:
 
 
 def _joint(leg: MonitoredLeg, k: int, name: str) -> Status:
-    """Counted clearance, growth, forces and forecast of clearance joint k, with the level of its alarms."""
+    """Modelled clearance, growth, forces and forecast of clearance joint k, with the level of its alarms."""
     twin, evaluation, last = leg.twin, leg.evaluation, leg.last
     names = [spec.name(name) for spec in alarm_specs.JOINT]
     level, code = evaluation.board.level(*names), _code(evaluation, names)

@@ -1,4 +1,4 @@
-"""The drive torque in the monitor: compared with the predicted one, explained, and followed by the twin."""
+"""The drive torque in the monitor: compared with the prediction, explained, and applied to the twin."""
 
 import logging
 import math
@@ -64,7 +64,7 @@ class TorqueWatch(Observer):
     Attributes
     ----------
     observer : TorqueObserver or None
-        Estimates clearances; None where that is disabled.
+        Estimates clearances; None if the diagnosis is disabled.
     record : TorqueRecord
     mismatch : MismatchWindow
     unexplained : str

@@ -168,7 +168,7 @@ class WearMonitor:
         verdicts: list[VerdictReport] = []
         states: list[VerdictReport] = []
         for piece, ends_period in leg.evaluation_periods.pieces(samples):
-            # guard: only samples that are believed go on
+            # guard: only accepted samples go on
             believed = self._believed(piece, ends_period)
             # twin: motion, forces and wear of the leg; the observers get the same samples
             followed, ended = self._follow(believed)
@@ -191,7 +191,7 @@ class WearMonitor:
         return Reports(samples_, tuple(cycles), tuple(changes), self.lost, tuple(verdicts), tuple(states))
 
     def _believed(self, piece: Samples, ends_period: bool) -> Samples:
-        """Samples that are believed: not counted before, of one source, with a known zero of the crank."""
+        """Accepted samples: not counted before, of one source, with a known zero of the crank."""
         piece = self._leg.guard.checked(self._accounting.not_counted(piece))
         for observer in self._leg.observers:
             piece = observer.passed(piece, ends_period)
@@ -320,7 +320,7 @@ class WearMonitor:
 
     @property
     def clearances_m(self) -> tuple[float, ...]:
-        """Mean clearance of each clearance joint, as counted."""
+        """Modelled mean clearance of each clearance joint."""
         return tuple(self._twin.clearance_mean_m.tolist())
 
     @property

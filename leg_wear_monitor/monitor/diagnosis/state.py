@@ -112,8 +112,7 @@ class Diagnosis:
         a bridged gap, or too few torque samples; irregular stamps; a torque that is wrong as received; a
         crank that turns otherwise.
     clearance_m, sigma_m : tuple of float
-        Estimated clearance of each clearance joint and its standard deviation; NaN where it is not
-        observable.
+        Estimated clearance of each clearance joint and its standard deviation; NaN if it is not observable.
     least_m : tuple of float
         Clearance that each joint surely has: the least by `SURE_SIGMAS` in the last estimates, as many in a
         row as an alarm waits for; minus infinity before.

@@ -298,7 +298,7 @@ class JointForecast:
 
     @property
     def now_m(self) -> float:
-        """Median of the clearance now; NaN where it is not believed."""
+        """Median of the clearance now; NaN if there is no valid estimate."""
         return self.clearance_m.p50 if self.clearance_m else math.nan
 
 
@@ -361,7 +361,7 @@ class JointCondition:
         error of the model is not in it: it is the same in all cycles of a leg, and belongs to the factor of
         the wear coefficient, which a measured clearance corrects.
     has_coefficient : bool
-        Whether its wear coefficient is above 0; without one no wear is counted.
+        Whether its wear coefficient is above 0; without one no wear is modelled.
     """
 
     joint: str

@@ -252,7 +252,7 @@ class Forecaster:
         ----------
         statistics : CycleStatistics
         wear_m : (k,) array
-            Wear counted by the twin for each part [m].
+            Wear modelled by the twin for each part [m].
         limits_m : sequence of float
             Of the mean clearances.
         is_valid : callable

@@ -67,7 +67,7 @@ class MeasurementResult:
     contradicts : bool
         Whether the model holds it next to impossible.
     modelled_m : float
-        Clearance that the twin had counted for this part.
+        Clearance that the twin had modelled for this part.
     words : tuple of str
         For people, a line each.
     shown_m, shown_sigma_m, shown_by : float, float, str

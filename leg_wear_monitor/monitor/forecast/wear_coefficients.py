@@ -1,8 +1,8 @@
 """Estimate of a joint's wear coefficient, and its Bayes update with measured clearances.
 
 The clearance is c = c_0 + d + x w: c_0 the nominal one when new, d the deviation of the part, w the wear that
-the twin has counted with the nominal coefficient, x the joint's factor on it. The priors are lognormal for
-x and normal for d; measured clearances have normal errors. d is eliminated in closed form, x is on a grid
+the twin has modelled with the nominal coefficient, x the joint's factor on it. The priors are lognormal for x
+and normal for d; measured clearances have normal errors. d is eliminated in closed form, x is on a grid
 around the estimate: an accepted measurement moves it as far as the data require.
 
 If the drive torque corrected the modelled clearance, c_0, d and w start again from the corrected clearance,
@@ -10,7 +10,7 @@ its error and the wear since; x remains.
 
 If the nominal coefficient was different, w is the wear that the present coefficient would have given, so the
 estimate of x times the coefficient stays, whatever is configured. That holds as soon as something was
-learned; until then wear is taken as it was counted.
+learned; until then the wear is taken as modelled.
 """
 
 import math
@@ -115,7 +115,7 @@ def usual_prior(settings: Forecasting, clearance: Clearance | None = None) -> Co
 
 @attrs.frozen
 class ClearanceAtWear:
-    """A clearance that is known at some counted wear: of a new part, corrected, or measured.
+    """A clearance that is known at some modelled wear: of a new part, corrected, or measured.
 
     Attributes
     ----------
@@ -188,7 +188,7 @@ class CoefficientEstimate:
     prior : CoefficientPrior
         Prior before the measurements.
     known : ClearanceAtWear
-        The one from which on wear is counted now; d is the deviation from it.
+        The clearance from which on wear is modelled now; d is the deviation from it.
     """
 
     log_factor: Floats
@@ -284,7 +284,7 @@ def measured_factor(
 ) -> tuple[float, float]:
     """Mean and precision of the factor from the measurements alone; 0 if they have no information.
 
-    The likelihood is normal in the factor, not in its logarithm. The clearance from which on wear is counted
+    The likelihood is normal in the factor, not in its logarithm. The clearance from which on wear is modelled
     is eliminated: it correlates the errors of the measurements after it.
     """
     spans = [_factor_since(*span) for span in _spans(settings, fresh_m, observations, corrections)]
@@ -313,7 +313,7 @@ def _spans(
 
 
 def _recounted(one: ClearanceAtWear, counted: Sequence[CoefficientSpan]) -> ClearanceAtWear:
-    """A clearance at the wear that ends with the present one, had all been counted with its coefficient."""
+    """A clearance at the wear that ends with the present one, had all been modelled with its coefficient."""
 
     def moved(wear_m: float) -> float:
         steps = ((1.0 - each.factor) * max(0.0, each.to_m - max(wear_m, each.from_m)) for each in counted)

@@ -1,1 +1,1 @@
-"""Counted wear on disk: entries, log, checksums, recovery."""
+"""Modelled wear on disk: entries, log, checksums, recovery."""

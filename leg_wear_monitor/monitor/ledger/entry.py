@@ -198,7 +198,8 @@ class JointWear:
     replaced_ns : int
         When the part was replaced, 0 if it never was.
     wear_coefficient_per_pa : float
-        Of bushing and journal together, with which the last of it was counted; 0 if it is not known.
+        Wear coefficient of bushing and journal together that gave the last of this wear; 0 if it is not
+        known.
     """
 
     name: str
@@ -417,13 +418,13 @@ class CoefficientSpan:
 
 
 Recount = CorrectedClearance | CoefficientSpan
-"""Counted wear of a part that a forecast takes otherwise than as worn with the present coefficient."""
+"""Modelled wear of a part that a forecast takes otherwise than as worn with the present coefficient."""
 
 
 def coefficient_spans(
     states: Iterable[JointWear], now_per_pa: Mapping[str, float]
 ) -> tuple[CoefficientSpan, ...]:
-    """Wear that was counted with other coefficients than the present ones; none where one is not known.
+    """Wear that was modelled with other coefficients than the present ones; none if one is not known.
 
     Parameters
     ----------

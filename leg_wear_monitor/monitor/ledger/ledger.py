@@ -1,4 +1,4 @@
-"""The ledger keeps the counted wear in an SQLite file that survives kills, full disks and a wrong leg.
+"""The ledger stores the modelled wear in an SQLite file that survives kills, full disks and a wrong leg.
 
 An entry is on the disk when `keep` returns. If a write fails, `Ledger.fault` gives the reason, the monitor
 continues, and the next entry includes all events since the last successful one. If the process is killed,

@@ -27,8 +27,8 @@ class KnownClearance:
     Attributes
     ----------
     by : str
-        ``encoders``, ``torque``, ``measured`` for a measurement by an operator, ``counted``, or ``both`` for
-        model and measurements together.
+        ``encoders``, ``torque``, ``measured`` for a measurement by an operator, ``modelled``, or
+        ``wear_and_measurement`` for model and measurements together.
     clearance_m, sigma_m : float
         Mean radial clearance and its standard deviation; NaN if that is not known.
     least_m : float
@@ -62,7 +62,7 @@ class JointSituation:
     label : str
         Operators' name of the joint, such as ``knee``; empty if it has no label.
     modelled_m, limit_m : float
-        Counted mean radial clearance, and its limit.
+        Modelled mean radial clearance, and its limit.
     best_estimate_m : float
         Median of the clearance in the forecast; NaN before the first forecast.
     measured : KnownClearance or None
@@ -72,7 +72,7 @@ class JointSituation:
     change : (float, float) or None
         Change since the baseline by the drive torque [m], and its standard deviation.
     sigma_m : float
-        Standard deviation of the modelled clearance; NaN where the torque is not compared.
+        Standard deviation of the modelled clearance; NaN if the torque is not compared.
     is_used : bool
         Whether the forecast uses the encoders' estimate of this joint.
     is_measurement_used : bool
@@ -176,7 +176,7 @@ class Situation:
         )
 
 
-# Which clearance of a joint is believed, and by whom: all views and the clearance alarm draw from here.
+# The best estimate of a joint's clearance and its source, for all views and the clearance alarm.
 
 
 COUNTED, MEASURED, BOTH = "modelled", "measured", "wear_and_measurement"
@@ -191,7 +191,7 @@ SOURCES = {
 
 
 def believed_words(one: JointClearance) -> str:
-    """The believed clearance, such as ``1.66 mm ± 0.4 mm according to the drive torque``; empty if none."""
+    """The best estimate, such as ``1.66 mm ± 0.4 mm according to the drive torque``; empty if none."""
     if one.best_estimate_m is None or one.best_estimate_source is None:
         return ""
     known = KnownClearance(one.best_estimate_source, one.best_estimate_m, or_nan(one.best_estimate_sigma_m))

@@ -159,7 +159,7 @@ INTERRUPTED = 130
 _SWALLOWING = {"importlib", "_frozen_importlib", "_frozen_importlib_external", "llvmlite", "numba"}
 
 _closers: list[Callable[[], None]] = []
-"""Functions that close what is open now, the newest last; see `closed_on_interrupt`."""
+"""Functions that close the things open now, the newest last; see `closed_on_interrupt`."""
 
 
 def would_be_lost(frame: FrameType | None) -> bool:

@@ -14,7 +14,7 @@ from leg_wear_monitor.configuration import part_document
 from leg_wear_monitor.files import finite_or_none, json_text
 
 SCHEMA_VERSION = 4
-"""Of the JSON; counts up when a field is renamed, removed or means something else."""
+"""Version of the JSON; counts up when a field is renamed, removed or means something else."""
 
 
 class Level(IntEnum):

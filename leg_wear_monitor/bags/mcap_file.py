@@ -31,7 +31,7 @@ _UNREADABLE = (
     McapError, zstandard.ZstdError, struct.error, ValueError, KeyError, OverflowError, MemoryError,
     RuntimeError, EOFError,
 )  # fmt: skip
-"""What the libraries raise over damaged bytes."""
+"""Errors that the libraries raise over damaged bytes."""
 
 _RECORD = struct.Struct("<BQ")
 _HEAD = np.dtype(

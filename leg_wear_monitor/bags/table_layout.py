@@ -25,7 +25,7 @@ REMEDIES = dict.fromkeys((".txt", ".tsv", ".dat", ".log"), _RENAME)
 REMEDIES |= dict.fromkeys((".xlsx", ".xls", ".ods"), _EXPORT)
 REMEDIES |= dict.fromkeys((".zstd", ".zst"), "compressed as a whole. Run: zstd -d {path} -o {path.stem}")
 REMEDIES[".bag"] = "a ROS 1 bag. Convert it: rosbags-convert --src {path} --dst {path.stem}"
-"""What to do with a file that is not read, by the end of its name."""
+"""Remedy for a file that is not read, by the end of its name."""
 STAMP, CRANK_ANGLE, CRANK_SPEED, DRIVE_TORQUE = "stamp", "crank_angle", "crank_speed", "drive_torque"
 FOOT_LOAD, FOOT_LOAD_ALONG = "foot_load", "foot_load_along"
 _MAY_BE_NONE = (CRANK_SPEED, DRIVE_TORQUE, FOOT_LOAD, FOOT_LOAD_ALONG)

@@ -277,7 +277,7 @@ WINKLER = Form(
 
 # The normal contact laws by name, and kernels that select a joint's law (physics.md section 4).
 #
-# To add a law of another form, add its `Form` above, an entry to `LAWS`, and its name to
+# To add a law of a different form, add its `Form` above, an entry to `LAWS`, and its name to
 # `NORMAL_LAWS` of `mechanism`, where mechanism files and the command line check it without importing numba.
 
 

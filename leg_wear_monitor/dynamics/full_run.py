@@ -312,7 +312,7 @@ class FullRun:
         Raises
         ------
         SimulationError
-            If the motion diverges; names the joint, the time and what to try.
+            If the motion diverges; names the joint, the time and a remedy.
         """
         status, k = advance_full(
             self.model,

@@ -327,7 +327,7 @@ def simulate(
     AssemblyError
         If the linkage does not close or has a dead point.
     SimulationError
-        If the motion diverges; names joint, time and what to try.
+        If the motion diverges; names joint, time and a remedy.
 
     Examples
     --------

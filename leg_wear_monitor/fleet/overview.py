@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SCHEMA_VERSION = 2
-"""Of the JSON; counts up when a field is renamed, removed or means something else."""
+"""Version of the JSON; counts up when a field is renamed, removed or means something else."""
 
 FILE, TABLE = "fleet.json", "fleet.csv"
 UNKNOWN = "unknown"
-"""State of a leg without a counted recording."""
+"""State of a leg without a recording in its ledger."""
 
 
 def leg_directory(out: Path, leg: str) -> Path:

@@ -27,7 +27,7 @@ class Outcome(Enum):
     ALREADY_COUNTED = "already_counted"
     """The ledger had the wear of all its time from other recordings."""
     NO_GAIT = "no_gait"
-    """No gait cycle in it fits the leg; nothing is counted."""
+    """No gait cycle in it fits the leg; no wear is modelled."""
     UNREADABLE = "unreadable"
 
 

@@ -116,7 +116,7 @@ class Duty:
 
 
 SCHEMA_VERSION = 1
-"""Of the JSON; counts up when a field is renamed, removed or means something else."""
+"""Version of the JSON; counts up when a field is renamed, removed or means something else."""
 
 _OF_JOINTS = ("clearance_m", "clearance_max_m", "worst_sector_deg", "peak_force_n", "growth_m_per_cycle")
 

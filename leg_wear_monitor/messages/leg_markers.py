@@ -20,7 +20,7 @@ from leg_wear_monitor.state import Level
 
 MARKERS = Output("~/markers", encode.MARKER_ARRAY)
 LINKAGE = Output("~/linkage_states", encode.JOINT_STATE)
-"""Joint positions of its robot description (`leg-wear-monitor draw --urdf`): those of the ideal leg."""
+"""Joint positions of its robot description (`leg-wear-monitor draw --urdf`), for the ideal leg."""
 
 SILENT_NS = 1_000_000_000  # samples apart by more: there was no current data
 _PERIOD_NS = 100_000_000

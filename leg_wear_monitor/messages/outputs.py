@@ -92,7 +92,7 @@ VERDICT = Output("~/verdict", encode.DIAGNOSTIC_ARRAY, LATCHED)
 STATE = Output("~/state", encode.STRING, LATCHED)
 DIAGNOSTICS = Output("/diagnostics", encode.DIAGNOSTIC_ARRAY)
 OUTPUTS = (CLEARANCES, IMPACTS, TORQUE, FORECAST, ALARMS, VERDICT, STATE, DIAGNOSTICS, MARKERS, LINKAGE)
-"""Those of every monitor; `Messages.outputs` has all."""
+"""Outputs of every monitor; `Messages.outputs` has all."""
 
 _AXES = {"x": 0, "y": 1, "z": 2}
 _DIGITS = 15

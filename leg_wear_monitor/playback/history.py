@@ -31,7 +31,7 @@ JOINT_COLUMNS = (
     "impacts",
 )
 SEEN_COLUMNS = ("estimated_m", "estimated_sigma_m")
-"""What encoders or the drive torque show best of a joint."""
+"""More certain of the two estimates of a joint's clearance: from encoders or from the drive torque."""
 
 _OF_A_JOINT = (*JOINT_COLUMNS, *SEEN_COLUMNS)
 

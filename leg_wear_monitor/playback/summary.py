@@ -65,7 +65,7 @@ def leg_forecast(forecast: LegForecast | None, verdict: Verdict) -> LegForecast 
 
 
 POINTS = 1000
-"""Points that a history is thinned to; peaks of forces are kept, and the range of what has no peaks."""
+"""Points of a thinned history; it keeps peaks of forces, and the range of quantities without peaks."""
 
 _RANGED = (
     "cadence_rpm",

@@ -362,7 +362,7 @@ class ClearanceRun:
         Raises
         ------
         SimulationError
-            If the motion diverges; names the joint, the time and what to try.
+            If the motion diverges; names the joint, the time and a remedy.
         """
         status, k = self.stepper.advance(self._polynomial, t_end, statistics)
         if status != DONE:

@@ -425,7 +425,7 @@ _STRANGE = 3.0  # energy that neither kind adds up to
 _LEAST = 1.0e-4  # smaller energies are rounding
 _NOISE_ERROR = 0.25  # relative error of the noise's variance
 _HIDDEN = 0.5  # fraction of sensor noise in the residual's energy from which nothing is decided
-_LARGE = 0.3  # of the torque: impacts have 0.5 to 2; smaller errors do not drown slow ones of 0.02
+_LARGE = 0.3  # fraction of the torque: impacts have 0.5 to 2; smaller ones do not drown slow errors of 0.02
 _NARROWER, _FLAT = 3.0, 0.5  # independent errors add up as much in narrow windows, slow ones less
 _ROUGH = 0.5  # energy of neighbours' steps over the energy of independent steps; 0.8 to 1.4 for impacts
 

@@ -37,7 +37,7 @@ _LEFT = 0.5
 _LATE_SIGMA_S = 0.0015  # about the step between the channels that are tried
 _NOISE_SIGMA = 0.08  # relative error of the noise: half of the step between the tried values
 _QUIETEST = 0.01  # fraction of the square of the roughness
-_QUIETER = 0.25  # of a decreased noise: an opening may hide the rest of the decrease
+_QUIETER = 0.25  # factor on a decreased noise: an opening may hide the rest of the decrease
 _ROUNDS = 2  # rounds of the search for a clearance and a noise
 # The search for two open joints tries seven sizes of each joint, a fifth apart; the sizes of the second joint
 # lie about 1.5 times its modelled clearance. A second round tries finer steps about the best sizes.

@@ -233,7 +233,7 @@ class Forecaster:
         self.growth = tuple(GrowthWindow() for _ in self._clearance_joints)
         self.measurements, self.corrections = tuple(measurements), tuple(corrections)
         self._last: Forecast | None = None  # None before the first, and when something is new
-        self._stamp_ns, self._known = 0, 0  # of the last forecast; joints whose growth was known then
+        self._stamp_ns, self._known = 0, 0  # stamp of the last forecast; joints whose growth was known then
         self.coefficient_estimates = tuple(
             self._estimate(k, when) for k, when in zip(range(len(self._fresh_m)), replaced_ns, strict=True)
         )

@@ -92,7 +92,8 @@ class McapFile:
         self._channels: dict[int, ChannelRecord] = {}
         file.seek(0)
         if (start := file.read(len(MAGIC))) != MAGIC:
-            fault = f"not an MCAP file: begins with {start!r}. Expected {MAGIC!r}"
+            fault = f"begins with {start!r}" if start else "is empty"
+            fault = f"{fault}. Expected an MCAP file, which begins with {MAGIC!r}"
             raise RecordingError(str(path), "", fault)
         self._scan()
         schemas = {channel.schema_id for channel in self._channels.values()}

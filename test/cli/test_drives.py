@@ -11,7 +11,7 @@ EACH = pytest.mark.parametrize(
     ("verb", "names", "known", "one", "of_it"),
     [
         ("drives", lw.drives(), "viscous 1.403 N m s/rad",
-         lw.load_drive("pulse115-60"), "those of the output shaft"),
+         lw.load_drive("pulse115-60"), "torques and speeds at the output shaft"),
         ("materials", lw.materials(), "p v up to 1.8 N/mm^2 m/s",
          lw.load_material("steel-on-steel-dry-severe"), "1.98e-12"),
     ],

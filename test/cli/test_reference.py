@@ -121,7 +121,7 @@ def test_the_load_of_references_is_reported(run, tmp_path: Path) -> None:
         (["--cadence", "nan", "--out", "leg.npz"], "--cadence"),
         (["--cadence", "0.0", "--out", "leg.npz"], "does not turn the crank"),
         (["no_leg", "--out", "leg.npz"], "no mechanism of this name"),
-        (["--out", "nowhere/leg.npz"], "there is no directory nowhere"),
+        (["--out", "nowhere/leg.npz"], "--out: nowhere/leg.npz: cannot be written: No such file"),
         ([], "--out"),
         (["--load", "none.csv", "--out", "leg.npz"], "none.csv: cannot be read: "),
         (["slider_crank", "--load", "none.csv", "--out", "leg.npz"], "no point is called toe"),

@@ -171,14 +171,14 @@ def test_a_verdict_that_asks_to_act_fails_where_it_is_asked_for(state):
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
-        (["nowhere.mcap"], "error: nowhere.mcap: does not exist, expected a bag directory"),
+        (["nowhere.mcap"], "error: nowhere.mcap: does not exist. Expected a bag directory"),
         ([], "error: Missing argument 'BAG...'. (see leg-wear-monitor replay --help)"),
         (["{bag}", "--joint-states", "/x"], "error: {bag}: /x: is not a topic of the recording, it has"),
         (["{bag}", "--config", "nowhere.yaml"], "error: nowhere.yaml: "),
         (["{bag}", "--time", "wall"], "error: Invalid value for '--time'"),
         (["{bag}", "--fail-on", "wear"], "error: Invalid value for '--fail-on'"),
         (["{bag}", "--out", "{bag}"], "error: --out: {bag}: cannot be written: Not a directory"),
-        (["empty.mcap", "--out", "out"], "error: empty.mcap: is empty, expected an MCAP file"),
+        (["empty.mcap", "--out", "out"], "error: empty.mcap: is empty. Expected an MCAP file"),
     ],
 )
 def test_what_cannot_be_is_said_in_a_line(refused, bag, tmp_path, arguments, line):

@@ -147,7 +147,7 @@ def test_every_joint_has_a_limit_of_its_own(lived):
 
 def test_jumps_too_short_to_reach_the_limit_are_refused(leg):
     run = LifeRun(leg, attrs.evolve(SHORT, jump=JumpControl.of(1e-12)), clearances=("A",))
-    with pytest.raises(ConfigError, match=r"^opens-m: 1e-12 m a jump takes 3e\+08 jumps"):
+    with pytest.raises(ConfigError, match=r"^max-wear-per-jump-m: 1e-12 m per jump takes 3e\+08 jumps"):
         simulate_life(run, limit_m=6e-4, horizon_cycles=1e9)
 
 

@@ -26,7 +26,7 @@ def test_a_block_holds_what_was_given_and_nan_elsewhere() -> None:
 
 
 def test_stamps_must_be_integers_for_a_float_cannot_hold_them() -> None:
-    with pytest.raises(LegWearError, match="float64 is no integer type"):
+    with pytest.raises(LegWearError, match="float64 is not an integer type"):
         gait_samples([1.7e18])
 
 

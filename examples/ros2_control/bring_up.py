@@ -26,7 +26,7 @@ def main(argv: Sequence[str]) -> int:
         "--ground-n", type=float, default=300.0, help="largest force of the ground [N] (300); 0: in the air"
     )
     parser.add_argument(
-        "--knee-mm", type=float, default=0.3, help="radial clearance of the knee, G [mm] (0.3, as counted)"
+        "--knee-mm", type=float, default=0.3, help="radial clearance of the knee, G [mm] (0.3, as modelled)"
     )
     parser.add_argument("--record", type=Path, help="MCAP file of all inputs and outputs of the monitor")
     given = parser.parse_args(argv)

@@ -638,7 +638,7 @@ def change_of(explanations: Sequence[Explanation], since_ns: int) -> Change | No
         sigma=best.sigma,
         counted=best.counted,
         log_odds=log_odds,
-        runner_up="as counted" if second is nothing else runner_up,
+        runner_up="as modelled" if second is nothing else runner_up,
         runner_up_log_odds=0.5 * (second.misfit - best.misfit) / max(1.0, best.square),
     )
 

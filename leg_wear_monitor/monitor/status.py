@@ -179,7 +179,7 @@ def _with_measured(joint: Status, measured: Measurement | None) -> Status:
     words = f"{estimate(measured.clearance_m, measured.sigma_m, 'm')} was measured"
     if not measured.counts:
         words += " (contradicts the model, not in the forecast)"
-    words += f", {amount(joint.values['clearance_m'], 'm')} is counted"
+    words += f", {amount(joint.values['clearance_m'], 'm')} is modelled"
     values = {"measured_clearance_m": measured.clearance_m, "measured_sigma_m": measured.sigma_m}
     return attrs.evolve(joint, message=f"{joint.message}; {words}", values=joint.values | values)
 

@@ -41,7 +41,7 @@ def test_a_different_wear_coefficient_is_reported_and_needs_the_parameter_file(
     (line,) = run(*given, "--config", str(config)).stderr.splitlines()
     assert line.startswith(
         f"warning: {config}: wear coefficient of joints A, B, G, I, J: 4e-15 1/Pa (bushing and journal "
-        "together), and the wear in the ledger was counted with 2e-15 1/Pa; that wear stays as counted"
+        "together), and the wear in the ledger was counted with 2e-15 1/Pa; that wear stays as modelled"
     )
     assert "name the parameter file of this leg" in refused(*given)
 

@@ -90,14 +90,11 @@ def test_two_joints_that_open_at_once_are_named_together(torque_of, table) -> No
         assert summary.clearances[joint].change_m > 5.0e-5
 
 
-def test_a_late_torque_does_not_hide_a_joint(torque_of, table) -> None:
-    walk = table(torque_of(TAKEN), torque_of(TAKEN, G=4.5e-4))
+def test_a_late_torque_accuses_no_joint(torque_of, table) -> None:
+    walk = table(torque_of(TAKEN), torque_of(TAKEN))
     late = np.interp(walk["time"] - 0.01, walk["time"], walk["drive_torque"])
-    summary = lw.replay({**walk, "drive_torque": late}).summary()
-    assert summary.verdict.fault_code == "TORQUE_TIMING"
-    assert "in joint G" in summary.verdict.why
-    assert summary.clearances["G"].status.value == "inspect"
-    assert summary.clearances["G"].estimated_m == pytest.approx(4.5e-4, abs=8.0e-5)
+    verdict = lw.replay({**walk, "drive_torque": late}).summary().verdict
+    assert (verdict.fault_code, verdict.joints) == ("TORQUE_TIMING", ())
 
 
 def test_before_a_joint_opens_nothing_is_reported(healthy) -> None:

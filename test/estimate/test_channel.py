@@ -96,7 +96,7 @@ def test_low_passes_are_those_of_butterworth(second_order, order):
 
 @pytest.mark.parametrize("channel", [pytest.param(DIRECT, marks=pytest.mark.slow), DRIVE])
 def test_a_leg_that_is_commissioned_with_a_worn_joint_has_its_right_channel(known, leg, channel):
-    """Lateness, by joints: 1.0 ± 0.1 and 0.8 ± 0.1 ms RMS (25 draws of cycles); 1.9 if as counted."""
+    """Lateness, by joints: 1.0 ± 0.1 and 0.8 ± 0.1 ms RMS (25 draws of cycles); 1.9 if as modelled."""
     reference, sensor, columns = known
     behind_it, off_s = attrs.evolve(sensor, channel=channel), []
     for k in range(len(leg.clearance_joints)):

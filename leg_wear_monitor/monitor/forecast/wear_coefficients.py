@@ -69,7 +69,7 @@ def coefficient_doubts(counted: Iterable[JointWear], leg: Mechanism) -> tuple[Do
         Doubt(
             f"wear coefficient of {'joint' if len(joints) == 1 else 'joints'} {', '.join(joints)}",
             f"{now:.4g} 1/Pa (bushing and journal together), and the wear in the ledger was counted with "
-            f"{was:.4g} 1/Pa; that wear stays as counted, {_further(was, now)}",
+            f"{was:.4g} 1/Pa; that wear stays as modelled, {_further(was, now)}",
         )
         for (was, now), joints in found.items()
     )

@@ -122,7 +122,7 @@ def joint_trends(summary: ReplaySummary, joint: str) -> list[Part]:
     panels: list[Panel] = []
     doubts: list[Part] = []
     for name, figure, panel in (
-        ("Counted clearance", Figure.CLEARANCES, _clearance_panel(summary, joint)),
+        ("Modelled clearance", Figure.CLEARANCES, _clearance_panel(summary, joint)),
         ("Contact forces", Figure.IMPACT_FORCES, _force_panel(summary, joint)),
     ):
         if doubt := not_valid(summary.verdict, figure):
@@ -154,7 +154,7 @@ def _clearance_panel(summary: ReplaySummary, joint: str) -> Panel:
     bands = [(0, 1)] if series else []
     modelled_m = history.modelled_m.get(joint, np.array([]))
     if _is_known(modelled_m) and Figure.CLEARANCES not in summary.verdict.not_valid:
-        series.append(Series("counted", "mm", 1.0e3 * modelled_m, "--ink"))
+        series.append(Series("modelled", "mm", 1.0e3 * modelled_m, "--ink"))
     if series and known:
         series.append(_limit("limit", "mm", 1.0e3 * known.limit_m, history.stamp_ns))
     title = f"Clearance of joint {summary.leg.joint_words(joint)}"

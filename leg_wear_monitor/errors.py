@@ -15,6 +15,11 @@ from types import FrameType
 _MOST_SHOWN = 2000  # characters, as many as a terminal of 25 lines of 80
 
 
+def one_line(error: BaseException) -> str:
+    """Text of an error on one line, at most 200 characters; its type if it has no text."""
+    return " ".join(str(error).split())[:200] or type(error).__name__
+
+
 def printable(text: str, most: int = _MOST_SHOWN) -> str:
     r"""Text from a file on one line, without control sequences for the terminal, and not too long.
 

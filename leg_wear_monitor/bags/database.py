@@ -14,6 +14,7 @@ from rosbags.rosbag2 import Reader, ReaderError
 
 from leg_wear_monitor.bags.findings import MOST_BYTES, Finding, RecordingError
 from leg_wear_monitor.bags.piece import Channel, Due, Piece
+from leg_wear_monitor.errors import one_line
 from leg_wear_monitor.messages.cdr import MESSAGE
 
 _JOURNALS = ("-wal", "-journal")  # endings of the files of transactions that were not written back
@@ -49,7 +50,7 @@ class DatabaseFile:
             raise OSError(errno.EIO, str(error)) from error
         except _UNREADABLE as error:
             cause = error.__cause__ or (None if isinstance(error, ReaderError) else error)
-            why = _one_line(cause) if cause else "it has no tables of a recording"
+            why = one_line(cause) if cause else "it has no tables of a recording"
             raise RecordingError(str(path), "", f"is not a readable .db3 file: {why}") from error
         for journal in (path.with_name(path.name + end) for end in _JOURNALS):
             if journal.exists() and journal.stat().st_size:
@@ -95,7 +96,7 @@ class DatabaseFile:
         except apsw.IOError as error:
             raise OSError(errno.EIO, str(error)) from error
         except _UNREADABLE as error:
-            self.findings.append(Finding(self.path, f"ends early: {_one_line(error)}"))
+            self.findings.append(Finding(self.path, f"ends early: {one_line(error)}"))
         if rows:
             yield self._due(rows, expected)
         if read != expected:
@@ -112,7 +113,3 @@ class DatabaseFile:
         data = np.frombuffer(b"".join(row[2] for row in rows), np.uint8)
         piece = Piece(rows[0][0], data, messages, self.size * len(rows) // max(expected, 1))
         return Due(piece.start_ns, lambda: piece)
-
-
-def _one_line(error: BaseException) -> str:
-    return " ".join(str(error).split())[:200] or type(error).__name__

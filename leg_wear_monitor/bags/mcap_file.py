@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError, check_size
 from leg_wear_monitor.bags.piece import Channel, Due, Piece
+from leg_wear_monitor.errors import one_line
 from leg_wear_monitor.messages.cdr import MESSAGE
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -193,7 +194,7 @@ class McapFile:
             data = self._content(segment)
             messages = self._messages(segment, data, codes)
         except (DamageError, *_UNREADABLE) as error:
-            self._find(f"chunk at byte {segment.at} {_one_line(error)}: its messages are lost")
+            self._find(f"chunk at byte {segment.at} {one_line(error)}: its messages are lost")
             return None
         self._read += len(messages)
         return Piece(segment.start_ns, np.frombuffer(data, np.uint8), messages, segment.stored)
@@ -217,7 +218,7 @@ class McapFile:
                 raise DamageError(f"contains {length} bytes, expected {chunk.uncompressed_size}")
             return stream.read(length)
         except _UNREADABLE as error:
-            raise DamageError(f"cannot be read: {_one_line(error)}") from error
+            raise DamageError(f"cannot be read: {one_line(error)}") from error
 
     def _messages(self, segment: _Segment, data: bytes, codes: NDArray[np.int64]) -> NDArray[np.void]:
         """Messages of the requested channels in a segment."""
@@ -272,7 +273,3 @@ def _declared(chunk: Chunk) -> int:
     if chunk.compression == "lz4":
         return int(lz4.frame.get_frame_info(chunk.data)["content_size"])
     return 0
-
-
-def _one_line(error: BaseException) -> str:
-    return " ".join(str(error).split())[:200] or type(error).__name__

@@ -27,7 +27,7 @@ from leg_wear_monitor.bags.table_layout import (
     is_number,
     places,
 )
-from leg_wear_monitor.errors import printable
+from leg_wear_monitor.errors import one_line, printable
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.config.tables import DATE, STAMPS
@@ -517,8 +517,3 @@ def _named(frame: Any) -> dict[str, Any]:
     if getattr(index, "name", None) is not None:
         columns.setdefault(str(index.name), index)
     return columns
-
-
-def one_line(error: BaseException) -> str:
-    """Text of an error on one line."""
-    return " ".join(str(error).split())[:200] or type(error).__name__

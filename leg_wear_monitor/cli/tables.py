@@ -10,7 +10,7 @@ from rich.table import Table
 
 from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.monitor.alarm_specs import QUANTITIES
-from leg_wear_monitor.monitor.alarms import ADVICE, raised_values, time_words
+from leg_wear_monitor.monitor.alarms import ADVICE, duration, raised_values, time_words
 from leg_wear_monitor.monitor.forecast.forecast import three_digits
 from leg_wear_monitor.monitor.ledger.entry import walked_words
 from leg_wear_monitor.monitor.verdict.decision import decision_of
@@ -48,13 +48,6 @@ def figure(value: float | None) -> str:
     if not 1.0e-4 <= size < 1.0e7:
         return f"{value:.2e}"
     return f"{value:.{max(0, 2 - math.floor(math.log10(size)))}f}"
-
-
-def duration(seconds: float) -> str:
-    """A time in a unit that suits it."""
-    if seconds < 120.0:
-        return f"{seconds:.3g} s"
-    return f"{seconds / 60.0:.3g} min" if seconds < 7200.0 else f"{seconds / 3600.0:.3g} h"
 
 
 # The statistics of a simulation.

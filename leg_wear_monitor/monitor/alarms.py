@@ -391,6 +391,13 @@ def raised_values(
     return ", ".join(words)
 
 
+def duration(seconds: float) -> str:
+    """A time in a unit that suits it."""
+    if seconds < 120.0:
+        return f"{seconds:.3g} s"
+    return f"{seconds / 60.0:.3g} min" if seconds < 7200.0 else f"{seconds / 3600.0:.3g} h"
+
+
 def time_words(stamp_ns: int) -> str:
     """A stamp as date and time, or as seconds if its clock began at zero."""
     seconds = stamp_ns / 1.0e9

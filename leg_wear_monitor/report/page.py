@@ -16,7 +16,7 @@ import numpy as np
 from markupsafe import Markup, escape
 
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.monitor.alarms import time_words
+from leg_wear_monitor.monitor.alarms import duration, time_words
 from leg_wear_monitor.monitor.verdict.decision import HOW_SURE, decision_of, figures_of
 from leg_wear_monitor.playback.result import ReplaySummary
 from leg_wear_monitor.state import Figure, Level, State, Verdict
@@ -448,13 +448,6 @@ def since_words(summary: ReplaySummary, stamp_ns: int) -> str:
 def is_of_recording(summary: ReplaySummary) -> bool:
     """True if the verdict was known at the recording's end: nothing was measured or entered later."""
     return summary.verdict.since_ns <= summary.recording.end_ns
-
-
-def duration(seconds: float) -> str:
-    """A time in a unit that suits it."""
-    if seconds < 120.0:
-        return f"{seconds:.3g} s"
-    return f"{seconds / 60.0:.3g} min" if seconds < 7200.0 else f"{seconds / 3600.0:.3g} h"
 
 
 def value(factor: float, number: float | None) -> str:

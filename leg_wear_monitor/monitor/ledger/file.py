@@ -9,7 +9,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from urllib.parse import quote
 
-from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.errors import LegWearError, one_line
 from leg_wear_monitor.monitor.ledger.entry import Binding
 from leg_wear_monitor.monitor.ledger.rows import FORMAT, create_tables
 
@@ -125,11 +125,6 @@ def copy_of(path: str | Path) -> Iterator[Path]:
             yield copy
         except LedgerError as error:
             raise LedgerError(str(error).replace(str(copy), str(original))) from error
-
-
-def one_line(error: Exception) -> str:
-    """Text of an error on one line."""
-    return " ".join(str(error).split())
 
 
 def _create(path: Path, binding: Binding) -> None:

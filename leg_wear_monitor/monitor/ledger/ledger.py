@@ -12,6 +12,7 @@ from pathlib import Path
 import attrs
 import numpy as np
 
+from leg_wear_monitor.errors import one_line
 from leg_wear_monitor.estimate.signature import CommissionedTorque
 from leg_wear_monitor.mechanism.arrays import Ints
 from leg_wear_monitor.mechanism.spec import Mechanism
@@ -41,7 +42,6 @@ from leg_wear_monitor.monitor.ledger.file import (
     connect,
     copy_of,
     damage_refused,
-    one_line,
     transaction,
 )
 from leg_wear_monitor.state import Verdict

@@ -196,7 +196,7 @@ def test_a_foot_load_is_taken_reported_recorded_and_replayed(
 def test_what_is_kept_of_a_break_out_replays_to_its_stop(stage, tmp_path: Path) -> None:
     """The file is written by itself; its replay has the verdict of the node: the walk is below 30 s."""
     breaks = KnockConfig(joint="G", at_s=7.0, clearance_m=2.0e-3)
-    monitor = stage.monitor(record__stops=str(tmp_path / "stops"))
+    monitor = stage.monitor(record__stop_recording_dir=str(tmp_path / "stops"))
     stage.legs().play(stage.walk(PublisherConfig(duration_s=13.0, knock=breaks)), monitor)
     monitor.stop()
     live = monitor.node.monitor.verdict.verdict

@@ -8,7 +8,7 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import IO, TYPE_CHECKING, Any, TypeVar
 from xml.etree import ElementTree
 
 import attrs
@@ -70,12 +70,23 @@ def unfinished(path: Path) -> Iterator[Path]:
     """
     remove_parts(path.parent, f"{glob.escape(path.name)}.[0-9]*")
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    with part.open("wb") as locked:
-        fcntl.flock(locked, fcntl.LOCK_EX)  # prevents other processes from removing it
-        try:
-            yield part
-        finally:
-            part.unlink(missing_ok=True)
+    while True:
+        with part.open("wb") as locked:
+            fcntl.flock(locked, fcntl.LOCK_EX)  # prevents other processes from removing it
+            if not _is_at(part, locked):  # a process has removed it before it was locked
+                continue
+            try:
+                yield part
+            finally:
+                part.unlink(missing_ok=True)
+            return
+
+
+def _is_at(path: Path, file: IO[bytes]) -> bool:
+    """True if an open file is still the file at a path."""
+    with suppress(FileNotFoundError):
+        return os.path.samestat(os.fstat(file.fileno()), path.stat())
+    return False
 
 
 def remove_parts(directory: Path, names: str) -> None:
@@ -93,7 +104,8 @@ def remove_parts(directory: Path, names: str) -> None:
             if part.is_file() and not part.is_symlink():
                 with part.open("r+b") as file:
                     fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                    part.unlink()
+                    if _is_at(part, file):
+                        part.unlink()
 
 
 # JSON as files and standard output hold it, and numbers that are not known, which it has not.

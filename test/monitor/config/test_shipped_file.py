@@ -21,3 +21,12 @@ def test_the_shipped_file_holds_every_parameter_but_empty_lists_at_its_default()
 
     shipped = names(document["/**"]["ros__parameters"])
     assert shipped == [name for name, parameter in PARAMETERS.items() if parameter.default != ()]
+
+
+def test_the_comment_of_each_parameter_is_its_description():
+    lines = shipped_config().read_text(encoding="utf-8").splitlines()
+    for name, parameter in PARAMETERS.items():
+        key, comment = name.rpartition(".")[2], f" # {parameter.description}"
+        assert any(
+            line.strip().removeprefix("# ").startswith(f"{key}:") and line.endswith(comment) for line in lines
+        ), name

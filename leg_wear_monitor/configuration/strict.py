@@ -31,8 +31,6 @@ RENAMED = {
     "knock_on_delay_cycles": "impact_on_delay_cycles",
     "life": "growth_law_file",
     "loose_joints": "clearance_joints",
-    "node_interval_s": "knot_interval_s",
-    "opens_m": "max_wear_per_jump_m",
     "stops": "stop_recording_dir",
     "warn_share": "warn_fraction",
 }

@@ -237,16 +237,16 @@ def _headline(verdict: dict[str, Any]) -> str:
 
 def _compare_with_truth(out: Path, live: dict[str, Any]) -> None:
     """Print the clearance of the broken joint on the synthetic leg next to the monitor's estimate."""
+    from leg_wear_monitor.files import or_nan
+    from leg_wear_monitor.monitor.alarms import amount
+    from leg_wear_monitor.monitor.verdict.verdict import estimate
+
     truth: dict[str, Any] = json.loads((out / "truth.json").read_text())
     for joint in live["verdict"]["joints"]:
-        estimate = live["clearances"][joint]
-        sigma = (
-            f" ± {1e3 * estimate['best_estimate_sigma_m']:.2f}" if estimate["best_estimate_sigma_m"] else ""
-        )
-        click.echo(
-            f"joint {joint}: the clearance is {1e3 * truth['clearance_m'][joint][-1]:.2f} mm on the leg, "
-            f"{1e3 * estimate['best_estimate_m']:.2f}{sigma} mm by the monitor"
-        )
+        known = live["clearances"][joint]
+        by_monitor = estimate(or_nan(known["best_estimate_m"]), or_nan(known["best_estimate_sigma_m"]), "m")
+        of_leg = amount(truth["clearance_m"][joint][-1], "m")
+        click.echo(f"joint {joint}: the clearance is {of_leg} on the leg, {by_monitor} by the monitor")
 
 
 # ``leg-wear-monitor dashboard``: a live page in a browser, for reading only.

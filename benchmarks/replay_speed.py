@@ -18,13 +18,13 @@ import attrs
 import numpy as np
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.bags.mcap_writer import McapWriter
-from leg_wear_monitor.bags.reader import Recording
 from leg_wear_monitor.gait.config import EncoderConfig, GaitConfig, PaceConfig, TorqueSensorConfig
 from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.sensors import readings
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.messages import encode
+from leg_wear_monitor.recordings import encode
+from leg_wear_monitor.recordings.mcap_writer import McapWriter
+from leg_wear_monitor.recordings.reader import Recording
 from leg_wear_monitor.twin import TORQUE
 
 NAMES = ["hip", "knee", "ankle", "crank", "toe", "pelvis", "spare"]

@@ -37,9 +37,9 @@ if TYPE_CHECKING:
     from leg_wear_monitor.monitor.config.settings import MonitorConfig
     from leg_wear_monitor.monitor.ledger.ledger import open_ledger
     from leg_wear_monitor.monitor.wear_monitor import WearMonitor
-    from leg_wear_monitor.playback.replay import replay
-    from leg_wear_monitor.playback.result import ReplayJoint, ReplaySummary
-    from leg_wear_monitor.playback.summary import ReplayResult
+    from leg_wear_monitor.recordings.replay import replay
+    from leg_wear_monitor.recordings.result import ReplayJoint, ReplaySummary
+    from leg_wear_monitor.recordings.summary import ReplayResult
     from leg_wear_monitor.report.plot import plot
     from leg_wear_monitor.studies.run import load_study
     from leg_wear_monitor.twin.sample import gait_samples
@@ -63,9 +63,9 @@ _HOME = {
     "Material": "mechanism.materials",
     "Mechanism": "mechanism.spec",
     "MonitorConfig": "monitor.config.settings",
-    "ReplayJoint": "playback.result",
-    "ReplayResult": "playback.summary",
-    "ReplaySummary": "playback.result",
+    "ReplayJoint": "recordings.result",
+    "ReplayResult": "recordings.summary",
+    "ReplaySummary": "recordings.result",
     "SimulationResult": "dynamics.result",
     "ToeResult": "dynamics.result",
     "TorqueResult": "dynamics.result",
@@ -84,7 +84,7 @@ _HOME = {
     "with_ground_reaction": "mechanism.person",
     "open_ledger": "monitor.ledger.ledger",
     "plot": "report.plot",
-    "replay": "playback.replay",
+    "replay": "recordings.replay",
     "share_directory": "files",
     "simulate": "dynamics.simulation",
     "simulate_life": "life.life",

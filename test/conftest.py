@@ -26,9 +26,9 @@ if os.environ.get("MOVED_STARTS"):  # as `make test-machines` sets it
     move_starts(int(os.environ["MOVED_STARTS"]))
 
 if find_spec("mcap") and find_spec("rosbags"):
-    pytest_plugins = ["recordings"]
+    pytest_plugins = ["made_recordings"]
 else:  # the extra `bags` is not installed
-    collect_ignore_glob = ["bags/*", "messages/*", "playback/*"]
+    collect_ignore_glob = ["recordings/*"]
 
 # the first example may wait for a compilation, so there is no deadline
 settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=50)

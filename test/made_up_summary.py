@@ -5,7 +5,6 @@ import math
 import attrs
 import numpy as np
 
-from leg_wear_monitor.bags.findings import Severity
 from leg_wear_monitor.mechanism.materials import BushingLoad
 from leg_wear_monitor.monitor.angle_regression import ClearanceObservation
 from leg_wear_monitor.monitor.config.settings import Limits
@@ -13,8 +12,9 @@ from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, Le
 from leg_wear_monitor.monitor.forecast.wear_coefficients import CoefficientPrior
 from leg_wear_monitor.monitor.ledger.entry import Measurement, WalkedLoad
 from leg_wear_monitor.monitor.reports import Lost
-from leg_wear_monitor.playback.history import CYCLE_COLUMNS, SUMMARY_COLUMNS
-from leg_wear_monitor.playback.result import (
+from leg_wear_monitor.recordings.findings import Severity
+from leg_wear_monitor.recordings.history import CYCLE_COLUMNS, SUMMARY_COLUMNS
+from leg_wear_monitor.recordings.result import (
     EncoderEvidence,
     LegJoint,
     ReplayFinding,

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from mcap.reader import make_reader
 
-from leg_wear_monitor.bags.mcap_writer import McapWriter
-from leg_wear_monitor.messages import encode
-from leg_wear_monitor.messages.streams import JOINT_STATE, WRENCH_STAMPED
+from leg_wear_monitor.recordings import encode
+from leg_wear_monitor.recordings.mcap_writer import McapWriter
+from leg_wear_monitor.recordings.streams import JOINT_STATE, WRENCH_STAMPED
 
 Message = tuple[int, int, bytes]
 """Code of the stream, log time [ns], bytes."""

@@ -31,7 +31,7 @@ from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.mechanism.arrays import body_names
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.mechanism.position import build_linkage, ideal_motion
-from leg_wear_monitor.messages import encode
+from leg_wear_monitor.recordings import encode
 from leg_wear_monitor.ros.gait_publisher import time_message
 from leg_wear_monitor.ros.inputs import message_class
 

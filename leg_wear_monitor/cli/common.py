@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from leg_wear_monitor.configuration import Doubt
     from leg_wear_monitor.mechanism.spec import Mechanism
     from leg_wear_monitor.monitor.config.settings import MonitorConfig
-    from leg_wear_monitor.playback.result import ReplaySummary
+    from leg_wear_monitor.recordings.result import ReplaySummary
 
 
 WITH_FINDINGS = 1

@@ -12,8 +12,8 @@ from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.gait.config import GaitConfig
 from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.sensors import readings
-from leg_wear_monitor.messages.cdr import Decoder
-from leg_wear_monitor.messages.streams import STREAMS
+from leg_wear_monitor.recordings.cdr import Decoder
+from leg_wear_monitor.recordings.streams import STREAMS
 from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
 from leg_wear_monitor.twin.torque_reference import TorqueReferenceRun
 from leg_wear_monitor.workers import results
@@ -43,7 +43,7 @@ def _reading() -> None:
     for stream in STREAMS:
         decoder.one(b"", stream.code)
     with suppress(ModuleNotFoundError):
-        from leg_wear_monitor.bags.reader import Recording
+        from leg_wear_monitor.recordings.reader import Recording
 
         path = share_directory() / "bags" / "healthy.mcap"
         with Recording([path], lw.load_config(path.with_suffix(".yaml"))) as recording:

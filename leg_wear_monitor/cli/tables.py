@@ -20,7 +20,7 @@ from leg_wear_monitor.state import as_plain
 
 if TYPE_CHECKING:
     from leg_wear_monitor.dynamics.result import JointResult, SimulationResult
-    from leg_wear_monitor.playback.summary import ReplayResult
+    from leg_wear_monitor.recordings.summary import ReplayResult
     from leg_wear_monitor.state import LegState, LifeHours
 
 

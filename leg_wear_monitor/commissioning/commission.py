@@ -7,9 +7,6 @@ from pathlib import Path
 import attrs
 import numpy as np
 
-from leg_wear_monitor.bags.bag import Recordable, listed_recordings
-from leg_wear_monitor.bags.findings import RecordingError
-from leg_wear_monitor.bags.series import JointName, Signals, TorqueSource, read_signals
 from leg_wear_monitor.commissioning import proposal
 from leg_wear_monitor.commissioning.detection import LEAST_CYCLES, Walk, walk_of, with_detections
 from leg_wear_monitor.commissioning.evidence import (
@@ -49,6 +46,9 @@ from leg_wear_monitor.monitor.config.parameters import config_from, load_config,
 from leg_wear_monitor.monitor.config.sections import drive_figures
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.verdict.causes import sentence
+from leg_wear_monitor.recordings.bag import Recordable, listed_recordings
+from leg_wear_monitor.recordings.findings import RecordingError
+from leg_wear_monitor.recordings.series import JointName, Signals, TorqueSource, read_signals
 
 # Sentences on undetermined parameters, on quantities that do not fit, and on further information.
 

@@ -11,8 +11,6 @@ from pathlib import Path
 import attrs
 import numpy as np
 
-from leg_wear_monitor.bags.bag import Recordable
-from leg_wear_monitor.bags.reader import Recording
 from leg_wear_monitor.commissioning.result import CommissioningResult, JointDetection
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.estimate.cause import Cause
@@ -54,6 +52,8 @@ from leg_wear_monitor.monitor.diagnosis.state import (
 from leg_wear_monitor.monitor.input_health import INPUT_RULES
 from leg_wear_monitor.monitor.reports import CycleReport
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
+from leg_wear_monitor.recordings.bag import Recordable
+from leg_wear_monitor.recordings.reader import Recording
 from leg_wear_monitor.twin.load import torque_size
 from leg_wear_monitor.twin.reference import CrankProfile, mean_profile
 from leg_wear_monitor.twin.sample import NONE

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 import attrs
 from ruamel.yaml import YAML
 
-from leg_wear_monitor.bags.findings import Finding
 from leg_wear_monitor.configuration import part_document
 from leg_wear_monitor.errors import LegWearError, printable
 from leg_wear_monitor.files import data_frame, json_text
 from leg_wear_monitor.monitor.config.parameters import MARK, PARAMETERS, nested, values_of
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.recordings.findings import Finding
 from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 if TYPE_CHECKING:

@@ -7,13 +7,13 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.bags.series import JointName, TorqueSource
 from leg_wear_monitor.estimate.joint_motion import JointMotion, Pair, Series, paired, steady_stretch
 from leg_wear_monitor.estimate.torque_fit import Fit, Start, fit, repeating, too_alike
 from leg_wear_monitor.estimate.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.inputs import EFFORT, INTERFACE
+from leg_wear_monitor.recordings.series import JointName, TorqueSource
 
 # Search of start values: every gear ratio, direction, offset and torque sign at once, by the leg's model.
 #

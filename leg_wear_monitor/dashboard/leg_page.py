@@ -13,7 +13,7 @@ from leg_wear_monitor.monitor.alarms import ADVICE
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.reports import Lost
 from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, guide_to
-from leg_wear_monitor.playback.result import (
+from leg_wear_monitor.recordings.result import (
     ReplayGait,
     ReplayHistory,
     ReplayLeg,
@@ -22,7 +22,7 @@ from leg_wear_monitor.playback.result import (
     ReplayStatus,
     ReplaySummary,
 )
-from leg_wear_monitor.playback.summary import leg_shape, settings_of
+from leg_wear_monitor.recordings.summary import leg_shape, settings_of
 from leg_wear_monitor.report.guide import enclosed
 from leg_wear_monitor.report.page import (
     STATE_LOOKS,

@@ -100,7 +100,7 @@ def recordings_of(home: Path, pattern: str) -> list[Path]:
     if not glob.has_magic(pattern):
         path = home / pattern
         return [path] if path.exists() else []
-    from leg_wear_monitor.bags.bag import is_bag_directory, is_recording_name
+    from leg_wear_monitor.recordings.bag import is_bag_directory, is_recording_name
 
     found = {home / name for name in glob.glob(pattern, root_dir=home, recursive=True)}
     bags = {path for path in found if path.is_dir() and is_bag_directory(path)}

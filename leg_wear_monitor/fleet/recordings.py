@@ -9,13 +9,13 @@ from typing import Any
 
 import attrs
 
-from leg_wear_monitor.bags.bag import find_files
-from leg_wear_monitor.bags.findings import RecordingError
-from leg_wear_monitor.bags.reader import Recording
 from leg_wear_monitor.configuration import part_document
 from leg_wear_monitor.errors import system_asked
 from leg_wear_monitor.fleet.description import FleetLeg
 from leg_wear_monitor.mechanism.arrays import Ints
+from leg_wear_monitor.recordings.bag import find_files
+from leg_wear_monitor.recordings.findings import RecordingError
+from leg_wear_monitor.recordings.reader import Recording
 
 FILE = "recordings.jsonl"
 

@@ -14,7 +14,6 @@ from pathlib import Path
 import attrs
 import numpy as np
 
-from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.errors import ConfigError, LegWearError, printable, system_asked
 from leg_wear_monitor.files import remove_parts, with_same_fields, write_whole
 from leg_wear_monitor.fleet.description import FleetDescription, FleetLeg
@@ -38,9 +37,10 @@ from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.ledger.entry import binding_of
 from leg_wear_monitor.monitor.ledger.ledger import LedgerContent, read_ledger
-from leg_wear_monitor.playback.replay import replay, state_in_ledger
-from leg_wear_monitor.playback.result import ReplaySummary, summary_of
-from leg_wear_monitor.playback.summary import ReplayResult
+from leg_wear_monitor.recordings.findings import RecordingError
+from leg_wear_monitor.recordings.replay import replay, state_in_ledger
+from leg_wear_monitor.recordings.result import ReplaySummary, summary_of
+from leg_wear_monitor.recordings.summary import ReplayResult
 from leg_wear_monitor.state import LegState
 from leg_wear_monitor.workers import results
 

@@ -14,7 +14,7 @@ from leg_wear_monitor.errors import printable
 from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.playback.result import ReplaySummary
+from leg_wear_monitor.recordings.result import ReplaySummary
 from leg_wear_monitor.wear import BUSHING, JOURNAL, wear_zone
 
 # Style of the figures: matplotlib without pyplot, in colours that colour-blind readers can distinguish.

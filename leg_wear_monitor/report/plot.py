@@ -14,8 +14,8 @@ from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.reach import findings, reach_of
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.playback.result import ReplaySummary
-from leg_wear_monitor.playback.summary import ReplayResult
+from leg_wear_monitor.recordings.result import ReplaySummary
+from leg_wear_monitor.recordings.summary import ReplayResult
 from leg_wear_monitor.report.drawing import first_position
 from leg_wear_monitor.report.figure import (
     BLUE,

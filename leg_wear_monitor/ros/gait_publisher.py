@@ -25,7 +25,7 @@ from leg_wear_monitor.files import json_text
 from leg_wear_monitor.gait.config import CONTACT, FLOAT64, GaitConfig
 from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.sensors import Reading, readings, stamp_ns
-from leg_wear_monitor.messages.streams import streams_read
+from leg_wear_monitor.recordings.streams import streams_read
 from leg_wear_monitor.ros.inputs import message_class
 from leg_wear_monitor.ros.parameters import Parameters
 from leg_wear_monitor.ros.running import WAKE_S, ClosingNode, repeated, run, spin, until_down

@@ -17,10 +17,10 @@ from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from leg_wear_monitor.errors import ConfigError, printable
-from leg_wear_monitor.messages.cdr import MESSAGE, Decoder
-from leg_wear_monitor.messages.names import is_without, names_in, twice, without_interface
-from leg_wear_monitor.messages.streams import INTERFACES, JOINT_STATE, Stream, streams_of
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.recordings.cdr import MESSAGE, Decoder
+from leg_wear_monitor.recordings.names import is_without, names_in, twice, without_interface
+from leg_wear_monitor.recordings.streams import INTERFACES, JOINT_STATE, Stream, streams_of
 from leg_wear_monitor.twin import LOAD
 from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, Samples
 

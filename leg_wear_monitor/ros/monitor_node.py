@@ -19,11 +19,6 @@ from leg_wear_monitor.dynamics.clearance.stepper import advance_beside
 from leg_wear_monitor.errors import LegWearError, closed_on_interrupt
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.mechanism.plausible import doubts
-from leg_wear_monitor.messages import outputs
-from leg_wear_monitor.messages.cdr import Decoder
-from leg_wear_monitor.messages.outputs import Messages
-from leg_wear_monitor.messages.qos import SENSOR_DATA
-from leg_wear_monitor.messages.streams import STREAMS, ForecastTimes
 from leg_wear_monitor.monitor.alarms import ADVICE, ALREADY_COUNTED
 from leg_wear_monitor.monitor.config.fitting import check_limits, parameter_doubts
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -32,6 +27,11 @@ from leg_wear_monitor.monitor.ledger.entry import JointWear
 from leg_wear_monitor.monitor.operators import alarm_words, wear_words
 from leg_wear_monitor.monitor.reports import Reports, Status
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor, open_monitor
+from leg_wear_monitor.recordings import outputs
+from leg_wear_monitor.recordings.cdr import Decoder
+from leg_wear_monitor.recordings.outputs import Messages
+from leg_wear_monitor.recordings.qos import SENSOR_DATA
+from leg_wear_monitor.recordings.streams import STREAMS, ForecastTimes
 from leg_wear_monitor.ros.health import Load, load_status, recording_status
 from leg_wear_monitor.ros.inputs import Inbox, Inputs, check_stamps
 from leg_wear_monitor.ros.measure import measured, not_stored, offer_measure, with_storage

@@ -9,7 +9,7 @@ import attrs
 
 # Kinds of samples: order, counts, rates, alarms and silence detection follow from these entries.
 #
-# `messages.streams` maps messages to kinds.
+# `recordings.streams` maps messages to kinds.
 
 
 @attrs.frozen(kw_only=True)

@@ -16,9 +16,9 @@ from leg_wear_monitor.state import Level, State
 pytest.importorskip("mcap")
 pytest.importorskip("rosbags")
 
-from leg_wear_monitor.bags.mcap_writer import McapWriter
-from leg_wear_monitor.bags.reader import TIMES
-from leg_wear_monitor.messages import encode
+from leg_wear_monitor.recordings import encode
+from leg_wear_monitor.recordings.mcap_writer import McapWriter
+from leg_wear_monitor.recordings.reader import TIMES
 
 SECONDS, RATE_HZ = 4, 200
 N = SECONDS * RATE_HZ

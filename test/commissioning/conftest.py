@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import Mechanism, MonitorConfig
-from leg_wear_monitor.bags.mcap_writer import McapWriter
-from leg_wear_monitor.bags.reader import Recording
 from leg_wear_monitor.estimate.torque_model import TorqueModel, torque_model
 from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.messages import encode
 from leg_wear_monitor.monitor.config.inputs import EFFORT, FLOAT64, INTERFACE, WRENCH
+from leg_wear_monitor.recordings import encode
+from leg_wear_monitor.recordings.mcap_writer import McapWriter
+from leg_wear_monitor.recordings.reader import Recording
 
 START_NS = 1_700_000_000 * 10**9
 FLOAT64_TYPE = "std_msgs/msg/Float64"

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import LegWearError, Mechanism, MonitorConfig, simulate
-from leg_wear_monitor.bags.series import JointName, Signals, TorqueSource
 from leg_wear_monitor.commissioning import commission as commissioning
 from leg_wear_monitor.commissioning import detection
 from leg_wear_monitor.commissioning.commission import commission, propose
@@ -22,6 +21,7 @@ from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.inputs import EFFORT, FLOAT64, INTERFACE, WRENCH
 from leg_wear_monitor.monitor.config.parameters import config_from, load_config
+from leg_wear_monitor.recordings.series import JointName, Signals, TorqueSource
 
 from .conftest import MakeWalk, Record, Robot, Walk, columns_of
 

@@ -7,7 +7,7 @@ import subprocess
 import layouts
 
 from leg_wear_monitor.files import share_directory
-from leg_wear_monitor.messages.leg_markers import MARKERS
+from leg_wear_monitor.recordings.leg_markers import MARKERS
 
 # Okabe and Ito's, which colour-blind people can tell apart
 COLOURS = {"#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00"}

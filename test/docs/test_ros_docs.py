@@ -7,9 +7,9 @@ from xml.etree import ElementTree
 from ruamel.yaml import YAML
 
 from leg_wear_monitor.files import share_directory
-from leg_wear_monitor.messages.streams import STREAMS
 from leg_wear_monitor.monitor.config.parameters import parse_config, structured
 from leg_wear_monitor.monitor.config.tables import FORCES
+from leg_wear_monitor.recordings.streams import STREAMS
 from leg_wear_monitor.ros import monitor_node
 from leg_wear_monitor.ros.gait_publisher import PublisherConfig
 from leg_wear_monitor.ros.inputs import DEPTH

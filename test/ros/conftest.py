@@ -34,7 +34,7 @@ if find_spec("rclpy"):
     from leg_wear_monitor.gait.config import JointEncodersConfig
     from leg_wear_monitor.gait.leg import SyntheticLeg
     from leg_wear_monitor.gait.sensors import readings
-    from leg_wear_monitor.messages.streams import streams_read
+    from leg_wear_monitor.recordings.streams import streams_read
     from leg_wear_monitor.ros.gait_publisher import PublisherConfig, sensor_message
     from leg_wear_monitor.ros.inputs import Arrival, Inputs, message_class
     from leg_wear_monitor.ros.monitor_node import MonitorNode

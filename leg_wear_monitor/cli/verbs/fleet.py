@@ -95,7 +95,7 @@ def _write_pages(out: Path, overview: "FleetOverview", fresh_days: float) -> Non
 
     from leg_wear_monitor.errors import ConfigError
     from leg_wear_monitor.fleet.overview import leg_directory
-    from leg_wear_monitor.playback.result import summary_of
+    from leg_wear_monitor.recordings.result import summary_of
     from leg_wear_monitor.report.fleet_page import fleet_page
     from leg_wear_monitor.report.page import page_html
 

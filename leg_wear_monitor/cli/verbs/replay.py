@@ -18,7 +18,7 @@ from leg_wear_monitor.state import Level, State
 
 if TYPE_CHECKING:
     from leg_wear_monitor.monitor.config.settings import MonitorConfig
-    from leg_wear_monitor.playback.summary import ReplayResult
+    from leg_wear_monitor.recordings.summary import ReplayResult
 
 
 # ``leg-wear-monitor replay``: a recording through the same monitor that runs live.
@@ -92,7 +92,7 @@ def replay(
         written.extend(write_replay(result, took[0], out, json_file))
 
     from leg_wear_monitor.dynamics.clearance.stepper import advance_beside
-    from leg_wear_monitor.playback.replay import replay as run
+    from leg_wear_monitor.recordings.replay import replay as run
 
     settings = _config(config, crank_joint, options["node"])
     with common.progress_bar("replaying") as progress, advance_beside():
@@ -159,7 +159,7 @@ def write_replay(
     """Write the requested files, and return their paths."""
     if out is None and json_file is None:
         return []
-    from leg_wear_monitor.playback.replay import REPORTS_FILE
+    from leg_wear_monitor.recordings.replay import REPORTS_FILE
 
     summary = result.summary(wall_s, made_with={"leg_wear_monitor": package_version()})
     text, written = summary.to_json(), list[Path]()
@@ -193,7 +193,7 @@ def report(directory: Path) -> int:
 
 
 def _replay(directory: Path) -> int:
-    from leg_wear_monitor.playback.result import summary_of
+    from leg_wear_monitor.recordings.result import summary_of
 
     source = directory / common.SUMMARY
     with _as_one_line(source):

@@ -7,7 +7,7 @@ import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.materials import BushingLoad
-from leg_wear_monitor.playback.result import ReplaySummary
+from leg_wear_monitor.recordings.result import ReplaySummary
 from leg_wear_monitor.report.figure import time_of
 from leg_wear_monitor.report.page import (
     NOT_VALID,

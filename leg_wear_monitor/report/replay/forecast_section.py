@@ -8,7 +8,7 @@ import numpy as np
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast, bases, three_digits
 from leg_wear_monitor.monitor.forecast.measurement import validity
 from leg_wear_monitor.monitor.ledger.entry import Measurement
-from leg_wear_monitor.playback.result import ReplaySummary, WornDepth
+from leg_wear_monitor.recordings.result import ReplaySummary, WornDepth
 from leg_wear_monitor.report.figure import length_unit
 from leg_wear_monitor.report.page import Chart, Panel, Part, Section, Series, Table, Text, not_valid
 from leg_wear_monitor.state import Figure

@@ -10,7 +10,7 @@ import attrs
 from leg_wear_monitor.monitor.alarms import joint_of
 from leg_wear_monitor.monitor.forecast.forecast import three_digits
 from leg_wear_monitor.monitor.verdict.situation import SOURCES
-from leg_wear_monitor.playback.result import Place, ReplaySummary
+from leg_wear_monitor.recordings.result import Place, ReplaySummary
 from leg_wear_monitor.report.page import LEVEL_LOOKS, NOT_VALID, STATE_LOOKS, not_valid, render
 from leg_wear_monitor.state import Figure, JointClearance, LegAlarm, Level, LifeHours, State
 

@@ -10,7 +10,7 @@ from leg_wear_monitor.monitor.alarms import amount, duration, joint_of, raised_v
 from leg_wear_monitor.monitor.verdict.decision import figures_of, how_sure
 from leg_wear_monitor.monitor.verdict.situation import COUNTED
 from leg_wear_monitor.monitor.verdict.verdict import guide_to
-from leg_wear_monitor.playback.result import (
+from leg_wear_monitor.recordings.result import (
     ReplayGait,
     ReplayRecording,
     ReplayStatus,

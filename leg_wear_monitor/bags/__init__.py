@@ -1,1 +1,0 @@
-"""Recordings on disk: MCAP and SQLite readers with salvage, MCAP writer."""

@@ -1,1 +1,0 @@
-"""Replay of recordings through the monitor."""

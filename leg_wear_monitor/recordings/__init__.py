@@ -1,0 +1,1 @@
+"""Recordings: ROS messages, MCAP, db3 and tables, and their replay through the monitor."""

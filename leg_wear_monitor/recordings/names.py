@@ -1,0 +1,104 @@
+"""Names in a message, for reports on missing names."""
+
+import struct
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from leg_wear_monitor.errors import printable
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.recordings.cdr import ENCAPSULATION
+from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, Samples
+
+_MOST_NAMED = 20
+
+
+class _Fields:
+    """Reads the fields of a message one after the other, from the frame of its header on."""
+
+    def __init__(self, raw: bytes) -> None:
+        self._raw, self._order = raw, "<" if raw[1] else ">"
+        self._at = ENCAPSULATION + 8
+        self.text()
+
+    def count(self) -> int:
+        self._at += -self._at % 4 + 4
+        return int(struct.unpack_from(f"{self._order}I", self._raw, self._at - 4)[0])
+
+    def text(self) -> str:
+        size = self.count()
+        self._at += size
+        return self._raw[self._at - size : self._at].rstrip(b"\0").decode("utf-8", "replace")
+
+    def texts(self) -> list[str]:
+        return [self.text() for _ in range(self.count())]
+
+    def skip_numbers(self) -> None:
+        if number := self.count():
+            self._at += (ENCAPSULATION - self._at) % 8 + 8 * number
+
+
+def names_in(raw: bytes) -> list[str]:
+    """Joint names in a sensor_msgs/JointState message that has been decoded successfully."""
+    return _Fields(raw).texts()
+
+
+def interfaces_in(raw: bytes) -> dict[str, list[str]]:
+    """Interfaces of each joint in a control_msgs/DynamicJointState message, decoded successfully."""
+    fields, found = _Fields(raw), dict[str, list[str]]()
+    joints = fields.texts()
+    fields.count()
+    for joint in joints:
+        found.setdefault(joint, fields.texts())
+        fields.skip_numbers()
+    return found
+
+
+def wanted_interfaces(config: MonitorConfig) -> dict[str, str]:
+    """Interfaces of the crank that are read, by the parameters that name them; empty names are not wanted."""
+    return {
+        "drive_torque.interface": config.drive_torque.interface,
+        "drive.temperature_interface": config.drive.temperature_interface,
+    }
+
+
+def twice(names: Sequence[str], joint: str) -> str:
+    """Report that a name occurs several times, and at which places; empty if it occurs at most once."""
+    places = [str(i + 1) for i, name in enumerate(names) if name == joint]
+    if len(places) < 2:
+        return ""
+    return f"joints {' and '.join(places)} of joint_states are both named {joint!r}: rename one of them"
+
+
+def is_without(samples: Samples, interfaces: Mapping[str, str]) -> NDArray[np.bool_]:
+    """Mask (n,) of the samples of control_msgs/DynamicJointState that lack a wanted interface."""
+    absent = samples["fault"] == MISSING_JOINT
+    if interfaces["drive.temperature_interface"]:
+        absent |= (samples["fault"] == NO_FAULT) & np.isnan(samples["temperature_c"])
+    return np.asarray(absent)
+
+
+def without_interface(raw: bytes, joint: str, interfaces: Mapping[str, str]) -> str:
+    """Report on a control_msgs/DynamicJointState message, decoded successfully, that lacks an interface.
+
+    Parameters
+    ----------
+    raw : bytes
+    joint : str
+    interfaces : mapping of str to str
+        Wanted interfaces by the parameters that name them; an empty one is not wanted.
+    """
+    there = interfaces_in(raw)
+    if joint not in there:
+        return f"no joint is named {joint!r}; there are {_listed(list(there))}"
+    absent = {key: name for key, name in interfaces.items() if name and name not in there[joint]}
+    if not absent:
+        return f"{joint} has no value of {' or '.join(filter(None, interfaces.values()))} yet"
+    names, keys = " and ".join(map(repr, absent.values())), " and ".join(absent)
+    return f"{joint} has no interface {names}, it has {_listed(there[joint])}; set {keys}"
+
+
+def _listed(names: list[str]) -> str:
+    shown = ", ".join(printable(name, 100) for name in sorted(set(names))[:_MOST_NAMED]) or "none"
+    return f"{shown} and more" if len(set(names)) > _MOST_NAMED else shown

@@ -1,0 +1,251 @@
+"""Conversion of reports to serialized output messages, byte-identical live and in replay."""
+
+import json
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from types import MappingProxyType
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from leg_wear_monitor.files import or_nan
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.monitor.alarms import Alarm, code_of, state_of
+from leg_wear_monitor.monitor.config.parameters import NODE
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.forecast.forecast import LegForecast, answer_words, lifetime_values
+from leg_wear_monitor.monitor.reports import (
+    AlarmList,
+    CycleReport,
+    JointReport,
+    Reports,
+    SampleReports,
+    Status,
+    VerdictReport,
+)
+from leg_wear_monitor.monitor.status import verdict_status
+from leg_wear_monitor.monitor.verdict.verdict import with_unit
+from leg_wear_monitor.recordings import encode
+from leg_wear_monitor.recordings.leg_markers import LINKAGE, MARKERS
+from leg_wear_monitor.recordings.qos import LATCHED, SENSOR_DATA
+from leg_wear_monitor.recordings.streams import Outgoing, Output, single
+from leg_wear_monitor.state import Level
+from leg_wear_monitor.twin import CRANK
+
+# Values of each clearance joint as numbers of their own, because tools plot arrays by index only.
+
+
+def _remaining_p50_h(joint: JointReport) -> float | None:
+    hours = joint.forecast.hours if joint.forecast else None
+    return hours.p50 if hours else None
+
+
+SCALARS: Mapping[str, Callable[[JointReport], float | None]] = MappingProxyType(
+    {
+        "clearance_m": lambda joint: joint.clearance_m,
+        "estimated_m": lambda joint: joint.estimated_m,
+        "remaining_p50_h": _remaining_p50_h,
+        "peak_force_n": lambda joint: joint.peak_force_n,
+    }
+)
+"""Values of a joint by the last part of their topics' names; None or not finite if not known."""
+
+
+class Scalars:
+    """Messages of std_msgs/Float64 after each gait cycle; a value that is not known has no message.
+
+    Parameters
+    ----------
+    clearance_joints : sequence of str
+        The clearance joints, in the order of the reports.
+
+    Attributes
+    ----------
+    outputs : tuple of Output
+        One for each joint and value, such as ``~/joints/A/clearance_m``.
+    """
+
+    def __init__(self, clearance_joints: Sequence[str]) -> None:
+        self._by_joint = {
+            joint: {name: Output(f"~/joints/{joint}/{name}", encode.FLOAT64) for name in SCALARS}
+            for joint in clearance_joints
+        }
+        self.outputs = tuple(output for outputs in self._by_joint.values() for output in outputs.values())
+
+    def of(self, cycle: CycleReport) -> Iterator[Outgoing]:
+        """Messages of all known values of a gait cycle."""
+        for joint in cycle.joints:
+            for name, output in self._by_joint[joint.joint].items():
+                value = SCALARS[name](joint)
+                if value is not None and math.isfinite(value):
+                    yield single(output, cycle.stamp_ns, encode.float64s(value)[0].tobytes())
+
+
+CLEARANCES = Output("~/clearance_states", encode.JOINT_STATE)
+IMPACTS = Output("~/impact_forces", encode.JOINT_STATE, SENSOR_DATA)
+TORQUE = Output("~/predicted_torque", encode.WRENCH_STAMPED, SENSOR_DATA)
+MEASURED_TORQUE = Output("~/measured_torque", encode.WRENCH_STAMPED, SENSOR_DATA)
+FORECAST = Output("~/forecast", encode.DIAGNOSTIC_ARRAY, LATCHED)
+ALARMS = Output("~/alarms", encode.DIAGNOSTIC_ARRAY, LATCHED)
+VERDICT = Output("~/verdict", encode.DIAGNOSTIC_ARRAY, LATCHED)
+STATE = Output("~/state", encode.STRING, LATCHED)
+DIAGNOSTICS = Output("/diagnostics", encode.DIAGNOSTIC_ARRAY)
+OUTPUTS = (CLEARANCES, IMPACTS, TORQUE, FORECAST, ALARMS, VERDICT, STATE, DIAGNOSTICS, MARKERS, LINKAGE)
+"""Outputs of every monitor; `Messages.outputs` has all."""
+
+_AXES = {"x": 0, "y": 1, "z": 2}
+_DIGITS = 15
+
+
+class Messages:
+    """Converts reports to messages.
+
+    Parameters
+    ----------
+    config : MonitorConfig
+    clearance_joints : sequence of str
+        The clearance joints, in the order of the reports.
+    node : str
+        Full name of the node; without its leading slash, it prefixes the names in diagnostics.
+
+    Attributes
+    ----------
+    outputs : tuple of Output
+        All topics that the parameters ask for.
+    """
+
+    def __init__(self, config: MonitorConfig, clearance_joints: Sequence[str], node: str = NODE) -> None:
+        self.config, self._node = config, node.lstrip("/")
+        self._scalars = Scalars(clearance_joints) if config.publish_scalars else None
+        plotted = () if self._scalars is None else (MEASURED_TORQUE, *self._scalars.outputs)
+        self.outputs = (*OUTPUTS, *plotted)
+        self._clearances = [f"{joint}_clearance" for joint in clearance_joints]
+        self._impacts = [f"{joint}_impact" for joint in clearance_joints]
+
+    def of(self, reports: Reports) -> Iterator[Outgoing]:
+        """All messages for reports: samples, gait cycles, alarms, verdict and state."""
+        yield from self.of_samples(reports.samples)
+        for cycle in reports.cycles:
+            yield single(CLEARANCES, cycle.stamp_ns, self.clearances(cycle))
+            if self._scalars:
+                yield from self._scalars.of(cycle)
+        for alarms in reports.alarms:
+            yield single(ALARMS, alarms.stamp_ns, self.alarms(alarms))
+        for verdict in reports.verdicts:
+            yield single(VERDICT, verdict.stamp_ns, self.verdict(verdict))
+        for state in reports.states:
+            yield single(STATE, state.stamp_ns, self.state(state))
+
+    def of_samples(self, samples: SampleReports) -> Iterator[Outgoing]:
+        """Torque at each tracked sample, contact forces at each crank sample, and the measured torque."""
+        followed = np.isfinite(samples.predicted_torque_nm)
+        if followed.any():
+            yield self._torques(TORQUE, samples.stamp_ns[followed], samples.predicted_torque_nm[followed])
+        measured = np.isfinite(samples.measured_torque_nm)
+        if self._scalars and measured.any():
+            torques = samples.measured_torque_nm[measured]
+            yield self._torques(MEASURED_TORQUE, samples.stamp_ns[measured], torques)
+        followed &= samples.kind == CRANK
+        if self.config.publish_impact_forces and followed.any():
+            yield self._forces(samples, followed)
+
+    def _torques(self, output: Output, stamps: NDArray[np.int64], torques: Floats) -> Outgoing:
+        torque = np.zeros((len(stamps), 3))
+        torque[:, _AXES[self.config.drive_torque.axis]] = torques
+        return Outgoing(output, stamps, encode.wrenches(stamps, torque=torque, frame_id=self.config.frame_id))
+
+    def _forces(self, samples: SampleReports, which: NDArray[np.bool_]) -> Outgoing:
+        stamps, forces = samples.stamp_ns[which], samples.contact_force_n[which]
+        rows = encode.joint_states(stamps, self._impacts, effort=forces, frame_id=self.config.frame_id)
+        return Outgoing(IMPACTS, stamps, rows)
+
+    def clearances(self, cycle: CycleReport) -> bytes:
+        """The message of `CLEARANCES` for a gait cycle."""
+        joints = cycle.joints
+        growth = [or_nan(joint.growth_mps) for joint in joints]
+        return encode.joint_states(
+            [cycle.stamp_ns],
+            self._clearances,
+            position=[[joint.clearance_m for joint in joints]],
+            velocity=[growth],
+            effort=[[joint.peak_force_n for joint in joints]],
+            frame_id=self.config.frame_id,
+        ).tobytes()
+
+    def forecast(self, cycle: CycleReport) -> bytes:
+        """The message of `FORECAST` after a gait cycle: remaining life of each joint and of the leg."""
+        leg = [] if cycle.forecast is None else [_leg_lifetime(cycle.forecast)]
+        return self._array(cycle.stamp_ns, [*map(_lifetime, cycle.joints), *leg])
+
+    def alarms(self, alarms: AlarmList) -> bytes:
+        """The message of `ALARMS`: the present state of all alarms."""
+        return self._array(alarms.stamp_ns, map(_alarm, alarms.alarms))
+
+    def verdict(self, report: VerdictReport) -> bytes:
+        """The message of `VERDICT`: one status, as the first one of `DIAGNOSTICS`."""
+        return self._array(report.stamp_ns, [verdict_status(report.verdict)])
+
+    def state(self, report: VerdictReport) -> bytes:
+        """The message of `STATE`: JSON of the state of the leg, in one line."""
+        return encode.string(json.dumps(report.state.to_dict(), allow_nan=False))
+
+    def diagnostics(self, stamp_ns: int, statuses: Iterable[Status]) -> bytes:
+        """The message of `DIAGNOSTICS`."""
+        return self._array(stamp_ns, statuses)
+
+    def _array(self, stamp_ns: int, statuses: Iterable[Status]) -> bytes:
+        hardware = self.config.hardware
+        lines = [
+            (
+                f"{self._node}: {status.name}",
+                int(status.level),
+                status.message,
+                hardware,
+                {
+                    "fault_code": status.fault_code,
+                    **{key: plain(value) for key, value in status.values.items()},
+                },
+            )
+            for status in statuses
+        ]
+        return encode.diagnostic_array(stamp_ns, lines)
+
+
+def plain(value: float) -> str:
+    """A number as text: integers without a decimal point, other numbers with fifteen digits."""
+    return str(int(value)) if float(value).is_integer() else f"{value:.{_DIGITS}g}"
+
+
+def _alarm(alarm: Alarm) -> Status:
+    values = {
+        with_unit("value", alarm.unit): alarm.value,
+        with_unit("limit", alarm.unit): alarm.limit,
+        with_unit("worst", alarm.unit): alarm.worst,
+        "raised_s": alarm.raised_ns / 1e9,
+        "acknowledged": float(alarm.acknowledged),
+        "present_level": float(alarm.present),
+    }
+    return Status(alarm.name, alarm.level, state_of(alarm), values, code_of(alarm))
+
+
+def _lifetime(joint: JointReport) -> Status:
+    name, forecast = f"forecast {joint.joint}", joint.forecast
+    if forecast is None:
+        return Status(name, Level.OK, "not enough growth or data", {})
+    values = lifetime_values(forecast)
+    if forecast.clearance_m is not None:
+        quantiles = attrs.asdict(forecast.clearance_m)
+        values |= {f"clearance_{fraction}_m": value for fraction, value in quantiles.items()}
+    values["measurements"] = float(forecast.measurements)
+    if forecast.prior is not None:
+        values["wear_coefficient_sigma"] = forecast.prior.sigma
+    return Status(name, Level.OK, answer_words(forecast), values)
+
+
+def _leg_lifetime(forecast: LegForecast) -> Status:
+    """Life until the first joint reaches its limit, and each joint's probability of being the first."""
+    values = lifetime_values(forecast)
+    values |= {f"{joint}_first_probability": value for joint, value in forecast.first_probability.items()}
+    values["simulated_lives"] = float(forecast.simulated_lives)
+    return Status("forecast leg", Level.OK, forecast.answer.value, values)

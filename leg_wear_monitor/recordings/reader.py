@@ -1,0 +1,475 @@
+"""Reads recordings, damaged ones too, as blocks of gait samples in log-time order, in bounded memory."""
+
+import heapq
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from itertools import repeat
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from leg_wear_monitor.errors import printable
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.recordings import bag
+from leg_wear_monitor.recordings.cdr import Decoder, mark_zero_stamps
+from leg_wear_monitor.recordings.findings import Clocks, Finding, RecordingError, Severity, reading
+from leg_wear_monitor.recordings.names import (
+    is_without,
+    names_in,
+    twice,
+    wanted_interfaces,
+    without_interface,
+)
+from leg_wear_monitor.recordings.piece import Piece
+from leg_wear_monitor.recordings.streams import INTERFACES, JOINT_STATE, WRENCH_STAMPED
+from leg_wear_monitor.recordings.table_layout import (
+    CRANK_SPEED,
+    DRIVE_TORQUE,
+    FOOT_LOAD,
+    FOOT_LOAD_ALONG,
+    STAMP,
+    Column,
+    columns_of,
+)
+from leg_wear_monitor.recordings.wrench_axis import WrenchAxis
+from leg_wear_monitor.twin import TORQUE
+from leg_wear_monitor.twin.sample import GAIT_SAMPLE, MISSING_JOINT, NO_FAULT, NOT_FINITE, ZERO_STAMP, Samples
+
+if TYPE_CHECKING:
+    from leg_wear_monitor.recordings.table_file import TableFile
+
+# Check that several files record one leg: the same topics, and the crank joint in their messages.
+
+
+_ADVICE = "are these two legs? Give one leg at a time, or select its topic with --joint-states"
+
+
+def check_topics(
+    sources: Iterable[bag.Source], topics: dict[str, str], joint_states: str | None
+) -> list[Finding]:
+    """Check that each file has the crank's topic, or has no other topic that could be a crank's.
+
+    Parameters
+    ----------
+    sources : iterable of Source
+    topics : dict
+        Topic by role.
+    joint_states : str, optional
+        The topic, if the user named it.
+
+    Raises
+    ------
+    RecordingError
+        If a file has a crank's topic in a different namespace and the user named no topic.
+    """
+    topic, findings = topics["joint_states"], []
+    for source in sources:
+        recorded = {channel.topic for channel in source.file.channels.values()}
+        if topic in recorded:
+            continue
+        others = [other for other in recorded if other.endswith("/joint_states")]
+        if others and joint_states is None:
+            text = f"has {bag.listed(others)}, where other files have {bag.listed([topic])}: {_ADVICE}"
+            raise RecordingError(str(source.bag_file.path), "joint_states", text)
+        text = f"has no topic {topic}: no crank is read from it"
+        findings.append(Finding(source.bag_file.path, text, Severity.NOTE))
+    return findings
+
+
+_MOST = 1000
+_NAMED = (NO_FAULT, NOT_FINITE, ZERO_STAMP)
+
+
+@attrs.define
+class _Missing:
+    """Messages of a file without the crank, their joints, and a report on the first without an interface."""
+
+    count: int = 0
+    names: set[str] = attrs.Factory(set)
+    twice: str = ""
+    without_interface: int = 0
+    interfaces: str = ""
+
+
+class JointNames:
+    """Searches the messages for the crank joint and its interfaces.
+
+    Parameters
+    ----------
+    crank_joint : str
+    interfaces : mapping of str to str
+        Interfaces returned by `wanted_interfaces`.
+    """
+
+    def __init__(self, crank_joint: str, interfaces: Mapping[str, str]) -> None:
+        self._crank, self._interfaces = crank_joint, interfaces
+        self._found = 0
+        self._files: dict[Path, _Missing] = {}
+
+    def add_samples(
+        self, path: Path, data: NDArray[np.uint8], messages: NDArray[np.void], samples: Samples
+    ) -> None:
+        """Count messages of a file, using the samples decoded from them."""
+        file = self._files.setdefault(path, _Missing())
+        cranks = messages["type"] == JOINT_STATE
+        self._found += int(np.count_nonzero(cranks & np.isin(samples["fault"], _NAMED)))
+        missing = messages[cranks & (samples["fault"] == MISSING_JOINT)]
+        file.count += len(missing)
+        if len(missing) and len(file.names) < _MOST:
+            names = names_in(_raw(data, missing[0]))[:_MOST]
+            file.names |= set(names)
+            file.twice = file.twice or twice(names, self._crank)
+        without = messages[(messages["type"] == INTERFACES) & is_without(samples, self._interfaces)]
+        file.without_interface += len(without)
+        if len(without) and not file.interfaces:
+            file.interfaces = without_interface(_raw(data, without[0]), self._crank, self._interfaces)
+
+    def findings(self) -> list[Finding]:
+        """Findings after all messages have been read.
+
+        Raises
+        ------
+        RecordingError
+            If messages contain joints but never the crank.
+        """
+        findings = []
+        for path, file in self._files.items():
+            if file.interfaces:
+                text = f"{file.without_interface} messages of dynamic_joint_states: {file.interfaces}"
+                findings.append(Finding(path, text))
+            if file.twice:
+                raise RecordingError(str(path), self._crank, file.twice)
+            if file.count:
+                text = f"is not among the joints of {file.count} messages, they have {bag.listed(file.names)}"
+                if not self._found:
+                    remedy = "set the crank with --crank-joint (crank_joint in the parameters)"
+                    raise RecordingError(str(path), self._crank, f"{text}; {remedy}")
+                text = f"joint {self._crank} {text}; {self._found} messages have it"
+                findings.append(Finding(path, text, Severity.NOTE))
+        return findings
+
+
+def _raw(data: NDArray[np.uint8], message: np.void) -> bytes:
+    return data[message["begin"] : message["end"]].tobytes()
+
+
+# Pauses between recordings that are replayed together: time without recording, not an input fault.
+
+
+@attrs.frozen(eq=False)
+class Block:
+    """Samples in order of log time.
+
+    Attributes
+    ----------
+    samples : (n,) array of GAIT_SAMPLE
+    log_time_ns : (n,) array of int
+    fraction : float
+        Fraction of the recording's bytes read so far, 0 to 1.
+    source : (n,) array of int
+        File index of each sample.
+    pause_ns : int
+        Duration of the pause before this block, in log time [ns]; 0 if there was no pause.
+    """
+
+    samples: Samples
+    log_time_ns: NDArray[np.int64]
+    fraction: float
+    source: NDArray[np.int64]
+    pause_ns: int = 0
+
+    def part(self, which: slice, pause_ns: int = 0) -> "Block":
+        """Block of a subset of the samples."""
+        return Block(
+            self.samples[which], self.log_time_ns[which], self.fraction, self.source[which], pause_ns
+        )
+
+
+class Pauses:
+    """Splits blocks where one recording has ended and the next one begins later.
+
+    Parameters
+    ----------
+    files : sequence of pathlib.Path
+        File by source index.
+    recordings : sequence of int
+        Recording index of each file; files of one bag have no pauses between them.
+    shortest_ns : int
+        Shortest gap that counts as a pause [ns].
+
+    Attributes
+    ----------
+    findings : list of Finding
+    """
+
+    def __init__(self, files: Sequence[Path], recordings: Sequence[int], shortest_ns: int) -> None:
+        self._files, self._shortest_ns = files, shortest_ns
+        self._recordings = np.array(recordings, np.int64)
+        self._known: set[int] = set()
+        self._last_ns = 0
+        self.findings: list[Finding] = []
+
+    def cut(self, block: Block) -> Iterator[Block]:
+        """Split a block at its pauses."""
+        times = np.concatenate([[self._last_ns], block.log_time_ns])
+        begin, pause_ns = 0, 0
+        for at in np.flatnonzero(np.diff(times) > self._shortest_ns).tolist():
+            recordings = self._recordings[block.source]
+            self._known.update(recordings[:at].tolist())
+            if self._known and recordings[at] not in self._known:
+                if at > begin:
+                    yield block.part(slice(begin, at), pause_ns)
+                begin, pause_ns = at, int(times[at + 1] - times[at])
+                self._report(block.source[at], pause_ns)
+        self._known.update(self._recordings[block.source].tolist())
+        self._last_ns = int(times[-1])
+        if begin < len(block.samples):
+            yield block.part(slice(begin, None), pause_ns)
+
+    def _report(self, source: int, pause_ns: int) -> None:
+        text = (
+            f"begins {pause_ns * 1.0e-9:.4g} s after the recording before it ended; the leg was not "
+            "monitored during this pause, which is not a fault of the input"
+        )
+        self.findings.append(Finding(self._files[source], text, Severity.NOTE))
+
+
+TIMES = ("header", "log", "publish")
+_TOGETHER = 4096  # smallest intended number of samples in a block
+_COMPARED = 100  # wrenches per file to compare the axes
+_MOST_WAITING = 640_000  # samples of overlapping chunks that are held, at 800 bytes with copies
+
+
+class Recording:
+    """One or more open recordings, read as one.
+
+    Messages are ordered by log time, which is the order of reception. Messages of equal log time keep their
+    order in the file.
+
+    Parameters
+    ----------
+    paths : iterable
+        MCAP, .db3, CSV and Parquet files; bag directories; tables in memory.
+    config : MonitorConfig
+        Provides the name of the crank joint and the source of the torque.
+    joint_states, drive_torque, foot_load : str, optional
+        Topics; by default found by their relative names.
+    time : str
+        Time that stamps the samples, one of `TIMES`. Float64 messages have no header and use the log time.
+
+    Attributes
+    ----------
+    topics : dict
+        Topics that are read, by their relative name in the node.
+
+    Raises
+    ------
+    RecordingError
+        If the recordings contain nothing usable.
+    """
+
+    def __init__(
+        self,
+        paths: Iterable[bag.Recordable],
+        config: MonitorConfig,
+        *,
+        joint_states: str | None = None,
+        drive_torque: str | None = None,
+        foot_load: str | None = None,
+        time: str = "header",
+    ) -> None:
+        if time not in TIMES:
+            raise RecordingError("time", "", f"{time!r} is not one of {', '.join(TIMES)}")
+        self.time = time
+        self._clocks = Clocks()
+        self._decoder = Decoder(config)
+        bag_files, self._findings = bag.find_files(paths)
+        self._axis = WrenchAxis(config.drive_torque.axis)
+        self._joints = JointNames(config.crank_joint, wanted_interfaces(config))
+        with ExitStack() as stack:
+            self._sources, lost = bag.open_sources(bag_files, config, stack)
+            given = {"joint_states": joint_states, "drive_torque": drive_torque, "foot_load": foot_load}
+            given["dynamic_joint_states"] = drive_torque
+            self.topics, missing = bag.assign(self._sources, config, given)
+            self._findings += lost + missing + check_topics(self._sources, self.topics, joint_states)
+            self._close = stack.pop_all()
+        numbers = [source.bag_file.recording for source in self._sources]
+        self._pauses = Pauses(self.files, numbers, round(config.tracker.gap_limit_s * 1.0e9))
+
+    def __enter__(self) -> "Recording":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the files."""
+        self._close.close()
+
+    @property
+    def files(self) -> list[Path]:
+        """The files that are read."""
+        return [source.bag_file.path for source in self._sources]
+
+    @property
+    def findings(self) -> list[Finding]:
+        """Findings so far; complete after all blocks have been read."""
+        found = [each for source in self._sources for each in source.file.findings]
+        return self._findings + found + self._pauses.findings
+
+    @property
+    def is_partial(self) -> bool:
+        """True if recorded data are lost or may be wrong."""
+        return any(finding.severity is Severity.LOSS for finding in self.findings)
+
+    def blocks(self) -> Iterator[Block]:
+        """Iterate over the samples of the whole recording; possible once only.
+
+        Raises
+        ------
+        RecordingError
+            At the end, if no message contains the crank; immediately, if the system cannot read the files.
+        """
+        with reading(self.files):
+            for block in self._joined():
+                yield from self._pauses.cut(block)
+        self._findings += self._joints.findings()
+        notes, other_axis = self._clocks.notes(), self._axis.report()
+        self._findings += [Finding(self.files[0], other_axis)] if other_axis else []
+        self._findings += [Finding(self.files[0], text, Severity.NOTE) for text in notes]
+
+    def _joined(self) -> Iterator[Block]:
+        """Samples of all files in order of log time."""
+        read, total = 0, max(1, sum(source.file.size for source in self._sources))
+        none: NDArray[np.int64] = np.zeros(0, np.int64)
+        waiting = Block(np.zeros(0, GAIT_SAMPLE), none, 0.0, none)
+        for number, piece in self._pieces():
+            bag_file = self._sources[number].bag_file
+            passed = int(np.searchsorted(waiting.log_time_ns, piece.start_ns))
+            if passed >= _TOGETHER:
+                yield waiting.part(slice(passed))
+                waiting = waiting.part(slice(passed, None))
+            elif len(waiting.samples) > _MOST_WAITING:
+                self._too_many_wait(bag_file.path)
+                yield waiting
+                waiting = waiting.part(slice(0))
+            read += piece.stored
+            times = piece.messages["log_time_ns"]
+            source = np.full(len(times), number, np.int64)
+            new = Block(self._samples(bag_file, piece), times, min(read / total, 1.0), source)
+            waiting = _merged(waiting, new)
+        if len(waiting.samples):
+            yield attrs.evolve(waiting, fraction=1.0)
+
+    def _pieces(self) -> Iterator[tuple[int, Piece]]:
+        """Pieces of all files, with their file index, ordered by start time; loaded only when needed."""
+        dues = (
+            zip(repeat(number), source.pieces(), strict=False) for number, source in enumerate(self._sources)
+        )
+        for number, due in heapq.merge(*dues, key=lambda each: each[1].start_ns):
+            piece = due.load()
+            if piece is not None:
+                yield number, piece
+
+    def _too_many_wait(self, path: Path) -> None:
+        text = f"has chunks that overlap in time by over {_MOST_WAITING} messages: some come out of order"
+        if not any(finding.text == text for finding in self._findings):
+            self._findings.append(Finding(path, text))
+
+    def _samples(self, bag_file: bag.BagFile, piece: Piece) -> Samples:
+        """Decode a piece, and stamp its samples with the selected time."""
+        samples = self._decoder.many(piece.data, piece.messages)
+        self._joints.add_samples(bag_file.path, piece.data, piece.messages, samples)
+        wrenches = np.flatnonzero(
+            (piece.messages["type"] == WRENCH_STAMPED)
+            & (samples["kind"] == TORQUE)
+            & (samples["fault"] == NO_FAULT)
+        )
+        some = piece.messages[wrenches[:: max(1, len(wrenches) // _COMPARED)]]
+        self._axis.add(piece.data[one["begin"] : one["end"]].tobytes() for one in some)
+        if bag_file.storage not in bag.TABLES:  # which have one clock only
+            self._clocks.compare(samples, piece.messages)
+        if self.time != "header":
+            samples["fault"][samples["fault"] == ZERO_STAMP] = NO_FAULT
+            samples["stamp_ns"] = piece.messages[f"{self.time}_time_ns"]
+            mark_zero_stamps(samples)
+        return samples
+
+
+def _merged(block: Block, new: Block) -> Block:
+    """Merge two blocks in order of log time."""
+    times = np.concatenate([block.log_time_ns, new.log_time_ns])
+    samples = np.concatenate([block.samples, new.samples])
+    source = np.concatenate([block.source, new.source])
+    if np.any(times[1:] < times[:-1]):
+        order = np.argsort(times, kind="stable")
+        times, samples, source = times[order], samples[order], source[order]
+    return Block(samples, times, new.fraction, source)
+
+
+# A table as the reader understands it: rows, time, columns with their ranges in SI units.
+
+
+_SI = {CRANK_SPEED: "rad/s", DRIVE_TORQUE: "N m", FOOT_LOAD: "N", FOOT_LOAD_ALONG: "N"}
+
+
+def understood(path: Path, config: MonitorConfig) -> tuple[list[str], list[Finding]]:
+    """Read a table as a whole; return how it was interpreted, one line per item, and the findings.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        CSV or Parquet file.
+    config : MonitorConfig
+        Names the columns and their units.
+
+    Raises
+    ------
+    RecordingError
+        If the table cannot be read.
+    """
+    from leg_wear_monitor.recordings.table_file import TableFile
+
+    files, findings = bag.find_files([path])
+    with ExitStack() as stack:
+        (source,), _ = bag.open_sources(files, config, stack)
+        table = source.file
+        if not isinstance(table, TableFile):
+            raise TypeError(f"{path} is no table")
+        for due in table.pieces({}):
+            due.load()
+        columns = columns_of(config)
+        lines = [_time(table, columns), *(_column(table, one) for one in columns if one.key != STAMP)]
+        return [*lines, *_others(table, columns)], findings + table.findings
+
+
+def _time(table: "TableFile", columns: tuple[Column, ...]) -> str:
+    counts = table.counts
+    seconds = ((counts.last_ns or 0) - (counts.first_ns or 0)) * 1.0e-9
+    rate = f", {(counts.rows - 1) / seconds:.4g} rows a second" if seconds > 0.0 else ""
+    of = next((f"time {_named(one)}" for one in columns if one.key == STAMP), "no column of the time")
+    return f"table of {counts.rows} rows over {seconds:.6g} s{rate}; {of}"
+
+
+def _column(table: "TableFile", column: Column) -> str:
+    counts, unit = table.counts, _SI.get(column.key, "rad")
+    number = counts.measured.get(column.key, 0)
+    found = f"{number} values"
+    if column.key in counts.least:
+        found += f", {counts.least[column.key]:.4g} to {counts.most[column.key]:.4g} {unit}"
+    elif number:
+        found += ", all of them NaN or infinite"
+    return f"{column.key} {_named(column)}: {found}"
+
+
+def _others(table: "TableFile", columns: tuple[Column, ...]) -> list[str]:
+    read = {column.name for column in columns}
+    others = [printable(name, 100) for name in table.names if name not in read]
+    return [f"not read: {', '.join(others)}"] if others else []
+
+
+def _named(column: Column) -> str:
+    return f"from {column.name!r} in {column.unit}"

@@ -1,0 +1,323 @@
+"""All joints and torques of recordings as time series.
+
+`commissioning` then finds out which joint is the crank, and which torque drives it.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterable
+from contextlib import ExitStack
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.estimate.joint_motion import Series, series
+from leg_wear_monitor.monitor.config.inputs import EFFORT, FLOAT64, INTERFACE, WRENCH, DriveTorque
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.recordings import outputs
+from leg_wear_monitor.recordings.bag import Recordable, Source, check_channel, find_files, open_sources
+from leg_wear_monitor.recordings.cdr import Decoder
+from leg_wear_monitor.recordings.findings import Finding, RecordingError, Severity
+from leg_wear_monitor.recordings.names import interfaces_in, names_in, twice
+from leg_wear_monitor.recordings.piece import Channel
+from leg_wear_monitor.recordings.streams import INTERFACES, JOINT_STATE, STREAMS, WRENCH_STAMPED, Stream
+from leg_wear_monitor.twin import CRANK, KINDS, TORQUE
+from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, ZERO_STAMP, Samples
+
+# Identity of a series: each joint is a candidate for the crank, each torque for the drive torque.
+
+
+@attrs.frozen
+class JointName:
+    """A joint of a recording: its topic and its name in the messages."""
+
+    topic: str
+    joint: str
+
+
+@attrs.frozen
+class TorqueSource:
+    """A torque of a recording.
+
+    Attributes
+    ----------
+    source : str
+        `WRENCH`, `EFFORT`, `INTERFACE` or `FLOAT64`, as the parameter `drive_torque.source`.
+    topic : str
+    component : str
+        Axis of a wrench (x, y or z); joint of an effort or of an interface; empty for a Float64.
+    interface : str
+        Name of the joint's interface, such as ``motor_current``; empty for the other sources.
+    """
+
+    source: str
+    topic: str
+    component: str = ""
+    interface: str = ""
+
+    @property
+    def label(self) -> str:
+        """Source, component and topic, as messages print them."""
+        if self.source == WRENCH:
+            return f"wrench, axis {self.component}, of {self.topic}"
+        if self.source == EFFORT:
+            return f"effort of {self.component} in {self.topic}"
+        if self.source == INTERFACE:
+            return f"{self.interface} of {self.component} in {self.topic}"
+        return f"Float64 of {self.topic}"
+
+
+@attrs.frozen(eq=False)
+class Signals:
+    """All candidates of one or more recordings, as series over time."""
+
+    joints: dict[JointName, Series]
+    torques: dict[TorqueSource, Series]
+
+
+# Reading: each channel is decoded by the monitor's own decoder, once for each joint or axis.
+#
+# The monitor's configuration names one crank joint and one axis, and its decoder yields the angle and the
+# torque of these only. So one decoder is made for each joint, as if that were the crank, and one for each
+# axis. A recording is read in pieces, because it may be larger than the memory.
+
+
+# Ends of the topics that the monitor publishes as joint states or wrenches. They are not sensors, and the
+# monitor's predicted torque would fit better than any measured torque.
+_PUBLISHED = tuple(each.name.lstrip("~") for each in (outputs.CLEARANCES, outputs.IMPACTS, outputs.TORQUE))
+# Interfaces of a joint that are not candidates: three are not torques, and joint_states has the effort as
+# well.
+_NO_CANDIDATES = ("position", "velocity", "acceleration", "effort")
+_MOST_JOINTS = 200  # joints per topic: each joint is decoded separately, so this bounds the work
+_NAMING_MESSAGES = 20  # messages at the start of a piece to read joint names from
+_LONGEST_PAUSE_NS = 10 * 10**9
+_NO_JOINT = "(no joint)"  # name of a crank joint that no message has
+
+
+_Selected = list[tuple[str, Stream]]
+"""Topics that are read, and their streams; files of one recording may share an entry."""
+
+_Parts = list[tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]]
+"""Parts of one series, a piece each: stamps [ns], values, indices of the recording, (n,) each."""
+
+
+def read_signals(
+    paths: Iterable[Recordable],
+    config: MonitorConfig,
+    *,
+    joint_states: str | None = None,
+    drive_torque: str | None = None,
+    progress: Callable[[float], None] = lambda _fraction: None,
+) -> tuple[Signals, list[Finding]]:
+    """Read all joints and torques of recordings.
+
+    Parameters
+    ----------
+    paths : iterable
+        MCAP, .db3, CSV and Parquet files, bag directories, tables in memory.
+    config : MonitorConfig
+        Columns and units of tables.
+    joint_states, drive_torque : str, optional
+        The only topic to read for joints, or for torques; default: all topics.
+    progress : callable
+        Called after each piece with the fraction that is read, up to 1.
+
+    Returns
+    -------
+    signals : Signals
+    findings : list of Finding
+        Files and channels that were not read, and damage in those that were.
+
+    Raises
+    ------
+    RecordingError
+        If nothing can be read, or there is no topic of joints.
+    """
+    bag_files, findings = find_files(paths)
+    with ExitStack() as stack:
+        sources, unreadable = open_sources(bag_files, config, stack)
+        selected, skipped = _select(sources, joint_states, drive_torque)
+        if not any(stream.kind == CRANK for _, stream in selected):
+            raise RecordingError(
+                ", ".join(str(one.path) for one in bag_files),
+                "joint_states",
+                "no topic of sensor_msgs/msg/JointState",
+            )
+        collected: dict[JointName | TorqueSource, _Parts] = {}
+        read, total = 0, max(1, sum(source.file.size for source in sources))
+        for source in sources:
+            for due in source.pieces():
+                piece = due.load()
+                if piece is not None:  # a damaged piece is a finding of its file
+                    recording = source.bag_file.recording
+                    _add_piece(collected, selected, piece.data, piece.messages, recording)
+                    read += piece.stored
+                    progress(min(1.0, read / total))
+        findings += unreadable + skipped + [each for source in sources for each in source.file.findings]
+    numbers = Counter(name.topic for name in collected if isinstance(name, JointName) or name.interface)
+    crowded = (topic for topic, number in numbers.items() if number >= _MOST_JOINTS)
+    only = f"only the first {_MOST_JOINTS} of its joints are read"
+    findings += [Finding(bag_files[0].path, f"{topic}: {only}", Severity.NOTE) for topic in crowded]
+    return _signals(collected), findings
+
+
+def _select(
+    sources: list[Source], joint_states: str | None, drive_torque: str | None
+) -> tuple[_Selected, list[Finding]]:
+    """Choose the topics to be read, and enter their channels in `Source.types`.
+
+    A source writes the number that `Source.types` has for a channel into the field `type` of its messages.
+    Elsewhere this number is the code of the stream. Here several topics may have the same stream, so the
+    number is the position of topic and stream in the returned list, counted from 1.
+    """
+    selected: dict[tuple[str, Stream], int] = {}
+    findings: list[Finding] = []
+    for source in sources:
+        for number, channel in sorted(source.file.channels.items()):
+            path, stream = source.bag_file.path, _stream(channel, joint_states, drive_torque)
+            if stream is None:
+                continue
+            try:
+                check_channel(stream, channel, str(path))
+            except RecordingError as error:
+                findings.append(Finding(path, f"{error.key} {error.fault}: it is not read", Severity.NOTE))
+                continue
+            source.types[number] = selected.setdefault((channel.topic, stream), 1 + len(selected))
+    return list(selected), findings
+
+
+def _stream(channel: Channel, joint_states: str | None, drive_torque: str | None) -> Stream | None:
+    """Stream of a channel by its message type; None for a channel that is not read."""
+    if channel.topic.endswith(_PUBLISHED):
+        return None
+    for stream in STREAMS:
+        # The streams of a foot load have the same types as torques; they are not read as torques.
+        if stream.type == channel.type and stream.kind in (CRANK, TORQUE):
+            wanted = joint_states if stream.kind == CRANK else drive_torque
+            return stream if wanted in (None, channel.topic, channel.topic.lstrip("/")) else None
+    return None
+
+
+def _add_piece(
+    collected: dict[JointName | TorqueSource, _Parts],
+    selected: _Selected,
+    data: NDArray[np.uint8],
+    messages: NDArray[np.void],
+    recording: int,
+) -> None:
+    """Decode a piece, and add its values to the series of each joint and torque.
+
+    Parameters
+    ----------
+    collected : dict
+        Parts of the series so far, added to.
+    selected : list of (str, Stream)
+        List returned by `_select`.
+    data : (bytes,) array of uint8
+    messages : (n,) array of `cdr.MESSAGE`
+        Position of each message in the data; `type` is the position in ``selected``, from 1.
+    recording : int
+        Index of the recording.
+    """
+    for number in np.unique(messages["type"]).tolist():
+        topic, stream = selected[number - 1]
+        chosen = messages[messages["type"] == number]  # a copy, with the code that the decoder expects
+        chosen["type"] = stream.code
+        for name, samples, field in _decoded_series(topic, stream.code, data, chosen):
+            # a message without a stamp is usable at its log time
+            is_unstamped = samples["fault"] == ZERO_STAMP
+            largest = KINDS[CRANK if isinstance(name, JointName) else TORQUE].largest
+            is_usable = (is_unstamped | (samples["fault"] == NO_FAULT)) & (np.abs(samples[field]) <= largest)
+            stamps = np.where(is_unstamped, chosen["log_time_ns"], samples["stamp_ns"])[is_usable]
+            parts = collected.setdefault(name, [])
+            parts.append((stamps, samples[field][is_usable], np.full(len(stamps), recording)))
+
+
+def _decoded_series(
+    topic: str, code: int, data: NDArray[np.uint8], messages: NDArray[np.void]
+) -> list[tuple[JointName | TorqueSource, Samples, str]]:
+    """Each series in the messages of a topic: its name, its samples, and the field of these with its values.
+
+    Each message gives one sample. Samples of a joint state have both the angle and the effort of the joint.
+    """
+    found: list[tuple[JointName | TorqueSource, Samples, str]] = []
+    if code == JOINT_STATE:
+        for joint in _joint_names(data, messages):
+            samples = _decoder(EFFORT, joint=joint).many(data, messages)
+            found.append((JointName(topic, joint), samples, "crank_angle_rad"))
+            if np.isfinite(samples["torque_nm"]).any():
+                found.append((TorqueSource(EFFORT, topic, joint), samples, "torque_nm"))
+        return found
+    if code == INTERFACES:
+        for joint, interface in _interfaces(data, messages):
+            samples = _decoder(INTERFACE, joint=joint, interface=interface).many(data, messages)
+            found.append((TorqueSource(INTERFACE, topic, joint, interface), samples, "torque_nm"))
+        return found
+    if code == WRENCH_STAMPED:
+        return [
+            (TorqueSource(WRENCH, topic, axis), _decoder(WRENCH, axis).many(data, messages), "torque_nm")
+            for axis in "xyz"
+        ]
+    return [(TorqueSource(FLOAT64, topic), _decoder(FLOAT64).many(data, messages), "torque_nm")]
+
+
+def _decoder(source: str, axis: str = "z", joint: str = _NO_JOINT, interface: str = "effort") -> Decoder:
+    """Decoder of one torque source and of one joint as the crank; a source ignores missing parts."""
+    torque = DriveTorque(source=source, axis=axis, interface=interface)
+    return Decoder(MonitorConfig(crank_joint=joint, drive_torque=torque))
+
+
+def _joint_names(data: NDArray[np.uint8], messages: NDArray[np.void]) -> list[str]:
+    """Names of the joints in the first messages, at most `_MOST_JOINTS`."""
+    names: dict[str, None] = {}  # a set that keeps the order
+    for raw in _first_decodable(EFFORT, data, messages):
+        known = names_in(raw)[:_MOST_JOINTS]
+        again = next(filter(None, (twice(known, name) for name in known if name)), "")
+        if again:
+            raise LegWearError(again)
+        names |= dict.fromkeys(known)
+    return [name for name in names if name][:_MOST_JOINTS]
+
+
+def _interfaces(data: NDArray[np.uint8], messages: NDArray[np.void]) -> list[tuple[str, str]]:
+    """Joints with their interfaces that may be a torque, in the first messages."""
+    pairs: dict[tuple[str, str], None] = {}
+    for raw in _first_decodable(INTERFACE, data, messages):
+        for joint, names in list(interfaces_in(raw).items())[:_MOST_JOINTS]:
+            pairs |= dict.fromkeys((joint, name) for name in names if name and name not in _NO_CANDIDATES)
+    return list(pairs)[:_MOST_JOINTS]
+
+
+def _first_decodable(source: str, data: NDArray[np.uint8], messages: NDArray[np.void]) -> list[bytes]:
+    """The first messages that are not damaged.
+
+    The decoder is made for a joint that no message has: it reports an undamaged message as MISSING_JOINT, and
+    a damaged message with a different fault.
+    """
+    faults = _decoder(source).many(data, messages)["fault"]
+    decodable = np.flatnonzero(faults == MISSING_JOINT)[:_NAMING_MESSAGES]
+    return [data[one["begin"] : one["end"]].tobytes() for one in messages[decodable]]
+
+
+def _signals(collected: dict[JointName | TorqueSource, _Parts]) -> Signals:
+    """Join the parts of each series that is not empty; time 0 is the first stamp of all series.
+
+    Longer pauses are shortened, and so is a clock that is set while recording: memory is for walking time.
+    """
+    full: dict[JointName | TorqueSource, Any] = {}
+    for name, parts in collected.items():
+        if any(len(stamps) for stamps, _, _ in parts):
+            full[name] = [np.concatenate(column) for column in zip(*parts, strict=True)]
+    if not full:
+        return Signals({}, {})
+    all_ns = np.unique(np.concatenate([stamps for stamps, _, _ in full.values()]))
+    walked_ns = np.append(0, np.cumsum(np.minimum(np.diff(all_ns), _LONGEST_PAUSE_NS)))
+    found = {
+        name: series(walked_ns[np.searchsorted(all_ns, stamps)], values, recording, 0)
+        for name, (stamps, values, recording) in full.items()
+    }
+    joints = {name: one for name, one in found.items() if isinstance(name, JointName)}
+    torques = {name: one for name, one in found.items() if isinstance(name, TorqueSource)}
+    return Signals(joints, torques)

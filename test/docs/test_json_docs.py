@@ -31,12 +31,16 @@ UNIT_IN_NAME = re.compile(
     r"_(?:m|s|h|n|nm|nms|j|pa|hz|rpm|deg|rad|mps|mps2|radps|ns|c)(?:_per_\w+)?(?=$|[.\[])"
 )
 SHORT = {"whole number": "integer", "true or false": "boolean", "list of numbers": "numbers", " or null": "?"}
+LIMITS = "monitor.limits"  # the page of the parameters has these
 STATE_IN = {"replay": "", "fleet": "legs[].state."}  # documents that contain the state of a leg, and its path
 
 
 def renewed(page: str) -> str:
     state_rows = set(state())
     listed: dict[tuple[Row, ...], str] = {}  # parts whose fields the page has, by these fields
+
+    def listed_parts(place: str) -> tuple[Row, ...]:
+        return next(parts for parts, path in listed.items() if path == place)
 
     def rows(name: str) -> Iterator[Row]:
         """Rows of a document without the fields that the page lists before."""
@@ -48,16 +52,24 @@ def renewed(page: str) -> str:
                 continue
             if left_out and path.startswith(left_out):
                 continue
+            if path == LIMITS:
+                left_out = f"{LIMITS}."
+                yield path, kind, unit, f"{text.removesuffix('.')}: the parameters `limits.…`."
+                continue
             below = f"{path}."
             parts = tuple(
                 (row[0].removeprefix(below), row[1], "", row[3])
                 for row in documented
                 if row[0].startswith(below)
             )
-            first = listed.setdefault(parts, path)
-            if len(parts) > 1 and first != path:
+            first = next((place for fields, place in listed.items() if set(fields) <= set(parts)), path)
+            if len(parts) > 1:
+                listed.setdefault(parts, path)
+            if first != path:
                 left_out = below
-                yield path, kind, unit, f"{text.removesuffix('.')}; fields as in `{first}`."
+                further = [part[0] for part in parts if part not in listed_parts(first)]
+                also = f", and {', '.join(f'`{one}`' for one in further)}" if further else ""
+                yield path, kind, unit, f"{text.removesuffix('.')}; fields as in `{first}`{also}."
             else:
                 yield path, kind, unit, text
 
@@ -66,6 +78,7 @@ def renewed(page: str) -> str:
         for path, kind, unit, text in rows(name):
             words = re.sub(r"\bNone\b", "null", text.replace("``", "`")).replace("|", r"\|")
             quantity = f"{kind}, {unit}" if unit and not UNIT_IN_NAME.search(path) else kind
+            quantity = re.sub(r"^one of `\S+ [^,]*`.*?(?= or null|$)", "text", quantity)  # sentences
             for long, short in SHORT.items():
                 quantity = quantity.replace(long, short)
             words = re.sub(r" \[[^\]\d]+\](?=[.,:;)])", "", words)  # units that the name has

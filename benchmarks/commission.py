@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from leg_wear_monitor.commissioning.commission import commission
-from leg_wear_monitor.commissioning.result import CommissioningItem, CommissioningResult
+from leg_wear_monitor.commissioning.result import CommissioningResult
 from leg_wear_monitor.gait.config import GaitConfig, LoadConfig, PaceConfig
 from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.mechanism.arrays import Floats
@@ -191,16 +191,8 @@ def errors(truth: dict[str, Any], result: CommissioningResult) -> dict[str, floa
         "scale": (measured - truth["factor"]) / (float(scale.sigma or 0.0) * turns),
         "friction": away("friction", truth["friction_nm"]),
         "load friction": away("load friction", truth["load_friction"]),
-        "bandwidth": _by_factor(found.get("bandwidth"), truth["bandwidth_hz"]),
     }
     return {name: value for name, value in sizes.items() if math.isfinite(value)}
-
-
-def _by_factor(item: CommissioningItem | None, true: float) -> float:
-    """Error of the logarithm of a quantity, in standard deviations."""
-    if item is None or item.sigma is None or isinstance(item.value, str) or math.isinf(true):
-        return math.nan
-    return math.log(float(item.value) / true) / (item.sigma / float(item.value))
 
 
 def row(seed: int, truth: dict[str, Any], result: CommissioningResult, seconds: float) -> str:
@@ -235,7 +227,6 @@ def row(seed: int, truth: dict[str, Any], result: CommissioningResult, seconds: 
         f"{truth['factor']:.4g} / {factor:.4g}",
         value("drive_torque.sampling"),
         pair("lag", late_s(truth), 1, 1.0e3),
-        pair("bandwidth", truth["bandwidth_hz"], 0),
         pair("friction", truth["friction_nm"], 2),
         pair("load friction", truth["load_friction"], 3),
         f"{found['crank.sign'].mismatch:.3f}",
@@ -253,10 +244,10 @@ def main() -> None:
     arguments = parser.parse_args()
     print(
         "| seed | rpm | Hz, sampling | foot load, N | signs | gear ratio | source | offset, rad | "
-        "scale × gear | sampling | lag, ms | bandwidth, Hz | friction, N m | load friction | mismatch | "
+        "scale × gear | sampling | lag, ms | friction, N m | load friction | mismatch | "
         "not enough to tell; does not fit | CPU s |"
     )
-    print("|" + "---|" * 17)
+    print("|" + "---|" * 16)
     away: dict[str, list[float]] = {}
     for seed in range(arguments.first, arguments.first + arguments.number):
         truth = robot(seed) | walk_of(seed) | drive_of(seed)

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from leg_wear_monitor.commissioning.commission import commission
-    from leg_wear_monitor.commissioning.result import CommissioningItem, CommissioningResult, JointDetection
+    from leg_wear_monitor.commissioning.result import CommissioningItem, CommissioningResult
     from leg_wear_monitor.dynamics.result import (
         EnergyBalance,
         Impact,
@@ -54,7 +54,6 @@ _HOME = {
     "Fleet": "fleet.overview",
     "FleetOverview": "fleet.overview",
     "Impact": "dynamics.result",
-    "JointDetection": "commissioning.result",
     "JointResult": "dynamics.result",
     "LegOverview": "fleet.overview",
     "Life": "life.result",
@@ -103,7 +102,6 @@ __all__ = [
     "Fleet",
     "FleetOverview",
     "Impact",
-    "JointDetection",
     "JointResult",
     "LegOverview",
     "LegWearError",

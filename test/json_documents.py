@@ -88,10 +88,6 @@ def commissioning() -> Iterator[Row]:
     yield "not_enough_to_tell[]", "text", "", texts["not_told"]
     yield "findings[]", "text", "", texts["findings"]
     yield "notes[]", "text", "", texts["notes"]
-    yield "joints[]", "object", "", texts["joints"]
-    yield from rows_of(lw.JointDetection, "joints[].")
-    yield "judgement", "text", "", lw.CommissioningResult.judgement.__doc__ or ""
-    yield "reference_used", "text", "", texts["reference_used"]
 
 
 def fleet() -> Iterator[Row]:

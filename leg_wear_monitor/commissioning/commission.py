@@ -1,24 +1,17 @@
 """Commissioning: recordings of a healthy leg in, proposed parameters out."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 import attrs
 import numpy as np
 
 from leg_wear_monitor.commissioning import proposal
-from leg_wear_monitor.commissioning.detection import LEAST_CYCLES, Walk, walk_of, with_detections
 from leg_wear_monitor.commissioning.evidence import (
-    LIMIT,
     Load,
-    LowPass,
     cadences_rpm,
     does_not_fit,
-    expected_leg,
-    low_pass_of,
-    low_pass_time,
-    mismatch_item,
     sampling_of,
     separates_lag,
     timing_of,
@@ -26,6 +19,7 @@ from leg_wear_monitor.commissioning.evidence import (
 )
 from leg_wear_monitor.commissioning.result import CommissioningResult
 from leg_wear_monitor.commissioning.search import Choice, candidates, choose
+from leg_wear_monitor.commissioning.walk import LEAST_CYCLES, LIMIT, Walk, mismatch_item, walk_of
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.estimate.cause import Cause, NamedCause
 from leg_wear_monitor.estimate.joint_motion import (
@@ -36,7 +30,7 @@ from leg_wear_monitor.estimate.joint_motion import (
     with_repeating_acceleration,
 )
 from leg_wear_monitor.estimate.torque_fit import Terms, fit, repeating
-from leg_wear_monitor.estimate.torque_model import TorqueModel, torque_model, with_clearances
+from leg_wear_monitor.estimate.torque_model import TorqueModel, torque_model
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
@@ -45,6 +39,7 @@ from leg_wear_monitor.monitor.config.inputs import EFFORT, FLOAT64
 from leg_wear_monitor.monitor.config.parameters import config_from, load_config, values_of
 from leg_wear_monitor.monitor.config.sections import drive_figures
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.diagnosis.reference_file import simulated_under
 from leg_wear_monitor.monitor.verdict.causes import sentence
 from leg_wear_monitor.recordings.bag import Recordable, listed_recordings
 from leg_wear_monitor.recordings.findings import RecordingError
@@ -218,7 +213,6 @@ def notes(found: proposal.Found) -> Iterator[str]:
 
 
 _LEAST_S = 10.0  # ten turns at 60 rpm
-_FASTER = 1.15  # a different cadence
 
 
 def commission(
@@ -292,29 +286,10 @@ def commission(
     if walk.faults:
         return attrs.evolve(result, not_told=(*result.not_told, *walk.faults), config=None)
     progress(0.8)
-    fast = _fastest(found, walk, recordings, topics)
-    legs = [expected_leg(one) for one in ((walk,) if fast is walk else (walk, fast)) if len(one.cycles)]
-    simulated = [leg for leg in legs if leg is not None]
-    if simulated:
-        low_pass = low_pass_of(fast, simulated[-1]) if len(fast.cycles) >= LEAST_CYCLES else None
-        model = with_clearances(model, simulated)
-        found, load = _final(found.choice, found.motion, model, base, low_pass)
-        result = attrs.evolve(_result(found, load, mechanism), faults=tuple(faults))
-    progress(0.9)
-    return with_detections(_with_limit(result, walk), walk, reference, lambda f: progress(0.9 + 0.1 * f))
-
-
-def _fastest(
-    found: proposal.Found, walk: Walk, recordings: Sequence[Recordable], topics: tuple[str | None, str | None]
-) -> Walk:
-    """The walk at the highest cadence that was recorded: the faster, the stronger are the impacts."""
-    usual = walk.config.cadence.commanded_rpm
-    fastest = max((rpm for rpm in cadences_rpm(found.fit) if rpm * usual > 0.0), key=abs, default=usual)
-    if abs(fastest) < _FASTER * abs(usual):
-        return walk
-    cadence = attrs.evolve(walk.config.cadence, commanded_rpm=fastest, tolerance_rpm=0.1 * abs(fastest))
-    other = walk_of(recordings[-1:], attrs.evolve(walk.config, cadence=cadence), *topics)
-    return other if len(other.cycles) >= LEAST_CYCLES else walk
+    result = _with_limit(result, walk)
+    return (
+        _with_reference(result, walk, reference, lambda f: progress(0.8 + 0.2 * f)) if reference else result
+    )
 
 
 def _with_limit(result: CommissioningResult, walk: Walk) -> CommissioningResult:
@@ -327,6 +302,24 @@ def _with_limit(result: CommissioningResult, walk: Walk) -> CommissioningResult:
         return attrs.evolve(result, not_told=(*result.not_told, why), config=None)
     config = config_from({**values_of(result.config), LIMIT: item.value}, "commission")
     return attrs.evolve(result, items=(*result.items, item), config=config)
+
+
+def _with_reference(
+    result: CommissioningResult, walk: Walk, file: str | Path, progress: Callable[[float], None]
+) -> CommissioningResult:
+    """The result with a torque reference that is simulated for the recorded motion of the crank."""
+    if result.config is None:
+        return result
+    if walk.profile is None:
+        cycles, rpm = len(walk.profiles), walk.config.cadence.commanded_rpm
+        why = (
+            f"diagnosis.reference: the recording has {cycles} gait cycles at {rpm:g} rpm, expected at least "
+            f"{LEAST_CYCLES}"
+        )
+        return attrs.evolve(result, not_told=(*result.not_told, why))
+    (made,) = simulated_under(walk.mechanism, [walk.profile], progress)
+    values = {**values_of(result.config), "diagnosis.reference": str(file)}
+    return attrs.evolve(result, reference=made, config=config_from(values, "commission"))
 
 
 def propose(
@@ -396,23 +389,19 @@ def _final(
     motion: JointMotion,
     model: TorqueModel,
     base: MonitorConfig,
-    low_pass: LowPass | None = None,
 ) -> tuple[proposal.Found, Load | None]:
     """The chosen fit again, with the terms that the recording determines, and the lag that it is late by."""
     one, declared = choice.best.fit, drive_figures(base.drive)
-    low_pass_s, low_pass_sigma_s = low_pass_time(low_pass, declared)
     terms = Terms(bias=one.pair.walks_both_ways, load_friction=True, lag=separates_lag(one.pair))
-    start = attrs.evolve(one.refined, lag_s=low_pass_s, low_pass_s=low_pass_s)
     # a repeating acceleration has less noise, but lacks the acceleration of a ramp
     pairs = one.pair, with_repeating_acceleration(one.pair, one.ratio)
-    own, repeating = (fit(pair, model, start, terms, with_errors=True) for pair in pairs)
+    own, repeating = (fit(pair, model, one.refined, terms, with_errors=True) for pair in pairs)
     again = repeating if repeating.mismatch <= _AS_WELL * own.mismatch else own
     again, load = with_load(again, model, terms)
     sampling = sampling_of(again, model)
     used = sampling.value or base.drive_torque.sampling
-    timing = timing_of(again, used, bool(sampling.value), declared.lag_s)
-    timing = attrs.evolve(timing, low_pass_s=low_pass_s, low_pass_sigma_s=low_pass_sigma_s)
-    found = proposal.Found(choice, again, motion, sampling, timing, declared, base, low_pass)
+    timing = timing_of(again, used, bool(sampling.value), declared)
+    found = proposal.Found(choice, again, motion, sampling, timing, declared, base)
     return proposal.settled(found, model), load
 
 

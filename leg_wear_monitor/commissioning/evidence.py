@@ -1,121 +1,20 @@
-"""Evidence of a walk on its sensors and drive: timing, sampling, noise, low-pass, torque residual."""
+"""Evidence of a walk on its sensors and drive: timing, sampling, noise, load."""
 
 import math
 
 import attrs
 import numpy as np
 
-from leg_wear_monitor.commissioning.detection import Walk
-from leg_wear_monitor.commissioning.result import CommissioningItem
-from leg_wear_monitor.errors import AssemblyError
 from leg_wear_monitor.estimate.body_torques import body_torques
-from leg_wear_monitor.estimate.channel import channel_of
 from leg_wear_monitor.estimate.drive import DriveFigures
 from leg_wear_monitor.estimate.joint_motion import Pair, is_steady, slow_speed
 from leg_wear_monitor.estimate.least_squares import solved
-from leg_wear_monitor.estimate.leg_model import nuisances
-from leg_wear_monitor.estimate.signature import with_noise_of
 from leg_wear_monitor.estimate.torque_fit import BINS, Fit, Terms, fit, repeating
 from leg_wear_monitor.estimate.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.twin.reference import LegParameters, LegSimulation
 from leg_wear_monitor.twin.sample import AVERAGE, INSTANT
-from leg_wear_monitor.twin.torque_reference import TorqueReference
-from leg_wear_monitor.wear import SECTORS
-
-# The low-pass of a drive, from the roughness of the expected leg's torque behind it.
-#
-# At one cadence a low-pass delays slow changes of the torque as a lag does. It also smooths fast changes, the
-# impacts of the joints: one simulated leg shows how rough the torque would be without it.
-
-
-_SETTLING, _CYCLES = 2, 40
-# legs in full coordinates, joints of 0.2 to 0.4 mm, 30 to 85 rpm, low-passes of 15 to 120 Hz: the logarithm
-# of the corner frequency is off by 0.24 where the mean square s of the residual is below 0.3, by 0.32 below
-# 0.6, by 0.65 below 1.2; beyond, clearances or masses are too far off, and 6 of 12 low-passes do not show.
-# 100 Hz were found for 3 of 5 sensors without a low-pass (n = 75, 2026-11-24)
-_SPREAD, _BY_SQUARE, _POOR = 0.2, 0.5, 1.0
-# observable corner frequencies, as a fraction of the sampling rate: at 100 Hz, 116 Hz looked like 50
-_SHOWS_HZ, _OF_RATE = 70.0, 0.4
-
-
-@attrs.frozen
-class LowPass:
-    """A first-order low-pass between a leg's torque and its samples.
-
-    Attributes
-    ----------
-    time_constant_s : float
-        0 where none shows; NaN where that is not known.
-    log_sigma : float
-        Standard deviation of its logarithm.
-    least_hz : float
-        Corner frequency that a low-pass has at least where none shows.
-    """
-
-    time_constant_s: float
-    log_sigma: float
-    least_hz: float
-
-    @property
-    def is_known(self) -> bool:
-        """Whether the recording shows if there is one."""
-        return math.isfinite(self.time_constant_s)
-
-    @property
-    def bandwidth_hz(self) -> float:
-        """Corner frequency [Hz]; NaN where none shows."""
-        return 1.0 / (TURN * self.time_constant_s) if self.time_constant_s else math.nan
-
-
-def low_pass_of(walk: Walk, reference: TorqueReference) -> LowPass | None:
-    """The low-pass that explains a walk; None without a sensor.
-
-    Parameters
-    ----------
-    walk : Walk
-        With signatures.
-    reference : TorqueReference
-        The leg as expected, of that walk.
-    """
-    if walk.sensor is None:
-        return None
-    mean = walk.baseline.mean
-    columns = nuisances(walk.mechanism, reference, walk.sensor)
-    found = channel_of(reference, with_noise_of(reference, walk.sensor, mean), mean, columns)
-    one = found.channel
-    least_hz = min(_SHOWS_HZ, _OF_RATE / walk.sensor.period_s)
-    shows = TURN * one.time_constant_s * least_hz > 0.99
-    # a direct drive is assumed if no other drive dynamics are surely better
-    is_known = found.square <= _POOR and bool(one.delay_s or one.time_constant_s)
-    log_sigma = _SPREAD + _BY_SQUARE * found.square
-    time_constant_s = one.time_constant_s if shows else 0.0
-    return LowPass(time_constant_s if is_known else math.nan, log_sigma, least_hz)
-
-
-def low_pass_time(found: LowPass | None, declared: DriveFigures) -> tuple[float, float]:
-    """Time constant of the low-pass that is declared or found, and its standard deviation [s]; 0 for none."""
-    if math.isfinite(declared.bandwidth_hz):
-        return 1.0 / (TURN * declared.bandwidth_hz), 0.0
-    if found is None or not found.is_known:
-        return 0.0, 0.0
-    return found.time_constant_s, found.time_constant_s * found.log_sigma
-
-
-def expected_leg(walk: Walk) -> TorqueReference | None:
-    """A reference of the new leg alone, under the walk's own motion; None where it cannot be simulated."""
-    own, new_m = LegParameters.none(walk.mechanism), walk.new_m
-    unworn = np.zeros((len(new_m), 2, SECTORS))
-    try:
-        leg = LegSimulation(walk.mechanism).simulate(walk.profile, own, new_m, unworn, _SETTLING, _CYCLES)
-    except AssemblyError:
-        return None
-    if leg is None:
-        return None
-    return TorqueReference(walk.profile, new_m[None], (leg.torque.astype(np.float16),), own)
-
 
 # Torque that repeats with each turn and does not fit the ideal leg: foot load, other masses, a different leg.
 
@@ -195,36 +94,6 @@ def _heavier(one: Fit, mechanism: Mechanism) -> tuple[str, float, float]:
     return best
 
 
-# The torque residual of a healthy leg as the monitor measures it, and the limit for it.
-
-
-LIMIT = "limits.torque_mismatch"
-
-_LEAST_CYCLES = 10
-# scatters of a cycle's torque residual from its mean to a warning: by chance less than once in 1e6
-_SIGMAS = 5.3
-
-
-def mismatch_item(walk: Walk) -> CommissioningItem | None:
-    """Torque residual limit from a healthy leg; None with too few gait cycles.
-
-    A given limit stays if it is high enough.
-    """
-    found = walk.mismatch
-    found = found[np.isfinite(found)]
-    if len(found) < _LEAST_CYCLES:
-        return None
-    mean, scatter = float(found.mean()), float(found.std(ddof=1))
-    least = (mean + _SIGMAS * scatter) / walk.config.limits.warn_fraction
-    given = walk.config.limits.torque_mismatch
-    return CommissioningItem(
-        name=LIMIT,
-        value=given if least <= given else math.ceil(100.0 * least) / 100.0,
-        sigma=scatter,
-        remark=f"{mean:.2g} in {len(found)} gait cycles of this leg",
-    )
-
-
 # Noise of the torque: of the sensor where the joints are quiet, and of everything that does not repeat.
 
 
@@ -297,11 +166,10 @@ class Timing:
         Time by which the torque is late in addition to its sampling, and its standard deviation [s]; NaN if
         it is not separated.
     sampling_s, sampling_sigma_s : float
-        Lag of the sampling, half a sampling interval for averages, and its standard deviation.
+        Lag of the sampling (half a sampling interval for averages) and of a declared low-pass, and its
+        standard deviation.
     declared_s : float
         Declared lag of the drive [s]; NaN without one.
-    low_pass_s, low_pass_sigma_s : float
-        Time by which the drive's low-pass makes the torque late, and its standard deviation [s].
     """
 
     is_lag_separated: bool
@@ -310,13 +178,11 @@ class Timing:
     sampling_s: float
     sampling_sigma_s: float = 0.0
     declared_s: float = math.nan
-    low_pass_s: float = 0.0
-    low_pass_sigma_s: float = 0.0
 
     @property
     def lag_s(self) -> float:
-        """Lag to allow for, from sampling, low-pass and drive [s]."""
-        return self.sampling_s + self.low_pass_s + self._drive[0]
+        """Lag to allow for, from sampling and drive [s]."""
+        return self.sampling_s + self._drive[0]
 
     @property
     def lag_sigma_s(self) -> float:
@@ -325,11 +191,11 @@ class Timing:
         # if only the whole lag is measured, its parts have the error of the drive's part
         if self.is_lag_separated:
             return sigma
-        return math.hypot(sigma, self.low_pass_sigma_s, self.sampling_sigma_s)
+        return math.hypot(sigma, self.sampling_sigma_s)
 
     @property
     def _drive(self) -> tuple[float, float]:
-        """Expected lag of the drive in addition to sampling and low-pass, and its standard deviation [s]."""
+        """Expected lag of the drive in addition to its sampling, and its standard deviation [s]."""
         is_declared = math.isfinite(self.declared_s)
         if not self.is_lag_separated:
             return (self.declared_s, _DECLARED_S) if is_declared else (0.0, _UNKNOWN_S)
@@ -339,15 +205,14 @@ class Timing:
         else:
             prior = np.where(lag <= _MOST_S, _STEP_S / _MOST_S, 0.0)
             prior[0] += 1.0
-        error = math.hypot(self.error_s, self.low_pass_sigma_s)
-        away = (self.late_s - self.low_pass_s - lag) / error
+        away = (self.late_s - lag) / self.error_s
         likely = prior * np.exp(-0.5 * (away**2 - float(np.min(away**2))))
         likely /= likely.sum()
         mean = float(likely @ lag)
         return mean, math.sqrt(float(likely @ (lag - mean) ** 2))
 
 
-def timing_of(one: Fit, sampling: str, is_sampling_known: bool, declared_s: float = math.nan) -> Timing:
+def timing_of(one: Fit, sampling: str, is_sampling_known: bool, declared: DriveFigures) -> Timing:
     """Timing of a torque with a sampling, from a fit whose lag is free if the recording separates it.
 
     Parameters
@@ -356,17 +221,19 @@ def timing_of(one: Fit, sampling: str, is_sampling_known: bool, declared_s: floa
     sampling : str
     is_sampling_known : bool
         Whether the recording shows the sampling.
-    declared_s : float
-        Declared lag of the drive [s].
+    declared : DriveFigures
+        Declared lag and low-pass of the drive.
     """
     interval_s = one.pair.interval_s
-    half, sigma_s = (0.5 * interval_s, _FILTERED * interval_s) if sampling == AVERAGE else (0.0, 0.0)
+    known_s, sigma_s = (0.5 * interval_s, _FILTERED * interval_s) if sampling == AVERAGE else (0.0, 0.0)
+    if math.isfinite(declared.bandwidth_hz):
+        known_s += 1.0 / (TURN * declared.bandwidth_hz)
     if not is_sampling_known:
         sigma_s = 0.5 * interval_s
     if not separates_lag(one.pair):
-        return Timing(False, math.nan, math.nan, half, sigma_s, declared_s)
+        return Timing(False, math.nan, math.nan, known_s, sigma_s, declared.lag_s)
     error_s = math.hypot(lag_error_s(one), sigma_s)
-    return Timing(True, one.lag_s - half, error_s, half, sigma_s, declared_s)
+    return Timing(True, one.lag_s - known_s, error_s, known_s, sigma_s, declared.lag_s)
 
 
 def lag_error_s(one: Fit) -> float:

@@ -8,7 +8,6 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.commissioning.evidence import (
-    LowPass,
     Sampling,
     Timing,
     cadence_rpm,
@@ -87,7 +86,6 @@ class Found:
     timing: Timing
     declared: DriveFigures
     base: MonitorConfig
-    low_pass: LowPass | None = None
 
     @property
     def doubts(self) -> tuple[str, ...]:
@@ -210,20 +208,12 @@ def _lag(found: Found) -> str:
     return _FURTHER if found.timing.is_lag_separated else _TWO_CADENCES
 
 
-def _bandwidth(found: Found) -> str:
-    one = found.low_pass
-    if one is not None and one.is_known and not math.isfinite(one.bandwidth_hz):
-        return ""
-    return "declare drive.bandwidth_hz, or walk faster: stronger impacts show it better"
-
-
 _WAYS: Mapping[str, Callable[[Found], str]] = {
     "crank.gear_ratio": lambda found: "" if gear(found)[1] else "enter the ratio of the teeth",
     "crank.offset_rad": _offset,
     "drive_torque.scale": lambda _: "measure the torque of a known weight on the crank",
     "drive_torque.sampling": lambda found: "" if found.sampling.value else "ask the drive's manual",
     "lag": _lag,
-    "bandwidth": _bandwidth,
     "load friction": lambda found: (
         f"declare drive.load_friction: clearances change it by {found.fit.error.load_friction:.2g}"
     ),
@@ -340,7 +330,6 @@ def _timing(found: Found) -> Iterator[Item]:
         if timing.is_lag_separated
         else "cannot be distinguished from an offset at one cadence",
     )
-    yield from _low_pass(found)
     cadence, tolerance = cadence_rpm(one)
     yield Item(name="cadence.commanded_rpm", value=cadence, unit="rpm")
     yield Item(name="cadence.tolerance_rpm", value=tolerance, unit="rpm")
@@ -367,27 +356,6 @@ def _frictions(found: Found) -> Iterator[Item]:
 
 def _declared(value: float, unit: str = "") -> str:
     return f"; declared: {value:.4g}{unit}" if math.isfinite(value) else ""
-
-
-def _low_pass(found: Found) -> Iterator[Item]:
-    one = found.low_pass
-    if one is None:
-        return
-    hz = one.bandwidth_hz
-    value: str | float = hz
-    if not one.is_known:
-        remark = "no low-pass is sure: the torque's noise hides it, or clearances and masses are others"
-    elif math.isfinite(hz):
-        remark = "corner frequency of a low-pass between the crank and the torque's samples"
-    else:
-        value, remark = f"none below {one.least_hz:g}", "no low-pass shows"
-    yield Item(
-        name="bandwidth",
-        value=value,
-        unit="Hz",
-        sigma=hz * one.log_sigma if math.isfinite(hz) else None,
-        remark=remark + _declared(found.declared.bandwidth_hz, " Hz"),
-    )
 
 
 def _noises(found: Found) -> Iterator[Item]:

@@ -1,4 +1,4 @@
-"""The result of commissioning: detectable clearances, the parameter file, and the result with all of it."""
+"""The result of commissioning: the parameter file, and the result with all of it."""
 
 from collections.abc import Sequence
 from io import StringIO
@@ -17,61 +17,6 @@ from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-# Detection: whether the drive torque is good enough to show the wear of each joint.
-
-
-@attrs.frozen(kw_only=True)
-class JointDetection:
-    """Detectability of a joint in the drive torque of a recording.
-
-    Attributes
-    ----------
-    joint : str
-        Name of the joint.
-    is_good : bool
-        Whether a joint with the last clearance of `clearances_m` is detected, and identified, soon enough.
-    clearances_m : tuple of float
-        Clearances of a wider joint.
-    cycles : tuple of float
-        Expected number of gait cycles until a joint with each of these clearances is detected; NaN where it
-        is not.
-    named_cycles : tuple of float
-        Number of gait cycles until the joint is identified in four of five legs whose masses are 4 % off; NaN
-        if it is not.
-    runner_up : str
-        Best other explanation of the last clearance, human-readable; empty if it is not detected.
-    reason : str
-        Why the torque is not good enough for this joint, and the remedy; empty if it is good enough.
-    """
-
-    joint: str
-    is_good: bool
-    clearances_m: tuple[float, ...]
-    cycles: tuple[float, ...]
-    named_cycles: tuple[float, ...]
-    runner_up: str
-    reason: str = ""
-
-
-def judgement(joints: Sequence[JointDetection]) -> str:
-    """Sentence: for which joints a torque is good enough, and why not for others; empty without joints."""
-    good = [each.joint for each in joints if each.is_good]
-    reasons: dict[str, list[str]] = {}
-    for each in joints:
-        if not each.is_good:
-            reasons.setdefault(each.reason, []).append(each.joint)
-    good_for = f"this torque is good enough for {_joint_names(good)}" if good else ""
-    bad = [f"{_joint_names(names)}, because {reason}" for reason, names in reasons.items()]
-    if not bad:
-        return good_for
-    not_for = f"for {'; nor for '.join(bad)}"
-    return f"{good_for}; not {not_for}" if good_for else f"this torque is not good enough {not_for}"
-
-
-def _joint_names(names: Sequence[str]) -> str:
-    return f"joint{'s' if len(names) > 1 else ''} {', '.join(names)}"
 
 
 # The ROS parameter file: parameters that differ from the defaults, which `config/monitor.yaml` lists.
@@ -167,10 +112,6 @@ class CommissioningResult:
         Turns of the crank in the recording.
     faults : tuple of Finding
         Faults of the recordings, whose other parts were used.
-    joints : tuple of JointDetection
-        Detectability of each joint in the torque; empty if it is not known.
-    reference_used : str
-        Torque reference used to judge the joints, or why they are not judged.
     reference : TorqueReference or None
         Reference simulated for ``diagnosis.reference``, if it was requested.
     """
@@ -182,19 +123,12 @@ class CommissioningResult:
     config: MonitorConfig | None
     turns: float
     faults: tuple[Finding, ...] = ()
-    joints: tuple[JointDetection, ...] = ()
-    reference_used: str = ""
     reference: TorqueReference | None = None
 
     @property
     def is_sure(self) -> bool:
         """Whether every parameter was determined, and everything fits."""
         return self.config is not None and not self.not_told and not self.findings
-
-    @property
-    def judgement(self) -> str:
-        """For which joints the torque is good enough, in a sentence; empty where that is not known."""
-        return judgement(self.joints)
 
     def item(self, name: str) -> CommissioningItem:
         """The item of a name; raises KeyError if there is none."""
@@ -210,9 +144,6 @@ class CommissioningResult:
             "not_enough_to_tell": list(self.not_told),
             "findings": list(self.findings),
             "notes": list(self.notes),
-            "joints": part_document(self.joints),
-            "judgement": self.judgement,
-            "reference_used": self.reference_used,
         }
 
     def to_json(self) -> str:
@@ -242,6 +173,5 @@ class CommissioningResult:
         if self.config is None:
             raise LegWearError(f"no parameters are proposed: {'; '.join(self.not_told)}")
         labels = {"not enough to tell": self.not_told, "does not fit": self.findings, "note": self.notes}
-        labels["torque"] = tuple(text for text in (self.judgement, self.reference_used) if text)
         remarks = [f"{label}: {text}" for label, texts in labels.items() for text in texts]
         return parameter_text(self.config, remarks)

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from leg_wear_monitor.estimate.drive import Channel
 from leg_wear_monitor.estimate.joint_motion import Pair
 from leg_wear_monitor.estimate.least_squares import Point, gauss_newton, jackknife, solved
 from leg_wear_monitor.estimate.torque_model import ModelError, TorqueModel
@@ -35,8 +34,6 @@ class Start:
     lag_s : float
         Time by which slow changes of the torque are late [s]; it stays unless it is among the terms of the
         fit.
-    low_pass_s : float
-        Part of the lag that is the time constant of a first-order low-pass.
     """
 
     ratio: float
@@ -45,7 +42,6 @@ class Start:
     explained: float
     recording: int
     lag_s: float = 0.0
-    low_pass_s: float = 0.0
 
 
 # Means over a twelfth of a turn: impacts of joints with clearance average out, the leg's torque stays.
@@ -149,7 +145,7 @@ class State:
         Crank angle at a position in the middle of each recording, and the position [rad].
     row : (n,) array of int
         Recording of each sample, as an index of `phase`.
-    lag_s, low_pass_s : float
+    lag_s : float
         As in `Start`.
     """
 
@@ -158,7 +154,6 @@ class State:
     middle: Floats
     row: NDArray[np.int64]
     lag_s: float = 0.0
-    low_pass_s: float = 0.0
 
     def vector(self, terms: Terms) -> Floats:
         """Phases, and ratio and lag where they are terms (k,)."""
@@ -180,7 +175,7 @@ def begin(pair: Pair, model: TorqueModel, start: Start) -> State:
         if number != start.recording:
             explained = explained_by_phase(pair.part(row == i), model, start, float(middle[i]))
             phase[i] = explained.argmax() * TURN / PHASES
-    return State(start.ratio, phase, middle, row, start.lag_s, start.low_pass_s)
+    return State(start.ratio, phase, middle, row, start.lag_s)
 
 
 def explained_by_phase(pair: Pair, model: TorqueModel, start: Start, middle: float) -> Floats:
@@ -201,23 +196,17 @@ def columns(
     pair: Pair, model: TorqueModel, state: State, terms: Terms, blocks: Blocks
 ) -> tuple[Floats, Floats]:
     """Columns of the linear terms, and at unit gain of small changes of phases, ratio and lag, by block."""
-    position, speed, acceleration = pair.earlier(state.lag_s - state.low_pass_s)
+    position, speed, acceleration = pair.earlier(state.lag_s)
     late, speed = position - state.middle[state.row], state.ratio * speed
     angle = state.ratio * late + state.phase[state.row]
     torque, slope = model.torque(angle, speed, state.ratio * acceleration)
-    channel = Channel(time_constant_s=state.low_pass_s)
-
-    def filtered(each: Floats) -> Floats:
-        return channel.received(each, pair.interval_s, direction=1.0)
-
-    slope = filtered(slope)
-    linear = [filtered(torque), np.sign(speed)]
+    linear = [torque, np.sign(speed)]
     if terms.bias:
         linear.append(np.ones_like(torque))
     if terms.load:
-        linear.append(filtered(model.load_torque(angle)))
+        linear.append(model.load_torque(angle))
     if terms.load_friction:
-        linear.append(filtered(np.abs(torque) * np.sign(speed)))
+        linear.append(np.abs(torque) * np.sign(speed))
     moving = [np.where(state.row == i, slope, 0.0) for i in range(len(state.phase))]
     if terms.ratio:
         moving.append(slope * late)

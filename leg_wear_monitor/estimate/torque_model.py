@@ -1,7 +1,5 @@
 """Drive torque of a leg: T = S + w D + w^2 H + a J, each a table over the crank angle."""
 
-from collections.abc import Sequence
-
 import attrs
 import numpy as np
 
@@ -11,10 +9,6 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.load import load_signature
-from leg_wear_monitor.twin.reference import even_angles
-from leg_wear_monitor.twin.torque_reference import TorqueReference
-
-_HARMONICS = 12  # effect of clearances: a mean over a twelfth of a turn shows no more
 
 PHASE_ERROR_RAD = 0.02
 """Standard deviation by which clearances of 0.3 mm in five joints shift the torque's phase."""
@@ -52,12 +46,8 @@ class ModelError:
     load_friction: float
 
 
-# the ideal leg: six legs in full coordinates behind 18 drives, 30 to 85 rpm (2026-11-24). With clearances: 17
-# robots of 0.2 to 0.4 mm behind drives (2026-11-25, docs/appendix/commissioning.md)
+# six legs in full coordinates behind 18 drives, 30 to 85 rpm
 _IDEAL = ModelError(phase_rad=PHASE_ERROR_RAD, lag_rad=0.01, scale=0.035, friction=0.012, load_friction=0.025)
-_WITH_CLEARANCES = ModelError(
-    phase_rad=0.015, lag_rad=0.0085, scale=0.0125, friction=0.010, load_friction=0.012
-)
 
 
 @attrs.frozen(eq=False)
@@ -99,36 +89,3 @@ def torque_model(mechanism: Mechanism) -> TorqueModel:
     linkage = build_linkage(mechanism)
     tables = torque_coefficients(linkage, one_cycle(linkage, POINTS, 1.0).q)[0]
     return TorqueModel(tables, load_signature(linkage)[:-1])
-
-
-def with_clearances(model: TorqueModel, legs: Sequence[TorqueReference]) -> TorqueModel:
-    """The model with the effect of clearances on the torque, in simulated legs at one or several cadences.
-
-    Clearances shift the torque's phase, and impacts and friction in the joints take power. Between the
-    cadences the change is linear in the speed.
-
-    Parameters
-    ----------
-    model : TorqueModel
-    legs : sequence of TorqueReference
-        References whose first legs are used; at least one.
-    """
-    points = model.tables.shape[1]
-    at = np.arange(points) * (TURN / points)
-    changes = []
-    for leg in legs:
-        measured = leg.torque_nm[0].astype(float).mean(axis=0)
-        even = even_angles(leg.profile)
-        motions = [leg.profile.at(phi) for phi in 0.5 * (even[1:] + even[:-1])]
-        angle, speed, acceleration = (
-            np.array([getattr(one, name) for one in motions]) for name in ("angle", "speed", "acceleration")
-        )
-        change = measured - model.torque(angle, speed, acceleration)[0]
-        waves = np.fft.rfft(np.interp(at, angle, change, period=TURN))
-        waves[_HARMONICS + 1 :] = 0.0
-        changes.append(np.fft.irfft(waves, points))
-    speeds = np.array([leg.profile.speed for leg in legs])
-    by_speed = np.stack([np.ones_like(speeds), speeds], axis=1)[:, : len(speeds)]
-    tables = model.tables.copy()
-    tables[: by_speed.shape[1]] += np.linalg.lstsq(by_speed, np.array(changes), rcond=None)[0]
-    return attrs.evolve(model, tables=tables, error=_WITH_CLEARANCES)

@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from leg_wear_monitor.commissioning import commission, detection
+from leg_wear_monitor.commissioning import commission
 from leg_wear_monitor.commissioning.result import CommissioningItem, CommissioningResult
 from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.monitor.config.parameters import load_config
@@ -15,7 +15,7 @@ HEALTHY = share_directory() / "bags" / "healthy.mcap"
 
 def test_the_sample_recording_gives_files_that_check_accepts(run, tmp_path: Path, monkeypatch) -> None:
     """Parameters, and a reference beside them: that of the package, in place of one that is simulated."""
-    monkeypatch.setattr(detection, "simulated_under", lambda mechanism, *_: shipped_references(mechanism))
+    monkeypatch.setattr(commission, "simulated_under", lambda mechanism, *_: shipped_references(mechanism))
     line = ("--out", "monitor.yaml", "--reference", "leg.npz", "--json", "found.json")
     result = run("commission", str(HEALTHY), *line)
     assert result.exit_code == 1  # one cadence does not tell a lag from an offset
@@ -35,10 +35,7 @@ def test_the_sample_recording_gives_files_that_check_accepts(run, tmp_path: Path
     found = json.loads((tmp_path / "found.json").read_text())
     signs = next(item for item in found["items"] if item["name"] == "crank.sign")
     assert signs["mismatch"] < 0.1 < 0.5 < signs["other_mismatch"]
-    assert "this torque is good enough for joints A, B, G" in result.stdout
     assert "better known: lag: record two cadences in one recording" in result.stdout
-    assert [one["joint"] for one in found["joints"] if one["is_good"]][:3] == ["A", "B", "G"]
-    assert found["judgement"] in result.stdout
 
 
 def test_a_file_that_is_there_may_be_better_than_what_is_not_certain(

@@ -11,8 +11,6 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import LegWearError, Mechanism, MonitorConfig, simulate
-from leg_wear_monitor.commissioning import commission as commissioning
-from leg_wear_monitor.commissioning import detection
 from leg_wear_monitor.commissioning.commission import commission, propose
 from leg_wear_monitor.commissioning.result import CommissioningResult
 from leg_wear_monitor.estimate.joint_motion import Series
@@ -217,14 +215,11 @@ def test_an_encoder_that_starts_anew_is_found_again_and_reported(
     assert "0.316" in text
 
 
-def test_the_limit_of_the_mismatch_is_that_of_the_leg(
-    leg: Mechanism, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_limit_of_the_mismatch_is_that_of_the_leg(leg: Mechanism) -> None:
     """A torque of which a part is not the model's would raise the alarm in each gait cycle.
 
     Of a table in memory, with times in nanoseconds and an encoder that counts the other way.
     """
-    monkeypatch.setattr(detection, "joint_detections", lambda *_: ())  # what it shows of joints is not asked
     ideal, config = simulate(leg, clearances=[], cycles=1, trace=200).trace, config_from(NS)
     angle, random, limits = np.tile(ideal.crank_angle_rad, 16), np.random.default_rng(1), []
     for strange_nm in (0.0, 2.5):
@@ -343,9 +338,7 @@ def walking_table(pause_s: float = 0.0, scatter_ns: float = 0.0) -> dict[str, np
     return {"time": stamp_ns, "crank_angle": angle, "drive_torque": torque}
 
 
-def test_a_pause_of_a_week_needs_no_memory(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(commissioning, "expected_leg", lambda _: None)  # simulates what is not asked
-    monkeypatch.setattr(detection, "joint_detections", lambda *_: ())
+def test_a_pause_of_a_week_needs_no_memory() -> None:
     result = commission(walking_table(pause_s=7.0 * 86400.0), config_from(NS))
     assert result.config is not None and result.config.crank.gear_ratio == 1.0
     assert result.item("cadence.commanded_rpm").value == pytest.approx(60.0, abs=0.5)

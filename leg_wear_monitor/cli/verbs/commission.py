@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from leg_wear_monitor.commissioning.result import CommissioningResult
 
 
-_NEVER = 1000  # gait cycles; a larger number is of no interest
-
 # ``leg-wear-monitor commission``: proposes the parameters of a robot from a recording of its healthy leg.
 
 
@@ -59,9 +57,8 @@ def commission(
 
     Reads MCAP, .db3, CSV and Parquet files or bag directories. Record a minute of walking with the foot in
     the air, preferably at two cadences. The command tries all joints and all torques, in both directions,
-    with every gear ratio and offset. It compares each with the drive torque of the mechanism. Then it tells
-    for which joints the torque is good enough. Exit code 1 if a parameter cannot be determined, or does not
-    fit.
+    with every gear ratio and offset. It compares each with the drive torque of the mechanism. Exit code 1 if
+    a parameter cannot be determined, or does not fit.
     """
     for option, path in (("--out", out), ("--reference", reference), ("--json", json_file)):
         common.check_file(option, path)
@@ -108,18 +105,8 @@ def _print(result: "CommissioningResult") -> None:
         table.add_row(item.name, f"{_shown(item.value)} {item.unit}".strip(), *shown)
     console.print(f"\nfrom {result.turns:.3g} turns of the crank\n", table, sep="\n")
     console.print("\nmismatch: RMS of the torque that stays unexplained, as a fraction of the torque's\n")
-    if result.joints:
-        joints = plain_table(("joint", "clearance", "detected", "named", "what else explains it"), 1, 5)
-        for one in result.joints:
-            for i, clearance_m in enumerate(one.clearances_m):
-                cycles = (_cycles(one.cycles[i]), _cycles(one.named_cycles[i]))
-                joints.add_row(one.joint, f"{1.0e3 * clearance_m:.3g} mm", *cycles, one.runner_up)
-        console.print("gait cycles until the drive torque shows a wider joint: detected, as expected;")
-        console.print("named, in four of five legs whose masses are 4 % off\n", joints, sep="\n")
     texts = {
         "better known": [f"{item.name}: {item.better}" for item in result.items if item.better],
-        "joints": [result.judgement] if result.joints else [],
-        "reference": [result.reference_used] if result.reference_used else [],
         "not enough to tell": result.not_told,
         "does not fit": result.findings,
         "note": result.notes,
@@ -129,10 +116,6 @@ def _print(result: "CommissioningResult") -> None:
             console.print(f"{label}: {printable(sentence)}", soft_wrap=True)
     if result.config is None:
         console.print("no parameters are proposed, because a choice between them is not certain")
-
-
-def _cycles(number: float) -> str:
-    return f"{math.ceil(number)}" if number < _NEVER else "never" if math.isnan(number) else f"over {_NEVER}"
 
 
 def _shown(value: str | int | float | None) -> str:

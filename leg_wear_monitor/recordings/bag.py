@@ -13,19 +13,22 @@ from numpy.typing import ArrayLike
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from leg_wear_monitor.errors import printable, system_asked
+from leg_wear_monitor.errors import system_asked
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.recordings.findings import (
+    CSV,
+    PARQUET,
+    Channel,
     DamageError,
+    Due,
     Finding,
+    Piece,
     RecordingError,
     Severity,
+    listed,
     open_recording,
 )
-from leg_wear_monitor.recordings.mcap_file import McapFile
-from leg_wear_monitor.recordings.piece import Channel, Due, Piece
-from leg_wear_monitor.recordings.streams import Stream, changed_fields, streams_of
-from leg_wear_monitor.recordings.table_layout import CSV, PARQUET, REMEDIES
+from leg_wear_monitor.recordings.streams import Stream, streams_of
 from leg_wear_monitor.twin import TORQUE
 
 # Resolve the user's paths to an ordered list of recordings: bags (plain, split, compressed) and tables.
@@ -39,6 +42,18 @@ _NAME = re.compile(r".*(\.mcap|\.db3)", re.DOTALL)
 _TABLE = re.compile(r".*(\.csv|\.parquet)", re.DOTALL | re.IGNORECASE)
 _ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 _EXPECTED = "a bag directory, .mcap, .db3, .csv or .parquet"
+_RENAME = "not read under this name. Rename it to {path.stem}.csv if it is a table"
+_EXPORT = "a spreadsheet. Save it as CSV (UTF-8)"
+_REMEDIES = dict.fromkeys((".txt", ".tsv", ".dat", ".log"), _RENAME)
+_REMEDIES |= dict.fromkeys((".xlsx", ".xls", ".ods"), _EXPORT)
+_REMEDIES |= dict.fromkeys((".zstd", ".zst"), "compressed as a whole. Run: zstd -d {path} -o {path.stem}")
+_REMEDIES[".bag"] = "a ROS 1 bag. Convert it: rosbags-convert --src {path} --dst {path.stem}"
+"""Remedy for a file that is not read, by the end of its name."""
+
+
+def is_table_name(name: str) -> bool:
+    """True if a file is a table by its name, or a recording of a kind that is refused with a remedy."""
+    return Path(name).suffix.lower() in (CSV, PARQUET, *_REMEDIES)
 
 
 class DataFrame(Protocol):
@@ -134,7 +149,7 @@ def is_bag_directory(path: Path) -> bool:
 def _file(path: Path) -> BagFile:
     match = _NAME.fullmatch(path.name) or _TABLE.fullmatch(path.name)
     if match is None:
-        remedy = REMEDIES.get(path.suffix.lower())
+        remedy = _REMEDIES.get(path.suffix.lower())
         text = remedy.format(path=path) if remedy else f"not a recording by its name. Expected {_EXPECTED}"
         raise RecordingError(str(path), "", text)
     if not path.is_file():
@@ -254,16 +269,6 @@ def check_channel(stream: Stream, channel: Channel, where: str) -> None:
         raise RecordingError(where, channel.topic, f"is of type {kind}, expected {stream.type}")
     if channel.encoding != "cdr":
         raise RecordingError(where, channel.topic, f"is encoded as {channel.encoding!r}, expected 'cdr'")
-    if changed := changed_fields(kind, channel.definition, channel.definition_encoding):
-        text = f"is defined differently than in ROS 2 ({listed(changed)})"
-        raise RecordingError(where, channel.topic, text)
-
-
-def listed(names: Iterable[str]) -> str:
-    """Sorted names as text, shortened if there are many."""
-    names = sorted(set(names))
-    more = f" and {len(names) - 20} more" if len(names) > 20 else ""
-    return (", ".join(printable(name, 100) for name in names[:20]) or "none") + more
 
 
 # Uniform access to the files of a recording, and selection of the channels to read.
@@ -367,7 +372,7 @@ def assign(
     RecordingError
         If the crank's topic is missing, or the type of a topic cannot be read.
     """
-    recorded = [channel.topic for source in sources for channel in source.file.channels.values()]
+    recorded = sorted({channel.topic for source in sources for channel in source.file.channels.values()})
     first = sources[0].bag_file.path
     topics: dict[str, str] = {}
     findings: list[Finding] = []
@@ -399,6 +404,8 @@ def _open(bag_file: BagFile, config: MonitorConfig, stack: ExitStack) -> OpenFil
             content = stack.enter_context(open_recording(path)) if is_file else bag_file.table
             return TableFile(path, content, bag_file.storage, config)
         if bag_file.storage == MCAP:
+            from leg_wear_monitor.recordings.mcap_file import McapFile
+
             return McapFile(path, stack.enter_context(open_recording(path)))
         from leg_wear_monitor.recordings.database import DatabaseFile
 

@@ -414,9 +414,15 @@ class Decoder:
         names = self._crank, self._interface, self._thermal, self._encoders
         decode(data, messages, *names, self._ends, self._axis, self._effort, *out)
         samples["encoder_rad"] = np.nan
-        samples["encoder_rad"][:, : len(self._ends)] = angles * self._signs
+        samples["encoder_rad"][:, : len(self._ends)] = angles
+        samples["foot_force_n"] = force
+        return self.scaled(samples)
+
+    def scaled(self, samples: Samples) -> Samples:
+        """Apply signs, scales and offset, in place, to samples that are as their messages are."""
+        samples["encoder_rad"][:, : len(self._ends)] *= self._signs
         with np.errstate(over="ignore"):
-            samples["foot_force_n"] = force * self._force_scale
+            samples["foot_force_n"] *= self._force_scale
             samples["crank_angle_rad"] *= self._crank_scale
             samples["crank_angle_rad"] += self._offset_rad
             samples["crank_velocity_radps"] *= self._crank_scale

@@ -9,18 +9,15 @@ from typing import Any
 
 import apsw
 import numpy as np
-from rosbags.interfaces import MessageDefinitionFormat
 from rosbags.rosbag2 import Reader, ReaderError
 
 from leg_wear_monitor.errors import one_line
 from leg_wear_monitor.recordings.cdr import MESSAGE
-from leg_wear_monitor.recordings.findings import MOST_BYTES, Finding, RecordingError
-from leg_wear_monitor.recordings.piece import Channel, Due, Piece
+from leg_wear_monitor.recordings.findings import MOST_BYTES, Channel, Due, Finding, Piece, RecordingError
 
 _JOURNALS = ("-wal", "-journal")  # endings of the files of transactions that were not written back
 _UNREADABLE = (ReaderError, apsw.Error, sqlite3.Error, ValueError, KeyError, TypeError, MemoryError)
 _TOGETHER = 4096  # messages of a piece
-_ENCODINGS = {MessageDefinitionFormat.MSG: "ros2msg", MessageDefinitionFormat.IDL: "ros2idl"}
 
 
 class DatabaseFile:
@@ -58,13 +55,7 @@ class DatabaseFile:
                 self.findings.append(Finding(path, f"was not closed: {journal.name} is not read. {remedy}"))
         self._connections = {one.id: one for one in self._reader.connections}
         self.channels = {
-            number: Channel(
-                one.topic,
-                one.msgtype,
-                getattr(one.ext, "serialization_format", ""),
-                one.msgdef.data,
-                _ENCODINGS.get(one.msgdef.format, ""),
-            )
+            number: Channel(one.topic, one.msgtype, getattr(one.ext, "serialization_format", ""))
             for number, one in self._connections.items()
         }
         unlisted = self._reader.message_count - sum(one.msgcount for one in self._connections.values())

@@ -1,10 +1,10 @@
-"""Shared parts of the readers of recordings: findings and errors, opening of files, clocks.
+"""Shared parts of the readers of recordings: findings and errors, opening of files, pieces.
 
 A recording may be damaged. A reader reads the usable part and lists the faults; only an unusable recording
 raises an error.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from enum import Enum
 from pathlib import Path
@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from leg_wear_monitor.errors import ConfigError, printable
-from leg_wear_monitor.recordings.streams import JOINT_STATE, STREAMS
-from leg_wear_monitor.twin.sample import NO_FAULT, Samples
+from leg_wear_monitor.twin.sample import Samples
 
 # Findings and errors: a reader lists faults as findings and goes on; `RecordingError` ends the reading, and
 # `DamageError` gives up one part of a file.
@@ -107,6 +106,16 @@ def check_size(needed: int) -> None:
         raise DamageError(text)
 
 
+CSV, PARQUET = ".csv", ".parquet"
+
+
+def listed(names: Iterable[str]) -> str:
+    """Names as text, the first 20 of them."""
+    names = list(names)
+    more = f" and {len(names) - 20} more" if len(names) > 20 else ""
+    return (", ".join(printable(name, 100) for name in names[:20]) or "none") + more
+
+
 _POINTER = b"version https://git-lfs.github.com/spec/"
 
 
@@ -128,50 +137,52 @@ def open_recording(path: Path) -> IO[bytes]:
     return file
 
 
-# Check that the clocks of a recording agree: header stamps against log times.
+# Messages of one step of reading, and the topic that they belong to.
 
 
-_FRACTION, _LEAST_NS = 0.05, 1_000_000_000
+@attrs.frozen
+class Channel:
+    """Topic, type and encoding of a channel in one file; an unknown type is empty."""
+
+    topic: str
+    type: str
+    encoding: str = "cdr"
 
 
-class Clocks:
-    """First and last stamps and log times of each message type."""
+@attrs.frozen(eq=False)
+class Piece:
+    """Messages that are read in one step.
 
-    def __init__(self) -> None:
-        self._ends: dict[int, NDArray[np.int64]] = {}
+    Attributes
+    ----------
+    start_ns : int
+        Lower bound of the log times in this piece and all later pieces of the file [ns].
+    data : (bytes,) array of uint8
+    messages : (n,) array of MESSAGE
+    stored : int
+        Bytes that the piece occupies in the file.
+    samples : (n,) array of GAIT_SAMPLE, optional
+        The messages as samples, without sign, scale and offset; a table has no other content of messages.
+    """
 
-    def compare(self, samples: Samples, messages: NDArray[np.void]) -> None:
-        """Update the times from messages and the samples decoded from them.
+    start_ns: int
+    data: NDArray[np.uint8]
+    messages: NDArray[np.void]
+    stored: int
+    samples: Samples | None = None
 
-        Parameters
-        ----------
-        samples : (n,) array of GAIT_SAMPLE
-            Stamped by their headers.
-        messages : (n,) array of MESSAGE
-        """
-        good = samples["fault"] == NO_FAULT
-        for code in np.unique(messages["type"][good]).tolist():
-            chosen = good & (messages["type"] == code)
-            ends = np.stack([samples["stamp_ns"][chosen], messages["log_time_ns"][chosen]])[:, [0, -1]]
-            ends[:, 0] = self._ends.get(code, ends)[:, 0]
-            self._ends[code] = ends
 
-    def notes(self) -> list[str]:
-        """Disagreements of the clocks, one line each."""
-        found = []
-        crank = self._ends.get(JOINT_STATE)
-        for stream in (stream for stream in STREAMS if stream.code in self._ends):
-            span, span_log = np.diff(self._ends[stream.code])[:, 0].tolist()
-            if stream.has_stamp and abs(span - span_log) > max(_LEAST_NS, _FRACTION * abs(span_log)):
-                found.append(
-                    f"{stream.topic}: header stamps span {span / 1e9:.6g} s, log times "
-                    f"{span_log / 1e9:.6g} s; header stamps are used, unless --time selects others"
-                )
-            if not stream.has_stamp and crank is not None:
-                apart = int(crank[1, 1] - crank[0, 1])
-                if abs(apart) > _LEAST_NS:
-                    found.append(
-                        f"{stream.topic} has no header, so its stamps are log times; they are "
-                        f"{apart / 1e9:.6g} s after the header stamps of joint_states; try --time log"
-                    )
-        return found
+@attrs.frozen(eq=False)
+class Due:
+    """A piece that is not loaded yet, so that a merge of many files has few pieces in memory.
+
+    Attributes
+    ----------
+    start_ns : int
+        `Piece.start_ns` of the piece [ns].
+    load : callable
+        Returns the piece, or None if it is damaged. Call it before requesting the next piece.
+    """
+
+    start_ns: int
+    load: Callable[[], Piece | None]

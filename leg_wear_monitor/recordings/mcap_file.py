@@ -24,8 +24,15 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.errors import one_line
 from leg_wear_monitor.recordings.cdr import MESSAGE
-from leg_wear_monitor.recordings.findings import DamageError, Finding, RecordingError, check_size
-from leg_wear_monitor.recordings.piece import Channel, Due, Piece
+from leg_wear_monitor.recordings.findings import (
+    Channel,
+    DamageError,
+    Due,
+    Finding,
+    Piece,
+    RecordingError,
+    check_size,
+)
 
 MAGIC = b"\x89MCAP0\r\n"
 _UNREADABLE = (
@@ -104,12 +111,11 @@ class McapFile:
 
     @property
     def channels(self) -> dict[int, Channel]:
-        """Channels by channel number, with the names and definitions of their schemas."""
+        """Channels by channel number, with the names of their schemas."""
         found = {}
         for number, one in self._channels.items():
-            schema = self._schemas.get(one.schema_id, Schema(0, b"", "", ""))
-            text = schema.data.decode("utf-8", "replace")
-            found[number] = Channel(one.topic, schema.name, one.message_encoding, text, schema.encoding)
+            schema = self._schemas.get(one.schema_id)
+            found[number] = Channel(one.topic, schema.name if schema else "", one.message_encoding)
         return found
 
     def pieces(self, types: dict[int, int]) -> Iterator[Due]:

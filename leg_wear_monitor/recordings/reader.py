@@ -5,17 +5,15 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from itertools import repeat
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.errors import printable
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.recordings import bag
 from leg_wear_monitor.recordings.cdr import Decoder, mark_zero_stamps
-from leg_wear_monitor.recordings.findings import Clocks, Finding, RecordingError, Severity, reading
+from leg_wear_monitor.recordings.findings import Finding, Piece, RecordingError, Severity, listed, reading
 from leg_wear_monitor.recordings.names import (
     is_without,
     names_in,
@@ -23,23 +21,10 @@ from leg_wear_monitor.recordings.names import (
     wanted_interfaces,
     without_interface,
 )
-from leg_wear_monitor.recordings.piece import Piece
-from leg_wear_monitor.recordings.streams import INTERFACES, JOINT_STATE, WRENCH_STAMPED
-from leg_wear_monitor.recordings.table_layout import (
-    CRANK_SPEED,
-    DRIVE_TORQUE,
-    FOOT_LOAD,
-    FOOT_LOAD_ALONG,
-    STAMP,
-    Column,
-    columns_of,
-)
+from leg_wear_monitor.recordings.streams import INTERFACES, JOINT_STATE, STREAMS, WRENCH_STAMPED
 from leg_wear_monitor.recordings.wrench_axis import WrenchAxis
 from leg_wear_monitor.twin import TORQUE
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, MISSING_JOINT, NO_FAULT, NOT_FINITE, ZERO_STAMP, Samples
-
-if TYPE_CHECKING:
-    from leg_wear_monitor.recordings.table_file import TableFile
 
 # Check that several files record one leg: the same topics, and the crank joint in their messages.
 
@@ -72,7 +57,7 @@ def check_topics(
             continue
         others = [other for other in recorded if other.endswith("/joint_states")]
         if others and joint_states is None:
-            text = f"has {bag.listed(others)}, where other files have {bag.listed([topic])}: {_ADVICE}"
+            text = f"has {listed(sorted(others))}, where other files have {topic}: {_ADVICE}"
             raise RecordingError(str(source.bag_file.path), "joint_states", text)
         text = f"has no topic {topic}: no crank is read from it"
         findings.append(Finding(source.bag_file.path, text, Severity.NOTE))
@@ -143,7 +128,8 @@ class JointNames:
             if file.twice:
                 raise RecordingError(str(path), self._crank, file.twice)
             if file.count:
-                text = f"is not among the joints of {file.count} messages, they have {bag.listed(file.names)}"
+                names = listed(sorted(file.names))
+                text = f"is not among the joints of {file.count} messages, they have {names}"
                 if not self._found:
                     remedy = "set the crank with --crank-joint (crank_joint in the parameters)"
                     raise RecordingError(str(path), self._crank, f"{text}; {remedy}")
@@ -235,6 +221,55 @@ class Pauses:
             "monitored during this pause, which is not a fault of the input"
         )
         self.findings.append(Finding(self._files[source], text, Severity.NOTE))
+
+
+# Check that the clocks of a recording agree: header stamps against log times.
+
+
+_FRACTION, _LEAST_NS = 0.05, 1_000_000_000
+
+
+class Clocks:
+    """First and last stamps and log times of each message type."""
+
+    def __init__(self) -> None:
+        self._ends: dict[int, NDArray[np.int64]] = {}
+
+    def compare(self, samples: Samples, messages: NDArray[np.void]) -> None:
+        """Update the times from messages and the samples decoded from them.
+
+        Parameters
+        ----------
+        samples : (n,) array of GAIT_SAMPLE
+            Stamped by their headers.
+        messages : (n,) array of MESSAGE
+        """
+        good = samples["fault"] == NO_FAULT
+        for code in np.unique(messages["type"][good]).tolist():
+            chosen = good & (messages["type"] == code)
+            ends = np.stack([samples["stamp_ns"][chosen], messages["log_time_ns"][chosen]])[:, [0, -1]]
+            ends[:, 0] = self._ends.get(code, ends)[:, 0]
+            self._ends[code] = ends
+
+    def notes(self) -> list[str]:
+        """Disagreements of the clocks, one line each."""
+        found = []
+        crank = self._ends.get(JOINT_STATE)
+        for stream in (stream for stream in STREAMS if stream.code in self._ends):
+            span, span_log = np.diff(self._ends[stream.code])[:, 0].tolist()
+            if stream.has_stamp and abs(span - span_log) > max(_LEAST_NS, _FRACTION * abs(span_log)):
+                found.append(
+                    f"{stream.topic}: header stamps span {span / 1e9:.6g} s, log times "
+                    f"{span_log / 1e9:.6g} s; header stamps are used, unless --time selects others"
+                )
+            if not stream.has_stamp and crank is not None:
+                apart = int(crank[1, 1] - crank[0, 1])
+                if abs(apart) > _LEAST_NS:
+                    found.append(
+                        f"{stream.topic} has no header, so its stamps are log times; they are "
+                        f"{apart / 1e9:.6g} s after the header stamps of joint_states; try --time log"
+                    )
+        return found
 
 
 TIMES = ("header", "log", "publish")
@@ -381,6 +416,8 @@ class Recording:
 
     def _samples(self, bag_file: bag.BagFile, piece: Piece) -> Samples:
         """Decode a piece, and stamp its samples with the selected time."""
+        if piece.samples is not None:  # a table has one clock only
+            return self._decoder.scaled(piece.samples)
         samples = self._decoder.many(piece.data, piece.messages)
         self._joints.add_samples(bag_file.path, piece.data, piece.messages, samples)
         wrenches = np.flatnonzero(
@@ -390,8 +427,7 @@ class Recording:
         )
         some = piece.messages[wrenches[:: max(1, len(wrenches) // _COMPARED)]]
         self._axis.add(piece.data[one["begin"] : one["end"]].tobytes() for one in some)
-        if bag_file.storage not in bag.TABLES:  # which have one clock only
-            self._clocks.compare(samples, piece.messages)
+        self._clocks.compare(samples, piece.messages)
         if self.time != "header":
             samples["fault"][samples["fault"] == ZERO_STAMP] = NO_FAULT
             samples["stamp_ns"] = piece.messages[f"{self.time}_time_ns"]
@@ -408,68 +444,3 @@ def _merged(block: Block, new: Block) -> Block:
         order = np.argsort(times, kind="stable")
         times, samples, source = times[order], samples[order], source[order]
     return Block(samples, times, new.fraction, source)
-
-
-# A table as the reader understands it: rows, time, columns with their ranges in SI units.
-
-
-_SI = {CRANK_SPEED: "rad/s", DRIVE_TORQUE: "N m", FOOT_LOAD: "N", FOOT_LOAD_ALONG: "N"}
-
-
-def understood(path: Path, config: MonitorConfig) -> tuple[list[str], list[Finding]]:
-    """Read a table as a whole; return how it was interpreted, one line per item, and the findings.
-
-    Parameters
-    ----------
-    path : pathlib.Path
-        CSV or Parquet file.
-    config : MonitorConfig
-        Names the columns and their units.
-
-    Raises
-    ------
-    RecordingError
-        If the table cannot be read.
-    """
-    from leg_wear_monitor.recordings.table_file import TableFile
-
-    files, findings = bag.find_files([path])
-    with ExitStack() as stack:
-        (source,), _ = bag.open_sources(files, config, stack)
-        table = source.file
-        if not isinstance(table, TableFile):
-            raise TypeError(f"{path} is no table")
-        for due in table.pieces({}):
-            due.load()
-        columns = columns_of(config)
-        lines = [_time(table, columns), *(_column(table, one) for one in columns if one.key != STAMP)]
-        return [*lines, *_others(table, columns)], findings + table.findings
-
-
-def _time(table: "TableFile", columns: tuple[Column, ...]) -> str:
-    counts = table.counts
-    seconds = ((counts.last_ns or 0) - (counts.first_ns or 0)) * 1.0e-9
-    rate = f", {(counts.rows - 1) / seconds:.4g} rows a second" if seconds > 0.0 else ""
-    of = next((f"time {_named(one)}" for one in columns if one.key == STAMP), "no column of the time")
-    return f"table of {counts.rows} rows over {seconds:.6g} s{rate}; {of}"
-
-
-def _column(table: "TableFile", column: Column) -> str:
-    counts, unit = table.counts, _SI.get(column.key, "rad")
-    number = counts.measured.get(column.key, 0)
-    found = f"{number} values"
-    if column.key in counts.least:
-        found += f", {counts.least[column.key]:.4g} to {counts.most[column.key]:.4g} {unit}"
-    elif number:
-        found += ", all of them NaN or infinite"
-    return f"{column.key} {_named(column)}: {found}"
-
-
-def _others(table: "TableFile", columns: tuple[Column, ...]) -> list[str]:
-    read = {column.name for column in columns}
-    others = [printable(name, 100) for name in table.names if name not in read]
-    return [f"not read: {', '.join(others)}"] if others else []
-
-
-def _named(column: Column) -> str:
-    return f"from {column.name!r} in {column.unit}"

@@ -19,9 +19,8 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.recordings import outputs
 from leg_wear_monitor.recordings.bag import Recordable, Source, check_channel, find_files, open_sources
 from leg_wear_monitor.recordings.cdr import Decoder
-from leg_wear_monitor.recordings.findings import Finding, RecordingError, Severity
+from leg_wear_monitor.recordings.findings import Channel, Finding, Piece, RecordingError, Severity
 from leg_wear_monitor.recordings.names import interfaces_in, names_in, twice
-from leg_wear_monitor.recordings.piece import Channel
 from leg_wear_monitor.recordings.streams import INTERFACES, JOINT_STATE, STREAMS, WRENCH_STAMPED, Stream
 from leg_wear_monitor.twin import CRANK, KINDS, TORQUE
 from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, ZERO_STAMP, Samples
@@ -152,7 +151,7 @@ def read_signals(
                 piece = due.load()
                 if piece is not None:  # a damaged piece is a finding of its file
                     recording = source.bag_file.recording
-                    _add_piece(collected, selected, piece.data, piece.messages, recording)
+                    _add_piece(collected, selected, piece, config, recording)
                     read += piece.stored
                     progress(min(1.0, read / total))
         findings += unreadable + skipped + [each for source in sources for each in source.file.findings]
@@ -203,8 +202,8 @@ def _stream(channel: Channel, joint_states: str | None, drive_torque: str | None
 def _add_piece(
     collected: dict[JointName | TorqueSource, _Parts],
     selected: _Selected,
-    data: NDArray[np.uint8],
-    messages: NDArray[np.void],
+    piece: Piece,
+    config: MonitorConfig,
     recording: int,
 ) -> None:
     """Decode a piece, and add its values to the series of each joint and torque.
@@ -214,53 +213,78 @@ def _add_piece(
     collected : dict
         Parts of the series so far, added to.
     selected : list of (str, Stream)
-        List returned by `_select`.
-    data : (bytes,) array of uint8
-    messages : (n,) array of `cdr.MESSAGE`
-        Position of each message in the data; `type` is the position in ``selected``, from 1.
+        List returned by `_select`; the field `type` of a message is the position in it, from 1.
+    piece : Piece
+    config : MonitorConfig
+        Names the columns of a table.
     recording : int
         Index of the recording.
     """
-    for number in np.unique(messages["type"]).tolist():
+    for number in np.unique(piece.messages["type"]).tolist():
         topic, stream = selected[number - 1]
-        chosen = messages[messages["type"] == number]  # a copy, with the code that the decoder expects
+        is_chosen = piece.messages["type"] == number
+        chosen = piece.messages[is_chosen]  # a copy, with the code that the decoder expects
         chosen["type"] = stream.code
-        for name, samples, field in _decoded_series(topic, stream.code, data, chosen):
+        if piece.samples is None:
+            found = _decoded_series(topic, stream.code, piece.data, chosen)
+        else:
+            found = _table_series(topic, stream, piece.samples[is_chosen], config)
+        for name, samples, values in found:
             # a message without a stamp is usable at its log time
             is_unstamped = samples["fault"] == ZERO_STAMP
             largest = KINDS[CRANK if isinstance(name, JointName) else TORQUE].largest
-            is_usable = (is_unstamped | (samples["fault"] == NO_FAULT)) & (np.abs(samples[field]) <= largest)
+            is_usable = (is_unstamped | (samples["fault"] == NO_FAULT)) & (np.abs(values) <= largest)
             stamps = np.where(is_unstamped, chosen["log_time_ns"], samples["stamp_ns"])[is_usable]
             parts = collected.setdefault(name, [])
-            parts.append((stamps, samples[field][is_usable], np.full(len(stamps), recording)))
+            parts.append((stamps, values[is_usable], np.full(len(stamps), recording)))
 
 
-def _decoded_series(
-    topic: str, code: int, data: NDArray[np.uint8], messages: NDArray[np.void]
-) -> list[tuple[JointName | TorqueSource, Samples, str]]:
-    """Each series in the messages of a topic: its name, its samples, and the field of these with its values.
+_Found = list[tuple[JointName | TorqueSource, Samples, NDArray[np.float64]]]
+"""Name of a series, its samples, and their values of this series."""
+
+
+def _table_series(topic: str, stream: Stream, samples: Samples, config: MonitorConfig) -> _Found:
+    """Each series in the rows of a table."""
+    torque, crank = config.drive_torque, config.crank_joint
+    if stream.code == JOINT_STATE:
+        found: _Found = [(JointName(topic, crank), samples, samples["crank_angle_rad"])]
+        for k, name in enumerate(config.encoders.names):
+            found.append((JointName(topic, name), samples, samples["encoder_rad"][:, k]))
+        if np.isfinite(samples["torque_nm"]).any():
+            found.append((TorqueSource(EFFORT, topic, crank), samples, samples["torque_nm"]))
+        return found
+    source = {
+        WRENCH_STAMPED: TorqueSource(WRENCH, topic, torque.axis),
+        INTERFACES: TorqueSource(INTERFACE, topic, crank, torque.interface),
+    }.get(stream.code, TorqueSource(FLOAT64, topic))
+    return [(source, samples, samples["torque_nm"])]
+
+
+def _decoded_series(topic: str, code: int, data: NDArray[np.uint8], messages: NDArray[np.void]) -> _Found:
+    """Each series in the messages of a topic.
 
     Each message gives one sample. Samples of a joint state have both the angle and the effort of the joint.
     """
-    found: list[tuple[JointName | TorqueSource, Samples, str]] = []
+    found: _Found = []
     if code == JOINT_STATE:
         for joint in _joint_names(data, messages):
             samples = _decoder(EFFORT, joint=joint).many(data, messages)
-            found.append((JointName(topic, joint), samples, "crank_angle_rad"))
+            found.append((JointName(topic, joint), samples, samples["crank_angle_rad"]))
             if np.isfinite(samples["torque_nm"]).any():
-                found.append((TorqueSource(EFFORT, topic, joint), samples, "torque_nm"))
+                found.append((TorqueSource(EFFORT, topic, joint), samples, samples["torque_nm"]))
         return found
+    sources = {TorqueSource(FLOAT64, topic): _decoder(FLOAT64)}
     if code == INTERFACES:
-        for joint, interface in _interfaces(data, messages):
-            samples = _decoder(INTERFACE, joint=joint, interface=interface).many(data, messages)
-            found.append((TorqueSource(INTERFACE, topic, joint, interface), samples, "torque_nm"))
-        return found
-    if code == WRENCH_STAMPED:
-        return [
-            (TorqueSource(WRENCH, topic, axis), _decoder(WRENCH, axis).many(data, messages), "torque_nm")
-            for axis in "xyz"
-        ]
-    return [(TorqueSource(FLOAT64, topic), _decoder(FLOAT64).many(data, messages), "torque_nm")]
+        sources = {
+            TorqueSource(INTERFACE, topic, joint, interface): _decoder(INTERFACE, "z", joint, interface)
+            for joint, interface in _interfaces(data, messages)
+        }
+    elif code == WRENCH_STAMPED:
+        sources = {TorqueSource(WRENCH, topic, axis): _decoder(WRENCH, axis) for axis in "xyz"}
+    for source, decoder in sources.items():
+        samples = decoder.many(data, messages)
+        found.append((source, samples, samples["torque_nm"]))
+    return found
 
 
 def _decoder(source: str, axis: str = "z", joint: str = _NO_JOINT, interface: str = "effort") -> Decoder:

@@ -3,10 +3,8 @@
 `cdr` parses the messages of a stream; `twin` defines the use of its samples.
 """
 
-import re
 from collections.abc import Iterator, Mapping
 from functools import cache
-from itertools import zip_longest
 from typing import TYPE_CHECKING
 
 import attrs
@@ -171,42 +169,6 @@ def definition(name: str) -> Definition:
     """Definition of a message type of ROS 2's common interfaces or of ros2_control."""
     text, _ = types().generate_msgdef(name, ros_version=2)
     return Definition(text, types().hash_rihs01(name))
-
-
-def changed_fields(name: str, text: str, encoding: str) -> list[str]:
-    """Fields, as ``type.field``, in a recorded definition that differ from the known definition.
-
-    Parameters
-    ----------
-    name : str
-        The message type. It is returned if its definition cannot be parsed.
-    text : str
-        The recorded definition, with the definitions of nested types; empty if there is none.
-    encoding : str
-        ``ros2msg`` or ``ros2idl``; a different one is not compared.
-    """
-    if not text or encoding not in ("ros2msg", "ros2idl"):
-        return []
-    from rosbags.typesys import TypesysError, get_types_from_idl, get_types_from_msg
-
-    try:
-        if encoding == "ros2msg":
-            recorded = get_types_from_msg(text, name)
-        else:
-            # Each type follows a line of equal signs. rosbags parses neither this line nor the next lines.
-            plain = re.sub(r"^(IDL: |#).*\n", "", text, flags=re.MULTILINE)
-            parts = filter(str.strip, re.split(r"^=+\n", plain, flags=re.MULTILINE))
-            recorded = {key: one for part in parts for key, one in get_types_from_idl(part).items()}
-    except (TypesysError, ValueError):
-        return [name]
-    known = types().fielddefs
-    pairs = [(key, list(recorded[key][1]), list(known[key][1])) for key in recorded if key in known]
-    return [
-        f"{key}.{found[0] if found else expected[0]}"
-        for key, ours, theirs in pairs
-        for found, expected in zip_longest(ours, theirs)
-        if found != expected
-    ]
 
 
 # Times of forecast messages: a minute after the last one, after an alarm change, on a new answer.

@@ -1,12 +1,18 @@
-"""Head of a CSV file: separator, decimal mark, and the lines before the first row of numbers."""
+"""Head of a CSV file: separator, decimal mark, lines before the rows; numbers, dates and units as text."""
 
 import csv
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
 
 import attrs
+import numpy as np
+from numpy.typing import NDArray
 
-from leg_wear_monitor.recordings.table_layout import dates, is_number, units_named
+from leg_wear_monitor.monitor.config.tables import COUNTS
+
+STAMP, CRANK_ANGLE, CRANK_SPEED, DRIVE_TORQUE = "stamp", "crank_angle", "crank_speed", "drive_torque"
+"""Keys of columns: the last part of the parameters that name them."""
 
 _SEPARATORS = "\t;|, "  # if several fit, the first one wins: a comma may be a decimal mark
 _SAMPLE = 200  # lines
@@ -61,7 +67,7 @@ def head_of(lines: Sequence[str], wanted: str) -> Head:
     units = rows[first - 1] if at is not None and first > at + 1 and _is_units(rows[first - 1]) else []
     names = [str(k + 1) for k in range(width)] if at is None else _fitted(rows[at], rows, first)
     taken = "" if at is None else f"line {at + 1} ({lines[at].strip()[:120]!r})"
-    return Head(names, units, first, taken, separator, _has_decimal_comma(rows[first:], separator))
+    return Head(names, units, first, taken, separator, _has_decimal_comma(rows[first:]))
 
 
 def _separator(lines: Sequence[str]) -> str:
@@ -92,7 +98,7 @@ def _usual_width(rows: Sequence[list[str]]) -> int:
 def _is_values(row: Sequence[str]) -> bool:
     """True if a row has numbers or dates, and hardly any text."""
     filled = [cell for cell in row if cell]
-    values = sum(is_number(cell.replace(",", ".", 1)) or bool(dates([cell])[1][0]) for cell in filled)
+    values = sum(is_number(cell.replace(",", ".", 1)) or is_date(cell) for cell in filled)
     return 2 * values >= len(filled) > 0
 
 
@@ -131,8 +137,87 @@ def _fitted(names: list[str], rows: Sequence[list[str]], first: int) -> list[str
     return names
 
 
-def _has_decimal_comma(rows: Sequence[list[str]], separator: str) -> bool:
+def _has_decimal_comma(rows: Sequence[list[str]]) -> bool:
     cells = [cell for row in rows for cell in row]
     with_comma = any("," in cell and is_number(cell.replace(",", ".", 1)) for cell in cells)
     has_point = any("." in cell and is_number(cell) for cell in cells)
     return with_comma and not has_point
+
+
+# Numbers, units and dates as text.
+
+
+def is_number(text: str) -> bool:
+    """True if a text is a number, NaN or infinity."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return "_" not in text
+
+
+_UNITS: Mapping[str, tuple[str, str]] = {
+    text: (key, unit)
+    for key, units in {
+        STAMP: {"s": "s sec seconds sekunden", "ms": "ms", "us": "us µs μs", "ns": "ns"},
+        CRANK_ANGLE: {
+            "rad": "rad", "deg": "deg degree degrees grad °", "rev": "rev turn turns umdrehungen",
+            COUNTS: "counts ticks",
+        },
+        CRANK_SPEED: {
+            "rad/s": "rad/s rads 1/s", "deg/s": "deg/s degs °/s", "rev/s": "rev/s rps",
+            "rpm": "rpm 1/min u/min",
+        },
+        DRIVE_TORQUE: {"N m": "nm newtonmeter", "N mm": "nmm mnm"},
+    }.items()
+    for unit, texts in units.items()
+    for text in texts.split()
+}  # fmt: skip
+"""Kind of column and unit of a parameter, by the unit as tables spell it."""
+
+
+def units_named(text: str) -> tuple[str, str] | None:
+    """Key of a column and unit of its parameter, by the text of a unit such as ``[Nm]``; None if unknown."""
+    bare = text.strip().strip("[]()").lower()
+    return _UNITS.get("".join(each for each in bare if each not in " ·*_."))
+
+
+def is_date(text: str) -> bool:
+    """True if a text is a date in ISO 8601."""
+    return bool(dates([text])[1][0])
+
+
+def dates(texts: Sequence[str], form: str = "") -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Stamps [ns] of dates and times, and whether each text is one.
+
+    Parameters
+    ----------
+    texts : sequence of str
+    form : str
+        Format of `datetime.strptime`; empty: ISO 8601. Without a time zone in it, the texts are in UTC.
+    """
+    stamps, good = np.zeros(len(texts), np.int64), np.zeros(len(texts), bool)
+    try:
+        return _parsed(texts, form), ~good
+    except ValueError:
+        if len(texts) == 1:
+            return stamps, good
+    for k, text in enumerate(texts):
+        (stamps[k],), (good[k],) = dates([text], form)
+    return stamps, good
+
+
+def _parsed(texts: Sequence[str], form: str) -> NDArray[np.int64]:
+    if form:
+        times = [datetime.strptime(text.strip(), form) for text in texts]
+        texts = [(time.astimezone(UTC) if time.tzinfo else time).isoformat() for time in times]
+    return np.array([_without_zone(text.strip()) for text in texts], "datetime64[ns]").astype(np.int64)
+
+
+def _without_zone(text: str) -> str:
+    """Text without the mark of UTC. Raises ValueError where numpy would only warn, or wrap around."""
+    for mark in ("Z", "+00:00", "+0000"):
+        text = text.removesuffix(mark)
+    if len(text) < 10 or not "1970" <= text[:4] < "2038" or "+" in text or text.count("-") != 2:
+        raise ValueError("not a date from 1970 to 2037 in UTC")
+    return text.strip().replace(",", ".")  # ISO 8601 permits a decimal comma, numpy does not

@@ -1,4 +1,4 @@
-"""Proposes the parameters to read a table, by the names, units and first rows of its columns."""
+"""Checks tables: how a table is read, and the parameters to read it by the names and units of its columns."""
 
 import json
 import re
@@ -9,21 +9,24 @@ from typing import Any
 import attrs
 import numpy as np
 
+from leg_wear_monitor.errors import printable
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.config.tables import COUNTS, DATE, Columns
 from leg_wear_monitor.recordings.bag import find_files
-from leg_wear_monitor.recordings.findings import open_recording
-from leg_wear_monitor.recordings.table_layout import (
+from leg_wear_monitor.recordings.findings import Finding, listed, open_recording
+from leg_wear_monitor.recordings.table_file import FOOT_LOAD, FOOT_LOAD_ALONG, TableFile, open_table
+from leg_wear_monitor.recordings.table_head import (
     CRANK_ANGLE,
     CRANK_SPEED,
     DRIVE_TORQUE,
     STAMP,
     dates,
+    is_date,
     is_number,
-    listed,
     units_named,
 )
-from leg_wear_monitor.recordings.table_rows import Lost, open_table
 
+_SI = {CRANK_SPEED: "rad/s", DRIVE_TORQUE: "N m", FOOT_LOAD: "N", FOOT_LOAD_ALONG: "N"}
 _WORDS = {
     STAMP: "time timestamp stamp date t zeit uhrzeit zeitstempel datum",
     CRANK_SPEED: "speed velocity omega rpm drehzahl geschwindigkeit",
@@ -89,20 +92,14 @@ def propose(path: Path) -> Proposal | None:
         names = source.head.names
         if {Columns().stamp, Columns().crank_angle, Columns().drive_torque} <= set(names):
             return None
-        parts = source.parts(list(range(len(names))), Lost(path, source.word, []))
-        first = next((part for part in parts if len(part.line)), None)
+        first = next((rows for rows in source.batches(range(len(names))) if len(rows.line)), None)
         rows = [column.slice(0, 200).to_pylist() for column in first.columns] if first else []
-    texts = [[_text(cell) for cell in column] for column in rows] or [[] for _ in names]
+    texts = [["" if cell is None else str(cell).strip() for cell in column] for column in rows]
+    texts = texts or [[] for _ in names]
     if source.head.has_decimal_comma:
         texts = [[re.sub(r"^([-+]?\d*),(\d+)$", r"\1.\2", cell) for cell in column] for column in texts]
     units = source.head.units or [""] * len(names)
     return _proposal(names, [*units, *[""] * len(names)], texts)
-
-
-def _text(cell: Any) -> str:
-    if isinstance(cell, bytes):
-        return cell.decode("utf-8", "replace").strip()
-    return "" if cell is None else str(cell)
 
 
 def _proposal(names: Sequence[str], units: Sequence[str], texts: Sequence[Sequence[str]]) -> Proposal:
@@ -171,7 +168,7 @@ def _of_time(cells: Sequence[str], named: str) -> Iterator[tuple[str, str]]:
     cells = [cell for cell in cells if cell]
     if cells and not is_number(cells[0]):
         yield "units.stamp", DATE
-        if not dates(cells[:1])[1][0]:
+        if not is_date(cells[0]):
             forms = (f"{day} {time}" for day in _DAYS for time in _TIMES)
             yield "date_format", next((form for form in forms if dates(cells, form)[1].all()), "")
         return
@@ -183,3 +180,50 @@ def _of_time(cells: Sequence[str], named: str) -> Iterator[tuple[str, str]]:
     step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
     by_step = next((unit for unit, most in _STEPS.items() if step < most), "ns")
     yield "units.stamp", next(since_1970, by_step)
+
+
+# A table as the reader understands it: rows, time, columns with their ranges in SI units.
+
+
+def understood(path: Path, config: MonitorConfig) -> tuple[list[str], list[Finding]]:
+    """Read a table as a whole; return how it was interpreted, one line per item, and the findings.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        CSV or Parquet file.
+    config : MonitorConfig
+        Names the columns and their units.
+
+    Raises
+    ------
+    RecordingError
+        If the table cannot be read.
+    """
+    (file,), _ = find_files([path])
+    with open_recording(path) as content:
+        table = TableFile(path, content, file.storage, config)
+        stamps, counts = list[int](), 0
+        numbers = dict.fromkeys((column.key for column in table.columns), 0)
+        ranges: dict[str, tuple[float, float]] = {}
+        for rows in table.rows:
+            counts += len(rows.stamp_ns)
+            stamps += rows.stamp_ns[[0, -1]].tolist() if len(rows.stamp_ns) else []
+            for key, values in rows.values.items():
+                numbers[key] += int(np.count_nonzero(rows.measured[key]))
+                if len(finite := values[np.isfinite(values)]):
+                    least, most = ranges.get(key, (np.inf, -np.inf))
+                    ranges[key] = min(least, finite.min()), max(most, finite.max())
+    seconds = (stamps[-1] - stamps[0]) * 1.0e-9
+    rate = f", {(counts - 1) / seconds:.4g} rows a second" if seconds > 0.0 else ""
+    of = next((f"time {one}" for one in table.columns if one.key == STAMP), "no column of the time")
+    lines = [f"table of {counts} rows over {seconds:.6g} s{rate}; {of}"]
+    for column in table.columns:
+        if column.key != STAMP:
+            found = ", all of them NaN or infinite" if numbers[column.key] else ""
+            if column.key in ranges:
+                least, most = ranges[column.key]
+                found = f", {least:.4g} to {most:.4g} {_SI.get(column.key, 'rad')}"
+            lines.append(f"{column.key} {column}: {numbers[column.key]} values{found}")
+    others = [f"not read: {', '.join(printable(name, 100) for name in table.others)}"] if table.others else []
+    return [*lines, *others], table.findings

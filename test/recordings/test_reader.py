@@ -228,13 +228,6 @@ def test_other_encodings_are_refused(write_as, read, encoding):
         read(path)
 
 
-def test_a_type_of_the_same_name_but_other_fields_is_refused(write_as, read):
-    text = b"# ours\nstd_msgs/Header header\nstring[] name # with names\nfloat32[] position\n"
-    path = write_as([("/joint_states", 1, b"\0\1\0\0")], schema=(encode.JOINT_STATE, "ros2msg", text))
-    with pytest.raises(RecordingError, match=r"JointState\.position, "):
-        read(path)
-
-
 def test_a_topic_without_a_type_is_read_as_what_it_must_be(sent, expected, write_as, read):
     path = write_as([(each.topic, each.log_time_ns, each.raw) for each in sent])
     assert read(path)[0].tobytes() == expected(sent).tobytes()

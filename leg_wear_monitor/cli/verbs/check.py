@@ -108,7 +108,7 @@ def _kernels() -> str:
 
 
 def _files(names: tuple[str, ...]) -> Mapping[str, Callable[[], str]]:
-    from leg_wear_monitor.recordings.table_layout import is_table_name
+    from leg_wear_monitor.recordings.bag import is_table_name
 
     files, parameters = {}, None
     for name in names:
@@ -122,8 +122,7 @@ def _table(name: str, parameters: str | None) -> str:
     """Read a table, and describe how it was interpreted."""
     from leg_wear_monitor.monitor.config.parameters import config_from, load_config
     from leg_wear_monitor.recordings.findings import Severity
-    from leg_wear_monitor.recordings.reader import understood
-    from leg_wear_monitor.recordings.table_proposal import propose
+    from leg_wear_monitor.recordings.table_proposal import propose, understood
 
     proposal = None if parameters else propose(Path(name))
     if proposal and proposal.missing:

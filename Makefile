@@ -69,15 +69,34 @@ test-without-ros: .venv-without-ros/installed
 test-oldest: .venv-oldest/installed
 	.venv-oldest/bin/python -m pytest $(TWO) -W default -m "not slow" --ignore test/docs
 
-# A wheel in an empty environment, without ROS and away from the checkout. What setuptools built before may be out of date.
-package: .venv/installed
-	rm -rf build/lib build/bdist.* build/wheel build/package
+# What numba compiles for every x86-64 processor since about 2015, and the tag of a wheel that carries it.
+BASELINE := NUMBA_CPU_NAME=x86-64-v3 NUMBA_CPU_FEATURES=
+TAGS = --python-tag $$(.venv/bin/python -c 'import sys; print("cp%d%d" % sys.version_info[:2])') --platform-tag manylinux_2_17_x86_64
+
+# Two wheels: one for any machine, and on x86-64 one that carries machine code, so that nothing is compiled at the first start.
+# What setuptools built before may be out of date.
+build/wheel: .venv/installed FORCE
+	rm -rf build/lib build/bdist.* build/wheel build/unpacked build/machine_code
 	.venv/bin/python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir build/wheel .
+	test "$$(uname -m)" != x86_64 || $(MAKE) --no-print-directory build/machine_code
+build/machine_code: .venv/installed FORCE
+	$(BASELINE) NUMBA_CACHE_DIR=$(CURDIR)/$@ .venv/bin/leg-wear-monitor cache --fill
+	.venv/bin/python -m wheel unpack --dest build/unpacked build/wheel/*.whl
+	mv $@/leg_wear_monitor build/unpacked/leg_wear_monitor-$(VERSION)/leg_wear_monitor/compiled/machine_code
+	.venv/bin/python -m wheel pack --dest-dir build/unpacked build/unpacked/leg_wear_monitor-$(VERSION)
+	.venv/bin/python -m wheel tags --remove $(TAGS) build/unpacked/*.whl
+	mv build/unpacked/*.whl build/wheel
+FORCE:
+
+# The wheels in an empty environment, without ROS and away from the checkout; the one with machine code compiles nothing.
+package: build/wheel
+	rm -rf build/package
 	.venv/bin/python -m venv --without-pip build/package
 	.venv/bin/python -m pip --python build/package/bin/python install $(QUICKLY) --only-binary :all: \
-		--constraint constraints.txt build/wheel/*.whl
-	cd build/package && unset AMENT_PREFIX_PATH && bin/leg-wear-monitor --help && bin/leg-wear-monitor check \
-		&& bin/leg-wear-monitor simulate --clearances none && bin/python -c 'import leg_wear_monitor'
+		--constraint constraints.txt $$(ls -t build/wheel/*.whl | head -n 1)
+	cd build/package && unset AMENT_PREFIX_PATH && export NUMBA_CACHE_DIR=$$PWD/cache && bin/leg-wear-monitor --help \
+		&& bin/leg-wear-monitor check && bin/leg-wear-monitor simulate --clearances none && bin/python -c 'import leg_wear_monitor' \
+		&& { test "$$(uname -m)" != x86_64 || ! find cache -name '*.nbc' | grep .; }
 
 # As in a ROS 2 workspace, with a selection of the tests. colcon runs the Python that runs it: the one that has our libraries.
 # Where pytest-cov is installed, it writes a page of coverage for every file unless told not to.

@@ -3,6 +3,7 @@
 import ast
 import math
 import os
+import platform
 import shutil
 import subprocess
 import sys
@@ -116,6 +117,30 @@ def test_a_second_process_does_not_compile_nor_does_a_copy_of_the_same_code(pack
     value, hits, there = copy.run(**home)
     assert (value, hits) == ("7.0", "0")
     assert there != here
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="machine code is carried for x86-64 alone")
+def test_machine_code_in_the_package_is_used_if_the_processor_can_run_it(package, tmp_path, monkeypatch):
+    baseline = {"NUMBA_CPU_NAME": "x86-64-v3", "NUMBA_CPU_FEATURES": ""}
+    assert package.run(NUMBA_CACHE_DIR=str(tmp_path / "built"), **baseline)[:2] == ["5.0", "0"]
+    shipped = package.directory / "compiled" / "machine_code"
+    (tmp_path / "built" / "leg_wear_monitor").rename(shipped)
+    value, hits, there = package.run(NUMBA_CACHE_DIR=str(tmp_path / "fresh"))
+    assert (value, hits) == ("5.0", "1")
+    assert not [*Path(there).parent.rglob("*.nbc")]
+    package.write(3.0)
+    assert package.run(NUMBA_CACHE_DIR=str(tmp_path / "fresh"))[:2] == ["7.0", "0"]
+
+    monkeypatch.setattr(whole_program, "SHIPPED", shipped)
+    (name,) = {each.name for each in shipped.glob("root.line-*")}
+    for features, directory in (
+        ({}, None),
+        (dict.fromkeys(whole_program._BASELINE_FEATURES, True), shipped / name),
+    ):
+        monkeypatch.setattr("llvmlite.binding.get_host_cpu_features", lambda have=features: have)
+        whole_program.shipped_directory.cache_clear()
+        assert whole_program.shipped_directory(name) == directory
+    whole_program.shipped_directory.cache_clear()
 
 
 def test_without_a_writable_home_the_temporary_directory_does(package, tmp_path, nowhere):

@@ -138,6 +138,35 @@ class KernelDispatcher(_Dispatcher):  # type: ignore[misc]
         return self._part.get_overload(sig)
 
 
+# Machine code inside the package: a wheel for x86-64 carries it, for every processor since about 2015.
+# It has the directories of the cache, so their names say which Python, numba and sources it is for.
+SHIPPED = Path(__file__).with_name("machine_code")
+_BASELINE = "x86-64-v3"
+_BASELINE_FEATURES = ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
+
+
+@cache
+def shipped_directory(name: str) -> Path | None:
+    """Directory of machine code that came with the package, if this processor can run it.
+
+    Parameters
+    ----------
+    name : str
+        Name of the directory, as in the cache.
+
+    Returns
+    -------
+    pathlib.Path or None
+    """
+    directory = SHIPPED / name
+    if not directory.is_dir():
+        return None
+    from llvmlite.binding import get_host_cpu_features
+
+    features = get_host_cpu_features()
+    return directory if all(features.get(one) for one in _BASELINE_FEATURES) else None
+
+
 class _Place:
     """Directory where numba stores code: its name is a digest of all sources, wherever they lie.
 
@@ -163,6 +192,17 @@ class _Place:
         return str(self._line)
 
 
+def _locators(directory: Path | None) -> Any:
+    """A class of locators, in the form that numba asks for."""
+
+    class Locators:
+        @staticmethod
+        def from_function(function: Callable[..., object], _file: str) -> _Place | None:
+            return _Place(function, directory) if directory else None
+
+    return Locators
+
+
 def store(entry: Any, directory: Path) -> None:
     """Have numba store an entry's code in a directory, and load it from there.
 
@@ -177,20 +217,14 @@ def store(entry: Any, directory: Path) -> None:
     directory : pathlib.Path
         Directory for these sources alone; writable.
     """
+    in_package = shipped_directory(directory.name)
     try:
         from numba.core.caching import CompileResultCacheImpl, FunctionCache
-
-        class Locators:
-            """Locators in the form that numba asks for."""
-
-            @staticmethod
-            def from_function(function: Callable[..., object], _file: str) -> _Place:
-                return _Place(function, directory)
 
         class Stored(CompileResultCacheImpl):  # type: ignore[misc]
             """Machine code, and the names in it."""
 
-            _locator_classes = (Locators,)
+            _locator_classes = (_locators(directory),)
 
             def reduce(self, result: Any) -> Any:
                 (name, kind, (code, intermediate)), *rest = super().reduce(result)
@@ -215,6 +249,25 @@ def store(entry: Any, directory: Path) -> None:
                         self.flush()
                         return None
 
+            def _load_overload(self, signature: Any, context: Any) -> Any:
+                found = super()._load_overload(signature, context)
+                return found if found or shipped is None else shipped.load_overload(signature, context)
+
+        class StoredInPackage(Stored):
+            """The same, compiled for the baseline of processors."""
+
+            _locator_classes = (_locators(in_package),)
+
+        class CacheInPackage(FunctionCache):  # type: ignore[misc]
+            """Looks for code of the baseline, whatever this processor is called."""
+
+            _impl_class = StoredInPackage
+
+            def _index_key(self, signature: Any, codegen: Any) -> Any:
+                kinds, (triple, *_), *code = super()._index_key(signature, codegen)
+                return kinds, (triple, _BASELINE, ""), *code
+
+        shipped = None if in_package is None else CacheInPackage(entry.py_func)
         entry._cache = Cache(entry.py_func)
     except (AttributeError, ImportError):  # then by path and time
         previous, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(directory)
@@ -488,8 +541,11 @@ def is_stored(compiled: Callable[..., object]) -> bool:
     if function is None:
         return True
     home = cache_directory(function)
+    if home is None:
+        return False
     # the code, not its index, which numba writes first
-    return home is not None and any(home.glob(f"**/*.{function.__name__}-*.nbc"))
+    places = (home, shipped_directory(home.name) or home)
+    return any(any(place.glob(f"**/*.{function.__name__}-*.nbc")) for place in places)
 
 
 class ByAddress:

@@ -98,9 +98,11 @@ def _library(name: str) -> Callable[[], str]:
 
 
 def _kernels() -> str:
-    from leg_wear_monitor.compiled.kernel import cache_directory
+    from leg_wear_monitor.compiled.kernel import cache_directory, shipped_directory
 
     place = cache_directory()
+    if place is not None and shipped_directory(place.name):
+        return "compiled in the package"
     if place is None:
         return "compiled at every start: no place for compiled code is private"
     common.check_directory("NUMBA_CACHE_DIR", place)
